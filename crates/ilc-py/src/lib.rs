@@ -1,0 +1,1 @@
+//! Python bindings of `ilc-rt`: conversion, shape checks and error mapping only.

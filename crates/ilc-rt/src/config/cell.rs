@@ -1,0 +1,304 @@
+//! The sections of a cell description that concern the machine: cell, bus, axes, safety.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::error::ConfigError;
+use super::program::{Learning, Program};
+
+/// A whole cell description, validated.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cell {
+    /// Where it was read from; empty for a text.
+    #[serde(skip)]
+    pub file: PathBuf,
+    /// `[cell]`
+    pub cell: CellSection,
+    /// `[bus]`
+    pub bus: BusSection,
+    /// `[[axis]]`, in the order of the coordinates of the program.
+    #[serde(rename = "axis")]
+    pub axes: Vec<Axis>,
+    /// `[tcp_encoder]`, a measurement of the tool centre point on the bus.
+    pub tcp_encoder: Option<TcpEncoder>,
+    /// `[program]`
+    pub program: Program,
+    /// `[learning]`
+    #[serde(default)]
+    pub learning: Learning,
+    /// `[safety]`
+    #[serde(default)]
+    pub safety: Safety,
+    /// `[telemetry]`
+    #[serde(default)]
+    pub telemetry: Telemetry,
+    /// `[simulation]`, read by the simulated drives only.
+    #[serde(default)]
+    pub simulation: Simulation,
+}
+
+/// `[cell]`: name and servo cycle.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CellSection {
+    /// Name, used in Zenoh keys and in the library: letters, digits, `-` and `_`.
+    pub name: String,
+    /// Servo cycle in microseconds; exact, as both clocks count in integers.
+    pub cycle_us: u32,
+}
+
+/// `[bus]`: which bus and how much of it may be used.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BusSection {
+    /// `can:vcan0`, `udp:239.74.163.2[:port]`, `zenoh:KEY` or `loopback:`.
+    pub address: String,
+    /// Bit rate of a real CAN bus, for the load check.
+    #[serde(default = "default_bitrate_bit_s")]
+    pub bitrate_bit_s: u32,
+    /// Largest share of the bus that cyclic traffic may take, 0 to 1.
+    #[serde(default = "default_load_max")]
+    pub load_max: f64,
+}
+
+fn default_bitrate_bit_s() -> u32 {
+    1_000_000
+}
+
+fn default_load_max() -> f64 {
+    0.8
+}
+
+/// How a drive is commanded, and where the learned input enters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Interface {
+    /// Cyclic synchronous position: the drive closes the position loop (series learning, input in m).
+    Csp,
+    /// Cyclic synchronous velocity: the position loop is here (parallel learning, input in m/s).
+    Csv,
+}
+
+/// `[[axis]]`: one drive.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// Name, as `x`.
+    pub name: String,
+    /// CANopen node, 1 to 127.
+    pub node: u8,
+    /// Command interface.
+    pub interface: Interface,
+    /// Position counts of the drive in one metre.
+    pub counts_per_m: f64,
+    /// `[axis.limits]`
+    pub limits: Limits,
+    /// `[axis.model]`: what learning believes of the axis.
+    pub model: AxisModel,
+    /// `[axis.position_loop]`: for `interface = "csv"` only.
+    pub position_loop: Option<PositionLoop>,
+    /// `[axis.simulation]`: physics, read by the simulated drives only.
+    #[serde(default)]
+    pub simulation: AxisSimulation,
+}
+
+/// `[axis.limits]`: what must never be exceeded.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Lowest position.
+    pub position_min_m: f64,
+    /// Highest position.
+    pub position_max_m: f64,
+    /// Highest speed.
+    pub velocity_max_m_s: f64,
+    /// Highest acceleration, also of a controlled stop.
+    pub acceleration_max_m_s2: f64,
+    /// Highest jerk.
+    pub jerk_max_m_s3: f64,
+    /// Distance between set point and encoder at which drive and controller fault.
+    pub following_error_max_m: f64,
+}
+
+/// `[axis.model]`: second-order position loop (csp) or first-order velocity loop (csv), and delay.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisModel {
+    /// Natural frequency of the drive's position loop; csp only.
+    pub natural_frequency_hz: Option<f64>,
+    /// Damping ratio of the drive's position loop; csp only.
+    pub damping: Option<f64>,
+    /// Bandwidth of the drive's velocity loop; csv only.
+    pub velocity_bandwidth_hz: Option<f64>,
+    /// Whole servo cycles from sending a command to its first effect, beyond the sampler's one.
+    #[serde(default)]
+    pub delay_samples: u32,
+}
+
+/// `[axis.position_loop]`: proportional position control in the controller.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PositionLoop {
+    /// Velocity per position error, kv.
+    pub gain_per_s: f64,
+    /// Share of the reference velocity that is fed forward, 0 to 1.
+    #[serde(default)]
+    pub velocity_feedforward: f64,
+}
+
+/// `[tcp_encoder]`: a node that measures the tool centre point, one coordinate an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TcpEncoder {
+    /// CANopen node, 1 to 127.
+    pub node: u8,
+    /// Counts in one metre, both coordinates.
+    pub counts_per_m: f64,
+}
+
+/// `[safety]`: when to stop without being told.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Safety {
+    /// Consecutive cycles without an answer of a node before a controlled stop.
+    pub silent_cycles_max: u32,
+    /// Consecutive overrun cycles before a controlled stop.
+    pub overrun_cycles_max: u32,
+    /// How long a node may take to boot and to answer.
+    pub answer_timeout_s: f64,
+}
+
+impl Default for Safety {
+    fn default() -> Self {
+        Self { silent_cycles_max: 20, overrun_cycles_max: 50, answer_timeout_s: 2.0 }
+    }
+}
+
+/// `[telemetry]`: what is seen from outside, on Zenoh.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Telemetry {
+    /// Whether to publish at all.
+    pub enabled: bool,
+    /// Zenoh endpoints to listen on, as `tcp/127.0.0.1:7447`.
+    pub listen: Vec<String>,
+    /// Zenoh endpoints to connect to.
+    pub connect: Vec<String>,
+    /// Whether to look for others by multicast.
+    pub scouting: bool,
+}
+
+impl Default for Telemetry {
+    fn default() -> Self {
+        Self { enabled: true, listen: Vec::new(), connect: Vec::new(), scouting: true }
+    }
+}
+
+/// `[simulation]`: the plant as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Simulation {
+    /// Error of the right angle between the first two axes: `x_tcp += orthogonality_rad * y`.
+    pub orthogonality_rad: f64,
+    /// Step of the drives' own control loops and of the integration.
+    pub step_us: u32,
+    /// Standard deviation of white noise on the encoders; 0 for none.
+    pub encoder_noise_m: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl Default for Simulation {
+    fn default() -> Self {
+        Self { orthogonality_rad: 0.0, step_us: 125, encoder_noise_m: 0.0, seed: 1 }
+    }
+}
+
+/// `[axis.simulation]`: a mass in a cascade (P position, PI velocity), friction, and one mode that
+/// only the tool centre point sees.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AxisSimulation {
+    /// Moving mass, the mode's included.
+    pub mass_kg: f64,
+    /// Natural frequency for which the cascade is tuned.
+    pub natural_frequency_hz: f64,
+    /// Damping ratio for which the cascade is tuned.
+    pub damping: f64,
+    /// Integral time of the velocity controller.
+    pub integral_time_s: f64,
+    /// Largest force of the motor.
+    pub force_max_n: f64,
+    /// Coulomb friction.
+    pub coulomb_n: f64,
+    /// Static friction.
+    pub static_n: f64,
+    /// Stribeck velocity.
+    pub stribeck_m_s: f64,
+    /// Part of the mass that swings as the mode; 0 for none.
+    pub mode_mass_kg: f64,
+    /// Natural frequency of the mode.
+    pub mode_frequency_hz: f64,
+    /// Damping ratio of the mode.
+    pub mode_damping: f64,
+    /// Position at power-on.
+    pub position_start_m: f64,
+}
+
+impl Default for AxisSimulation {
+    fn default() -> Self {
+        Self {
+            mass_kg: 20.0,
+            natural_frequency_hz: 15.0,
+            damping: 1.0,
+            integral_time_s: 0.1,
+            force_max_n: 2000.0,
+            coulomb_n: 0.0,
+            static_n: 0.0,
+            stribeck_m_s: 0.002,
+            mode_mass_kg: 0.0,
+            mode_frequency_hz: 20.0,
+            mode_damping: 0.1,
+            position_start_m: 0.0,
+        }
+    }
+}
+
+impl Cell {
+    /// Reads and validates a cell description.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with file, key, value and what is allowed.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| ConfigError::Read {
+            file: file.clone(),
+            reason: error.to_string(),
+        })?;
+        Self::parse(&text, &file)
+    }
+
+    /// Reads and validates a cell description from its text; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with file, key, value and what is allowed.
+    pub fn parse(text: &str, file: &str) -> Result<Self, ConfigError> {
+        let mut cell: Self =
+            toml::from_str(text).map_err(|error| super::validate::syntax(text, file, &error))?;
+        cell.file = PathBuf::from(file);
+        super::validate::check(&cell)?;
+        Ok(cell)
+    }
+
+    /// The servo cycle in seconds.
+    pub fn cycle_s(&self) -> f64 {
+        f64::from(self.cell.cycle_us) * 1e-6
+    }
+
+    /// Number of axes.
+    pub fn n_axes(&self) -> usize {
+        self.axes.len()
+    }
+}

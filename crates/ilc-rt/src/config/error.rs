@@ -1,0 +1,38 @@
+//! Why a cell description was refused: file, place, value and what is allowed, in one line.
+
+/// A refused cell description.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ConfigError {
+    /// The file could not be read.
+    #[error("{file}: cannot be read: {reason}")]
+    Read {
+        /// The path as given.
+        file: String,
+        /// What the operating system said.
+        reason: String,
+    },
+    /// The text is not TOML, or a key is unknown, missing or of the wrong type.
+    #[error("{file}:{line}: {key}: {reason}")]
+    Syntax {
+        /// The path as given.
+        file: String,
+        /// Line of the file, from 1.
+        line: usize,
+        /// Table and key, as `[axis.limits] position_min_m`.
+        key: String,
+        /// What is wrong and what is allowed.
+        reason: String,
+    },
+    /// A value is out of its range, or two values contradict each other.
+    #[error("{file}: {key} = {value}: {allowed}")]
+    Value {
+        /// The path as given.
+        file: String,
+        /// Table and key, as `[[axis]] x: limits.position_min_m`.
+        key: String,
+        /// The value found.
+        value: String,
+        /// What is allowed.
+        allowed: String,
+    },
+}

@@ -1,0 +1,1 @@
+//! Controllers that run in the tick: the position loop and limits.

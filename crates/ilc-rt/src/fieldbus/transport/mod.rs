@@ -1,0 +1,1 @@
+//! The transports: SocketCAN, UDP multicast, Zenoh and in-process loopback.

@@ -1,0 +1,1 @@
+//! Learning laws: from one run's error to the next run's input.

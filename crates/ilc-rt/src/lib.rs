@@ -1,0 +1,19 @@
+//! The motion controller that learns.
+//!
+//! A fixed-rate servo loop on CiA 402 drives, an interpolator, and iterative learning control that
+//! computes the next run's input while the axes return to the start. `ARCHITECTURE.md` at the root
+//! of the project tells how the modules fit; each module's head says what it is for and who may
+//! import it.
+
+pub mod config;
+pub mod control;
+pub mod fieldbus;
+pub mod learning;
+pub mod library;
+pub mod model;
+pub mod record;
+pub mod rt;
+pub mod servo;
+pub mod signal;
+pub mod supervisor;
+pub mod trajectory;

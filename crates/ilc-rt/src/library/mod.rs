@@ -1,0 +1,1 @@
+//! The iteration library: every run kept in SQLite.

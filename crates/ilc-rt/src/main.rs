@@ -1,0 +1,3 @@
+//! The standalone real-time controller.
+
+fn main() {}

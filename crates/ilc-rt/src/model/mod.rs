@@ -1,0 +1,1 @@
+//! Linear models: state space, discretisation, delays, feedback.

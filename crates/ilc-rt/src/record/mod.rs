@@ -1,0 +1,1 @@
+//! The record of one iteration and its figures.

@@ -1,0 +1,1 @@
+//! Real-time ground: clocks, thread set-up and the latency histogram.

@@ -1,0 +1,1 @@
+//! The servo cycle: receive, measure, control, add the learned input, limit, send.

@@ -1,0 +1,1 @@
+//! Filters: Butterworth as second-order sections and zero-phase filtering.

@@ -1,0 +1,1 @@
+//! The campaign: iterations, learning between them, faults and stops.

@@ -1,0 +1,1 @@
+//! From a program of segments to set points, and the geometry of contours.

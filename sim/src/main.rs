@@ -1,0 +1,3 @@
+//! Simulated drives in a process of their own.
+
+fn main() {}
