@@ -69,7 +69,7 @@ pub(super) fn check(cell: &Cell) -> Result<(), ConfigError> {
     v.range("[simulation] orthogonality_rad", simulation.orthogonality_rad, -0.1, 0.1)?;
     v.range("[simulation] encoder_noise_m", simulation.encoder_noise_m, 0.0, 1e-3)?;
     v.that(
-        simulation.step_us > 0 && cell.cell.cycle_us % simulation.step_us == 0,
+        cell.cell.cycle_us.is_multiple_of(simulation.step_us),
         "[simulation] step_us",
         &simulation.step_us,
         "a divisor of [cell] cycle_us",
