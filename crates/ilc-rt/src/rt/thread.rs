@@ -40,8 +40,7 @@ pub fn enter(request: RtRequest) -> RtReport {
     let mut notes = Vec::new();
     let parameters = libc::sched_param { sched_priority: request.priority };
     // SAFETY: `parameters` is valid for the call; thread 0 means the caller.
-    let fifo =
-        unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } == 0;
+    let fifo = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } == 0;
     if !fifo {
         notes.push(format!(
             "SCHED_FIFO {} refused ({}); give the program CAP_SYS_NICE or an rtprio limit",
@@ -50,8 +49,8 @@ pub fn enter(request: RtRequest) -> RtReport {
         ));
     }
     // SAFETY: mlockall takes flags only.
-    let mlock = request.lock_memory
-        && unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0;
+    let mlock =
+        request.lock_memory && unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0;
     if request.lock_memory && !mlock {
         notes.push(format!(
             "mlockall refused ({}); give the program CAP_IPC_LOCK or a memlock limit",
