@@ -135,7 +135,8 @@ mod tests {
 
     /// Rests, goes along a square with a diagonal, and rests again.
     fn contour() -> Vec<f64> {
-        let corners = [[0.08, 0.0], [0.08, 0.04], [0.06, 0.06], [0.0, 0.06], [0.0, 0.0], [0.08, 0.0]];
+        let corners =
+            [[0.08, 0.0], [0.08, 0.04], [0.06, 0.06], [0.0, 0.06], [0.0, 0.0], [0.08, 0.0]];
         let mut points = vec![corners[0]; 50];
         for pair in corners.windows(2) {
             let (dx, dy) = (pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]);
@@ -200,8 +201,7 @@ mod tests {
         let reference = contour();
         let mut random = Random(9);
         for scale in [1e-6, 3e-4, 1e-2, 1.0] {
-            let actual: Vec<f64> =
-                reference.iter().map(|r| r + scale * random.signed()).collect();
+            let actual: Vec<f64> = reference.iter().map(|r| r + scale * random.signed()).collect();
             for window in [0, 1, 17, 200, 10_000] {
                 assert_eq!(
                     contour_error_m(&reference, &actual, 2, window),

@@ -65,7 +65,9 @@ pub enum TrajectoryError {
         value: f64,
     },
     /// The values are so far apart that the duration cannot be computed.
-    #[error("a move of {length_m} m at these limits would last {duration_s} s: must be finite and above 0")]
+    #[error(
+        "a move of {length_m} m at these limits would last {duration_s} s: must be finite and above 0"
+    )]
     Duration {
         /// Length of the move.
         length_m: f64,
@@ -177,7 +179,10 @@ impl fmt::Display for Remedy {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(factor, feed_m_s, window_s) = self;
         if *factor > 0.0 {
-            write!(out, "largest admissible feed {feed_m_s:.6} m/s (every feed times {factor:.4})")?;
+            write!(
+                out,
+                "largest admissible feed {feed_m_s:.6} m/s (every feed times {factor:.4})"
+            )?;
         } else {
             out.write_str("no lower feed was found that holds the limits")?;
         }

@@ -180,7 +180,8 @@ fn peaks(blend: &mut Blend, n_axes: usize, rest_tick: usize, cycle_s: f64) -> Pe
             let acceleration = (velocity - before[axis][1]) / cycle_s;
             let jerk = (acceleration - before[axis][2]) / cycle_s;
             (now[axis][1], now[axis][2]) = (velocity, acceleration);
-            for (peak, value) in peaks.of_axis[axis].iter_mut().zip([velocity, acceleration, jerk]) {
+            for (peak, value) in peaks.of_axis[axis].iter_mut().zip([velocity, acceleration, jerk])
+            {
                 *peak = peak.max(value.abs());
             }
         }
