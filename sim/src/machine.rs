@@ -226,8 +226,7 @@ impl Machine {
 
     fn step(&mut self, out: &mut dyn FnMut(Frame)) {
         for (axis, demand) in self.axes.iter_mut().zip(&mut self.demands) {
-            *demand =
-                if axis.is_muted { Demand::Off } else { axis.drive.step(self.step_us, out) };
+            *demand = if axis.is_muted { Demand::Off } else { axis.drive.step(self.step_us, out) };
         }
         if let Some(tool) = self.tool.as_mut().filter(|tool| !tool.is_muted) {
             tool.encoder.step(self.step_us, out);

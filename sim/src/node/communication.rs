@@ -2,7 +2,8 @@
 
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{
-    AbortCode, Emergency, Heartbeat, NmtCommand, NmtState, NodeId, ObjectAddress, cob_id, emcy, sync,
+    AbortCode, Emergency, Heartbeat, NmtCommand, NmtState, NodeId, ObjectAddress, cob_id, emcy,
+    sync,
 };
 use ilc_rt::fieldbus::cia402::objects;
 

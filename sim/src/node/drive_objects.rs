@@ -33,7 +33,8 @@ pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
             &display_map[..],
         ),
     ];
-    let mut entries = standard_objects::communication(node, DEVICE_TYPE, "ilc-sim CiA 402 drive", 402);
+    let mut entries =
+        standard_objects::communication(node, DEVICE_TYPE, "ilc-sim CiA 402 drive", 402);
     entries.extend(standard_objects::process_data(node, &pdos));
     entries.extend(words_and_options());
     entries.extend(motion(parameters));
@@ -96,7 +97,11 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         output(objects::POSITION_DEMAND, Value::I32(0)),
         output(objects::POSITION_INTERNAL, Value::I32(0)),
         output(objects::POSITION_ACTUAL, Value::I32(0)),
-        setting(objects::FOLLOWING_ERROR_WINDOW, 0, unsigned(counts(parameters.following_error_max_m))),
+        setting(
+            objects::FOLLOWING_ERROR_WINDOW,
+            0,
+            unsigned(counts(parameters.following_error_max_m)),
+        ),
         setting(objects::FOLLOWING_ERROR_TIME, 0, Value::U16(10)),
         output(objects::VELOCITY_DEMAND, Value::I32(0)),
         output(objects::VELOCITY_ACTUAL, Value::I32(0)),
@@ -113,8 +118,12 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         setting(limit, 1, signed(counts(parameters.position_min_m))),
         setting(limit, 2, signed(counts(parameters.position_max_m))),
         setting(objects::MAX_VELOCITY, 0, unsigned(counts(parameters.velocity_max_m_s))),
-        setting(objects::QUICK_STOP_DECELERATION, 0, unsigned(counts(parameters.deceleration_m_s2)))
-            .allowing(Allowed::Range(1, i64::from(u32::MAX))),
+        setting(
+            objects::QUICK_STOP_DECELERATION,
+            0,
+            unsigned(counts(parameters.deceleration_m_s2)),
+        )
+        .allowing(Allowed::Range(1, i64::from(u32::MAX))),
         input(objects::POSITION_OFFSET, Value::I32(0)),
         input(objects::VELOCITY_OFFSET, Value::I32(0)),
         input(objects::TORQUE_OFFSET, Value::I16(0)),

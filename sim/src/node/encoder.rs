@@ -30,7 +30,8 @@ impl EncoderNode {
     /// The abort code of an object that is missing from the encoder's own table.
     pub fn new(node: NodeId, counts_per_m: f64) -> Result<Self, AbortCode> {
         let index = objects::ENCODER_POSITIONS;
-        let mut entries = standard_objects::communication(node, DEVICE_TYPE, "ilc-sim encoder", 406);
+        let mut entries =
+            standard_objects::communication(node, DEVICE_TYPE, "ilc-sim encoder", 406);
         let pdo = PdoDefault {
             number: pdo_map::ENCODER_PDO,
             transmission: TYPE_EVERY_SYNC,

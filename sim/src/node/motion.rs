@@ -25,11 +25,23 @@ pub struct MotionLimits {
 enum Phase {
     Off,
     /// Interpolates from `start_m` to `end_m`.
-    Position { start_m: f64, end_m: f64, elapsed_s: f64, period_s: f64 },
-    Velocity { velocity_m_s: f64 },
+    Position {
+        start_m: f64,
+        end_m: f64,
+        elapsed_s: f64,
+        period_s: f64,
+    },
+    Velocity {
+        velocity_m_s: f64,
+    },
     /// Brakes to standstill.
-    Ramp { velocity_m_s: f64, settling_s: f64 },
-    Hold { position_m: f64 },
+    Ramp {
+        velocity_m_s: f64,
+        settling_s: f64,
+    },
+    Hold {
+        position_m: f64,
+    },
 }
 
 /// The target generator of a drive.

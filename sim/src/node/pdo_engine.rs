@@ -58,9 +58,8 @@ impl Pdo {
             inhibit_us: u64::from(communication(3)) * 100,
             ..Self::EMPTY
         };
-        let mapping = |sub| {
-            pdo_rules::parameter(dictionary, ObjectAddress::new(number.mapping_index(), sub))
-        };
+        let mapping =
+            |sub| pdo_rules::parameter(dictionary, ObjectAddress::new(number.mapping_index(), sub));
         let n_mapped = u8::try_from(mapping(0)).unwrap_or(0).min(MAPPED_MAX);
         for sub in 1..=n_mapped {
             let object = MappedObject::from_entry(mapping(sub));

@@ -26,7 +26,11 @@ pub fn pdo_at(index: u16) -> Option<PdoNumber> {
 ///
 /// # Errors
 /// The abort code with which the write must be refused.
-pub fn check(dictionary: &Dictionary, address: ObjectAddress, number: i64) -> Result<(), AbortCode> {
+pub fn check(
+    dictionary: &Dictionary,
+    address: ObjectAddress,
+    number: i64,
+) -> Result<(), AbortCode> {
     let Some(pdo) = pdo_at(address.index) else { return Ok(()) };
     let value = u32::try_from(number).map_err(|_| AbortCode::ValueRange)?;
     if address.index == pdo.communication_index() {

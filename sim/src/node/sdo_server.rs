@@ -1,9 +1,9 @@
 //! SDO server: answers every request, with an abort if need be.
 
+use ilc_rt::fieldbus::canopen::AbortCode;
 use ilc_rt::fieldbus::canopen::sdo::{
     Expedited, ObjectAddress, SEGMENT_MAX, SdoRequest, SdoResponse, Segment,
 };
-use ilc_rt::fieldbus::canopen::AbortCode;
 
 use super::value::{Encoded, TEXT_MAX, Value};
 
@@ -26,8 +26,19 @@ pub trait Objects {
 #[derive(Clone, Copy, Debug)]
 enum Transfer {
     None,
-    Upload { address: ObjectAddress, data: Encoded, sent: usize, toggle: bool },
-    Download { address: ObjectAddress, buffer: [u8; TEXT_MAX], len: usize, size: Option<u32>, toggle: bool },
+    Upload {
+        address: ObjectAddress,
+        data: Encoded,
+        sent: usize,
+        toggle: bool,
+    },
+    Download {
+        address: ObjectAddress,
+        buffer: [u8; TEXT_MAX],
+        len: usize,
+        size: Option<u32>,
+        toggle: bool,
+    },
 }
 
 /// The server's side of one SDO channel.
@@ -164,11 +175,8 @@ fn write_expedited(
     objects: &mut dyn Objects,
 ) -> Result<SdoResponse, AbortCode> {
     let present = objects.read(address)?;
-    let bytes = if data.size_indicated() {
-        data.data()
-    } else {
-        &data.data()[..present.len().min(4)]
-    };
+    let bytes =
+        if data.size_indicated() { data.data() } else { &data.data()[..present.len().min(4)] };
     objects.write(address, bytes)?;
     Ok(SdoResponse::DownloadInitiate(address))
 }

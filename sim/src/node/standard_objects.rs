@@ -24,7 +24,12 @@ pub struct PdoDefault<'a> {
 }
 
 /// Returns the objects from 0x1000 to 0x1200 of a node.
-pub fn communication(node: NodeId, device_type: u32, device_name: &str, product: u32) -> Vec<Entry> {
+pub fn communication(
+    node: NodeId,
+    device_type: u32,
+    device_name: &str,
+    product: u32,
+) -> Vec<Entry> {
     let id = u32::from(node.get());
     let text = |text: &str| Value::Text(Text::new(text.as_bytes()));
     let mut entries = vec![
@@ -37,7 +42,12 @@ pub fn communication(node: NodeId, device_type: u32, device_name: &str, product:
         Entry::read_write(objects::CYCLE_PERIOD, 0, "Communication cycle period", Value::U32(0)),
         Entry::read_write(objects::SYNC_WINDOW, 0, "Synchronous window length", Value::U32(0)),
         Entry::constant(objects::DEVICE_NAME, 0, "Manufacturer device name", text(device_name)),
-        Entry::constant(objects::HARDWARE_VERSION, 0, "Manufacturer hardware version", text("none")),
+        Entry::constant(
+            objects::HARDWARE_VERSION,
+            0,
+            "Manufacturer hardware version",
+            text("none"),
+        ),
         Entry::constant(
             objects::SOFTWARE_VERSION,
             0,
@@ -47,12 +57,7 @@ pub fn communication(node: NodeId, device_type: u32, device_name: &str, product:
         Entry::constant(objects::COB_ID_EMCY, 0, "COB-ID EMCY", Value::U32(0x80 + id)),
         Entry::constant(objects::CONSUMER_HEARTBEAT, 0, "Highest sub-index", Value::U8(1)),
         Entry::read_write(objects::CONSUMER_HEARTBEAT, 1, "Consumer heartbeat time", Value::U32(0)),
-        Entry::read_write(
-            objects::PRODUCER_HEARTBEAT,
-            0,
-            "Producer heartbeat time",
-            Value::U16(0),
-        ),
+        Entry::read_write(objects::PRODUCER_HEARTBEAT, 0, "Producer heartbeat time", Value::U16(0)),
         Entry::constant(objects::IDENTITY, 0, "Highest sub-index", Value::U8(4)),
         Entry::constant(objects::IDENTITY, 1, "Vendor-ID", Value::U32(0)),
         Entry::constant(objects::IDENTITY, 2, "Product code", Value::U32(product)),

@@ -84,8 +84,9 @@ impl StateMachine {
     /// Transition 13, and 14 at once where nothing moves: the drive has a fault.
     pub fn fault(&mut self) {
         self.state = match self.state {
-            State::OperationEnabled | State::QuickStopActive => State::FaultReactionActive,
-            State::FaultReactionActive => State::FaultReactionActive,
+            State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive => {
+                State::FaultReactionActive
+            }
             State::NotReadyToSwitchOn
             | State::SwitchOnDisabled
             | State::ReadyToSwitchOn

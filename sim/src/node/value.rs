@@ -30,19 +30,19 @@ impl Text {
 /// The value of an object; the variant is its type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Value {
-    /// UNSIGNED8
+    /// Unsigned, 8 bits.
     U8(u8),
-    /// UNSIGNED16
+    /// Unsigned, 16 bits.
     U16(u16),
-    /// UNSIGNED32
+    /// Unsigned, 32 bits.
     U32(u32),
-    /// INTEGER8
+    /// Signed, 8 bits.
     I8(i8),
-    /// INTEGER16
+    /// Signed, 16 bits.
     I16(i16),
-    /// INTEGER32
+    /// Signed, 32 bits.
     I32(i32),
-    /// VISIBLE_STRING
+    /// A visible string.
     Text(Text),
 }
 
