@@ -45,15 +45,14 @@ impl Friction {
         if sign * next[1] > 0.0 {
             return next;
         }
+        // In the direction of the old motion: what friction must take up so that the axis stops. If
+        // it turns round by itself, friction leaves it alone for this step: it must not push.
         let stopping_n = step.stopping_force_n(z);
-        // In the direction of the old motion: what friction must take up so that the axis stops.
-        let taken_n = sign * (motor_n - stopping_n);
-        if taken_n >= -static_n {
-            let mut stopped = step.free(z, stopping_n);
-            stopped[1] = 0.0;
-            stopped
-        } else {
-            step.free(z, motor_n + sign * static_n)
+        if sign * (motor_n - stopping_n) < 0.0 {
+            return step.free(z, motor_n);
         }
+        let mut stopped = step.free(z, stopping_n);
+        stopped[1] = 0.0;
+        stopped
     }
 }

@@ -65,9 +65,7 @@ pub enum TrajectoryError {
         value: f64,
     },
     /// The values are so far apart that the duration cannot be computed.
-    #[error(
-        "a move of {length_m} m at these limits would last {duration_s} s: must be finite and above 0"
-    )]
+    #[error("a move of {length_m} m at these limits would last {duration_s} s: must be finite and above 0")]
     Duration {
         /// Length of the move.
         length_m: f64,
@@ -149,8 +147,9 @@ pub enum TrajectoryError {
     },
     /// A blended path would break a limit of an axis.
     #[error(
-        "axis {}: {quantity} reaches {reached} {unit}, limit {limit} {unit}: {}",
+        "axis {}: {quantity} reaches {} {unit}, limit {limit} {unit}: {}",
         axis + 1,
+        Figure(*reached),
         Remedy(*feed_factor, *feed_admissible_m_s, *window_admissible_s),
         unit = quantity.unit()
     )]
@@ -179,16 +178,25 @@ impl fmt::Display for Remedy {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(factor, feed_m_s, window_s) = self;
         if *factor > 0.0 {
-            write!(
-                out,
-                "largest admissible feed {feed_m_s:.6} m/s (every feed times {factor:.4})"
-            )?;
+            let (feed, factor) = (Figure(*feed_m_s), Figure(*factor));
+            write!(out, "largest admissible feed {feed} m/s (every feed times {factor})")?;
         } else {
             out.write_str("no lower feed was found that holds the limits")?;
         }
         match window_s {
-            Some(window_s) => write!(out, ", or blend window {window_s} s"),
+            Some(window_s) => write!(out, ", or blend window {} s", Figure(*window_s)),
             None => Ok(()),
         }
+    }
+}
+
+/// A measured number to six digits.
+struct Figure(f64);
+
+impl fmt::Display for Figure {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let scale = 10.0_f64.powf(5.0 - self.0.abs().log10().floor());
+        let rounded = (self.0 * scale).round() / scale;
+        write!(out, "{}", if rounded.is_finite() { rounded } else { self.0 })
     }
 }

@@ -67,6 +67,8 @@ impl PathLimits {
     /// # Shapes
     /// - `direction`, `limits`: one entry an axis; the shorter of the two counts.
     pub fn along(direction: &[f64], limits: &[AxisLimits], feed_m_s: f64) -> Self {
+        // `f64::min` would lose a feed that is not a number, and with it the refusal of the move.
+        let tighter = |so_far: f64, limit: f64| if limit < so_far { limit } else { so_far };
         let mut path = Self {
             velocity_m_s: feed_m_s,
             acceleration_m_s2: f64::INFINITY,
@@ -74,10 +76,10 @@ impl PathLimits {
         };
         for (share, limit) in direction.iter().map(|d| d.abs()).zip(limits) {
             if share > 0.0 {
-                path.velocity_m_s = path.velocity_m_s.min(limit.velocity_max_m_s / share);
+                path.velocity_m_s = tighter(path.velocity_m_s, limit.velocity_max_m_s / share);
                 path.acceleration_m_s2 =
-                    path.acceleration_m_s2.min(limit.acceleration_max_m_s2 / share);
-                path.jerk_m_s3 = path.jerk_m_s3.min(limit.jerk_max_m_s3 / share);
+                    tighter(path.acceleration_m_s2, limit.acceleration_max_m_s2 / share);
+                path.jerk_m_s3 = tighter(path.jerk_m_s3, limit.jerk_max_m_s3 / share);
             }
         }
         path

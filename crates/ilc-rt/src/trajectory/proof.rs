@@ -6,7 +6,7 @@
 use super::MAX_AXES;
 use super::blend::Blend;
 use super::error::{Quantity, TrajectoryError};
-use super::limits::{AxisLimits, Line};
+use super::limits::{AxisLimits, Line, PathLimits};
 use super::path::{PathSpec, check_time};
 
 /// Most samples of one run.
@@ -99,13 +99,9 @@ impl Proof<'_> {
             limit,
             feed_factor,
             feed_admissible_m_s: feed_factor * self.spec.feed_max_m_s(),
-            window_admissible_s: match quantity {
-                // Averaging does not slow a straight segment down.
-                Quantity::Velocity => None,
-                Quantity::Acceleration | Quantity::Jerk => self
-                    .window_ticks(window, reached / limit)
-                    .map(|ticks| ticks as f64 * self.cycle_s),
-            },
+            window_admissible_s: self
+                .window_ticks(window, reached / limit)
+                .map(|ticks| ticks as f64 * self.cycle_s),
         }
     }
 
@@ -137,8 +133,15 @@ impl Proof<'_> {
         matches!(self.excess(window, window), Ok(None))
     }
 
-    /// A longer window that holds every limit; none up to the longest one allowed.
+    /// A longer window that holds every limit; none up to the longest one allowed, and none if a
+    /// segment by itself is too fast for an axis, as averaging does not slow a straight line down.
     fn window_ticks(&self, window: usize, ratio: f64) -> Option<usize> {
+        for (line, segment) in self.lines.iter().zip(&self.spec.segments) {
+            let path = PathLimits::along(&line.direction, self.limits, segment.feed_m_s);
+            if path.velocity_m_s < segment.feed_m_s * (1.0 - TOLERANCE) {
+                return None;
+            }
+        }
         let longest = ticks(WINDOW_MAX_S, self.cycle_s);
         let (mut broken, mut holds) = (window, window);
         while !self.window_holds(holds) {

@@ -127,17 +127,15 @@ fn friction_never_adds_energy() {
     let mut z: State = [0.0, 0.0, 3e-3, 0.0];
     let first = energy(&z);
     let mut before = first;
-    let mut stuck = 0;
     for _ in 0..40_000 {
         z = friction.step(&step, &z, 0.0, 0.0);
         let now = energy(&z);
         assert!(now <= before * (1.0 + 1e-12), "{before} J became {now} J");
-        stuck = if z[1] == 0.0 { stuck + 1 } else { 0 };
         before = now;
     }
-    assert!(before < 0.1 * first, "friction took {first} J down to {before} J");
-    assert!(stuck > 1000, "in the end the mode is too weak to break it loose");
-    assert!(before > 0.0, "an undamped mode rings on");
+    // An undamped mode rings on at the amplitude that just does not break the carriage loose.
+    let held = 0.5 * 100.0_f64.powi(2) / (30.0 * (TAU * 20.0_f64).powi(2));
+    assert!((0.5 * held..1.1 * held).contains(&before), "{first} J fell to {before} J, not {held}");
 }
 
 #[test]

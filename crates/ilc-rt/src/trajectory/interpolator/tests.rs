@@ -86,7 +86,7 @@ fn the_example_contour_is_blended_at_its_feed() {
 fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
     let mut random = Random(21);
     let mut refused = 0;
-    for round in 0..150 {
+    for round in 0..60 {
         let n_axes = 1 + round % 4;
         let axes: Vec<AxisLimits> = (0..n_axes)
             .map(|_| limits(random.log(0.2, 1.0), random.log(1.0, 20.0), random.log(50.0, 5e3)))
@@ -97,7 +97,7 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
         let mut spec = PathSpec {
             start_m: point(&mut random),
             segments: (0..5)
-                .map(|_| PathSegment { to_m: point(&mut random), feed_m_s: random.log(0.02, 0.4) })
+                .map(|_| PathSegment { to_m: point(&mut random), feed_m_s: random.log(0.08, 0.4) })
                 .collect(),
             corner: CornerRule::ExactStop,
             dwell_before_s: 0.03 * random.unit(),
@@ -134,7 +134,7 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
             assert_eq!(plan.next(), last, "the last set point is held");
         }
     }
-    assert!((10..140).contains(&refused), "{refused} of 150 blends refused: both cases must occur");
+    assert!((10..50).contains(&refused), "{refused} of 60 blends refused: both cases must occur");
 }
 
 #[test]
@@ -228,7 +228,8 @@ fn a_blend_beyond_the_limits_is_refused_with_what_would_do() {
     let window_s = window_admissible_s.unwrap();
     assert!((window_s - 0.1).abs() < 3e-3, "0.1 m/s at 1 m/s2: {window_s}");
     let line = error.to_string();
-    assert!(line.starts_with("axis 2: acceleration reaches 2.5"), "{line}");
+    println!("{line}");
+    assert!(line.starts_with("axis 2: acceleration reaches 2.5 m/s^2, limit 1 m/s^2"), "{line}");
     assert!(!line.contains('\n'));
 
     let slower = contour(CornerRule::Blend { window_s: 0.04 }, feed_admissible_m_s);
