@@ -1,3 +1,129 @@
 //! Simulated drives in a process of their own.
 
-fn main() {}
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::canopen::NodeId;
+use ilc_sim::{ClockMode, Machine, eds};
+
+mod run;
+
+use run::Mute;
+
+/// Simulated CiA 402 drives that speak the real protocol.
+#[derive(Debug, Parser)]
+#[command(name = "ilc-sim", version, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  ilc-sim run examples/01_gantry.toml
+  ilc-sim run examples/01_gantry.toml --bus can:vcan0
+  ilc-sim run examples/01_gantry.toml --mute 1@5
+  ilc-sim eds examples/01_gantry.toml --node 1 > drive.eds";
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Runs the drives of a cell until interrupted.
+    #[command(after_help = EXAMPLES)]
+    Run {
+        /// Cell description: nodes, counts, limits and physics.
+        cell: PathBuf,
+        /// Bus to be on, instead of the cell's: can:IFACE, udp:GROUP[:PORT], zenoh:KEY.
+        #[arg(long, value_name = "ADDRESS")]
+        bus: Option<String>,
+        /// Let time pass by SYNC only, one cycle each, instead of by the wall clock.
+        #[arg(long)]
+        lockstep: bool,
+        /// Take the power from a node after some time; may be given more than once.
+        #[arg(long, value_name = "NODE@SECONDS")]
+        mute: Vec<Mute>,
+    },
+    /// Prints the electronic data sheet (EDS) of a node.
+    Eds {
+        /// Cell description.
+        cell: PathBuf,
+        /// Which node.
+        #[arg(long)]
+        node: u8,
+    },
+}
+
+/// Why the program ends early.
+enum Failure {
+    /// What the user gave cannot be used: exit status 2.
+    Input(String),
+    /// Something broke on the way: exit status 1.
+    Broken(String),
+}
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::parse().verb {
+        Verb::Run { cell, bus, lockstep, mute } => run(&cell, bus, lockstep, &mute),
+        Verb::Eds { cell, node } => print_eds(&cell, node),
+    };
+    let (line, status) = match outcome {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Input(line)) => (line, 2),
+        Err(Failure::Broken(line)) => (line, 1),
+    };
+    // Nobody is left to tell if standard error is gone.
+    let _ = writeln!(std::io::stderr(), "ilc-sim: {line}");
+    ExitCode::from(status)
+}
+
+fn run(path: &Path, bus: Option<String>, lockstep: bool, mute: &[Mute]) -> Result<(), Failure> {
+    let cell = load(path)?;
+    let address = bus.unwrap_or_else(|| cell.bus.address.clone());
+    if address.starts_with("loopback:") {
+        return Err(Failure::Input(format!(
+            "{address} is for drives in the controller's own process (`ilc run`, tests): give \
+             --bus udp:239.74.163.2, can:IFACE or zenoh:KEY"
+        )));
+    }
+    let clock = if lockstep { ClockMode::LockStep } else { ClockMode::RealTime };
+    let machine = machine(&cell, clock)?;
+    for mute in mute {
+        require_node(&machine, mute.node, "--mute")?;
+    }
+    let bus = ilc_rt::fieldbus::transport::open(&address)
+        .map_err(|error| Failure::Input(error.to_string()))?;
+    run::run(&cell, machine, bus, &address, clock, mute)
+        .map_err(|error| Failure::Broken(error.to_string()))
+}
+
+fn print_eds(path: &Path, node: u8) -> Result<(), Failure> {
+    let cell = load(path)?;
+    let machine = machine(&cell, ClockMode::LockStep)?;
+    let node = NodeId::new(node)
+        .ok_or_else(|| Failure::Input(format!("--node {node}: allowed 1 to 127")))?;
+    let dictionary = require_node(&machine, node, "--node")?;
+    let is_drive = machine.drive_state(node).is_some();
+    let text = eds::write(dictionary, if is_drive { "CiA 402 drive" } else { "encoder" });
+    std::io::stdout().write_all(text.as_bytes()).map_err(|e| Failure::Broken(e.to_string()))
+}
+
+fn load(path: &Path) -> Result<Cell, Failure> {
+    Cell::load(path).map_err(|error| Failure::Input(error.to_string()))
+}
+
+fn machine(cell: &Cell, clock: ClockMode) -> Result<Machine, Failure> {
+    Machine::from_cell(cell, clock).map_err(|error| Failure::Input(error.to_string()))
+}
+
+fn require_node<'a>(
+    machine: &'a Machine,
+    node: NodeId,
+    option: &str,
+) -> Result<&'a ilc_sim::node::Dictionary, Failure> {
+    machine.dictionary(node).ok_or_else(|| {
+        let known: Vec<String> = machine.nodes().map(|known| known.to_string()).collect();
+        Failure::Input(format!("{option} {node}: the cell has nodes {}", known.join(", ")))
+    })
+}

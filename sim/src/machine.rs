@@ -1,0 +1,318 @@
+//! A whole simulated machine: its nodes, its plant, and the time they share.
+
+use std::collections::VecDeque;
+
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::Frame;
+use ilc_rt::fieldbus::canopen::{AbortCode, NmtState, NodeId, sync};
+use ilc_rt::fieldbus::cia402::State;
+use ilc_rt::fieldbus::transport::Responder;
+
+use crate::event::{Change, Event};
+use crate::node::{Dictionary, DriveNode, DriveParameters, EncoderNode, Measured};
+use crate::plant::{Demand, Gantry, Plant};
+
+/// Events kept until they are taken; older ones are dropped.
+const EVENTS_MAX: usize = 64;
+
+/// What moves the machine's time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClockMode {
+    /// Every SYNC advances the machine by one cycle, before the nodes sample.
+    LockStep,
+    /// [`Machine::advance`] does, at the pace of its caller.
+    RealTime,
+}
+
+/// Why a machine cannot be made from a cell description.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MachineError {
+    /// A node number is not one.
+    #[error("node {0}: allowed 1 to 127")]
+    Node(u8),
+    /// An object is missing from a node's own table.
+    #[error("node {node}: its object dictionary is incomplete: {code}")]
+    Dictionary {
+        /// The node.
+        node: NodeId,
+        /// What the look-up said.
+        code: AbortCode,
+    },
+    /// The plant has another number of axes than the cell.
+    #[error("plant: expected {expected} axes, found {found}")]
+    Axes {
+        /// Axes of the cell.
+        expected: usize,
+        /// Axes of the plant.
+        found: usize,
+    },
+}
+
+/// A drive on its axis, and what was last told of it.
+#[derive(Clone, Debug)]
+struct Axis {
+    drive: DriveNode,
+    is_muted: bool,
+    nmt: NmtState,
+    state: State,
+}
+
+/// The encoder of the tool, and what was last told of it.
+#[derive(Clone, Debug)]
+struct Tool {
+    encoder: EncoderNode,
+    is_muted: bool,
+    nmt: NmtState,
+}
+
+/// All nodes of a cell, and the plant they move.
+///
+/// # Real Time
+/// Set-up allocates; [`receive`](Responder::receive) and [`advance`](Self::advance) do not.
+pub struct Machine {
+    clock: ClockMode,
+    axes: Vec<Axis>,
+    tool: Option<Tool>,
+    plant: Box<dyn Plant>,
+    demands: Vec<Demand>,
+    cycle_us: u32,
+    step_us: u32,
+    time_us: u64,
+    has_booted: bool,
+    events: VecDeque<Event>,
+}
+
+impl Machine {
+    /// The machine that a cell description states, at rest and not yet booted.
+    ///
+    /// # Errors
+    /// [`MachineError`] if the cell is not one that was validated.
+    pub fn from_cell(cell: &Cell, clock: ClockMode) -> Result<Self, MachineError> {
+        Self::with_plant(cell, clock, Box::new(Gantry::from_cell(cell)))
+    }
+
+    /// The same nodes on another plant.
+    ///
+    /// # Errors
+    /// [`MachineError`] if the cell is not one that was validated, or the plant has not its axes.
+    pub fn with_plant(
+        cell: &Cell,
+        clock: ClockMode,
+        plant: Box<dyn Plant>,
+    ) -> Result<Self, MachineError> {
+        if plant.n_axes() != cell.n_axes() {
+            return Err(MachineError::Axes { expected: cell.n_axes(), found: plant.n_axes() });
+        }
+        let node_of = |number| NodeId::new(number).ok_or(MachineError::Node(number));
+        let mut axes = Vec::with_capacity(cell.n_axes());
+        for axis in &cell.axes {
+            let node = node_of(axis.node)?;
+            let parameters = DriveParameters {
+                counts_per_m: axis.counts_per_m,
+                position_min_m: axis.limits.position_min_m,
+                position_max_m: axis.limits.position_max_m,
+                velocity_max_m_s: axis.limits.velocity_max_m_s,
+                deceleration_m_s2: axis.limits.acceleration_max_m_s2,
+                following_error_max_m: axis.limits.following_error_max_m,
+                force_max_n: axis.simulation.force_max_n,
+            };
+            let drive = DriveNode::new(node, parameters)
+                .map_err(|code| MachineError::Dictionary { node, code })?;
+            let (nmt, state) = (drive.nmt(), drive.state());
+            axes.push(Axis { drive, is_muted: false, nmt, state });
+        }
+        let tool = match cell.tcp_encoder {
+            None => None,
+            Some(described) => {
+                let node = node_of(described.node)?;
+                let encoder = EncoderNode::new(node, described.counts_per_m)
+                    .map_err(|code| MachineError::Dictionary { node, code })?;
+                let nmt = encoder.nmt();
+                Some(Tool { encoder, is_muted: false, nmt })
+            }
+        };
+        let mut machine = Self {
+            clock,
+            demands: vec![Demand::Off; axes.len()],
+            axes,
+            tool,
+            plant,
+            cycle_us: cell.cell.cycle_us,
+            step_us: cell.simulation.step_us,
+            time_us: 0,
+            has_booted: false,
+            events: VecDeque::with_capacity(EVENTS_MAX),
+        };
+        machine.measure();
+        Ok(machine)
+    }
+
+    /// Powers the nodes: each sends its boot-up. Done by the first frame or step otherwise.
+    pub fn boot(&mut self, out: &mut dyn FnMut(Frame)) {
+        if self.has_booted {
+            return;
+        }
+        self.has_booted = true;
+        for axis in self.axes.iter_mut().filter(|axis| !axis.is_muted) {
+            axis.drive.boot(out);
+        }
+        if let Some(tool) = self.tool.as_mut().filter(|tool| !tool.is_muted) {
+            tool.encoder.boot(out);
+        }
+        self.note_changes();
+    }
+
+    /// Lets `n_steps` steps of the drives' own loops pass.
+    pub fn advance(&mut self, n_steps: u32, out: &mut dyn FnMut(Frame)) {
+        self.boot(out);
+        for _ in 0..n_steps {
+            self.step(out);
+        }
+    }
+
+    /// Takes the power from a node: no frame comes from it any more, and its axis is braked.
+    /// Returns whether there is such a node.
+    pub fn mute(&mut self, node: NodeId) -> bool {
+        let axis = self.axes.iter_mut().find(|axis| axis.drive.node() == node);
+        let tool = self.tool.as_mut().filter(|tool| tool.encoder.node() == node);
+        let is_muted = match (axis, tool) {
+            (Some(axis), _) => &mut axis.is_muted,
+            (None, Some(tool)) => &mut tool.is_muted,
+            (None, None) => return false,
+        };
+        if !std::mem::replace(is_muted, true) {
+            self.note(node, Change::Muted);
+        }
+        true
+    }
+
+    /// Time since the machine was powered.
+    pub fn time_us(&self) -> u64 {
+        self.time_us
+    }
+
+    /// One step of the drives' own loops.
+    pub fn step_us(&self) -> u32 {
+        self.step_us
+    }
+
+    /// The physics, to look at.
+    pub fn plant(&self) -> &dyn Plant {
+        self.plant.as_ref()
+    }
+
+    /// State of the drive at `node`, if there is one.
+    pub fn drive_state(&self, node: NodeId) -> Option<State> {
+        self.axes.iter().find(|axis| axis.drive.node() == node).map(|axis| axis.drive.state())
+    }
+
+    /// Objects of `node`, if there is one.
+    pub fn dictionary(&self, node: NodeId) -> Option<&Dictionary> {
+        let tool = self.tool.iter().map(|tool| (tool.encoder.node(), tool.encoder.dictionary()));
+        let drives = self.axes.iter().map(|axis| (axis.drive.node(), axis.drive.dictionary()));
+        drives.chain(tool).find(|(found, _)| *found == node).map(|(_, dictionary)| dictionary)
+    }
+
+    /// All nodes: the axes in order, then the encoder.
+    pub fn nodes(&self) -> impl Iterator<Item = NodeId> {
+        let tool = self.tool.iter().map(|tool| tool.encoder.node());
+        self.axes.iter().map(|axis| axis.drive.node()).chain(tool)
+    }
+
+    /// Takes the oldest event that was not taken yet.
+    pub fn take_event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    fn step(&mut self, out: &mut dyn FnMut(Frame)) {
+        for (axis, demand) in self.axes.iter_mut().zip(&mut self.demands) {
+            *demand = if axis.is_muted { Demand::Off } else { axis.drive.step(self.step_us, out) };
+        }
+        if let Some(tool) = self.tool.as_mut().filter(|tool| !tool.is_muted) {
+            tool.encoder.step(self.step_us, out);
+        }
+        self.plant.step(&self.demands, f64::from(self.step_us) * 1e-6);
+        self.time_us += u64::from(self.step_us);
+        self.measure();
+        self.note_changes();
+    }
+
+    fn measure(&mut self) {
+        for (number, axis) in self.axes.iter_mut().enumerate() {
+            axis.drive.measure(Measured {
+                position_m: self.plant.encoder_m(number),
+                velocity_m_s: self.plant.encoder_velocity_m_s(number),
+                force_n: self.plant.force_n(number),
+            });
+        }
+        if let Some(tool) = &mut self.tool {
+            tool.encoder.measure([self.plant.tool_m(0), self.plant.tool_m(1)]);
+        }
+    }
+
+    fn note_changes(&mut self) {
+        let time_us = self.time_us;
+        let mut note = |node, change| push(&mut self.events, Event { time_us, node, change });
+        for axis in &mut self.axes {
+            let node = axis.drive.node();
+            if let Some(code) = axis.drive.take_emergency() {
+                note(node, Change::Emergency(code));
+            }
+            if std::mem::replace(&mut axis.nmt, axis.drive.nmt()) != axis.nmt {
+                note(node, Change::Nmt(axis.nmt));
+            }
+            if std::mem::replace(&mut axis.state, axis.drive.state()) != axis.state {
+                note(node, Change::Drive(axis.state));
+            }
+        }
+        if let Some(tool) = &mut self.tool {
+            let node = tool.encoder.node();
+            if let Some(code) = tool.encoder.take_emergency() {
+                note(node, Change::Emergency(code));
+            }
+            if std::mem::replace(&mut tool.nmt, tool.encoder.nmt()) != tool.nmt {
+                note(node, Change::Nmt(tool.nmt));
+            }
+        }
+    }
+
+    fn note(&mut self, node: NodeId, change: Change) {
+        push(&mut self.events, Event { time_us: self.time_us, node, change });
+    }
+}
+
+fn push(events: &mut VecDeque<Event>, event: Event) {
+    if events.len() == EVENTS_MAX {
+        events.pop_front();
+    }
+    events.push_back(event);
+}
+
+impl Responder for Machine {
+    /// Takes a frame from the bus. In lock-step a SYNC first lets one cycle pass, so that what the
+    /// nodes send in answer is the end of that cycle.
+    fn receive(&mut self, frame: &Frame, reply: &mut dyn FnMut(Frame)) {
+        self.boot(reply);
+        if self.clock == ClockMode::LockStep && sync::is_sync(frame) {
+            self.advance(self.cycle_us / self.step_us, reply);
+        }
+        for axis in self.axes.iter_mut().filter(|axis| !axis.is_muted) {
+            axis.drive.receive(frame, reply);
+        }
+        if let Some(tool) = self.tool.as_mut().filter(|tool| !tool.is_muted) {
+            tool.encoder.receive(frame, reply);
+        }
+        self.note_changes();
+    }
+}
+
+impl std::fmt::Debug for Machine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Machine")
+            .field("clock", &self.clock)
+            .field("axes", &self.axes)
+            .field("tool", &self.tool)
+            .field("time_us", &self.time_us)
+            .finish_non_exhaustive()
+    }
+}

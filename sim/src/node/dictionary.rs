@@ -1,0 +1,221 @@
+//! The object dictionary: what a node has, who may write it, and what it is worth now.
+
+use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
+
+use super::value::Value;
+
+/// Who may do what with an object by SDO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Read, and it never changes.
+    Constant,
+    /// Read.
+    ReadOnly,
+    /// Read and write.
+    ReadWrite,
+}
+
+/// Which PDOs may carry an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mappable {
+    /// None.
+    No,
+    /// RPDOs.
+    Receive,
+    /// TPDOs.
+    Transmit,
+    /// Both.
+    Both,
+}
+
+/// Which values an object takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Allowed {
+    /// All of its type.
+    Any,
+    /// From … to.
+    Range(i64, i64),
+    /// These.
+    OneOf(&'static [i64]),
+}
+
+/// An object.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// Where.
+    pub address: ObjectAddress,
+    /// Name, as in an EDS.
+    pub name: &'static str,
+    /// Who may write it.
+    pub access: Access,
+    /// Which PDOs may carry it.
+    pub mappable: Mappable,
+    /// Which values it takes.
+    pub allowed: Allowed,
+    /// Value at power-on.
+    pub power_on: Value,
+    value: Value,
+    written: bool,
+}
+
+impl Entry {
+    /// An object that may be read.
+    pub fn read_only(index: u16, sub: u8, name: &'static str, value: Value) -> Self {
+        Self {
+            address: ObjectAddress::new(index, sub),
+            name,
+            access: Access::ReadOnly,
+            mappable: Mappable::No,
+            allowed: Allowed::Any,
+            power_on: value,
+            value,
+            written: false,
+        }
+    }
+
+    /// An object that never changes.
+    pub fn constant(index: u16, sub: u8, name: &'static str, value: Value) -> Self {
+        Self { access: Access::Constant, ..Self::read_only(index, sub, name, value) }
+    }
+
+    /// An object that may be read and written.
+    pub fn read_write(index: u16, sub: u8, name: &'static str, value: Value) -> Self {
+        Self { access: Access::ReadWrite, ..Self::read_only(index, sub, name, value) }
+    }
+
+    /// The same, in PDOs.
+    #[must_use]
+    pub fn mappable(self, mappable: Mappable) -> Self {
+        Self { mappable, ..self }
+    }
+
+    /// The same, taking only some values.
+    #[must_use]
+    pub fn allowing(self, allowed: Allowed) -> Self {
+        Self { allowed, ..self }
+    }
+
+    /// The present value.
+    pub fn value(&self) -> Value {
+        self.value
+    }
+}
+
+/// The place of an object in its dictionary, found once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Slot(usize);
+
+impl Slot {
+    /// The first object, which every dictionary has.
+    pub const FIRST: Self = Self(0);
+}
+
+/// All objects of a node, in order.
+#[derive(Clone, Debug)]
+pub struct Dictionary {
+    entries: Vec<Entry>,
+}
+
+impl Dictionary {
+    /// Puts the objects in order.
+    pub fn new(mut entries: Vec<Entry>) -> Self {
+        entries.sort_by_key(|entry| entry.address);
+        Self { entries }
+    }
+
+    /// All objects, in order.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// Finds an object.
+    ///
+    /// # Errors
+    /// [`AbortCode::NoObject`], or [`AbortCode::NoSubIndex`] if only the sub-index is missing.
+    pub fn find(&self, address: ObjectAddress) -> Result<Slot, AbortCode> {
+        match self.entries.binary_search_by_key(&address, |entry| entry.address) {
+            Ok(place) => Ok(Slot(place)),
+            Err(place) => {
+                let near = [place.checked_sub(1), Some(place)];
+                let known = near.into_iter().flatten().any(|place| {
+                    self.entries.get(place).is_some_and(|e| e.address.index == address.index)
+                });
+                Err(if known { AbortCode::NoSubIndex } else { AbortCode::NoObject })
+            }
+        }
+    }
+
+    /// The object at `slot`.
+    pub fn entry(&self, slot: Slot) -> &Entry {
+        &self.entries[slot.0]
+    }
+
+    /// The value at `slot`, as a number.
+    pub fn number(&self, slot: Slot) -> i64 {
+        self.entries[slot.0].value.number()
+    }
+
+    /// Sets a value from inside the node, to the nearest one of its type.
+    pub fn set(&mut self, slot: Slot, number: i64) {
+        let entry = &mut self.entries[slot.0];
+        entry.value = entry.value.with_number(number);
+    }
+
+    /// Checks that `bytes` may be written to `slot` by SDO and returns the value they encode.
+    ///
+    /// # Errors
+    /// The abort code with which the write must be refused.
+    pub fn check(&self, slot: Slot, bytes: &[u8]) -> Result<Value, AbortCode> {
+        let entry = self.entry(slot);
+        if entry.access != Access::ReadWrite {
+            return Err(AbortCode::ReadOnly);
+        }
+        let value = entry.value.decode_like(bytes)?;
+        entry.admits(value)?;
+        Ok(value)
+    }
+
+    /// Stores a value from the bus and marks the object as written.
+    pub fn store(&mut self, slot: Slot, value: Value) {
+        let entry = &mut self.entries[slot.0];
+        entry.value = value;
+        entry.written = true;
+    }
+
+    /// Stores bytes that came in a PDO; what the object does not admit changes nothing.
+    pub fn store_from_pdo(&mut self, slot: Slot, bytes: &[u8]) {
+        let entry = self.entry(slot);
+        if let Ok(value) = entry.value.decode_like(bytes)
+            && entry.admits(value).is_ok()
+        {
+            self.store(slot, value);
+        }
+    }
+
+    /// Tells whether the object was written since this was last asked, equal value or not.
+    pub fn take_written(&mut self, slot: Slot) -> bool {
+        std::mem::take(&mut self.entries[slot.0].written)
+    }
+
+    /// Gives the objects from `first` to `last` their power-on values.
+    pub fn reset(&mut self, first: u16, last: u16) {
+        for entry in &mut self.entries {
+            if (first..=last).contains(&entry.address.index) {
+                entry.value = entry.power_on;
+                entry.written = false;
+            }
+        }
+    }
+}
+
+impl Entry {
+    fn admits(&self, value: Value) -> Result<(), AbortCode> {
+        let number = value.number();
+        match self.allowed {
+            Allowed::Range(_, high) if number > high => Err(AbortCode::ValueTooHigh),
+            Allowed::Range(low, _) if number < low => Err(AbortCode::ValueTooLow),
+            Allowed::OneOf(values) if !values.contains(&number) => Err(AbortCode::ValueRange),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,440 @@
+//! A simulated CiA 402 drive: communication, state machine, motion, and the faults between them.
+
+use ilc_rt::fieldbus::Frame;
+use ilc_rt::fieldbus::canopen::{AbortCode, NmtCommand, NmtState, NodeId, emcy};
+use ilc_rt::fieldbus::cia402::{Mode, State, Statusword};
+
+use super::communication::{Communication, Incoming, Silence};
+use super::dictionary::{Dictionary, Slot};
+use super::drive_objects::{self, DriveSlots, whole};
+use super::motion::{Motion, MotionLimits};
+use super::state_machine::StateMachine;
+use crate::plant::Demand;
+
+/// Communication fault: a frozen controller, or NMT left operational under power (0x603F).
+const CODE_CONNECTION: u16 = 0x7500;
+/// The following-error monitor is off at this window.
+const WINDOW_OFF: i64 = 0xFFFF_FFFF;
+/// Bit 8 of the controlword.
+const HALT: u16 = 1 << 8;
+
+/// What the drive's maker and integrator have set, in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveParameters {
+    /// Counts in one metre.
+    pub counts_per_m: f64,
+    /// Lowest position.
+    pub position_min_m: f64,
+    /// Highest position.
+    pub position_max_m: f64,
+    /// Highest speed.
+    pub velocity_max_m_s: f64,
+    /// Deceleration of quick stop and fault reaction.
+    pub deceleration_m_s2: f64,
+    /// Following-error window.
+    pub following_error_max_m: f64,
+    /// Force at 1000 thousandths of torque.
+    pub force_max_n: f64,
+}
+
+/// What the drive measures of its axis.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Measured {
+    /// Position of the encoder.
+    pub position_m: f64,
+    /// Velocity of the encoder.
+    pub velocity_m_s: f64,
+    /// Force of the motor.
+    pub force_n: f64,
+}
+
+/// A simulated drive.
+///
+/// Frames come in by [`receive`](Self::receive), time by [`step`](Self::step); neither allocates.
+#[derive(Clone, Debug)]
+pub struct DriveNode {
+    communication: Communication,
+    slots: DriveSlots,
+    parameters: DriveParameters,
+    machine: StateMachine,
+    motion: Motion,
+    measured: Measured,
+    is_halted: bool,
+    /// Since the following error left its window.
+    astray_us: u64,
+    has_following_error: bool,
+}
+
+impl DriveNode {
+    /// A drive that is powered but has not booted.
+    ///
+    /// # Errors
+    /// The abort code of an object that is missing from the drive's own table.
+    pub fn new(node: NodeId, parameters: DriveParameters) -> Result<Self, AbortCode> {
+        let communication = Communication::new(node, drive_objects::all(node, &parameters))?;
+        let slots = DriveSlots::find(communication.dictionary())?;
+        Ok(Self {
+            communication,
+            slots,
+            parameters,
+            machine: StateMachine::default(),
+            motion: Motion::default(),
+            measured: Measured::default(),
+            is_halted: false,
+            astray_us: 0,
+            has_following_error: false,
+        })
+    }
+
+    /// The node.
+    pub fn node(&self) -> NodeId {
+        self.communication.node()
+    }
+
+    /// The state of the drive.
+    pub fn state(&self) -> State {
+        self.machine.state()
+    }
+
+    /// The NMT state.
+    pub fn nmt(&self) -> NmtState {
+        self.communication.nmt()
+    }
+
+    /// The objects.
+    pub fn dictionary(&self) -> &Dictionary {
+        self.communication.dictionary()
+    }
+
+    /// Takes the last emergency sent since this was last asked.
+    pub fn take_emergency(&mut self) -> Option<u16> {
+        self.communication.take_emergency()
+    }
+
+    /// Tells the drive what it measures from now on.
+    pub fn measure(&mut self, measured: Measured) {
+        self.measured = measured;
+    }
+
+    /// Boots: self-test, boot-up message, pre-operational.
+    pub fn boot(&mut self, out: &mut dyn FnMut(Frame)) {
+        self.machine.initialised();
+        self.communication.boot(out);
+    }
+
+    /// Takes a frame from the bus.
+    pub fn receive(&mut self, frame: &Frame, out: &mut dyn FnMut(Frame)) {
+        if self.communication.is_question(frame) {
+            self.show();
+        }
+        match self.communication.receive(frame, out) {
+            Incoming::Nothing => {}
+            Incoming::Nmt(command) => self.on_nmt(command, out),
+            Incoming::Written => {
+                self.show_mode();
+                self.heed_controlword(out);
+            }
+            Incoming::Sync => {
+                // In this order: sample, take over, send. What is sent is what was measured at SYNC.
+                self.communication.apply_latched();
+                self.show_mode();
+                self.heed_controlword(out);
+                self.take_target();
+                self.show();
+                self.communication.transmit_at_sync(out);
+            }
+        }
+    }
+
+    /// Advances by one step of the drive's own loop and returns what it demands of its axis.
+    pub fn step(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) -> Demand {
+        self.show_statusword();
+        match self.communication.advance(step_us.into(), out) {
+            Silence::None => {}
+            Silence::Command => self.fault(emcy::CODE_RPDO_TIMEOUT),
+            Silence::Heartbeat => self.on_connection_loss(emcy::CODE_HEARTBEAT, None),
+        }
+        let dt_s = f64::from(step_us) * 1e-6;
+        let demand = self.motion.step(
+            &self.limits(),
+            self.measured.position_m,
+            self.measured.velocity_m_s,
+            self.si(self.slots.velocity_offset),
+            dt_s,
+        );
+        self.end_ramp();
+        self.watch_following_error(step_us, out);
+        if self.machine.state() == State::Fault { Demand::Off } else { demand }
+    }
+
+    fn on_nmt(&mut self, command: NmtCommand, out: &mut dyn FnMut(Frame)) {
+        match command {
+            NmtCommand::Start => {}
+            NmtCommand::Stop | NmtCommand::PreOperational | NmtCommand::ResetCommunication => {
+                self.on_connection_loss(CODE_CONNECTION, Some(out));
+            }
+            NmtCommand::ResetNode => {
+                self.machine = StateMachine::default();
+                self.machine.initialised();
+                self.motion.off();
+                self.is_halted = false;
+                self.has_following_error = false;
+            }
+        }
+    }
+
+    /// Does what 0x6007 says when the controller is gone while the drive has power over the axis.
+    fn on_connection_loss(&mut self, code: u16, announce: Option<&mut dyn FnMut(Frame)>) {
+        if !matches!(self.state(), State::OperationEnabled | State::QuickStopActive) {
+            return;
+        }
+        match self.number(self.slots.connection_loss_option) {
+            0 => {}
+            2 => self.command(0x0000),
+            3 => self.command(0x0002),
+            _ => {
+                if let Some(out) = announce {
+                    self.communication.emergency(code, out);
+                }
+                self.fault(code);
+            }
+        }
+    }
+
+    fn heed_controlword(&mut self, out: &mut dyn FnMut(Frame)) {
+        if !self.communication.dictionary_mut().take_written(self.slots.controlword) {
+            return;
+        }
+        let controlword = u16::try_from(self.number(self.slots.controlword)).unwrap_or(0);
+        let was_fault = self.state() == State::Fault;
+        self.command(controlword);
+        if was_fault && self.state() != State::Fault {
+            self.has_following_error = false;
+            self.set(self.slots.error_code, 0);
+            self.communication.emergency(emcy::CODE_RESET, out);
+        }
+        self.heed_halt(controlword & HALT != 0);
+    }
+
+    /// Runs the state machine and starts what its new state means for the motion.
+    fn command(&mut self, controlword: u16) {
+        let before = self.state();
+        let after = self.machine.command(controlword);
+        if before == after {
+            return;
+        }
+        match after {
+            State::OperationEnabled => {
+                // A target from before must not move the axis: it counts from the next SYNC on.
+                self.forget_targets();
+                self.motion.hold(self.measured.position_m);
+                self.is_halted = false;
+                self.astray_us = 0;
+            }
+            State::QuickStopActive => {
+                if self.number(self.slots.quick_stop_option) == 0 {
+                    self.machine.quick_stop_done();
+                    self.motion.off();
+                } else {
+                    self.motion.ramp_down(self.measured.velocity_m_s);
+                }
+            }
+            State::NotReadyToSwitchOn
+            | State::SwitchOnDisabled
+            | State::ReadyToSwitchOn
+            | State::SwitchedOn
+            | State::FaultReactionActive
+            | State::Fault => self.motion.off(),
+        }
+    }
+
+    fn heed_halt(&mut self, asked: bool) {
+        if self.state() != State::OperationEnabled || asked == self.is_halted {
+            return;
+        }
+        self.is_halted = asked;
+        if asked {
+            self.motion.ramp_down(self.measured.velocity_m_s);
+        } else {
+            self.forget_targets();
+            self.motion.hold(self.measured.position_m);
+        }
+    }
+
+    fn forget_targets(&mut self) {
+        let dictionary = self.communication.dictionary_mut();
+        dictionary.take_written(self.slots.target_position);
+        dictionary.take_written(self.slots.target_velocity);
+    }
+
+    /// Takes over the target of the active mode at SYNC.
+    fn take_target(&mut self) {
+        if self.state() != State::OperationEnabled || self.is_halted {
+            self.forget_targets();
+            return;
+        }
+        let dictionary = self.communication.dictionary_mut();
+        let has_position = dictionary.take_written(self.slots.target_position);
+        let has_velocity = dictionary.take_written(self.slots.target_velocity);
+        match self.mode() {
+            Some(Mode::Csp) if has_position => {
+                let counts = self.number(self.slots.target_position)
+                    + self.number(self.slots.position_offset);
+                let target_m = counts as f64 / self.parameters.counts_per_m;
+                self.motion.position_target(target_m, self.period_s());
+            }
+            // Without a promised deadline a target is there to stay, as when it is set by SDO.
+            Some(Mode::Csp) if self.communication.has_deadline() => {
+                self.motion.extrapolate_once(self.period_s());
+            }
+            Some(Mode::Csv) if has_velocity => {
+                let velocity_m_s =
+                    self.si(self.slots.target_velocity) + self.si(self.slots.velocity_offset);
+                self.motion.velocity_target(velocity_m_s);
+            }
+            Some(Mode::Csp | Mode::Csv) | None => {}
+        }
+    }
+
+    /// Shows the mode that is active; a change under power begins with a hold.
+    fn show_mode(&mut self) {
+        let dictionary = self.communication.dictionary_mut();
+        if !dictionary.take_written(self.slots.mode) {
+            return;
+        }
+        let (wanted, shown) =
+            (dictionary.number(self.slots.mode), dictionary.number(self.slots.mode_display));
+        dictionary.set(self.slots.mode_display, wanted);
+        if wanted != shown && self.state() == State::OperationEnabled {
+            self.motion.hold(self.measured.position_m);
+        }
+    }
+
+    /// Ends what a ramp was for.
+    fn end_ramp(&mut self) {
+        if self.motion.is_ramping() {
+            return;
+        }
+        match self.state() {
+            State::FaultReactionActive => {
+                self.machine.fault_reaction_done();
+                self.motion.off();
+            }
+            State::QuickStopActive if self.number(self.slots.quick_stop_option) != 6 => {
+                self.machine.quick_stop_done();
+                self.motion.off();
+            }
+            _ => {}
+        }
+    }
+
+    fn watch_following_error(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) {
+        let window = self.number(self.slots.error_window);
+        let watched = self.state() == State::OperationEnabled
+            && self.mode() == Some(Mode::Csp)
+            && window != WINDOW_OFF;
+        if !watched || whole(self.following_error_counts()).abs() <= window {
+            self.astray_us = 0;
+            return;
+        }
+        self.astray_us += u64::from(step_us);
+        let patience_us = u64::try_from(self.number(self.slots.error_time_ms)).unwrap_or(0) * 1000;
+        if self.astray_us > patience_us {
+            self.has_following_error = true;
+            self.communication.emergency(emcy::CODE_FOLLOWING_ERROR, out);
+            self.fault(emcy::CODE_FOLLOWING_ERROR);
+        }
+    }
+
+    /// Enters the fault reaction. A drive without power over its axis only reports a lost command.
+    fn fault(&mut self, code: u16) {
+        if !matches!(self.state(), State::OperationEnabled | State::QuickStopActive) {
+            return;
+        }
+        self.set(self.slots.error_code, code.into());
+        self.machine.fault();
+        self.astray_us = 0;
+        if self.number(self.slots.fault_reaction_option) == 0 {
+            self.machine.fault_reaction_done();
+            self.motion.off();
+        } else {
+            self.motion.ramp_down(self.measured.velocity_m_s);
+        }
+    }
+
+    /// Demand before limits minus actual position; 0 where position is not controlled.
+    fn following_error_counts(&self) -> f64 {
+        let demand_m = self.motion.demand_m().unwrap_or(self.measured.position_m);
+        (demand_m - self.measured.position_m) * self.parameters.counts_per_m
+    }
+
+    fn mode(&self) -> Option<Mode> {
+        i8::try_from(self.number(self.slots.mode_display)).ok().and_then(Mode::from_code)
+    }
+
+    fn period_s(&self) -> f64 {
+        let exponent = i32::try_from(self.number(self.slots.period_exponent)).unwrap_or(-3);
+        self.number(self.slots.period) as f64 * 10.0_f64.powi(exponent)
+    }
+
+    fn limits(&self) -> MotionLimits {
+        MotionLimits {
+            position_min_m: self.si(self.slots.position_min),
+            position_max_m: self.si(self.slots.position_max),
+            velocity_max_m_s: self.si(self.slots.velocity_max),
+            deceleration_m_s2: self.si(self.slots.deceleration),
+        }
+    }
+
+    fn number(&self, slot: Slot) -> i64 {
+        self.communication.dictionary().number(slot)
+    }
+
+    /// The value of an object in counts, in SI units.
+    fn si(&self, slot: Slot) -> f64 {
+        self.number(slot) as f64 / self.parameters.counts_per_m
+    }
+
+    fn set(&mut self, slot: Slot, number: i64) {
+        self.communication.dictionary_mut().set(slot, number);
+    }
+
+    /// Shows what the drive measures and demands.
+    fn show(&mut self) {
+        let counts = |value_si: f64| whole(value_si * self.parameters.counts_per_m);
+        let Measured { position_m, velocity_m_s, force_n } = self.measured;
+        let demand_m = self.motion.demand_m().unwrap_or(position_m);
+        let values = [
+            (self.slots.position_demand, counts(demand_m)),
+            (self.slots.position_internal, counts(position_m)),
+            (self.slots.position_actual, counts(position_m)),
+            (self.slots.velocity_demand, counts(self.motion.demand_m_s())),
+            (self.slots.velocity_actual, counts(velocity_m_s)),
+            (self.slots.torque_actual, whole(force_n / self.parameters.force_max_n * 1000.0)),
+            (self.slots.following_error, whole(self.following_error_counts())),
+        ];
+        for (slot, number) in values {
+            self.set(slot, number);
+        }
+        self.show_statusword();
+    }
+
+    fn show_statusword(&mut self) {
+        let (_, coding) = self.state().coding();
+        let mut word = coding | Statusword::REMOTE;
+        if self.state() != State::NotReadyToSwitchOn {
+            word |= Statusword::VOLTAGE_ENABLED;
+        }
+        if self.motion.is_limited() {
+            word |= Statusword::INTERNAL_LIMIT;
+        }
+        let is_cyclic = self.mode().is_some();
+        if self.state() == State::OperationEnabled && is_cyclic && !self.is_halted {
+            word |= Statusword::FOLLOWS_TARGET;
+        }
+        if self.has_following_error {
+            word |= Statusword::FOLLOWING_ERROR;
+        }
+        self.set(self.slots.statusword, word.into());
+    }
+}

@@ -1,0 +1,195 @@
+//! The objects of a simulated drive, 0x6000 and above, and their places.
+
+use ilc_rt::fieldbus::canopen::pdo::{MappedObject, TYPE_EVERY_SYNC};
+use ilc_rt::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
+use ilc_rt::fieldbus::cia402::{Mode, objects, pdo_map};
+
+use super::dictionary::{Allowed, Dictionary, Entry, Mappable, Slot};
+use super::drive::DriveParameters;
+use super::standard_objects::{self, PdoDefault};
+use super::value::Value;
+
+/// Device type: profile 402, servo drive.
+pub const DEVICE_TYPE: u32 = 0x0002_0192;
+/// Event-driven transmission.
+const TYPE_EVENT: u8 = 255;
+
+/// Returns all objects of a drive.
+///
+/// 0x6502 names the modes that are simulated and no others; option codes admit what is simulated.
+pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
+    let mode_map = [mapped(objects::MODE_OF_OPERATION, 8)];
+    let display_map = [mapped(objects::MODE_DISPLAY, 8), mapped(objects::ERROR_CODE, 16)];
+    let command_map = pdo_map::command_map(Mode::Csp);
+    let default = |number, transmission, map| PdoDefault { number, transmission, map };
+    let pdos = [
+        default(pdo_map::COMMAND_PDO, TYPE_EVERY_SYNC, &command_map[..]),
+        default(ilc_rt::fieldbus::canopen::pdo::PdoNumber::receive(1), TYPE_EVENT, &mode_map[..]),
+        default(pdo_map::STATUS_PDO, TYPE_EVERY_SYNC, &pdo_map::STATUS_MAP[..]),
+        default(pdo_map::EXTRA_PDO, TYPE_EVERY_SYNC, &pdo_map::EXTRA_MAP[..]),
+        default(
+            ilc_rt::fieldbus::canopen::pdo::PdoNumber::transmit(2),
+            TYPE_EVENT,
+            &display_map[..],
+        ),
+    ];
+    let mut entries =
+        standard_objects::communication(node, DEVICE_TYPE, "ilc-sim CiA 402 drive", 402);
+    entries.extend(standard_objects::process_data(node, &pdos));
+    entries.extend(words_and_options());
+    entries.extend(motion(parameters));
+    entries
+}
+
+const fn mapped(index: u16, bits: u8) -> MappedObject {
+    MappedObject { address: ObjectAddress::new(index, 0), bits }
+}
+
+/// An object of this profile, by the name that the profile gives it.
+fn object(index: u16, value: Value) -> Entry {
+    Entry::read_only(index, 0, objects::name(index).unwrap_or("Object"), value)
+}
+
+/// An object that the controller writes, also in RPDOs.
+fn input(index: u16, value: Value) -> Entry {
+    let name = objects::name(index).unwrap_or("Object");
+    Entry::read_write(index, 0, name, value).mappable(Mappable::Both)
+}
+
+/// An object that the drive shows, also in TPDOs.
+fn output(index: u16, value: Value) -> Entry {
+    object(index, value).mappable(Mappable::Transmit)
+}
+
+/// An object that is set up once.
+fn setting(index: u16, sub: u8, value: Value) -> Entry {
+    Entry::read_write(index, sub, objects::name(index).unwrap_or("Object"), value)
+}
+
+fn words_and_options() -> Vec<Entry> {
+    let modes = Mode::Csp.supported_bit() | Mode::Csv.supported_bit();
+    vec![
+        // 0: nothing, 1: fault, 2: disable voltage, 3: quick stop.
+        setting(objects::CONNECTION_LOSS_OPTION, 0, Value::I16(1)).allowing(Allowed::Range(0, 3)),
+        output(objects::ERROR_CODE, Value::U16(0)),
+        input(objects::CONTROLWORD, Value::U16(0)),
+        output(objects::STATUSWORD, Value::U16(0)),
+        // 0: power off, 2: ramp and power off, 6: ramp and hold.
+        setting(objects::QUICK_STOP_OPTION, 0, Value::I16(6)).allowing(Allowed::OneOf(&[0, 2, 6])),
+        setting(objects::SHUTDOWN_OPTION, 0, Value::I16(0)).allowing(Allowed::OneOf(&[0])),
+        setting(objects::DISABLE_OPTION, 0, Value::I16(0)).allowing(Allowed::OneOf(&[0])),
+        setting(objects::HALT_OPTION, 0, Value::I16(2)).allowing(Allowed::OneOf(&[2])),
+        // 0: power off, 2: ramp and power off.
+        setting(objects::FAULT_REACTION_OPTION, 0, Value::I16(2)).allowing(Allowed::OneOf(&[0, 2])),
+        input(objects::MODE_OF_OPERATION, Value::I8(0)).allowing(Allowed::OneOf(&[0, 8, 9])),
+        output(objects::MODE_DISPLAY, Value::I8(0)),
+        Entry::constant(objects::SUPPORTED_MODES, 0, "Supported drive modes", Value::U32(modes)),
+    ]
+}
+
+fn motion(parameters: &DriveParameters) -> Vec<Entry> {
+    let unsigned = |counts: f64| Value::U32(0).with_number(whole(counts));
+    let signed = |counts: f64| Value::I32(0).with_number(whole(counts));
+    let counts = |value_si: f64| value_si * parameters.counts_per_m;
+    let limit = objects::POSITION_LIMIT;
+    let period = objects::INTERPOLATION_PERIOD;
+    let mut entries = vec![
+        output(objects::POSITION_DEMAND, Value::I32(0)),
+        output(objects::POSITION_INTERNAL, Value::I32(0)),
+        output(objects::POSITION_ACTUAL, Value::I32(0)),
+        setting(
+            objects::FOLLOWING_ERROR_WINDOW,
+            0,
+            unsigned(counts(parameters.following_error_max_m)),
+        ),
+        setting(objects::FOLLOWING_ERROR_TIME, 0, Value::U16(10)),
+        output(objects::VELOCITY_DEMAND, Value::I32(0)),
+        output(objects::VELOCITY_ACTUAL, Value::I32(0)),
+        setting(objects::MAX_TORQUE, 0, Value::U16(1000)).allowing(Allowed::OneOf(&[1000])),
+        Entry::constant(
+            objects::RATED_TORQUE,
+            0,
+            "Motor rated torque",
+            unsigned(parameters.force_max_n * 1000.0),
+        ),
+        output(objects::TORQUE_ACTUAL, Value::I16(0)),
+        input(objects::TARGET_POSITION, Value::I32(0)),
+        Entry::constant(limit, 0, "Highest sub-index", Value::U8(2)),
+        setting(limit, 1, signed(counts(parameters.position_min_m))),
+        setting(limit, 2, signed(counts(parameters.position_max_m))),
+        setting(objects::MAX_VELOCITY, 0, unsigned(counts(parameters.velocity_max_m_s))),
+        setting(
+            objects::QUICK_STOP_DECELERATION,
+            0,
+            unsigned(counts(parameters.deceleration_m_s2)),
+        )
+        .allowing(Allowed::Range(1, i64::from(u32::MAX))),
+        input(objects::POSITION_OFFSET, Value::I32(0)),
+        input(objects::VELOCITY_OFFSET, Value::I32(0)),
+        input(objects::TORQUE_OFFSET, Value::I16(0)),
+        Entry::constant(period, 0, "Highest sub-index", Value::U8(2)),
+        setting(period, 1, Value::U8(1)).allowing(Allowed::Range(1, 255)),
+        setting(period, 2, Value::I8(-3)).allowing(Allowed::Range(-6, 0)),
+        output(objects::FOLLOWING_ERROR_ACTUAL, Value::I32(0)),
+        input(objects::TARGET_VELOCITY, Value::I32(0)),
+    ];
+    for ratio in [objects::ENCODER_RESOLUTION, objects::GEAR_RATIO, objects::FEED_CONSTANT] {
+        let name = objects::name(ratio).unwrap_or("Ratio");
+        entries.push(Entry::constant(ratio, 0, "Highest sub-index", Value::U8(2)));
+        entries.push(Entry::constant(ratio, 1, name, Value::U32(1)));
+        entries.push(Entry::constant(ratio, 2, name, Value::U32(1)));
+    }
+    entries
+}
+
+/// The whole number nearest to a count, as wide as any object needs.
+#[expect(clippy::cast_possible_truncation, reason = "saturates; no count is NaN")]
+pub(super) fn whole(counts: f64) -> i64 {
+    counts.round() as i64
+}
+
+macro_rules! slots {
+    ($($name:ident = $index:expr, $sub:literal;)*) => {
+        /// The places of the objects that the drive uses, found once.
+        #[derive(Clone, Copy, Debug)]
+        pub(super) struct DriveSlots {
+            $(pub(super) $name: Slot,)*
+        }
+
+        impl DriveSlots {
+            pub(super) fn find(dictionary: &Dictionary) -> Result<Self, AbortCode> {
+                Ok(Self { $($name: dictionary.find(ObjectAddress::new($index, $sub))?,)* })
+            }
+        }
+    };
+}
+
+slots! {
+    connection_loss_option = objects::CONNECTION_LOSS_OPTION, 0;
+    error_code = objects::ERROR_CODE, 0;
+    controlword = objects::CONTROLWORD, 0;
+    statusword = objects::STATUSWORD, 0;
+    quick_stop_option = objects::QUICK_STOP_OPTION, 0;
+    fault_reaction_option = objects::FAULT_REACTION_OPTION, 0;
+    mode = objects::MODE_OF_OPERATION, 0;
+    mode_display = objects::MODE_DISPLAY, 0;
+    position_demand = objects::POSITION_DEMAND, 0;
+    position_internal = objects::POSITION_INTERNAL, 0;
+    position_actual = objects::POSITION_ACTUAL, 0;
+    error_window = objects::FOLLOWING_ERROR_WINDOW, 0;
+    error_time_ms = objects::FOLLOWING_ERROR_TIME, 0;
+    velocity_demand = objects::VELOCITY_DEMAND, 0;
+    velocity_actual = objects::VELOCITY_ACTUAL, 0;
+    torque_actual = objects::TORQUE_ACTUAL, 0;
+    target_position = objects::TARGET_POSITION, 0;
+    position_min = objects::POSITION_LIMIT, 1;
+    position_max = objects::POSITION_LIMIT, 2;
+    velocity_max = objects::MAX_VELOCITY, 0;
+    deceleration = objects::QUICK_STOP_DECELERATION, 0;
+    position_offset = objects::POSITION_OFFSET, 0;
+    velocity_offset = objects::VELOCITY_OFFSET, 0;
+    period = objects::INTERPOLATION_PERIOD, 1;
+    period_exponent = objects::INTERPOLATION_PERIOD, 2;
+    following_error = objects::FOLLOWING_ERROR_ACTUAL, 0;
+    target_velocity = objects::TARGET_VELOCITY, 0;
+}

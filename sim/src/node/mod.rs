@@ -1,0 +1,21 @@
+//! Simulated CANopen nodes: dictionary, SDO server, NMT slave, process data, and the CiA 402 drive.
+//!
+//! Nodes talk frames on one side and demands and measurements on the other; they know no plant and no
+//! clock, and after they are built they allocate nothing. Imported by `machine` and `eds`.
+
+pub mod communication;
+pub mod dictionary;
+pub mod drive;
+pub mod drive_objects;
+pub mod encoder;
+pub mod motion;
+pub mod pdo_engine;
+pub mod pdo_rules;
+pub mod sdo_server;
+pub mod standard_objects;
+pub mod state_machine;
+pub mod value;
+
+pub use dictionary::Dictionary;
+pub use drive::{DriveNode, DriveParameters, Measured};
+pub use encoder::EncoderNode;

@@ -1,0 +1,233 @@
+//! Process data in motion: latches RPDOs until SYNC, sends TPDOs at SYNC or on change.
+
+use ilc_rt::fieldbus::Frame;
+use ilc_rt::fieldbus::canopen::ObjectAddress;
+use ilc_rt::fieldbus::canopen::pdo::{COB_INVALID, MappedObject, PdoNumber};
+
+use super::dictionary::{Dictionary, Slot};
+use super::pdo_rules;
+use super::standard_objects::MAPPED_MAX;
+
+/// Highest synchronous transmission type.
+const SYNCHRONOUS_MAX: u8 = 240;
+
+/// A PDO as its parameters define it, resolved so that an exchange is a few copies.
+#[derive(Clone, Copy, Debug)]
+struct Pdo {
+    /// `None`: invalid.
+    cob_id: Option<u16>,
+    transmission: u8,
+    event_ms: u32,
+    inhibit_us: u64,
+    map: [(Slot, usize); MAPPED_MAX as usize],
+    n_mapped: usize,
+    n_bytes: usize,
+    latched: Option<Frame>,
+    last_sent: Option<Frame>,
+    n_syncs: u8,
+    /// Since the last reception or transmission; `None` while the timer is not armed.
+    since_us: Option<u64>,
+}
+
+impl Pdo {
+    const EMPTY: Self = Self {
+        cob_id: None,
+        transmission: 1,
+        event_ms: 0,
+        inhibit_us: 0,
+        map: [(Slot::FIRST, 0); MAPPED_MAX as usize],
+        n_mapped: 0,
+        n_bytes: 0,
+        latched: None,
+        last_sent: None,
+        n_syncs: 0,
+        since_us: None,
+    };
+
+    fn load(dictionary: &Dictionary, number: PdoNumber) -> Self {
+        let communication = |sub| {
+            let address = ObjectAddress::new(number.communication_index(), sub);
+            pdo_rules::parameter(dictionary, address)
+        };
+        let cob_id = communication(1);
+        let mut pdo = Self {
+            cob_id: (cob_id & COB_INVALID == 0)
+                .then(|| u16::try_from(cob_id & 0x7FF).unwrap_or_default()),
+            transmission: u8::try_from(communication(2)).unwrap_or(1),
+            event_ms: communication(5),
+            inhibit_us: u64::from(communication(3)) * 100,
+            ..Self::EMPTY
+        };
+        let mapping =
+            |sub| pdo_rules::parameter(dictionary, ObjectAddress::new(number.mapping_index(), sub));
+        let n_mapped = u8::try_from(mapping(0)).unwrap_or(0).min(MAPPED_MAX);
+        for sub in 1..=n_mapped {
+            let object = MappedObject::from_entry(mapping(sub));
+            let Ok(slot) = dictionary.find(object.address) else { continue };
+            pdo.map[pdo.n_mapped] = (slot, usize::from(object.bits / 8));
+            pdo.n_mapped += 1;
+            pdo.n_bytes += usize::from(object.bits / 8);
+        }
+        pdo
+    }
+
+    fn objects(&self) -> &[(Slot, usize)] {
+        &self.map[..self.n_mapped]
+    }
+
+    fn unpack(&self, frame: &Frame, dictionary: &mut Dictionary) {
+        let mut rest = frame.payload();
+        for &(slot, n_bytes) in self.objects() {
+            let Some((bytes, after)) = rest.split_at_checked(n_bytes) else { return };
+            dictionary.store_from_pdo(slot, bytes);
+            rest = after;
+        }
+    }
+
+    fn pack(&self, cob_id: u16, dictionary: &Dictionary) -> Frame {
+        let mut payload = [0; 8];
+        let mut rest = &mut payload[..];
+        for &(slot, n_bytes) in self.objects() {
+            let encoded = dictionary.entry(slot).value().encode();
+            let Some((place, after)) = rest.split_at_mut_checked(n_bytes) else { break };
+            if let Some(bytes) = encoded.as_bytes().get(..n_bytes) {
+                place.copy_from_slice(bytes);
+            }
+            rest = after;
+        }
+        Frame::new(cob_id, &payload[..self.n_bytes.min(8)]).unwrap_or_default()
+    }
+
+    fn is_synchronous(&self) -> bool {
+        self.transmission <= SYNCHRONOUS_MAX
+    }
+}
+
+/// What a frame was to the process data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Received {
+    /// No PDO of this node.
+    Foreign,
+    /// Kept until the next SYNC.
+    Latched,
+    /// Taken over at once.
+    Applied,
+    /// Shorter than its mapping: discarded.
+    TooShort,
+}
+
+/// The eight PDOs of a node.
+#[derive(Clone, Copy, Debug)]
+pub struct PdoEngine {
+    receive: [Pdo; 4],
+    transmit: [Pdo; 4],
+}
+
+impl PdoEngine {
+    /// Reads all parameters.
+    pub fn new(dictionary: &Dictionary) -> Self {
+        let mut engine = Self { receive: [Pdo::EMPTY; 4], transmit: [Pdo::EMPTY; 4] };
+        for offset in 0..4_u8 {
+            let at = usize::from(offset);
+            engine.receive[at] = Pdo::load(dictionary, PdoNumber::receive(offset));
+            engine.transmit[at] = Pdo::load(dictionary, PdoNumber::transmit(offset));
+        }
+        engine
+    }
+
+    /// Takes a frame that may be an RPDO.
+    pub fn receive(&mut self, frame: &Frame, dictionary: &mut Dictionary) -> Received {
+        let Some(pdo) = self.receive.iter_mut().find(|pdo| pdo.cob_id == Some(frame.id())) else {
+            return Received::Foreign;
+        };
+        if frame.payload().len() < pdo.n_bytes {
+            return Received::TooShort;
+        }
+        pdo.since_us = Some(0);
+        if pdo.is_synchronous() {
+            pdo.latched = Some(*frame);
+            Received::Latched
+        } else {
+            pdo.unpack(frame, dictionary);
+            Received::Applied
+        }
+    }
+
+    /// Takes over the RPDOs that arrived since the last SYNC.
+    pub fn apply_latched(&mut self, dictionary: &mut Dictionary) {
+        for pdo in &mut self.receive {
+            if let Some(frame) = pdo.latched.take() {
+                pdo.unpack(&frame, dictionary);
+            }
+        }
+    }
+
+    /// Sends the TPDOs that are due at this SYNC.
+    pub fn transmit_at_sync(&mut self, dictionary: &Dictionary, out: &mut dyn FnMut(Frame)) {
+        for pdo in &mut self.transmit {
+            let Some(cob_id) = pdo.cob_id else { continue };
+            if !pdo.is_synchronous() {
+                continue;
+            }
+            pdo.n_syncs += 1;
+            let frame = pdo.pack(cob_id, dictionary);
+            let due = match pdo.transmission {
+                0 => pdo.last_sent != Some(frame),
+                every => pdo.n_syncs >= every,
+            };
+            if due || pdo.transmission == 0 {
+                pdo.n_syncs = 0;
+            }
+            if due {
+                pdo.last_sent = Some(frame);
+                out(frame);
+            }
+        }
+    }
+
+    /// Sends the event-driven TPDOs that changed or whose timer ran out.
+    pub fn transmit_events(
+        &mut self,
+        elapsed_us: u64,
+        dictionary: &Dictionary,
+        out: &mut dyn FnMut(Frame),
+    ) {
+        for pdo in &mut self.transmit {
+            let Some(cob_id) = pdo.cob_id else { continue };
+            if pdo.is_synchronous() {
+                continue;
+            }
+            let since_us = pdo.since_us.map(|since| since + elapsed_us);
+            pdo.since_us = since_us;
+            if since_us.is_some_and(|since| since < pdo.inhibit_us) {
+                continue;
+            }
+            let frame = pdo.pack(cob_id, dictionary);
+            let timer_us = u64::from(pdo.event_ms) * 1000;
+            let is_late = timer_us > 0 && since_us.is_none_or(|since| since >= timer_us);
+            if is_late || pdo.last_sent != Some(frame) {
+                pdo.last_sent = Some(frame);
+                pdo.since_us = Some(0);
+                out(frame);
+            }
+        }
+    }
+
+    /// Counts time and tells whether an RPDO with a deadline is overdue; each silence is told once.
+    pub fn deadline_passed(&mut self, elapsed_us: u64) -> bool {
+        let mut passed = false;
+        for pdo in &mut self.receive {
+            let (Some(since_us), 1..) = (pdo.since_us, pdo.event_ms) else { continue };
+            let since_us = since_us + elapsed_us;
+            let is_late = since_us > u64::from(pdo.event_ms) * 1000;
+            passed |= is_late;
+            pdo.since_us = (!is_late).then_some(since_us);
+        }
+        passed
+    }
+
+    /// Whether RPDO1 has a deadline: its sender has promised to be cyclic.
+    pub fn has_deadline(&self) -> bool {
+        self.receive[0].event_ms > 0
+    }
+}

@@ -1,0 +1,191 @@
+//! The machine on a bus: its clock, its log, its end.
+
+use std::io::Write;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::canopen::{NodeId, sync};
+use ilc_rt::fieldbus::transport::Responder;
+use ilc_rt::fieldbus::{Bus, BusError, Frame};
+use ilc_sim::{ClockMode, Machine};
+
+/// Longest wait for a frame before the plant is brought up to date.
+const BATCH: Duration = Duration::from_millis(1);
+/// Time behind which the machine no longer runs after the wall clock, as after a suspended computer.
+const BEHIND_MAX: Duration = Duration::from_secs(1);
+
+/// A node that is to lose its power.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Mute {
+    /// Which node.
+    pub(crate) node: NodeId,
+    /// When, since the start.
+    pub(crate) after: Duration,
+}
+
+impl FromStr for Mute {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('@').and_then(|(node, seconds)| {
+            let node = node.parse().ok().and_then(NodeId::new)?;
+            let after = Duration::try_from_secs_f64(seconds.parse().ok()?).ok()?;
+            Some(Self { node, after })
+        });
+        parts.ok_or_else(|| "write NODE@SECONDS, as 1@5, with a node of 1 to 127".to_owned())
+    }
+}
+
+/// Why the machine cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RunError {
+    /// The bus failed.
+    #[error("{address}: {source}")]
+    Bus { address: String, source: BusError },
+    /// Signals cannot be caught.
+    #[error("signals cannot be caught: {0}")]
+    Signal(std::io::Error),
+}
+
+/// The sending side, which counts.
+struct Outlet {
+    bus: Box<dyn Bus>,
+    n_sent: u64,
+    n_dropped: u64,
+    broken: Option<BusError>,
+}
+
+impl Outlet {
+    fn send(&mut self, frame: Frame) {
+        match self.bus.send(&frame) {
+            Ok(()) => self.n_sent += 1,
+            Err(BusError::Full) => self.n_dropped += 1,
+            Err(error) => self.broken = Some(error),
+        }
+    }
+}
+
+/// Runs the machine until SIGINT or SIGTERM.
+pub(crate) fn run(
+    cell: &Cell,
+    mut machine: Machine,
+    bus: Box<dyn Bus>,
+    address: &str,
+    clock: ClockMode,
+    mutes: &[Mute],
+) -> Result<(), RunError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(RunError::Signal)?;
+    }
+    let failed = |source| RunError::Bus { address: address.to_owned(), source };
+    let mut outlet = Outlet { bus, n_sent: 0, n_dropped: 0, broken: None };
+    let mut mutes = mutes.to_vec();
+    let start = Instant::now();
+    let mut pace =
+        Pace { start, step: Duration::from_micros(machine.step_us().into()), n_steps: 0 };
+    let mut n_syncs = 0_u64;
+    print(&ready(cell, address, clock));
+    machine.boot(&mut |frame| outlet.send(frame));
+    while !stop.load(Ordering::Relaxed) {
+        let received = outlet.bus.recv(BATCH).map_err(failed)?;
+        if clock == ClockMode::RealTime {
+            let due = pace.due();
+            machine.advance(due, &mut |frame| outlet.send(frame));
+        }
+        if let Some(frame) = received {
+            n_syncs += u64::from(sync::is_sync(&frame));
+            machine.receive(&frame, &mut |frame| outlet.send(frame));
+        }
+        let elapsed = start.elapsed();
+        mutes.retain(|mute| {
+            let is_due = elapsed >= mute.after;
+            if is_due {
+                machine.mute(mute.node);
+            }
+            !is_due
+        });
+        while let Some(event) = machine.take_event() {
+            print(&event.to_string());
+        }
+        if let Some(error) = outlet.broken {
+            return Err(failed(error));
+        }
+    }
+    print(&summary(cell, &machine, start.elapsed(), n_syncs, &outlet));
+    Ok(())
+}
+
+/// The wall clock in steps of the drives' loops, on an absolute grid.
+struct Pace {
+    start: Instant,
+    step: Duration,
+    n_steps: u32,
+}
+
+impl Pace {
+    /// Steps that are due now. After a long stop the missed time is left out, not made up for.
+    fn due(&mut self) -> u32 {
+        let behind = self.start.elapsed().saturating_sub(self.step * self.n_steps);
+        if behind > BEHIND_MAX {
+            self.restart();
+            return 0;
+        }
+        let n_due = u32::try_from(behind.as_nanos() / self.step.as_nanos()).unwrap_or(0);
+        self.n_steps += n_due;
+        // The grid is laid anew now and then, before the count of steps can overflow.
+        if self.n_steps > u32::MAX / 2 {
+            self.start += self.step * self.n_steps;
+            self.n_steps = 0;
+        }
+        n_due
+    }
+
+    fn restart(&mut self) {
+        self.start = Instant::now();
+        self.n_steps = 0;
+    }
+}
+
+fn ready(cell: &Cell, address: &str, clock: ClockMode) -> String {
+    let axes = cell.axes.iter().map(|axis| format!("{} ({})", axis.node, axis.name));
+    let tool = cell.tcp_encoder.iter().map(|tool| format!("{} (tool)", tool.node));
+    let nodes: Vec<String> = axes.chain(tool).collect();
+    let clock = match clock {
+        ClockMode::RealTime => "real time",
+        ClockMode::LockStep => "lock-step",
+    };
+    format!("ready: nodes {} on {address}; {clock}", nodes.join(", "))
+}
+
+fn summary(
+    cell: &Cell,
+    machine: &Machine,
+    elapsed: Duration,
+    n_syncs: u64,
+    outlet: &Outlet,
+) -> String {
+    let states: Vec<String> = cell
+        .axes
+        .iter()
+        .filter_map(|axis| {
+            let state = machine.drive_state(NodeId::new(axis.node)?)?;
+            Some(format!("{} ({}) {state}", axis.node, axis.name))
+        })
+        .collect();
+    format!(
+        "stopped after {:.1} s: {n_syncs} SYNC received, {} frames sent, {} not sent; nodes {}",
+        elapsed.as_secs_f64(),
+        outlet.n_sent,
+        outlet.n_dropped,
+        states.join(", ")
+    )
+}
+
+/// Prints a line. A reader who has gone must not stop the drives.
+fn print(line: &str) {
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
