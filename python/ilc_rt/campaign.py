@@ -137,6 +137,8 @@ class Campaign:
         with ControlledStop(self.interrupt) as stop:
             controller = self._controller = self._start(iterations)
             try:
+                if stop.received is not None:
+                    controller.interrupt(stop.received)
                 for line in controller.lines():
                     event = parse_event(line)
                     if event is not None:

@@ -34,11 +34,9 @@ class ControlledStop:
 
     Examples
     --------
-    >>> with ControlledStop(print) as stop:
-    ...     signal.raise_signal(signal.SIGINT)
-    ...     stop.received is signal.SIGINT
-    Signals.SIGINT
-    True
+    >>> with ControlledStop(lambda number: print("stop:", number.name)) as stop:
+    ...     signal.raise_signal(signal.SIGTERM)
+    stop: SIGTERM
     """
 
     def __init__(self, stop: Callable[[signal.Signals], None]) -> None:

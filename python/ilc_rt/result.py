@@ -132,6 +132,10 @@ class CampaignResult:
         """Address of the bus, or ``""`` if not known."""
         return self.start.bus if self.start else ""
 
+    def input_units(self, scale: float = 1.0) -> str:
+        """Return the unit of the learned input, in metres or thousandths."""
+        return {1.0: "m", 1e-3: "mm", 1e-6: "µm"}[scale]
+
     def sentence(self) -> str:
         """Say in one plain sentence what was learned.
 
