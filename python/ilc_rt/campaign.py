@@ -185,7 +185,9 @@ class Campaign:
             "law": self.law,
         }
         apart = self.simulated and self.transport != "loopback"
-        drives = start_simulated_drives(cell_file, self.bus, self.lockstep) if apart else None
+        drives = None
+        if apart:
+            drives = start_simulated_drives(cell_file, self.bus, lockstep=self.lockstep)
         return InProcessController(options, drives)
 
     def _check_end(self, controller: Controller) -> None:
@@ -231,9 +233,7 @@ def transport_of(bus: str) -> str:
     """
     kind, colon, _ = bus.partition(":")
     if not colon or kind not in TRANSPORTS:
-        message = (
-            f"bus = {bus}: allowed can:INTERFACE, udp:ADDRESS[:PORT], zenoh:KEY or loopback:"
-        )
+        message = f"bus = {bus}: allowed can:INTERFACE, udp:ADDRESS[:PORT], zenoh:KEY or loopback:"
         raise BadInputError(message)
     return kind
 

@@ -71,7 +71,7 @@ class ProcessController:
         self._drives: Program | None = None
         self._stop_by: float | None = None
         if simulated:
-            self._drives = start_simulated_drives(cell_file, bus, lockstep)
+            self._drives = start_simulated_drives(cell_file, bus, lockstep=lockstep)
         argv = [str(controller), "run", cell_file, "--events", *arguments]
         if bus is not None:
             argv += ["--bus", bus]
@@ -196,4 +196,3 @@ class InProcessController:
         self._source = None
         if self._drives is not None:
             self._drives.close()
-

@@ -91,5 +91,5 @@ def magnification(largest_m: float, extent_m: float, share: float = 0.12) -> int
     if largest_m <= 0.0:
         return 1
     wanted = max(1.0, share * extent_m / largest_m)
-    decade = 10 ** int(np.floor(np.log10(wanted)))
+    decade = int(10 ** np.floor(np.log10(wanted)))
     return max(step * decade for step in (1, 2, 5) if step * decade <= wanted)

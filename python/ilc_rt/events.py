@@ -136,13 +136,7 @@ class EndEvent:
 
 
 Event = (
-    StartEvent
-    | StateEvent
-    | ProgressEvent
-    | IterationEvent
-    | LatencyEvent
-    | FaultEvent
-    | EndEvent
+    StartEvent | StateEvent | ProgressEvent | IterationEvent | LatencyEvent | FaultEvent | EndEvent
 )
 
 _CLASSES: dict[str, type[Any]] = {

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType, TracebackType
 
+    from typing_extensions import Self
+
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _UNTOUCHED = (signal.SIG_DFL, signal.default_int_handler)
 
@@ -44,7 +46,7 @@ class ControlledStop:
         self._stop = stop
         self._replaced: dict[signal.Signals, Any] = {}
 
-    def __enter__(self) -> ControlledStop:
+    def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
             for number in STOP_SIGNALS:
                 if signal.getsignal(number) in _UNTOUCHED:

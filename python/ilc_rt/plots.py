@@ -6,7 +6,7 @@ can tell apart (Okabe and Ito), at a width that a phone can show.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -34,7 +34,7 @@ WIDTH_IN = 5.6
 BARS_MAX = 60
 LOG_TIME_RATIO = 50.0
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": "#9AA0A8",
     "axes.grid": True,
@@ -222,8 +222,7 @@ def _contour_panel(
     axes.set_aspect("equal")
     round_m = _round_down(largest_m)
     axes.set_title(
-        f"deviation shown {factor:,} times: "
-        f"{round_m * 1e6:g} µm as {round_m * factor * 1e3:.2g} mm"
+        f"deviation shown {factor:,} times: {round_m * 1e6:g} µm as {round_m * factor * 1e3:.2g} mm"
     )
     axes.set_xlabel(f"{names[0]} in mm")
     axes.set_ylabel(f"{names[1]} in mm")

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import TracebackType
 
+    from typing_extensions import Self
+
 READY_DEADLINE_S = 15.0
 END_DEADLINE_S = 5.0
 
@@ -90,7 +92,7 @@ class Program:
             message = f"cannot start {argv[0]}: {error.strerror}"
             raise CampaignError(message) from error
 
-    def __enter__(self) -> Program:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -190,7 +192,7 @@ class Program:
             return None
 
 
-def start_simulated_drives(cell_file: str | Path, bus: str | None, lockstep: bool | None) -> Program:
+def start_simulated_drives(cell_file: str | Path, bus: str | None, *, lockstep: bool) -> Program:
     """Start `ilc-sim` and wait until its drives listen.
 
     Parameters
@@ -199,7 +201,7 @@ def start_simulated_drives(cell_file: str | Path, bus: str | None, lockstep: boo
         The cell description.
     bus : str or None
         Bus address in place of the cell's.
-    lockstep : bool or None
+    lockstep : bool
         Whether the drives advance on SYNC.
 
     Raises

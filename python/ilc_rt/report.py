@@ -182,7 +182,7 @@ def _row(record: IterationRecord, first: IterationRecord) -> str:
     less = ""
     if record is not first and None not in {record.contour_inf_m, first.contour_inf_m}:
         change = reduction(first.contour_inf_m or 0.0, record.contour_inf_m or 0.0)
-        less = f"{change:.1f} %".replace("-", "−")
+        less = f"{change:.1f} %".replace("-", "\N{MINUS SIGN}")
     notes = [note for flag, note in ((record.rolled_back, "rolled back"),
                                      (record.late_updates, "learning late")) if flag]  # fmt: skip
     values = (
@@ -191,7 +191,7 @@ def _row(record: IterationRecord, first: IterationRecord) -> str:
                            record.contour_inf_m, record.contour_rms_m)),
         less,
         str(record.overruns),
-        "–" if record.update_ms is None else f"{record.update_ms:.2f}",
+        "-" if record.update_ms is None else f"{record.update_ms:.2f}",
         ", ".join(notes),
     )  # fmt: skip
     return "<tr>" + "".join(f"<td>{html.escape(value)}</td>" for value in values) + "</tr>"
@@ -251,4 +251,4 @@ def _warning(result: CampaignResult) -> str:
 
 def _percent(before: float, after: float) -> str:
     change = reduction(before, after)
-    return f"−{change:.1f} %" if change >= 0 else f"+{-change:.1f} %"
+    return f"\N{MINUS SIGN}{change:.1f} %" if change >= 0 else f"+{-change:.1f} %"

@@ -238,10 +238,10 @@ def micrometres(length_m: float | None) -> str:
     Examples
     --------
     >>> micrometres(1.23456e-3), micrometres(4.5678e-6), micrometres(None)
-    ('1235', '4.57', '–')
+    ('1235', '4.57', '-')
     """
     if length_m is None:
-        return "–"
+        return "-"
     value = length_m * 1e6
     if abs(value) >= 100:
         return f"{value:.0f}"
