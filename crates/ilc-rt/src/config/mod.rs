@@ -9,8 +9,8 @@ mod program;
 mod validate;
 
 pub use cell::{
-    Axis, AxisModel, AxisSimulation, BusSection, Cell, CellSection, Interface, Limits, PositionLoop,
-    Safety, Simulation, TcpEncoder, Telemetry,
+    Axis, AxisModel, AxisSimulation, BusSection, Cell, CellSection, Interface, Limits,
+    PositionLoop, Safety, Simulation, TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
 pub use program::{

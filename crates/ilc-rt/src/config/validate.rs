@@ -58,7 +58,12 @@ pub(super) fn check(cell: &Cell) -> Result<(), ConfigError> {
     }
     if let Some(tcp) = &cell.tcp_encoder {
         v.range("[tcp_encoder] counts_per_m", tcp.counts_per_m, 1.0, 1e10)?;
-        v.that(cell.axes.len() <= 2, "[tcp_encoder] node", &tcp.node, "at most 2 axes: one frame holds two coordinates")?;
+        v.that(
+            cell.axes.len() <= 2,
+            "[tcp_encoder] node",
+            &tcp.node,
+            "at most 2 axes: one frame holds two coordinates",
+        )?;
     }
     check_program(cell, &v)?;
     check_learning(cell, &v)?;
@@ -69,7 +74,7 @@ pub(super) fn check(cell: &Cell) -> Result<(), ConfigError> {
     v.range("[simulation] orthogonality_rad", simulation.orthogonality_rad, -0.1, 0.1)?;
     v.range("[simulation] encoder_noise_m", simulation.encoder_noise_m, 0.0, 1e-3)?;
     v.that(
-        simulation.step_us > 0 && cell.cell.cycle_us % simulation.step_us == 0,
+        cell.cell.cycle_us.is_multiple_of(simulation.step_us),
         "[simulation] step_us",
         &simulation.step_us,
         "a divisor of [cell] cycle_us",
@@ -83,7 +88,11 @@ fn nodes(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     for (node, key) in axes.chain(tcp) {
         v.that((1..=NODE_MAX).contains(&node), &key, &node, "1 to 127")?;
         if let Some((_, other)) = taken.iter().find(|(seen, _)| *seen == node) {
-            return Err(v.refuse(&key, &node, &format!("a number of its own; {other} has it already")));
+            return Err(v.refuse(
+                &key,
+                &node,
+                &format!("a number of its own; {other} has it already"),
+            ));
         }
         taken.push((node, key));
     }
@@ -141,24 +150,43 @@ fn check_axis(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
         let key = at(&format!("model.{key}"));
         match value {
             Some(value) => v.range(&key, value, low, high)?,
-            None => return Err(v.refuse(&key, &"missing", &format!("{low} to {high} for this interface"))),
+            None => {
+                return Err(v.refuse(
+                    &key,
+                    &"missing",
+                    &format!("{low} to {high} for this interface"),
+                ));
+            }
         }
     }
     for (key, value) in unwanted {
         if let Some(value) = value {
-            return Err(v.refuse(&at(&format!("model.{key}")), &value, "not used by this interface; remove it"));
+            return Err(v.refuse(
+                &at(&format!("model.{key}")),
+                &value,
+                "not used by this interface; remove it",
+            ));
         }
     }
     match (axis.interface, &axis.position_loop) {
-        (Interface::Csv, None) => {
-            Err(v.refuse(&at("position_loop"), &"missing", "interface \"csv\" needs [axis.position_loop] gain_per_s"))
-        }
-        (Interface::Csp, Some(_)) => {
-            Err(v.refuse(&at("position_loop"), &"given", "interface \"csp\" has its position loop in the drive; remove it"))
-        }
+        (Interface::Csv, None) => Err(v.refuse(
+            &at("position_loop"),
+            &"missing",
+            "interface \"csv\" needs [axis.position_loop] gain_per_s",
+        )),
+        (Interface::Csp, Some(_)) => Err(v.refuse(
+            &at("position_loop"),
+            &"given",
+            "interface \"csp\" has its position loop in the drive; remove it",
+        )),
         (Interface::Csv, Some(position_loop)) => {
             v.range(&at("position_loop.gain_per_s"), position_loop.gain_per_s, 0.01, 1e3)?;
-            v.range(&at("position_loop.velocity_feedforward"), position_loop.velocity_feedforward, 0.0, 1.0)
+            v.range(
+                &at("position_loop.velocity_feedforward"),
+                position_loop.velocity_feedforward,
+                0.0,
+                1.0,
+            )
         }
         (Interface::Csp, None) => Ok(()),
     }?;
@@ -174,7 +202,12 @@ fn check_axis(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
     v.range(&at("simulation.mode_mass_kg"), s.mode_mass_kg, 0.0, 0.9 * s.mass_kg)?;
     v.range(&at("simulation.mode_frequency_hz"), s.mode_frequency_hz, 0.1, 1e3)?;
     v.range(&at("simulation.mode_damping"), s.mode_damping, 0.0, 2.0)?;
-    v.range(&at("simulation.position_start_m"), s.position_start_m, l.position_min_m, l.position_max_m)
+    v.range(
+        &at("simulation.position_start_m"),
+        s.position_start_m,
+        l.position_min_m,
+        l.position_max_m,
+    )
 }
 
 fn check_program(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {

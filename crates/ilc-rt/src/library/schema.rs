@@ -1,0 +1,44 @@
+//! The tables, and how they come to be.
+
+/// Version of the schema, in SQLite's `user_version`.
+pub(super) const VERSION: i64 = 1;
+
+/// Arrays are little-endian float64, time first; times are UTC in ISO 8601.
+pub(super) const CREATE: &str = "
+CREATE TABLE IF NOT EXISTS iteration (
+    id              INTEGER PRIMARY KEY,
+    created_utc     TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
+    cell            TEXT NOT NULL,
+    campaign        TEXT NOT NULL,
+    fingerprint     TEXT NOT NULL,
+    iteration       INTEGER NOT NULL,
+    program         TEXT NOT NULL,
+    law             TEXT NOT NULL,
+    law_parameters  TEXT NOT NULL,
+    measure         TEXT NOT NULL,
+    cycle_s         REAL NOT NULL,
+    n_axes          INTEGER NOT NULL,
+    n_samples       INTEGER NOT NULL,
+    reference_m     BLOB NOT NULL,
+    disturbance     BLOB,
+    input           BLOB NOT NULL,
+    encoder_m       BLOB NOT NULL,
+    tool_m          BLOB,
+    error_m         BLOB NOT NULL,
+    contour_m       BLOB NOT NULL,
+    digest          TEXT NOT NULL,
+    tracking_inf_m          REAL NOT NULL,
+    tracking_rms_m          REAL NOT NULL,
+    contour_inf_m           REAL NOT NULL,
+    contour_rms_m           REAL NOT NULL,
+    encoder_tracking_inf_m  REAL NOT NULL,
+    tool_tracking_inf_m     REAL,
+    overruns                INTEGER NOT NULL,
+    missing_samples         INTEGER NOT NULL,
+    late_updates            INTEGER NOT NULL,
+    update_ms               REAL NOT NULL,
+    rolled_back             INTEGER NOT NULL,
+    UNIQUE (campaign, iteration)
+);
+CREATE INDEX IF NOT EXISTS iteration_by_fingerprint ON iteration (fingerprint, id);
+";

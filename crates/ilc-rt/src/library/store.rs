@@ -1,0 +1,369 @@
+//! Appending and reading iterations.
+
+use std::path::Path;
+use std::time::Duration;
+
+use rusqlite::{Connection, OptionalExtension, params};
+
+use super::schema;
+use crate::record::{Figures, IterationRecord, Meta};
+
+/// How long to wait for another process that is writing.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// An open iteration library.
+#[derive(Debug)]
+pub struct Library {
+    connection: Connection,
+    path: String,
+}
+
+/// One kept run with its provenance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Key in the library.
+    pub id: i64,
+    /// When it was appended, UTC.
+    pub created_utc: String,
+    /// Where it comes from.
+    pub meta: Meta,
+    /// SHA-256 of the arrays, as they were appended.
+    pub digest: String,
+    /// Samples in the run.
+    pub n_samples: usize,
+    /// Arrays and figures; the arrays are empty in listings.
+    pub record: IterationRecord,
+}
+
+/// Why the library could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LibraryError {
+    /// SQLite refused.
+    #[error("library {path}: {source}")]
+    Sqlite {
+        /// File.
+        path: String,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+    /// The file was written by another version of this program.
+    #[error("library {path}: schema version {found}; this program reads version {expected}")]
+    Version {
+        /// File.
+        path: String,
+        /// Version in the file.
+        found: i64,
+        /// Version of this program.
+        expected: i64,
+    },
+    /// There is no such row.
+    #[error("library {path}: no iteration with id {id}")]
+    NoSuchRow {
+        /// File.
+        path: String,
+        /// Key asked for.
+        id: i64,
+    },
+    /// The stored arrays do not have the digest that was stored with them.
+    #[error("library {path}: iteration {id} is damaged: its arrays do not match its digest")]
+    Damaged {
+        /// File.
+        path: String,
+        /// Key of the row.
+        id: i64,
+    },
+}
+
+const COLUMNS: &str = "id, created_utc, cell, campaign, fingerprint, iteration, program, law, \
+    law_parameters, measure, cycle_s, n_axes, n_samples, digest, tracking_inf_m, tracking_rms_m, \
+    contour_inf_m, contour_rms_m, encoder_tracking_inf_m, tool_tracking_inf_m, overruns, \
+    missing_samples, late_updates, update_ms, rolled_back";
+
+const ARRAYS: &str = "reference_m, input, encoder_m, tool_m, error_m, contour_m";
+
+impl Library {
+    /// Opens a library, creating file and tables if they are not there.
+    ///
+    /// # Errors
+    /// [`LibraryError::Sqlite`] if the file cannot be opened or is no library;
+    /// [`LibraryError::Version`] if it has another version.
+    pub fn open(path: &Path) -> Result<Self, LibraryError> {
+        let name = path.display().to_string();
+        let fail = |source| LibraryError::Sqlite { path: name.clone(), source };
+        let connection = Connection::open(path).map_err(fail)?;
+        connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
+        connection.pragma_update(None, "journal_mode", "WAL").map_err(fail)?;
+        // FULL: an appended run survives not only a kill but a power cut.
+        connection.pragma_update(None, "synchronous", "FULL").map_err(fail)?;
+        let found: i64 =
+            connection.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fail)?;
+        match found {
+            0 => {
+                connection.execute_batch(schema::CREATE).map_err(fail)?;
+                connection.pragma_update(None, "user_version", schema::VERSION).map_err(fail)?;
+            }
+            schema::VERSION => {}
+            found => {
+                return Err(LibraryError::Version { path: name, found, expected: schema::VERSION });
+            }
+        }
+        Ok(Self { connection, path: name })
+    }
+
+    /// Opens a library in memory, which is gone when dropped.
+    ///
+    /// # Errors
+    /// [`LibraryError::Sqlite`] if SQLite refuses.
+    pub fn in_memory() -> Result<Self, LibraryError> {
+        Self::open(Path::new(":memory:"))
+    }
+
+    /// Keeps one run and returns its key.
+    ///
+    /// # Errors
+    /// [`LibraryError::Sqlite`], also if the campaign has a run of this number already.
+    pub fn append(&self, meta: &Meta, record: &IterationRecord) -> Result<i64, LibraryError> {
+        let f = &record.figures;
+        let n_samples = record.contour_m.len();
+        let statement = "INSERT INTO iteration (cell, campaign, fingerprint, iteration, program, \
+            law, law_parameters, measure, cycle_s, n_axes, n_samples, reference_m, input, \
+            encoder_m, tool_m, error_m, contour_m, digest, tracking_inf_m, tracking_rms_m, \
+            contour_inf_m, contour_rms_m, encoder_tracking_inf_m, tool_tracking_inf_m, overruns, \
+            missing_samples, late_updates, update_ms, rolled_back) VALUES (?1, ?2, ?3, ?4, ?5, \
+            ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22, ?23, \
+            ?24, ?25, ?26, ?27, ?28, ?29)";
+        let tool = (!record.tool_m.is_empty()).then(|| blob(&record.tool_m));
+        self.connection
+            .prepare_cached(statement)
+            .and_then(|mut insert| {
+                insert.insert(params![
+                    meta.cell,
+                    meta.campaign,
+                    meta.fingerprint,
+                    record.index,
+                    meta.program,
+                    meta.law,
+                    meta.law_parameters,
+                    meta.measure,
+                    meta.cycle_s,
+                    as_integer(meta.n_axes),
+                    as_integer(n_samples),
+                    blob(&record.reference_m),
+                    blob(&record.input),
+                    blob(&record.encoder_m),
+                    tool,
+                    blob(&record.error_m),
+                    blob(&record.contour_m),
+                    record.digest(),
+                    f.tracking_inf_m,
+                    f.tracking_rms_m,
+                    f.contour_inf_m,
+                    f.contour_rms_m,
+                    f.encoder_tracking_inf_m,
+                    f.tool_tracking_inf_m,
+                    f.overruns,
+                    f.missing_samples,
+                    f.late_updates,
+                    f.update_ms,
+                    f.rolled_back,
+                ])
+            })
+            .map_err(|source| self.fail(source))
+    }
+
+    /// Lists the runs kept, oldest first, without their arrays; of one campaign if asked.
+    ///
+    /// # Errors
+    /// [`LibraryError::Sqlite`] if the file cannot be read.
+    pub fn list(&self, campaign: Option<&str>) -> Result<Vec<Row>, LibraryError> {
+        let query = format!(
+            "SELECT {COLUMNS} FROM iteration WHERE ?1 IS NULL OR campaign = ?1 ORDER BY id"
+        );
+        let mut statement = self.connection.prepare(&query).map_err(|e| self.fail(e))?;
+        let rows = statement.query_map([campaign], |row| read_row(row, false));
+        rows.and_then(Iterator::collect).map_err(|source| self.fail(source))
+    }
+
+    /// Reads one run with its arrays, and checks them against their digest.
+    ///
+    /// # Errors
+    /// [`LibraryError::NoSuchRow`]; [`LibraryError::Damaged`] if the digest does not match.
+    pub fn load(&self, id: i64) -> Result<Row, LibraryError> {
+        let query = format!("SELECT {COLUMNS}, {ARRAYS} FROM iteration WHERE id = ?1");
+        let row = self
+            .connection
+            .query_row(&query, [id], |row| read_row(row, true))
+            .optional()
+            .map_err(|source| self.fail(source))?
+            .ok_or_else(|| LibraryError::NoSuchRow { path: self.path.clone(), id })?;
+        if row.record.digest() != row.digest {
+            return Err(LibraryError::Damaged { path: self.path.clone(), id });
+        }
+        Ok(row)
+    }
+
+    /// Returns the name of the newest campaign with this fingerprint, if there is one.
+    ///
+    /// # Errors
+    /// [`LibraryError::Sqlite`] if the file cannot be read.
+    pub fn newest_campaign(&self, fingerprint: &str) -> Result<Option<String>, LibraryError> {
+        self.connection
+            .query_row(
+                "SELECT campaign FROM iteration WHERE fingerprint = ?1 ORDER BY id DESC LIMIT 1",
+                [fingerprint],
+                |row| row.get(0),
+            )
+            .optional()
+            .map_err(|source| self.fail(source))
+    }
+
+    fn fail(&self, source: rusqlite::Error) -> LibraryError {
+        LibraryError::Sqlite { path: self.path.clone(), source }
+    }
+}
+
+fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row> {
+    let count = |name: &str| row.get::<_, i64>(name).map(|n| usize::try_from(n).unwrap_or(0));
+    let array = |name: &str| -> rusqlite::Result<Vec<f64>> {
+        if with_arrays {
+            Ok(floats(&row.get::<_, Option<Vec<u8>>>(name)?.unwrap_or_default()))
+        } else {
+            Ok(Vec::new())
+        }
+    };
+    Ok(Row {
+        id: row.get("id")?,
+        created_utc: row.get("created_utc")?,
+        meta: Meta {
+            cell: row.get("cell")?,
+            campaign: row.get("campaign")?,
+            fingerprint: row.get("fingerprint")?,
+            law: row.get("law")?,
+            law_parameters: row.get("law_parameters")?,
+            measure: row.get("measure")?,
+            program: row.get("program")?,
+            cycle_s: row.get("cycle_s")?,
+            n_axes: count("n_axes")?,
+        },
+        digest: row.get("digest")?,
+        n_samples: count("n_samples")?,
+        record: IterationRecord {
+            index: row.get("iteration")?,
+            reference_m: array("reference_m")?,
+            input: array("input")?,
+            encoder_m: array("encoder_m")?,
+            tool_m: array("tool_m")?,
+            error_m: array("error_m")?,
+            contour_m: array("contour_m")?,
+            figures: Figures {
+                tracking_inf_m: row.get("tracking_inf_m")?,
+                tracking_rms_m: row.get("tracking_rms_m")?,
+                contour_inf_m: row.get("contour_inf_m")?,
+                contour_rms_m: row.get("contour_rms_m")?,
+                encoder_tracking_inf_m: row.get("encoder_tracking_inf_m")?,
+                tool_tracking_inf_m: row.get("tool_tracking_inf_m")?,
+                overruns: row.get("overruns")?,
+                missing_samples: row.get("missing_samples")?,
+                late_updates: row.get("late_updates")?,
+                update_ms: row.get("update_ms")?,
+                rolled_back: row.get("rolled_back")?,
+            },
+        },
+    })
+}
+
+fn as_integer(count: usize) -> i64 {
+    i64::try_from(count).unwrap_or(i64::MAX)
+}
+
+fn blob(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+fn floats(bytes: &[u8]) -> Vec<f64> {
+    let mut word = [0; 8];
+    bytes
+        .chunks_exact(8)
+        .map(|chunk| {
+            word.copy_from_slice(chunk);
+            f64::from_le_bytes(word)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn meta(campaign: &str) -> Meta {
+        Meta {
+            cell: "gantry".into(),
+            campaign: campaign.into(),
+            fingerprint: "f".into(),
+            law: "norm_optimal".into(),
+            law_parameters: "{}".into(),
+            measure: "tcp".into(),
+            program: "[]".into(),
+            cycle_s: 0.002,
+            n_axes: 2,
+        }
+    }
+
+    fn record(index: u32) -> IterationRecord {
+        IterationRecord {
+            index,
+            reference_m: vec![1.0, 2.0, 3.0, 4.0],
+            input: vec![0.0, -0.0, f64::MIN_POSITIVE, 1e300],
+            encoder_m: vec![0.1; 4],
+            tool_m: vec![0.2; 4],
+            error_m: vec![0.3; 4],
+            contour_m: vec![0.4; 2],
+            figures: Figures { update_ms: 0.5, rolled_back: true, ..Default::default() },
+        }
+    }
+
+    #[test]
+    fn what_was_appended_is_read_back_bit_by_bit() {
+        let library = Library::in_memory().unwrap();
+        let id = library.append(&meta("a"), &record(0)).unwrap();
+        let row = library.load(id).unwrap();
+        assert_eq!(row.record, record(0));
+        assert_eq!(row.meta, meta("a"));
+        assert_eq!(row.n_samples, 2);
+    }
+
+    #[test]
+    fn a_run_cannot_be_kept_twice() {
+        let library = Library::in_memory().unwrap();
+        library.append(&meta("a"), &record(0)).unwrap();
+        assert!(library.append(&meta("a"), &record(0)).is_err());
+        assert_eq!(library.list(Some("a")).unwrap().len(), 1);
+        assert!(library.list(Some("b")).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_flipped_bit_is_noticed() {
+        let library = Library::in_memory().unwrap();
+        let id = library.append(&meta("a"), &record(0)).unwrap();
+        library.connection.execute("UPDATE iteration SET input = zeroblob(32)", []).unwrap();
+        assert!(matches!(library.load(id), Err(LibraryError::Damaged { .. })));
+    }
+
+    #[test]
+    fn the_newest_campaign_is_found_by_fingerprint() {
+        let library = Library::in_memory().unwrap();
+        library.append(&meta("a"), &record(0)).unwrap();
+        library.append(&meta("b"), &record(0)).unwrap();
+        assert_eq!(library.newest_campaign("f").unwrap().as_deref(), Some("b"));
+        assert_eq!(library.newest_campaign("g").unwrap(), None);
+    }
+
+    #[test]
+    fn a_file_that_is_no_library_is_refused() {
+        let path = std::env::temp_dir().join(format!("ilc-not-a-library-{}", std::process::id()));
+        std::fs::write(&path, "this is no database, it only looks like a file").unwrap();
+        let refused = Library::open(&path);
+        std::fs::remove_file(&path).unwrap();
+        assert!(refused.unwrap_err().to_string().contains("not a database"));
+    }
+}

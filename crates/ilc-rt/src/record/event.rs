@@ -1,0 +1,122 @@
+//! What a running campaign tells the world: the same objects on standard output and on Zenoh.
+
+use serde::Serialize;
+
+use super::figures::Figures;
+use crate::rt::{LatencyFigures, RtReport};
+
+/// One thing that happened; JSON with the field `event` naming it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum Event {
+    /// A campaign begins.
+    Start {
+        /// Name of the cell.
+        cell: String,
+        /// Identifier of the campaign in the library.
+        campaign: String,
+        /// Samples in a run.
+        n_samples: usize,
+        /// Number of axes.
+        n_axes: usize,
+        /// Their names.
+        axis_names: Vec<String>,
+        /// Servo cycle.
+        cycle_s: f64,
+        /// Number of the first run to come; above 0 when resumed.
+        first_index: u32,
+        /// Runs in the whole campaign.
+        iterations: u32,
+        /// Measurement learned from.
+        measure: String,
+        /// Law.
+        law: String,
+        /// Bus address.
+        bus: String,
+        /// `realtime` or `lockstep`.
+        mode: &'static str,
+        /// What the system granted the loop; absent in lock-step.
+        rt: Option<RtReport>,
+    },
+    /// The cell entered a state.
+    State {
+        /// The state.
+        state: StateName,
+        /// The run it belongs to.
+        iteration: u32,
+    },
+    /// Where the running run is; about ten a second.
+    Progress {
+        /// Number of the run.
+        iteration: u32,
+        /// Sample reached.
+        sample: usize,
+        /// Samples in a run.
+        n_samples: usize,
+    },
+    /// A run ended and is kept.
+    Iteration {
+        /// Row in the library.
+        id: i64,
+        /// Number of the run.
+        index: u32,
+        /// SHA-256 of its arrays.
+        digest: String,
+        /// Figures.
+        #[serde(flatten)]
+        figures: Figures,
+    },
+    /// Timing of the loop over the whole campaign; in real time only.
+    Latency {
+        /// How late the loop woke on its grid.
+        wake_late_us: LatencyFigures,
+        /// How long a tick took.
+        execution_us: LatencyFigures,
+    },
+    /// Something stopped the axes.
+    Fault {
+        /// One sentence.
+        reason: String,
+    },
+    /// The campaign is over and the axes are at rest.
+    End {
+        /// How.
+        status: EndStatus,
+        /// One sentence.
+        reason: String,
+        /// Runs kept in the whole campaign.
+        iterations: u32,
+    },
+}
+
+/// States of a cell as others see them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StateName {
+    /// Nodes are reset, checked and configured.
+    BringingUp,
+    /// Drives are switched on, holding their position.
+    Enabling,
+    /// Axes go to the start.
+    Returning,
+    /// Axes rest at the start.
+    Settling,
+    /// A run is on.
+    Running,
+    /// Axes are brought to rest ahead of time.
+    Stopping,
+    /// Drives are off.
+    Stopped,
+}
+
+/// How a campaign ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EndStatus {
+    /// All runs were made.
+    Completed,
+    /// It was asked to stop.
+    Interrupted,
+    /// A fault stopped it.
+    Fault,
+}
