@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -16,7 +17,7 @@ from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Generator, Iterator
 
     import numpy as np
     from numpy.typing import NDArray
@@ -120,11 +121,12 @@ class Campaign:
         KeyboardInterrupt
             After Ctrl-C, when the axes are at rest; a second Ctrl-C at once.
         """
-        for event in self.events(iterations):
-            if isinstance(event, IterationEvent):
-                yield self.result.records[-1]
+        with closing(self.events(iterations)) as events:
+            for event in events:
+                if isinstance(event, IterationEvent):
+                    yield self.result.records[-1]
 
-    def events(self, iterations: int) -> Iterator[Event]:
+    def events(self, iterations: int) -> Generator[Event, None, None]:
         """Run the program and yield every event of the controller.
 
         Leaving the loop early stops the axes in a controlled way before this

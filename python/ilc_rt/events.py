@@ -42,7 +42,11 @@ class Histogram:
 
 @dataclass(frozen=True, slots=True)
 class StartEvent:
-    """The campaign begins; everything that stays the same while it lasts."""
+    """The campaign begins; everything that stays the same while it lasts.
+
+    `iterations` counts all runs of the campaign, also those before
+    `first_index` that a resumed one has behind it.
+    """
 
     name: ClassVar[str] = "start"
     cell: str
@@ -99,6 +103,7 @@ class IterationEvent:
     encoder_tracking_inf_m: float | None = None
     tool_tracking_inf_m: float | None = None
     overruns: int = 0
+    missing_samples: int = 0
     late_updates: int = 0
     update_ms: float | None = None
     rolled_back: bool = False

@@ -206,7 +206,7 @@ def _contour_panel(
     names: tuple[str, ...],
     extent_m: float,
 ) -> None:
-    deviations = {record.id: path_deviation(record.reference_m, measured(record))
+    deviations = {record.id: path_deviation(record.reference_m, record.tool_or_encoder_m)
                   for record in {r.id: r for r in (*records, widest)}.values()}  # fmt: skip
     scale_by = widest if widest in records else records[0]
     largest_m = float(np.linalg.norm(deviations[scale_by.id], axis=1).max())
@@ -234,7 +234,7 @@ def _round_down(value: float) -> float:
     if value <= 0.0:
         return 0.0
     decade = 10.0 ** float(np.floor(np.log10(value)))
-    return max(step * decade for step in (1, 2, 5) if step * decade <= value * 1.0001)
+    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= value * 1.0001)
 
 
 def _histogram_panel(axes: Axes, histogram: Histogram, colour: str, title: str) -> None:
@@ -262,11 +262,6 @@ def _histogram_panel(axes: Axes, histogram: Histogram, colour: str, title: str) 
         fontsize=9,
     )
     axes.set_ylabel("cycles")
-
-
-def measured(record: IterationRecord) -> Array:
-    """Return the positions that were learned from: reference less error."""
-    return record.reference_m - record.error_m
 
 
 def _minor_label(value: float, _position: int | None) -> str:

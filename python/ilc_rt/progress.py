@@ -88,7 +88,7 @@ class CampaignView:
     def show(self, event: Event, result: CampaignResult) -> None:
         """Show one event; `result` has taken it in already."""
         if isinstance(event, StartEvent):
-            self._last_index = event.first_index + event.iterations - 1
+            self._last_index = event.iterations - 1
             self._console.print(describe(event), soft_wrap=True)
             for note in event.rt.notes if event.rt else ():
                 self._console.print(f"note: {note}", style="yellow", soft_wrap=True)

@@ -28,6 +28,7 @@ FIGURES = (
     "encoder_tracking_inf_m",
     "tool_tracking_inf_m",
     "overruns",
+    "missing_samples",
     "late_updates",
     "update_ms",
     "rolled_back",
@@ -49,8 +50,9 @@ class IterationRecord:
         that is learned from.
     contour_inf_m, contour_rms_m : float or None
         Distance from the programmed path in m; None with a single axis.
-    overruns, late_updates : int
-        Servo cycles that took too long; learned inputs that came too late.
+    overruns, missing_samples, late_updates : int
+        Servo cycles that began too late; measurements that never arrived;
+        runs so far that repeated the old input because learning was late.
     update_ms : float or None
         How long the learning took.
 
@@ -72,6 +74,7 @@ class IterationRecord:
     encoder_tracking_inf_m: float | None = None
     tool_tracking_inf_m: float | None = None
     overruns: int = 0
+    missing_samples: int = 0
     late_updates: int = 0
     update_ms: float | None = None
     rolled_back: bool = False
@@ -122,6 +125,12 @@ class IterationRecord:
     def contour_m(self) -> NDArray[np.float64] | None:
         """Distance from the programmed path in m, shape (n_samples,), or None."""
         return self._optional("contour_m")
+
+    @property
+    def tool_or_encoder_m(self) -> NDArray[np.float64]:
+        """The tool where it is measured, else the encoders: what contour is of."""
+        tool = self.tool_m
+        return self.encoder_m if tool is None else tool
 
     @property
     def law_parameters(self) -> str:

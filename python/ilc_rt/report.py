@@ -152,7 +152,7 @@ def _tiles(result: CampaignResult) -> Iterator[str]:
     def tile(value: str, label: str, kind: str = "") -> str:
         return f'<div class="tile {kind}"><b>{html.escape(value)}</b><span>{label}</span></div>'
 
-    if first.contour_inf_m is not None and last.contour_inf_m is not None:
+    if first.contour_inf_m and last.contour_inf_m:
         yield tile(
             f"{micrometres(first.contour_inf_m)} → {micrometres(last.contour_inf_m)} µm",
             "largest contour error, first → last run", "main",

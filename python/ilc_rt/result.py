@@ -148,7 +148,7 @@ class CampaignResult:
             return "No run was completed."
         first, last = self.records[0], self.records[-1]
         runs = f"{len(self.records)} run{'s' if len(self.records) > 1 else ''}"
-        if first.contour_inf_m is not None and last.contour_inf_m is not None:
+        if first.contour_inf_m and last.contour_inf_m:
             what, before, after = "Contour error", first.contour_inf_m, last.contour_inf_m
         else:
             what, before, after = "Tracking error", first.tracking_inf_m, last.tracking_inf_m

@@ -27,10 +27,10 @@ HEAD = (
 
 def run_cells(record: IterationRecord, first: IterationRecord) -> tuple[str, ...]:
     """Return the cells of one run; `first` is what it is compared with."""
-    if first.contour_inf_m is None or record.contour_inf_m is None:
-        change = reduction(first.tracking_inf_m, record.tracking_inf_m)
-    else:
+    if first.contour_inf_m and record.contour_inf_m:
         change = reduction(first.contour_inf_m, record.contour_inf_m)
+    else:
+        change = reduction(first.tracking_inf_m, record.tracking_inf_m)
     return (
         str(record.index),
         micrometres(record.tracking_inf_m),
