@@ -234,7 +234,7 @@ def _round_down(value: float) -> float:
     if value <= 0.0:
         return 0.0
     decade = 10.0 ** float(np.floor(np.log10(value)))
-    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= value * 1.0001)
+    return float(max(s * decade for s in (1.0, 2.0, 5.0) if s * decade <= value * 1.0001))
 
 
 def _histogram_panel(axes: Axes, histogram: Histogram, colour: str, title: str) -> None:

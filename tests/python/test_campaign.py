@@ -261,7 +261,7 @@ def test_interrupting_stops_the_axes_before_the_drives(
     programs("ilc-rt", stopping_controller(START, ITERATION))
     campaign = Campaign(gantry, library=tmp_path / "l.db")
     seen = []
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt):  # noqa: PT012
         for event in campaign.events(5):
             seen.append(event)
             if event.name == "state":
@@ -296,7 +296,7 @@ def test_a_controller_that_will_not_stop_is_ended(
     programs("ilc-sim", GOOD_DRIVES)
     programs("ilc-rt", "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + deaf)
     campaign = Campaign(gantry, library=tmp_path / "l.db")
-    with pytest.raises(CampaignError, match="did not stop in time"):
+    with pytest.raises(CampaignError, match="did not stop in time"):  # noqa: PT012
         for _ in campaign.run(5):
             campaign.interrupt()
     assert (tmp_path / "drives-end").exists()

@@ -44,13 +44,13 @@ class Page(HTMLParser):
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        """An element that closes itself."""
+        """Take in an element that closes itself."""
         self.handle_starttag(tag, attributes)
         if tag not in VOID:
             self.open.pop()
 
     def handle_endtag(self, tag: str) -> None:
-        """It must be the one that was opened last."""
+        """Check that it is the one that was opened last."""
         if tag not in VOID:
             assert self.open.pop() == tag
 

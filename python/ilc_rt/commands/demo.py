@@ -11,6 +11,7 @@ import typer
 from ilc_rt.campaign import Campaign
 from ilc_rt.commands.options import (
     DEFAULT_LIBRARY_FILE,
+    REPORT_NAME,
     Bus,
     Iterations,
     JsonFile,
@@ -18,7 +19,6 @@ from ilc_rt.commands.options import (
     Lockstep,
 )
 from ilc_rt.commands.run import carry_out
-from ilc_rt.report import REPORT_NAME
 
 ReportFile = Annotated[Path, typer.Option("--report", metavar="PATH", help="The HTML report.")]
 

@@ -54,4 +54,5 @@ JsonFile = Annotated[
     Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to this file.")
 ]
 LibraryArgument = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Library file.")]
+REPORT_NAME = "ilc-report.html"
 DEFAULT_LIBRARY_FILE = Path(DEFAULT_LIBRARY)

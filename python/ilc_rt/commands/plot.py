@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import matplotlib as mpl
 import typer
 
-from ilc_rt import plots
-from ilc_rt.commands.options import LibraryArgument  # noqa: TC001 (typer reads it)
+from ilc_rt.commands.options import (
+    REPORT_NAME,
+    LibraryArgument,
+)
 from ilc_rt.errors import BadInputError
-from ilc_rt.report import REPORT_NAME, write_report
 from ilc_rt.result import CampaignResult
 
 CampaignOption = Annotated[
@@ -31,6 +31,12 @@ def plot(
     Example: ilc plot ilc-library.db --out pictures/
     """
     result = CampaignResult.from_library(library, campaign)
+    # Here and not above: matplotlib takes its time, and bad input should not wait for it.
+    import matplotlib as mpl
+
+    from ilc_rt import plots
+    from ilc_rt.report import write_report
+
     typer.echo(result.sentence())
     if out.suffix == ".html":
         typer.echo(f"report: {write_report(result, out)}")

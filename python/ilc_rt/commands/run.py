@@ -21,7 +21,6 @@ from ilc_rt.commands.options import (
 )
 from ilc_rt.errors import CampaignError
 from ilc_rt.progress import CampaignView
-from ilc_rt.report import write_report
 
 ReportFile = Annotated[
     Path | None,
@@ -94,4 +93,7 @@ def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> N
         result.write_json(json_file)
         typer.echo(f"figures: {json_file}")
     if report is not None:
+        # Here and not above: matplotlib takes its time, and bad input should not wait for it.
+        from ilc_rt.report import write_report
+
         typer.echo(f"report:  {write_report(result, report)}")
