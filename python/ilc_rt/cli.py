@@ -56,7 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _say(error.reason)
         return error.exit_code
     except KeyboardInterrupt:
-        _say("stopped on request")
         return EXIT_INTERRUPTED
     except SystemExit as error:
         return error.code if isinstance(error.code, int) else EXIT_FAILURE

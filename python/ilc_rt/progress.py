@@ -67,7 +67,7 @@ class CampaignView:
             console=self._console,
         )
         self._task = self._bar.add_task("starting", total=1.0)
-        self._last_index = 0
+        self._runs = 0
         self._named = False
 
     def __enter__(self) -> Self:
@@ -88,15 +88,14 @@ class CampaignView:
     def show(self, event: Event, result: CampaignResult) -> None:
         """Show one event; `result` has taken it in already."""
         if isinstance(event, StartEvent):
-            self._last_index = event.iterations - 1
+            self._runs = event.iterations
             self._console.print(describe(event), soft_wrap=True)
             for note in event.rt.notes if event.rt else ():
                 self._console.print(f"note: {note}", style="yellow", soft_wrap=True)
         elif isinstance(event, StateEvent):
             words = WORDS.get(event.state, event.state.replace("_", " "))
-            run = (
-                "" if event.iteration is None else f"run {event.iteration} of {self._last_index}: "
-            )
+            index = event.iteration
+            run = "" if index is None else f"run {index} ({index + 1} of {self._runs}): "
             self._bar.reset(self._task, description=run + words)
         elif isinstance(event, ProgressEvent):
             self._bar.update(self._task, completed=event.sample / max(1, event.n_samples))

@@ -122,7 +122,7 @@ def test_ctrl_c_in_a_real_time_run_is_a_controlled_stop(gantry: Path, tmp_path: 
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
-    assert err.strip() == "ilc: stopped on request"
+    assert err.strip() == "ilc: stopped on request; the axes are at rest"
     assert "in 1 run" in out
     assert len(Library(str(tmp_path / "ilc-library.db")).list()) == 1
 
@@ -151,7 +151,7 @@ def test_a_terminal_gets_a_table_and_a_bar(gantry: Path, tmp_path: Path) -> None
     os.close(main)
     text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", said.decode())
     assert "max contour µm" in text
-    assert "run 1 of 1: running" in text
+    assert "run 1 (2 of 2): running" in text
     assert text.rstrip().splitlines()[-1].startswith("library: ")
 
 

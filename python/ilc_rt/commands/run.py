@@ -77,10 +77,12 @@ def carry_out(
         with CampaignView() as view:
             for event in campaign.events(iterations):
                 view.show(event, campaign.result)
-    except (CampaignError, KeyboardInterrupt, SystemExit):
+    except (CampaignError, KeyboardInterrupt, SystemExit) as stopped:
         if campaign.result.records:
             typer.echo(campaign.result.sentence())
             _write(campaign, json_file, report)
+        if not isinstance(stopped, CampaignError):
+            typer.echo("ilc: stopped on request; the axes are at rest", err=True)
         raise
     typer.echo(campaign.result.sentence())
     _write(campaign, json_file, report)
