@@ -190,7 +190,12 @@ fn check_axis(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
         }
         (Interface::Csp, None) => Ok(()),
     }?;
-    let s = &axis.simulation;
+    check_simulation(axis, v)
+}
+
+fn check_simulation(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
+    let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
+    let (s, l) = (&axis.simulation, &axis.limits);
     v.range(&at("simulation.mass_kg"), s.mass_kg, 1e-3, 1e5)?;
     v.range(&at("simulation.natural_frequency_hz"), s.natural_frequency_hz, 0.1, 1e3)?;
     v.range(&at("simulation.damping"), s.damping, 0.05, 5.0)?;

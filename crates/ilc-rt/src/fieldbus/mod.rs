@@ -8,6 +8,7 @@ pub mod bus;
 pub mod canopen;
 pub mod cia402;
 pub mod frame;
+pub mod load;
 pub mod transport;
 
 pub use bus::{Bus, BusError};

@@ -1,1 +1,40 @@
 //! Learning laws: from one run's error to the next run's input.
+//!
+//! This folder holds the [`Law`] trait, one law a file under [`law`], and the linear-time solver
+//! ([`sweep`]) that the optimal ones share. It runs between iterations, never in the tick;
+//! `config`, `supervisor` and the Python bindings may import it.
+
+mod error;
+pub mod law;
+pub mod sweep;
+
+pub use error::LearningError;
+
+/// A rule that turns the error of one run into the input of the next.
+///
+/// # Shapes
+/// - all signals time first, sample `k` of channel `i` at `k * n_channels + i`: `input` and `next`
+///   have `n_samples` x `n_inputs`, `error` has `n_samples` x `n_outputs`
+/// - `error[k] = reference[k] - measured[k]` on the grid of `input`: `input[k]` acts from sample `k`
+///   on and shows at `k + 1` at the earliest unless the axis has direct feedthrough. Each law pairs
+///   the samples by itself; nobody shifts anything beforehand.
+pub trait Law: Send {
+    /// Computes the input of the next run.
+    ///
+    /// # Real Time
+    /// Cold path, but allocates nothing: it may run while the axes return to the start.
+    /// # Errors
+    /// - [`LearningError::Length`] or [`LearningError::NotFinite`]; `next` is then not to be used.
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError>;
+
+    /// Forgets everything that earlier runs taught the law itself.
+    fn reset(&mut self);
+
+    /// Returns the law and its parameters as one line of JSON, for the record of the run.
+    fn describe(&self) -> String;
+}

@@ -1,1 +1,19 @@
-//! CiA 402 drive profile: states, objects, units and the bring-up of a drive.
+//! CiA 402 drive profile: states, objects, process data, units and the bring-up of a drive.
+//!
+//! What the servo cycle needs of a drive (hot) and what set-up needs (cold: [`bring_up`]); imported by
+//! `servo`, `supervisor` and the simulator. Imports `canopen` and the frame only.
+
+pub mod bring_up;
+pub mod mode;
+pub mod objects;
+pub mod pdo_map;
+pub mod state;
+pub mod units;
+
+pub use bring_up::{
+    BringUpError, DriveIdentity, DriveSetup, EncoderIdentity, bring_up, bring_up_encoder,
+};
+pub use mode::Mode;
+pub use pdo_map::{Command, EncoderSample, Extra, Status};
+pub use state::{Controlword, State, Statusword, next_command};
+pub use units::Scale;

@@ -1,0 +1,98 @@
+//! The border between SI units and the counts of a drive. Nothing else converts.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+/// Counts of a drive or encoder per SI unit; for positions (m) and velocities (m/s) alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    counts_per_m: f64,
+}
+
+impl Scale {
+    /// Returns the scale, or `None` unless `counts_per_m` is finite and above zero.
+    pub fn new(counts_per_m: f64) -> Option<Self> {
+        (counts_per_m.is_finite() && counts_per_m > 0.0).then_some(Self { counts_per_m })
+    }
+
+    /// Returns the nearest count of a position (m) or velocity (m/s).
+    ///
+    /// Values beyond 32 bits give the nearest end. Not a number gives `None`, never 0: zero is a
+    /// place, and a drive sent there moves.
+    pub fn to_counts(self, value_si: f64) -> Option<i32> {
+        if value_si.is_nan() {
+            return None;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "saturates, and not NaN here")]
+        Some((value_si * self.counts_per_m).round() as i32)
+    }
+
+    /// Returns the position (m) or velocity (m/s) of `counts`.
+    pub fn to_si(self, counts: i32) -> f64 {
+        f64::from(counts) / self.counts_per_m
+    }
+
+    /// Counts in one metre.
+    pub fn counts_per_m(self) -> f64 {
+        self.counts_per_m
+    }
+}
+
+/// Returns `value / rated` in thousandths, saturating at 16 bits; 0 if that is not a number, as no
+/// force is the safe feed-forward.
+pub fn per_mille(value: f64, rated: f64) -> i16 {
+    let ratio = value / rated * 1000.0;
+    #[expect(clippy::cast_possible_truncation, reason = "saturates; NaN gives 0, as documented")]
+    {
+        ratio.round() as i16
+    }
+}
+
+/// Returns the value of `thousandths` of `rated`.
+pub fn from_per_mille(thousandths: i16, rated: f64) -> f64 {
+    f64::from(thousandths) * 1e-3 * rated
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_macros,
+    clippy::disallowed_types,
+    reason = "tests are cold"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_to_the_nearest_count_and_saturates() {
+        let scale = Scale::new(1e8).unwrap();
+        assert_eq!(scale.to_counts(0.04), Some(4_000_000));
+        assert_eq!(scale.to_counts(-4.9e-9), Some(0));
+        assert_eq!(scale.to_counts(-5.1e-9), Some(-1));
+        assert_eq!(scale.to_counts(1e9), Some(i32::MAX));
+        assert_eq!(scale.to_counts(f64::NEG_INFINITY), Some(i32::MIN));
+        assert_eq!(scale.to_counts(f64::NAN), None);
+    }
+
+    #[test]
+    fn every_count_survives_the_way_there_and_back() {
+        let scale = Scale::new(123_456.789).unwrap();
+        for counts in [i32::MIN, -1, 0, 1, 77_777, i32::MAX] {
+            assert_eq!(scale.to_counts(scale.to_si(counts)), Some(counts));
+        }
+    }
+
+    #[test]
+    fn refuses_scales_that_are_no_scales() {
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Scale::new(bad).is_none());
+        }
+    }
+
+    #[test]
+    fn torque_is_in_thousandths() {
+        assert_eq!(per_mille(50.0, 200.0), 250);
+        assert_eq!(per_mille(1e9, 1.0), i16::MAX);
+        assert_eq!(per_mille(0.0, 0.0), 0);
+        assert!((from_per_mille(250, 200.0) - 50.0).abs() < 1e-12);
+    }
+}

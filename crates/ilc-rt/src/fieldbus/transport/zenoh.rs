@@ -1,0 +1,112 @@
+//! CAN frames on a Zenoh key expression.
+//!
+//! Each endpoint publishes under `KEY/<its own random id>` and subscribes to `KEY/*`; a frame is two
+//! bytes of identifier, little endian, and its payload. Zenoh never runs in the caller's thread: a ring
+//! buffer each way stands between. Unless the address names endpoints, sessions listen on the host's own
+//! address only: a simulated bus must not command somebody else's drives.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use std::fmt;
+use std::time::Duration;
+
+use rtrb::{Consumer, Producer};
+
+use super::super::bus::{Bus, BusError};
+use super::super::frame::{Frame, PAYLOAD_MAX};
+use super::doorbell::Bell;
+use super::error::OpenError;
+use super::wait::Deadline;
+use super::zenoh_link::{Ends, Link, Settings};
+
+/// Bytes of the identifier in front of the payload.
+const ID_BYTES: usize = 2;
+
+/// How long [`ZenohBus::open`] waits for an endpoint that the address says to connect to.
+const CONNECT_WAIT: Duration = Duration::from_secs(3);
+
+/// An endpoint on a Zenoh key expression.
+pub struct ZenohBus {
+    outgoing: Producer<Frame>,
+    incoming: Consumer<Frame>,
+    bell: Bell,
+    link: Link,
+}
+
+impl ZenohBus {
+    /// Opens a session of its own and joins the bus.
+    ///
+    /// If the settings name an endpoint to connect to, waits up to three seconds until somebody on the
+    /// other side listens to this bus, and goes on without if nobody does.
+    ///
+    /// # Real Time
+    /// Cold: starts threads.
+    /// # Errors
+    /// [`OpenError::Zenoh`] with the step that Zenoh refused, such as listening on an endpoint that is
+    /// taken.
+    pub fn open(settings: &Settings) -> Result<Self, OpenError> {
+        let Ends { outgoing, incoming, bell, link } = Link::open(settings)?;
+        let bus = Self { outgoing, incoming, bell, link };
+        if !settings.connect.is_empty() {
+            bus.wait_for_peer(CONNECT_WAIT);
+        }
+        Ok(bus)
+    }
+
+    /// Waits until another endpoint receives what is sent here; false if none did in time.
+    ///
+    /// # Real Time
+    /// Cold: sleeps.
+    pub fn wait_for_peer(&self, timeout: Duration) -> bool {
+        self.link.wait_for_peer(timeout)
+    }
+}
+
+impl Bus for ZenohBus {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        if self.outgoing.is_abandoned() {
+            return Err(BusError::Closed);
+        }
+        self.outgoing.push(*frame).map_err(|_| BusError::Full)?;
+        self.link.wake_publisher();
+        Ok(())
+    }
+
+    fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        let incoming = &mut self.incoming;
+        let mut take = || {
+            let abandoned = incoming.is_abandoned();
+            match incoming.pop() {
+                Ok(frame) => Ok(Some(frame)),
+                Err(_) if abandoned => Err(BusError::Closed),
+                Err(_) => Ok(None),
+            }
+        };
+        match take() {
+            Ok(None) if !timeout.is_zero() => self.bell.wait(Deadline::after(timeout), take),
+            taken => taken,
+        }
+    }
+}
+
+impl fmt::Debug for ZenohBus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ZenohBus").finish_non_exhaustive()
+    }
+}
+
+/// Returns the bytes of a frame on Zenoh and how many of them count.
+pub(super) fn encode(frame: &Frame) -> ([u8; ID_BYTES + PAYLOAD_MAX], usize) {
+    let mut bytes = [0; ID_BYTES + PAYLOAD_MAX];
+    let payload = frame.payload();
+    let len = ID_BYTES + payload.len();
+    bytes[..ID_BYTES].copy_from_slice(&frame.id().to_le_bytes());
+    bytes[ID_BYTES..len].copy_from_slice(payload);
+    (bytes, len)
+}
+
+/// Returns the frame in a sample, or `None` if there is none.
+pub(super) fn decode(bytes: &[u8]) -> Option<Frame> {
+    let (id, payload) = bytes.split_first_chunk::<ID_BYTES>()?;
+    Frame::new(u16::from_le_bytes(*id), payload)
+}

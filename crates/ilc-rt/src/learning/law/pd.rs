@@ -1,0 +1,212 @@
+//! Proportional-derivative learning with a low-pass filter.
+
+use crate::learning::error::check;
+use crate::learning::{Law, LearningError};
+use crate::signal::{Section, SosFilter, ZeroPhase};
+
+/// The numbers of a [`Pd`] law.
+///
+/// # Units
+/// - `kp`, `kd`: input units per error unit; `lead` in samples
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PdGains {
+    /// Proportional gain.
+    pub kp: f64,
+    /// Gain of the error's difference from one sample to the next.
+    pub kd: f64,
+    /// How many samples ahead the error is taken: the relative degree of the axis, 1 without delay.
+    pub lead: usize,
+}
+
+/// The filter through which the next input passes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum QFilter {
+    /// None: the law converges only where the model allows it.
+    None,
+    /// Forward and backward: no lag.
+    ZeroPhase(Vec<Section>),
+    /// Forward only: lags, shown for comparison.
+    Causal(Vec<Section>),
+}
+
+#[derive(Debug)]
+enum Runner {
+    None,
+    ZeroPhase(ZeroPhase),
+    Causal(SosFilter),
+}
+
+/// Proportional-derivative learning, each channel by itself.
+///
+/// `u_{j+1}[n] = Q (u_j[n] + kp e_j[n + lead] + kd (e_j[n + lead] - e_j[n + lead - 1]))`
+///
+/// Beyond the end of the run the error is held at its last value (and before its start at the first
+/// one), so the derivative part is zero there.
+///
+/// # Shapes
+/// - `input`, `error`, `next`: `n_samples` x `n_channels`
+/// # Real Time
+/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples n_channels)`.
+/// # Source
+/// - [haas2016], Eq. (4); [dimarco2016], Eq. (3.2).
+#[derive(Debug)]
+pub struct Pd {
+    gains: PdGains,
+    n_samples: usize,
+    n_channels: usize,
+    q_filter: QFilter,
+    runner: Runner,
+}
+
+impl Pd {
+    /// Makes the law for runs of `n_samples` samples of `n_channels` axes.
+    ///
+    /// # Errors
+    /// - [`LearningError::Parameter`] for a gain that is not finite.
+    /// - [`LearningError::Empty`] for no samples or no channels.
+    /// - [`LearningError::Signal`] if the run is too short for the zero-phase filter.
+    pub fn new(
+        gains: PdGains,
+        n_samples: usize,
+        n_channels: usize,
+        q_filter: QFilter,
+    ) -> Result<Self, LearningError> {
+        for (what, value) in [("kp", gains.kp), ("kd", gains.kd)] {
+            if !value.is_finite() {
+                let allowed = "a gain must be finite";
+                return Err(LearningError::Parameter { what, value, allowed });
+            }
+        }
+        for (what, count) in [("n_samples", n_samples), ("n_channels", n_channels)] {
+            if count == 0 {
+                return Err(LearningError::Empty { what });
+            }
+        }
+        let runner = match &q_filter {
+            QFilter::None => Runner::None,
+            QFilter::ZeroPhase(sections) => {
+                Runner::ZeroPhase(ZeroPhase::new(sections.clone(), n_samples)?)
+            }
+            QFilter::Causal(sections) => Runner::Causal(SosFilter::new(sections.clone())),
+        };
+        Ok(Self { gains, n_samples, n_channels, q_filter, runner })
+    }
+}
+
+impl Law for Pd {
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError> {
+        let (n_samples, n_channels) = (self.n_samples, self.n_channels);
+        check("input", input, n_samples, n_channels)?;
+        check("error", error, n_samples, n_channels)?;
+        if next.len() != input.len() {
+            let found = next.len();
+            return Err(LearningError::Length { what: "next", found, n_samples, n_channels });
+        }
+        let PdGains { kp, kd, lead } = self.gains;
+        let last = n_samples - 1;
+        for channel in 0..n_channels {
+            let at = |sample: usize| sample.min(last) * n_channels + channel;
+            for k in 0..n_samples {
+                let ahead = error[at(k.saturating_add(lead))];
+                let before = error[at(k.saturating_add(lead).saturating_sub(1))];
+                next[at(k)] = input[at(k)] + kp * ahead + kd * (ahead - before);
+            }
+            match &mut self.runner {
+                Runner::None => {}
+                Runner::ZeroPhase(filter) => filter.apply(next, channel, n_channels)?,
+                Runner::Causal(filter) => {
+                    filter.reset();
+                    for k in 0..n_samples {
+                        next[at(k)] = filter.step(next[at(k)]);
+                    }
+                }
+            }
+        }
+        check("next", next, n_samples, n_channels)
+    }
+
+    fn reset(&mut self) {
+        if let Runner::Causal(filter) = &mut self.runner {
+            filter.reset();
+        }
+    }
+
+    fn describe(&self) -> String {
+        let (filter, n_sections) = match &self.q_filter {
+            QFilter::None => ("none", 0),
+            QFilter::ZeroPhase(sections) => ("zero_phase", sections.len()),
+            QFilter::Causal(sections) => ("causal", sections.len()),
+        };
+        format!(
+            r#"{{"law":"pd","kp":{},"kd":{},"lead":{},"q_filter":"{filter}","q_sections":{n_sections},"n_samples":{},"n_channels":{}}}"#,
+            self.gains.kp, self.gains.kd, self.gains.lead, self.n_samples, self.n_channels
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::butterworth;
+
+    fn pd(kp: f64, kd: f64, lead: usize, n_channels: usize) -> Pd {
+        Pd::new(PdGains { kp, kd, lead }, 4, n_channels, QFilter::None).unwrap()
+    }
+
+    #[test]
+    fn the_equation_holds_sample_by_sample() {
+        let mut next = [0.0; 4];
+        let error = [1.0, 3.0, 7.0, 4.0];
+        pd(2.0, 10.0, 1, 1).update(&[100.0; 4], &error, &mut next).unwrap();
+        // Beyond the end the error stays 4 and its difference 0.
+        assert_eq!(next.to_vec(), [126.0, 154.0, 78.0, 108.0]);
+        pd(2.0, 10.0, 0, 1).update(&[0.0; 4], &error, &mut next).unwrap();
+        assert_eq!(next.to_vec(), [2.0, 26.0, 54.0, -22.0]);
+        pd(1.0, 0.0, 9, 1).update(&[0.0; 4], &error, &mut next).unwrap();
+        assert_eq!(next.to_vec(), [4.0; 4]);
+    }
+
+    #[test]
+    fn channels_do_not_mix() {
+        let mut next = [0.0; 8];
+        let error = [1.0, -1.0, 3.0, -3.0, 7.0, -7.0, 4.0, -4.0];
+        pd(2.0, 10.0, 1, 2).update(&[0.0; 8], &error, &mut next).unwrap();
+        for pair in next.chunks_exact(2) {
+            assert!((pair[0] + pair[1]).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_filter_removes_what_alternates() {
+        let gains = PdGains { kp: 0.0, kd: 0.0, lead: 1 };
+        let sections = butterworth(2, 20.0, 2e-3).unwrap();
+        let alternating: Vec<f64> = (0..200).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        for filter in [QFilter::ZeroPhase(sections.clone()), QFilter::Causal(sections)] {
+            let mut next = vec![0.0; 200];
+            let mut law = Pd::new(gains, 200, 1, filter).unwrap();
+            law.update(&alternating, &[0.0; 200], &mut next).unwrap();
+            assert!(next[80..120].iter().all(|value| value.abs() < 1e-3), "{:?}", law.describe());
+        }
+    }
+
+    #[test]
+    fn wrong_signals_are_refused_one_at_a_time() {
+        let mut law = pd(1.0, 1.0, 1, 1);
+        let mut next = [0.0; 4];
+        let line = law.update(&[0.0; 3], &[0.0; 4], &mut next).unwrap_err().to_string();
+        assert!(line.contains("input holds 3 values"), "{line}");
+        let line = law.update(&[0.0; 4], &[0.0; 5], &mut next).unwrap_err().to_string();
+        assert!(line.contains("error holds 5 values"), "{line}");
+        let error = [0.0, 0.0, f64::NAN, 0.0];
+        let line = law.update(&[0.0; 4], &error, &mut next).unwrap_err().to_string();
+        assert!(line.contains("error is NaN at sample 2, channel 0"), "{line}");
+        assert!(law.update(&[0.0; 4], &[0.0; 4], &mut [0.0; 3]).is_err());
+        let gains = PdGains { kp: f64::INFINITY, kd: 0.0, lead: 1 };
+        assert!(Pd::new(gains, 4, 1, QFilter::None).is_err());
+    }
+}

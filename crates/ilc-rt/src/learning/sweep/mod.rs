@@ -1,0 +1,61 @@
+//! The linear-time solver of the tracking problem behind every norm-optimal law.
+//!
+//! One backward and one forward sweep along the run solve exactly what textbooks write as a dense
+//! `N x N` system; the laws under [`super::law`] describe their stages here and import nothing else.
+//!
+//! With `v_k` the change of the input, `x_k` the deviation it causes (`x_0 = 0`) and `e_k` the error
+//! before it,
+//!
+//! `x_{k+1} = A x_k + B v_k`, `z_k = e_k - C x_k - D v_k`,
+//!
+//! `J = sum_k |z_k|^2_Q + |u_k + v_k|^2_S + |v_k|^2_R -> min`.
+//!
+//! [`Stages`] says what the matrices are at each sample, [`Gains`] are the result of the backward
+//! Riccati recursion (they depend on model and weights alone), and [`Sweep`] applies them to one
+//! run's input and error without allocating.
+
+mod cholesky;
+mod factor;
+mod general;
+mod single;
+mod stage;
+
+pub use factor::{FactorError, Gains};
+pub use general::General;
+pub use single::{MAX_STATES, single};
+pub use stage::{Rate, Stage, Stages};
+
+/// Where the signals of a solver lie among those of the whole machine.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Channels {
+    /// Index of each of its inputs.
+    pub inputs: Vec<usize>,
+    /// Index of each of its outputs.
+    pub outputs: Vec<usize>,
+    /// For each output, after how many samples it first answers to an input.
+    pub shifts: Vec<usize>,
+}
+
+/// The signals of one run, time first.
+#[derive(Debug)]
+pub struct Run<'a> {
+    /// Input of the run, `n_samples` x `n_inputs`.
+    pub input: &'a [f64],
+    /// Its error, `n_samples` x `n_outputs`.
+    pub error: &'a [f64],
+    /// Input of the next run, `n_samples` x `n_inputs`, written by the sweep.
+    pub next: &'a mut [f64],
+    /// Inputs of the whole machine.
+    pub n_inputs: usize,
+    /// Outputs of the whole machine.
+    pub n_outputs: usize,
+}
+
+/// Gains with their workspace: the two sweeps along a run.
+pub trait Sweep: Send + std::fmt::Debug {
+    /// Writes the next input of this solver's channels. The lengths in `run` must agree.
+    ///
+    /// # Real Time
+    /// Cold path. Allocates nothing; `O(n_samples)`.
+    fn solve(&mut self, run: &mut Run);
+}

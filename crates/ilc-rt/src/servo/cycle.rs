@@ -1,0 +1,203 @@
+//! One tick: receive, measure, control, add the learned input, limit, send.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::input::LearnedInput;
+use super::mailbox::{LoopSide, Message, Sample, StopReason, Table};
+use super::node::Drive;
+use super::phase::Phase;
+use super::slots::Slots;
+use super::spec::ServoSpec;
+use crate::fieldbus::Bus;
+use crate::fieldbus::cia402::Mode;
+use crate::rt::Nanos;
+use crate::trajectory::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
+
+/// Longest fade of the learned input after a run.
+const FADE_MAX_S: f64 = 0.2;
+
+/// Whether the loop has more to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TickStatus {
+    /// Tick on.
+    Running,
+    /// Drives are off, or lost; there is nothing more to do.
+    Stopped,
+}
+
+/// The servo cycle and all that it needs, sized when it is made.
+///
+/// # Real Time
+/// [`Cycle::tick`] allocates nothing, takes no lock, reads no clock and cannot panic.
+pub struct Cycle {
+    pub(super) bus: Box<dyn Bus>,
+    pub(super) spec: ServoSpec,
+    pub(super) mail: LoopSide,
+    pub(super) drives: [Drive; MAX_AXES],
+    pub(super) tool_m: [f64; MAX_AXES],
+    pub(super) slots: Slots,
+    pub(super) interpolator: Interpolator,
+    pub(super) input: LearnedInput,
+    pub(super) phase: Phase,
+    pub(super) reference: Setpoint,
+    /// The last three position commands of each axis, newest first: where a stop has to begin.
+    pub(super) commanded_m: [[f64; MAX_AXES]; 3],
+    pub(super) run: u32,
+    pub(super) overrun_streak: u32,
+    pub(super) run_overruns: u32,
+    pub(super) stopping: Option<StopReason>,
+    pub(super) limits: [AxisLimits; MAX_AXES],
+    pub(super) start_m: [f64; MAX_AXES],
+    table: Table,
+}
+
+impl std::fmt::Debug for Cycle {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Cycle")
+            .field("phase", &self.phase.name())
+            .field("run", &self.run)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Cycle {
+    /// Makes the cycle on a bus whose nodes have been brought up. Cold.
+    ///
+    /// # Shapes
+    /// - `spec.axes`, `spec.start_m`: one entry for each axis of `interpolator`
+    pub fn new(
+        bus: Box<dyn Bus>,
+        spec: ServoSpec,
+        interpolator: Interpolator,
+        mail: LoopSide,
+    ) -> Self {
+        let dt_s = spec.cycle.as_secs_f64();
+        let n_axes = spec.axes.len();
+        let (mut most, mut step_max) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
+        let mut limits =
+            [AxisLimits { velocity_max_m_s: 1.0, acceleration_max_m_s2: 1.0, jerk_max_m_s3: 1.0 };
+                MAX_AXES];
+        let mut start_m = [0.0; MAX_AXES];
+        for (i, axis) in spec.axes.iter().enumerate().take(MAX_AXES) {
+            most[i] = axis.input_max;
+            step_max[i] = match axis.mode {
+                Mode::Csp => axis.limits.velocity_max_m_s * dt_s,
+                Mode::Csv => axis.limits.acceleration_max_m_s2 * dt_s,
+            };
+            limits[i] = axis.limits;
+            start_m[i] = spec.start_m.get(i).copied().unwrap_or(0.0);
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "small, positive"
+        )]
+        let fade_ticks = ((FADE_MAX_S / dt_s) as u32).min(spec.settle_ticks / 2).max(1);
+        Self {
+            bus,
+            mail,
+            drives: [Drive::default(); MAX_AXES],
+            tool_m: [0.0; MAX_AXES],
+            slots: Slots::new(n_axes + usize::from(spec.tool.is_some())),
+            interpolator,
+            input: LearnedInput::new(most, step_max, fade_ticks),
+            phase: Phase::Enabling { ticks: 0 },
+            reference: Setpoint {
+                position_m: [0.0; MAX_AXES],
+                velocity_m_s: [0.0; MAX_AXES],
+                done: false,
+            },
+            commanded_m: [[0.0; MAX_AXES]; 3],
+            run: spec.runs.start,
+            overrun_streak: 0,
+            run_overruns: 0,
+            stopping: None,
+            limits,
+            start_m,
+            table: Table { number: 0, input: Box::default() },
+            spec,
+        }
+    }
+
+    /// The servo cycle.
+    pub fn period(&self) -> Nanos {
+        self.spec.cycle
+    }
+
+    /// One servo cycle; `missed` cycles before it were skipped because it came too late.
+    pub fn tick(&mut self, missed: u32) -> TickStatus {
+        if missed > 0 {
+            self.overrun_streak = self.overrun_streak.saturating_add(missed);
+            self.run_overruns = self.run_overruns.saturating_add(missed);
+        } else {
+            self.overrun_streak = 0;
+        }
+        let received = self.receive();
+        self.give_out();
+        let fault = received.err().or_else(|| self.find_fault());
+        let before = self.phase.name();
+        if let Some(reason) = fault {
+            self.begin_stop(reason);
+        }
+        let at = self.advance();
+        let after = self.phase.name();
+        if before != after {
+            self.mail.tell(Message::Phase(after, self.run));
+        }
+        if matches!(self.phase, Phase::Stopped) {
+            return TickStatus::Stopped;
+        }
+        self.command();
+        let mut sample = Sample {
+            at,
+            reference_m: self.reference.position_m,
+            input: self.input.value(),
+            tool_m: self.tool_m,
+            ..Sample::default()
+        };
+        for (axis, drive) in self.drives.iter().enumerate() {
+            sample.encoder_m[axis] = drive.encoder_m;
+        }
+        let last_of_run = at.is_some_and(|(_, k)| k as usize + 1 == self.interpolator.n_samples());
+        self.slots.send(sample, last_of_run);
+        TickStatus::Running
+    }
+
+    /// Gives the bus back when the loop is over.
+    pub fn into_bus(self) -> Box<dyn Bus> {
+        self.bus
+    }
+
+    /// Number of axes.
+    pub(super) fn n_axes(&self) -> usize {
+        self.spec.axes.len().min(MAX_AXES)
+    }
+
+    /// Swaps in the newest input table, if one is waiting, and tells which one this run uses.
+    pub(super) fn take_table(&mut self) {
+        self.mail.newest_table(&mut self.table);
+        self.mail.tell(Message::RunStarted { run: self.run, table: self.table.number });
+    }
+
+    /// The row of the input table for a sample; empty where the table ends.
+    pub(super) fn table_row(&self, sample: usize) -> [f64; MAX_AXES] {
+        let mut row = [0.0; MAX_AXES];
+        let n_axes = self.n_axes();
+        let from = sample * n_axes;
+        if let Some(entries) = self.table.input.get(from..from + n_axes) {
+            row[..n_axes].copy_from_slice(entries);
+        }
+        row
+    }
+
+    /// Passes on every cycle that is complete.
+    fn give_out(&mut self) {
+        self.slots.watch_lag();
+        while let Some((sample, last_of_run)) = self.slots.take() {
+            self.mail.tell(Message::Sample(sample));
+            if let (true, Some((run, _))) = (last_of_run, sample.at) {
+                self.mail.tell(Message::RunEnded { run, overruns: self.run_overruns });
+            }
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The learned input on its way to the axes: bounded, never a step, and faded out after a run.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use crate::control::{SlewLimiter, clamp_finite};
+use crate::trajectory::MAX_AXES;
+
+/// The learned input of all axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LearnedInput {
+    most: [f64; MAX_AXES],
+    slew: [SlewLimiter; MAX_AXES],
+    value: [f64; MAX_AXES],
+    fade_from: [f64; MAX_AXES],
+    fade_ticks: u32,
+    fade_tick: u32,
+}
+
+impl LearnedInput {
+    /// `most` bounds the input, `step_max` its change in a tick; a fade takes `fade_ticks`.
+    pub(super) fn new(most: [f64; MAX_AXES], step_max: [f64; MAX_AXES], fade_ticks: u32) -> Self {
+        Self {
+            most,
+            slew: step_max.map(SlewLimiter::new),
+            value: [0.0; MAX_AXES],
+            fade_from: [0.0; MAX_AXES],
+            fade_ticks: fade_ticks.max(1),
+            fade_tick: fade_ticks.max(1),
+        }
+    }
+
+    /// The input of this tick.
+    pub(super) fn value(&self) -> [f64; MAX_AXES] {
+        self.value
+    }
+
+    /// Takes one row of the table, bounded.
+    ///
+    /// # Errors
+    /// The axis whose entry is not finite; its input stays as it was.
+    pub(super) fn follow(&mut self, row: &[f64]) -> Result<(), usize> {
+        let mut bad = Ok(());
+        for (axis, &wanted) in row.iter().enumerate().take(MAX_AXES) {
+            let bounded = clamp_finite(wanted, self.most[axis]);
+            if bounded.finite {
+                self.value[axis] = self.slew[axis].next(bounded.value);
+            } else {
+                bad = Err(axis);
+            }
+        }
+        self.fade_from = self.value;
+        self.fade_tick = 0;
+        bad
+    }
+
+    /// Moves on towards no input, along a half cosine from where the run left it.
+    pub(super) fn fade(&mut self) {
+        if self.fade_tick >= self.fade_ticks {
+            return;
+        }
+        self.fade_tick += 1;
+        let share = f64::from(self.fade_tick) / f64::from(self.fade_ticks);
+        let weight =
+            if share >= 1.0 { 0.0 } else { 0.5 * (1.0 + (std::f64::consts::PI * share).cos()) };
+        for axis in 0..MAX_AXES {
+            self.value[axis] = self.fade_from[axis] * weight;
+            self.slew[axis].reset(self.value[axis]);
+        }
+    }
+
+    /// Drops the input at once, because it has become part of the set point.
+    pub(super) fn absorb(&mut self) {
+        self.value = [0.0; MAX_AXES];
+        self.fade_from = [0.0; MAX_AXES];
+        self.fade_tick = self.fade_ticks;
+    }
+
+    /// Whether no input is left.
+    pub(super) fn faded(&self) -> bool {
+        self.fade_tick >= self.fade_ticks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn input() -> LearnedInput {
+        LearnedInput::new([1.0; MAX_AXES], [0.25; MAX_AXES], 10)
+    }
+
+    #[test]
+    fn a_wild_table_is_bounded_and_never_steps() {
+        let mut input = input();
+        let mut last = 0.0;
+        for wanted in [5.0, 5.0, -5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0] {
+            assert_eq!(input.follow(&[wanted, 0.0]), Ok(()));
+            assert!((input.value()[0] - last).abs() <= 0.25 + 1e-15 && input.value()[0] <= 1.0);
+            last = input.value()[0];
+        }
+        assert_eq!(input.follow(&[0.0, f64::NAN]), Err(1));
+    }
+
+    #[test]
+    fn it_fades_to_exactly_zero() {
+        let mut input = input();
+        input.follow(&[0.2]).unwrap();
+        let mut last = 0.2;
+        for _ in 0..10 {
+            assert!(!input.faded());
+            input.fade();
+            assert!(input.value()[0] < last);
+            last = input.value()[0];
+        }
+        assert!(input.faded() && last == 0.0);
+    }
+}

@@ -1,0 +1,211 @@
+//! What passes between the servo cycle and the rest, without locks and without allocation.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI32, Ordering};
+
+use rtrb::{Consumer, Producer, RingBuffer};
+
+use super::phase::PhaseName;
+use crate::fieldbus::BusError;
+use crate::trajectory::MAX_AXES;
+
+/// One servo cycle as it was: what was asked and what was measured at the same SYNC.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Count of SYNCs since the loop began.
+    pub sync: u64,
+    /// Run and sample in it, while a run is on.
+    pub at: Option<(u32, u32)>,
+    /// Set points without the learned input.
+    pub reference_m: [f64; MAX_AXES],
+    /// Learned input as it was applied.
+    pub input: [f64; MAX_AXES],
+    /// Encoders.
+    pub encoder_m: [f64; MAX_AXES],
+    /// Tool centre point; zeros without such a measurement.
+    pub tool_m: [f64; MAX_AXES],
+    /// Whether a measurement never came and an older one stands here.
+    pub missing: bool,
+}
+
+/// Why the axes were brought to rest ahead of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StopReason {
+    /// Asked to, with the number of the signal.
+    Asked(i32),
+    /// A drive reported a fault; its last emergency code, or 0.
+    DriveFault {
+        /// Axis.
+        axis: usize,
+        /// Emergency code of the drive.
+        code: u16,
+        /// Distance of demand and position that the drive reported last.
+        following_error_m: f64,
+    },
+    /// A drive did not reach, or left, operation enabled.
+    NotEnabled {
+        /// Axis.
+        axis: usize,
+        /// Its statusword.
+        statusword: u16,
+    },
+    /// A drive did not answer.
+    SilentAxis {
+        /// Axis.
+        axis: usize,
+        /// Cycles without an answer.
+        cycles: u32,
+    },
+    /// The tool measurement did not answer.
+    SilentTool {
+        /// Cycles without an answer.
+        cycles: u32,
+    },
+    /// A node restarted or left operation by itself.
+    NodeLeft {
+        /// CANopen node.
+        node: u8,
+    },
+    /// Command and encoder came too far apart.
+    FollowingError {
+        /// Axis.
+        axis: usize,
+        /// Distance found.
+        error_m: f64,
+    },
+    /// A number in the command was not finite.
+    NotFinite {
+        /// Axis.
+        axis: usize,
+    },
+    /// The loop could not keep its cycle.
+    Overrun {
+        /// Consecutive cycles missed.
+        cycles: u32,
+    },
+    /// The bus failed.
+    Bus(BusError),
+}
+
+/// What the loop reports.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Message {
+    /// A cycle.
+    Sample(Sample),
+    /// A new phase, and the run it belongs to.
+    Phase(PhaseName, u32),
+    /// A run began with the input table of this number.
+    RunStarted {
+        /// Run.
+        run: u32,
+        /// Number of the table.
+        table: u32,
+    },
+    /// All samples of a run are out.
+    RunEnded {
+        /// Run.
+        run: u32,
+        /// Cycles in it that began a whole cycle late.
+        overruns: u32,
+    },
+    /// The axes are being stopped.
+    Stopping(StopReason),
+}
+
+/// An input table on its way into the loop, or the one it replaced on its way back.
+#[derive(Debug)]
+pub(super) struct Table {
+    pub(super) number: u32,
+    pub(super) input: Box<[f64]>,
+}
+
+/// The supervisor's side.
+#[derive(Debug)]
+pub struct Mailbox {
+    messages: Consumer<Message>,
+    tables: Producer<Table>,
+    spent: Consumer<Table>,
+    stop: Arc<AtomicI32>,
+}
+
+/// The loop's side.
+#[derive(Debug)]
+pub struct LoopSide {
+    messages: Producer<Message>,
+    pub(super) tables: Consumer<Table>,
+    spent: Producer<Table>,
+    stop: Arc<AtomicI32>,
+    dropped: u64,
+}
+
+/// Returns the two sides; `capacity` messages may wait, and `stop` is set to a signal's number to
+/// bring the axes to rest.
+pub fn mailbox(capacity: usize, stop: Arc<AtomicI32>) -> (Mailbox, LoopSide) {
+    let (messages_in, messages_out) = RingBuffer::new(capacity);
+    let (tables_in, tables_out) = RingBuffer::new(2);
+    // One more than can be under way, so that handing one back never fails.
+    let (spent_in, spent_out) = RingBuffer::new(4);
+    (
+        Mailbox {
+            messages: messages_out,
+            tables: tables_in,
+            spent: spent_out,
+            stop: Arc::clone(&stop),
+        },
+        LoopSide { messages: messages_in, tables: tables_out, spent: spent_in, stop, dropped: 0 },
+    )
+}
+
+impl Mailbox {
+    /// The next message, if there is one.
+    pub fn read(&mut self) -> Option<Message> {
+        self.messages.pop().ok()
+    }
+
+    /// Hands the loop the input of the next run; returns it if two are waiting already.
+    ///
+    /// # Errors
+    /// The table itself, untouched.
+    pub fn send_table(&mut self, number: u32, input: Box<[f64]>) -> Result<(), Box<[f64]>> {
+        while self.spent.pop().is_ok() {}
+        self.tables.push(Table { number, input }).map_err(|refused| match refused {
+            rtrb::PushError::Full(table) => table.input,
+        })
+    }
+
+    /// Asks the loop to bring the axes to rest, as if the signal of this number had come.
+    pub fn stop(&self, signal: i32) {
+        self.stop.store(signal, Ordering::Relaxed);
+    }
+}
+
+impl LoopSide {
+    /// Reports; counts what nobody has room for.
+    pub(super) fn tell(&mut self, message: Message) {
+        if self.messages.push(message).is_err() {
+            self.dropped += 1;
+        }
+    }
+
+    /// The newest input table that is waiting; what it replaces goes back to be freed elsewhere.
+    pub(super) fn newest_table(&mut self, current: &mut Table) -> bool {
+        let mut changed = false;
+        while !self.spent.is_full() {
+            let Ok(table) = self.tables.pop() else { break };
+            let old = std::mem::replace(current, table);
+            // There is room, checked above; the box must not be freed in the loop.
+            if let Err(rtrb::PushError::Full(old)) = self.spent.push(old) {
+                std::mem::forget(old);
+            }
+            changed = true;
+        }
+        changed
+    }
+
+    /// The signal that asked to stop, or 0.
+    pub(super) fn asked_to_stop(&self) -> i32 {
+        self.stop.load(Ordering::Relaxed)
+    }
+}

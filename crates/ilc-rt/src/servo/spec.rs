@@ -1,0 +1,77 @@
+//! What the servo cycle is told once: its nodes, their limits, and its own patience.
+
+use std::time::Duration;
+
+use crate::control::PositionLoop;
+use crate::fieldbus::canopen::NodeId;
+use crate::fieldbus::cia402::{Mode, Scale};
+use crate::rt::Nanos;
+use crate::trajectory::AxisLimits;
+
+/// One axis.
+#[derive(Clone, Copy, Debug)]
+pub struct AxisSpec {
+    /// Node of the drive.
+    pub node: NodeId,
+    /// Command interface.
+    pub mode: Mode,
+    /// Counts of the drive's encoder.
+    pub scale: Scale,
+    /// Limits of motion.
+    pub limits: AxisLimits,
+    /// Lowest position.
+    pub position_min_m: f64,
+    /// Highest position.
+    pub position_max_m: f64,
+    /// Distance of command and encoder at which the axes stop.
+    pub following_error_max_m: f64,
+    /// Position loop of a velocity-commanded drive; not used otherwise.
+    pub position_loop: PositionLoop,
+    /// Largest learned input: m (position-commanded) or m/s (velocity-commanded).
+    pub input_max: f64,
+}
+
+/// A node that measures the tool centre point.
+#[derive(Clone, Copy, Debug)]
+pub struct ToolSpec {
+    /// Its node.
+    pub node: NodeId,
+    /// Its counts.
+    pub scale: Scale,
+}
+
+/// What sets the pace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// The clock; answers that are not there are late.
+    Clock,
+    /// The nodes' answers; there is no clock, and a node that is silent for this long is lost.
+    Answers(Duration),
+}
+
+/// The whole cycle.
+#[derive(Clone, Debug)]
+pub struct ServoSpec {
+    /// Axes in the order of the coordinates.
+    pub axes: Vec<AxisSpec>,
+    /// Tool measurement, if there is one.
+    pub tool: Option<ToolSpec>,
+    /// Servo cycle.
+    pub cycle: Nanos,
+    /// What sets the pace.
+    pub pace: Pace,
+    /// Number of the first run, and of the run after the last one.
+    pub runs: std::ops::Range<u32>,
+    /// Start of each run.
+    pub start_m: Vec<f64>,
+    /// Speed of the move to the start.
+    pub return_feed_m_s: f64,
+    /// Rest between the arrival at the start and the run.
+    pub settle_ticks: u32,
+    /// How long a drive may take to be switched on.
+    pub enable_ticks: u32,
+    /// Consecutive unanswered cycles at which a node is lost.
+    pub silent_cycles_max: u32,
+    /// Consecutive overrun cycles at which the axes stop.
+    pub overrun_cycles_max: u32,
+}

@@ -1,0 +1,128 @@
+//! Design of digital Butterworth low-pass filters.
+
+use std::f64::consts::PI;
+
+use nalgebra::Complex;
+
+use super::{Section, SignalError};
+
+/// The highest order that [`butterworth`] designs.
+pub const MAX_ORDER: usize = 12;
+
+/// Returns a Butterworth low-pass as second-order sections.
+///
+/// Analogue poles on the circle of radius `(2/T) tan(pi f_c T)`, brought to sampled time by the
+/// bilinear rule, so that the gain at `cutoff_hz` is exactly `1/sqrt(2)`.
+///
+/// # Shapes
+/// - `(order + 1) / 2` sections; those with the least damped poles come last, and each pole takes
+///   the nearest zeros, which keeps intermediate values small
+/// # Units
+/// - `cutoff_hz` in hertz, `dt_s` in seconds
+/// # Errors
+/// - [`SignalError::Order`], [`SignalError::Cutoff`] or [`SignalError::SampleTime`].
+/// # Source
+/// - [oppenheim2009], Ch. 7: Butterworth poles and the bilinear rule.
+pub fn butterworth(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Vec<Section>, SignalError> {
+    if !(1..=MAX_ORDER).contains(&order) {
+        return Err(SignalError::Order { order, max: MAX_ORDER });
+    }
+    if !(dt_s.is_finite() && dt_s > 0.0) {
+        return Err(SignalError::SampleTime { dt_s });
+    }
+    let limit_hz = 0.5 / dt_s;
+    if !(cutoff_hz > 0.0 && cutoff_hz < limit_hz) {
+        return Err(SignalError::Cutoff { cutoff_hz, limit_hz });
+    }
+    // Everything is scaled by T/2, so that the bilinear rule is z = (1 + s) / (1 - s).
+    let radius = (PI * cutoff_hz * dt_s).tan();
+    let one = Complex::new(1.0, 0.0);
+    let mut gain = one;
+    let mut upper_poles = Vec::new();
+    let mut real_pole = None;
+    for k in 0..order {
+        let angle = PI * (2 * k + order + 1) as f64 / (2 * order) as f64;
+        let is_real = 2 * k + 1 == order;
+        let analogue =
+            if is_real { Complex::new(-radius, 0.0) } else { Complex::from_polar(radius, angle) };
+        gain *= Complex::new(radius, 0.0) / (one - analogue);
+        let digital = (one + analogue) / (one - analogue);
+        if is_real {
+            real_pole = Some(digital.re);
+        } else if 2 * k + 1 < order {
+            upper_poles.push(digital);
+        }
+    }
+    upper_poles.sort_by(|p, q| q.norm().total_cmp(&p.norm()));
+
+    // An odd order is filled up by a pole and a zero at the origin; the zero goes to the first pole
+    // that is nearer to it than to the other zeros, all at -1.
+    let mut origin_zero = real_pole.is_some();
+    let mut zeros_for = |pole: Complex<f64>, last: bool| {
+        if origin_zero && (last || pole.norm() < (pole + one).norm()) {
+            origin_zero = false;
+            [1.0, 1.0, 0.0]
+        } else {
+            [1.0, 2.0, 1.0]
+        }
+    };
+    let mut sections: Vec<Section> = upper_poles
+        .iter()
+        .map(|pole| Section { b: zeros_for(*pole, false), a: [-2.0 * pole.re, pole.norm_sqr()] })
+        .collect();
+    if let Some(pole) = real_pole {
+        sections.push(Section { b: zeros_for(Complex::new(pole, 0.0), true), a: [-pole, 0.0] });
+    }
+    sections.reverse();
+    for coefficient in &mut sections[0].b {
+        *coefficient *= gain.re;
+    }
+    Ok(sections)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gain_at(sections: &[Section], frequency_hz: f64, dt_s: f64) -> f64 {
+        let back = Complex::from_polar(1.0, -2.0 * PI * frequency_hz * dt_s);
+        sections
+            .iter()
+            .map(|s| {
+                let top = Complex::from(s.b[0]) + back * s.b[1] + back * back * s.b[2];
+                let bottom = Complex::from(1.0) + back * s.a[0] + back * back * s.a[1];
+                (top / bottom).norm()
+            })
+            .product()
+    }
+
+    #[test]
+    fn every_order_has_its_three_defining_gains() {
+        for order in 1..=MAX_ORDER {
+            for cutoff_hz in [5.0, 50.0, 180.0] {
+                let sections = butterworth(order, cutoff_hz, 2e-3).unwrap();
+                assert_eq!(sections.len(), order.div_ceil(2));
+                assert!((gain_at(&sections, 0.0, 2e-3) - 1.0).abs() < 1e-9);
+                assert!((gain_at(&sections, cutoff_hz, 2e-3) - 0.5_f64.sqrt()).abs() < 1e-9);
+                assert!(gain_at(&sections, 250.0, 2e-3) < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_first_order_filter_is_known_by_hand() {
+        // At a quarter of the sampling rate the analogue radius is 1: pole at 0, gain 1/2.
+        let [section] = butterworth(1, 0.25, 1.0).unwrap()[..] else { unreachable!() };
+        assert!((section.b[0] - 0.5).abs() < 1e-15 && (section.b[1] - 0.5).abs() < 1e-15);
+        assert!(section.a[0].abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_cannot_be_designed_is_refused() {
+        assert!(matches!(butterworth(0, 1.0, 0.1), Err(SignalError::Order { .. })));
+        assert!(matches!(butterworth(13, 1.0, 0.1), Err(SignalError::Order { .. })));
+        assert!(matches!(butterworth(2, 5.0, 0.1), Err(SignalError::Cutoff { .. })));
+        assert!(matches!(butterworth(2, f64::NAN, 0.1), Err(SignalError::Cutoff { .. })));
+        assert!(matches!(butterworth(2, 1.0, 0.0), Err(SignalError::SampleTime { .. })));
+    }
+}

@@ -1,0 +1,83 @@
+//! The tick of a path that comes to rest at every corner: one jerk-limited move a segment.
+//!
+//! Moves are not rounded to ticks: each is evaluated on the time of the whole run, so that a set
+//! point never waits for the grid and the limits hold between set points as well as on them.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::MAX_AXES;
+use super::error::TrajectoryError;
+use super::limits::{AxisLimits, Line, PathLimits};
+use super::path::PathSpec;
+use super::profile::JerkLimited;
+use super::setpoint::Setpoint;
+
+/// One segment: its line, its profile, and when it starts.
+#[derive(Clone, Debug)]
+struct Move {
+    line: Line,
+    profile: JerkLimited,
+    start_s: f64,
+    end_s: f64,
+}
+
+/// The segments of a run, and the one that the run is in.
+#[derive(Clone, Debug)]
+pub(super) struct ExactStop {
+    moves: Box<[Move]>,
+    current: usize,
+}
+
+impl ExactStop {
+    /// Plans one move a segment. Cold.
+    pub(super) fn plan(
+        spec: &PathSpec,
+        lines: &[Line],
+        limits: &[AxisLimits],
+    ) -> Result<Self, TrajectoryError> {
+        let mut start_s = spec.dwell_before_s;
+        let mut plan_move = |(line, segment): (&Line, &super::path::PathSegment)| {
+            let along = PathLimits::along(&line.direction, limits, segment.feed_m_s);
+            let profile = JerkLimited::along(line.length_m, &along)?;
+            let end_s = start_s + profile.duration_s();
+            let planned = Move { line: *line, profile, start_s, end_s };
+            start_s = end_s;
+            Ok(planned)
+        };
+        let moves = lines
+            .iter()
+            .zip(&spec.segments)
+            .map(&mut plan_move)
+            .collect::<Result<Box<[_]>, _>>()?;
+        Ok(Self { moves, current: 0 })
+    }
+
+    /// When the last move ends.
+    pub(super) fn end_s(&self) -> f64 {
+        self.moves.last().map_or(0.0, |last| last.end_s)
+    }
+
+    /// Goes back to the first move.
+    pub(super) fn restart(&mut self) {
+        self.current = 0;
+    }
+
+    /// The set point at a time that is not before that of the last call.
+    pub(super) fn at(&mut self, t_s: f64) -> Setpoint {
+        while self.current + 1 < self.moves.len() && t_s >= self.moves[self.current].end_s {
+            self.current += 1;
+        }
+        let Some(now) = self.moves.get(self.current) else {
+            return Setpoint::at_rest([0.0; MAX_AXES]);
+        };
+        if t_s >= now.end_s {
+            return Setpoint::at_rest(now.line.to_m);
+        }
+        let state = now.profile.at(t_s - now.start_s);
+        Setpoint {
+            position_m: now.line.point_m(state.s_m),
+            velocity_m_s: now.line.along(state.v_m_s),
+            done: false,
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The set points of a run, one a tick.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::blend::Blend;
+use super::error::TrajectoryError;
+use super::exact_stop::ExactStop;
+use super::limits::AxisLimits;
+use super::path::{CornerRule, PathSpec};
+use super::proof::{self, Proof};
+use super::setpoint::Setpoint;
+
+/// How the corners of this run are taken.
+#[derive(Clone, Debug)]
+enum Motion {
+    ExactStop(ExactStop),
+    Blend(Blend),
+}
+
+/// A planned run: rest, path, rest.
+#[derive(Clone, Debug)]
+pub struct Interpolator {
+    motion: Motion,
+    n_axes: usize,
+    cycle_s: f64,
+    n_samples: usize,
+    tick: usize,
+}
+
+impl Interpolator {
+    /// Plans a run; every set point that it will give holds the limits of every axis.
+    ///
+    /// With exact stops each segment is a jerk-limited move, no faster than its feed. A blended path
+    /// keeps its feed, through an average of the window and a second, shorter one that planning
+    /// chooses for the jerk; its set points are generated here once and their finite differences
+    /// over the cycle compared with the limits.
+    ///
+    /// # Shapes
+    /// - `limits`: one entry for each coordinate of `spec.start_m`, 1 to 6
+    /// # Real Time
+    /// Cold: allocates, and walks through a blended run several times.
+    /// # Errors
+    /// [`TrajectoryError`] for values out of range, and [`TrajectoryError::Exceeds`] for a blended
+    /// path that breaks a limit: it is refused with the feed that would do, never slowed down.
+    pub fn plan(
+        spec: &PathSpec,
+        limits: &[AxisLimits],
+        cycle_s: f64,
+    ) -> Result<Self, TrajectoryError> {
+        let lines = spec.lines(limits, cycle_s)?;
+        let (motion, rest_tick) = match spec.corner {
+            CornerRule::ExactStop => {
+                let moves = ExactStop::plan(spec, &lines, limits)?;
+                let rest_tick = proof::n_ticks_after(moves.end_s(), cycle_s)?;
+                (Motion::ExactStop(moves), rest_tick)
+            }
+            CornerRule::Blend { window_s } => {
+                let (blend, rest_tick) =
+                    Proof { spec, lines: &lines, limits, cycle_s }.plan(window_s)?;
+                (Motion::Blend(blend), rest_tick)
+            }
+        };
+        let n_samples = rest_tick + proof::n_ticks(spec.dwell_after_s, cycle_s)? + 1;
+        Ok(Self { motion, n_axes: spec.start_m.len(), cycle_s, n_samples, tick: 0 })
+    }
+
+    /// Goes back to the first set point.
+    ///
+    /// # Real Time
+    /// Hot; a blended path refills its filters, in the order of the windows.
+    pub fn restart(&mut self) {
+        self.tick = 0;
+        match &mut self.motion {
+            Motion::ExactStop(moves) => moves.restart(),
+            Motion::Blend(blend) => blend.restart(),
+        }
+    }
+
+    /// The set point of the next tick; the first call gives the start, and the last set point, which
+    /// says `done`, is repeated for ever.
+    ///
+    /// # Real Time
+    /// Hot, allocates nothing.
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "the set points do not end: the last one is held"
+    )]
+    pub fn next(&mut self) -> Setpoint {
+        let done = self.tick + 1 >= self.n_samples;
+        let setpoint = match &mut self.motion {
+            Motion::ExactStop(moves) => moves.at(self.tick as f64 * self.cycle_s),
+            Motion::Blend(blend) => blend.next(),
+        };
+        if !done {
+            self.tick += 1;
+        }
+        Setpoint { done, ..setpoint }
+    }
+
+    /// Number of samples of the run, the first and the last included.
+    pub fn n_samples(&self) -> usize {
+        self.n_samples
+    }
+
+    /// Number of axes.
+    pub fn n_axes(&self) -> usize {
+        self.n_axes
+    }
+
+    /// The servo cycle for which the run was planned.
+    pub fn cycle_s(&self) -> f64 {
+        self.cycle_s
+    }
+
+    /// All set points of the run, by running a copy: the same numbers bit by bit as in the loop.
+    ///
+    /// # Shapes
+    /// - returns `n_samples * n_axes`, time first, in metres
+    /// # Real Time
+    /// Cold: allocates.
+    #[expect(clippy::disallowed_methods, reason = "cold: laid out once a campaign")]
+    pub fn reference(&self) -> Vec<f64> {
+        let mut copy = self.clone();
+        copy.restart();
+        let mut reference_m = Vec::with_capacity(self.n_samples * self.n_axes);
+        for _ in 0..self.n_samples {
+            let setpoint = copy.next();
+            reference_m.extend_from_slice(&setpoint.position_m[..self.n_axes]);
+        }
+        reference_m
+    }
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    reason = "tests are cold"
+)]
+mod tests;

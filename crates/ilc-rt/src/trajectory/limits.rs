@@ -1,0 +1,193 @@
+//! Limits of the axes, and what they leave for a straight move along a path.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::MAX_AXES;
+use super::error::{Quantity, TrajectoryError};
+
+/// What the set points of one axis never exceed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLimits {
+    /// Highest speed.
+    pub velocity_max_m_s: f64,
+    /// Highest acceleration.
+    pub acceleration_max_m_s2: f64,
+    /// Highest jerk.
+    pub jerk_max_m_s3: f64,
+}
+
+impl AxisLimits {
+    /// Limits of a few axes in an array for all; the axes that are not there get limits of 1.
+    pub fn padded(limits: &[Self]) -> [Self; MAX_AXES] {
+        let unused = Self { velocity_max_m_s: 1.0, acceleration_max_m_s2: 1.0, jerk_max_m_s3: 1.0 };
+        let mut all = [unused; MAX_AXES];
+        for (to, from) in all.iter_mut().zip(limits) {
+            *to = *from;
+        }
+        all
+    }
+
+    /// Refuses limits that are not positive numbers; `axis` names the axis in the error.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::AxisLimit`].
+    pub fn check(&self, axis: usize) -> Result<(), TrajectoryError> {
+        for (quantity, value) in self.named() {
+            if !is_positive(value) {
+                return Err(TrajectoryError::AxisLimit { axis, quantity, value });
+            }
+        }
+        Ok(())
+    }
+
+    /// The three limits, each with its name.
+    pub(super) fn named(&self) -> [(Quantity, f64); 3] {
+        [
+            (Quantity::Velocity, self.velocity_max_m_s),
+            (Quantity::Acceleration, self.acceleration_max_m_s2),
+            (Quantity::Jerk, self.jerk_max_m_s3),
+        ]
+    }
+}
+
+/// What a straight move may do along its path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathLimits {
+    /// Highest speed along the path.
+    pub velocity_m_s: f64,
+    /// Highest acceleration along the path.
+    pub acceleration_m_s2: f64,
+    /// Highest jerk along the path.
+    pub jerk_m_s3: f64,
+}
+
+impl PathLimits {
+    /// Limits along a unit direction: the tightest `limit_i / |d_i|` of all axes, and the feed.
+    ///
+    /// # Shapes
+    /// - `direction`, `limits`: one entry an axis; the shorter of the two counts.
+    pub fn along(direction: &[f64], limits: &[AxisLimits], feed_m_s: f64) -> Self {
+        // `f64::min` would lose a feed that is not a number, and with it the refusal of the move.
+        let tighter = |so_far: f64, limit: f64| if limit < so_far { limit } else { so_far };
+        let mut path = Self {
+            velocity_m_s: feed_m_s,
+            acceleration_m_s2: f64::INFINITY,
+            jerk_m_s3: f64::INFINITY,
+        };
+        for (share, limit) in direction.iter().map(|d| d.abs()).zip(limits) {
+            if share > 0.0 {
+                path.velocity_m_s = tighter(path.velocity_m_s, limit.velocity_max_m_s / share);
+                path.acceleration_m_s2 =
+                    tighter(path.acceleration_m_s2, limit.acceleration_max_m_s2 / share);
+                path.jerk_m_s3 = tighter(path.jerk_m_s3, limit.jerk_max_m_s3 / share);
+            }
+        }
+        path
+    }
+}
+
+/// A straight line from one point to another, its direction a unit vector.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    pub(super) from_m: [f64; MAX_AXES],
+    pub(super) to_m: [f64; MAX_AXES],
+    pub(super) direction: [f64; MAX_AXES],
+    pub(super) length_m: f64,
+}
+
+impl Line {
+    /// Unused axes are 0 in both points; a line without length has no direction (all 0).
+    pub(super) fn new(from_m: [f64; MAX_AXES], to_m: [f64; MAX_AXES]) -> Self {
+        let mut direction = [0.0; MAX_AXES];
+        for (axis, share) in direction.iter_mut().enumerate() {
+            *share = to_m[axis] - from_m[axis];
+        }
+        // Scaled by the largest share, so that the squares of tiny moves do not vanish.
+        let largest = direction.iter().fold(0.0_f64, |most, share| most.max(share.abs()));
+        if largest == 0.0 {
+            return Self { from_m, to_m, direction, length_m: 0.0 };
+        }
+        let squares: f64 = direction.iter().map(|share| (share / largest).powi(2)).sum();
+        let length_m = largest * squares.sqrt();
+        for share in &mut direction {
+            *share /= length_m;
+        }
+        Self { from_m, to_m, direction, length_m }
+    }
+
+    /// The point at `s_m` from the start; exactly the end at the end.
+    pub(super) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
+        if s_m >= self.length_m {
+            return self.to_m;
+        }
+        let mut point_m = self.from_m;
+        for (coordinate, share) in point_m.iter_mut().zip(&self.direction) {
+            *coordinate += share * s_m;
+        }
+        point_m
+    }
+
+    /// The direction times `scale`.
+    pub(super) fn along(&self, scale: f64) -> [f64; MAX_AXES] {
+        self.direction.map(|share| share * scale)
+    }
+}
+
+/// Whether a value is finite and above 0.
+pub(super) fn is_positive(value: f64) -> bool {
+    value.is_finite() && value > 0.0
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    reason = "tests are cold"
+)]
+mod tests {
+    use super::*;
+
+    fn limits(velocity: f64, acceleration: f64, jerk: f64) -> AxisLimits {
+        AxisLimits {
+            velocity_max_m_s: velocity,
+            acceleration_max_m_s2: acceleration,
+            jerk_max_m_s3: jerk,
+        }
+    }
+
+    #[test]
+    fn the_tightest_axis_and_the_feed_bound_the_path() {
+        let axes = [limits(0.3, 6.0, 60.0), limits(0.8, 1.6, 800.0)];
+        let path = PathLimits::along(&[0.6, -0.8], &axes, 10.0);
+        assert!((path.velocity_m_s - 0.5).abs() < 1e-15, "0.3/0.6 before 0.8/0.8");
+        assert!((path.acceleration_m_s2 - 2.0).abs() < 1e-15, "1.6/0.8 before 6/0.6");
+        assert!((path.jerk_m_s3 - 100.0).abs() < 1e-12, "60/0.6 before 800/0.8");
+        let slow = PathLimits::along(&[0.6, -0.8], &axes, 0.1);
+        assert!((slow.velocity_m_s - 0.1).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_axis_that_stands_still_bounds_nothing() {
+        let path =
+            PathLimits::along(&[1.0, 0.0], &[limits(1.0, 2.0, 3.0), limits(1e-9, 1e-9, 1e-9)], 9.0);
+        assert_eq!((path.velocity_m_s, path.acceleration_m_s2, path.jerk_m_s3), (1.0, 2.0, 3.0));
+    }
+
+    #[test]
+    fn a_bad_limit_is_named() {
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = limits(1.0, bad, 1.0).check(1).unwrap_err().to_string();
+            assert!(error.starts_with("axis 2: acceleration limit"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_line_ends_exactly_and_survives_tiny_lengths() {
+        let mut to_m = [0.0; MAX_AXES];
+        (to_m[0], to_m[1]) = (3e-200, 4e-200);
+        let line = Line::new([0.0; MAX_AXES], to_m);
+        assert!((line.length_m / 5e-200 - 1.0).abs() < 1e-15);
+        assert_eq!(line.point_m(line.length_m), to_m);
+    }
+}
