@@ -38,8 +38,9 @@ class Message:
     cell : str
         Name of the cell.
     topic : str
-        ``state``, ``iteration``, ``fault``, ``servo`` or ``latency``; or
-        ``alive`` and ``gone`` when a controller appears and disappears.
+        ``state`` (start, states, progress and end of a campaign),
+        ``iteration``, ``fault``, ``servo`` or ``latency``; or ``alive`` and
+        ``gone`` when a controller appears and disappears.
     payload : dict
         The JSON object; empty for ``alive`` and ``gone``.
     event : Event or None

@@ -11,8 +11,17 @@ import typer
 
 from ilc_rt.campaign import load_cell
 from ilc_rt.errors import EXIT_FAULT
-from ilc_rt.events import FaultEvent, IterationEvent, LatencyEvent
+from ilc_rt.events import (
+    EndEvent,
+    FaultEvent,
+    IterationEvent,
+    LatencyEvent,
+    ProgressEvent,
+    StartEvent,
+    StateEvent,
+)
 from ilc_rt.monitor import Message, Monitor
+from ilc_rt.progress import WORDS, describe
 from ilc_rt.record import IterationRecord
 from ilc_rt.table import HEAD, plain_line, run_cells
 
@@ -69,6 +78,7 @@ class _View:
         self.runs = 0
         self.faults = 0
         self._events = events
+        self._present: set[str] = set()
         self._first: dict[str, IterationRecord] = {}
 
     def show(self, message: Message) -> None:
@@ -88,12 +98,23 @@ class _View:
                 f"{message.cell}: loop woke late by {late.p99:.3g} µs (99 %), "
                 f"{late.max:.3g} µs at most"
             )
-        elif message.topic == "state":
-            run = message.payload.get("iteration")
-            state = str(message.payload.get("state", "?")).replace("_", " ")
-            typer.echo(f"{message.cell}: {state}" + ("" if run is None else f" (run {run})"))
+        elif isinstance(event, StartEvent):
+            typer.echo(describe(event))
+        elif isinstance(event, StateEvent):
+            run = "" if event.iteration is None else f" (run {event.iteration})"
+            typer.echo(f"{message.cell}: {WORDS.get(event.state, event.state)}{run}")
+        elif isinstance(event, ProgressEvent) and message.cell not in self._present:
+            # Someone who joins late is told where the run is, once.
+            share = 100.0 * event.sample / max(1, event.n_samples)
+            typer.echo(f"{message.cell}: run {event.iteration}, {share:.0f} %")
+        elif isinstance(event, EndEvent):
+            why = "" if event.status == "completed" or not event.reason else f": {event.reason}"
+            typer.echo(f"{message.cell}: {event.status}{why}")
         elif message.topic in {"alive", "gone"}:
             typer.echo(f"{message.cell}: controller {message.topic}")
+            self._present.discard(message.cell)
+        if message.topic == "state":
+            self._present.add(message.cell)
         sys.stdout.flush()
 
     def _show_run(self, cell: str, record: IterationRecord) -> None:
