@@ -112,7 +112,8 @@ class Campaign:
         Parameters
         ----------
         iterations : int
-            Number of runs, at least 1; the first is without learning.
+            Runs in the whole campaign, at least 1, those before a `resume`
+            included; the first is without learning.
 
         Raises
         ------

@@ -95,7 +95,8 @@ class CampaignView:
         elif isinstance(event, StateEvent):
             words = WORDS.get(event.state, event.state.replace("_", " "))
             index = event.iteration
-            run = "" if index is None else f"run {index} ({index + 1} of {self._runs}): "
+            of_all = f" ({index + 1} of {self._runs})" if self._runs and index is not None else ""
+            run = "" if index is None else f"run {index}{of_all}: "
             self._bar.reset(self._task, description=run + words)
         elif isinstance(event, ProgressEvent):
             self._bar.update(self._task, completed=event.sample / max(1, event.n_samples))

@@ -28,7 +28,10 @@ class DriveChoice(str, Enum):
 
 CellFile = Annotated[Path, typer.Argument(metavar="CELL", help="Cell description, a TOML file.")]
 Iterations = Annotated[
-    int, typer.Option("--iterations", "-n", help="Number of runs; the first is without learning.")
+    int,
+    typer.Option(
+        "--iterations", "-n", help="Runs in the whole campaign; the first is without learning."
+    ),
 ]
 Bus = Annotated[
     str | None,
