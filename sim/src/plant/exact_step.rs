@@ -68,7 +68,8 @@ impl ExactStep {
         let mut next = [0.0; 4];
         for (row, next) in next.iter_mut().enumerate() {
             let a = &self.free[row];
-            *next = a[0] * z[0] + a[1] * z[1] + a[2] * z[2] + a[3] * z[3] + self.force[row] * force_n;
+            *next =
+                a[0] * z[0] + a[1] * z[1] + a[2] * z[2] + a[3] * z[3] + self.force[row] * force_n;
         }
         next
     }

@@ -93,6 +93,13 @@ impl SetpointLimits {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
+)]
 mod tests {
     use super::*;
 
@@ -103,7 +110,10 @@ mod tests {
         let cut = clamp_finite(-3.0, 1.0);
         assert_eq!(cut, Bounded { value: -1.0, saturated: true, finite: true });
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert_eq!(clamp_finite(bad, 1.0), Bounded { value: 0.0, saturated: false, finite: false });
+            assert_eq!(
+                clamp_finite(bad, 1.0),
+                Bounded { value: 0.0, saturated: false, finite: false }
+            );
         }
         assert_eq!(clamp_finite(1.0, f64::NAN).value, 0.0);
         assert_eq!(clamp_finite(1.0, -1.0).value, 0.0);

@@ -44,8 +44,11 @@ impl ExactStop {
             start_s = end_s;
             Ok(planned)
         };
-        let moves =
-            lines.iter().zip(&spec.segments).map(&mut plan_move).collect::<Result<Box<[_]>, _>>()?;
+        let moves = lines
+            .iter()
+            .zip(&spec.segments)
+            .map(&mut plan_move)
+            .collect::<Result<Box<[_]>, _>>()?;
         Ok(Self { moves, current: 0 })
     }
 

@@ -2,8 +2,8 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use super::error::{Quantity, TrajectoryError};
 use super::MAX_AXES;
+use super::error::{Quantity, TrajectoryError};
 
 /// What the set points of one axis never exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,8 +19,7 @@ pub struct AxisLimits {
 impl AxisLimits {
     /// Limits of a few axes in an array for all; the axes that are not there get limits of 1.
     pub fn padded(limits: &[Self]) -> [Self; MAX_AXES] {
-        let unused =
-            Self { velocity_max_m_s: 1.0, acceleration_max_m_s2: 1.0, jerk_max_m_s3: 1.0 };
+        let unused = Self { velocity_max_m_s: 1.0, acceleration_max_m_s2: 1.0, jerk_max_m_s3: 1.0 };
         let mut all = [unused; MAX_AXES];
         for (to, from) in all.iter_mut().zip(limits) {
             *to = *from;
@@ -144,7 +143,8 @@ pub(super) fn is_positive(value: f64) -> bool {
     clippy::disallowed_methods,
     clippy::disallowed_types,
     clippy::disallowed_macros,
-    reason = "tests are cold"
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
 )]
 mod tests {
     use super::*;
@@ -170,7 +170,8 @@ mod tests {
 
     #[test]
     fn an_axis_that_stands_still_bounds_nothing() {
-        let path = PathLimits::along(&[1.0, 0.0], &[limits(1.0, 2.0, 3.0), limits(1e-9, 1e-9, 1e-9)], 9.0);
+        let path =
+            PathLimits::along(&[1.0, 0.0], &[limits(1.0, 2.0, 3.0), limits(1e-9, 1e-9, 1e-9)], 9.0);
         assert_eq!((path.velocity_m_s, path.acceleration_m_s2, path.jerk_m_s3), (1.0, 2.0, 3.0));
     }
 

@@ -22,11 +22,15 @@ impl AxisStop {
     /// `v_0` is the velocity that would remain if the acceleration were taken back at once,
     /// `v + a|a|/2j`; deceleration goes against it, to the peak `p = √(j(|v| + a²/2j))` or to the
     /// limit.
-    fn plan(position_m: f64, velocity_m_s: f64, acceleration_m_s2: f64, limits: &AxisLimits) -> Self {
+    fn plan(
+        position_m: f64,
+        velocity_m_s: f64,
+        acceleration_m_s2: f64,
+        limits: &AxisLimits,
+    ) -> Self {
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
         let usable = |limit: f64| if limit.is_finite() && limit > 0.0 { limit } else { 1e9 };
-        let (most, jerk) =
-            (usable(limits.acceleration_max_m_s2), usable(limits.jerk_max_m_s3));
+        let (most, jerk) = (usable(limits.acceleration_max_m_s2), usable(limits.jerk_max_m_s3));
         let velocity = finite(velocity_m_s);
         let acceleration = finite(acceleration_m_s2).clamp(-most, most);
         let remaining = velocity + acceleration * acceleration.abs() / (2.0 * jerk);
@@ -140,7 +144,8 @@ impl ControlledStop {
     clippy::disallowed_methods,
     clippy::disallowed_types,
     clippy::disallowed_macros,
-    reason = "tests are cold"
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
 )]
 mod tests {
     use super::*;
@@ -163,8 +168,13 @@ mod tests {
     #[test]
     fn hand_computed_stop() {
         // 1 m/s at 2 m/s2 and 8 m/s3: the mirror image of the rise in the profile, 0.75 s, 0.375 m.
-        let mut stop =
-            ControlledStop::new(&only(3.0), &only(1.0), &only(0.0), 1, &[limits(2.0, 8.0); MAX_AXES]);
+        let mut stop = ControlledStop::new(
+            &only(3.0),
+            &only(1.0),
+            &only(0.0),
+            1,
+            &[limits(2.0, 8.0); MAX_AXES],
+        );
         assert!((stop.duration_s() - 0.75).abs() < 1e-15);
         let middle = stop.next(0.375);
         assert!((middle.velocity_m_s[0] - 0.5).abs() < 1e-15 && !middle.done);

@@ -27,12 +27,8 @@ fn second_order(t: f64, w: f64, d: f64) -> f64 {
 #[test]
 fn an_ideal_axis_answers_a_step_as_the_second_order_model() {
     for damping in [0.5, 0.6, 1.0] {
-        let mut gantry = alone(AxisSimulation {
-            damping,
-            integral_time_s: 1e9,
-            force_max_n: 1e9,
-            ..axis()
-        });
+        let mut gantry =
+            alone(AxisSimulation { damping, integral_time_s: 1e9, force_max_n: 1e9, ..axis() });
         let w = TAU * 15.0;
         let mut worst = 0.0_f64;
         for n in 1..=4000_u32 {
@@ -53,8 +49,9 @@ fn the_sampled_drive_approaches_the_model_with_the_step() {
         let mut worst = 0.0_f64;
         for n in 1..=((0.1 / dt) as u32) {
             gantry.step(&position(1.0), dt);
-            worst = worst
-                .max((gantry.encoder_m(0) - second_order(f64::from(n) * dt, TAU * 15.0, 1.0)).abs());
+            worst = worst.max(
+                (gantry.encoder_m(0) - second_order(f64::from(n) * dt, TAU * 15.0, 1.0)).abs(),
+            );
         }
         worst
     };
@@ -68,7 +65,10 @@ fn a_velocity_demand_settles_at_that_velocity() {
     for _ in 0..16_000 {
         gantry.step(&[Demand::Velocity { velocity_m_s: 0.05 }], STEP_S);
     }
-    assert!((gantry.encoder_velocity_m_s(0) - 0.05).abs() < 1e-6, "the integral carries the friction");
+    assert!(
+        (gantry.encoder_velocity_m_s(0) - 0.05).abs() < 1e-6,
+        "the integral carries the friction"
+    );
     assert!((gantry.force_n(0) - 15.0).abs() < 0.1);
 }
 
@@ -225,8 +225,12 @@ fn a_demand_that_is_not_a_number_gives_no_force() {
 #[test]
 fn the_same_inputs_give_the_same_bits_and_another_seed_does_not() {
     let run = |seed: u64| {
-        let simulation =
-            Simulation { encoder_noise_m: 1e-7, seed, orthogonality_rad: 1e-3, ..Simulation::default() };
+        let simulation = Simulation {
+            encoder_noise_m: 1e-7,
+            seed,
+            orthogonality_rad: 1e-3,
+            ..Simulation::default()
+        };
         let noisy = AxisSimulation { coulomb_n: 15.0, static_n: 25.0, mode_mass_kg: 3.0, ..axis() };
         let mut gantry = Gantry::new(&[noisy, noisy], &simulation);
         let mut bits = Vec::new();

@@ -51,7 +51,10 @@ fn assert_holds(plan: &Interpolator, limits: &[AxisLimits], what: &str) {
     for (axis, limit) in limits.iter().enumerate() {
         let found = peaks(&reference, limits.len(), axis, plan.cycle_s());
         for ((quantity, most), found) in limit.named().into_iter().zip(found) {
-            assert!(found <= most * (1.0 + 1e-6) + 1e-5, "{what}: axis {axis} {quantity} {found} > {most}");
+            assert!(
+                found <= most * (1.0 + 1e-6) + 1e-5,
+                "{what}: axis {axis} {quantity} {found} > {most}"
+            );
         }
     }
 }
@@ -100,7 +103,9 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
             dwell_before_s: 0.03 * random.unit(),
             dwell_after_s: if round % 3 == 0 { 0.0 } else { 0.05 * random.unit() },
         };
-        for corner in [CornerRule::ExactStop, CornerRule::Blend { window_s: random.log(0.004, 0.3) }] {
+        for corner in
+            [CornerRule::ExactStop, CornerRule::Blend { window_s: random.log(0.004, 0.3) }]
+        {
             spec.corner = corner;
             let mut plan = match Interpolator::plan(&spec, &axes, CYCLE_S) {
                 Ok(plan) => plan,
@@ -206,7 +211,13 @@ fn a_blend_beyond_the_limits_is_refused_with_what_would_do() {
     let weak = [limits(0.5, 8.0, 1000.0), limits(0.5, 1.0, 1000.0)];
     let error = Interpolator::plan(&spec, &weak, CYCLE_S).unwrap_err();
     let TrajectoryError::Exceeds {
-        axis, quantity, reached, limit, feed_admissible_m_s, window_admissible_s, ..
+        axis,
+        quantity,
+        reached,
+        limit,
+        feed_admissible_m_s,
+        window_admissible_s,
+        ..
     } = error
     else {
         panic!("{error}");
@@ -261,7 +272,9 @@ fn bad_values_are_refused_one_at_a_time() {
     assert!(broken(&|s| s.segments[2].to_m.truncate(1)).contains("segment 3: 1 coordinates"));
     assert!(broken(&|s| s.segments[2].to_m[0] = 1e9).contains("axis 1: position"));
     assert!(broken(&|s| s.segments[0].feed_m_s = 0.0).contains("segment 1: feed 0"));
-    assert!(broken(&|s| s.segments[1].to_m = s.segments[0].to_m.clone()).contains("segment 2: ends"));
+    assert!(
+        broken(&|s| s.segments[1].to_m = s.segments[0].to_m.clone()).contains("segment 2: ends")
+    );
     assert!(broken(&|s| s.dwell_before_s = -0.1).contains("dwell before"));
     assert!(broken(&|s| s.dwell_after_s = f64::NAN).contains("dwell after"));
     assert!(broken(&|s| s.corner = CornerRule::Blend { window_s: 0.0 }).contains("blend window"));
