@@ -5,6 +5,7 @@
 //! of the project tells how the modules fit; each module's head says what it is for and who may
 //! import it.
 
+pub mod cli;
 pub mod config;
 pub mod control;
 pub mod fieldbus;

@@ -1,3 +1,7 @@
 //! The standalone real-time controller.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    ilc_rt::cli::main()
+}

@@ -16,3 +16,4 @@ pub use error::ConfigError;
 pub use program::{
     Corner, LawName, Learning, Measure, NormOptimalSection, PdSection, Program, Segment,
 };
+pub use validate::check;

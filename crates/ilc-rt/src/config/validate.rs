@@ -32,8 +32,11 @@ pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigE
     ConfigError::Syntax { file: file.to_owned(), line, key, reason }
 }
 
-/// Checks every range and every pair of values that must agree.
-pub(super) fn check(cell: &Cell) -> Result<(), ConfigError> {
+/// Checks every range and every pair of values that must agree; for cells changed after loading.
+///
+/// # Errors
+/// [`ConfigError::Value`] for the first value that is not allowed.
+pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     let v = Checker { file: cell.file.display().to_string() };
     let name = &cell.cell.name;
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';

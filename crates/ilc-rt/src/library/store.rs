@@ -217,6 +217,20 @@ impl Library {
             .map_err(|source| self.fail(source))
     }
 
+    /// Returns a name for a new campaign: the time in UTC and four random digits.
+    ///
+    /// # Errors
+    /// [`LibraryError::Sqlite`] if the file cannot be read.
+    pub fn new_campaign(&self) -> Result<String, LibraryError> {
+        self.connection
+            .query_row(
+                "SELECT strftime('%Y%m%d-%H%M%S', 'now') || '-' || lower(hex(randomblob(2)))",
+                [],
+                |row| row.get(0),
+            )
+            .map_err(|source| self.fail(source))
+    }
+
     fn fail(&self, source: rusqlite::Error) -> LibraryError {
         LibraryError::Sqlite { path: self.path.clone(), source }
     }

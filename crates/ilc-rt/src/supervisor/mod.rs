@@ -1,1 +1,21 @@
-//! The campaign: iterations, learning between them, faults and stops.
+//! The campaign: brings the nodes up, paces the loop, learns between runs, keeps every run, and says
+//! what happens.
+//!
+//! The owner of loop, library and telemetry; only the binary and the Python bindings import it. Cold:
+//! it reads the loop's mailbox and never shares anything else with it.
+
+mod announce;
+mod campaign;
+mod collect;
+mod error;
+mod learner;
+mod nodes;
+mod pace;
+mod plan;
+mod progress;
+mod reason;
+mod telemetry;
+
+pub use campaign::{Options, Outcome, run};
+pub use error::SupervisorError;
+pub use plan::Plan;

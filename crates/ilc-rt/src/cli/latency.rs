@@ -1,0 +1,67 @@
+//! `ilc-rt latency`: how late this machine wakes a thread that is set up like the loop's.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{EXIT_BAD_INPUT, show};
+use crate::rt::{Clock, Latency, MonotonicClock, Nanos, RtRequest, thread};
+
+#[derive(Args)]
+#[command(after_help = "Examples:
+  ilc-rt latency
+  ilc-rt latency --cycle-us 500 --seconds 60 --json latency.json")]
+pub(super) struct LatencyArguments {
+    /// Cycle to keep.
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(50..=100_000))]
+    cycle_us: u32,
+    /// How long to measure.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=86_400))]
+    seconds: u32,
+    /// Spin the last microseconds before each deadline.
+    #[arg(long, default_value_t = 100)]
+    spin_us: u32,
+    /// Write the figures to a file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Measures; returns the exit status.
+pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
+    let report = thread::enter(RtRequest::default());
+    show::say(&format!(
+        "{} {}, memory {}, kernel {}; measuring for {} s",
+        report.policy,
+        report.priority,
+        if report.mlock { "locked" } else { "not locked" },
+        report.kernel,
+        arguments.seconds
+    ));
+    for note in &report.notes {
+        show::say(&format!("  note: {note}"));
+    }
+    let clock = MonotonicClock::new(Nanos::from_micros(arguments.spin_us));
+    let period = Nanos::from_micros(arguments.cycle_us);
+    let end = clock.now().plus(Nanos(u64::from(arguments.seconds) * 1_000_000_000));
+    let mut latency = Latency::default();
+    let mut due = clock.now().plus(period);
+    while due < end {
+        clock.sleep_until(due);
+        let late = clock.now().since(due);
+        latency.record(late);
+        due = due.plus(Nanos(period.0 * (late.0 / period.0 + 1)));
+    }
+    let figures = latency.figures();
+    show::say(&format!(
+        "woke late by at most {:.1} us; 99.9 % {:.1}, 99 % {:.1}, median {:.1}; {} wake-ups",
+        figures.max, figures.p999, figures.p99, figures.p50, figures.count
+    ));
+    if let Some(path) = &arguments.json {
+        let text = serde_json::json!({ "rt": report, "cycle_us": arguments.cycle_us, "wake_late_us": figures });
+        if let Err(error) = std::fs::write(path, format!("{text:#}\n")) {
+            show::complain(&format!("--json {}: cannot be written: {error}", path.display()));
+            return EXIT_BAD_INPUT;
+        }
+    }
+    0
+}

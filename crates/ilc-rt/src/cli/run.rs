@@ -1,0 +1,160 @@
+//! `ilc-rt run`: a campaign on a bus.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI32, Ordering};
+
+use clap::{Args, ValueEnum};
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+use super::{EXIT_BAD_INPUT, EXIT_FAULT, show};
+use crate::config::{Cell, Measure};
+use crate::fieldbus::transport;
+use crate::record::{EndStatus, Event};
+use crate::supervisor::{self, Options, Outcome, SupervisorError};
+
+#[derive(Args)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
+#[command(after_help = "Examples:
+  ilc-rt run gantry.toml --iterations 10
+  ilc-rt run gantry.toml --bus can:can0 --library /var/lib/ilc/gantry.db --resume
+  ilc-rt run gantry.toml --bus udp:239.74.163.2 --measure encoder --json figures.json")]
+pub(super) struct RunArguments {
+    /// Cell description.
+    cell: PathBuf,
+    /// Bus instead of the cell's: can:IFACE, udp:GROUP[:PORT], zenoh:KEY.
+    #[arg(long, value_name = "ADDRESS")]
+    bus: Option<String>,
+    /// Runs in all; the first one is without learning.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
+    iterations: u32,
+    /// Measurement to learn from instead of the cell's.
+    #[arg(long, value_enum)]
+    measure: Option<MeasureName>,
+    /// Pace the loop by the drives' answers instead of the clock: exact repetition, no wall clock.
+    #[arg(long)]
+    lockstep: bool,
+    /// Where every run is kept.
+    #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
+    library: PathBuf,
+    /// Go on with the newest campaign of this cell, program, measurement and law.
+    #[arg(long)]
+    resume: bool,
+    /// Write the figures of all runs to a file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Print one JSON object a line instead of a table.
+    #[arg(long)]
+    events: bool,
+    /// Do not publish on Zenoh.
+    #[arg(long)]
+    no_telemetry: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MeasureName {
+    Encoder,
+    Tcp,
+}
+
+/// Runs a campaign; returns the exit status.
+pub(super) fn run(arguments: &RunArguments) -> u8 {
+    match campaign(arguments) {
+        Ok(outcome) => finish(arguments, &outcome),
+        Err(error) => {
+            show::complain(&error);
+            EXIT_BAD_INPUT
+        }
+    }
+}
+
+fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
+    let mut cell = Cell::load(&arguments.cell)?;
+    if let Some(address) = &arguments.bus {
+        cell.bus.address.clone_from(address);
+    }
+    let file = || cell.file.display().to_string();
+    let address = &cell.bus.address;
+    if address.starts_with("loopback:") {
+        return Err(SupervisorError::Loopback { file: file() });
+    }
+    let options = Options {
+        iterations: arguments.iterations,
+        measure: arguments.measure.map(|measure| match measure {
+            MeasureName::Encoder => Measure::Encoder,
+            MeasureName::Tcp => Measure::Tcp,
+        }),
+        lockstep: arguments.lockstep,
+        resume: arguments.resume,
+        library: arguments.library.clone(),
+        telemetry: !arguments.no_telemetry,
+        stop: stop_on_signals(),
+    };
+    let bus =
+        transport::open(address).map_err(|source| SupervisorError::Bus { file: file(), source })?;
+    let mut first_contour_m = None;
+    let mut observe = |event: &Event| {
+        if arguments.events {
+            if let Ok(text) = serde_json::to_string(event) {
+                show::say(&text);
+            }
+        } else {
+            show::event(event, &mut first_contour_m);
+        }
+    };
+    supervisor::run(&cell, &options, bus, None, &mut observe)
+}
+
+/// A number that becomes a signal's when it comes: the loop reads it and brings the axes to rest.
+fn stop_on_signals() -> Arc<AtomicI32> {
+    let stop = Arc::new(AtomicI32::new(0));
+    for signal in [SIGINT, SIGTERM] {
+        let stop = Arc::clone(&stop);
+        #[expect(
+            unsafe_code,
+            reason = "a signal handler; signal-hook has no safe form for a value"
+        )]
+        // SAFETY: the handler stores to an atomic, which is async-signal-safe, and nothing else.
+        let registered = unsafe {
+            signal_hook::low_level::register(signal, move || stop.store(signal, Ordering::Relaxed))
+        };
+        if let Err(error) = registered {
+            tracing::warn!(
+                "signal {signal} will kill this program instead of stopping the axes: {error}"
+            );
+        }
+    }
+    stop
+}
+
+fn finish(arguments: &RunArguments, outcome: &Outcome) -> u8 {
+    if let Some(path) = &arguments.json {
+        let iterations: Vec<_> = outcome
+            .runs
+            .iter()
+            .map(|(index, figures)| {
+                let mut entry = serde_json::to_value(figures).unwrap_or_default();
+                entry["index"] = (*index).into();
+                entry
+            })
+            .collect();
+        let text = serde_json::json!({
+            "campaign": outcome.campaign,
+            "status": outcome.status,
+            "reason": outcome.reason,
+            "iterations": iterations,
+        });
+        if let Err(error) = std::fs::write(path, format!("{text:#}\n")) {
+            show::complain(&format!("--json {}: cannot be written: {error}", path.display()));
+            return EXIT_BAD_INPUT;
+        }
+    }
+    match outcome.status {
+        EndStatus::Completed => 0,
+        EndStatus::Interrupted => u8::try_from(128 + outcome.signal).unwrap_or(EXIT_FAULT),
+        EndStatus::Fault => {
+            show::complain(&format!("controlled stop: {}", outcome.reason));
+            EXIT_FAULT
+        }
+    }
+}

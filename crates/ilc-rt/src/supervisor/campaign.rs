@@ -1,0 +1,324 @@
+//! One campaign from the first frame to the last: bring-up, runs, learning, library, end.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicI32;
+
+use super::announce::Announcer;
+use super::collect::Collector;
+use super::error::SupervisorError;
+use super::learner::Learner;
+use super::pace::Pacer;
+use super::plan::Plan;
+use super::progress::{Decision, Progress, Resumed};
+use super::telemetry::Telemetry;
+use super::{nodes, reason};
+use crate::config::{Cell, LawName, Measure};
+use crate::fieldbus::Bus;
+use crate::learning::Law;
+use crate::library::Library;
+use crate::record::{EndStatus, Event, Figures, IterationRecord, Meta, StateName};
+use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
+
+/// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
+const MAILBOX: usize = 8192;
+/// Time between two reports of progress.
+const PROGRESS_S: f64 = 0.1;
+
+/// What the caller chooses beyond the cell description.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Runs in the whole campaign; the first one is without learning.
+    pub iterations: u32,
+    /// Measurement to learn from, if not the cell's.
+    pub measure: Option<Measure>,
+    /// Paced by the nodes' answers instead of the clock.
+    pub lockstep: bool,
+    /// Go on with the newest campaign of the same cell, program and law.
+    pub resume: bool,
+    /// Where every run is kept.
+    pub library: PathBuf,
+    /// Whether to publish on Zenoh.
+    pub telemetry: bool,
+    /// Set to a signal's number to bring the axes to rest.
+    pub stop: Arc<AtomicI32>,
+}
+
+/// How a campaign ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// How.
+    pub status: EndStatus,
+    /// One sentence.
+    pub reason: String,
+    /// Signal that asked to stop, or 0.
+    pub signal: i32,
+    /// Name of the campaign in the library.
+    pub campaign: String,
+    /// Number and figures of every run of the campaign, resumed ones included.
+    pub runs: Vec<(u32, Figures)>,
+}
+
+/// Runs a campaign on a bus (`cell.bus.address`, open), with the cell's law or another one; `observe` hears every event.
+///
+/// # Errors
+/// [`SupervisorError`] before anything has moved. Whatever happens later brings the axes to rest and
+/// is told by the [`Outcome`].
+pub fn run(
+    cell: &Cell,
+    options: &Options,
+    mut bus: Box<dyn Bus>,
+    law: Option<Box<dyn Law>>,
+    observe: &mut dyn FnMut(&Event),
+) -> Result<Outcome, SupervisorError> {
+    let mut plan = Plan::new(cell, options.measure, options.lockstep)?;
+    let (name, mut law) = match law {
+        Some(law) => ("user", Some(law)),
+        None => (law_name(cell), plan.law(cell)?),
+    };
+    let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), |law| law.describe());
+    plan.name_law(cell, name, &parameters);
+    let library = Library::open(&options.library)?;
+    let mut progress = Progress::new(cell.learning.rollback_ratio);
+    let resumed = if options.resume {
+        progress.resume(&library, &mut plan.meta, law.as_deref_mut())?
+    } else {
+        plan.meta.campaign = library.new_campaign()?;
+        Resumed::default()
+    };
+    let learner = match law {
+        Some(law) if options.lockstep => Some(Learner::in_line(law)),
+        Some(law) => Some(Learner::on_thread(law)?),
+        None => None,
+    };
+    let first = resumed.runs.last().map_or(0, |(index, _)| index + 1);
+    if first >= options.iterations {
+        return Err(SupervisorError::Resume(format!(
+            "campaign {} has {first} of {} runs already; ask for more with --iterations",
+            plan.meta.campaign, options.iterations
+        )));
+    }
+    let telemetry = if options.telemetry && cell.telemetry.enabled {
+        Some(Telemetry::start(cell)?)
+    } else {
+        None
+    };
+    let mut announcer = Announcer::new(observe, telemetry, cell.cycle_s(), cell.n_axes());
+    announcer.tell(&Event::State { state: StateName::BringingUp, iteration: first });
+    nodes::start(cell, bus.as_mut(), options.lockstep)?;
+
+    plan.servo.runs = first..options.iterations;
+    let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&options.stop));
+    if let Some((input, update_ms)) = resumed.next {
+        progress.send(&mut mail, input, update_ms);
+    }
+    let cycle = Cycle::new(bus, plan.servo.clone(), plan.interpolator.clone(), loop_side);
+    let (mut pacer, granted) = if options.lockstep {
+        (Pacer::in_line(cycle), None)
+    } else {
+        let (pacer, report) = Pacer::on_clock(cycle)?;
+        (pacer, Some(report))
+    };
+    announcer.tell(&Event::Start {
+        cell: cell.cell.name.clone(),
+        campaign: plan.meta.campaign.clone(),
+        n_samples: plan.n_samples(),
+        n_axes: cell.n_axes(),
+        axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
+        cycle_s: cell.cycle_s(),
+        first_index: first,
+        iterations: options.iterations,
+        measure: plan.meta.measure.clone(),
+        law: plan.meta.law.clone(),
+        bus: cell.bus.address.clone(),
+        mode: if options.lockstep { "lockstep" } else { "realtime" },
+        rt: granted,
+    });
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, positive")]
+    let progress_every = ((PROGRESS_S / cell.cycle_s()) as u32).max(1);
+    let mut campaign = Running {
+        collector: Collector::new(
+            plan.n_samples(),
+            cell.n_axes(),
+            plan.measure,
+            cell.tcp_encoder.is_some(),
+            cell.cycle_s(),
+        ),
+        announcer,
+        library,
+        meta: plan.meta,
+        progress,
+        learner,
+        runs: resumed.runs,
+        mail,
+        stopping: None,
+        failure: None,
+        phase_iteration: first,
+        progress_every: if options.lockstep { u32::MAX } else { progress_every },
+        n_samples: plan.interpolator.n_samples(),
+    };
+    loop {
+        let over = pacer.go_on();
+        campaign.read_mail();
+        if over {
+            break;
+        }
+    }
+    Ok(campaign.end(pacer, cell, options))
+}
+
+fn law_name(cell: &Cell) -> &'static str {
+    match cell.learning.law {
+        LawName::NormOptimal => "norm_optimal",
+        LawName::Pd => "pd",
+        LawName::None => "none",
+    }
+}
+
+/// A campaign whose loop runs.
+struct Running<'a> {
+    collector: Collector,
+    announcer: Announcer<'a>,
+    library: Library,
+    meta: Meta,
+    progress: Progress,
+    learner: Option<Learner>,
+    runs: Vec<(u32, Figures)>,
+    mail: Mailbox,
+    stopping: Option<StopReason>,
+    /// Why no more runs can be kept, if so: the axes are stopped, as nothing may be lost.
+    failure: Option<String>,
+    phase_iteration: u32,
+    progress_every: u32,
+    n_samples: usize,
+}
+
+impl Running<'_> {
+    /// Handles all that the loop has reported, and all that has been learned meanwhile.
+    fn read_mail(&mut self) {
+        while let Some(message) = self.mail.read() {
+            match message {
+                Message::Sample(sample) => {
+                    self.announcer.sample(&sample);
+                    if let Some((run, k)) = sample.at {
+                        self.collector.take(run, k, &sample);
+                        if k % self.progress_every == self.progress_every - 1 {
+                            let (iteration, sample) = (run, k as usize + 1);
+                            let n_samples = self.n_samples;
+                            self.announcer.tell(&Event::Progress { iteration, sample, n_samples });
+                        }
+                    }
+                }
+                Message::Phase(phase, iteration) => {
+                    self.phase_iteration = iteration;
+                    self.announcer.tell(&Event::State { state: state_name(phase), iteration });
+                }
+                Message::RunStarted { run, table } => {
+                    self.collector.begin(run);
+                    self.progress.started(table);
+                }
+                Message::RunEnded { overruns, .. } => self.run_ended(overruns),
+                Message::Stopping(reason) => self.stopping = Some(reason),
+            }
+        }
+        while let Some(lesson) = self.learner.as_mut().and_then(Learner::take) {
+            match lesson.input {
+                Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
+                Err(error) => self.fail(format!("the law refused the last run: {error}")),
+            }
+        }
+    }
+
+    fn run_ended(&mut self, overruns: u32) {
+        let Some(mut record) = self.collector.end() else {
+            self.fail("samples of a run were lost on their way to the record".to_owned());
+            return;
+        };
+        record.figures.overruns = overruns;
+        self.progress.note(&mut record);
+        match self.progress.decide(&mut record) {
+            Decision::Learn => {
+                if let Some(learner) = &mut self.learner {
+                    self.progress.asked();
+                    learner.begin(&record.input, &record.error_m);
+                }
+            }
+            Decision::RollBack(input) => self.progress.send(&mut self.mail, input, 0.0),
+            Decision::Hold => {}
+        }
+        self.keep(&record);
+    }
+
+    fn keep(&mut self, record: &IterationRecord) {
+        match self.library.append(&self.meta, record) {
+            Ok(id) => {
+                self.announcer.tell(&Event::Iteration {
+                    id,
+                    index: record.index,
+                    digest: record.digest(),
+                    figures: record.figures.clone(),
+                });
+                self.runs.push((record.index, record.figures.clone()));
+            }
+            Err(error) => self.fail(error.to_string()),
+        }
+    }
+
+    fn fail(&mut self, why: String) {
+        if self.failure.is_none() {
+            self.failure = Some(why);
+            self.mail.stop(libc::SIGABRT);
+        }
+    }
+
+    fn end(mut self, pacer: Pacer, cell: &Cell, options: &Options) -> Outcome {
+        let remains = pacer.end();
+        self.read_mail();
+        let (status, reason) = match (&self.failure, self.stopping, &remains) {
+            (Some(why), _, _) => (EndStatus::Fault, why.clone()),
+            (None, Some(reason), _) => (reason::status(reason), reason::sentence(reason, cell)),
+            (None, None, None) => (
+                EndStatus::Fault,
+                "the loop's thread died; the drives stop by themselves".to_owned(),
+            ),
+            (None, None, Some(_)) => {
+                (EndStatus::Completed, format!("{} runs made and kept", options.iterations))
+            }
+        };
+        if status == EndStatus::Fault {
+            self.announcer.tell(&Event::Fault { reason: reason.clone() });
+        }
+        if let Some(mut remains) = remains {
+            if let Err(error) = nodes::release(remains.bus.as_mut()) {
+                tracing::warn!("nodes could not be taken out of operation: {error}");
+            }
+            if let Some(timing) = remains.timing {
+                self.announcer.tell(&Event::Latency {
+                    wake_late_us: timing.wake_late.figures(),
+                    execution_us: timing.execution.figures(),
+                });
+            }
+        }
+        let iterations = u32::try_from(self.runs.len()).unwrap_or(u32::MAX);
+        self.announcer
+            .tell(&Event::State { state: StateName::Stopped, iteration: self.phase_iteration });
+        self.announcer.tell(&Event::End { status, reason: reason.clone(), iterations });
+        let signal = match self.stopping {
+            Some(StopReason::Asked(signal)) if self.failure.is_none() => signal,
+            _ => 0,
+        };
+        Outcome { status, reason, signal, campaign: self.meta.campaign, runs: self.runs }
+    }
+}
+
+fn state_name(phase: PhaseName) -> StateName {
+    match phase {
+        PhaseName::Enabling => StateName::Enabling,
+        PhaseName::Returning => StateName::Returning,
+        PhaseName::Settling => StateName::Settling,
+        PhaseName::Running => StateName::Running,
+        PhaseName::Stopping | PhaseName::Disabling => StateName::Stopping,
+        PhaseName::Stopped => StateName::Stopped,
+    }
+}

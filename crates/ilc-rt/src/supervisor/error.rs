@@ -1,0 +1,103 @@
+//! Why a campaign could not begin; nothing has moved when one of these is returned.
+
+use crate::config::ConfigError;
+use crate::fieldbus::cia402::BringUpError;
+use crate::fieldbus::load::LoadError;
+use crate::fieldbus::transport::OpenError;
+use crate::learning::LearningError;
+use crate::library::LibraryError;
+use crate::model::ModelError;
+use crate::trajectory::TrajectoryError;
+
+/// A refusal, in one line.
+#[derive(Debug, thiserror::Error)]
+pub enum SupervisorError {
+    /// The cell description.
+    #[error("{0}")]
+    Config(#[from] ConfigError),
+    /// The bus does not open.
+    #[error("{file}: [bus] address: {source}")]
+    Bus {
+        /// Cell description.
+        file: String,
+        /// Why.
+        source: OpenError,
+    },
+    /// The bus cannot carry the traffic.
+    #[error("{file}: [bus] load_max: {source}")]
+    Load {
+        /// Cell description.
+        file: String,
+        /// Why.
+        source: LoadError,
+    },
+    /// A node does not answer, or is not what the cell says.
+    #[error("{file}: {key} on {address}: {source}")]
+    BringUp {
+        /// Cell description.
+        file: String,
+        /// Which node, as `[[axis]] x node = 1`.
+        key: String,
+        /// Bus address.
+        address: String,
+        /// Why.
+        source: Box<BringUpError>,
+    },
+    /// The bus failed while the nodes were started.
+    #[error("{file}: [bus] address = {address}: {source}")]
+    Start {
+        /// Cell description.
+        file: String,
+        /// Bus address.
+        address: String,
+        /// Why.
+        source: crate::fieldbus::BusError,
+    },
+    /// The program cannot be run within the limits.
+    #[error("{file}: [program]: {source}")]
+    Program {
+        /// Cell description.
+        file: String,
+        /// Why.
+        source: TrajectoryError,
+    },
+    /// The model of an axis is unusable.
+    #[error("{file}: [axis.model]: {source}")]
+    Model {
+        /// Cell description.
+        file: String,
+        /// Why.
+        source: ModelError,
+    },
+    /// The law refuses model or weights.
+    #[error("{file}: [learning]: {source}")]
+    Learning {
+        /// Cell description.
+        file: String,
+        /// Why.
+        source: LearningError,
+    },
+    /// The library.
+    #[error("{0}")]
+    Library(#[from] LibraryError),
+    /// There is nothing to go on with.
+    #[error("--resume: {0}")]
+    Resume(String),
+    /// `loopback:` was asked of a program that has no drives in it.
+    #[error(
+        "{file}: [bus] address = loopback: has no drives in this program; allowed: can:, udp:, zenoh: \
+         (`ilc run` in Python runs loopback: with simulated drives)"
+    )]
+    Loopback {
+        /// Cell description.
+        file: String,
+    },
+    /// A thread could not be started.
+    #[error("the {what} thread could not be started: {source}")]
+    Thread {
+        /// Which one.
+        what: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}

@@ -1,0 +1,92 @@
+//! The learning between two runs: on its own thread in real time, in line in lock-step.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use super::error::SupervisorError;
+use crate::learning::{Law, LearningError};
+
+/// What a law made of a run.
+#[derive(Debug)]
+pub(super) struct Lesson {
+    /// Input of the next run.
+    pub(super) input: Result<Vec<f64>, LearningError>,
+    /// How long it took.
+    pub(super) update_ms: f64,
+}
+
+/// A run to learn from.
+pub(super) struct Job {
+    input: Vec<f64>,
+    error: Vec<f64>,
+}
+
+/// A law, and where it computes.
+pub(super) enum Learner {
+    /// In the caller's thread: the result is there at once, always at the same tick.
+    InLine { law: Box<dyn Law>, done: Option<Lesson> },
+    /// On a thread of its own: the loop's thread and the caller's go on meanwhile.
+    Thread { jobs: Option<Sender<Job>>, lessons: Receiver<Lesson>, thread: Option<JoinHandle<()>> },
+}
+
+impl Learner {
+    pub(super) fn in_line(law: Box<dyn Law>) -> Self {
+        Self::InLine { law, done: None }
+    }
+
+    pub(super) fn on_thread(mut law: Box<dyn Law>) -> Result<Self, SupervisorError> {
+        let (jobs, todo) = channel::<Job>();
+        let (done, lessons) = channel();
+        let thread = std::thread::Builder::new()
+            .name("ilc-learn".to_owned())
+            .spawn(move || {
+                for job in todo {
+                    if done.send(learn(law.as_mut(), &job.input, &job.error)).is_err() {
+                        return;
+                    }
+                }
+            })
+            .map_err(|source| SupervisorError::Thread { what: "learning", source })?;
+        Ok(Self::Thread { jobs: Some(jobs), lessons, thread: Some(thread) })
+    }
+
+    /// Begins to learn from a run.
+    pub(super) fn begin(&mut self, input: &[f64], error: &[f64]) {
+        match self {
+            Self::InLine { law, done } => *done = Some(learn(law.as_mut(), input, error)),
+            Self::Thread { jobs: Some(jobs), .. } => {
+                // A thread that is gone never answers; the old input is then repeated and counted.
+                let _ = jobs.send(Job { input: input.to_vec(), error: error.to_vec() });
+            }
+            Self::Thread { .. } => {}
+        }
+    }
+
+    /// What was learned, once it is there.
+    pub(super) fn take(&mut self) -> Option<Lesson> {
+        match self {
+            Self::InLine { done, .. } => done.take(),
+            Self::Thread { lessons, .. } => lessons.try_recv().ok(),
+        }
+    }
+}
+
+impl Drop for Learner {
+    fn drop(&mut self) {
+        if let Self::Thread { jobs, thread, .. } = self {
+            drop(jobs.take());
+            if let Some(thread) = thread.take() {
+                let _ = thread.join();
+            }
+        }
+    }
+}
+
+/// Learns from a run, here and now.
+pub(super) fn learn(law: &mut dyn Law, input: &[f64], error: &[f64]) -> Lesson {
+    let began = Instant::now();
+    let mut next = vec![0.0; input.len()];
+    let result = law.update(input, error, &mut next);
+    Lesson { input: result.map(|()| next), update_ms: began.elapsed().as_secs_f64() * 1e3 }
+}

@@ -1,0 +1,78 @@
+//! Runs the loop: on a real-time thread, or in line in lock-step.
+
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::error::SupervisorError;
+use crate::fieldbus::Bus;
+use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
+use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
+
+/// How often the mailbox of a loop on its own thread is read.
+const READ_EVERY: Duration = Duration::from_millis(2);
+/// How long before a tick the loop's thread stops sleeping and spins.
+const SPIN: Nanos = Nanos::from_micros(100);
+
+/// The loop, wherever it runs.
+pub(super) enum Pacer {
+    /// On a thread of its own.
+    Clock { thread: Option<JoinHandle<(Cycle, Timing)>> },
+    /// Here, a tick at a time.
+    Answers { cycle: Option<Box<Cycle>> },
+}
+
+/// What remains of the loop.
+pub(super) struct Remains {
+    pub(super) bus: Box<dyn Bus>,
+    pub(super) timing: Option<Timing>,
+}
+
+impl Pacer {
+    pub(super) fn in_line(cycle: Cycle) -> Self {
+        Self::Answers { cycle: Some(Box::new(cycle)) }
+    }
+
+    /// Starts the loop's thread, and tells what the system granted it.
+    pub(super) fn on_clock(mut cycle: Cycle) -> Result<(Self, RtReport), SupervisorError> {
+        let (report, granted) = std::sync::mpsc::sync_channel(1);
+        let thread = std::thread::Builder::new()
+            .name("ilc-servo".to_owned())
+            .spawn(move || {
+                let mut timing = Timing::default();
+                // Set-up of the thread is over before the first tick; nobody waits for the report.
+                let _ = report.send(thread::enter(RtRequest::default()));
+                run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
+                (cycle, timing)
+            })
+            .map_err(|source| SupervisorError::Thread { what: "servo", source })?;
+        let report = granted.recv().unwrap_or_default();
+        Ok((Self::Clock { thread: Some(thread) }, report))
+    }
+
+    /// Lets the loop go on for a while; returns whether it is over.
+    pub(super) fn go_on(&mut self) -> bool {
+        match self {
+            Self::Clock { thread } => {
+                if thread.as_ref().is_none_or(JoinHandle::is_finished) {
+                    return true;
+                }
+                std::thread::sleep(READ_EVERY);
+                false
+            }
+            Self::Answers { cycle } => {
+                cycle.as_mut().is_none_or(|cycle| cycle.tick(0) == TickStatus::Stopped)
+            }
+        }
+    }
+
+    /// Ends; `None` if the loop's thread has died.
+    pub(super) fn end(self) -> Option<Remains> {
+        match self {
+            Self::Clock { thread } => {
+                let (cycle, timing) = thread?.join().ok()?;
+                Some(Remains { bus: cycle.into_bus(), timing: Some(timing) })
+            }
+            Self::Answers { cycle } => Some(Remains { bus: cycle?.into_bus(), timing: None }),
+        }
+    }
+}

@@ -1,0 +1,332 @@
+//! From a cell description to what the loop and the law are made of; refuses before anything moves.
+
+use std::time::Duration;
+
+use serde_json::json;
+
+use super::error::SupervisorError;
+use crate::config::{Axis, Cell, ConfigError, Corner, Interface, LawName, Measure};
+use crate::control::PositionLoop;
+use crate::fieldbus::canopen::NodeId;
+use crate::fieldbus::cia402::{Mode, Scale};
+use crate::fieldbus::load;
+use crate::learning::Law;
+use crate::learning::law::norm_optimal::{NormOptimal, Weights};
+use crate::learning::law::pd::{Pd, PdGains, QFilter};
+use crate::model::{
+    Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
+};
+use crate::record::{Meta, fingerprint};
+use crate::rt::Nanos;
+use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
+use crate::signal::butterworth;
+use crate::trajectory::{AxisLimits, CornerRule, Interpolator, PathSegment, PathSpec};
+
+/// How long drives may take to be switched on.
+const ENABLE_S: f64 = 3.0;
+
+/// A cell description worked out: nothing in it can fail any more.
+#[derive(Debug)]
+pub struct Plan {
+    /// The servo cycle's own description; runs are filled in by the campaign.
+    pub servo: ServoSpec,
+    /// Set points.
+    pub interpolator: Interpolator,
+    /// Set points of a whole run, `n_samples * n_axes`.
+    pub reference_m: Vec<f64>,
+    /// What was learned from.
+    pub measure: Measure,
+    /// Provenance of the records; the campaign's name is filled in by the campaign.
+    pub meta: Meta,
+    /// Worst-case share of the bus taken by cyclic traffic.
+    pub bus_load: f64,
+}
+
+impl Plan {
+    /// Works a cell description out, with the measurement to learn from if it is to be another one.
+    ///
+    /// # Errors
+    /// [`SupervisorError`] for a program beyond the limits, an overloaded bus, or a measurement that
+    /// is not there.
+    pub fn new(
+        cell: &Cell,
+        measure: Option<Measure>,
+        lockstep: bool,
+    ) -> Result<Self, SupervisorError> {
+        let file = cell.file.display().to_string();
+        let mut cell = cell.clone();
+        cell.learning.measure = measure.unwrap_or(cell.learning.measure);
+        crate::config::check(&cell)?;
+        let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
+        let interpolator = Interpolator::plan(&path(&cell), &limits, cell.cycle_s())
+            .map_err(|source| SupervisorError::Program { file: file.clone(), source })?;
+        let bus_load = bus_load(&cell)
+            .map_err(|source| SupervisorError::Load { file: file.clone(), source })?;
+        let reference_m = interpolator.reference();
+        Ok(Self {
+            servo: servo_spec(&cell, lockstep)?,
+            interpolator,
+            reference_m,
+            measure: cell.learning.measure,
+            meta: Meta {
+                cell: cell.cell.name.clone(),
+                campaign: String::new(),
+                fingerprint: String::new(),
+                law: String::new(),
+                law_parameters: String::new(),
+                measure: match cell.learning.measure {
+                    Measure::Encoder => "encoder".to_owned(),
+                    Measure::Tcp => "tcp".to_owned(),
+                },
+                program: program_json(&cell),
+                cycle_s: cell.cycle_s(),
+                n_axes: cell.n_axes(),
+            },
+            bus_load,
+        })
+    }
+
+    /// Samples in a run.
+    pub fn n_samples(&self) -> usize {
+        self.interpolator.n_samples()
+    }
+
+    /// Makes the law that the cell names; `None` if it shall not learn.
+    ///
+    /// # Errors
+    /// [`SupervisorError::Model`] or [`SupervisorError::Learning`] if model or weights are unusable.
+    pub fn law(&self, cell: &Cell) -> Result<Option<Box<dyn Law>>, SupervisorError> {
+        let file = || cell.file.display().to_string();
+        let n_samples = self.n_samples();
+        let refused = |source| SupervisorError::Learning { file: file(), source };
+        match cell.learning.law {
+            LawName::None => Ok(None),
+            LawName::NormOptimal => {
+                let model = model(cell)
+                    .map_err(|source| SupervisorError::Model { file: file(), source })?;
+                let w = cell.learning.norm_optimal;
+                let weights = Weights { q: w.q, s: w.s, r: w.r, rate: w.rate };
+                let law = NormOptimal::new(&model, n_samples, weights).map_err(refused)?;
+                Ok(Some(Box::new(law)))
+            }
+            LawName::Pd => {
+                let pd = cell.learning.pd;
+                let gains = PdGains { kp: pd.kp, kd: pd.kd, lead: pd.lead_samples };
+                let filter = butterworth(pd.order, pd.cutoff_hz, cell.cycle_s())
+                    .map_err(|source| refused(source.into()))?;
+                let law = Pd::new(gains, n_samples, cell.n_axes(), QFilter::ZeroPhase(filter))
+                    .map_err(refused)?;
+                Ok(Some(Box::new(law)))
+            }
+        }
+    }
+
+    /// Completes the provenance with the law that will be used.
+    pub fn name_law(&mut self, cell: &Cell, name: &str, parameters: &str) {
+        name.clone_into(&mut self.meta.law);
+        parameters.clone_into(&mut self.meta.law_parameters);
+        let axes: Vec<_> = cell
+            .axes
+            .iter()
+            .map(|a| format!("{:?}", (&a.name, a.interface, a.limits, a.model, a.position_loop)))
+            .collect();
+        let whole = format!(
+            "{:?}",
+            (
+                &self.meta.cell,
+                axes,
+                &self.meta.program,
+                cell.cell.cycle_us,
+                &self.meta.measure,
+                name,
+                parameters,
+                cell.learning.input_max_m,
+                cell.learning.input_max_m_s,
+            )
+        );
+        self.meta.fingerprint = fingerprint(&whole);
+    }
+}
+
+/// The model that learning uses: the axes' closed loops side by side.
+fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
+    let mut models = cell.axes.iter().map(|axis| axis_model(axis, cell.cycle_s()));
+    let first =
+        models.next().unwrap_or_else(|| StateSpace::static_gain(nalgebra::dmatrix![1.0], None))?;
+    models.try_fold(first, |all, next| all.append(&next?))
+}
+
+/// The closed loop of one axis from learned input to position.
+///
+/// csp: `w^2 / (s^2 + 2 d w s + w^2)`. csv: `G / (1 + kv z^-1 G)` with `G = a / (s (s + a))`, as the
+/// position that the loop here sees is one cycle old. Both sampled with a zero-order hold.
+fn axis_model(axis: &Axis, cycle_s: f64) -> Result<StateSpace, ModelError> {
+    let turn = std::f64::consts::TAU;
+    let hold = |model: &StateSpace| discretize(model, cycle_s, Method::ZeroOrderHold);
+    let n_delay = axis.model.delay_samples as usize;
+    match axis.interface {
+        Interface::Csp => {
+            let frequency_hz = axis.model.natural_frequency_hz.unwrap_or(1.0);
+            let damping = axis.model.damping.unwrap_or(1.0);
+            hold(&second_order(turn * frequency_hz, damping)?)?.delayed(n_delay)
+        }
+        Interface::Csv => {
+            let bandwidth = turn * axis.model.velocity_bandwidth_hz.unwrap_or(1.0);
+            let velocity = from_transfer_function(&[bandwidth], &[1.0, bandwidth, 0.0], None)?;
+            let gain = axis.position_loop.map_or(1.0, |position_loop| position_loop.gain_per_s);
+            let controller =
+                StateSpace::static_gain(nalgebra::dmatrix![gain], Some(cycle_s))?.delayed(1)?;
+            hold(&velocity)?.delayed(n_delay)?.feedback(&controller)
+        }
+    }
+}
+
+fn axis_limits(axis: &Axis) -> AxisLimits {
+    AxisLimits {
+        velocity_max_m_s: axis.limits.velocity_max_m_s,
+        acceleration_max_m_s2: axis.limits.acceleration_max_m_s2,
+        jerk_max_m_s3: axis.limits.jerk_max_m_s3,
+    }
+}
+
+fn path(cell: &Cell) -> PathSpec {
+    let program = &cell.program;
+    PathSpec {
+        start_m: program.start_m.clone(),
+        segments: program
+            .segments
+            .iter()
+            .map(|segment| PathSegment {
+                to_m: segment.to_m.clone(),
+                feed_m_s: segment.feed_m_s.unwrap_or(program.feed_m_s),
+            })
+            .collect(),
+        corner: match program.corner {
+            Corner::ExactStop => CornerRule::ExactStop,
+            Corner::Blend => CornerRule::Blend { window_s: program.blend_s },
+        },
+        dwell_before_s: program.dwell_before_s,
+        dwell_after_s: program.dwell_after_s,
+    }
+}
+
+fn program_json(cell: &Cell) -> String {
+    let program = &cell.program;
+    let segments: Vec<_> = program
+        .segments
+        .iter()
+        .map(|s| json!({ "to_m": s.to_m, "feed_m_s": s.feed_m_s.unwrap_or(program.feed_m_s) }))
+        .collect();
+    let corner = match program.corner {
+        Corner::ExactStop => json!("exact_stop"),
+        Corner::Blend => json!({ "blend_s": program.blend_s }),
+    };
+    json!({
+        "start_m": program.start_m,
+        "segments": segments,
+        "corner": corner,
+        "dwell_before_s": program.dwell_before_s,
+        "dwell_after_s": program.dwell_after_s,
+        "settle_s": program.settle_s,
+    })
+    .to_string()
+}
+
+/// Cyclic frames: a command and two answers a drive, one answer of the tool, SYNC, and room for one
+/// frame of something else.
+fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
+    let mut payloads = vec![0, 8];
+    payloads.extend(cell.axes.iter().flat_map(|_| [8, 8, 8]));
+    payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
+    // Only a real bus has bits; the others are as fast as the machine.
+    let load_max = if cell.bus.address.starts_with("can:") { cell.bus.load_max } else { f64::MAX };
+    let found = load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, load_max)?;
+    Ok(found.ratio())
+}
+
+fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
+    let ticks = |span_s: f64| -> u32 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked spans"
+        )]
+        let ticks = (span_s / cell.cycle_s()).ceil() as u32;
+        ticks
+    };
+    Ok(ServoSpec {
+        axes: cell
+            .axes
+            .iter()
+            .map(|axis| {
+                Ok(AxisSpec {
+                    node: node(cell, axis.node)?,
+                    mode: mode(axis),
+                    scale: scale(cell, axis.counts_per_m)?,
+                    limits: axis_limits(axis),
+                    position_min_m: axis.limits.position_min_m,
+                    position_max_m: axis.limits.position_max_m,
+                    following_error_max_m: axis.limits.following_error_max_m,
+                    position_loop: PositionLoop {
+                        gain_per_s: axis.position_loop.map_or(0.0, |p| p.gain_per_s),
+                        velocity_feedforward: axis
+                            .position_loop
+                            .map_or(0.0, |p| p.velocity_feedforward),
+                    },
+                    input_max: match axis.interface {
+                        Interface::Csp => cell.learning.input_max_m,
+                        Interface::Csv => cell.learning.input_max_m_s,
+                    },
+                })
+            })
+            .collect::<Result<_, ConfigError>>()?,
+        tool: cell
+            .tcp_encoder
+            .map(|tool| -> Result<_, ConfigError> {
+                Ok(ToolSpec {
+                    node: node(cell, tool.node)?,
+                    scale: scale(cell, tool.counts_per_m)?,
+                })
+            })
+            .transpose()?,
+        cycle: Nanos::from_micros(cell.cell.cycle_us),
+        pace: if lockstep {
+            Pace::Answers(Duration::from_secs_f64(cell.safety.answer_timeout_s))
+        } else {
+            Pace::Clock
+        },
+        runs: 0..0,
+        start_m: cell.program.start_m.clone(),
+        return_feed_m_s: cell.program.feed_m_s,
+        settle_ticks: ticks(cell.program.settle_s),
+        enable_ticks: ticks(ENABLE_S),
+        silent_cycles_max: cell.safety.silent_cycles_max,
+        overrun_cycles_max: cell.safety.overrun_cycles_max,
+    })
+}
+
+/// The node of a number that validation has seen already.
+pub(super) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
+    NodeId::new(number).ok_or_else(|| refused(cell, "node", &number, "1 to 127"))
+}
+
+fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
+    Scale::new(counts_per_m).ok_or_else(|| refused(cell, "counts_per_m", &counts_per_m, "above 0"))
+}
+
+fn refused(cell: &Cell, key: &str, value: &dyn std::fmt::Display, allowed: &str) -> ConfigError {
+    ConfigError::Value {
+        file: cell.file.display().to_string(),
+        key: key.to_owned(),
+        value: value.to_string(),
+        allowed: allowed.to_owned(),
+    }
+}
+
+/// The command interface of an axis in the words of the drive profile.
+pub(super) fn mode(axis: &Axis) -> Mode {
+    match axis.interface {
+        Interface::Csp => Mode::Csp,
+        Interface::Csv => Mode::Csv,
+    }
+}

@@ -1,0 +1,197 @@
+//! What the next run gets: a lesson, the best input so far, or the old input once more.
+
+use super::error::SupervisorError;
+use super::learner::learn;
+use crate::learning::Law;
+use crate::library::Library;
+use crate::record::{Figures, IterationRecord, Meta};
+use crate::servo::Mailbox;
+
+/// Times that the best input is restored before learning is switched off for good.
+const ROLLBACKS_MAX: u32 = 2;
+
+/// What to do after a run.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Decision {
+    /// Learn from it.
+    Learn,
+    /// Its error has grown too far: restore this input.
+    RollBack(Vec<f64>),
+    /// Leave the input as it is; learning is off.
+    Hold,
+}
+
+/// The state of learning in a campaign.
+#[derive(Debug)]
+pub(super) struct Progress {
+    rollback_ratio: f64,
+    best: Option<(f64, Vec<f64>)>,
+    rollbacks: u32,
+    /// Number of the table that the next run shall use.
+    promised: u32,
+    late_updates: u32,
+    /// Time of the lesson in each table handed to the loop; table n at n - 1.
+    update_ms: Vec<f64>,
+    table_in_use: u32,
+}
+
+impl Progress {
+    pub(super) fn new(rollback_ratio: f64) -> Self {
+        Self {
+            rollback_ratio,
+            best: None,
+            rollbacks: 0,
+            promised: 0,
+            late_updates: 0,
+            update_ms: Vec::new(),
+            table_in_use: 0,
+        }
+    }
+
+    /// A run began with a table.
+    pub(super) fn started(&mut self, table: u32) {
+        self.table_in_use = table;
+        self.late_updates += u32::from(table < self.promised);
+    }
+
+    /// A lesson was asked for.
+    pub(super) fn asked(&mut self) {
+        self.promised = self.next_number();
+    }
+
+    fn next_number(&self) -> u32 {
+        u32::try_from(self.update_ms.len() + 1).unwrap_or(u32::MAX)
+    }
+
+    /// Writes into a record what belongs to its run.
+    pub(super) fn note(&self, record: &mut IterationRecord) {
+        record.figures.late_updates = self.late_updates;
+        record.figures.update_ms = (self.table_in_use as usize)
+            .checked_sub(1)
+            .and_then(|table| self.update_ms.get(table))
+            .copied()
+            .unwrap_or(0.0);
+    }
+
+    /// Decides what follows a run, and marks it if the best input is restored because of it.
+    ///
+    /// Growth is measured in the RMS error over the best run so far. After two restorations the law
+    /// has shown that it does not converge here, and learning stays off.
+    pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
+        let rms = record.figures.tracking_rms_m;
+        let off = self.rollbacks >= ROLLBACKS_MAX;
+        match &self.best {
+            Some((best, input)) if rms > best * self.rollback_ratio && !off => {
+                self.rollbacks += 1;
+                record.figures.rolled_back = true;
+                Decision::RollBack(input.clone())
+            }
+            Some((best, _)) if rms >= *best => {
+                if off {
+                    Decision::Hold
+                } else {
+                    Decision::Learn
+                }
+            }
+            _ => {
+                self.best = Some((rms, record.input.clone()));
+                if off { Decision::Hold } else { Decision::Learn }
+            }
+        }
+    }
+
+    /// Hands the loop the input of its next run.
+    pub(super) fn send(&mut self, mail: &mut Mailbox, input: Vec<f64>, update_ms: f64) {
+        let number = self.next_number();
+        // Refused only if two tables wait already; the run then repeats an input and is counted late.
+        self.promised = number;
+        if mail.send_table(number, input.into_boxed_slice()).is_ok() {
+            self.update_ms.push(update_ms);
+        }
+    }
+
+    /// Takes up the newest campaign of the same fingerprint where it ended: its runs, and the input
+    /// of the next one with the time that it took to learn it.
+    pub(super) fn resume(
+        &mut self,
+        library: &Library,
+        meta: &mut Meta,
+        law: Option<&mut (dyn Law + '_)>,
+    ) -> Result<Resumed, SupervisorError> {
+        let Some(campaign) = library.newest_campaign(&meta.fingerprint)? else {
+            return Err(SupervisorError::Resume(
+                "the library has no campaign of this cell, program, measurement and law".to_owned(),
+            ));
+        };
+        let rows = library.list(Some(&campaign))?;
+        meta.campaign = campaign;
+        let mut last = None;
+        for row in &rows {
+            let mut record = library.load(row.id)?.record;
+            let decision = self.decide(&mut record);
+            last = Some((decision, record));
+        }
+        let next = match (last, law) {
+            (Some((Decision::RollBack(input), _)), _) => Some(Ok((input, 0.0))),
+            (Some((Decision::Learn, record)), Some(law)) => {
+                let lesson = learn(law, &record.input, &record.error_m);
+                Some(lesson.input.map(|input| (input, lesson.update_ms)))
+            }
+            (Some((_, record)), _) => Some(Ok((record.input, 0.0))),
+            (None, _) => None,
+        };
+        let next = next.transpose().map_err(|error| {
+            SupervisorError::Resume(format!("the law refused the last run: {error}"))
+        })?;
+        let runs = rows.into_iter().map(|row| (row.record.index, row.record.figures)).collect();
+        Ok(Resumed { runs, next })
+    }
+}
+
+/// A campaign taken up again.
+#[derive(Debug, Default)]
+pub(super) struct Resumed {
+    /// Number and figures of the runs that are kept.
+    pub(super) runs: Vec<(u32, Figures)>,
+    /// Input of the next run, and how long it took to learn it.
+    pub(super) next: Option<(Vec<f64>, f64)>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(rms: f64) -> IterationRecord {
+        IterationRecord {
+            input: vec![rms],
+            figures: Figures { tracking_rms_m: rms, ..Figures::default() },
+            ..IterationRecord::default()
+        }
+    }
+
+    #[test]
+    fn growth_restores_the_best_input_twice_and_then_learning_is_off() {
+        let mut progress = Progress::new(1.5);
+        assert_eq!(progress.decide(&mut record(1.0)), Decision::Learn);
+        assert_eq!(progress.decide(&mut record(0.4)), Decision::Learn);
+        assert_eq!(progress.decide(&mut record(0.5)), Decision::Learn, "within the ratio");
+        let mut grown = record(0.7);
+        assert_eq!(progress.decide(&mut grown), Decision::RollBack(vec![0.4]));
+        assert!(grown.figures.rolled_back);
+        assert_eq!(progress.decide(&mut record(0.4)), Decision::Learn);
+        assert_eq!(progress.decide(&mut record(f64::INFINITY)), Decision::RollBack(vec![0.4]));
+        assert_eq!(progress.decide(&mut record(0.4)), Decision::Hold);
+        assert_eq!(progress.decide(&mut record(9.0)), Decision::Hold);
+    }
+
+    #[test]
+    fn a_run_with_an_older_table_than_promised_is_late() {
+        let mut progress = Progress::new(1.5);
+        progress.started(0);
+        progress.asked();
+        progress.started(0);
+        let mut late = record(1.0);
+        progress.note(&mut late);
+        assert_eq!(late.figures.late_updates, 1);
+    }
+}

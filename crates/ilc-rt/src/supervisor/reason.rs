@@ -1,0 +1,84 @@
+//! Why the axes were stopped, in one sentence that names axis, node and numbers.
+
+use crate::config::Cell;
+use crate::fieldbus::canopen::emcy;
+use crate::fieldbus::cia402::Statusword;
+use crate::record::EndStatus;
+use crate::servo::StopReason;
+
+/// The sentence for a reason to stop.
+pub(super) fn sentence(reason: StopReason, cell: &Cell) -> String {
+    let axis = |index: usize| {
+        cell.axes.get(index).map_or_else(
+            || format!("axis {index}"),
+            |axis| format!("axis {} (node {})", axis.name, axis.node),
+        )
+    };
+    let ms = |cycles: u32| f64::from(cycles) * cell.cycle_s() * 1e3;
+    match reason {
+        StopReason::Asked(signal) => match signal {
+            libc::SIGINT => "stopped by Ctrl-C".to_owned(),
+            libc::SIGTERM => "stopped by SIGTERM".to_owned(),
+            other => format!("stopped by signal {other}"),
+        },
+        StopReason::DriveFault { axis: index, code, following_error_m } => format!(
+            "drive of {} faulted: 0x{code:04X} {}; its following error was {:.3} mm",
+            axis(index),
+            emcy::meaning(code),
+            following_error_m * 1e3
+        ),
+        StopReason::NotEnabled { axis: index, statusword } => {
+            let state = Statusword(statusword)
+                .state()
+                .map_or_else(|| "no known state".to_owned(), |state| state.to_string());
+            format!(
+                "drive of {} is not enabled: statusword 0x{statusword:04X}, {state}",
+                axis(index)
+            )
+        }
+        StopReason::SilentAxis { axis: index, cycles } => format!(
+            "drive of {} is silent: no answer in {cycles} cycles ({:.0} ms)",
+            axis(index),
+            ms(cycles)
+        ),
+        StopReason::SilentTool { cycles } => format!(
+            "tool measurement (node {}) is silent: no answer in {cycles} cycles ({:.0} ms)",
+            cell.tcp_encoder.map_or(0, |tool| tool.node),
+            ms(cycles)
+        ),
+        StopReason::NodeLeft { node } => {
+            format!("node {node} restarted or left operation by itself")
+        }
+        StopReason::FollowingError { axis: index, error_m } => format!(
+            "{}: following error {:.3} mm, limits.following_error_max_m allows {:.3} mm",
+            axis(index),
+            error_m.abs() * 1e3,
+            cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m * 1e3)
+        ),
+        StopReason::NotFinite { axis: index } => {
+            format!("{}: the command was not a finite number", axis(index))
+        }
+        StopReason::Overrun { cycles } => format!(
+            "the loop missed {cycles} cycles in a row ({:.0} ms); safety.overrun_cycles_max allows {}",
+            ms(cycles),
+            cell.safety.overrun_cycles_max
+        ),
+        StopReason::Bus(error) => format!("{error}"),
+    }
+}
+
+/// Whether a reason is somebody's wish or a fault.
+pub(super) fn status(reason: StopReason) -> EndStatus {
+    match reason {
+        StopReason::Asked(_) => EndStatus::Interrupted,
+        StopReason::DriveFault { .. }
+        | StopReason::NotEnabled { .. }
+        | StopReason::SilentAxis { .. }
+        | StopReason::SilentTool { .. }
+        | StopReason::NodeLeft { .. }
+        | StopReason::FollowingError { .. }
+        | StopReason::NotFinite { .. }
+        | StopReason::Overrun { .. }
+        | StopReason::Bus(_) => EndStatus::Fault,
+    }
+}

@@ -1,0 +1,97 @@
+"""The program `ilc`: run, look at and keep what the machine learned."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from typing import TYPE_CHECKING
+
+import typer
+from typer import Typer
+
+from ilc_rt.commands import demo, library, monitor, plot, run
+from ilc_rt.errors import (
+    EXIT_BAD_INPUT,
+    EXIT_FAILURE,
+    EXIT_INTERRUPTED,
+    CampaignError,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+app = Typer(
+    name="ilc",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help="The motion controller that learns: each run corrects the next.",
+)
+app.command("demo")(demo.demo)
+app.command("run")(run.run)
+app.command("plot")(plot.plot)
+app.add_typer(library.app, name="library")
+app.command("monitor")(monitor.monitor)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `ilc` and return its exit code; errors are one line.
+
+    Parameters
+    ----------
+    arguments : sequence of str or None
+        Command line without the program's name; None for this process's.
+
+    Returns
+    -------
+    int
+        0 done, 2 bad input, 3 controlled stop after a fault, 130 and 143
+        stopped by a signal, 1 any other failure.
+    """
+    try:
+        code = app(args=arguments, standalone_mode=False, prog_name="ilc")
+    except CampaignError as error:
+        _say(error.reason)
+        return error.exit_code
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except SystemExit as error:
+        return error.code if isinstance(error.code, int) else EXIT_FAILURE
+    except BrokenPipeError:
+        # The reader has gone, as in `ilc library list | head`; nothing is left to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
+    except Exception as error:
+        if os.environ.get("ILC_TRACEBACK"):
+            raise
+        return _unexpected(error)
+    return code if isinstance(code, int) else 0
+
+
+def _unexpected(error: Exception) -> int:
+    """Report a wrong command line, or what nobody thought of."""
+    format_message = getattr(error, "format_message", None)
+    if callable(format_message):
+        context = getattr(error, "ctx", None)
+        hint = f" (see `{context.command_path} --help`)" if context is not None else ""
+        text = str(format_message()).rstrip(".")
+        if text:
+            _say(text + hint)
+        return int(getattr(error, "exit_code", EXIT_BAD_INPUT))
+    _say(f"unexpected {type(error).__name__}: {error} (ILC_TRACEBACK=1 shows where)")
+    return EXIT_FAILURE
+
+
+def _say(reason: str) -> None:
+    typer.echo(f"ilc: {' '.join(reason.split())}", err=True)
+
+
+def entry() -> None:
+    """Run `ilc` as the console script."""
+    sys.exit(main())
+
+
+if __name__ == "__main__":
+    entry()

@@ -1,0 +1,124 @@
+"""`ilc monitor`: follow controllers on the network from a terminal."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ilc_rt.campaign import load_cell
+from ilc_rt.errors import EXIT_FAULT
+from ilc_rt.events import (
+    EndEvent,
+    FaultEvent,
+    IterationEvent,
+    LatencyEvent,
+    ProgressEvent,
+    StartEvent,
+    StateEvent,
+)
+from ilc_rt.monitor import Message, Monitor
+from ilc_rt.progress import WORDS, describe
+from ilc_rt.record import IterationRecord
+from ilc_rt.table import HEAD, plain_line, run_cells
+
+CellName = Annotated[
+    str, typer.Argument(metavar="[CELL]", help="Name of a cell, or its TOML file; * for all.")
+]
+Connect = Annotated[
+    list[str] | None,
+    typer.Option(metavar="ENDPOINT", help="Zenoh endpoint, as tcp/192.168.1.5:7447; repeatable."),
+]
+Scouting = Annotated[
+    bool, typer.Option("--scouting/--no-scouting", help="Look for controllers by multicast.")
+]
+Runs = Annotated[
+    int | None, typer.Option("--iterations", "-n", help="End after this many runs were seen.")
+]
+Timeout = Annotated[
+    float | None, typer.Option("--timeout", metavar="SECONDS", help="End after this time.")
+]
+Raw = Annotated[
+    bool, typer.Option("--events", help="Print the JSON objects as they come, one a line.")
+]
+
+
+def monitor(
+    cell: CellName = "*",
+    connect: Connect = None,
+    scouting: Scouting = True,
+    iterations: Runs = None,
+    timeout: Timeout = None,
+    events: Raw = False,
+) -> None:
+    """Watch a controller: its state, each run's error, and faults.
+
+    Example: ilc monitor gantry --connect tcp/192.168.1.5:7447
+    """
+    name = load_cell(cell).name if Path(cell).suffix == ".toml" else cell
+    view = _View(events=events)
+    with Monitor(name, connect or (), scouting=scouting) as watching:
+        whom = "every cell" if name == "*" else name
+        typer.echo(f"watching {whom}; Ctrl-C ends this, not the machine", err=True)
+        for message in watching.messages(timeout):
+            view.show(message)
+            if iterations is not None and view.runs >= iterations:
+                break
+    if view.faults:
+        raise SystemExit(EXIT_FAULT)
+
+
+class _View:
+    """Prints messages as lines, and counts them."""
+
+    def __init__(self, *, events: bool) -> None:
+        self.runs = 0
+        self.faults = 0
+        self._events = events
+        self._present: set[str] = set()
+        self._first: dict[str, IterationRecord] = {}
+
+    def show(self, message: Message) -> None:
+        event = message.event
+        self.runs += isinstance(event, IterationEvent)
+        self.faults += message.topic == "fault"
+        if self._events:
+            kept = {"cell": message.cell, "topic": message.topic, **message.payload}
+            typer.echo(json.dumps(kept))
+        elif isinstance(event, IterationEvent):
+            self._show_run(message.cell, IterationRecord.from_event(event, ""))
+        elif isinstance(event, FaultEvent):
+            typer.echo(f"{message.cell}: FAULT: {event.reason}")
+        elif isinstance(event, LatencyEvent):
+            late = event.wake_late_us
+            typer.echo(
+                f"{message.cell}: loop woke late by {late.p99:.3g} µs (99 %), "
+                f"{late.max:.3g} µs at most"
+            )
+        elif isinstance(event, StartEvent):
+            typer.echo(describe(event))
+        elif isinstance(event, StateEvent):
+            run = "" if event.iteration is None else f" (run {event.iteration})"
+            typer.echo(f"{message.cell}: {WORDS.get(event.state, event.state)}{run}")
+        elif isinstance(event, ProgressEvent) and message.cell not in self._present:
+            # Someone who joins late is told where the run is, once.
+            share = 100.0 * event.sample / max(1, event.n_samples)
+            typer.echo(f"{message.cell}: run {event.iteration}, {share:.0f} %")
+        elif isinstance(event, EndEvent):
+            why = "" if event.status == "completed" or not event.reason else f": {event.reason}"
+            typer.echo(f"{message.cell}: {event.status}{why}")
+        elif message.topic in {"alive", "gone"}:
+            typer.echo(f"{message.cell}: controller {message.topic}")
+            self._present.discard(message.cell)
+        if message.topic == "state":
+            self._present.add(message.cell)
+        sys.stdout.flush()
+
+    def _show_run(self, cell: str, record: IterationRecord) -> None:
+        if cell not in self._first or record.index == 0:
+            self._first[cell] = record
+            typer.echo(" " * len(cell) + "  " + plain_line([name for name, _ in HEAD]))
+        typer.echo(f"{cell}  {plain_line(run_cells(record, self._first[cell]))}")

@@ -1,0 +1,61 @@
+"""Options and arguments that several verbs share."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ilc_rt.campaign import DEFAULT_LIBRARY
+
+
+class Measure(str, Enum):
+    """Which measurement to learn from."""
+
+    encoder = "encoder"
+    tcp = "tcp"
+
+
+class DriveChoice(str, Enum):
+    """Whether to start simulated drives."""
+
+    auto = "auto"
+    simulated = "simulated"
+    external = "external"
+
+
+CellFile = Annotated[Path, typer.Argument(metavar="CELL", help="Cell description, a TOML file.")]
+Iterations = Annotated[
+    int,
+    typer.Option(
+        "--iterations", "-n", help="Runs in the whole campaign; the first is without learning."
+    ),
+]
+Bus = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDR",
+        help="Bus in place of the cell's: can:vcan0, udp:239.74.163.2, zenoh:KEY or loopback:",
+    ),
+]
+MeasureOption = Annotated[
+    Measure | None, typer.Option(help="What to learn from, in place of the cell's.")
+]
+Lockstep = Annotated[
+    bool | None,
+    typer.Option(
+        "--lockstep/--realtime",
+        help="Advance on the drives' answers, with no wall clock; loopback: does so by itself.",
+    ),
+]
+LibraryFile = Annotated[
+    Path, typer.Option("--library", metavar="FILE", help="Where the runs are kept.")
+]
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to this file.")
+]
+LibraryArgument = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Library file.")]
+REPORT_NAME = "ilc-report.html"
+DEFAULT_LIBRARY_FILE = Path(DEFAULT_LIBRARY)

@@ -1,0 +1,62 @@
+"""`ilc plot`: the pictures of a campaign in the library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ilc_rt.commands.options import (
+    REPORT_NAME,
+    LibraryArgument,
+)
+from ilc_rt.errors import BadInputError
+from ilc_rt.result import CampaignResult
+
+CampaignOption = Annotated[
+    str | None, typer.Option(metavar="ID", help="Which campaign; the latest if not given.")
+]
+Out = Annotated[
+    Path,
+    typer.Option("--out", "-o", metavar="PATH", help="A .html report, or a folder for pictures."),
+]
+
+
+def plot(
+    library: LibraryArgument, campaign: CampaignOption = None, out: Out = Path(REPORT_NAME)
+) -> None:
+    """Draw a campaign from the library: a report, or one picture a file.
+
+    Example: ilc plot ilc-library.db --out pictures/
+    """
+    result = CampaignResult.from_library(library, campaign)
+    # Here and not above: matplotlib takes its time, and bad input should not wait for it.
+    import matplotlib as mpl
+
+    from ilc_rt import plots
+    from ilc_rt.report import write_report
+
+    typer.echo(result.sentence())
+    if out.suffix == ".html":
+        typer.echo(f"report: {write_report(result, out)}")
+        return
+    if out.suffix:
+        message = f"{out}: must be a .html file or a folder"
+        raise BadInputError(message)
+    figures = {
+        "convergence": plots.convergence(result),
+        "contour": plots.contour(result),
+        "tracking": plots.tracking(result),
+        "input": plots.learned_input(result),
+    }
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name, figure in figures.items():
+            if figure is not None:
+                with mpl.rc_context(plots.STYLE):
+                    figure.savefig(out / f"{name}.png")
+                typer.echo(f"picture: {out / name}.png")
+    except OSError as error:
+        message = f"{out}: cannot be written: {error.strerror}"
+        raise BadInputError(message) from error

@@ -1,0 +1,101 @@
+"""`ilc run`: run a cell's program and learn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ilc_rt.campaign import Campaign
+from ilc_rt.commands.options import (
+    DEFAULT_LIBRARY_FILE,
+    Bus,
+    CellFile,
+    DriveChoice,
+    Iterations,
+    JsonFile,
+    LibraryFile,
+    Lockstep,
+    MeasureOption,
+)
+from ilc_rt.errors import CampaignError
+from ilc_rt.progress import CampaignView
+
+ReportFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--report", metavar="PATH", help="Write an HTML report: a .html file or a folder."
+    ),
+]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on from the last campaign of this cell.")
+]
+DriveOption = Annotated[
+    DriveChoice,
+    typer.Option(help="Start simulated drives; auto never does on a can: bus."),
+]
+
+
+def run(
+    cell: CellFile,
+    iterations: Iterations = 10,
+    bus: Bus = None,
+    measure: MeasureOption = None,
+    lockstep: Lockstep = None,
+    library: LibraryFile = DEFAULT_LIBRARY_FILE,
+    resume: Resume = False,
+    json_file: JsonFile = None,
+    report: ReportFile = None,
+    drives: DriveOption = DriveChoice.auto,
+) -> None:
+    """Run a cell's program again and again, each run better than the last.
+
+    Example: ilc run examples/01_gantry.toml --iterations 10 --report report.html
+    """
+    campaign = Campaign(
+        cell,
+        library=library,
+        bus=bus,
+        measure=measure.value if measure else None,
+        lockstep=lockstep,
+        drives=drives.value,
+        resume=resume,
+    )
+    carry_out(campaign, iterations, json_file, report)
+
+
+def carry_out(
+    campaign: Campaign, iterations: int, json_file: Path | None, report: Path | None
+) -> None:
+    """Run a campaign in the terminal, then write what was asked for.
+
+    Files are written also after a fault or a stop on request, of the runs
+    that were completed.
+    """
+    try:
+        with CampaignView() as view:
+            for event in campaign.events(iterations):
+                view.show(event, campaign.result)
+    except (CampaignError, KeyboardInterrupt, SystemExit) as stopped:
+        if campaign.result.records:
+            typer.echo(campaign.result.sentence())
+            _write(campaign, json_file, report)
+        if not isinstance(stopped, CampaignError):
+            typer.echo("ilc: stopped on request; the axes are at rest", err=True)
+        raise
+    typer.echo(campaign.result.sentence())
+    _write(campaign, json_file, report)
+
+
+def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> None:
+    result = campaign.result
+    typer.echo(f"library: {campaign.library} (campaign {result.campaign})")
+    if json_file is not None:
+        result.write_json(json_file)
+        typer.echo(f"figures: {json_file}")
+    if report is not None:
+        # Here and not above: matplotlib takes its time, and bad input should not wait for it.
+        from ilc_rt.report import write_report
+
+        typer.echo(f"report:  {write_report(result, report)}")

@@ -1,0 +1,198 @@
+"""The two ways to run the controller: as a process, or inside this one.
+
+Both give the same lines of events. A bus between processes gets a process
+with a real-time thread; ``loopback:`` and laws written in Python run inside
+this process.
+"""
+
+from __future__ import annotations
+
+import json
+import selectors
+import signal
+import time
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ilc_rt import _native
+from ilc_rt.errors import EXIT_FAULT, CampaignError
+from ilc_rt.events import EndEvent, event_payload
+from ilc_rt.processes import Program, find_program, start_simulated_drives
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+STOP_DEADLINE_S = 30.0
+DRIVES_DIED_DEADLINE_S = 15.0
+
+
+class Controller(Protocol):
+    """A controller that is about to run."""
+
+    def lines(self) -> Iterator[str]:
+        """Yield one event a line until the controller ends."""
+
+    def interrupt(self, number: int = signal.SIGINT) -> None:
+        """Ask for a controlled stop; `lines` goes on until it has happened."""
+
+    def failure(self) -> CampaignError | None:
+        """Return why the controller ended, if not by finishing."""
+
+    def close(self) -> None:
+        """Stop the axes if they still move, then end and reap everything."""
+
+
+class ProcessController:
+    """`ilc-rt run --events` in a process, with or without simulated drives.
+
+    Parameters
+    ----------
+    cell_file : str
+        The cell description.
+    arguments : list of str
+        Further arguments of ``ilc-rt run``.
+    bus : str or None
+        Bus address in place of the cell's.
+    lockstep : bool
+        Whether drives and loop advance on each other's answer.
+    simulated : bool
+        Whether to start `ilc-sim` first.
+    """
+
+    def __init__(
+        self,
+        cell_file: str,
+        arguments: list[str],
+        *,
+        bus: str | None,
+        lockstep: bool,
+        simulated: bool,
+    ) -> None:
+        controller = find_program("ilc-rt")
+        self._drives: Program | None = None
+        self._stop_by: float | None = None
+        if simulated:
+            self._drives = start_simulated_drives(cell_file, bus, lockstep=lockstep)
+        argv = [str(controller), "run", cell_file, "--events", *arguments]
+        if bus is not None:
+            argv += ["--bus", bus]
+        if lockstep:
+            argv.append("--lockstep")
+        try:
+            self._controller = Program(argv)
+        except BaseException:
+            self._close_drives()
+            raise
+
+    def lines(self) -> Iterator[str]:
+        """Yield one event a line until the controller ends."""
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._controller, selectors.EVENT_READ)
+            if self._drives is not None:
+                selector.register(self._drives, selectors.EVENT_READ)
+            while not self._controller.at_end:
+                for key, _ in selector.select(0.5):
+                    program = key.fileobj
+                    assert isinstance(program, Program)
+                    program.receive()
+                    if program.at_end:
+                        selector.unregister(program)
+                        # The controller sees the silence itself; this only bounds the wait.
+                        self._must_stop_within(DRIVES_DIED_DEADLINE_S)
+                while self._controller.lines:
+                    yield self._controller.lines.pop(0)
+                if self._stop_by is not None and time.monotonic() > self._stop_by:
+                    self._controller.signal(signal.SIGKILL)
+                    message = "the controller did not stop in time and was ended"
+                    raise self._with_cause(CampaignError(message))
+
+    def interrupt(self, number: int = signal.SIGINT) -> None:
+        """Ask for a controlled stop; `lines` goes on until it has happened."""
+        self._controller.signal(number)
+        self._must_stop_within(STOP_DEADLINE_S)
+
+    def failure(self) -> CampaignError | None:
+        """Return why the controller ended, if not by finishing."""
+        if not self._controller.at_end:
+            return None
+        error = self._controller.failure()
+        code = self._controller.returncode
+        if code in {0, 128 + signal.SIGINT, 128 + signal.SIGTERM}:
+            return None
+        return self._with_cause(error)
+
+    def close(self) -> None:
+        """Stop the axes if they still move, then end and reap everything."""
+        try:
+            if self._controller.returncode is None:
+                self.interrupt()
+                for _ in self.lines():
+                    pass
+        finally:
+            self._controller.close()
+            self._close_drives()
+
+    def _must_stop_within(self, seconds: float) -> None:
+        if self._stop_by is None:
+            self._stop_by = time.monotonic() + seconds
+
+    def _with_cause(self, error: CampaignError) -> CampaignError:
+        """Add that the simulated drives died, if they did."""
+        if self._drives is None or self._drives.returncode is None:
+            return error
+        cause = self._drives.failure().reason
+        message = f"{error.reason} (the simulated drives ended: {cause})"
+        return CampaignError(message, error.exit_code)
+
+    def _close_drives(self) -> None:
+        if self._drives is not None:
+            self._drives.close()
+
+
+class InProcessController:
+    """The controller inside this process, for ``loopback:`` and Python laws.
+
+    Parameters
+    ----------
+    options : dict
+        Arguments of ``_native.run_events``.
+    drives : Program or None
+        Simulated drives in a process, for a bus other than ``loopback:``.
+    """
+
+    def __init__(self, options: dict[str, Any], drives: Program | None = None) -> None:
+        self._options = options
+        self._drives = drives
+        self._interrupted = 0
+        self._error: CampaignError | None = None
+        self._source: Iterator[str] | None = None
+
+    def lines(self) -> Iterator[str]:
+        """Yield one event a line until the controller ends."""
+        done = 0
+        try:
+            self._source = iter(_native.run_events(**self._options))
+            for line in self._source:
+                done += '"event":"iteration"' in line
+                yield line
+                if self._interrupted:
+                    ended = EndEvent("interrupted", done, "stopped on request")
+                    yield json.dumps(event_payload(ended))
+                    return
+        except (ValueError, OSError) as error:
+            self._error = CampaignError(str(error), 2)
+        except RuntimeError as error:
+            self._error = CampaignError(str(error), EXIT_FAULT)
+
+    def interrupt(self, number: int = signal.SIGINT) -> None:
+        """Ask for a controlled stop; `lines` goes on until it has happened."""
+        self._interrupted = number
+
+    def failure(self) -> CampaignError | None:
+        """Return why the controller ended, if not by finishing."""
+        return self._error
+
+    def close(self) -> None:
+        """Stop the axes if they still move, then end and reap everything."""
+        self._source = None
+        if self._drives is not None:
+            self._drives.close()

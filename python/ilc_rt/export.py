@@ -1,0 +1,87 @@
+"""Take one run out of the library into a file of another kind."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ilc_rt.errors import BadInputError
+from ilc_rt.record import SIGNALS
+from ilc_rt.result import axis_names, write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+FORMATS = (".npz", ".csv", ".json")
+
+
+def export_run(row: Mapping[str, Any], path: str | Path) -> None:
+    """Write a run as ``.npz``, ``.csv`` or ``.json``, by the file's ending.
+
+    Parameters
+    ----------
+    row : mapping
+        What `Library.load` returns.
+    path : path
+        The file. npz and json hold everything; csv holds the signals, one
+        sample a line, and the rest as comments at its head.
+
+    Raises
+    ------
+    BadInputError
+        If the ending is unknown or the file cannot be written.
+    """
+    target = Path(path)
+    if target.suffix not in FORMATS:
+        message = f"{target}: the ending must be one of {', '.join(FORMATS)}"
+        raise BadInputError(message)
+    signals = {
+        name: np.asarray(row[name], dtype=np.float64)
+        for name in (*SIGNALS, "disturbance")
+        if row.get(name) is not None
+    }
+    rest = {key: value for key, value in row.items() if key not in {*SIGNALS, "disturbance"}}
+    if target.suffix == ".npz":
+        _write_npz(target, signals, rest)
+    elif target.suffix == ".csv":
+        write_text(target, _csv_text(signals, rest))
+    else:
+        content = {**rest, **{name: signal.tolist() for name, signal in signals.items()}}
+        write_text(target, json.dumps(content, indent=1, default=str) + "\n")
+
+
+def _write_npz(target: Path, signals: dict[str, Any], rest: dict[str, Any]) -> None:
+    figures = np.array(json.dumps(rest, default=str))
+    try:
+        with target.open("wb") as file:
+            np.savez_compressed(file, figures=figures, **signals)
+    except OSError as error:
+        message = f"{target}: cannot be written: {error.strerror}"
+        raise BadInputError(message) from error
+
+
+def _csv_text(signals: dict[str, Any], rest: dict[str, Any]) -> str:
+    names = axis_names(rest)
+    n_samples = int(rest["n_samples"])
+    columns = {"time_s": np.arange(n_samples) * float(rest["cycle_s"])}
+    for name, signal in signals.items():
+        quantity, _, unit = name.partition("_m")
+        ending = "_m" if name.endswith("_m") else unit
+        if signal.ndim == 1:
+            columns[name] = signal
+            continue
+        for axis in range(signal.shape[1]):
+            label = names[axis].replace(" ", "") if axis < len(names) else str(axis + 1)
+            columns[f"{quantity}_{label}{ending}"] = signal[:, axis]
+    text = io.StringIO()
+    for key, value in rest.items():
+        text.write(f"# {key} = {value}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    return text.getvalue()

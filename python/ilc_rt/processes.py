@@ -1,0 +1,228 @@
+"""Find, start, read and end the programs `ilc-rt` and `ilc-sim`.
+
+Both run in a session of their own: Ctrl-C in a terminal must reach the
+controller alone, which stops the axes while the drives still answer.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import selectors
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ilc_rt.errors import EXIT_BAD_INPUT, EXIT_FAILURE, CampaignError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+READY_DEADLINE_S = 15.0
+END_DEADLINE_S = 5.0
+
+
+def find_program(name: str) -> Path:
+    """Find one of the two programs.
+
+    Looked for beside the running Python interpreter (a virtual environment's
+    ``bin``), then along ``PATH``.
+
+    Parameters
+    ----------
+    name : str
+        ``"ilc-rt"`` or ``"ilc-sim"``.
+
+    Raises
+    ------
+    CampaignError
+        If it is in neither place.
+    """
+    beside = Path(sys.executable).parent / name
+    if beside.is_file() and os.access(beside, os.X_OK):
+        return beside
+    found = shutil.which(name)
+    if found is None:
+        message = (
+            f"the program {name} is neither beside {sys.executable} nor on the PATH: "
+            "run `make build`"
+        )
+        raise CampaignError(message)
+    return Path(found)
+
+
+class Program:
+    """A running program whose lines are read as they come.
+
+    Parameters
+    ----------
+    argv : sequence of str
+        Program and arguments.
+
+    Notes
+    -----
+    Standard error goes to a file of its own, so a talkative program never
+    blocks; its last line is the reason that `failure` gives.
+    """
+
+    def __init__(self, argv: Sequence[str | Path]) -> None:
+        self.name = Path(argv[0]).name
+        self.lines: list[str] = []
+        self.at_end = False
+        self._partial = b""
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed by close)
+        try:
+            self._process = subprocess.Popen(
+                [str(argument) for argument in argv],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                start_new_session=True,
+            )
+        except OSError as error:
+            self._errors.close()
+            message = f"cannot start {argv[0]}: {error.strerror}"
+            raise CampaignError(message) from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """Exit code; None while it runs, negative if a signal ended it."""
+        return self._process.poll()
+
+    def fileno(self) -> int:
+        """Return the descriptor of the pipe to wait on."""
+        assert self._process.stdout is not None
+        return self._process.stdout.fileno()
+
+    def receive(self) -> None:
+        """Move what is in the pipe to `lines`; call it when readable."""
+        chunk = os.read(self.fileno(), 65536)
+        self.at_end = not chunk
+        *whole, self._partial = (self._partial + chunk).split(b"\n")
+        if self.at_end and self._partial:
+            whole.append(self._partial)
+            self._partial = b""
+        self.lines.extend(line.decode("utf-8", "replace") for line in whole)
+
+    def wait_for_line(self, start: str, deadline_s: float) -> str:
+        """Read until a line begins with `start` and return it.
+
+        Raises
+        ------
+        CampaignError
+            If the program ends first, or the deadline passes.
+        """
+        until = time.monotonic() + deadline_s
+        with selectors.DefaultSelector() as selector:
+            selector.register(self, selectors.EVENT_READ)
+            while True:
+                while self.lines:
+                    line = self.lines.pop(0)
+                    if line.startswith(start):
+                        return line
+                if self.at_end:
+                    raise self.failure()
+                if not selector.select(max(0.0, until - time.monotonic())):
+                    message = f'{self.name} did not say "{start}" within {deadline_s:g} s'
+                    raise CampaignError(message)
+                self.receive()
+
+    def signal(self, number: int) -> None:
+        """Send a signal, if it still runs."""
+        if self.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.send_signal(number)
+
+    def failure(self) -> CampaignError:
+        """Return the error that says why it ended: its own last line."""
+        code = self._wait(END_DEADLINE_S)
+        reason = self.last_error_line()
+        if not reason and code is not None and code < 0:
+            reason = f"{self.name} was ended by {signal.Signals(-code).name}"
+        elif not reason:
+            reason = f"{self.name} ended with exit code {code} and no word"
+        return CampaignError(reason, code if code is not None and code > 0 else EXIT_FAILURE)
+
+    def last_error_line(self) -> str:
+        """Return the last line that it wrote to standard error, or ``""``."""
+        self._errors.seek(0)
+        lines = self._errors.read().decode("utf-8", "replace").split("\n")
+        said = [line.strip() for line in lines if line.strip()]
+        return said[-1] if said else ""
+
+    def close(self) -> None:
+        """End it if it still runs (politely, then not), and reap it."""
+        if self.returncode is None:
+            self.signal(signal.SIGTERM)
+            if self._wait(END_DEADLINE_S) is None:
+                self.signal(signal.SIGKILL)
+                self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+        self._errors.close()
+
+    def _wait(self, deadline_s: float) -> int | None:
+        try:
+            return self._process.wait(deadline_s)
+        except subprocess.TimeoutExpired:
+            return None
+
+
+def start_simulated_drives(cell_file: str | Path, bus: str | None, *, lockstep: bool) -> Program:
+    """Start `ilc-sim` and wait until its drives listen.
+
+    Parameters
+    ----------
+    cell_file : path
+        The cell description.
+    bus : str or None
+        Bus address in place of the cell's.
+    lockstep : bool
+        Whether the drives advance on SYNC.
+
+    Raises
+    ------
+    CampaignError
+        If it does not get ready.
+    """
+    argv: list[str | Path] = [find_program("ilc-sim"), "run", cell_file]
+    if bus is not None:
+        argv += ["--bus", bus]
+    if lockstep:
+        argv.append("--lockstep")
+    drives = Program(argv)
+    try:
+        drives.wait_for_line("ready:", READY_DEADLINE_S)
+    except CampaignError as error:
+        drives.close()
+        code = EXIT_BAD_INPUT if error.exit_code == EXIT_BAD_INPUT else EXIT_FAILURE
+        message = f"simulated drives did not start: {error.reason}"
+        raise CampaignError(message, code) from error
+    except BaseException:
+        drives.close()
+        raise
+    return drives

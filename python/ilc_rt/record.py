@@ -1,0 +1,164 @@
+"""One run of the program: its figures, and its signals on demand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ilc_rt._native import Library
+from ilc_rt.errors import BadInputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from ilc_rt.events import IterationEvent
+
+FIGURES = (
+    "id",
+    "index",
+    "tracking_inf_m",
+    "tracking_rms_m",
+    "contour_inf_m",
+    "contour_rms_m",
+    "encoder_tracking_inf_m",
+    "tool_tracking_inf_m",
+    "overruns",
+    "missing_samples",
+    "late_updates",
+    "update_ms",
+    "rolled_back",
+    "digest",
+)
+SIGNALS = ("reference_m", "input", "encoder_m", "tool_m", "error_m", "contour_m")
+
+
+@dataclass(frozen=True, slots=True)
+class IterationRecord:
+    """One run: figures at once, signals from the library when asked for.
+
+    Attributes
+    ----------
+    id, index : int
+        Key in the library; number of the run in its campaign, from 0.
+    tracking_inf_m, tracking_rms_m : float
+        Largest and root-mean-square tracking error in m, of the measurement
+        that is learned from.
+    contour_inf_m, contour_rms_m : float or None
+        Distance from the programmed path in m; None with a single axis.
+    overruns, missing_samples, late_updates : int
+        Servo cycles that began too late; measurements that never arrived;
+        runs so far that repeated the old input because learning was late.
+    update_ms : float or None
+        How long the learning took.
+
+    Examples
+    --------
+    >>> record = IterationRecord(library="x.db", id=1, index=0,
+    ...     tracking_inf_m=2e-3, tracking_rms_m=1e-3)
+    >>> record.tracking_inf_m
+    0.002
+    """
+
+    library: str
+    id: int
+    index: int
+    tracking_inf_m: float
+    tracking_rms_m: float
+    contour_inf_m: float | None = None
+    contour_rms_m: float | None = None
+    encoder_tracking_inf_m: float | None = None
+    tool_tracking_inf_m: float | None = None
+    overruns: int = 0
+    missing_samples: int = 0
+    late_updates: int = 0
+    update_ms: float | None = None
+    rolled_back: bool = False
+    digest: str = ""
+    _loaded: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def from_event(cls, event: IterationEvent, library: str) -> IterationRecord:
+        """Return the record that an iteration event announces."""
+        return cls(library=library, **{name: getattr(event, name) for name in FIGURES})
+
+    @classmethod
+    def from_row(cls, row: Mapping[str, Any], library: str) -> IterationRecord:
+        """Return the record of one row of `Library.list`."""
+        known = {f.name for f in fields(cls)} & set(FIGURES)
+        return cls(library=library, **{name: row[name] for name in known if name in row})
+
+    def figures(self) -> dict[str, Any]:
+        """Return the figures by name, in the order of the JSON file."""
+        return {name: getattr(self, name) for name in FIGURES}
+
+    @property
+    def reference_m(self) -> NDArray[np.float64]:
+        """Programmed position in m, shape (n_samples, n_axes)."""
+        return self._signal("reference_m")
+
+    @property
+    def input(self) -> NDArray[np.float64]:
+        """Learned input, shape (n_samples, n_axes), in m or m/s (csv axes)."""
+        return self._signal("input")
+
+    @property
+    def encoder_m(self) -> NDArray[np.float64]:
+        """Encoder positions of the drives in m, shape (n_samples, n_axes)."""
+        return self._signal("encoder_m")
+
+    @property
+    def tool_m(self) -> NDArray[np.float64] | None:
+        """Measured tool centre point in m, shape (n_samples, n_axes), or None."""
+        return self._optional("tool_m")
+
+    @property
+    def error_m(self) -> NDArray[np.float64]:
+        """Tracking error that was learned from in m, shape (n_samples, n_axes)."""
+        return self._signal("error_m")
+
+    @property
+    def contour_m(self) -> NDArray[np.float64] | None:
+        """Distance from the programmed path in m, shape (n_samples,), or None."""
+        return self._optional("contour_m")
+
+    @property
+    def tool_or_encoder_m(self) -> NDArray[np.float64]:
+        """The tool where it is measured, else the encoders: what contour is of."""
+        tool = self.tool_m
+        return self.encoder_m if tool is None else tool
+
+    @property
+    def law_parameters(self) -> str:
+        """JSON text of the law's parameters."""
+        return str(self.row().get("law_parameters") or "{}")
+
+    def row(self) -> dict[str, Any]:
+        """Return everything that the library holds of this run.
+
+        Raises
+        ------
+        BadInputError
+            If the library or the run in it is gone.
+        """
+        if not self._loaded:
+            if not Path(self.library).is_file():
+                message = f"{self.library}: no such library"
+                raise BadInputError(message)
+            self._loaded.update(Library(self.library).load(self.id))
+        return self._loaded
+
+    def _optional(self, name: str) -> NDArray[np.float64] | None:
+        value = self.row().get(name)
+        return None if value is None else np.asarray(value, dtype=np.float64)
+
+    def _signal(self, name: str) -> NDArray[np.float64]:
+        value = self._optional(name)
+        if value is None:
+            message = f"{self.library}: run {self.id} holds no {name}"
+            raise BadInputError(message)
+        return value

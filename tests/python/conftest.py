@@ -1,0 +1,74 @@
+"""What several test files share: the cell, a finished campaign, programs to stand in."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from ilc_rt import Campaign, controllers, processes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ilc_rt import CampaignResult
+
+ROOT = Path(__file__).resolve().parents[2]
+GANTRY = ROOT / "examples" / "01_gantry.toml"
+
+
+@pytest.fixture(scope="session")
+def gantry() -> Path:
+    """Return the path of the example cell."""
+    return GANTRY
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> CampaignResult:
+    """Return a campaign of three runs by the real controller, in lock-step."""
+    library = tmp_path_factory.mktemp("finished") / "library.db"
+    campaign = Campaign(GANTRY, library=library, bus="loopback:")
+    assert len(list(campaign.run(3))) == 3
+    return campaign.result
+
+
+@pytest.fixture
+def ilc(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Return a function that runs `ilc` as a process in an empty folder."""
+
+    def run(*arguments: str | Path, timeout_s: float = 120.0) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "ilc_rt.cli", *map(str, arguments)],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=timeout_s,
+            check=False,
+            env={**os.environ, "COLUMNS": "120"},
+        )
+
+    return run
+
+
+@pytest.fixture
+def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], None]:
+    """Return a function that puts a script in the place of a program.
+
+    The scripts misbehave in ways that the real programs do not.
+    """
+    folder = tmp_path / "programs"
+    folder.mkdir()
+
+    def install(name: str, source: str) -> None:
+        script = folder / name
+        script.write_text(f"#!{sys.executable}\n{source}")
+        script.chmod(script.stat().st_mode | stat.S_IXUSR)
+
+    for module in (controllers, processes):
+        monkeypatch.setattr(module, "find_program", lambda name: folder / name)
+    return install

@@ -1,0 +1,275 @@
+"""`ilc` as a person calls it: a process, its exit code and what it says."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from ilc_rt import Library
+from ilc_rt.record import SIGNALS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from ilc_rt import CampaignResult
+
+    Ilc = Callable[..., subprocess.CompletedProcess[str]]
+
+FIGURES = {
+    "id": int, "index": int, "tracking_inf_m": float, "tracking_rms_m": float,
+    "contour_inf_m": float, "contour_rms_m": float, "encoder_tracking_inf_m": float,
+    "tool_tracking_inf_m": float, "overruns": int, "missing_samples": int, "late_updates": int,
+    "update_ms": float, "rolled_back": bool, "digest": str,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "verb",
+    ["run", "demo", "plot", "monitor", "library list", "library show", "library export"],
+)
+def test_every_verb_has_help_with_an_example(ilc: Ilc, verb: str) -> None:
+    """The example is a line that one can copy."""
+    done = ilc(*verb.split(), "--help")
+    assert done.returncode == 0
+    assert re.search(rf"Example: ilc {verb}\b", done.stdout)
+
+
+def test_a_run_prints_one_row_a_run_and_writes_what_was_asked(
+    ilc: Ilc, gantry: Path, tmp_path: Path
+) -> None:
+    """Rows, closing sentence, figures file, report and library."""
+    done = ilc("run", gantry, "--bus", "loopback:", "--iterations", 3, "--library", "l.db",
+               "--json", "f.json", "--report", "r.html")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    rows = [line for line in done.stdout.splitlines() if re.match(r"\s+\d\s", line)]
+    assert [int(row.split()[0]) for row in rows] == [0, 1, 2]
+    assert re.search(r"Contour error from [\d.]+ µm to [\d.]+ µm \([\d.]+ % less\)", done.stdout)
+    check_figures(json.loads((tmp_path / "f.json").read_text()), runs=3)
+    assert (tmp_path / "r.html").stat().st_size > 10_000
+    assert len(Library(str(tmp_path / "l.db")).list()) == 3
+
+
+def check_figures(data: dict[str, object], runs: int) -> None:
+    """Check the file of --json key by key."""
+    assert data["cell"] == "gantry"
+    assert data["status"] == "completed"
+    assert isinstance(data["campaign"], str)
+    assert data["n_axes"] == 2
+    assert data["axis_names"] == ["x", "y"]
+    iterations = data["iterations"]
+    assert isinstance(iterations, list)
+    assert [figures["index"] for figures in iterations] == list(range(runs))
+    for figures in iterations:
+        assert set(figures) == set(FIGURES)
+        for name, kind in FIGURES.items():
+            assert isinstance(figures[name], kind), name
+
+
+def test_the_demo_needs_nothing(ilc: Ilc, tmp_path: Path) -> None:
+    """No cell, no option but a fast bus: it runs, and says where everything is."""
+    done = ilc("demo", "--bus", "loopback:", "--iterations", 2)
+    assert done.returncode == 0, done.stderr
+    assert "report:  ilc-report.html" in done.stdout
+    assert "library: ilc-library.db" in done.stdout
+    assert (tmp_path / "ilc-report.html").exists()
+
+
+def test_the_packaged_cell_is_the_example(gantry: Path) -> None:
+    """`ilc demo` and the example run the same machine."""
+    import ilc_rt
+
+    assert ilc_rt.__file__ is not None
+    packaged = gantry.parents[1] / "python" / "ilc_rt" / "data" / "gantry.toml"
+    assert packaged.read_bytes() == gantry.read_bytes()
+
+
+def test_processes_over_udp_in_lockstep(ilc: Ilc, gantry: Path, tmp_path: Path) -> None:
+    """The real programs, each in a process of its own."""
+    done = ilc("run", gantry, "--bus", "udp:239.74.163.77", "--lockstep", "--iterations", 2,
+               "--json", "f.json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    data = json.loads((tmp_path / "f.json").read_text())
+    check_figures(data, runs=2)
+    assert data["mode"] == "lockstep"
+    assert data["iterations"][1]["tracking_rms_m"] < data["iterations"][0]["tracking_rms_m"]
+
+
+def test_ctrl_c_in_a_real_time_run_is_a_controlled_stop(gantry: Path, tmp_path: Path) -> None:
+    """SIGINT to the terminal's whole group: exit 130, one line, nothing left running."""
+    command = [sys.executable, "-m", "ilc_rt.cli", "run", str(gantry), "--iterations", "5",
+               "--bus", "udp:239.74.163.78"]  # fmt: skip
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        for line in process.stdout:
+            if re.match(r"\s+0\s", line):
+                break
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert err.strip() == "ilc: stopped on request; the axes are at rest"
+    assert "in 1 run" in out
+    assert len(Library(str(tmp_path / "ilc-library.db")).list()) == 1
+
+
+def test_a_terminal_gets_a_table_and_a_bar(gantry: Path, tmp_path: Path) -> None:
+    """On a terminal, the table stays and the bar is gone at the end."""
+    main, side = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "120", "LINES": "40"}
+    with subprocess.Popen(
+        [sys.executable, "-m", "ilc_rt.cli", "run", str(gantry), "--bus", "loopback:",
+         "--iterations", "2"],
+        cwd=tmp_path, stdout=side, stderr=side, env=environment,
+    ) as process:  # fmt: skip
+        os.close(side)
+        said = b""
+        until = time.monotonic() + 60
+        while time.monotonic() < until:
+            try:
+                chunk = os.read(main, 65536)
+            except OSError:
+                break
+            if not chunk:
+                break
+            said += chunk
+        assert process.wait(10) == 0
+    os.close(main)
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", said.decode())
+    assert "max contour µm" in text
+    assert "run 1 (2 of 2): running" in text
+    assert text.rstrip().splitlines()[-1].startswith("library: ")
+
+
+def bad_cell(gantry: Path, tmp_path: Path, old: str, new: str) -> Path:
+    """Return a copy of the cell with one thing wrong."""
+    text = gantry.read_text()
+    assert old in text
+    path = tmp_path / "bad.toml"
+    path.write_text(text.replace(old, new, 1))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run", "nix.toml"], "nix.toml"),
+        (["run"], "Missing argument 'CELL'"),
+        (["run", "CELL", "--bus", "foo"], "bus = foo: allowed can:INTERFACE"),
+        (["run", "CELL", "--iterations", "0"], "iterations = 0: at least 1"),
+        (["run", "CELL", "--iterations", "many"], "--iterations"),
+        (["run", "CELL", "--measure", "laser"], "--measure"),
+        (["run", "CELL", "--library", "/no/folder/l.db"], "no such folder"),
+        (["run", "CELL", "--frobnicate"], "--frobnicate"),
+        (["frobnicate"], "frobnicate"),
+        (["plot", "nix.db"], "nix.db: no such library"),
+        (["library", "list", "nix.db"], "nix.db: no such library"),
+        (["library", "show", "nix.db", "1"], "nix.db: no such library"),
+        (["monitor", "a/b"], "a/b"),
+        (["monitor", "gantry", "--connect", "nonsense", "--no-scouting"], "nonsense"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(
+    ilc: Ilc, gantry: Path, arguments: list[str], said: str
+) -> None:
+    """No traceback, ever."""
+    done = ilc(*(str(gantry) if argument == "CELL" else argument for argument in arguments))
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert said in done.stderr
+    assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("cycle_us = 2000", "cycle_us = 2000\nspeed = 3", "speed"),
+        ("cycle_us = 2000", "cycle_us = 3", "cycle_us"),
+        ("cycle_us = 2000", 'cycle_us = "fast"', "cycle_us"),
+        ("[cell]", "[cell", "bad.toml:4"),
+    ],
+)
+def test_a_bad_cell_names_file_and_key(
+    ilc: Ilc, gantry: Path, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    """What the controller's own check says, in one line."""
+    done = ilc("run", bad_cell(gantry, tmp_path, old, new))
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert "bad.toml" in done.stderr
+    assert said in done.stderr
+
+
+def test_a_file_that_is_no_library_is_refused(ilc: Ilc, gantry: Path) -> None:
+    """A text file is not taken for a library."""
+    done = ilc("library", "list", gantry)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+
+
+def test_the_library_lists_and_shows(ilc: Ilc, finished: CampaignResult) -> None:
+    """Every run is listed; one is shown with all that is kept."""
+    listed = ilc("library", "list", finished.library)
+    assert listed.returncode == 0
+    assert listed.stdout.count(finished.campaign) == 3
+    assert "3 runs in" in listed.stdout
+    shown = ilc("library", "show", finished.library, finished.records[1].id)
+    assert shown.returncode == 0
+    assert finished.records[1].digest in shown.stdout
+    assert "reference_m" in shown.stdout
+    missing = ilc("library", "show", finished.library, 99)
+    assert missing.returncode == 2
+    assert "no run 99" in missing.stderr
+
+
+def test_an_exported_run_is_the_run(ilc: Ilc, finished: CampaignResult, tmp_path: Path) -> None:
+    """Npz and json bit by bit, csv to the last digit."""
+    record = finished.records[-1]
+    for ending in ("npz", "json", "csv"):
+        done = ilc("library", "export", finished.library, record.id, f"run.{ending}")
+        assert done.returncode == 0, done.stderr
+    with np.load(tmp_path / "run.npz") as packed:
+        for name in SIGNALS:
+            np.testing.assert_array_equal(packed[name], record.row()[name])
+        assert json.loads(str(packed["figures"]))["digest"] == record.digest
+    content = json.loads((tmp_path / "run.json").read_text())
+    np.testing.assert_array_equal(content["error_m"], record.error_m)
+    lines = (tmp_path / "run.csv").read_text().splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert len(rows) == finished.n_samples
+    names = [name for name in rows[0] if name.startswith("error_")]
+    assert len(names) == 2
+    read = np.array([[float(row[name]) for name in names] for row in rows])
+    np.testing.assert_array_equal(read, record.error_m)
+    assert float(rows[1]["time_s"]) == finished.cycle_s
+    refused = ilc("library", "export", finished.library, record.id, "run.xlsx")
+    assert refused.returncode == 2
+    assert ".npz, .csv, .json" in refused.stderr
+
+
+def test_plot_makes_pictures_or_a_report(
+    ilc: Ilc, finished: CampaignResult, tmp_path: Path
+) -> None:
+    """A folder gets one picture each; a .html gets the report."""
+    done = ilc("plot", finished.library, "--out", "pictures")
+    assert done.returncode == 0, done.stderr
+    names = {path.name for path in (tmp_path / "pictures").iterdir()}
+    assert names == {"convergence.png", "contour.png", "tracking.png", "input.png"}
+    done = ilc("plot", finished.library, "--campaign", finished.campaign, "--out", "r.html")
+    assert done.returncode == 0
+    assert (tmp_path / "r.html").exists()
+    assert ilc("plot", finished.library, "--campaign", "nix").returncode == 2

@@ -1,0 +1,43 @@
+"""Every example runs as it stands, in a folder of its own."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+from ilc_rt import Library
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def run_example(script: Path, folder: Path, *arguments: str) -> str:
+    """Run a script and return what it prints."""
+    done = subprocess.run(
+        [sys.executable, str(script), *arguments],
+        cwd=folder, capture_output=True, text=True, timeout=180, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_gantry_learns_its_contour(gantry: Path, tmp_path: Path) -> None:
+    """One line a run with falling errors, a picture and a library."""
+    said = run_example(gantry.with_suffix(".py"), tmp_path, "4")
+    rows = [line.split() for line in said.splitlines() if re.match(r"\s*\d", line)]
+    errors_um = [float(row[2]) for row in rows]
+    assert len(errors_um) == 4
+    assert errors_um[3] < 0.3 * errors_um[0]
+    assert (tmp_path / "01_gantry.png").stat().st_size > 10_000
+    assert len(Library(str(tmp_path / "01_gantry.db")).list()) == 4
+
+
+def test_a_law_of_ones_own_learns(gantry: Path, tmp_path: Path) -> None:
+    """The RMS error falls from run to run."""
+    said = run_example(gantry.with_name("03_own_law.py"), tmp_path, "4")
+    errors_um = [float(value) for value in re.findall(r"error\s+([\d.]+) µm", said)]
+    assert len(errors_um) == 4
+    assert errors_um == sorted(errors_um, reverse=True)
+    assert errors_um[3] < 0.4 * errors_um[0]

@@ -1,0 +1,139 @@
+"""The monitor against a real Zenoh session on this computer."""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+import threading
+from typing import TYPE_CHECKING
+
+import pytest
+
+from ilc_rt.events import IterationEvent, StateEvent
+from ilc_rt.monitor import Message, Monitor
+
+zenoh = pytest.importorskip("zenoh")
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+STATE = {"event": "state", "state": "running", "iteration": 3}
+
+
+def iteration(index: int, error_m: float) -> dict[str, object]:
+    """Return an iteration as the controller publishes it."""
+    return {
+        "event": "iteration", "id": index + 1, "index": index, "tracking_inf_m": error_m,
+        "tracking_rms_m": error_m / 2, "contour_inf_m": error_m / 4, "contour_rms_m": error_m / 8,
+        "overruns": 0, "update_ms": 0.3,
+    }  # fmt: skip
+
+
+class Publisher:
+    """The publishing side as the contract describes it."""
+
+    def __init__(self, port: int) -> None:
+        self.endpoint = f"tcp/127.0.0.1:{port}"
+        config = zenoh.Config()
+        config.insert_json5("listen/endpoints", json.dumps([self.endpoint]))
+        config.insert_json5("scouting/multicast/enabled", "false")
+        self.session = zenoh.open(config)
+        self.session.declare_queryable(
+            "ilc/gantry/state",
+            lambda query: query.reply("ilc/gantry/state", json.dumps(STATE)),
+        )
+        self.token = self.session.liveliness().declare_token("ilc/gantry/alive")
+
+    def put(self, topic: str, payload: object) -> None:
+        """Publish one object."""
+        self.session.put(f"ilc/gantry/{topic}", json.dumps(payload))
+
+
+@pytest.fixture
+def publisher() -> Iterator[Publisher]:
+    """Return a session that stands for a controller."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    publisher = Publisher(port)
+    yield publisher
+    publisher.session.close()
+
+
+def test_a_late_joiner_sees_the_present_state(publisher: Publisher) -> None:
+    """The controller is alive, and its state is asked for at once."""
+    with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
+        messages = monitor.messages(30.0)
+        assert next(messages) == Message("gantry", "alive", {})
+        state = next(messages)
+        assert state.event == StateEvent("running", 3)
+        publisher.put("iteration", iteration(4, 2e-5))
+        seen = next(messages)
+        assert isinstance(seen.event, IterationEvent)
+        assert seen.event.tracking_inf_m == 2e-5
+        publisher.put("servo", {"sample": 17})
+        assert next(messages) == Message("gantry", "servo", {"sample": 17})
+        publisher.token.undeclare()
+        assert next(messages).topic == "gone"
+
+
+def test_garbage_on_the_network_is_passed_over(publisher: Publisher) -> None:
+    """What is no JSON object is dropped; an incomplete event has no type."""
+    with Monitor("*", [publisher.endpoint], scouting=False) as monitor:
+        messages = monitor.messages(30.0)
+        assert [next(messages).topic for _ in range(2)] == ["alive", "state"]
+        publisher.session.put("ilc/gantry/iteration", b"\xff\x00 nonsense")
+        publisher.session.put("ilc/gantry/iteration", b"[1, 2]")
+        publisher.put("iteration", {"index": 1})
+        seen = next(messages)
+        assert seen.payload == {"index": 1}
+        assert seen.event is None
+
+
+def test_the_verb_prints_the_error_falling(publisher: Publisher) -> None:
+    """`ilc monitor` in a process: state, rows, and an end after two runs."""
+    command = [sys.executable, "-m", "ilc_rt.cli", "monitor", "gantry", "--no-scouting",
+               "--connect", publisher.endpoint, "--iterations", "2", "--timeout", "60"]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        said = [process.stdout.readline() for _ in range(2)]
+        publisher.put("iteration", iteration(0, 2e-3))
+        publisher.put("iteration", iteration(1, 2e-5))
+        rest, _ = process.communicate(timeout=60)
+    assert said == ["gantry: controller alive\n", "gantry: running (run 3)\n"]
+    assert process.returncode == 0
+    rows = rest.splitlines()
+    assert "max tracking µm" in rows[0]
+    assert rows[2].split()[:3] == ["gantry", "1", "20.0"]
+
+
+def test_the_example_ends_after_its_runs(publisher: Publisher, gantry: Path) -> None:
+    """examples/02_monitor.py draws one bar a run, each shorter than the last."""
+    script = gantry.parent / "02_monitor.py"
+    with subprocess.Popen(
+        [sys.executable, str(script), "3", publisher.endpoint], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("waiting")
+        stop = threading.Event()
+
+        def publish() -> None:
+            # The example's subscription reaches this session a moment after its first line.
+            index = 0
+            while not stop.wait(0.1):
+                publisher.put("iteration", iteration(index, 2e-3 * 0.5**index))
+                index += 1
+
+        thread = threading.Thread(target=publish)
+        thread.start()
+        rest, _ = process.communicate(timeout=60)
+        stop.set()
+        thread.join()
+    assert process.returncode == 0
+    bars = [line.count("#") for line in rest.splitlines()]
+    assert len(bars) == 3
+    assert bars == sorted(bars, reverse=True)
+    assert bars[-1] < bars[0]
