@@ -1,0 +1,90 @@
+//! Simulated drives allocate nothing once they are set up: in lock-step they run inside the
+//! controller's own tick.
+
+#![expect(unsafe_code, reason = "a global allocator is an unsafe trait")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell as Counter;
+use std::path::Path;
+use std::time::Duration;
+
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
+use ilc_rt::fieldbus::cia402::{Command, Controlword, DriveSetup, Mode, State, bring_up};
+use ilc_rt::fieldbus::transport::InProcess;
+use ilc_rt::fieldbus::{Bus, Frame};
+use ilc_sim::{ClockMode, Machine};
+
+struct Counting;
+
+thread_local! {
+    // Per thread, because the test harness allocates on its own threads meanwhile.
+    static ALLOCATIONS: Counter<u64> = const { Counter::new(0) };
+}
+
+// SAFETY: every call is handed to the system allocator unchanged; counting touches no memory but a
+// thread-local cell that needs no set-up.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller's contract is passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's contract is passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller's contract is passed on.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+#[test]
+fn cycles_faults_and_questions_allocate_nothing() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/01_gantry.toml");
+    let cell = Cell::load(&path).unwrap();
+    let node = NodeId::new(1).unwrap();
+    let mut bus = InProcess::new(Machine::from_cell(&cell, ClockMode::LockStep).unwrap(), 256);
+    let setup = DriveSetup {
+        node,
+        mode: Mode::Csp,
+        cycle_us: cell.cell.cycle_us,
+        following_error_max_counts: 1_000_000,
+        heartbeat_ms: 10,
+        rpdo_deadline_ms: 50,
+        answer_timeout: Duration::from_secs(1),
+    };
+    bring_up(&mut bus, &setup).unwrap();
+    bus.send(&NmtCommand::Start.frame(None)).unwrap();
+    let question = Frame::new(0x601, &[0x40, 0x08, 0x10, 0, 0, 0, 0, 0]).unwrap();
+    let start_counts = 4_000_000;
+
+    let before = ALLOCATIONS.get();
+    for cycle in 0..500 {
+        let controlword = match cycle {
+            0..5 => Controlword::SHUTDOWN,
+            5..10 => Controlword::SWITCH_ON,
+            _ => Controlword::ENABLE_OPERATION,
+        };
+        // From cycle 300 on the controller is silent: deadline, emergency, ramp, fault.
+        if cycle < 300 {
+            let target_counts = start_counts + 1000 * (cycle - 20).max(0);
+            let command = Command { controlword, target_counts, torque_offset: 0 };
+            bus.send(&command.encode(node)).unwrap();
+        }
+        bus.send(&question).unwrap();
+        bus.send(&sync::frame()).unwrap();
+        while bus.recv(Duration::ZERO).unwrap().is_some() {}
+    }
+    let after = ALLOCATIONS.get();
+
+    assert_eq!(bus.responder().drive_state(node), Some(State::Fault));
+    assert_eq!(after - before, 0);
+}

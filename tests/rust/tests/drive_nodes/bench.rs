@@ -1,0 +1,244 @@
+//! A cell with an ideal plant, and the controller's end of its bus.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::canopen::{Emergency, NmtCommand, NodeId, sync};
+use ilc_rt::fieldbus::cia402::{
+    self, Command, Controlword, DriveSetup, Extra, Mode, State, Status, next_command,
+};
+use ilc_rt::fieldbus::transport::InProcess;
+use ilc_rt::fieldbus::{Bus, Frame};
+use ilc_sim::plant::{Demand, Plant};
+use ilc_sim::{ClockMode, Machine};
+
+pub const COUNTS_PER_M: f64 = 1e6;
+pub const CYCLE_US: u32 = 1000;
+pub const START_M: f64 = 0.08;
+pub const VELOCITY_MAX_M_S: f64 = 0.5;
+pub const DECELERATION_M_S2: f64 = 10.0;
+pub const ANSWER: Duration = Duration::from_secs(2);
+
+pub fn node(number: u8) -> NodeId {
+    NodeId::new(number).unwrap()
+}
+
+pub fn counts(position_m: f64) -> i32 {
+    cia402::Scale::new(COUNTS_PER_M).unwrap().to_counts(position_m).unwrap()
+}
+
+pub fn cell() -> Cell {
+    let axis = |name: &str, node: u8| {
+        format!(
+            r#"
+[[axis]]
+name = "{name}"
+node = {node}
+interface = "csp"
+counts_per_m = {COUNTS_PER_M}
+[axis.limits]
+position_min_m = -0.02
+position_max_m = 0.10
+velocity_max_m_s = {VELOCITY_MAX_M_S}
+acceleration_max_m_s2 = {DECELERATION_M_S2}
+jerk_max_m_s3 = 1000.0
+following_error_max_m = 0.005
+[axis.model]
+natural_frequency_hz = 15.0
+damping = 1.0
+[axis.simulation]
+position_start_m = {START_M}
+"#
+        )
+    };
+    let text = format!(
+        r#"
+[cell]
+name = "bench"
+cycle_us = {CYCLE_US}
+[bus]
+address = "loopback:"
+{}{}
+[tcp_encoder]
+node = 10
+counts_per_m = {COUNTS_PER_M}
+[program]
+start_m = [0.0, 0.0]
+feed_m_s = 0.1
+[[program.segment]]
+to_m = [0.01, 0.01]
+"#,
+        axis("x", 1),
+        axis("y", 2)
+    );
+    Cell::parse(&text, "bench.toml").unwrap()
+}
+
+/// Axes that follow every demand at once, up to a speed; a stuck one does not move at all.
+pub struct Ideal {
+    position_m: [f64; 2],
+    velocity_m_s: [f64; 2],
+    is_stuck: Arc<AtomicBool>,
+}
+
+impl Plant for Ideal {
+    fn n_axes(&self) -> usize {
+        2
+    }
+
+    fn step(&mut self, demand: &[Demand], dt_s: f64) {
+        for (axis, demand) in demand.iter().enumerate() {
+            let wanted_m_s = match *demand {
+                Demand::Off => 0.0,
+                Demand::Position { position_m, .. } => (position_m - self.position_m[axis]) / dt_s,
+                Demand::Velocity { velocity_m_s } => velocity_m_s,
+            };
+            let is_stuck = self.is_stuck.load(Ordering::Relaxed);
+            self.velocity_m_s[axis] = if is_stuck { 0.0 } else { wanted_m_s };
+            self.position_m[axis] = match *demand {
+                Demand::Position { position_m, .. } if !is_stuck => position_m,
+                _ => self.position_m[axis] + self.velocity_m_s[axis] * dt_s,
+            };
+        }
+    }
+
+    fn encoder_m(&self, axis: usize) -> f64 {
+        self.position_m[axis]
+    }
+
+    fn encoder_velocity_m_s(&self, axis: usize) -> f64 {
+        self.velocity_m_s[axis]
+    }
+
+    fn force_n(&self, _axis: usize) -> f64 {
+        0.0
+    }
+
+    fn tool_m(&self, axis: usize) -> f64 {
+        self.position_m[axis] + 0.001
+    }
+}
+
+/// What drive 1 sent in one cycle.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Answer {
+    pub status: Option<Status>,
+    pub extra: Option<Extra>,
+    pub emergencies: Vec<u16>,
+    pub frames: Vec<Frame>,
+}
+
+impl Answer {
+    pub fn position(&self) -> i32 {
+        self.status.expect("a status every cycle").position_counts
+    }
+
+    pub fn state(&self) -> State {
+        self.status.expect("a status every cycle").statusword.state().expect("a defined state")
+    }
+}
+
+pub struct Bench {
+    pub bus: InProcess<Machine>,
+    pub is_stuck: Arc<AtomicBool>,
+}
+
+impl Bench {
+    pub fn new(clock: ClockMode) -> Self {
+        let is_stuck = Arc::new(AtomicBool::new(false));
+        let plant = Ideal {
+            position_m: [START_M; 2],
+            velocity_m_s: [0.0; 2],
+            is_stuck: Arc::clone(&is_stuck),
+        };
+        let machine = Machine::with_plant(&cell(), clock, Box::new(plant)).unwrap();
+        Self { bus: InProcess::new(machine, 4096), is_stuck }
+    }
+
+    /// Drive 1 brought up and operational, not yet enabled.
+    pub fn started(mode: Mode) -> Self {
+        let mut bench = Self::new(ClockMode::LockStep);
+        cia402::bring_up(&mut bench.bus, &setup(mode)).unwrap();
+        bench.bus.send(&NmtCommand::Start.frame(None)).unwrap();
+        bench
+    }
+
+    /// Drive 1 enabled, holding where it is.
+    pub fn enabled(mode: Mode) -> Self {
+        let mut bench = Self::started(mode);
+        bench.enable(if mode == Mode::Csp { counts(START_M) } else { 0 });
+        bench
+    }
+
+    pub fn enable(&mut self, target_counts: i32) {
+        let mut state = self.sync().state();
+        for _ in 0..6 {
+            if state == State::OperationEnabled {
+                return;
+            }
+            state = self.cycle(next_command(state), target_counts).state();
+        }
+        panic!("not enabled but {state}");
+    }
+
+    /// One cycle: command first, then SYNC, as the drive takes over at SYNC what came before it.
+    pub fn cycle(&mut self, controlword: Controlword, target_counts: i32) -> Answer {
+        let command = Command { controlword, target_counts, torque_offset: 0 };
+        self.bus.send(&command.encode(node(1))).unwrap();
+        self.sync()
+    }
+
+    /// One cycle of an enabled drive.
+    pub fn follow(&mut self, target_counts: i32) -> Answer {
+        self.cycle(Controlword::ENABLE_OPERATION, target_counts)
+    }
+
+    /// One cycle without a command.
+    pub fn sync(&mut self) -> Answer {
+        self.bus.send(&sync::frame()).unwrap();
+        self.collect()
+    }
+
+    pub fn collect(&mut self) -> Answer {
+        let mut answer = Answer::default();
+        while let Some(frame) = self.bus.recv(Duration::ZERO).unwrap() {
+            if let Some(status) = Status::decode(&frame, node(1)) {
+                answer.status = Some(status);
+            }
+            if let Some(extra) = Extra::decode(&frame, node(1)) {
+                answer.extra = Some(extra);
+            }
+            if let Some(emergency) = Emergency::decode(&frame) {
+                answer.emergencies.push(emergency.code);
+            }
+            answer.frames.push(frame);
+        }
+        answer
+    }
+
+    pub fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) {
+        ilc_rt::fieldbus::canopen::SdoClient::new(node(1), ANSWER)
+            .download(&mut self.bus, index, sub, bytes)
+            .unwrap();
+    }
+
+    pub fn read(&mut self, index: u16, sub: u8) -> u32 {
+        ilc_rt::fieldbus::canopen::SdoClient::new(node(1), ANSWER)
+            .upload_u32(&mut self.bus, index, sub)
+            .unwrap()
+    }
+}
+
+pub fn setup(mode: Mode) -> DriveSetup {
+    DriveSetup {
+        node: node(1),
+        mode,
+        cycle_us: CYCLE_US,
+        following_error_max_counts: 5000,
+        heartbeat_ms: 0,
+        rpdo_deadline_ms: 0,
+        answer_timeout: ANSWER,
+    }
+}

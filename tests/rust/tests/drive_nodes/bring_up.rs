@@ -1,0 +1,185 @@
+//! Bring-up against the simulated nodes: what it finds, what it refuses, what it survives.
+
+use std::time::Duration;
+
+use ilc_rt::fieldbus::canopen::{
+    AbortCode, Heartbeat, NmtState, NodeId, SdoClient, SdoError, sdo::ObjectAddress,
+};
+use ilc_rt::fieldbus::cia402::{
+    BringUpError, DriveSetup, EncoderSample, Mode, bring_up, bring_up_encoder, pdo_map,
+};
+use ilc_rt::fieldbus::transport::InProcess;
+use ilc_rt::fieldbus::{Bus, BusError, Frame};
+use ilc_sim::{ClockMode, Machine};
+
+use crate::bench::{ANSWER, Bench, COUNTS_PER_M, START_M, node, setup};
+
+#[test]
+fn a_drive_says_who_it_is_and_is_configured() {
+    for mode in [Mode::Csp, Mode::Csv] {
+        let mut bench = Bench::new(ClockMode::LockStep);
+        let identity = bring_up(&mut bench.bus, &setup(mode)).unwrap();
+        assert_eq!(identity.device_type & 0xFFFF, 402);
+        assert_eq!(identity.supported_modes, 0x180, "CSP and CSV are simulated, nothing else");
+        assert_eq!(identity.identity, [0, 402, 1, 1]);
+        assert_eq!(bench.read(0x6061, 0), u32::from(mode.code().cast_unsigned()));
+        assert_eq!(bench.read(0x60C2, 1), 1);
+        assert_eq!(bench.read(0x60C2, 2).to_le_bytes()[0].cast_signed(), -3);
+        assert_eq!(bench.read(0x6065, 0), 5000);
+        for (sub, object) in (1..).zip(pdo_map::command_map(mode)) {
+            assert_eq!(bench.read(0x1600, sub), object.entry());
+        }
+        assert_eq!(bench.read(0x1400, 1), 0x4000_0201);
+        assert_ne!(bench.read(0x1802, 1) & 0x8000_0000, 0, "unused PDOs are off");
+    }
+}
+
+#[test]
+fn the_encoder_sends_both_coordinates_at_sync() {
+    let mut bench = Bench::started(Mode::Csp);
+    let identity = bring_up_encoder(&mut bench.bus, node(10), ANSWER).unwrap();
+    assert_eq!(identity.device_type & 0xFFFF, 406);
+    bench.bus.send(&ilc_rt::fieldbus::canopen::NmtCommand::Start.frame(None)).unwrap();
+    let answer = bench.sync();
+    let samples: Vec<_> =
+        answer.frames.iter().filter_map(|f| EncoderSample::decode(f, node(10))).collect();
+    #[expect(clippy::cast_possible_truncation, reason = "a small count")]
+    let expected = ((START_M + 0.001) * COUNTS_PER_M).round() as i32;
+    assert_eq!(samples, [EncoderSample { x_counts: expected, y_counts: expected }]);
+}
+
+#[test]
+fn a_missing_node_is_named_with_the_question_to_ask() {
+    let mut bench = Bench::new(ClockMode::LockStep);
+    let missing = DriveSetup { node: node(5), ..setup(Mode::Csp) };
+    let error = bring_up(&mut bench.bus, &missing).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "node 5: no boot-up within 2s after reset; is it powered, on this bus and set to this number?"
+    );
+}
+
+#[test]
+fn a_node_of_another_kind_is_refused() {
+    let mut bench = Bench::new(ClockMode::LockStep);
+    let encoder = DriveSetup { node: node(10), ..setup(Mode::Csp) };
+    let error = bring_up(&mut bench.bus, &encoder).unwrap_err();
+    assert!(
+        matches!(error, BringUpError::Profile { expected: 402, found: 406, .. }),
+        "{error}"
+    );
+    let error = bring_up_encoder(&mut bench.bus, node(1), ANSWER).unwrap_err();
+    assert!(matches!(error, BringUpError::Profile { expected: 406, found: 402, .. }), "{error}");
+}
+
+#[test]
+fn a_cycle_that_no_drive_can_hold_is_refused_before_anything_is_sent() {
+    let mut bench = Bench::new(ClockMode::LockStep);
+    let odd = DriveSetup { cycle_us: 1001, ..setup(Mode::Csp) };
+    let error = bring_up(&mut bench.bus, &odd).unwrap_err();
+    assert!(error.to_string().starts_with("node 1: interpolation period: a cycle of 1001 us"));
+    assert!(bench.collect().frames.is_empty());
+}
+
+#[test]
+fn a_refusal_names_node_object_and_reason() {
+    let mut bench = Bench::new(ClockMode::LockStep);
+    let client = SdoClient::new(node(1), ANSWER);
+    let error = client.download(&mut bench.bus, 0x6041, 0, &[0, 0]).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "node 1: object 0x6041:00: refused with abort code 0x06010002 (object is read-only)"
+    );
+    let absent = client.upload(&mut bench.bus, 0x5FFF, 0).unwrap_err();
+    let address = ObjectAddress::new(0x5FFF, 0);
+    let code = AbortCode::NoObject;
+    assert_eq!(absent, SdoError::Aborted { node: node(1), address, code });
+}
+
+#[test]
+fn texts_go_both_ways_in_segments() {
+    let mut bench = Bench::new(ClockMode::LockStep);
+    let client = SdoClient::new(node(1), ANSWER);
+    let name = client.upload(&mut bench.bus, 0x1008, 0).unwrap();
+    assert_eq!(name, b"ilc-sim CiA 402 drive");
+    for label in ["", "x", "four", "exactly 7", "twenty-one characters", "a label of thirty-two characters"] {
+        client.download(&mut bench.bus, 0x2000, 0, label.as_bytes()).unwrap();
+        assert_eq!(client.upload(&mut bench.bus, 0x2000, 0).unwrap(), label.as_bytes());
+    }
+}
+
+/// A bus on which other nodes talk all the time.
+struct Crowded {
+    inner: InProcess<Machine>,
+    foreign: Vec<Frame>,
+}
+
+impl Bus for Crowded {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let other = node(77);
+        let heartbeat = Heartbeat { node: other, state: NmtState::BootUp }.encode();
+        let answer = Frame::new(0x580 + 77, &[0x60, 0x40, 0x60, 0, 0, 0, 0, 0]).unwrap();
+        let status = Frame::new(0x180 + 77, &[0; 8]).unwrap();
+        self.foreign.extend([heartbeat, answer, status]);
+        self.inner.send(frame)
+    }
+
+    fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        match self.foreign.pop() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.inner.recv(timeout),
+        }
+    }
+}
+
+#[test]
+fn foreign_traffic_is_ignored() {
+    let bench = Bench::new(ClockMode::LockStep);
+    let mut bus = Crowded { inner: bench.bus, foreign: Vec::new() };
+    bring_up(&mut bus, &setup(Mode::Csp)).unwrap();
+}
+
+/// A bus that loses every n-th frame towards the nodes.
+struct Lossy {
+    inner: InProcess<Machine>,
+    every: usize,
+    n_sent: usize,
+}
+
+impl Bus for Lossy {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.n_sent += 1;
+        if self.n_sent.is_multiple_of(self.every) { Ok(()) } else { self.inner.send(frame) }
+    }
+
+    fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        self.inner.recv(timeout)
+    }
+}
+
+#[test]
+fn single_lost_requests_are_asked_again() {
+    let bench = Bench::new(ClockMode::LockStep);
+    let mut bus = Lossy { inner: bench.bus, every: 5, n_sent: 0 };
+    bring_up(&mut bus, &setup(Mode::Csp)).unwrap();
+    assert!(bus.n_sent > 40);
+}
+
+#[test]
+fn a_silent_server_is_reported_with_its_object() {
+    let mut bench = Bench::new(ClockMode::LockStep);
+    bench.bus.responder_mut().mute(node(1));
+    let short = Duration::from_millis(5);
+    let error = SdoClient::new(node(1), short).upload(&mut bench.bus, 0x1000, 0).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "node 1: object 0x1000:00: no answer within 5ms, tried 2 times"
+    );
+}
+
+#[test]
+fn node_numbers_are_1_to_127() {
+    assert_eq!(NodeId::new(0), None);
+    assert_eq!(NodeId::new(128), None);
+    assert_eq!(NodeId::new(127).map(NodeId::get), Some(127));
+}

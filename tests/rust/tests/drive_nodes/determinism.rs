@@ -1,0 +1,72 @@
+//! In lock-step the same commands give the same frames, to the last bit, on the gantry with friction.
+
+use std::path::Path;
+use std::time::Duration;
+
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
+use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Mode, Status, bring_up, next_command};
+use ilc_rt::fieldbus::transport::InProcess;
+use ilc_rt::fieldbus::{Bus, Frame};
+use ilc_sim::{ClockMode, Machine};
+
+use crate::bench::ANSWER;
+
+fn run() -> Vec<Frame> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/01_gantry.toml");
+    let cell = Cell::load(&path).unwrap();
+    let mut bus = InProcess::new(Machine::from_cell(&cell, ClockMode::LockStep).unwrap(), 256);
+    let nodes: Vec<NodeId> = cell.axes.iter().map(|a| NodeId::new(a.node).unwrap()).collect();
+    for &node in &nodes {
+        let setup = DriveSetup {
+            node,
+            mode: Mode::Csp,
+            cycle_us: cell.cell.cycle_us,
+            following_error_max_counts: 1_000_000,
+            heartbeat_ms: 0,
+            rpdo_deadline_ms: 0,
+            answer_timeout: ANSWER,
+        };
+        bring_up(&mut bus, &setup).unwrap();
+    }
+    bus.send(&NmtCommand::Start.frame(None)).unwrap();
+    let mut frames = Vec::new();
+    let mut status = [Status::default(); 2];
+    let mut start: [Option<i32>; 2] = [None; 2];
+    for cycle in 0..1000 {
+        bus.send(&sync::frame()).unwrap();
+        while let Some(frame) = bus.recv(Duration::ZERO).unwrap() {
+            for (axis, &node) in nodes.iter().enumerate() {
+                status[axis] = Status::decode(&frame, node).unwrap_or(status[axis]);
+            }
+            frames.push(frame);
+        }
+        for (axis, &node) in nodes.iter().enumerate() {
+            let start = *start[axis].get_or_insert(status[axis].position_counts);
+            let phase = f64::from(cycle) * 0.02;
+            #[expect(clippy::cast_possible_truncation, reason = "a small count")]
+            let swing = (1e6 * (1.0 - phase.cos())) as i32;
+            let command = Command {
+                controlword: next_command(status[axis].statusword.state().unwrap()),
+                target_counts: if cycle < 20 { start } else { start + swing },
+                torque_offset: 0,
+            };
+            bus.send(&command.encode(node)).unwrap();
+        }
+    }
+    frames
+}
+
+#[test]
+fn two_runs_are_one_run() {
+    let (first, second) = (run(), run());
+    assert!(first.len() > 4000);
+    let positions: Vec<i32> = first
+        .iter()
+        .filter_map(|frame| Status::decode(frame, NodeId::new(1).unwrap()))
+        .map(|status| status.position_counts)
+        .collect();
+    let spread = positions.iter().max().unwrap() - positions.iter().min().unwrap();
+    assert!(spread > 1_000_000, "the axis moved {spread} counts only");
+    assert_eq!(first, second);
+}
