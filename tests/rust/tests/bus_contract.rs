@@ -3,6 +3,15 @@
 //! The cases are written once against the `Bus` trait; each transport brings two endpoints of one bus.
 //! SocketCAN needs an interface: `tests/vcan/run` provides one where the machine has none.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test may panic, and prints figures and what it skips"
+)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::fs::File;
 use std::net::{TcpListener, UdpSocket};
@@ -21,8 +30,7 @@ const BURST: usize = 50;
 
 /// The `n`-th frame of a sequence: identifier, length and data all follow from `n`.
 fn numbered(n: usize) -> Frame {
-    let n32 = u32::try_from(n).unwrap();
-    let data = [n32.to_le_bytes(), (!n32).to_be_bytes()].concat();
+    let data = (n as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).to_le_bytes();
     Frame::new(u16::try_from(n % 0x800).unwrap(), &data[..n % 9]).unwrap()
 }
 
@@ -125,6 +133,51 @@ fn never_blocks_the_sender((mut a, b): Ends) {
     assert!(elapsed < Duration::from_secs(5), "11000 frames nobody takes took {elapsed:?}");
 }
 
+fn allocates_nothing_in_the_callers_thread((mut a, mut b): Ends) {
+    let mut exchange = |n| {
+        a.send(&numbered(n)).unwrap();
+        assert_eq!(receive(&mut *b), numbered(n));
+        assert_eq!(b.recv(Duration::ZERO).unwrap(), None);
+        assert_eq!(a.recv(Duration::from_micros(50)).unwrap(), None);
+    };
+    exchange(0);
+    let before = allocations();
+    for n in 0..500 {
+        exchange(n);
+    }
+    assert_eq!(allocations() - before, 0);
+    drop(std::hint::black_box(Box::new(numbered(1))));
+    assert_ne!(allocations() - before, 0, "the count counts");
+}
+
+/// The system's allocator, counting the requests of each thread.
+struct Counting;
+
+thread_local!(static ALLOCATIONS: Cell<u64> = const { Cell::new(0) });
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations() -> u64 {
+    ALLOCATIONS.get()
+}
+
+#[expect(unsafe_code, reason = "an allocator is")]
+// SAFETY: every request goes on to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // Gone when a thread ends; what is allocated then is nobody's to count.
+        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller's promises about `layout` are the ones asked for here.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: `memory` came from `alloc` above, with this layout.
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
+
 macro_rules! contract {
     ($transport:ident, $make:expr, [$($case:ident),* $(,)?]) => {
         mod $transport {
@@ -145,18 +198,19 @@ macro_rules! contract {
             is_woken_by_a_frame,
             carries_both_directions_at_once,
             never_blocks_the_sender,
+            allocates_nothing_in_the_callers_thread,
         ]);
     };
 }
 
-contract!(over_loopback, super::loopback_ends());
+contract!(over_loopback, Some(super::loopback_ends()));
 contract!(over_udp, Some(super::udp_ends(&super::udp_address())));
 contract!(over_zenoh, Some(super::boxed(super::zenoh_ends())));
 contract!(over_can, super::can_interface().map(|name| super::can_ends(&name)));
 
-fn loopback_ends() -> Option<Ends> {
+fn loopback_ends() -> Ends {
     let (a, b) = loopback::pair(64).unwrap();
-    Some((Box::new(a), Box::new(b)))
+    (Box::new(a), Box::new(b))
 }
 
 /// A multicast address whose port no other test uses: it stays taken on the host's own address.
@@ -387,7 +441,9 @@ fn in_process_never_waits_and_never_echoes() {
     let mut bus = InProcess::new(Repeater::default(), 8);
     bus.send(&Frame::new(1, &[]).unwrap()).unwrap();
     let start = Instant::now();
+    let before = allocations();
     assert_eq!(bus.recv(PATIENCE).unwrap(), None);
+    assert_eq!(allocations(), before);
     assert!(start.elapsed() < PATIENCE / 10);
 }
 
@@ -407,7 +463,7 @@ fn in_process_says_when_answers_do_not_fit() {
 #[ignore = "prints figures, asserts nothing about them"]
 fn round_trip_times() {
     let mut ends: Vec<(&str, Ends)> = vec![
-        ("loopback pair", loopback_ends().unwrap()),
+        ("loopback pair", loopback_ends()),
         ("udp multicast", udp_ends(&udp_address())),
         ("zenoh", boxed(zenoh_ends())),
     ];
