@@ -148,8 +148,7 @@ fn a_controller_whose_heartbeat_stops_is_missed() {
         }
         bench.bus.send(&beat).unwrap();
     }
-    let codes: Vec<u16> =
-        (0..15).flat_map(|_| bench.follow(counts(START_M)).emergencies).collect();
+    let codes: Vec<u16> = (0..15).flat_map(|_| bench.follow(counts(START_M)).emergencies).collect();
     assert_eq!(codes, [0x8130]);
     assert_eq!(bench.bus.responder().drive_state(node(1)), Some(State::Fault));
 }
