@@ -1,6 +1,19 @@
 """The motion controller that learns: iterative learning control on the machine."""
 
-from ilc_rt._native import Cell, Library
+from ilc_rt import signal
+from ilc_rt._native import (
+    Cell,
+    LearningError,
+    Library,
+    ModelError,
+    NormOptimalIlc,
+    PdIlc,
+    SignalError,
+    StateSpace,
+    discretize,
+    from_transfer_function,
+    second_order,
+)
 from ilc_rt.campaign import Campaign, Law
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.record import IterationRecord
@@ -14,5 +27,15 @@ __all__ = [
     "Cell",
     "IterationRecord",
     "Law",
+    "LearningError",
     "Library",
+    "ModelError",
+    "NormOptimalIlc",
+    "PdIlc",
+    "SignalError",
+    "StateSpace",
+    "discretize",
+    "from_transfer_function",
+    "second_order",
+    "signal",
 ]

@@ -161,4 +161,10 @@ impl Plant for Gantry {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small positive counts; what rests must rest to the last bit"
+)]
 mod tests;

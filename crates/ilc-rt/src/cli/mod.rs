@@ -10,6 +10,9 @@ mod show;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use tracing::Level;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::prelude::*;
 
 /// Bad input: nothing has moved.
 pub const EXIT_BAD_INPUT: u8 = 2;
@@ -39,14 +42,13 @@ enum Verb {
 
 /// Runs the program's arguments and returns its exit status.
 pub fn main() -> ExitCode {
-    let filter = tracing_subscriber::EnvFilter::try_from_env("ILC_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("ilc_rt=info"));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
+    let filter = std::env::var("ILC_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .without_time()
         .with_target(false)
-        .init();
+        .with_filter(filter.unwrap_or_else(|| Targets::new().with_target("ilc_rt", Level::INFO)));
+    tracing_subscriber::registry().with(lines).init();
     let status = match Arguments::parse().verb {
         Verb::Run(arguments) => run::run(&arguments),
         Verb::Check(arguments) => check::check(&arguments),

@@ -3,9 +3,9 @@
 /// `v_cmd = k_v (r − y) + f ṙ`
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionLoop {
-    /// Velocity per position error, k_v.
+    /// Velocity per position error, `k_v`.
     pub gain_per_s: f64,
-    /// Share f of the reference velocity that is fed forward, 0 to 1.
+    /// Share `f` of the reference velocity that is fed forward, 0 to 1.
     pub velocity_feedforward: f64,
 }
 
@@ -22,6 +22,13 @@ impl PositionLoop {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
+)]
 mod tests {
     use super::*;
 

@@ -41,6 +41,13 @@ impl SlewLimiter {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
+)]
 mod tests {
     use super::*;
 

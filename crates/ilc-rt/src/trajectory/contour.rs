@@ -48,10 +48,8 @@ struct Path<'a, const N: usize> {
 
 impl<'a, const N: usize> Path<'a, N> {
     fn new(samples_m: &'a [[f64; N]]) -> Self {
-        let step_max_m = samples_m
-            .windows(2)
-            .map(|pair| distance_m(&pair[0], &pair[1]))
-            .fold(0.0, f64::max);
+        let step_max_m =
+            samples_m.windows(2).map(|pair| distance_m(&pair[0], &pair[1])).fold(0.0, f64::max);
         Self { samples_m, step_max_m }
     }
 
@@ -70,7 +68,10 @@ impl<'a, const N: usize> Path<'a, N> {
         }
         let share =
             if length_squared > 0.0 { (projection / length_squared).clamp(0.0, 1.0) } else { 0.0 };
-        distance_m(point_m, &std::array::from_fn(|axis| from[axis] + share * (to[axis] - from[axis])))
+        distance_m(
+            point_m,
+            &std::array::from_fn(|axis| from[axis] + share * (to[axis] - from[axis])),
+        )
     }
 
     /// Distance to the part of the path within `window` samples of sample `k`.
@@ -114,6 +115,12 @@ fn distance_m<const N: usize>(one: &[f64; N], other: &[f64; N]) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small positive counts; skipping must change nothing at all"
+)]
 mod tests {
     use super::*;
     use crate::trajectory::random::Random;
@@ -203,8 +210,7 @@ mod tests {
         let reference = contour();
         let mut random = Random(9);
         for scale in [1e-6, 3e-4, 1e-2, 1.0] {
-            let actual: Vec<f64> =
-                reference.iter().map(|r| r + scale * random.signed()).collect();
+            let actual: Vec<f64> = reference.iter().map(|r| r + scale * random.signed()).collect();
             for window in [0, 1, 17, 200, 10_000] {
                 assert_eq!(
                     contour_error_m(&reference, &actual, 2, window),

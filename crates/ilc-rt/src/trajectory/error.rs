@@ -65,7 +65,9 @@ pub enum TrajectoryError {
         value: f64,
     },
     /// The values are so far apart that the duration cannot be computed.
-    #[error("a move of {length_m} m at these limits would last {duration_s} s: must be finite and above 0")]
+    #[error(
+        "a move of {length_m} m at these limits would last {duration_s} s: must be finite and above 0"
+    )]
     Duration {
         /// Length of the move.
         length_m: f64,

@@ -87,7 +87,8 @@ impl PointToPoint {
     clippy::disallowed_methods,
     clippy::disallowed_types,
     clippy::disallowed_macros,
-    reason = "tests are cold"
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
 )]
 mod tests {
     use super::*;

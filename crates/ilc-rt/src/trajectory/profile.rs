@@ -172,12 +172,7 @@ impl JerkLimited {
             PathState { s_m: 0.0, v_m_s: 0.0, a_m_s2: 0.0, j_m_s3: 0.0 }
         } else if t_s <= self.jerk_time_s {
             let t = t_s;
-            PathState {
-                s_m: j * t * t * t / 6.0,
-                v_m_s: 0.5 * j * t * t,
-                a_m_s2: j * t,
-                j_m_s3: j,
-            }
+            PathState { s_m: j * t * t * t / 6.0, v_m_s: 0.5 * j * t * t, a_m_s2: j * t, j_m_s3: j }
         } else if t_s <= self.jerk_time_s + self.hold_time_s {
             let t = t_s - self.jerk_time_s;
             let (v_1, s_1) =
@@ -207,7 +202,8 @@ impl JerkLimited {
     clippy::disallowed_methods,
     clippy::disallowed_types,
     clippy::disallowed_macros,
-    reason = "tests are cold"
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
 )]
 mod tests {
     use super::*;
@@ -217,7 +213,9 @@ mod tests {
     fn hand_computed_move_reaches_every_limit() {
         // v = 1, a = 2, j = 8: T_j = 0.25, hold 0.25, rise 0.75 s and 0.375 m; cruise 1.25 s.
         let plan = JerkLimited::plan(2.0, 1.0, 2.0, 8.0).unwrap();
-        for (found, wanted) in plan.phases_s().iter().zip([0.25, 0.25, 0.25, 1.25, 0.25, 0.25, 0.25]) {
+        for (found, wanted) in
+            plan.phases_s().iter().zip([0.25, 0.25, 0.25, 1.25, 0.25, 0.25, 0.25])
+        {
             assert!((found - wanted).abs() < 1e-15);
         }
         let state = plan.at(0.5);
@@ -232,7 +230,10 @@ mod tests {
         let acceleration_only = JerkLimited::plan(0.25, 10.0, 2.0, 8.0).unwrap();
         assert!((acceleration_only.duration_s() - 1.0).abs() < 1e-12);
         let jerk_only = JerkLimited::plan(0.25 / 8.0, 10.0, 2.0, 8.0).unwrap();
-        assert!((jerk_only.duration_s() - 0.5).abs() < 1e-15, "an eighth of the way in half the time");
+        assert!(
+            (jerk_only.duration_s() - 0.5).abs() < 1e-15,
+            "an eighth of the way in half the time"
+        );
         assert!(jerk_only.phases_s()[1].abs() < 1e-15);
         assert!((jerk_only.peak_acceleration_m_s2() - 1.0).abs() < 1e-15);
     }
@@ -298,7 +299,10 @@ mod tests {
             let slope = (high.s_m - low.s_m) / (2.0 * h);
             assert!((slope - mid.v_m_s).abs() < 1e-3 * peak_v, "{plan:?} at {t}");
             let bend = (high.v_m_s - low.v_m_s) / (2.0 * h);
-            assert!((bend - mid.a_m_s2).abs() < 1e-3 * plan.peak_acceleration_m_s2(), "{plan:?} at {t}");
+            assert!(
+                (bend - mid.a_m_s2).abs() < 1e-3 * plan.peak_acceleration_m_s2(),
+                "{plan:?} at {t}"
+            );
         }
     }
 

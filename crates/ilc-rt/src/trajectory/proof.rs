@@ -145,7 +145,8 @@ impl Proof<'_> {
         let longest = ticks(WINDOW_MAX_S, self.cycle_s);
         let (mut broken, mut holds) = (window, window);
         while !self.window_holds(holds) {
-            let wider = ((holds as f64 * ratio.clamp(1.25, 2.0)).ceil() as usize).max(holds + 1);
+            let wider_s = holds as f64 * self.cycle_s * ratio.clamp(1.25, 2.0);
+            let wider = ticks(wider_s, self.cycle_s).max(holds + 1);
             if wider > longest {
                 return None;
             }

@@ -144,7 +144,8 @@ impl ControlledStop {
     clippy::disallowed_methods,
     clippy::disallowed_types,
     clippy::disallowed_macros,
-    reason = "tests are cold"
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
 )]
 mod tests {
     use super::*;

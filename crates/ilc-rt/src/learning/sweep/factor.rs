@@ -115,6 +115,9 @@ impl Gains {
             if is_settled || k == constant.start {
                 bounded(&gains, constant.len())?;
             }
+            if is_settled && vanished && k > constant.start {
+                return Err(FactorError::Undetermined { sample: k - 1 });
+            }
             if is_settled {
                 settled = Some(gains);
                 k = constant.start;

@@ -176,6 +176,13 @@ fn problems_without_a_solution_are_refused_in_a_sentence() {
     assert!(line.contains("does not determine the input at sample"), "{line}");
     assert!(NormOptimal::new(&wide, 300, weights(1.0, 0.0, 1e-3, 0.0)).is_ok());
 
+    // Settles within one sample, while the last samples are still allowed to be undetermined.
+    let row = |values: &[f64]| DMatrix::from_row_slice(1, values.len(), values);
+    let twins =
+        StateSpace::discrete(row(&[0.5]), row(&[1.0, 1.0]), row(&[1.0]), row(&[0.0, 0.0]), 1.0);
+    let line = NormOptimal::new(&twins.unwrap(), 300, Weights::default()).unwrap_err().to_string();
+    assert!(line.contains("does not determine the input at sample"), "{line}");
+
     let model = axis(157.0, 0.5, 2e-3);
     for bad in [weights(-1.0, 0.0, 0.0, 0.0), weights(1.0, f64::NAN, 0.0, 0.0)] {
         assert!(matches!(NormOptimal::new(&model, 9, bad), Err(LearningError::Parameter { .. })));

@@ -1,0 +1,150 @@
+//! Arrays that come from and go to Python.
+
+use ilc_rt::model::StateSpace;
+use numpy::ndarray::{Array1, Array2};
+use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// The matrix type of `ilc-rt`.
+pub(crate) type Matrix = nalgebra::DMatrix<f64>;
+
+/// A signal, time first, that remembers whether it had a channel axis.
+#[derive(Debug)]
+pub(crate) struct Signal {
+    pub(crate) values: Vec<f64>,
+    pub(crate) n_samples: usize,
+    pub(crate) n_channels: usize,
+    pub(crate) is_flat: bool,
+}
+
+impl Signal {
+    /// Reads `(n_samples,)` or `(n_samples, n_channels)`.
+    pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (values, shape) = read(name, object)?;
+        let (n_samples, n_channels, is_flat) = match shape[..] {
+            [n_samples] => (n_samples, 1, true),
+            [n_samples, n_channels] => (n_samples, n_channels, false),
+            _ => return Err(misfit(name, &shape, "(n_samples,) or (n_samples, n_channels)")),
+        };
+        if values.is_empty() {
+            return Err(misfit(name, &shape, "at least one sample of one channel"));
+        }
+        Ok(Self { values, n_samples, n_channels, is_flat })
+    }
+
+    /// Refuses any other number of channels.
+    pub(crate) fn with_channels(self, name: &str, n_channels: usize) -> PyResult<Self> {
+        if self.n_channels == n_channels {
+            return Ok(self);
+        }
+        Err(misfit(name, &self.shape(), &format!("(n_samples, {n_channels})")))
+    }
+
+    /// Refuses any other number of samples.
+    pub(crate) fn with_samples(self, name: &str, n_samples: usize) -> PyResult<Self> {
+        if self.n_samples == n_samples {
+            return Ok(self);
+        }
+        let rule = format!("({n_samples},) or ({n_samples}, n_channels)");
+        Err(misfit(name, &self.shape(), &rule))
+    }
+
+    /// Returns the shape as it came from Python.
+    pub(crate) fn shape(&self) -> Vec<usize> {
+        if self.is_flat { vec![self.n_samples] } else { vec![self.n_samples, self.n_channels] }
+    }
+}
+
+/// Reads a matrix; a single number stands for a 1 x 1 one.
+pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Matrix> {
+    let (values, shape) = read(name, object)?;
+    match shape[..] {
+        [] => Ok(Matrix::from_element(1, 1, values[0])),
+        [rows, cols] => Ok(Matrix::from_row_slice(rows, cols, &values)),
+        _ => Err(misfit(name, &shape, "two axes, (rows, columns)")),
+    }
+}
+
+/// Reads a list of numbers with exactly one axis.
+pub(crate) fn read_vector(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let (values, shape) = read(name, object)?;
+    if shape.len() == 1 { Ok(values) } else { Err(misfit(name, &shape, "one axis, (n,)")) }
+}
+
+/// Returns a time-first signal to Python, without channel axis if `is_flat`.
+pub(crate) fn give_signal(
+    py: Python<'_>,
+    values: Vec<f64>,
+    n_channels: usize,
+    is_flat: bool,
+) -> PyResult<Bound<'_, PyAny>> {
+    if is_flat {
+        return Ok(Array1::from(values).into_pyarray(py).into_any());
+    }
+    let shape = (values.len() / n_channels.max(1), n_channels);
+    Array2::from_shape_vec(shape, values)
+        .map(|array| array.into_pyarray(py).into_any())
+        .map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+/// Returns a matrix to Python.
+pub(crate) fn give_matrix<'py>(py: Python<'py>, matrix: &Matrix) -> Bound<'py, PyAny> {
+    Array2::from_shape_fn(matrix.shape(), |(row, col)| matrix[(row, col)])
+        .into_pyarray(py)
+        .into_any()
+}
+
+/// Returns the exception for an argument of the wrong shape.
+pub(crate) fn misfit(name: &str, shape: &[usize], allowed: &str) -> PyErr {
+    let lengths: Vec<String> = shape.iter().map(usize::to_string).collect();
+    let comma = if shape.len() == 1 { "," } else { "" };
+    PyValueError::new_err(format!(
+        "{name} has shape ({}{comma}); {allowed} is needed",
+        lengths.join(", ")
+    ))
+}
+
+/// Reads any array of float64 or integers in row-major order.
+fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let numpy = object.py().import("numpy")?;
+    let array = numpy.call_method1("asarray", (object,)).map_err(|error| {
+        PyValueError::new_err(format!("{name} is no array of numbers: {error}"))
+    })?;
+    let dtype = array.getattr("dtype")?;
+    let kind: String = dtype.getattr("kind")?.extract()?;
+    let size: usize = dtype.getattr("itemsize")?.extract()?;
+    // An empty list becomes float64 by itself; integers are exact as far as they are set-points.
+    if !(matches!(kind.as_str(), "i" | "u") || kind == "f" && size == 8) {
+        return Err(PyTypeError::new_err(format!("{name} has dtype {dtype}; float64 is needed")));
+    }
+    let array = array.call_method1("astype", ("float64",))?;
+    let array = array.cast::<PyArrayDyn<f64>>()?;
+    let shape = array.shape().to_vec();
+    let values: Vec<f64> = array.readonly().as_array().iter().copied().collect();
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok((values, shape)),
+        Some(index) => Err(PyValueError::new_err(format!(
+            "{name} holds {} at {}; only finite numbers are allowed",
+            values[index],
+            place(index, &shape)
+        ))),
+    }
+}
+
+/// Returns the position of a flat index as Python would write it.
+fn place(index: usize, shape: &[usize]) -> String {
+    let mut rest = index;
+    let mut indices = Vec::new();
+    for length in shape.iter().rev() {
+        indices.push((rest % length).to_string());
+        rest /= length;
+    }
+    indices.reverse();
+    format!("[{}]", indices.join(", "))
+}
+
+/// Returns whether an output of `model` can be handed back without channel axis.
+pub(crate) fn is_flat_output(input: &Signal, model: &StateSpace) -> bool {
+    input.is_flat && model.n_outputs() == 1
+}

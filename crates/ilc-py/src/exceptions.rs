@@ -1,0 +1,21 @@
+//! The exceptions of `ilc_rt`. All are `ValueError`: the caller gave something that cannot be used.
+
+use pyo3::create_exception;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+create_exception!(ilc_rt, ModelError, PyValueError, "A model that cannot be used as asked.");
+create_exception!(ilc_rt, SignalError, PyValueError, "A filter or signal that cannot be used.");
+create_exception!(
+    ilc_rt,
+    LearningError,
+    PyValueError,
+    "A learning law, or what it was given, that cannot be used."
+);
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("ModelError", py.get_type::<ModelError>())?;
+    module.add("SignalError", py.get_type::<SignalError>())?;
+    module.add("LearningError", py.get_type::<LearningError>())
+}

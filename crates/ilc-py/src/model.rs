@@ -1,0 +1,439 @@
+//! Models: `StateSpace`, `from_transfer_function`, `second_order`, `discretize`.
+
+use ilc_rt::model::{self, Method, StateSpace};
+use numpy::IntoPyArray;
+use numpy::ndarray::{Array1, Array3};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
+use crate::detached::detached;
+use crate::error::OrRaise;
+use crate::model_argument::{read_model, read_sample_time};
+
+/// Linear time-invariant model, sampled or continuous.
+///
+/// ``x[k+1] = A x[k] + B u[k]``, ``y[k] = C x[k] + D u[k]``.
+///
+/// Parameters
+/// ----------
+/// a : array_like, shape (n_states, n_states)
+///     State matrix.
+/// b : array_like, shape (n_states, n_inputs)
+///     Input matrix.
+/// c : array_like, shape (n_outputs, n_states)
+///     Output matrix.
+/// d : array_like, shape (n_outputs, n_inputs)
+///     Feedthrough matrix.
+/// dt_s : float or None
+///     Sample time in seconds; None or 0 for a continuous model.
+///
+/// Raises
+/// ------
+/// ModelError
+///     If the matrices do not fit each other.
+/// ValueError, TypeError
+///     If a matrix has the wrong number of axes, holds a number that is not
+///     finite, or is not of real numbers.
+///
+/// Notes
+/// -----
+/// Objects of scipy.signal and python-control are accepted wherever a model is.
+///
+/// Examples
+/// --------
+/// >>> from ilc_rt import StateSpace
+/// >>> StateSpace([[0.5]], [[1.0]], [[2.0]], [[0.0]], 0.001).simulate([1.0, 0.0, 0.0])
+/// array([0., 2., 1.])
+#[pyclass(name = "StateSpace", module = "ilc_rt", frozen)]
+#[derive(Debug)]
+pub(crate) struct PyStateSpace(StateSpace);
+
+impl PyStateSpace {
+    pub(crate) fn model(&self) -> &StateSpace {
+        &self.0
+    }
+}
+
+#[pymethods]
+impl PyStateSpace {
+    #[new]
+    #[pyo3(signature = (a, b, c, d, dt_s=None))]
+    fn new(
+        a: &Bound<'_, PyAny>,
+        b: &Bound<'_, PyAny>,
+        c: &Bound<'_, PyAny>,
+        d: &Bound<'_, PyAny>,
+        dt_s: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let dt_s = dt_s.map_or(Ok(None), |dt_s| read_sample_time("dt_s", dt_s))?;
+        let (a, b) = (read_matrix("a", a)?, read_matrix("b", b)?);
+        let (c, d) = (read_matrix("c", c)?, read_matrix("d", d)?);
+        StateSpace::new(a, b, c, d, dt_s).or_raise().map(Self)
+    }
+
+    /// State matrix, shape (n_states, n_states).
+    #[getter]
+    fn a<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        give_matrix(py, self.0.a())
+    }
+
+    /// Input matrix, shape (n_states, n_inputs).
+    #[getter]
+    fn b<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        give_matrix(py, self.0.b())
+    }
+
+    /// Output matrix, shape (n_outputs, n_states).
+    #[getter]
+    fn c<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        give_matrix(py, self.0.c())
+    }
+
+    /// Feedthrough matrix, shape (n_outputs, n_inputs).
+    #[getter]
+    fn d<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        give_matrix(py, self.0.d())
+    }
+
+    /// Sample time in seconds; None for a continuous model.
+    #[getter]
+    fn dt_s(&self) -> Option<f64> {
+        self.0.dt_s()
+    }
+
+    /// Number of states.
+    #[getter]
+    fn n_states(&self) -> usize {
+        self.0.n_states()
+    }
+
+    /// Number of inputs.
+    #[getter]
+    fn n_inputs(&self) -> usize {
+        self.0.n_inputs()
+    }
+
+    /// Number of outputs.
+    #[getter]
+    fn n_outputs(&self) -> usize {
+        self.0.n_outputs()
+    }
+
+    /// Return the output that an input produces.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : ndarray of float64, shape (n_samples,) or (n_samples, n_inputs)
+    ///     Input.
+    /// x0 : array_like or None, shape (n_states,)
+    ///     State at the first sample; zero if None.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (n_samples,) or (n_samples, n_outputs)
+    ///     Output; without channel axis if `u` has none and there is one output.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If the model is continuous or `x0` does not fit it.
+    /// ValueError, TypeError
+    ///     If `u` has the wrong shape, dtype or a number that is not finite.
+    #[pyo3(signature = (u, x0=None))]
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        u: &Bound<'py, PyAny>,
+        x0: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let u = Signal::read("u", u)?.with_channels("u", self.0.n_inputs())?;
+        let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
+        let y = detached(py, || self.0.simulate(&u.values, x0.as_deref())).or_raise()?;
+        give_signal(py, y, self.0.n_outputs(), is_flat_output(&u, &self.0))
+    }
+
+    /// Return the first Markov parameters: D, CB, CAB, ...
+    ///
+    /// Parameters
+    /// ----------
+    /// n : int
+    ///     How many.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (n, n_outputs, n_inputs)
+    ///     Response to a unit pulse, sample by sample.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If the model is continuous.
+    fn markov<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Bound<'py, PyAny>> {
+        let parameters = detached(py, || self.0.markov(n)).or_raise()?;
+        let shape = (n, self.0.n_outputs(), self.0.n_inputs());
+        let array = Array3::from_shape_fn(shape, |(k, row, col)| parameters[k][(row, col)]);
+        Ok(array.into_pyarray(py).into_any())
+    }
+
+    /// Return the dense matrix that maps a whole input to a whole output.
+    ///
+    /// Parameters
+    /// ----------
+    /// n : int
+    ///     Number of samples of a run.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (n * n_outputs, n * n_inputs)
+    ///     Block lower-triangular Toeplitz matrix of the Markov parameters, for
+    ///     analysis; signals are stacked sample by sample.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If the model is continuous.
+    fn lifted<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Bound<'py, PyAny>> {
+        let lifted = detached(py, || self.0.lifted(n)).or_raise()?;
+        Ok(give_matrix(py, &lifted))
+    }
+
+    /// Return the poles, the eigenvalues of A.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of complex128, shape (n_states,)
+    ///     Poles in no particular order.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If the eigenvalue iteration does not end.
+    fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let poles = self.0.poles().or_raise()?;
+        Ok(Array1::from(poles).into_pyarray(py).into_any())
+    }
+
+    /// Return the closed loop with a controller, y = P (r - K y).
+    ///
+    /// Parameters
+    /// ----------
+    /// controller : StateSpace or compatible
+    ///     K, from the outputs to the inputs of this model P.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     From set-point r to output y: P / (1 + P K).
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If sample times or signals do not match, or the loop is not well posed.
+    /// TypeError
+    ///     If `controller` is no model.
+    fn feedback(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let controller = read_model("controller", controller)?;
+        self.0.feedback(&controller).or_raise().map(Self)
+    }
+
+    /// Return this model followed by another, y = next(self(u)).
+    ///
+    /// Parameters
+    /// ----------
+    /// next : StateSpace or compatible
+    ///     Model that takes this one's outputs.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     From the input of this model to the output of `next`.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If sample times or signals do not match.
+    /// TypeError
+    ///     If `next` is no model.
+    fn series(&self, next: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let next = read_model("next", next)?;
+        self.0.series(&next).or_raise().map(Self)
+    }
+
+    /// Return two sets of axes side by side.
+    ///
+    /// Parameters
+    /// ----------
+    /// other : StateSpace or compatible
+    ///     Axes whose inputs and outputs follow those of this model.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     Block-diagonal model.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If sample times differ.
+    /// TypeError
+    ///     If `other` is no model.
+    fn append(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let other = read_model("other", other)?;
+        self.0.append(&other).or_raise().map(Self)
+    }
+
+    /// Return the model with every input delayed, as by a bus.
+    ///
+    /// Parameters
+    /// ----------
+    /// n_samples : int
+    ///     By how many samples.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     Model with `n_samples` more states for each input.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If the model is continuous.
+    fn delayed(&self, n_samples: usize) -> PyResult<Self> {
+        self.0.delayed(n_samples).or_raise().map(Self)
+    }
+
+    fn __repr__(&self) -> String {
+        let (n, m, p) = (self.0.n_states(), self.0.n_inputs(), self.0.n_outputs());
+        let dt_s = self.0.dt_s().map_or_else(|| "None".to_owned(), |dt_s| dt_s.to_string());
+        format!("StateSpace(n_states={n}, n_inputs={m}, n_outputs={p}, dt_s={dt_s})")
+    }
+}
+
+/// Return the state-space model of a transfer function.
+///
+/// ``G = (num[0] s^n + ...) / (den[0] s^n + ...)``, with z for s if sampled.
+///
+/// Parameters
+/// ----------
+/// num : array_like, shape (n_num,)
+///     Numerator, highest power first.
+/// den : array_like, shape (n_den,)
+///     Denominator, highest power first.
+/// dt_s : float or None
+///     Sample time in seconds; None or 0 for a continuous model.
+///
+/// Returns
+/// -------
+/// StateSpace
+///     Controllable canonical form, one input, one output.
+///
+/// Raises
+/// ------
+/// ModelError
+///     If the numerator has the higher degree or the denominator is zero.
+///
+/// Examples
+/// --------
+/// >>> from ilc_rt import from_transfer_function
+/// >>> from_transfer_function([1.0], [1.0, -0.5], 0.001).simulate([1.0, 0.0, 0.0])
+/// array([0. , 1. , 0.5])
+#[pyfunction]
+#[pyo3(signature = (num, den, dt_s=None))]
+fn from_transfer_function(
+    num: &Bound<'_, PyAny>,
+    den: &Bound<'_, PyAny>,
+    dt_s: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyStateSpace> {
+    let dt_s = dt_s.map_or(Ok(None), |dt_s| read_sample_time("dt_s", dt_s))?;
+    let (num, den) = (read_vector("num", num)?, read_vector("den", den)?);
+    model::from_transfer_function(&num, &den, dt_s).or_raise().map(PyStateSpace)
+}
+
+/// Return the continuous model of a position loop.
+///
+/// ``G(s) = w0^2 / (s^2 + 2 delta w0 s + w0^2)``
+///
+/// Parameters
+/// ----------
+/// natural_frequency_rad_s : float
+///     Bandwidth w0 in rad/s.
+/// damping : float
+///     Damping factor delta.
+///
+/// Returns
+/// -------
+/// StateSpace
+///     Continuous model; `discretize` makes it sampled.
+///
+/// Raises
+/// ------
+/// ModelError
+///     If the frequency is not positive or the damping is negative.
+///
+/// References
+/// ----------
+/// [haas2016], Eq. (13).
+///
+/// Examples
+/// --------
+/// >>> from ilc_rt import discretize, second_order
+/// >>> discretize(second_order(157.0, 0.5), 0.002)
+/// StateSpace(n_states=2, n_inputs=1, n_outputs=1, dt_s=0.002)
+#[pyfunction]
+fn second_order(natural_frequency_rad_s: f64, damping: f64) -> PyResult<PyStateSpace> {
+    model::second_order(natural_frequency_rad_s, damping).or_raise().map(PyStateSpace)
+}
+
+/// Return the sampled form of a continuous model.
+///
+/// Parameters
+/// ----------
+/// model : StateSpace or compatible
+///     Continuous model.
+/// dt_s : float
+///     Sample time in seconds.
+/// method : {"zoh", "tustin"}
+///     Zero-order hold (exact for a held input) or Tustin's bilinear rule.
+///
+/// Returns
+/// -------
+/// StateSpace
+///     Sampled model.
+///
+/// Raises
+/// ------
+/// ModelError
+///     If the model is sampled already or the sample time is not positive.
+/// ValueError
+///     If `method` is not one of those offered.
+/// TypeError
+///     If `model` is no model.
+///
+/// Examples
+/// --------
+/// >>> from ilc_rt import discretize, from_transfer_function
+/// >>> lag = from_transfer_function([1.0], [1.0, 1.0])
+/// >>> discretize(lag, 0.1).dt_s
+/// 0.1
+#[pyfunction]
+#[pyo3(signature = (model, dt_s, method="zoh"))]
+fn discretize(model: &Bound<'_, PyAny>, dt_s: f64, method: &str) -> PyResult<PyStateSpace> {
+    let method = match method {
+        "zoh" => Method::ZeroOrderHold,
+        "tustin" => Method::Tustin,
+        _ => {
+            let line = format!("method = '{method}'; 'zoh' or 'tustin' is needed");
+            return Err(PyValueError::new_err(line));
+        }
+    };
+    let model = read_model("model", model)?;
+    model::discretize(&model, dt_s, method).or_raise().map(PyStateSpace)
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyStateSpace>()?;
+    module.add_function(wrap_pyfunction!(from_transfer_function, module)?)?;
+    module.add_function(wrap_pyfunction!(second_order, module)?)?;
+    module.add_function(wrap_pyfunction!(discretize, module)?)
+}
