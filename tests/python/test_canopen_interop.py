@@ -79,7 +79,8 @@ class Sim:
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
         ready = self.wait_line("ready")
-        assert ready == f"ready: nodes 1 (x), 2 (y), 10 (tool) on {address}; real time"
+        clock = "lock-step" if "--lockstep" in arguments else "real time"
+        assert ready == f"ready: nodes 1 (x), 2 (y), 10 (tool) on {address}; {clock}"
 
     def _read(self) -> None:
         assert self._process.stdout is not None
@@ -344,6 +345,20 @@ def test_drive_that_loses_power_goes_silent(eds: Path) -> None:
             node.nmt.wait_for_heartbeat(timeout=0.1)
         with pytest.raises(canopen.nmt.NmtError):
             node.nmt.wait_for_heartbeat(timeout=0.5)
+
+
+def test_in_lockstep_time_is_counted_in_syncs(eds: Path) -> None:
+    with running("--lockstep") as (_, network):
+        node = attach(network, 1, eds)
+        beats: list[int] = []
+        node.nmt.add_heartbeat_callback(beats.append)
+        # The cell's cycle is 2 ms: one heartbeat in ten SYNC, however long they take.
+        node.sdo[0x1017].raw = 20
+        for _ in range(35):
+            network.sync.transmit()
+        assert node.sdo[0x1017].raw == 20
+        wait_until(lambda: len(beats) >= 3, "three heartbeats")
+        assert beats == [0x7F] * 3
 
 
 def test_summary_at_the_end() -> None:
