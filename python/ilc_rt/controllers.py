@@ -7,7 +7,6 @@ this process.
 
 from __future__ import annotations
 
-import json
 import selectors
 import signal
 import time
@@ -15,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ilc_rt import _native
 from ilc_rt.errors import EXIT_FAULT, CampaignError
-from ilc_rt.events import EndEvent, event_payload
 from ilc_rt.processes import Program, find_program, start_simulated_drives
 
 if TYPE_CHECKING:
@@ -162,22 +160,14 @@ class InProcessController:
     def __init__(self, options: dict[str, Any], drives: Program | None = None) -> None:
         self._options = options
         self._drives = drives
-        self._interrupted = 0
         self._error: CampaignError | None = None
-        self._source: Iterator[str] | None = None
+        self._source: _native.EventStream | None = None
 
     def lines(self) -> Iterator[str]:
         """Yield one event a line until the controller ends."""
-        done = 0
         try:
-            self._source = iter(_native.run_events(**self._options))
-            for line in self._source:
-                done += '"event":"iteration"' in line
-                yield line
-                if self._interrupted:
-                    ended = EndEvent("interrupted", done, "stopped on request")
-                    yield json.dumps(event_payload(ended))
-                    return
+            self._source = _native.run_events(**self._options)
+            yield from self._source
         except (ValueError, OSError) as error:
             self._error = CampaignError(str(error), 2)
         except RuntimeError as error:
@@ -185,7 +175,8 @@ class InProcessController:
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
         """Ask for a controlled stop; `lines` goes on until it has happened."""
-        self._interrupted = number
+        if self._source is not None:
+            self._source.stop(number)
 
     def failure(self) -> CampaignError | None:
         """Return why the controller ended, if not by finishing."""
