@@ -1,6 +1,7 @@
 //! Which error of `ilc-rt` becomes which exception.
 
-use ilc_rt::{learning, model, signal};
+use ilc_rt::{config, learning, library, model, signal, supervisor};
+use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::exceptions;
@@ -31,5 +32,23 @@ impl<T> OrRaise<T> for Result<T, learning::LearningError> {
             Signal(error) => Err(error).or_raise(),
             error => Err(exceptions::LearningError::new_err(error.to_string())),
         })
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, config::ConfigError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, library::LibraryError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| PyOSError::new_err(error.to_string()))
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, supervisor::SupervisorError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 }

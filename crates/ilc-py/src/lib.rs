@@ -6,12 +6,16 @@
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
 mod argument;
+mod campaign;
+mod cell;
 mod detached;
 mod error;
 mod exceptions;
 mod laws;
+mod library;
 mod model;
 mod model_argument;
+mod python_law;
 mod signal;
 
 use pyo3::prelude::*;
@@ -23,5 +27,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     model::register(module)?;
     signal::register(module)?;
     laws::register(module)?;
+    cell::register(module)?;
+    library::register(module)?;
+    campaign::register(module)?;
     Ok(())
 }

@@ -34,6 +34,14 @@ pub enum LearningError {
         /// The offending value.
         value: f64,
     },
+    /// A law that somebody else wrote refused, or gave something that is no input.
+    #[error("the law {law} failed: {reason}")]
+    User {
+        /// Name of the law.
+        law: String,
+        /// What it said.
+        reason: String,
+    },
     /// A parameter outside its range.
     #[error("{what} = {value}; {allowed}")]
     Parameter {

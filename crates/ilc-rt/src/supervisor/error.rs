@@ -92,6 +92,14 @@ pub enum SupervisorError {
         /// Cell description.
         file: String,
     },
+    /// Simulated drives could not be made of the cell.
+    #[error("{file}: [simulation]: {reason}")]
+    Simulation {
+        /// Cell description.
+        file: String,
+        /// Why.
+        reason: String,
+    },
     /// A thread could not be started.
     #[error("the {what} thread could not be started: {source}")]
     Thread {

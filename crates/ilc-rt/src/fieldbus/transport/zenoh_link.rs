@@ -25,6 +25,9 @@ const RING_FRAMES: usize = 4096;
 /// How often [`Link::wait_for_peer`] looks.
 const POLL: Duration = Duration::from_millis(1);
 
+/// How long a peer may leave its frames lying before they are dropped.
+const STALL_US: u32 = 100_000;
+
 /// What a `zenoh:` address says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
@@ -165,6 +168,9 @@ fn config(settings: &Settings) -> zenoh::Result<zenoh::Config> {
     set("scouting/gossip/enabled", settings.scouting.into())?;
     // Express frames travel one by one, so the queue counts frames; 16 is the most that Zenoh takes.
     set("transport/link/tx/queue/size/real_time", 16.into())?;
+    // The publisher's thread may wait where the caller's may not. Beyond this a peer has stalled, and its
+    // frames are dropped so that the others get theirs.
+    set("transport/link/tx/queue/congestion_control/drop/wait_before_drop", STALL_US.into())?;
     Ok(config)
 }
 

@@ -1,0 +1,204 @@
+//! A campaign inside this process: `run_events`.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use ilc_rt::config::{Cell, Measure};
+use ilc_rt::fieldbus::Bus;
+use ilc_rt::fieldbus::transport::{self, loopback::InProcess};
+use ilc_rt::learning::Law;
+use ilc_rt::supervisor::{self, Options, SupervisorError};
+use ilc_sim::machine::{ClockMode, Machine};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::cell::PyCell;
+use crate::detached::detached;
+use crate::error::OrRaise;
+use crate::python_law::PythonLaw;
+
+/// Frames that may wait for the loop on the bus inside the process.
+const LOOPBACK_FRAMES: usize = 1024;
+/// Events that may wait for Python; the campaign waits when they are not taken.
+const EVENTS: usize = 64;
+/// How often a waiting `next` looks for signals.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Signal number with which a dropped stream stops its axes.
+const SIGTERM: i32 = 15;
+
+/// Events of a campaign that runs inside this process, one JSON object each.
+#[pyclass(name = "EventStream", module = "ilc_rt._native", frozen)]
+struct EventStream {
+    events: Mutex<Receiver<String>>,
+    thread: Mutex<Option<JoinHandle<Result<(), SupervisorError>>>>,
+    stop: Arc<AtomicI32>,
+}
+
+#[pymethods]
+impl EventStream {
+    fn __iter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        loop {
+            let event = detached(py, || {
+                self.events.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK_EVERY)
+            });
+            match event {
+                Ok(event) => return Ok(Some(event)),
+                Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+                Err(RecvTimeoutError::Disconnected) => return self.finish(py).map(|()| None),
+            }
+        }
+    }
+
+    /// Bring the axes to rest; the events go on until they are.
+    ///
+    /// Parameters
+    /// ----------
+    /// signal : int
+    ///     Number of the signal that asked for it.
+    #[pyo3(signature = (signal=SIGTERM))]
+    fn stop(&self, signal: i32) {
+        self.stop.store(signal, Ordering::Relaxed);
+    }
+}
+
+impl EventStream {
+    fn finish(&self, py: Python<'_>) -> PyResult<()> {
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        match thread.map(|thread| detached(py, || thread.join())) {
+            Some(Ok(ended)) => ended.or_raise(),
+            Some(Err(_)) => Err(PyValueError::new_err("the campaign's thread died")),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for EventStream {
+    fn drop(&mut self) {
+        self.stop.store(SIGTERM, Ordering::Relaxed);
+        let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(thread) = thread {
+            // The campaign must not wait for somebody to take its events, nor for the interpreter.
+            Python::attach(|py| {
+                detached(py, || {
+                    let events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
+                    while events.recv().is_ok() {}
+                    let _ = thread.join();
+                });
+            });
+        }
+    }
+}
+
+/// Run a campaign inside this process and return its events.
+///
+/// With ``loopback:`` the simulated drives are in this process too.
+///
+/// Parameters
+/// ----------
+/// cell : Cell
+///     The cell.
+/// iterations : int
+///     Runs in all; the first one is without learning.
+/// library : str or os.PathLike
+///     Where the runs are kept.
+/// bus : str or None
+///     Bus address instead of the cell's.
+/// measure : str or None
+///     ``encoder`` or ``tcp`` instead of the cell's.
+/// lockstep : bool
+///     Whether the drives' answers set the pace instead of the clock.
+/// resume : bool
+///     Whether to go on with the newest campaign of the same kind.
+/// law : object or None
+///     A law with ``update(u, e, disturbance=None)`` instead of the cell's.
+///
+/// Returns
+/// -------
+/// EventStream
+///     An iterator of JSON texts.
+///
+/// Raises
+/// ------
+/// ValueError
+///     From the iterator, before anything moves, if something cannot be used.
+#[pyfunction]
+#[pyo3(signature = (cell, iterations, library, bus=None, measure=None, lockstep=true, resume=false, law=None))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
+fn run_events(
+    cell: &Bound<'_, PyCell>,
+    iterations: u32,
+    library: PathBuf,
+    bus: Option<String>,
+    measure: Option<&str>,
+    lockstep: bool,
+    resume: bool,
+    law: Option<&Bound<'_, PyAny>>,
+) -> PyResult<EventStream> {
+    let mut cell: Cell = cell.get().cell.clone();
+    if let Some(address) = bus {
+        cell.bus.address = address;
+    }
+    let measure = match measure {
+        None => None,
+        Some("encoder") => Some(Measure::Encoder),
+        Some("tcp") => Some(Measure::Tcp),
+        Some(other) => {
+            let line = format!("measure = {other:?}: \"encoder\" or \"tcp\" is allowed");
+            return Err(PyValueError::new_err(line));
+        }
+    };
+    let law = law.map(|law| PythonLaw::new(law, cell.n_axes())).transpose()?;
+    let stop = Arc::new(AtomicI32::new(0));
+    let loopback = cell.bus.address.starts_with("loopback:");
+    let options = Options {
+        iterations,
+        measure,
+        lockstep,
+        resume,
+        library,
+        telemetry: !loopback,
+        stop: Arc::clone(&stop),
+    };
+    if loopback && !lockstep {
+        return Err(PyValueError::new_err(
+            "bus = loopback: runs in lock-step only, as its drives have no clock of their own",
+        ));
+    }
+    let (sender, events) = sync_channel(EVENTS);
+    let thread = std::thread::Builder::new().name("ilc-campaign".to_owned()).spawn(move || {
+        let bus = open(&cell)?;
+        let law = law.map(|law| -> Box<dyn Law> { Box::new(law) });
+        supervisor::run(&cell, &options, bus, law, &mut |event| {
+            if let Ok(text) = serde_json::to_string(event) {
+                let _ = sender.send(text);
+            }
+        })
+        .map(drop)
+    })?;
+    Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop })
+}
+
+fn open(cell: &Cell) -> Result<Box<dyn Bus>, SupervisorError> {
+    let file = cell.file.display().to_string();
+    if !cell.bus.address.starts_with("loopback:") {
+        return transport::open(&cell.bus.address)
+            .map_err(|source| SupervisorError::Bus { file, source });
+    }
+    match Machine::from_cell(cell, ClockMode::LockStep) {
+        Ok(machine) => Ok(Box::new(InProcess::new(machine, LOOPBACK_FRAMES))),
+        Err(error) => Err(SupervisorError::Simulation { file, reason: error.to_string() }),
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<EventStream>()?;
+    module.add_function(wrap_pyfunction!(run_events, module)?)
+}

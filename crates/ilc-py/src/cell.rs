@@ -1,0 +1,135 @@
+//! The cell description: `Cell`.
+
+use std::path::Path;
+
+use ilc_rt::config::{Cell, LawName, Measure};
+use ilc_rt::supervisor::Plan;
+use pyo3::prelude::*;
+
+use crate::argument::give_signal;
+use crate::error::OrRaise;
+
+/// A cell description, read and validated.
+///
+/// Attributes are those of the file; `reference` gives the set points of a run.
+///
+/// Examples
+/// --------
+/// >>> from ilc_rt import Cell
+/// >>> cell = Cell.load("examples/01_gantry.toml")
+/// >>> cell.axis_names
+/// ['x', 'y']
+#[pyclass(name = "Cell", module = "ilc_rt", frozen)]
+#[derive(Debug)]
+pub(crate) struct PyCell {
+    pub(crate) cell: Cell,
+    reference_m: Vec<f64>,
+    n_samples: usize,
+}
+
+#[pymethods]
+impl PyCell {
+    /// Read a cell description from a TOML file.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     The file.
+    ///
+    /// Returns
+    /// -------
+    /// Cell
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     In one line: file, key, value and what is allowed.
+    #[staticmethod]
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
+    fn load(path: std::path::PathBuf) -> PyResult<Self> {
+        let cell = Cell::load(Path::new(&path)).or_raise()?;
+        let plan = Plan::new(&cell, None, false).or_raise()?;
+        // Refuses a model or weights that cannot learn, before any drive is touched.
+        plan.law(&cell).or_raise()?;
+        Ok(Self { n_samples: plan.n_samples(), reference_m: plan.reference_m, cell })
+    }
+
+    /// Name of the cell.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.cell.cell.name
+    }
+
+    /// Where it was read from.
+    #[getter]
+    fn path(&self) -> String {
+        self.cell.file.display().to_string()
+    }
+
+    /// Servo cycle in seconds.
+    #[getter]
+    fn cycle_s(&self) -> f64 {
+        self.cell.cycle_s()
+    }
+
+    /// Samples in a run.
+    #[getter]
+    fn n_samples(&self) -> usize {
+        self.n_samples
+    }
+
+    /// Number of axes.
+    #[getter]
+    fn n_axes(&self) -> usize {
+        self.cell.n_axes()
+    }
+
+    /// Names of the axes, in the order of the coordinates.
+    #[getter]
+    fn axis_names(&self) -> Vec<String> {
+        self.cell.axes.iter().map(|axis| axis.name.clone()).collect()
+    }
+
+    /// Bus address.
+    #[getter]
+    fn bus(&self) -> &str {
+        &self.cell.bus.address
+    }
+
+    /// Measurement to learn from: `encoder` or `tcp`.
+    #[getter]
+    fn measure(&self) -> &'static str {
+        match self.cell.learning.measure {
+            Measure::Encoder => "encoder",
+            Measure::Tcp => "tcp",
+        }
+    }
+
+    /// Law: `norm_optimal`, `pd` or `none`.
+    #[getter]
+    fn law(&self) -> &'static str {
+        match self.cell.learning.law {
+            LawName::NormOptimal => "norm_optimal",
+            LawName::Pd => "pd",
+            LawName::None => "none",
+        }
+    }
+
+    /// Return the set points of a run, as the loop will give them.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (n_samples, n_axes)
+    ///     Positions in metres.
+    fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give_signal(py, self.reference_m.clone(), self.cell.n_axes(), false)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Cell({:?}, {} axes, {})", self.name(), self.n_axes(), self.bus())
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyCell>()
+}

@@ -1,0 +1,157 @@
+"""Frames go back and forth between python-can's ``udp_multicast`` interface and ours.
+
+The other side is ``bus_echo``, an example of the Rust crate, in a process of its own: what it
+receives comes back with the next identifier. ``ILC_BUS_ECHO`` names a built one; else
+cargo builds it.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import socket
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import can
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).resolve().parents[2]
+GROUP = "239.74.163.78"
+STOP_ID = 0x7FF
+PATIENCE_S = 20.0
+
+
+@pytest.fixture(scope="module")
+def bus_echo() -> Path:
+    """Return the path of the echo program."""
+    if built := os.environ.get("ILC_BUS_ECHO"):
+        return Path(built)
+    cargo = ["cargo", "build", "--release", "--workspace", "--example", "bus_echo"]
+    build = subprocess.run(
+        [*cargo, "--message-format=json-render-diagnostics"],
+        cwd=ROOT,
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    messages = [json.loads(line) for line in build.stdout.splitlines() if line.startswith("{")]
+    paths = [m["executable"] for m in messages if m.get("target", {}).get("name") == "bus_echo"]
+    return Path(paths[-1])
+
+
+@pytest.fixture
+def port() -> Iterator[int]:
+    """Hold a UDP port that no other test uses."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
+        # Shared, since python-can binds the port on every address, this one included.
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        holder.bind(("127.0.0.1", 0))
+        yield holder.getsockname()[1]
+
+
+@pytest.fixture
+def bus(port: int) -> Iterator[can.BusABC]:
+    """Open python-can's end; its frames stay on this host as ours do."""
+    try:
+        bus = can.Bus(interface="udp_multicast", channel=GROUP, port=port, hop_limit=0)
+    except can.CanInitializationError as error:
+        if not is_without_network(error):
+            raise
+        pytest.skip("python-can needs a network interface for multicast, ours does not")
+    with bus:
+        yield bus
+
+
+@pytest.fixture
+def echo(bus_echo: Path, bus: can.BusABC, port: int) -> Iterator[subprocess.Popen[str]]:
+    """Start the echo program and stop it by a frame."""
+    command = [str(bus_echo), f"udp:{GROUP}:{port}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("ready")
+        try:
+            yield process
+            bus.send(can.Message(arbitration_id=STOP_ID, is_extended_id=False))
+            assert process.wait(PATIENCE_S) == 0
+        finally:
+            process.kill()
+
+
+def is_without_network(error: can.CanInitializationError) -> bool:
+    """Tell whether the machine has no interface that multicast could use."""
+    return isinstance(error.__cause__, OSError) and error.__cause__.errno == errno.ENODEV
+
+
+def receive_answer(bus: can.BusABC) -> can.Message:
+    """Return the next frame of the echo program, which has an odd identifier."""
+    # python-can hears what it sends: those are even and passed over.
+    while True:
+        message = bus.recv(PATIENCE_S)
+        assert message is not None, "the echo program did not answer"
+        if message.arbitration_id % 2 == 1:
+            return message
+
+
+@pytest.mark.usefixtures("echo")
+def test_every_length_comes_back(bus: can.BusABC) -> None:
+    for length in range(9):
+        data = bytes(range(0xF8, 0xF8 + length)) if length < 8 else bytes(8)
+        for arbitration_id in (0x000, 0x07E, 0x080, 0x0FE, 0x100, 0x600, 0x7FC):
+            sent = can.Message(arbitration_id=arbitration_id, data=data, is_extended_id=False)
+            bus.send(sent)
+            answer = receive_answer(bus)
+            assert answer.arbitration_id == arbitration_id + 1
+            assert bytes(answer.data) == data
+            assert answer.dlc == length
+            assert not answer.is_extended_id
+            assert not answer.is_remote_frame
+            assert not answer.is_error_frame
+            assert not answer.is_fd
+
+
+@pytest.mark.usefixtures("echo")
+def test_a_burst_comes_back_in_order(bus: can.BusABC) -> None:
+    numbers = range(50)
+    for number in numbers:
+        bus.send(can.Message(arbitration_id=0x200, data=[number], is_extended_id=False))
+    assert [receive_answer(bus).data[0] for _ in numbers] == list(numbers)
+
+
+@pytest.mark.usefixtures("echo")
+@pytest.mark.parametrize(
+    "foreign",
+    [
+        can.Message(arbitration_id=0x100, data=[1], is_extended_id=True),
+        can.Message(arbitration_id=0x100, dlc=1, is_remote_frame=True, is_extended_id=False),
+        can.Message(arbitration_id=0x100, data=[1], is_error_frame=True, is_extended_id=False),
+        can.Message(arbitration_id=0x100, data=[1], is_fd=True, is_extended_id=False),
+        can.Message(arbitration_id=0x100, data=bytes(64), is_fd=True, is_extended_id=False),
+    ],
+    ids=["extended", "remote", "error", "fd", "long fd"],
+)
+def test_other_kinds_of_frames_are_passed_over(bus: can.BusABC, foreign: can.Message) -> None:
+    bus.send(foreign)
+    bus.send(can.Message(arbitration_id=0x200, data=[2], is_extended_id=False))
+    # An answer to the foreign frame would be the first to come.
+    assert receive_answer(bus).arbitration_id == 0x201
+
+
+def test_a_wrong_address_is_one_clear_line(bus_echo: Path) -> None:
+    run = subprocess.run(
+        [bus_echo, "udp:192.168.0.1"],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert run.returncode == 2
+    assert run.stderr.count("\n") == 1
+    assert "192.168.0.1" in run.stderr
+    assert "224.0.0.0 to 239.255.255.255" in run.stderr
