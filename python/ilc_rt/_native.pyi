@@ -1,11 +1,16 @@
-from typing import Literal, Protocol, final
+from collections.abc import Iterator
+from os import PathLike
+from typing import Any, Literal, Protocol, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "ButterworthFilter",
+    "Cell",
+    "EventStream",
     "LearningError",
+    "Library",
     "ModelError",
     "NormOptimalIlc",
     "PdIlc",
@@ -14,6 +19,7 @@ __all__ = [
     "butterworth",
     "discretize",
     "from_transfer_function",
+    "run_events",
     "second_order",
     "zero_phase",
 ]
@@ -133,3 +139,50 @@ class NormOptimalIlc:
         self, u: ArrayLike, e: ArrayLike, disturbance: object = None
     ) -> NDArray[np.float64]: ...
     def reset(self) -> None: ...
+
+@final
+class Cell:
+    @staticmethod
+    def load(path: str | PathLike[str]) -> Cell: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def path(self) -> str: ...
+    @property
+    def cycle_s(self) -> float: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def n_axes(self) -> int: ...
+    @property
+    def axis_names(self) -> list[str]: ...
+    @property
+    def bus(self) -> str: ...
+    @property
+    def measure(self) -> Literal["encoder", "tcp"]: ...
+    @property
+    def law(self) -> Literal["norm_optimal", "pd", "none"]: ...
+    def reference(self) -> NDArray[np.float64]: ...
+
+@final
+class Library:
+    def __new__(cls, path: str | PathLike[str]) -> Library: ...
+    def list(self, cell: str | None = None) -> list[dict[str, Any]]: ...
+    def load(self, id: int) -> dict[str, Any]: ...
+
+@final
+class EventStream:
+    def __iter__(self) -> Iterator[str]: ...
+    def __next__(self) -> str: ...
+    def stop(self, signal: int = 15) -> None: ...
+
+def run_events(
+    cell: Cell,
+    iterations: int,
+    library: str | PathLike[str],
+    bus: str | None = None,
+    measure: str | None = None,
+    lockstep: bool = True,
+    resume: bool = False,
+    law: object | None = None,
+) -> EventStream: ...

@@ -93,6 +93,7 @@ class Program:
             raise CampaignError(message) from error
 
     def __enter__(self) -> Self:
+        """Return itself."""
         return self
 
     def __exit__(
@@ -101,6 +102,7 @@ class Program:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """End the program and reap it."""
         self.close()
 
     @property
