@@ -212,7 +212,9 @@ impl Running<'_> {
                 }
                 Message::Phase(phase, iteration) => {
                     self.phase_iteration = iteration;
-                    self.announcer.tell(&Event::State { state: state_name(phase), iteration });
+                    if let Some(state) = state_name(phase) {
+                        self.announcer.tell(&Event::State { state, iteration });
+                    }
                 }
                 Message::RunStarted { run, table } => {
                     self.collector.begin(run);
@@ -312,13 +314,14 @@ impl Running<'_> {
     }
 }
 
-fn state_name(phase: PhaseName) -> StateName {
-    match phase {
+/// The state as others see it; switching off and being off are told when the campaign ends.
+fn state_name(phase: PhaseName) -> Option<StateName> {
+    Some(match phase {
         PhaseName::Enabling => StateName::Enabling,
         PhaseName::Returning => StateName::Returning,
         PhaseName::Settling => StateName::Settling,
         PhaseName::Running => StateName::Running,
-        PhaseName::Stopping | PhaseName::Disabling => StateName::Stopping,
-        PhaseName::Stopped => StateName::Stopped,
-    }
+        PhaseName::Stopping => StateName::Stopping,
+        PhaseName::Disabling | PhaseName::Stopped => return None,
+    })
 }

@@ -1,0 +1,85 @@
+# Two commands matter: `make demo` and `make test`. Both do all their own set-up.
+
+VENV    := .venv
+BIN     := $(VENV)/bin
+TARGET  := $(or $(CARGO_TARGET_DIR),target)
+SOURCES := $(shell find crates sim python -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.toml') \
+           Cargo.toml Cargo.lock pyproject.toml README.md
+NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
+
+.DEFAULT_GOAL := help
+.PHONY: help build demo test test-rust test-python check fmt lint docs bench rt vcan clean
+
+help: ## List the targets
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+$(BIN)/python:
+	python3 -m venv $(VENV)
+	$(BIN)/pip install --quiet --upgrade pip
+
+$(VENV)/.tools: pyproject.toml | $(BIN)/python
+	$(BIN)/pip install --quiet "maturin>=1.9,<2"
+	@touch $@
+
+$(VENV)/.built: $(SOURCES) $(VENV)/.tools
+	cargo build --release --workspace --bins
+	rm -rf build/wheels
+	$(BIN)/maturin build --quiet --release --out build/wheels
+	$(BIN)/pip install --quiet --force-reinstall --no-deps build/wheels/*.whl
+	$(BIN)/pip install --quiet build/wheels/*.whl
+	install -m 755 $(TARGET)/release/ilc-rt $(TARGET)/release/ilc-sim $(BIN)/
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.built
+	wheel=$$(ls build/wheels/*.whl) && $(BIN)/pip install --quiet "$$wheel[test]"
+	@touch $@
+
+build: $(VENV)/.built ## Build the binaries and the Python package into .venv
+
+demo: build ## Ten runs on simulated drives, the error falling, and a report
+	$(BIN)/ilc demo
+
+test: test-rust test-python vcan ## Everything that can fail, on every transport
+
+test-rust: ## Rust tests
+ifeq ($(NEXTEST),yes)
+	cargo nextest run --release --workspace --no-fail-fast
+else
+	cargo test --release --workspace --no-fail-fast
+endif
+	cargo test --release --workspace --doc
+
+test-python: $(VENV)/.test ## Python tests
+	$(BIN)/python -m pytest -q
+
+vcan: build ## The bus contract and the main job on a real vcan0
+	tests/vcan/job
+
+check: fmt lint test ## All that a change needs before review
+
+fmt: $(VENV)/.test ## Format
+	cargo fmt --all
+	$(BIN)/ruff format python tests examples
+
+lint: $(VENV)/.test ## Formatting, lints, types, layers
+	cargo fmt --all --check
+	cargo clippy --release --workspace --all-targets -- -D warnings
+	$(BIN)/ruff format --check python tests examples
+	$(BIN)/ruff check python tests examples
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest ilc_rt._native
+	$(BIN)/lint-imports
+
+docs: ## Rust documentation, with warnings denied
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
+
+bench: ## Speed, as ratios
+	cargo bench --workspace
+
+rt: ## What is promised of the tick: no allocation, exact repetition; and this machine's punctuality
+	cargo nextest run --release --workspace -E 'binary(no_alloc) | binary(no_alloc_learning) | binary(lockstep)'
+	cargo run --release --workspace --bin ilc-rt -- latency --seconds 5
+
+clean: ## Remove what was built
+	rm -rf build $(VENV)
+	cargo clean
