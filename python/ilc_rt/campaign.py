@@ -94,6 +94,9 @@ class Campaign:
         self.law = law
         self.library = str(library)
         self.bus = bus if bus is not None else str(self.cell.bus)
+        if law is not None and not callable(getattr(law, "update", None)):
+            message = f"law = {law!r}: an object with update(u, e, disturbance=None), or None"
+            raise BadInputError(message)
         self.measure = measure
         self.transport = transport_of(self.bus)
         self.lockstep = self.transport == "loopback" if lockstep is None else lockstep
@@ -216,7 +219,7 @@ def load_cell(path: str | Path) -> Cell:
         With file, key, value and what is allowed.
     """
     try:
-        return Cell.load(str(path))
+        return Cell.load(path)
     except (ValueError, OSError, RuntimeError) as error:
         raise BadInputError(" ".join(str(error).split())) from error
 

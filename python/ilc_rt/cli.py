@@ -88,10 +88,5 @@ def _say(reason: str) -> None:
     typer.echo(f"ilc: {' '.join(reason.split())}", err=True)
 
 
-def entry() -> None:
-    """Run `ilc` as the console script."""
-    sys.exit(main())
-
-
 if __name__ == "__main__":
-    entry()
+    sys.exit(main())

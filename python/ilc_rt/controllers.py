@@ -7,13 +7,14 @@ this process.
 
 from __future__ import annotations
 
+import contextlib
 import selectors
 import signal
 import time
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ilc_rt import _native
-from ilc_rt.errors import EXIT_FAULT, CampaignError
+from ilc_rt.errors import EXIT_BAD_INPUT, CampaignError
 from ilc_rt.processes import Program, find_program, start_simulated_drives
 
 if TYPE_CHECKING:
@@ -160,23 +161,25 @@ class InProcessController:
     def __init__(self, options: dict[str, Any], drives: Program | None = None) -> None:
         self._options = options
         self._drives = drives
+        self._asked: int | None = None
         self._error: CampaignError | None = None
-        self._source: _native.EventStream | None = None
+        self._stream: _native.EventStream | None = None
 
     def lines(self) -> Iterator[str]:
         """Yield one event a line until the controller ends."""
         try:
-            self._source = _native.run_events(**self._options)
-            yield from self._source
+            self._stream = _native.run_events(**self._options)
+            if self._asked is not None:
+                self._stream.stop(self._asked)
+            yield from self._stream
         except (ValueError, OSError) as error:
-            self._error = CampaignError(str(error), 2)
-        except RuntimeError as error:
-            self._error = CampaignError(str(error), EXIT_FAULT)
+            self._error = CampaignError(str(error), EXIT_BAD_INPUT)
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
         """Ask for a controlled stop; `lines` goes on until it has happened."""
-        if self._source is not None:
-            self._source.stop(number)
+        self._asked = number
+        if self._stream is not None:
+            self._stream.stop(number)
 
     def failure(self) -> CampaignError | None:
         """Return why the controller ended, if not by finishing."""
@@ -184,6 +187,11 @@ class InProcessController:
 
     def close(self) -> None:
         """Stop the axes if they still move, then end and reap everything."""
-        self._source = None
+        if self._stream is not None:
+            self.interrupt()
+            # The events end when the axes are at rest; the drives must live until then.
+            with contextlib.suppress(ValueError, OSError):
+                for _ in self._stream:
+                    pass
         if self._drives is not None:
             self._drives.close()

@@ -193,8 +193,7 @@ def parse_event(line: str | bytes) -> Event | None:
     cls = _CLASSES.get(data["event"])
     if cls is None:
         return None
-    event: Event = _build(cls, data)
-    return event
+    return _build(cls, data)
 
 
 def event_payload(event: Event) -> dict[str, Any]:
@@ -216,7 +215,7 @@ def parse_histogram(data: dict[str, Any]) -> Histogram:
     )
 
 
-def _build(cls: type[Any], data: dict[str, Any]) -> Any:
+def _build(cls: type[Any], data: dict[str, Any]) -> Event:
     values: dict[str, Any] = {}
     for field in fields(cls):
         if field.name in data:
@@ -234,7 +233,8 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Any:
     except (KeyError, TypeError, ValueError) as error:
         message = f'event "{data["event"]}" is malformed ({error}): {data!r}'
         raise EventError(message) from error
-    return cls(**values)
+    event: Event = cls(**values)
+    return event
 
 
 def _real_time_report(data: dict[str, Any]) -> RealTimeReport:

@@ -47,6 +47,7 @@ class ControlledStop:
         self._replaced: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
+        """Replace the signal handlers."""
         if threading.current_thread() is threading.main_thread():
             for number in STOP_SIGNALS:
                 if signal.getsignal(number) in _UNTOUCHED:
@@ -59,6 +60,7 @@ class ControlledStop:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """Put the signal handlers back."""
         for number, handler in self._replaced.items():
             signal.signal(number, handler)
         self._replaced.clear()

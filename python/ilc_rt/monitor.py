@@ -96,6 +96,7 @@ class Monitor:
         self._values = self._session.declare_subscriber(f"ilc/{cell}/*", self._on_value)
 
     def __enter__(self) -> Self:
+        """Return itself."""
         return self
 
     def __exit__(
@@ -104,6 +105,7 @@ class Monitor:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """Leave the network."""
         self.close()
 
     @property
@@ -144,7 +146,7 @@ class Monitor:
     def close(self) -> None:
         """Leave the network."""
         if not self._session.is_closed():
-            self._session.close()
+            self._session.close()  # type: ignore[no-untyped-call]
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         topic = "gone" if str(sample.kind).endswith("DELETE") else "alive"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from ilc_rt.deviation import magnification, path_deviation
 
@@ -31,8 +31,7 @@ CONTOUR = "#009E73"
 PATH = "#DADDE2"
 INK = "#30343B"
 WIDTH_IN = 5.6
-BARS_MAX = 60
-LOG_TIME_RATIO = 50.0
+FIRST_BIN_RATIO = 1.5
 
 STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
@@ -238,28 +237,27 @@ def _round_down(value: float) -> float:
 
 
 def _histogram_panel(axes: Axes, histogram: Histogram, colour: str, title: str) -> None:
-    uppers = np.array([upper for upper, _ in histogram.bins], dtype=np.float64)
-    counts = np.array([count for _, count in histogram.bins], dtype=np.float64)
-    if counts.sum() > 0:
-        spread = histogram.max > LOG_TIME_RATIO * max(histogram.p50, 1.0)
-        n_bars = int(min(BARS_MAX, max(8, len(uppers))))
-        top = max(float(uppers[counts > 0].max()), 1.0) * 1.001
-        edges = np.geomspace(1.0, top, n_bars + 1) if spread else np.linspace(0, top, n_bars + 1)
-        bars, _ = np.histogram(np.clip(uppers, edges[0], None), edges, weights=counts)
-        axes.bar(edges[:-1], bars, np.diff(edges), align="edge", color=colour,
-                 edgecolor="white", linewidth=0.4)  # fmt: skip
-        if spread:
-            axes.set_xscale("log")
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    """Draw the bins as they are counted: each begins where the one before ends."""
+    seen = [number for number, (_, count) in enumerate(histogram.bins) if count > 0]
+    if seen:
+        uppers = np.array([upper for upper, _ in histogram.bins], dtype=np.float64)
+        counts = np.array([count for _, count in histogram.bins], dtype=np.float64)
+        lowers = np.r_[uppers[0] / FIRST_BIN_RATIO, uppers[:-1]]
+        shown = slice(seen[0], seen[-1] + 1)
+        axes.bar(lowers[shown], counts[shown], (uppers - lowers)[shown], align="edge",
+                 color=colour, edgecolor="white", linewidth=0.5)  # fmt: skip
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_ylim(bottom=0.6)
-    for value in (histogram.p50, histogram.p99, histogram.p999, histogram.max):
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    quantiles = (histogram.p50, histogram.p99, histogram.p999, histogram.max)
+    for value in quantiles:
         axes.axvline(value, color=INK, linewidth=0.9, linestyle=(0, (3, 2)))
+    half, p99, p999, longest = (f"{v:.3g}" if v < 1000 else f"{v:.0f}" for v in quantiles)
     axes.set_title(
-        f"{title}: half within {histogram.p50:.3g}, 99 % {histogram.p99:.3g}, "
-        f"99.9 % {histogram.p999:.3g}, all {histogram.max:.3g} µs",
-        fontsize=9,
+        f"{title}: half within {half} µs, 99 % {p99}, 99.9 % {p999}, all {longest}", fontsize=9
     )
     axes.set_ylabel("cycles")
 

@@ -93,6 +93,7 @@ class Program:
             raise CampaignError(message) from error
 
     def __enter__(self) -> Self:
+        """Return itself."""
         return self
 
     def __exit__(
@@ -101,6 +102,7 @@ class Program:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """End the program and reap it."""
         self.close()
 
     @property
@@ -172,7 +174,7 @@ class Program:
         self._errors.seek(0)
         lines = self._errors.read().decode("utf-8", "replace").split("\n")
         said = [line.strip() for line in lines if line.strip()]
-        return said[-1] if said else ""
+        return said[-1].removeprefix(f"{self.name}: ") if said else ""
 
     def close(self) -> None:
         """End it if it still runs (politely, then not), and reap it."""

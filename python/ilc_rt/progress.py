@@ -71,6 +71,7 @@ class CampaignView:
         self._named = False
 
     def __enter__(self) -> Self:
+        """Start drawing."""
         if self._console.is_terminal:
             self._live = Live(console=self._console, refresh_per_second=10, transient=True)
             self._live.start()
@@ -82,6 +83,7 @@ class CampaignView:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """Stop drawing."""
         if self._live is not None:
             self._live.stop()
 
@@ -95,8 +97,10 @@ class CampaignView:
         elif isinstance(event, StateEvent):
             words = WORDS.get(event.state, event.state.replace("_", " "))
             index = event.iteration
-            of_all = f" ({index + 1} of {self._runs})" if self._runs and index is not None else ""
-            run = "" if index is None else f"run {index}{of_all}: "
+            if index is None or index >= self._runs > 0:
+                run = ""  # the way home after the last run
+            else:
+                run = f"run {index}" + (f" ({index + 1} of {self._runs}): " if self._runs else ": ")
             self._bar.reset(self._task, description=run + words)
         elif isinstance(event, ProgressEvent):
             self._bar.update(self._task, completed=event.sample / max(1, event.n_samples))

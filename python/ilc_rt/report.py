@@ -127,7 +127,9 @@ def svg(figure: Figure, name: str) -> str:
 def _cards(result: CampaignResult) -> Iterator[str]:
     pictures = (
         ("convergence", "Error against run", plots.convergence(result),
-         "Largest and root-mean-square value of each run, on a logarithmic scale."),
+         "Largest and root-mean-square value of each run, on a logarithmic scale. "
+         + ("After the run at the dashed line the best input so far was restored."
+            if any(record.rolled_back for record in result.records) else "")),
         ("contour", "The contour", plots.contour(result),
          "What is drawn beside the path is the distance from it, magnified; lag along the path "
          "does not show. The lower picture has the last run alone, magnified further."),

@@ -19,6 +19,9 @@ from ilc_rt.events import (
 )
 from ilc_rt.record import IterationRecord
 
+# The best run is worth a word if it is this much better than the last.
+BEST_SHARE = 0.9
+
 
 @dataclass(slots=True)
 class CampaignResult:
@@ -146,19 +149,23 @@ class CampaignResult:
         """
         if not self.records:
             return "No run was completed."
-        first, last = self.records[0], self.records[-1]
-        runs = f"{len(self.records)} run{'s' if len(self.records) > 1 else ''}"
-        if first.contour_inf_m and last.contour_inf_m:
-            what, before, after = "Contour error", first.contour_inf_m, last.contour_inf_m
-        else:
-            what, before, after = "Tracking error", first.tracking_inf_m, last.tracking_inf_m
-        if len(self.records) == 1:
+        by_contour = all(record.contour_inf_m for record in self.records)
+        what = "Contour error" if by_contour else "Tracking error"
+        errors_m = [
+            (by_contour and record.contour_inf_m) or record.tracking_inf_m
+            for record in self.records
+        ]
+        before, after = errors_m[0], errors_m[-1]
+        if len(errors_m) == 1:
             return f"{what} {micrometres(before)} µm at most in 1 run."
         change = reduction(before, after)
         said = f"{change:.1f} % less" if change >= 0 else f"{-change:.1f} % more"
+        best = min(errors_m)
+        index = self.records[errors_m.index(best)].index
+        aside = f"; best {micrometres(best)} µm in run {index}" if best < BEST_SHARE * after else ""
         return (
             f"{what} from {micrometres(before)} µm to {micrometres(after)} µm "
-            f"({said}) within {runs}."
+            f"({said}) within {len(errors_m)} runs{aside}."
         )
 
     def to_json(self) -> dict[str, Any]:

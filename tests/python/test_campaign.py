@@ -195,7 +195,9 @@ def test_the_controllers_line_and_exit_code_are_handed_on(
     """Refused by the controller: its last line, its exit code."""
     monkeypatch.chdir(tmp_path)
     programs("ilc-sim", GOOD_DRIVES)
-    programs("ilc-rt", "import sys; print('note\\nbus: load 0.9', file=sys.stderr); sys.exit(2)")
+    programs(
+        "ilc-rt", "import sys; print('note\\nilc-rt: bus: load 0.9', file=sys.stderr); sys.exit(2)"
+    )
     with pytest.raises(CampaignError, match=r"^bus: load 0\.9$") as caught:
         list(Campaign(gantry, library=tmp_path / "l.db").run(1))
     assert caught.value.exit_code == 2
@@ -307,6 +309,7 @@ def test_a_controller_that_will_not_stop_is_ended(
     [
         ({"bus": "foo"}, "bus = foo: allowed can:INTERFACE"),
         ({"bus": "usb:0"}, "bus = usb:0"),
+        ({"law": "norm_optimal"}, "law = 'norm_optimal': an object with update"),
         ({"drives": "real"}, "drives = real"),
         ({"bus": "loopback:", "drives": "external"}, "loopback: has no outside"),
         ({"library": "/no/such/folder/l.db"}, "no such folder"),

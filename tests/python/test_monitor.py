@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from ilc_rt.events import IterationEvent, StateEvent
+from ilc_rt.events import EndEvent, IterationEvent, StateEvent
 from ilc_rt.monitor import Message, Monitor
+from ilc_rt.result import micrometres
 
 zenoh = pytest.importorskip("zenoh")
 
@@ -52,13 +53,17 @@ class Publisher:
         self.session.put(f"ilc/gantry/{topic}", json.dumps(payload))
 
 
+def free_port() -> int:
+    """Return a port that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
 @pytest.fixture
 def publisher() -> Iterator[Publisher]:
     """Return a session that stands for a controller."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    publisher = Publisher(port)
+    publisher = Publisher(free_port())
     yield publisher
     publisher.session.close()
 
@@ -137,3 +142,34 @@ def test_the_example_ends_after_its_runs(publisher: Publisher, gantry: Path) -> 
     assert len(bars) == 3
     assert bars == sorted(bars, reverse=True)
     assert bars[-1] < bars[0]
+
+
+def test_a_real_controller_is_followed_from_beginning_to_end(gantry: Path, tmp_path: Path) -> None:
+    """A monitor that waits sees all there is to see of a real-time run."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    cell = tmp_path / "cell.toml"
+    settings = f'[telemetry]\nlisten = ["{endpoint}"]\nscouting = false\n'
+    cell.write_text(f"{gantry.read_text()}\n{settings}")
+    command = [sys.executable, "-m", "ilc_rt.cli", "run", str(cell), "--iterations", "2",
+               "--bus", "udp:239.74.163.80"]  # fmt: skip
+    seen: list[Message] = []
+    with (
+        Monitor("gantry", [endpoint], scouting=False) as monitor,
+        subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process,
+    ):
+        for message in monitor.messages(90.0):
+            seen.append(message)
+            if message.topic == "gone":
+                break
+        out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, out
+    topics = {message.topic for message in seen}
+    assert topics >= {"alive", "state", "iteration", "servo", "latency", "gone"}
+    events = [message.event for message in seen if message.event is not None]
+    ends = [event for event in events if isinstance(event, EndEvent)]
+    assert [(event.status, event.iterations) for event in ends] == [("completed", 2)]
+    last = [event for event in events if isinstance(event, IterationEvent)][-1]
+    assert last.index == 1
+    assert micrometres(last.tracking_inf_m) in out
+    servo = next(message.payload for message in seen if message.topic == "servo")
+    assert len(servo["reference_m"][0]) == 2

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from ilc_rt import BadInputError, CampaignResult, plots
+from ilc_rt import BadInputError, CampaignResult, IterationRecord, plots
 from ilc_rt.deviation import magnification, path_deviation
 from ilc_rt.events import Histogram, LatencyEvent
 from ilc_rt.report import render, write_report
@@ -157,6 +157,22 @@ def test_deviation_is_normal_to_the_path_and_ignores_lag() -> None:
     )
     with pytest.raises(ValueError, match="shapes differ"):
         path_deviation(circle, circle[1:])
+
+
+def record(index: int, error_m: float, contour_m: float | None) -> IterationRecord:
+    """Return a record with these figures."""
+    return IterationRecord("l.db", index + 1, index, error_m, error_m / 2, contour_m)
+
+
+def test_the_sentence_says_what_was_learned() -> None:
+    """First against last; the best one if it was better; tracking if there is no contour."""
+    result = CampaignResult("l.db", records=[record(0, 1e-3, 2e-4), record(1, 5e-4, 1e-4)])
+    assert result.sentence() == "Contour error from 200 µm to 100 µm (50.0 % less) within 2 runs."
+    result.records.append(record(2, 1e-3, 3e-4))
+    assert "(50.0 % more) within 3 runs; best 100 µm in run 1." in result.sentence()
+    result.records = [record(0, 1e-3, 0.0), record(1, 1e-4, 0.0)]
+    assert result.sentence().startswith("Tracking error from 1000 µm to 100 µm (90.0 % less)")
+    assert "1 run." in CampaignResult("l.db", records=result.records[:1]).sentence()
 
 
 @pytest.mark.parametrize("largest_m", [1e-7, 3.3e-6, 1e-4, 9e-3, 0.5])
