@@ -240,13 +240,8 @@ fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
     payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
     // Only a real bus has bits; the others are as fast as the machine, and are told for comparison.
     if cell.bus.address.starts_with("can:") {
-        return load::check(
-            &payloads,
-            cell.cycle_s(),
-            cell.bus.bitrate_bit_s,
-            cell.bus.load_max,
-        )
-        .map(|found| found.ratio());
+        return load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, cell.bus.load_max)
+            .map(|found| found.ratio());
     }
     let bits: u64 = payloads.iter().map(|&n_bytes| load::frame_bits(n_bytes)).sum();
     Ok(bits as f64 / (f64::from(cell.bus.bitrate_bit_s) * cell.cycle_s()))
