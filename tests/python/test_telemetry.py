@@ -66,6 +66,7 @@ class Watcher:
             self._news.notify_all()
 
     def wait_for_tokens(self, *tokens: str) -> None:
+        """Wait until exactly these have come."""
         with self._news:
             assert self._news.wait_for(lambda: self.tokens == list(tokens), DEADLINE_S), self.tokens
 
