@@ -1,6 +1,6 @@
 //! The objects of a simulated drive, 0x6000 and above, and their places.
 
-use ilc_rt::fieldbus::canopen::pdo::{MappedObject, TYPE_EVERY_SYNC};
+use ilc_rt::fieldbus::canopen::pdo::{MappedObject, PdoNumber, TYPE_EVERY_SYNC};
 use ilc_rt::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
 use ilc_rt::fieldbus::cia402::{Mode, objects, pdo_map};
 
@@ -13,6 +13,8 @@ use super::value::Value;
 pub const DEVICE_TYPE: u32 = 0x0002_0192;
 /// Event-driven transmission.
 const TYPE_EVENT: u8 = 255;
+/// Some masters take a TPDO that came twice for periodic, and then miss it on a quiet drive.
+const DISPLAY_EVENT_MS: u16 = 100;
 
 /// Returns all objects of a drive.
 ///
@@ -21,17 +23,16 @@ pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
     let mode_map = [mapped(objects::MODE_OF_OPERATION, 8)];
     let display_map = [mapped(objects::MODE_DISPLAY, 8), mapped(objects::ERROR_CODE, 16)];
     let command_map = pdo_map::command_map(Mode::Csp);
-    let default = |number, transmission, map| PdoDefault { number, transmission, map };
+    let default = |number, transmission, map| PdoDefault { number, transmission, event_ms: 0, map };
     let pdos = [
         default(pdo_map::COMMAND_PDO, TYPE_EVERY_SYNC, &command_map[..]),
-        default(ilc_rt::fieldbus::canopen::pdo::PdoNumber::receive(1), TYPE_EVENT, &mode_map[..]),
+        default(PdoNumber::receive(1), TYPE_EVENT, &mode_map[..]),
         default(pdo_map::STATUS_PDO, TYPE_EVERY_SYNC, &pdo_map::STATUS_MAP[..]),
         default(pdo_map::EXTRA_PDO, TYPE_EVERY_SYNC, &pdo_map::EXTRA_MAP[..]),
-        default(
-            ilc_rt::fieldbus::canopen::pdo::PdoNumber::transmit(2),
-            TYPE_EVENT,
-            &display_map[..],
-        ),
+        PdoDefault {
+            event_ms: DISPLAY_EVENT_MS,
+            ..default(PdoNumber::transmit(2), TYPE_EVENT, &display_map[..])
+        },
     ];
     let mut entries =
         standard_objects::communication(node, DEVICE_TYPE, "ilc-sim CiA 402 drive", 402);

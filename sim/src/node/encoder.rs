@@ -35,6 +35,7 @@ impl EncoderNode {
         let pdo = PdoDefault {
             number: pdo_map::ENCODER_PDO,
             transmission: TYPE_EVERY_SYNC,
+            event_ms: 0,
             map: &pdo_map::ENCODER_MAP,
         };
         entries.extend(standard_objects::process_data(node, &[pdo]));

@@ -290,7 +290,8 @@ mod tests {
             motion.step(&LIMITS, 0.3, 0.0, 0.0, 0.001);
             n_steps += 1;
         }
-        assert_eq!(n_steps, 10);
+        // One more where rounding leaves a remainder.
+        assert!((10..=11).contains(&n_steps), "{n_steps}");
         assert_eq!(motion.demand_m(), Some(0.3));
     }
 

@@ -19,6 +19,8 @@ pub struct PdoDefault<'a> {
     pub number: PdoNumber,
     /// Transmission type.
     pub transmission: u8,
+    /// Event timer, in milliseconds; 0 for none.
+    pub event_ms: u16,
     /// What it carries; nothing makes it invalid.
     pub map: &'a [MappedObject],
 }
@@ -97,13 +99,14 @@ fn one_pdo(node: NodeId, number: PdoNumber, default: Option<&PdoDefault<'_>>) ->
     let invalid = if map.is_empty() { COB_INVALID } else { 0 };
     let cob_id = u32::from(number.default_cob_id(node)) | COB_NO_RTR | invalid;
     let transmission = default.map_or(1, |default| default.transmission);
+    let event_ms = default.map_or(0, |default| default.event_ms);
     let communication = number.communication_index();
     let highest = if number.direction == Direction::Transmit { 6 } else { 5 };
     let mut entries = vec![
         Entry::constant(communication, 0, "Highest sub-index", Value::U8(highest)),
         Entry::read_write(communication, 1, "COB-ID", Value::U32(cob_id)),
         Entry::read_write(communication, 2, "Transmission type", Value::U8(transmission)),
-        Entry::read_write(communication, 5, "Event timer", Value::U16(0)),
+        Entry::read_write(communication, 5, "Event timer", Value::U16(event_ms)),
     ];
     if number.direction == Direction::Transmit {
         entries.push(Entry::read_write(communication, 3, "Inhibit time", Value::U16(0)));

@@ -14,22 +14,22 @@ use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_sim::plant::{Demand, Plant};
 use ilc_sim::{ClockMode, Machine};
 
-pub const COUNTS_PER_M: f64 = 1e6;
-pub const CYCLE_US: u32 = 1000;
-pub const START_M: f64 = 0.08;
-pub const VELOCITY_MAX_M_S: f64 = 0.5;
-pub const DECELERATION_M_S2: f64 = 10.0;
-pub const ANSWER: Duration = Duration::from_secs(2);
+pub(crate) const COUNTS_PER_M: f64 = 1e6;
+pub(crate) const CYCLE_US: u32 = 1000;
+pub(crate) const START_M: f64 = 0.08;
+pub(crate) const VELOCITY_MAX_M_S: f64 = 0.5;
+pub(crate) const DECELERATION_M_S2: f64 = 10.0;
+pub(crate) const ANSWER: Duration = Duration::from_secs(2);
 
-pub fn node(number: u8) -> NodeId {
+pub(crate) fn node(number: u8) -> NodeId {
     NodeId::new(number).unwrap()
 }
 
-pub fn counts(position_m: f64) -> i32 {
+pub(crate) fn counts(position_m: f64) -> i32 {
     cia402::Scale::new(COUNTS_PER_M).unwrap().to_counts(position_m).unwrap()
 }
 
-pub fn cell() -> Cell {
+pub(crate) fn cell() -> Cell {
     let axis = |name: &str, node: u8| {
         format!(
             r#"
@@ -67,6 +67,7 @@ counts_per_m = {COUNTS_PER_M}
 [program]
 start_m = [0.0, 0.0]
 feed_m_s = 0.1
+corner = "exact_stop"
 [[program.segment]]
 to_m = [0.01, 0.01]
 "#,
@@ -77,7 +78,7 @@ to_m = [0.01, 0.01]
 }
 
 /// Axes that follow every demand at once, up to a speed; a stuck one does not move at all.
-pub struct Ideal {
+pub(crate) struct Ideal {
     position_m: [f64; 2],
     velocity_m_s: [f64; 2],
     is_stuck: Arc<AtomicBool>,
@@ -123,30 +124,30 @@ impl Plant for Ideal {
 
 /// What drive 1 sent in one cycle.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Answer {
-    pub status: Option<Status>,
-    pub extra: Option<Extra>,
-    pub emergencies: Vec<u16>,
-    pub frames: Vec<Frame>,
+pub(crate) struct Answer {
+    pub(crate) status: Option<Status>,
+    pub(crate) extra: Option<Extra>,
+    pub(crate) emergencies: Vec<u16>,
+    pub(crate) frames: Vec<Frame>,
 }
 
 impl Answer {
-    pub fn position(&self) -> i32 {
+    pub(crate) fn position(&self) -> i32 {
         self.status.expect("a status every cycle").position_counts
     }
 
-    pub fn state(&self) -> State {
+    pub(crate) fn state(&self) -> State {
         self.status.expect("a status every cycle").statusword.state().expect("a defined state")
     }
 }
 
-pub struct Bench {
-    pub bus: InProcess<Machine>,
-    pub is_stuck: Arc<AtomicBool>,
+pub(crate) struct Bench {
+    pub(crate) bus: InProcess<Machine>,
+    pub(crate) is_stuck: Arc<AtomicBool>,
 }
 
 impl Bench {
-    pub fn new(clock: ClockMode) -> Self {
+    pub(crate) fn new(clock: ClockMode) -> Self {
         let is_stuck = Arc::new(AtomicBool::new(false));
         let plant = Ideal {
             position_m: [START_M; 2],
@@ -158,7 +159,7 @@ impl Bench {
     }
 
     /// Drive 1 brought up and operational, not yet enabled.
-    pub fn started(mode: Mode) -> Self {
+    pub(crate) fn started(mode: Mode) -> Self {
         let mut bench = Self::new(ClockMode::LockStep);
         cia402::bring_up(&mut bench.bus, &setup(mode)).unwrap();
         bench.bus.send(&NmtCommand::Start.frame(None)).unwrap();
@@ -166,13 +167,13 @@ impl Bench {
     }
 
     /// Drive 1 enabled, holding where it is.
-    pub fn enabled(mode: Mode) -> Self {
+    pub(crate) fn enabled(mode: Mode) -> Self {
         let mut bench = Self::started(mode);
         bench.enable(if mode == Mode::Csp { counts(START_M) } else { 0 });
         bench
     }
 
-    pub fn enable(&mut self, target_counts: i32) {
+    pub(crate) fn enable(&mut self, target_counts: i32) {
         let mut state = self.sync().state();
         for _ in 0..6 {
             if state == State::OperationEnabled {
@@ -184,24 +185,24 @@ impl Bench {
     }
 
     /// One cycle: command first, then SYNC, as the drive takes over at SYNC what came before it.
-    pub fn cycle(&mut self, controlword: Controlword, target_counts: i32) -> Answer {
+    pub(crate) fn cycle(&mut self, controlword: Controlword, target_counts: i32) -> Answer {
         let command = Command { controlword, target_counts, torque_offset: 0 };
         self.bus.send(&command.encode(node(1))).unwrap();
         self.sync()
     }
 
     /// One cycle of an enabled drive.
-    pub fn follow(&mut self, target_counts: i32) -> Answer {
+    pub(crate) fn follow(&mut self, target_counts: i32) -> Answer {
         self.cycle(Controlword::ENABLE_OPERATION, target_counts)
     }
 
     /// One cycle without a command.
-    pub fn sync(&mut self) -> Answer {
+    pub(crate) fn sync(&mut self) -> Answer {
         self.bus.send(&sync::frame()).unwrap();
         self.collect()
     }
 
-    pub fn collect(&mut self) -> Answer {
+    pub(crate) fn collect(&mut self) -> Answer {
         let mut answer = Answer::default();
         while let Some(frame) = self.bus.recv(Duration::ZERO).unwrap() {
             if let Some(status) = Status::decode(&frame, node(1)) {
@@ -218,20 +219,20 @@ impl Bench {
         answer
     }
 
-    pub fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) {
+    pub(crate) fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) {
         ilc_rt::fieldbus::canopen::SdoClient::new(node(1), ANSWER)
             .download(&mut self.bus, index, sub, bytes)
             .unwrap();
     }
 
-    pub fn read(&mut self, index: u16, sub: u8) -> u32 {
+    pub(crate) fn read(&mut self, index: u16, sub: u8) -> u32 {
         ilc_rt::fieldbus::canopen::SdoClient::new(node(1), ANSWER)
             .upload_u32(&mut self.bus, index, sub)
             .unwrap()
     }
 }
 
-pub fn setup(mode: Mode) -> DriveSetup {
+pub(crate) fn setup(mode: Mode) -> DriveSetup {
     DriveSetup {
         node: node(1),
         mode,

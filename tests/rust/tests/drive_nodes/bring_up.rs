@@ -64,10 +64,7 @@ fn a_node_of_another_kind_is_refused() {
     let mut bench = Bench::new(ClockMode::LockStep);
     let encoder = DriveSetup { node: node(10), ..setup(Mode::Csp) };
     let error = bring_up(&mut bench.bus, &encoder).unwrap_err();
-    assert!(
-        matches!(error, BringUpError::Profile { expected: 402, found: 406, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, BringUpError::Profile { expected: 402, found: 406, .. }), "{error}");
     let error = bring_up_encoder(&mut bench.bus, node(1), ANSWER).unwrap_err();
     assert!(matches!(error, BringUpError::Profile { expected: 406, found: 402, .. }), "{error}");
 }
@@ -102,7 +99,9 @@ fn texts_go_both_ways_in_segments() {
     let client = SdoClient::new(node(1), ANSWER);
     let name = client.upload(&mut bench.bus, 0x1008, 0).unwrap();
     assert_eq!(name, b"ilc-sim CiA 402 drive");
-    for label in ["", "x", "four", "exactly 7", "twenty-one characters", "a label of thirty-two characters"] {
+    for label in
+        ["", "x", "four", "exactly 7", "twenty-one characters", "a label of thirty-two characters"]
+    {
         client.download(&mut bench.bus, 0x2000, 0, label.as_bytes()).unwrap();
         assert_eq!(client.upload(&mut bench.bus, 0x2000, 0).unwrap(), label.as_bytes());
     }
@@ -171,10 +170,7 @@ fn a_silent_server_is_reported_with_its_object() {
     bench.bus.responder_mut().mute(node(1));
     let short = Duration::from_millis(5);
     let error = SdoClient::new(node(1), short).upload(&mut bench.bus, 0x1000, 0).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "node 1: object 0x1000:00: no answer within 5ms, tried 2 times"
-    );
+    assert_eq!(error.to_string(), "node 1: object 0x1000:00: no answer within 5ms, tried 2 times");
 }
 
 #[test]

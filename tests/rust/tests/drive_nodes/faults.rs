@@ -140,7 +140,8 @@ fn heartbeats_keep_their_period_and_tell_the_state() {
 #[test]
 fn a_controller_whose_heartbeat_stops_is_missed() {
     let mut bench = Bench::enabled(Mode::Csp);
-    bench.write(0x1016, 1, &((100_u32 << 16) | 10).to_le_bytes());
+    // Node 100, 10 ms.
+    bench.write(0x1016, 1, &0x0064_000A_u32.to_le_bytes());
     let beat = Heartbeat { node: node(100), state: NmtState::Operational }.encode();
     for _ in 0..5 {
         for _ in 0..8 {
@@ -148,8 +149,7 @@ fn a_controller_whose_heartbeat_stops_is_missed() {
         }
         bench.bus.send(&beat).unwrap();
     }
-    let codes: Vec<u16> =
-        (0..15).flat_map(|_| bench.follow(counts(START_M)).emergencies).collect();
+    let codes: Vec<u16> = (0..15).flat_map(|_| bench.follow(counts(START_M)).emergencies).collect();
     assert_eq!(codes, [0x8130]);
     assert_eq!(bench.bus.responder().drive_state(node(1)), Some(State::Fault));
 }

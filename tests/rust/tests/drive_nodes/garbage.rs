@@ -41,8 +41,9 @@ fn frame() -> impl Strategy<Value = Frame> {
         let [low, high] = i.to_le_bytes();
         vec![c, low, high, s, d[0], d[1], d[2], d[3]]
     });
-    let command = (prop_oneof![Just(0x06_u8), Just(0x07), Just(0x0F), any::<u8>()], any::<[u8; 7]>())
-        .prop_map(|(word, rest)| [vec![word, 0], rest[1..].to_vec()].concat());
+    let command =
+        (prop_oneof![Just(0x06_u8), Just(0x07), Just(0x0F), any::<u8>()], any::<[u8; 7]>())
+            .prop_map(|(word, rest)| [vec![word, 0], rest[1..].to_vec()].concat());
     let nmt = prop_oneof![Just(1_u8), Just(2), Just(0x80), Just(0x81), Just(0x82)]
         .prop_map(|command| vec![command, 0]);
     let payload =
@@ -51,7 +52,7 @@ fn frame() -> impl Strategy<Value = Frame> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn random_frames_never_break_a_drive(

@@ -1,12 +1,13 @@
 //! Motion of an enabled drive: timing of targets, limits, stops.
 
+use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::canopen::NmtCommand;
 use ilc_rt::fieldbus::cia402::{Controlword, DriveSetup, Mode, State, Statusword, bring_up};
-use ilc_rt::fieldbus::Bus;
 use ilc_sim::ClockMode;
 
 use crate::bench::{
-    Bench, COUNTS_PER_M, CYCLE_US, DECELERATION_M_S2, START_M, VELOCITY_MAX_M_S, counts, node, setup,
+    Bench, COUNTS_PER_M, CYCLE_US, DECELERATION_M_S2, START_M, VELOCITY_MAX_M_S, counts, node,
+    setup,
 };
 
 /// Furthest that the shaft may move in a cycle, in counts.
