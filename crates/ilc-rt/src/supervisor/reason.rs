@@ -19,6 +19,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell) -> String {
         StopReason::Asked(signal) => match signal {
             libc::SIGINT => "stopped by Ctrl-C".to_owned(),
             libc::SIGTERM => "stopped by SIGTERM".to_owned(),
+            libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
             other => format!("stopped by signal {other}"),
         },
         StopReason::DriveFault { axis: index, code, following_error_m } => format!(
