@@ -9,7 +9,7 @@
 use std::time::Duration;
 
 /// Cycles without SYNC after which the clock runs by itself.
-const LOST_AFTER: u32 = 5;
+const LOST_AFTER: u32 = 15;
 
 /// The clock; it is told the wall time and gives steps to take.
 #[derive(Debug)]

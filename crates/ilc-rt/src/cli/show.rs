@@ -4,6 +4,17 @@ use std::io::Write;
 
 use crate::record::{Event, StateName};
 
+/// Columns of the table of runs.
+const HEADINGS: [&str; 7] = [
+    "run",
+    "max tracking um",
+    "rms tracking um",
+    "max contour um",
+    "change",
+    "overruns",
+    "update ms",
+];
+
 /// Prints one line on standard error.
 pub(super) fn complain(line: &dyn std::fmt::Display) {
     let _ = writeln!(std::io::stderr(), "ilc-rt: {line}");
@@ -21,32 +32,21 @@ pub(super) fn sentence(event: &Event, first_contour_m: &mut Option<f64>) -> Opti
         Event::Start {
             cell, bus, mode, law, measure, n_samples, cycle_s, campaign, rt, ..
         } => {
-            let mut text = format!(
-                "cell {cell} on {bus}, {mode}, {:.0} us cycle, {n_samples} samples a run; law {law} from \
-                 the {measure}; campaign {campaign}\n",
-                cycle_s * 1e6
-            );
-            if let Some(rt) = rt {
+            let thread = rt.as_ref().map_or_else(String::new, |rt| {
                 let memory = if rt.mlock { "locked" } else { "not locked" };
-                text += &format!(
-                    "servo thread: {} {}, memory {memory}, kernel {}\n",
+                let notes: String = rt.notes.iter().flat_map(|note| ["\n  note: ", note]).collect();
+                format!(
+                    "servo thread: {} {}, memory {memory}, kernel {}{notes}\n",
                     rt.policy, rt.priority, rt.kernel
-                );
-                for note in &rt.notes {
-                    text += &format!("  note: {note}\n");
-                }
-            }
-            text += &format!(
-                "{:>4} {:>16} {:>16} {:>15} {:>9} {:>9} {:>10}",
-                "run",
-                "max tracking um",
-                "rms tracking um",
-                "max contour um",
-                "change",
-                "overruns",
-                "update ms"
-            );
-            Some(text)
+                )
+            });
+            let [run, max, rms, contour, change, overruns, update] = HEADINGS;
+            Some(format!(
+                "cell {cell} on {bus}, {mode}, {:.0} us cycle, {n_samples} samples a run; law {law} from \
+                 the {measure}; campaign {campaign}\n{thread}{run:>4} {max:>16} {rms:>16} {contour:>15} \
+                 {change:>9} {overruns:>9} {update:>10}",
+                cycle_s * 1e6
+            ))
         }
         Event::Iteration { index, figures, .. } => {
             let first = *first_contour_m.get_or_insert(figures.contour_inf_m);
