@@ -89,8 +89,8 @@ mod tests {
     fn a_sync_handled_late_still_stands_for_one_cycle() {
         let mut clock = locked(10);
         assert_eq!(clock.idle(CYCLE * 13), 0);
-        for k in 11..=13 {
-            assert_eq!(clock.at_sync(CYCLE * 13 + Duration::from_micros(k.into())), STEPS);
+        for k in 11..=13_u32 {
+            assert_eq!(clock.at_sync(CYCLE * 13 + Duration::from_micros(u64::from(k))), STEPS);
         }
         assert_eq!(clock.at_sync(CYCLE * 14), STEPS);
     }

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 
 use clap::{Args, ValueEnum};
-use signal_hook::consts::{SIGINT, SIGPIPE, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 
-use super::{EXIT_BAD_INPUT, EXIT_FAULT, show};
+use super::figures::FiguresFile;
+use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show};
 use crate::config::{Cell, Measure};
 use crate::fieldbus::transport;
 use crate::record::{EndStatus, Event};
@@ -59,9 +60,19 @@ enum MeasureName {
 
 /// Runs a campaign; returns the exit status.
 pub(super) fn run(arguments: &RunArguments) -> u8 {
+    let figures_file = match &arguments.json {
+        None => None,
+        Some(path) => match FiguresFile::reserve(path) {
+            None => return EXIT_BAD_INPUT,
+            reserved => reserved,
+        },
+    };
     match campaign(arguments) {
-        Ok(outcome) => finish(arguments, &outcome),
+        Ok(outcome) => finish(figures_file.as_ref(), &outcome),
         Err(error) => {
+            if let Some(file) = figures_file {
+                file.give_up();
+            }
             show::complain(&error);
             EXIT_BAD_INPUT
         }
@@ -111,7 +122,10 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
 /// A number that becomes a signal's when it comes: the loop reads it and brings the axes to rest.
 fn stop_on_signals() -> Arc<AtomicI32> {
     let stop = Arc::new(AtomicI32::new(0));
-    for signal in [SIGINT, SIGTERM] {
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        if signal == SIGHUP && is_ignored(signal) {
+            continue;
+        }
         let stop = Arc::clone(&stop);
         #[expect(
             unsafe_code,
@@ -130,8 +144,20 @@ fn stop_on_signals() -> Arc<AtomicI32> {
     stop
 }
 
-fn finish(arguments: &RunArguments, outcome: &Outcome) -> u8 {
-    if let Some(path) = &arguments.json {
+/// Whether a signal is ignored, as SIGHUP is by what `nohup` starts: then it stays so.
+fn is_ignored(signal: i32) -> bool {
+    #[expect(unsafe_code, reason = "neither the standard library nor signal-hook can ask")]
+    // SAFETY: zeros are a valid sigaction; with no new action the call only writes the present one.
+    unsafe {
+        let mut present: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(signal, std::ptr::null(), &raw mut present) == 0
+            && present.sa_sigaction == libc::SIG_IGN
+    }
+}
+
+fn finish(figures_file: Option<&FiguresFile>, outcome: &Outcome) -> u8 {
+    let mut written = true;
+    if let Some(file) = figures_file {
         let iterations: Vec<_> = outcome
             .runs
             .iter()
@@ -147,13 +173,11 @@ fn finish(arguments: &RunArguments, outcome: &Outcome) -> u8 {
             "reason": outcome.reason,
             "iterations": iterations,
         });
-        if let Err(error) = std::fs::write(path, format!("{text:#}\n")) {
-            show::complain(&format!("--json {}: cannot be written: {error}", path.display()));
-            return EXIT_BAD_INPUT;
-        }
+        written = file.write(&text);
     }
     match outcome.status {
-        EndStatus::Completed => 0,
+        EndStatus::Completed if written => 0,
+        EndStatus::Completed => EXIT_FAILURE,
         EndStatus::Interrupted => u8::try_from(128 + outcome.signal).unwrap_or(EXIT_FAULT),
         EndStatus::Fault => {
             show::complain(&format!("controlled stop: {}", outcome.reason));

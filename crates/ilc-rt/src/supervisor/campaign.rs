@@ -135,6 +135,8 @@ pub fn run(
         mode: if options.lockstep { "lockstep" } else { "realtime" },
         rt: granted,
     });
+    // The loop tells of changes only, and this is where it begins.
+    announcer.tell(&Event::State { state: StateName::Enabling, iteration: first });
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, positive")]
     let progress_every = ((PROGRESS_S / cell.cycle_s()) as u32).max(1);
@@ -280,7 +282,9 @@ impl Running<'_> {
         self.read_mail();
         let (status, reason) = match (&self.failure, self.stopping, &remains) {
             (Some(why), _, _) => (EndStatus::Fault, why.clone()),
-            (None, Some(reason), _) => (reason::status(reason), reason::sentence(reason, cell)),
+            (None, Some(reason), _) => {
+                (reason::status(reason), reason::sentence(reason, cell, options.lockstep))
+            }
             (None, None, None) => (
                 EndStatus::Fault,
                 "the loop's thread died; the drives stop by themselves".to_owned(),

@@ -3,7 +3,7 @@
 //! A thread and a session of their own; the supervisor hands over finished text through a bounded
 //! queue and drops what does not fit. Nothing here can hold up the loop, and nothing can command it.
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
@@ -16,9 +16,17 @@ use crate::config::{Cell, Telemetry as Settings};
 /// Messages that may wait for the network.
 const QUEUE: usize = 1024;
 
+/// Something to publish.
+struct Message {
+    key: &'static str,
+    json: String,
+    /// Whether a late joiner is told it as the state.
+    is_state: bool,
+}
+
 /// A running publisher.
 pub(super) struct Telemetry {
-    queue: Option<SyncSender<(&'static str, String)>>,
+    queue: Option<SyncSender<Message>>,
     thread: Option<JoinHandle<()>>,
     dropped: u64,
 }
@@ -40,12 +48,15 @@ impl Telemetry {
         Ok(Self { queue: Some(queue), thread: Some(thread), dropped: 0 })
     }
 
-    /// Publishes under `ilc/<cell>/<key>`, unless the queue is full.
-    pub(super) fn send(&mut self, key: &'static str, json: String) {
-        if let Some(queue) = &self.queue
-            && queue.try_send((key, json)).is_err()
-        {
-            self.dropped += 1;
+    /// Publishes under `ilc/<cell>/<key>`, unless the queue is full; `is_state` is what a late joiner
+    /// is told.
+    pub(super) fn send(&mut self, key: &'static str, json: String, is_state: bool) {
+        let Some(queue) = &self.queue else { return };
+        match queue.try_send(Message { key, json, is_state }) {
+            Ok(()) => {}
+            Err(TrySendError::Full(_)) => self.dropped += 1,
+            // The thread has ended, and has said why.
+            Err(TrySendError::Disconnected(_)) => self.queue = None,
         }
     }
 }
@@ -75,11 +86,7 @@ fn configuration(settings: &Settings) -> zenoh::Result<zenoh::Config> {
     Ok(config)
 }
 
-fn publish(
-    settings: &Settings,
-    prefix: &str,
-    messages: &Receiver<(&'static str, String)>,
-) -> zenoh::Result<()> {
+fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> zenoh::Result<()> {
     let session = zenoh::open(configuration(settings)?).wait()?;
     let alive = session.liveliness().declare_token(format!("{prefix}/alive")).wait()?;
     let latest: Arc<Mutex<Option<String>>> = Arc::default();
@@ -95,10 +102,8 @@ fn publish(
         }
     };
     let queryable = session.declare_queryable(&state_key).callback(answer).wait()?;
-    for (key, json) in messages {
-        if key == "state"
-            && let Ok(mut state) = latest.lock()
-        {
+    for Message { key, json, is_state } in messages {
+        if is_state && let Ok(mut state) = latest.lock() {
             *state = Some(json.clone());
         }
         session
