@@ -82,7 +82,7 @@ mod tests {
         let mut clock = DriveClock::new(CYCLE, STEP);
         assert_eq!(clock.idle(Duration::from_micros(600)), 2);
         assert_eq!(clock.idle(Duration::from_micros(700)), 0);
-        assert_eq!(clock.idle(Duration::from_micros(1000)), 2);
+        assert_eq!(clock.idle(Duration::from_millis(1)), 2);
     }
 
     #[test]

@@ -79,9 +79,7 @@ class Process:
         The lines of standard output that were read.
     """
 
-    def __init__(
-        self, argv: Iterable[str | Path], folder: Path, stdout: int | None = None
-    ) -> None:
+    def __init__(self, argv: Iterable[str | Path], folder: Path, stdout: int | None = None) -> None:
         self.argv = [str(argument) for argument in argv]
         self.said: list[str] = []
         self._errors = folder / f"stderr-{time.monotonic_ns()}"
