@@ -91,16 +91,16 @@ def test_a_signal_in_lock_step_stops_as_well(bench: Bench, patient: Path) -> Non
     assert controller.events[-1]["iterations"] == n_kept
 
 
-def test_a_reader_who_goes_does_not_end_the_motion(bench: Bench, patient: Path) -> None:
-    """As in `ilc-rt run | head -1`: the runs are made and kept, drives off, no panic."""
+def test_a_reader_of_events_who_goes_stops_the_axes(bench: Bench, patient: Path) -> None:
+    """Nobody would notice trouble any more: a controlled stop, drives off, no panic."""
     drives = bench.drives(patient, "--lockstep")
     reading, writing = os.pipe()
     controller = bench.controller(patient, "--lockstep", runs=2, stdout=writing)
     os.close(writing)
     os.close(reading)
-    assert controller.end() == 0
+    assert controller.end() == 128 + signal.SIGPIPE
     assert controller.errors == []
-    assert [index for _, index, _ in bench.kept()] == [0, 1]
+    assert len(bench.kept()) < 2
     assert BOTH_OFF in goodbye(drives)
 
 
