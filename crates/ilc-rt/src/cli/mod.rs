@@ -62,7 +62,7 @@ pub fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(refusal) => {
-            show::complain(&refused(&refusal.render().to_string()));
+            show::complain(&refusal_line(&refusal));
             return ExitCode::from(EXIT_BAD_INPUT);
         }
     };
@@ -75,10 +75,12 @@ pub fn main() -> ExitCode {
 }
 
 /// One line of what the parser of arguments says in several, without its usage.
-fn refused(text: &str) -> String {
+pub fn refusal_line(refusal: &clap::Error) -> String {
+    let text = refusal.render().to_string();
     let lines = text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:"));
     let words: Vec<_> = lines
         .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
         .collect();
-    words.join("; ").trim_start_matches("error: ").replace(":; ", ": ")
+    let line = words.join("; ").replace(":; ", ": ");
+    format!("{}; --help tells what is allowed", line.trim_start_matches("error: "))
 }

@@ -84,10 +84,13 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
     if let Some(address) = &arguments.bus {
         cell.bus.address.clone_from(address);
     }
-    let file = || cell.file.display().to_string();
+    let place = match &arguments.bus {
+        Some(_) => "--bus".to_owned(),
+        None => format!("{}: [bus] address", cell.file.display()),
+    };
     let address = &cell.bus.address;
     if address.starts_with("loopback:") {
-        return Err(SupervisorError::Loopback { file: file() });
+        return Err(SupervisorError::Loopback { place });
     }
     let options = Options {
         iterations: arguments.iterations,
@@ -101,8 +104,7 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
         telemetry: !arguments.no_telemetry,
         stop: stop_on_signals(),
     };
-    let bus =
-        transport::open(address).map_err(|source| SupervisorError::Bus { file: file(), source })?;
+    let bus = transport::open(address).map_err(|source| SupervisorError::Bus { place, source })?;
     let mut first_contour_m = None;
     let mut observe = |event: &Event| {
         if !arguments.events {

@@ -46,6 +46,17 @@ pub enum LibraryError {
         /// What SQLite said.
         source: rusqlite::Error,
     },
+    /// The file cannot be used as a library.
+    #[error(
+        "library {path}: cannot be opened: {source}; allowed: a library of this program, or a new \
+         file in a folder that exists and can be written"
+    )]
+    Open {
+        /// File.
+        path: String,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
     /// The file was written by another version of this program.
     #[error("library {path}: schema version {found}; this program reads version {expected}")]
     Version {
@@ -85,11 +96,11 @@ impl Library {
     /// Opens a library, creating file and tables if they are not there.
     ///
     /// # Errors
-    /// [`LibraryError::Sqlite`] if the file cannot be opened or is no library;
+    /// [`LibraryError::Open`] if the file cannot be opened or is no library;
     /// [`LibraryError::Version`] if it has another version.
     pub fn open(path: &Path) -> Result<Self, LibraryError> {
         let name = path.display().to_string();
-        let fail = |source| LibraryError::Sqlite { path: name.clone(), source };
+        let fail = |source| LibraryError::Open { path: name.clone(), source };
         let connection = Connection::open(path).map_err(fail)?;
         connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
         connection.pragma_update(None, "journal_mode", "WAL").map_err(fail)?;
@@ -113,7 +124,7 @@ impl Library {
     /// Opens a library in memory, which is gone when dropped.
     ///
     /// # Errors
-    /// [`LibraryError::Sqlite`] if SQLite refuses.
+    /// [`LibraryError::Open`] if SQLite refuses.
     pub fn in_memory() -> Result<Self, LibraryError> {
         Self::open(Path::new(":memory:"))
     }

@@ -78,6 +78,11 @@ pub fn run(
     };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), |law| law.describe());
     plan.name_law(cell, name, &parameters);
+    if options.resume && !options.library.exists() {
+        // Opening it would leave an empty file where a name was mistyped.
+        let path = options.library.display();
+        return Err(SupervisorError::Resume(format!("there is no library {path} to go on with")));
+    }
     let library = Library::open(&options.library)?;
     let mut progress = Progress::new(cell.learning.rollback_ratio);
     let resumed = if options.resume {

@@ -58,8 +58,14 @@ impl Plan {
         cell.learning.measure = measure.unwrap_or(cell.learning.measure);
         crate::config::check(&cell)?;
         let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
-        let interpolator = Interpolator::plan(&path(&cell), &limits, cell.cycle_s())
-            .map_err(|source| SupervisorError::Program { file: file.clone(), source })?;
+        let interpolator =
+            Interpolator::plan(&path(&cell), &limits, cell.cycle_s()).map_err(|source| {
+                let key = match source.axis().and_then(|i| Some((i, cell.axes.get(i)?))) {
+                    Some((i, axis)) => format!("[program] (axis {} is {})", i + 1, axis.name),
+                    None => "[program]".to_owned(),
+                };
+                SupervisorError::Program { file: file.clone(), key, source }
+            })?;
         let bus_load = bus_load(&cell)
             .map_err(|source| SupervisorError::Load { file: file.clone(), source })?;
         let reference_m = interpolator.reference();
