@@ -13,12 +13,14 @@ import signal
 import time
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ilc_rt import _native
+from ilc_rt._native import run_events
 from ilc_rt.errors import EXIT_BAD_INPUT, CampaignError
 from ilc_rt.processes import Program, find_program, start_simulated_drives
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from ilc_rt._native import EventStream
 
 STOP_DEADLINE_S = 30.0
 DRIVES_DIED_DEADLINE_S = 15.0
@@ -163,12 +165,12 @@ class InProcessController:
         self._drives = drives
         self._asked: int | None = None
         self._error: CampaignError | None = None
-        self._stream: _native.EventStream | None = None
+        self._stream: EventStream | None = None
 
     def lines(self) -> Iterator[str]:
         """Yield one event a line until the controller ends."""
         try:
-            self._stream = _native.run_events(**self._options)
+            self._stream = run_events(**self._options)
             if self._asked is not None:
                 self._stream.stop(self._asked)
             yield from self._stream

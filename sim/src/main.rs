@@ -10,6 +10,7 @@ use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::NodeId;
 use ilc_sim::{ClockMode, Machine, eds};
 
+mod drive_clock;
 mod run;
 
 use run::Mute;

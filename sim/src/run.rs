@@ -10,12 +10,15 @@ use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NodeId, sync};
 use ilc_rt::fieldbus::transport::Responder;
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
+use ilc_rt::rt::{RtRequest, thread};
 use ilc_sim::{ClockMode, Machine};
+
+use crate::drive_clock::DriveClock;
 
 /// Longest wait for a frame before the plant is brought up to date.
 const BATCH: Duration = Duration::from_millis(1);
-/// Time behind which the machine no longer runs after the wall clock, as after a suspended computer.
-const BEHIND_MAX: Duration = Duration::from_secs(1);
+/// Real-time priority of the drives, below the controller's: they stand for hardware.
+const PRIORITY: i32 = 70;
 
 /// A node that is to lose its power.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,16 +88,25 @@ pub(crate) fn run(
     let mut outlet = Outlet { bus, n_sent: 0, n_dropped: 0, broken: None };
     let mut mutes = mutes.to_vec();
     let start = Instant::now();
-    let mut pace =
-        Pace { start, step: Duration::from_micros(machine.step_us().into()), n_steps: 0 };
+    let mut drive_clock = DriveClock::new(
+        Duration::from_micros(cell.cell.cycle_us.into()),
+        Duration::from_micros(machine.step_us().into()),
+    );
+    if clock == ClockMode::RealTime {
+        // What is refused only makes the drives less punctual; the controller tells of its own rights.
+        let _ = thread::enter(RtRequest { priority: PRIORITY, lock_memory: true });
+    }
     let mut n_syncs = 0_u64;
     print(&ready(cell, address, clock));
     machine.boot(&mut |frame| outlet.send(frame));
     while !stop.load(Ordering::Relaxed) {
         let received = outlet.bus.recv(BATCH).map_err(failed)?;
         if clock == ClockMode::RealTime {
-            let due = pace.due();
-            machine.advance(due, &mut |frame| outlet.send(frame));
+            let n_steps = match &received {
+                Some(frame) if sync::is_sync(frame) => drive_clock.at_sync(start.elapsed()),
+                _ => drive_clock.idle(start.elapsed()),
+            };
+            machine.advance(n_steps, &mut |frame| outlet.send(frame));
         }
         if let Some(frame) = received {
             n_syncs += u64::from(sync::is_sync(&frame));
@@ -117,37 +129,6 @@ pub(crate) fn run(
     }
     print(&summary(cell, &machine, start.elapsed(), n_syncs, &outlet));
     Ok(())
-}
-
-/// The wall clock in steps of the drives' loops, on an absolute grid.
-struct Pace {
-    start: Instant,
-    step: Duration,
-    n_steps: u32,
-}
-
-impl Pace {
-    /// Steps that are due now. After a long stop the missed time is left out, not made up for.
-    fn due(&mut self) -> u32 {
-        let behind = self.start.elapsed().saturating_sub(self.step * self.n_steps);
-        if behind > BEHIND_MAX {
-            self.restart();
-            return 0;
-        }
-        let n_due = u32::try_from(behind.as_nanos() / self.step.as_nanos()).unwrap_or(0);
-        self.n_steps += n_due;
-        // The grid is laid anew now and then, before the count of steps can overflow.
-        if self.n_steps > u32::MAX / 2 {
-            self.start += self.step * self.n_steps;
-            self.n_steps = 0;
-        }
-        n_due
-    }
-
-    fn restart(&mut self) {
-        self.start = Instant::now();
-        self.n_steps = 0;
-    }
 }
 
 fn ready(cell: &Cell, address: &str, clock: ClockMode) -> String {

@@ -112,6 +112,53 @@ def test_a_law_written_in_python_is_asked_between_the_runs(gantry: Path, tmp_pat
     np.testing.assert_allclose(records[1].input, 1e-5)
 
 
+def test_a_law_that_fails_is_a_fault_that_names_it(gantry: Path, tmp_path: Path) -> None:
+    """The axes are stopped; the error says which law and why; the run before is kept."""
+
+    class Broken:
+        def update(self, u: np.ndarray, e: np.ndarray, disturbance: object = None) -> np.ndarray:
+            del u, e, disturbance
+            message = "I divide by zero"
+            raise ArithmeticError(message)
+
+    campaign = Campaign(gantry, law=Broken(), library=tmp_path / "l.db", bus="loopback:")
+    with pytest.raises(CampaignError, match="I divide by zero") as caught:
+        list(campaign.run(3))
+    assert caught.value.exit_code == 3
+    assert "Broken" in str(caught.value)
+    assert len(campaign.result.records) == 1
+
+
+def test_ctrl_c_in_this_process_is_a_controlled_stop(gantry: Path, tmp_path: Path) -> None:
+    """The controller ends by itself, then the exception comes; the runs are kept."""
+    campaign = Campaign(gantry, library=tmp_path / "l.db", bus="loopback:")
+    with pytest.raises(KeyboardInterrupt):  # noqa: PT012
+        for record in campaign.run(500):
+            if record.index == 1:
+                signal.raise_signal(signal.SIGINT)
+    assert campaign.result.status == "interrupted"
+    kept = CampaignResult.from_library(tmp_path / "l.db")
+    assert 2 <= len(kept.records) < 500
+
+
+def test_a_campaign_that_was_left_goes_on_with_what_it_had_learned(
+    gantry: Path, tmp_path: Path
+) -> None:
+    """The next input is the same bit by bit as without the break; the result has all runs."""
+    whole = Campaign(gantry, library=tmp_path / "whole.db", bus="loopback:")
+    expected = list(whole.run(6))
+    for record in Campaign(gantry, library=tmp_path / "cut.db", bus="loopback:").run(4):
+        if record.index == 1:
+            break
+    kept = len(CampaignResult.from_library(tmp_path / "cut.db").records)
+    rest = Campaign(gantry, library=tmp_path / "cut.db", bus="loopback:", resume=True)
+    resumed = list(rest.run(6))
+    assert [record.index for record in resumed] == list(range(kept, 6))
+    assert [record.index for record in rest.result.records] == list(range(6))
+    np.testing.assert_array_equal(resumed[0].input, expected[kept].input)
+    assert resumed[0].input.any()
+
+
 def test_a_campaign_is_found_again_in_the_library(finished: CampaignResult) -> None:
     """What the events said and what the library says are the same."""
     again = CampaignResult.from_library(finished.library)

@@ -91,11 +91,27 @@ def test_a_signal_in_lock_step_stops_as_well(bench: Bench, patient: Path) -> Non
     assert controller.events[-1]["iterations"] == n_kept
 
 
-def test_a_reader_who_goes_does_not_end_the_motion(bench: Bench, patient: Path) -> None:
-    """As in `ilc-rt run | head -1`: the runs are made and kept, drives off, no panic."""
+def test_a_reader_of_events_who_goes_stops_the_axes(bench: Bench, patient: Path) -> None:
+    """Nobody would notice trouble any more: a controlled stop, drives off, no panic."""
     drives = bench.drives(patient, "--lockstep")
     reading, writing = os.pipe()
     controller = bench.controller(patient, "--lockstep", runs=2, stdout=writing)
+    os.close(writing)
+    os.close(reading)
+    assert controller.end() == 128 + signal.SIGPIPE
+    assert controller.errors == []
+    assert len(bench.kept()) < 2
+    assert BOTH_OFF in goodbye(drives)
+
+
+def test_a_reader_of_the_table_who_goes_stops_nothing(bench: Bench, patient: Path) -> None:
+    """As in `ilc-rt run | head -1`: the runs are made and kept, drives off, no panic."""
+    drives = bench.drives(patient, "--lockstep")
+    reading, writing = os.pipe()
+    controller = bench.start(
+        "ilc-rt", "run", patient, "--bus", bench.bus, "--lockstep", "--iterations", "2",
+        "--library", bench.library, "--no-telemetry", stdout=writing,
+    )  # fmt: skip
     os.close(writing)
     os.close(reading)
     assert controller.end() == 0
@@ -163,7 +179,7 @@ def test_a_tool_measurement_without_power_stops_both(bench: Bench) -> None:
 
 
 def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
-    """After kill -9 of the controller, --resume goes on with the same drives; all runs are there."""
+    """After kill -9 of the controller, --resume goes on with the same drives and loses no run."""
     cell = bench.cell(short=True, more="\n[safety]\nsilent_cycles_max = 250\n")
     drives = bench.drives(cell)
     controller = bench.controller(cell, runs=4)

@@ -13,7 +13,10 @@ from rich.table import Table
 from typer import Typer
 
 from ilc_rt._native import Library
-from ilc_rt.commands.options import LibraryArgument  # noqa: TC001 (typer reads it)
+from ilc_rt.commands.options import (
+    DEFAULT_LIBRARY_FILE,
+    LibraryArgument,
+)
 from ilc_rt.errors import BadInputError
 from ilc_rt.export import export_run
 from ilc_rt.result import library_rows, micrometres
@@ -35,7 +38,9 @@ ExportFile = Annotated[
 
 @app.command("list")
 def list_runs(
-    library: LibraryArgument, cell: CellName = None, campaign: CampaignOption = None
+    library: LibraryArgument = DEFAULT_LIBRARY_FILE,
+    cell: CellName = None,
+    campaign: CampaignOption = None,
 ) -> None:
     """List the runs, one a line.
 

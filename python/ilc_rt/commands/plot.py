@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ilc_rt.commands.options import (
+    DEFAULT_LIBRARY_FILE,
     REPORT_NAME,
     LibraryArgument,
 )
@@ -24,7 +25,9 @@ Out = Annotated[
 
 
 def plot(
-    library: LibraryArgument, campaign: CampaignOption = None, out: Out = Path(REPORT_NAME)
+    library: LibraryArgument = DEFAULT_LIBRARY_FILE,
+    campaign: CampaignOption = None,
+    out: Out = Path(REPORT_NAME),
 ) -> None:
     """Draw a campaign from the library: a report, or one picture a file.
 

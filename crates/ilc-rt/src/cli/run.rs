@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 
 use clap::{Args, ValueEnum};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 
 use super::figures::FiguresFile;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show};
@@ -107,12 +107,15 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
     let bus = transport::open(address).map_err(|source| SupervisorError::Bus { place, source })?;
     let mut first_contour_m = None;
     let mut observe = |event: &Event| {
-        if arguments.events {
-            if let Ok(text) = serde_json::to_string(event) {
+        if !arguments.events {
+            if let Some(text) = show::sentence(event, &mut first_contour_m) {
                 show::say(&text);
             }
-        } else {
-            show::event(event, &mut first_contour_m);
+        } else if let Ok(text) = serde_json::to_string(event)
+            && !show::say(&text)
+        {
+            // Whoever asked for the events is gone, and with it whoever would notice trouble.
+            options.stop.store(SIGPIPE, Ordering::Relaxed);
         }
     };
     supervisor::run(&cell, &options, bus, None, &mut observe)

@@ -87,6 +87,8 @@ impl Plan {
                 program: program_json(&cell),
                 cycle_s: cell.cycle_s(),
                 n_axes: cell.n_axes(),
+                axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
+                input_units: cell.axes.iter().map(|axis| input_unit(axis).to_owned()).collect(),
             },
             bus_load,
         })
@@ -192,6 +194,13 @@ fn axis_limits(axis: &Axis) -> AxisLimits {
         velocity_max_m_s: axis.limits.velocity_max_m_s,
         acceleration_max_m_s2: axis.limits.acceleration_max_m_s2,
         jerk_max_m_s3: axis.limits.jerk_max_m_s3,
+    }
+}
+
+fn input_unit(axis: &Axis) -> &'static str {
+    match axis.interface {
+        Interface::Csp => "m",
+        Interface::Csv => "m/s",
     }
 }
 

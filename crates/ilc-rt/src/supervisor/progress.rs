@@ -17,7 +17,7 @@ pub(super) enum Decision {
     Learn,
     /// Its error has grown too far: restore this input.
     RollBack(Vec<f64>),
-    /// Leave the input as it is; learning is off.
+    /// Leave the input as it is.
     Hold,
 }
 
@@ -76,11 +76,15 @@ impl Progress {
     /// Decides what follows a run, and marks it if the best input is restored because of it.
     ///
     /// Growth is measured in the RMS error over the best run so far. After two restorations the law
-    /// has shown that it does not converge here, and learning stays off.
+    /// has shown that it does not converge here, and learning stays off. A run that the computer
+    /// disturbed (overruns, missing samples) is no evidence: unless it is the best all the same, its
+    /// input is repeated.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
         let rms = record.figures.tracking_rms_m;
         let off = self.rollbacks >= ROLLBACKS_MAX;
+        let disturbed = record.figures.overruns > 0 || record.figures.missing_samples > 0;
         match &self.best {
+            Some((best, _)) if disturbed && rms >= *best => Decision::Hold,
             Some((best, input)) if rms > best * self.rollback_ratio && !off => {
                 self.rollbacks += 1;
                 record.figures.rolled_back = true;
@@ -182,6 +186,19 @@ mod tests {
         assert_eq!(progress.decide(&mut record(f64::INFINITY)), Decision::RollBack(vec![0.4]));
         assert_eq!(progress.decide(&mut record(0.4)), Decision::Hold);
         assert_eq!(progress.decide(&mut record(9.0)), Decision::Hold);
+    }
+
+    #[test]
+    fn a_disturbed_run_is_neither_learned_from_nor_held_against_the_law() {
+        let mut progress = Progress::new(1.5);
+        assert_eq!(progress.decide(&mut record(1.0)), Decision::Learn);
+        let mut disturbed = record(9.0);
+        disturbed.figures.overruns = 3;
+        assert_eq!(progress.decide(&mut disturbed), Decision::Hold);
+        assert!(!disturbed.figures.rolled_back);
+        let mut better = record(0.5);
+        better.figures.missing_samples = 1;
+        assert_eq!(progress.decide(&mut better), Decision::Learn);
     }
 
     #[test]

@@ -30,6 +30,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
         StopReason::Asked(signal) => match signal {
             libc::SIGINT => "stopped by Ctrl-C".to_owned(),
             libc::SIGTERM => "stopped by SIGTERM".to_owned(),
+            libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
             libc::SIGHUP => "stopped as its terminal is gone (SIGHUP)".to_owned(),
             other => format!("stopped by signal {other}"),
         },

@@ -120,7 +120,12 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
         }
         session
             .put(format!("{prefix}/{key}"), json)
-            .congestion_control(CongestionControl::Drop)
+            .congestion_control(if key == "servo" {
+                CongestionControl::Drop
+            } else {
+                // Rare and not repeated, so worth waiting for a slow subscriber, here in this thread.
+                CongestionControl::Block
+            })
             .encoding(zenoh::bytes::Encoding::APPLICATION_JSON)
             .wait()?;
     }

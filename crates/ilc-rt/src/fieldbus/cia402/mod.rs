@@ -1,6 +1,6 @@
 //! CiA 402 drive profile: states, objects, process data, units and the bring-up of a drive.
 //!
-//! What the servo cycle needs of a drive (hot) and what set-up needs (cold: [`bring_up`]); imported by
+//! What the servo cycle needs of a drive (hot) and what set-up needs (cold: [`mod@bring_up`]); imported by
 //! `servo`, `supervisor` and the simulator. Imports `canopen` and the frame only.
 
 pub mod bring_up;
