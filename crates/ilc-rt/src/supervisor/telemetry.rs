@@ -20,6 +20,10 @@ const QUEUE: usize = 1024;
 /// reads would hold the session up for much longer.
 const CLOSE_MAX: Duration = Duration::from_secs(2);
 
+/// How long the token outlives the last message: Zenoh sends declarations before data that waits, and
+/// whoever watches leaves when the token goes.
+const LINGER: Duration = Duration::from_millis(100);
+
 /// Something to publish.
 struct Message {
     key: &'static str,
@@ -129,6 +133,7 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
             .encoding(zenoh::bytes::Encoding::APPLICATION_JSON)
             .wait()?;
     }
+    std::thread::sleep(LINGER);
     queryable.undeclare().wait()?;
     alive.undeclare().wait()?;
     session.close().wait()
