@@ -111,7 +111,7 @@ mod tests {
     fn a_sync_handled_late_still_stands_for_one_cycle() {
         let mut clock = locked(10);
         assert_eq!(clock.idle(CYCLE * 13), 0);
-        for k in 11..=13 {
+        for k in 11..=13_u32 {
             assert_eq!(clock.at_sync(CYCLE * 13 + Duration::from_micros(k.into())), STEPS);
         }
         assert_eq!(clock.at_sync(CYCLE * 14), STEPS);

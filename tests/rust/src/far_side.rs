@@ -21,13 +21,23 @@ pub struct FarSide {
 
 impl FarSide {
     /// Begins to serve.
-    pub fn serve(mut bus: Box<dyn Bus>, mut machine: Machine) -> Self {
+    pub fn serve(bus: Box<dyn Bus>, machine: Machine) -> Self {
+        Self::serve_with(bus, machine, |_| {})
+    }
+
+    /// Begins to serve, with `meddle` called before each frame.
+    pub fn serve_with(
+        mut bus: Box<dyn Bus>,
+        mut machine: Machine,
+        mut meddle: impl FnMut(&mut Machine) + Send + 'static,
+    ) -> Self {
         let over = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&over);
         let thread = std::thread::spawn(move || {
             while !told.load(Ordering::Relaxed) {
                 let Ok(received) = bus.recv(LOOK) else { return };
                 let Some(frame) = received else { continue };
+                meddle(&mut machine);
                 let mut answers = Vec::new();
                 machine.receive(&frame, &mut |answer| answers.push(answer));
                 for answer in answers {

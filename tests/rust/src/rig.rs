@@ -161,6 +161,8 @@ pub struct Rig {
     pub samples: Vec<Sample>,
     /// Why the axes were stopped, if they were.
     pub reason: Option<StopReason>,
+    /// SYNCs sent before the tick in which the stop began.
+    pub stopping_at: Option<usize>,
     /// Runs that have ended, with their overruns.
     pub ended: Vec<(u32, u32)>,
     /// Run and table of each start.
@@ -214,6 +216,7 @@ impl Rig {
             tap,
             samples: Vec::new(),
             reason: None,
+            stopping_at: None,
             ended: Vec::new(),
             started: Vec::new(),
             phase: (PhaseName::Enabling, 0),
@@ -243,7 +246,9 @@ impl Rig {
                 Message::Phase(phase, _) => self.phase = (phase, n_syncs),
                 Message::RunStarted { run, table } => self.started.push((run, table)),
                 Message::RunEnded { run, overruns } => self.ended.push((run, overruns)),
-                Message::Stopping(reason) => self.reason = Some(reason),
+                Message::Stopping(reason) => {
+                    (self.reason, self.stopping_at) = (Some(reason), Some(n_syncs));
+                }
             }
         }
     }
