@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use ilc_rt::cli::refusal_line;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::NodeId;
 use ilc_sim::{ClockMode, Machine, eds};
@@ -65,9 +66,11 @@ enum Failure {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().verb {
-        Verb::Run { cell, bus, lockstep, mute } => run(&cell, bus, lockstep, &mute),
-        Verb::Eds { cell, node } => print_eds(&cell, node),
+    let outcome = match Arguments::try_parse() {
+        Ok(arguments) => carry_out(arguments.verb),
+        // What is printed by --help and --version comes as an error as well.
+        Err(answer) if answer.exit_code() == 0 => answer.exit(),
+        Err(refusal) => Err(Failure::Input(refusal_line(&refusal))),
     };
     let (line, status) = match outcome {
         Ok(()) => return ExitCode::SUCCESS,
@@ -77,6 +80,13 @@ fn main() -> ExitCode {
     // Nobody is left to tell if standard error is gone.
     let _ = writeln!(std::io::stderr(), "ilc-sim: {line}");
     ExitCode::from(status)
+}
+
+fn carry_out(verb: Verb) -> Result<(), Failure> {
+    match verb {
+        Verb::Run { cell, bus, lockstep, mute } => run(&cell, bus, lockstep, &mute),
+        Verb::Eds { cell, node } => print_eds(&cell, node),
+    }
 }
 
 fn run(path: &Path, bus: Option<String>, lockstep: bool, mute: &[Mute]) -> Result<(), Failure> {

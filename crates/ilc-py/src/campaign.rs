@@ -189,8 +189,9 @@ fn run_events(
 fn open(cell: &Cell) -> Result<Box<dyn Bus>, SupervisorError> {
     let file = cell.file.display().to_string();
     if !cell.bus.address.starts_with("loopback:") {
+        let place = format!("{file}: [bus] address");
         return transport::open(&cell.bus.address)
-            .map_err(|source| SupervisorError::Bus { file, source });
+            .map_err(|source| SupervisorError::Bus { place, source });
     }
     match Machine::from_cell(cell, ClockMode::LockStep) {
         Ok(machine) => Ok(Box::new(InProcess::new(machine, LOOPBACK_FRAMES))),

@@ -17,8 +17,8 @@ use crate::error::OrRaise;
 /// --------
 /// >>> from ilc_rt import Cell
 /// >>> cell = Cell.load("examples/01_gantry.toml")
-/// >>> cell.axis_names
-/// ['x', 'y']
+/// >>> cell.n_axes
+/// 2
 #[pyclass(name = "Cell", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyCell {

@@ -125,6 +125,8 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     run.set_item("n_samples", row.n_samples)?;
     run.set_item("n_axes", row.meta.n_axes)?;
     run.set_item("cycle_s", row.meta.cycle_s)?;
+    run.set_item("axis_names", &row.meta.axis_names)?;
+    run.set_item("input_units", &row.meta.input_units)?;
     run.set_item("tracking_inf_m", figures.tracking_inf_m)?;
     run.set_item("tracking_rms_m", figures.tracking_rms_m)?;
     run.set_item("contour_inf_m", figures.contour_inf_m)?;

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{EXIT_BAD_INPUT, show};
+use super::figures::FiguresFile;
+use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
 use crate::rt::{Clock, Latency, MonotonicClock, Nanos, RtRequest, thread};
 
 #[derive(Args)]
@@ -28,6 +29,13 @@ pub(super) struct LatencyArguments {
 
 /// Measures; returns the exit status.
 pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
+    let figures_file = match &arguments.json {
+        None => None,
+        Some(path) => match FiguresFile::reserve(path) {
+            None => return EXIT_BAD_INPUT,
+            reserved => reserved,
+        },
+    };
     let report = thread::enter(RtRequest::default());
     show::say(&format!(
         "{} {}, memory {}, kernel {}; measuring for {} s",
@@ -56,11 +64,10 @@ pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
         "woke late by at most {:.1} us; 99.9 % {:.1}, 99 % {:.1}, median {:.1}; {} wake-ups",
         figures.max, figures.p999, figures.p99, figures.p50, figures.count
     ));
-    if let Some(path) = &arguments.json {
+    if let Some(file) = figures_file {
         let text = serde_json::json!({ "rt": report, "cycle_us": arguments.cycle_us, "wake_late_us": figures });
-        if let Err(error) = std::fs::write(path, format!("{text:#}\n")) {
-            show::complain(&format!("--json {}: cannot be written: {error}", path.display()));
-            return EXIT_BAD_INPUT;
+        if !file.write(&text) {
+            return EXIT_FAILURE;
         }
     }
     0

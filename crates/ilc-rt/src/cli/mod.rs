@@ -3,6 +3,7 @@
 //! Imports everything and is imported by `main` only.
 
 mod check;
+mod figures;
 mod latency;
 mod run;
 mod show;
@@ -14,6 +15,8 @@ use tracing::Level;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 
+/// Done, but what was asked for beyond it could not be written.
+pub const EXIT_FAILURE: u8 = 1;
 /// Bad input: nothing has moved.
 pub const EXIT_BAD_INPUT: u8 = 2;
 /// A fault brought the axes to rest.
@@ -22,8 +25,8 @@ pub const EXIT_FAULT: u8 = 3;
 #[derive(Parser)]
 #[command(name = "ilc-rt", version, about = "The real-time controller that learns", long_about = None)]
 #[command(
-    after_help = "Exit status: 0 done, 2 bad input (nothing moved), 3 controlled stop after a \
-fault, 130 after Ctrl-C, 143 after SIGTERM."
+    after_help = "Exit status: 0 done, 1 done but --json could not be written, 2 bad input (nothing moved), 3 controlled stop after a \
+fault, 129 after SIGHUP, 130 after Ctrl-C, 143 after SIGTERM."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -46,13 +49,38 @@ pub fn main() -> ExitCode {
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .without_time()
+        // A reader who has gone must not end the program: no complaint about complaints.
+        .log_internal_errors(false)
         .with_target(false)
         .with_filter(filter.unwrap_or_else(|| Targets::new().with_target("ilc_rt", Level::INFO)));
     tracing_subscriber::registry().with(lines).init();
-    let status = match Arguments::parse().verb {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        // What is printed by --help and --version comes as an error as well.
+        Err(answer) if answer.exit_code() == 0 => {
+            show::say(&answer.render().to_string().trim_end());
+            return ExitCode::SUCCESS;
+        }
+        Err(refusal) => {
+            show::complain(&refusal_line(&refusal));
+            return ExitCode::from(EXIT_BAD_INPUT);
+        }
+    };
+    let status = match arguments.verb {
         Verb::Run(arguments) => run::run(&arguments),
         Verb::Check(arguments) => check::check(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),
     };
     ExitCode::from(status)
+}
+
+/// One line of what the parser of arguments says in several, without its usage.
+pub fn refusal_line(refusal: &clap::Error) -> String {
+    let text = refusal.render().to_string();
+    let lines = text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:"));
+    let words: Vec<_> = lines
+        .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
+        .collect();
+    let line = words.join("; ").replace(":; ", ": ");
+    format!("{}; --help tells what is allowed", line.trim_start_matches("error: "))
 }

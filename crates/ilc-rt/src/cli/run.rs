@@ -5,9 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 
 use clap::{Args, ValueEnum};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 
-use super::{EXIT_BAD_INPUT, EXIT_FAULT, show};
+use super::figures::FiguresFile;
+use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show};
 use crate::config::{Cell, Measure};
 use crate::fieldbus::transport;
 use crate::record::{EndStatus, Event};
@@ -59,9 +60,19 @@ enum MeasureName {
 
 /// Runs a campaign; returns the exit status.
 pub(super) fn run(arguments: &RunArguments) -> u8 {
+    let figures_file = match &arguments.json {
+        None => None,
+        Some(path) => match FiguresFile::reserve(path) {
+            None => return EXIT_BAD_INPUT,
+            reserved => reserved,
+        },
+    };
     match campaign(arguments) {
-        Ok(outcome) => finish(arguments, &outcome),
+        Ok(outcome) => finish(figures_file.as_ref(), &outcome),
         Err(error) => {
+            if let Some(file) = figures_file {
+                file.give_up();
+            }
             show::complain(&error);
             EXIT_BAD_INPUT
         }
@@ -73,10 +84,13 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
     if let Some(address) = &arguments.bus {
         cell.bus.address.clone_from(address);
     }
-    let file = || cell.file.display().to_string();
+    let place = match &arguments.bus {
+        Some(_) => "--bus".to_owned(),
+        None => format!("{}: [bus] address", cell.file.display()),
+    };
     let address = &cell.bus.address;
     if address.starts_with("loopback:") {
-        return Err(SupervisorError::Loopback { file: file() });
+        return Err(SupervisorError::Loopback { place });
     }
     let options = Options {
         iterations: arguments.iterations,
@@ -90,16 +104,18 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
         telemetry: !arguments.no_telemetry,
         stop: stop_on_signals(),
     };
-    let bus =
-        transport::open(address).map_err(|source| SupervisorError::Bus { file: file(), source })?;
+    let bus = transport::open(address).map_err(|source| SupervisorError::Bus { place, source })?;
     let mut first_contour_m = None;
     let mut observe = |event: &Event| {
-        if arguments.events {
-            if let Ok(text) = serde_json::to_string(event) {
+        if !arguments.events {
+            if let Some(text) = show::sentence(event, &mut first_contour_m) {
                 show::say(&text);
             }
-        } else {
-            show::event(event, &mut first_contour_m);
+        } else if let Ok(text) = serde_json::to_string(event)
+            && !show::say(&text)
+        {
+            // Whoever asked for the events is gone, and with it whoever would notice trouble.
+            options.stop.store(SIGPIPE, Ordering::Relaxed);
         }
     };
     supervisor::run(&cell, &options, bus, None, &mut observe)
@@ -108,7 +124,10 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
 /// A number that becomes a signal's when it comes: the loop reads it and brings the axes to rest.
 fn stop_on_signals() -> Arc<AtomicI32> {
     let stop = Arc::new(AtomicI32::new(0));
-    for signal in [SIGINT, SIGTERM] {
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        if signal == SIGHUP && is_ignored(signal) {
+            continue;
+        }
         let stop = Arc::clone(&stop);
         #[expect(
             unsafe_code,
@@ -127,8 +146,20 @@ fn stop_on_signals() -> Arc<AtomicI32> {
     stop
 }
 
-fn finish(arguments: &RunArguments, outcome: &Outcome) -> u8 {
-    if let Some(path) = &arguments.json {
+/// Whether a signal is ignored, as SIGHUP is by what `nohup` starts: then it stays so.
+fn is_ignored(signal: i32) -> bool {
+    #[expect(unsafe_code, reason = "neither the standard library nor signal-hook can ask")]
+    // SAFETY: zeros are a valid sigaction; with no new action the call only writes the present one.
+    unsafe {
+        let mut present: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(signal, std::ptr::null(), &raw mut present) == 0
+            && present.sa_sigaction == libc::SIG_IGN
+    }
+}
+
+fn finish(figures_file: Option<&FiguresFile>, outcome: &Outcome) -> u8 {
+    let mut written = true;
+    if let Some(file) = figures_file {
         let iterations: Vec<_> = outcome
             .runs
             .iter()
@@ -144,13 +175,11 @@ fn finish(arguments: &RunArguments, outcome: &Outcome) -> u8 {
             "reason": outcome.reason,
             "iterations": iterations,
         });
-        if let Err(error) = std::fs::write(path, format!("{text:#}\n")) {
-            show::complain(&format!("--json {}: cannot be written: {error}", path.display()));
-            return EXIT_BAD_INPUT;
-        }
+        written = file.write(&text);
     }
     match outcome.status {
-        EndStatus::Completed => 0,
+        EndStatus::Completed if written => 0,
+        EndStatus::Completed => EXIT_FAILURE,
         EndStatus::Interrupted => u8::try_from(128 + outcome.signal).unwrap_or(EXIT_FAULT),
         EndStatus::Fault => {
             show::complain(&format!("controlled stop: {}", outcome.reason));

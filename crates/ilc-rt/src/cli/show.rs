@@ -1,56 +1,56 @@
 //! Text for people: the table of runs, and lines on standard error.
 
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this is the program's output")]
+use std::io::Write;
 
 use crate::record::{Event, StateName};
 
+/// Columns of the table of runs.
+const HEADINGS: [&str; 7] = [
+    "run",
+    "max tracking um",
+    "rms tracking um",
+    "max contour um",
+    "change",
+    "overruns",
+    "update ms",
+];
+
 /// Prints one line on standard error.
 pub(super) fn complain(line: &dyn std::fmt::Display) {
-    eprintln!("ilc-rt: {line}");
+    let _ = writeln!(std::io::stderr(), "ilc-rt: {line}");
 }
 
-/// Prints one line on standard output.
-pub(super) fn say(line: &dyn std::fmt::Display) {
-    println!("{line}");
+/// Prints one line on standard output, and tells whether somebody can read it. A reader who has gone
+/// must not end the program while axes move.
+pub(super) fn say(line: &dyn std::fmt::Display) -> bool {
+    writeln!(std::io::stdout(), "{line}").is_ok()
 }
 
-/// Prints what an event says to a person.
-pub(super) fn event(event: &Event, first_contour_m: &mut Option<f64>) {
+/// What an event says to a person, if anything; `first_contour_m` remembers the first run's.
+pub(super) fn sentence(event: &Event, first_contour_m: &mut Option<f64>) -> Option<String> {
     match event {
         Event::Start {
             cell, bus, mode, law, measure, n_samples, cycle_s, campaign, rt, ..
         } => {
-            println!(
+            let thread = rt.as_ref().map_or_else(String::new, |rt| {
+                let memory = if rt.mlock { "locked" } else { "not locked" };
+                let notes: String = rt.notes.iter().flat_map(|note| ["\n  note: ", note]).collect();
+                format!(
+                    "servo thread: {} {}, memory {memory}, kernel {}{notes}\n",
+                    rt.policy, rt.priority, rt.kernel
+                )
+            });
+            let [run, max, rms, contour, change, overruns, update] = HEADINGS;
+            Some(format!(
                 "cell {cell} on {bus}, {mode}, {:.0} us cycle, {n_samples} samples a run; law {law} from \
-                 the {measure}; campaign {campaign}",
+                 the {measure}; campaign {campaign}\n{thread}{run:>4} {max:>16} {rms:>16} {contour:>15} \
+                 {change:>9} {overruns:>9} {update:>10}",
                 cycle_s * 1e6
-            );
-            if let Some(rt) = rt {
-                println!(
-                    "servo thread: {} {}, memory {}, kernel {}",
-                    rt.policy,
-                    rt.priority,
-                    if rt.mlock { "locked" } else { "not locked" },
-                    rt.kernel
-                );
-                for note in &rt.notes {
-                    println!("  note: {note}");
-                }
-            }
-            println!(
-                "{:>4} {:>16} {:>16} {:>15} {:>9} {:>9} {:>10}",
-                "run",
-                "max tracking um",
-                "rms tracking um",
-                "max contour um",
-                "change",
-                "overruns",
-                "update ms"
-            );
+            ))
         }
         Event::Iteration { index, figures, .. } => {
             let first = *first_contour_m.get_or_insert(figures.contour_inf_m);
-            println!(
+            Some(format!(
                 "{index:>4} {:>16.1} {:>16.1} {:>15.1} {:>8.1}% {:>9} {:>10.3}{}",
                 figures.tracking_inf_m * 1e6,
                 figures.tracking_rms_m * 1e6,
@@ -59,12 +59,12 @@ pub(super) fn event(event: &Event, first_contour_m: &mut Option<f64>) {
                 figures.overruns,
                 figures.update_ms,
                 if figures.rolled_back { "  error grew: best input restored" } else { "" }
-            );
+            ))
         }
         Event::State { state: StateName::Stopping, iteration } => {
-            println!("bringing the axes to rest (run {iteration})");
+            Some(format!("bringing the axes to rest (run {iteration})"))
         }
-        Event::Latency { wake_late_us, execution_us } => println!(
+        Event::Latency { wake_late_us, execution_us } => Some(format!(
             "loop: woke late by {:.1} us (median), {:.0} (99 %), {:.0} (most); a tick took {:.1} us \
              (median), {:.0} (most); {} ticks",
             wake_late_us.p50,
@@ -73,8 +73,8 @@ pub(super) fn event(event: &Event, first_contour_m: &mut Option<f64>) {
             execution_us.p50,
             execution_us.max,
             wake_late_us.count
-        ),
-        Event::End { reason, .. } => println!("{reason}"),
-        Event::State { .. } | Event::Progress { .. } | Event::Fault { .. } => {}
+        )),
+        Event::End { reason, .. } => Some(reason.clone()),
+        Event::State { .. } | Event::Progress { .. } | Event::Fault { .. } => None,
     }
 }

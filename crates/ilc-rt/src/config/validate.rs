@@ -26,6 +26,8 @@ pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigE
         Some((name, value)) if !row.starts_with('[') => {
             format!("{table} {} = {}", name.trim(), value.split('#').next().unwrap_or("").trim())
         }
+        // A key that is missing is reported at the head of its table.
+        _ if row.starts_with('[') => row.split('#').next().unwrap_or("").trim().to_owned(),
         _ => table.to_owned(),
     };
     let reason = error.message().replace('\n', " ");

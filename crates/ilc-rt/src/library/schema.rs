@@ -3,7 +3,7 @@
 /// Version of the schema, in SQLite's `user_version`.
 pub(super) const VERSION: i64 = 1;
 
-/// Arrays are little-endian float64, time first; times are UTC in ISO 8601.
+/// Arrays are little-endian float64, time first; lists of names are JSON; times are UTC in ISO 8601.
 pub(super) const CREATE: &str = "
 CREATE TABLE IF NOT EXISTS iteration (
     id              INTEGER PRIMARY KEY,
@@ -18,6 +18,8 @@ CREATE TABLE IF NOT EXISTS iteration (
     measure         TEXT NOT NULL,
     cycle_s         REAL NOT NULL,
     n_axes          INTEGER NOT NULL,
+    axis_names      TEXT NOT NULL,
+    input_units     TEXT NOT NULL,
     n_samples       INTEGER NOT NULL,
     reference_m     BLOB NOT NULL,
     disturbance     BLOB,

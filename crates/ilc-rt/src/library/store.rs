@@ -46,6 +46,17 @@ pub enum LibraryError {
         /// What SQLite said.
         source: rusqlite::Error,
     },
+    /// The file cannot be used as a library.
+    #[error(
+        "library {path}: cannot be opened: {source}; allowed: a library of this program, or a new \
+         file in a folder that exists and can be written"
+    )]
+    Open {
+        /// File.
+        path: String,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
     /// The file was written by another version of this program.
     #[error("library {path}: schema version {found}; this program reads version {expected}")]
     Version {
@@ -77,7 +88,7 @@ pub enum LibraryError {
 const COLUMNS: &str = "id, created_utc, cell, campaign, fingerprint, iteration, program, law, \
     law_parameters, measure, cycle_s, n_axes, n_samples, digest, tracking_inf_m, tracking_rms_m, \
     contour_inf_m, contour_rms_m, encoder_tracking_inf_m, tool_tracking_inf_m, overruns, \
-    missing_samples, late_updates, update_ms, rolled_back";
+    missing_samples, late_updates, update_ms, rolled_back, axis_names, input_units";
 
 const ARRAYS: &str = "reference_m, input, encoder_m, tool_m, error_m, contour_m";
 
@@ -85,11 +96,11 @@ impl Library {
     /// Opens a library, creating file and tables if they are not there.
     ///
     /// # Errors
-    /// [`LibraryError::Sqlite`] if the file cannot be opened or is no library;
+    /// [`LibraryError::Open`] if the file cannot be opened or is no library;
     /// [`LibraryError::Version`] if it has another version.
     pub fn open(path: &Path) -> Result<Self, LibraryError> {
         let name = path.display().to_string();
-        let fail = |source| LibraryError::Sqlite { path: name.clone(), source };
+        let fail = |source| LibraryError::Open { path: name.clone(), source };
         let connection = Connection::open(path).map_err(fail)?;
         connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
         connection.pragma_update(None, "journal_mode", "WAL").map_err(fail)?;
@@ -113,7 +124,7 @@ impl Library {
     /// Opens a library in memory, which is gone when dropped.
     ///
     /// # Errors
-    /// [`LibraryError::Sqlite`] if SQLite refuses.
+    /// [`LibraryError::Open`] if SQLite refuses.
     pub fn in_memory() -> Result<Self, LibraryError> {
         Self::open(Path::new(":memory:"))
     }
@@ -129,9 +140,9 @@ impl Library {
             law, law_parameters, measure, cycle_s, n_axes, n_samples, reference_m, input, \
             encoder_m, tool_m, error_m, contour_m, digest, tracking_inf_m, tracking_rms_m, \
             contour_inf_m, contour_rms_m, encoder_tracking_inf_m, tool_tracking_inf_m, overruns, \
-            missing_samples, late_updates, update_ms, rolled_back) VALUES (?1, ?2, ?3, ?4, ?5, \
+            missing_samples, late_updates, update_ms, rolled_back, axis_names, input_units) VALUES (?1, ?2, ?3, ?4, ?5, \
             ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22, ?23, \
-            ?24, ?25, ?26, ?27, ?28, ?29)";
+            ?24, ?25, ?26, ?27, ?28, ?29, ?30, ?31)";
         let tool = (!record.tool_m.is_empty()).then(|| blob(&record.tool_m));
         self.connection
             .prepare_cached(statement)
@@ -166,6 +177,8 @@ impl Library {
                     f.late_updates,
                     f.update_ms,
                     f.rolled_back,
+                    json_list(&meta.axis_names),
+                    json_list(&meta.input_units),
                 ])
             })
             .map_err(|source| self.fail(source))
@@ -238,6 +251,9 @@ impl Library {
 
 fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row> {
     let count = |name: &str| row.get::<_, i64>(name).map(|n| usize::try_from(n).unwrap_or(0));
+    let list = |name: &str| -> rusqlite::Result<Vec<String>> {
+        Ok(serde_json::from_str(&row.get::<_, String>(name)?).unwrap_or_default())
+    };
     let array = |name: &str| -> rusqlite::Result<Vec<f64>> {
         if with_arrays {
             Ok(floats(&row.get::<_, Option<Vec<u8>>>(name)?.unwrap_or_default()))
@@ -258,6 +274,8 @@ fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row>
             program: row.get("program")?,
             cycle_s: row.get("cycle_s")?,
             n_axes: count("n_axes")?,
+            axis_names: list("axis_names")?,
+            input_units: list("input_units")?,
         },
         digest: row.get("digest")?,
         n_samples: count("n_samples")?,
@@ -284,6 +302,10 @@ fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row>
             },
         },
     })
+}
+
+fn json_list(names: &[String]) -> String {
+    serde_json::Value::from(names).to_string()
 }
 
 fn as_integer(count: usize) -> i64 {
@@ -320,6 +342,8 @@ mod tests {
             program: "[]".into(),
             cycle_s: 0.002,
             n_axes: 2,
+            axis_names: vec!["x".into(), "y".into()],
+            input_units: vec!["m".into(), "m/s".into()],
         }
     }
 

@@ -21,6 +21,8 @@ pub enum Event {
         n_axes: usize,
         /// Their names.
         axis_names: Vec<String>,
+        /// Unit of each axis' learned input.
+        input_units: Vec<String>,
         /// Servo cycle.
         cycle_s: f64,
         /// Number of the first run to come; above 0 when resumed.

@@ -25,6 +25,10 @@ pub struct Meta {
     pub cycle_s: f64,
     /// Number of axes.
     pub n_axes: usize,
+    /// Their names.
+    pub axis_names: Vec<String>,
+    /// Unit of each axis' learned input: `m` or `m/s`.
+    pub input_units: Vec<String>,
 }
 
 /// One run.

@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn it_fades_to_exactly_zero() {
         let mut input = input();
-        input.follow(&[0.2]).unwrap();
+        assert_eq!(input.follow(&[0.2]), Ok(()));
         let mut last = 0.2;
         for _ in 0..10 {
             assert!(!input.faded());

@@ -14,6 +14,8 @@ use crate::fieldbus::{Bus, Frame};
 
 /// Most frames taken in one tick, so that a babbling bus cannot hold the loop.
 const FRAMES_MAX: usize = 256;
+/// Cycles without an answer after which a position is too old to blame the drive for its distance.
+const STALE_CYCLES: u64 = 5;
 
 impl Cycle {
     /// Takes every frame that is there; paced by answers, waits until all have come.
@@ -103,12 +105,14 @@ impl Cycle {
             let lag = self.slots.silence(axis);
             if lag > most && !self.drives[axis].lost {
                 self.drives[axis].lost = true;
+                self.slots.give_up(axis);
                 found = found.or(Some(StopReason::SilentAxis { axis, cycles: saturate(lag) }));
             }
         }
         let lag = self.slots.silence(self.n_axes());
-        if found.is_none() && self.spec.tool.is_some() && lag > most {
-            found = Some(StopReason::SilentTool { cycles: saturate(lag) });
+        if self.spec.tool.is_some() && lag > most {
+            self.slots.give_up(self.n_axes());
+            found = found.or(Some(StopReason::SilentTool { cycles: saturate(lag) }));
         }
         found
     }
@@ -136,8 +140,15 @@ impl Cycle {
             Mode::Csv => self.reference.position_m[axis],
         };
         let error_m = wanted_m - drive.encoder_m;
-        (error_m.abs() > spec.following_error_max_m)
-            .then_some(StopReason::FollowingError { axis, error_m })
+        if error_m.abs() <= spec.following_error_max_m {
+            return None;
+        }
+        let silence = self.slots.silence(axis);
+        Some(if silence > STALE_CYCLES {
+            StopReason::SilentAxis { axis, cycles: saturate(silence) }
+        } else {
+            StopReason::FollowingError { axis, error_m }
+        })
     }
 }
 

@@ -38,6 +38,7 @@ struct Lag {
 pub(super) struct Slots {
     ring: [Slot; DEPTH],
     lags: [Lag; NODES_MAX],
+    given_up: [bool; NODES_MAX],
     n_nodes: usize,
     sent: u64,
     given: u64,
@@ -48,6 +49,7 @@ impl Slots {
         Self {
             ring: [Slot::default(); DEPTH],
             lags: [Lag::default(); NODES_MAX],
+            given_up: [false; NODES_MAX],
             n_nodes: n_nodes.min(NODES_MAX),
             sent: 0,
             given: 0,
@@ -91,9 +93,16 @@ impl Slots {
         self.lags.get(node).map_or(0, |lag| lag.silent)
     }
 
-    /// Whether every node has answered every SYNC.
+    /// No longer waits for `node`, which is silent: the stop that follows needs many ticks.
+    pub(super) fn give_up(&mut self, node: usize) {
+        if let Some(given_up) = self.given_up.get_mut(node) {
+            *given_up = true;
+        }
+    }
+
+    /// Whether every node that is not given up has answered every SYNC.
     pub(super) fn all_answered(&self) -> bool {
-        (0..self.n_nodes).all(|node| self.lag(node) == 0)
+        (0..self.n_nodes).all(|node| self.given_up[node] || self.lag(node) == 0)
     }
 
     /// Once a tick, after receiving: skips answers that are lost for good.

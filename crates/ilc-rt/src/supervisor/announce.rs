@@ -48,7 +48,8 @@ impl<'a> Announcer<'a> {
             | Event::End { .. } => "state",
         };
         if let Ok(text) = serde_json::to_string(event) {
-            telemetry.send(key, text);
+            // Progress is gone in a moment; a late joiner wants to know the state.
+            telemetry.send(key, text, key == "state" && !matches!(event, Event::Progress { .. }));
         }
     }
 
@@ -73,7 +74,7 @@ impl<'a> Announcer<'a> {
             "tool_m": rows(|sample| &sample.tool_m),
         })
         .to_string();
-        telemetry.send("servo", text);
+        telemetry.send("servo", text, false);
         self.batch.clear();
     }
 }

@@ -78,6 +78,11 @@ pub fn run(
     };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), |law| law.describe());
     plan.name_law(cell, name, &parameters);
+    if options.resume && !options.library.exists() {
+        // Opening it would leave an empty file where a name was mistyped.
+        let path = options.library.display();
+        return Err(SupervisorError::Resume(format!("there is no library {path} to go on with")));
+    }
     let library = Library::open(&options.library)?;
     let mut progress = Progress::new(cell.learning.rollback_ratio);
     let resumed = if options.resume {
@@ -124,7 +129,8 @@ pub fn run(
         campaign: plan.meta.campaign.clone(),
         n_samples: plan.n_samples(),
         n_axes: cell.n_axes(),
-        axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
+        axis_names: plan.meta.axis_names.clone(),
+        input_units: plan.meta.input_units.clone(),
         cycle_s: cell.cycle_s(),
         first_index: first,
         iterations: options.iterations,
@@ -134,6 +140,8 @@ pub fn run(
         mode: if options.lockstep { "lockstep" } else { "realtime" },
         rt: granted,
     });
+    // The loop tells of changes only, and this is where it begins.
+    announcer.tell(&Event::State { state: StateName::Enabling, iteration: first });
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, positive")]
     let progress_every = ((PROGRESS_S / cell.cycle_s()) as u32).max(1);
@@ -279,7 +287,9 @@ impl Running<'_> {
         self.read_mail();
         let (status, reason) = match (&self.failure, self.stopping, &remains) {
             (Some(why), _, _) => (EndStatus::Fault, why.clone()),
-            (None, Some(reason), _) => (reason::status(reason), reason::sentence(reason, cell)),
+            (None, Some(reason), _) => {
+                (reason::status(reason), reason::sentence(reason, cell, options.lockstep))
+            }
             (None, None, None) => (
                 EndStatus::Fault,
                 "the loop's thread died; the drives stop by themselves".to_owned(),

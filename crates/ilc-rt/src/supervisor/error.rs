@@ -16,10 +16,10 @@ pub enum SupervisorError {
     #[error("{0}")]
     Config(#[from] ConfigError),
     /// The bus does not open.
-    #[error("{file}: [bus] address: {source}")]
+    #[error("{place}: {source}")]
     Bus {
-        /// Cell description.
-        file: String,
+        /// Where the address stands: file and key, or an option of the command line.
+        place: String,
         /// Why.
         source: OpenError,
     },
@@ -54,10 +54,12 @@ pub enum SupervisorError {
         source: crate::fieldbus::BusError,
     },
     /// The program cannot be run within the limits.
-    #[error("{file}: [program]: {source}")]
+    #[error("{file}: {key}: {source}")]
     Program {
         /// Cell description.
         file: String,
+        /// `[program]`, and which axis the number in the reason stands for.
+        key: String,
         /// Why.
         source: TrajectoryError,
     },
@@ -85,12 +87,12 @@ pub enum SupervisorError {
     Resume(String),
     /// `loopback:` was asked of a program that has no drives in it.
     #[error(
-        "{file}: [bus] address = loopback: has no drives in this program; allowed: can:, udp:, zenoh: \
+        "{place}: `loopback:` has no drives in this program; allowed: can:, udp:, zenoh: \
          (`ilc run` in Python runs loopback: with simulated drives)"
     )]
     Loopback {
-        /// Cell description.
-        file: String,
+        /// Where the address stands: file and key, or an option of the command line.
+        place: String,
     },
     /// Simulated drives could not be made of the cell.
     #[error("{file}: [simulation]: {reason}")]

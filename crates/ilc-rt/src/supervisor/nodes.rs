@@ -13,11 +13,7 @@ use crate::fieldbus::{Bus, BusError};
 const HEARTBEAT_MS: u16 = 100;
 
 /// Resets, checks and configures all nodes, then starts them together. No axis moves.
-pub(super) fn start(
-    cell: &Cell,
-    bus: &mut dyn Bus,
-    lockstep: bool,
-) -> Result<(), SupervisorError> {
+pub(super) fn start(cell: &Cell, bus: &mut dyn Bus, lockstep: bool) -> Result<(), SupervisorError> {
     let file = cell.file.display().to_string();
     let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s);
     let refused = |key: String| {

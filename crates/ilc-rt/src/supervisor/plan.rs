@@ -58,8 +58,14 @@ impl Plan {
         cell.learning.measure = measure.unwrap_or(cell.learning.measure);
         crate::config::check(&cell)?;
         let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
-        let interpolator = Interpolator::plan(&path(&cell), &limits, cell.cycle_s())
-            .map_err(|source| SupervisorError::Program { file: file.clone(), source })?;
+        let interpolator =
+            Interpolator::plan(&path(&cell), &limits, cell.cycle_s()).map_err(|source| {
+                let key = match source.axis().and_then(|i| Some((i, cell.axes.get(i)?))) {
+                    Some((i, axis)) => format!("[program] (axis {} is {})", i + 1, axis.name),
+                    None => "[program]".to_owned(),
+                };
+                SupervisorError::Program { file: file.clone(), key, source }
+            })?;
         let bus_load = bus_load(&cell)
             .map_err(|source| SupervisorError::Load { file: file.clone(), source })?;
         let reference_m = interpolator.reference();
@@ -81,6 +87,8 @@ impl Plan {
                 program: program_json(&cell),
                 cycle_s: cell.cycle_s(),
                 n_axes: cell.n_axes(),
+                axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
+                input_units: cell.axes.iter().map(|axis| input_unit(axis).to_owned()).collect(),
             },
             bus_load,
         })
@@ -189,6 +197,13 @@ fn axis_limits(axis: &Axis) -> AxisLimits {
     }
 }
 
+fn input_unit(axis: &Axis) -> &'static str {
+    match axis.interface {
+        Interface::Csp => "m",
+        Interface::Csv => "m/s",
+    }
+}
+
 fn path(cell: &Cell) -> PathSpec {
     let program = &cell.program;
     PathSpec {
@@ -240,13 +255,8 @@ fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
     payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
     // Only a real bus has bits; the others are as fast as the machine, and are told for comparison.
     if cell.bus.address.starts_with("can:") {
-        return load::check(
-            &payloads,
-            cell.cycle_s(),
-            cell.bus.bitrate_bit_s,
-            cell.bus.load_max,
-        )
-        .map(|found| found.ratio());
+        return load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, cell.bus.load_max)
+            .map(|found| found.ratio());
     }
     let bits: u64 = payloads.iter().map(|&n_bytes| load::frame_bits(n_bytes)).sum();
     Ok(bits as f64 / (f64::from(cell.bus.bitrate_bit_s) * cell.cycle_s()))

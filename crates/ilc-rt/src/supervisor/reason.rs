@@ -7,18 +7,31 @@ use crate::record::EndStatus;
 use crate::servo::StopReason;
 
 /// The sentence for a reason to stop.
-pub(super) fn sentence(reason: StopReason, cell: &Cell) -> String {
+pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> String {
     let axis = |index: usize| {
         cell.axes.get(index).map_or_else(
             || format!("axis {index}"),
             |axis| format!("axis {} (node {})", axis.name, axis.node),
         )
     };
+    // In lock-step the loop waits for every answer, so that the count of cycles says nothing.
+    let unanswered = |cycles: u32| {
+        if lockstep {
+            format!("no answer in {} s", cell.safety.answer_timeout_s)
+        } else {
+            format!(
+                "no answer in {cycles} cycles ({:.0} ms)",
+                f64::from(cycles) * cell.cycle_s() * 1e3
+            )
+        }
+    };
     let ms = |cycles: u32| f64::from(cycles) * cell.cycle_s() * 1e3;
     match reason {
         StopReason::Asked(signal) => match signal {
             libc::SIGINT => "stopped by Ctrl-C".to_owned(),
             libc::SIGTERM => "stopped by SIGTERM".to_owned(),
+            libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
+            libc::SIGHUP => "stopped as its terminal is gone (SIGHUP)".to_owned(),
             other => format!("stopped by signal {other}"),
         },
         StopReason::DriveFault { axis: index, code, following_error_m } => format!(
@@ -36,15 +49,13 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell) -> String {
                 axis(index)
             )
         }
-        StopReason::SilentAxis { axis: index, cycles } => format!(
-            "drive of {} is silent: no answer in {cycles} cycles ({:.0} ms)",
-            axis(index),
-            ms(cycles)
-        ),
+        StopReason::SilentAxis { axis: index, cycles } => {
+            format!("drive of {} is silent: {}", axis(index), unanswered(cycles))
+        }
         StopReason::SilentTool { cycles } => format!(
-            "tool measurement (node {}) is silent: no answer in {cycles} cycles ({:.0} ms)",
+            "tool measurement (node {}) is silent: {}",
             cell.tcp_encoder.map_or(0, |tool| tool.node),
-            ms(cycles)
+            unanswered(cycles)
         ),
         StopReason::NodeLeft { node } => {
             format!("node {node} restarted or left operation by itself")

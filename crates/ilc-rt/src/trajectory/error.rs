@@ -173,6 +173,18 @@ pub enum TrajectoryError {
     },
 }
 
+impl TrajectoryError {
+    /// The axis that the refusal is about, if it is about one.
+    pub fn axis(&self) -> Option<usize> {
+        match *self {
+            Self::AxisLimit { axis, .. }
+            | Self::Position { axis, .. }
+            | Self::Exceeds { axis, .. } => Some(axis),
+            _ => None,
+        }
+    }
+}
+
 /// What the user can do about a blended path that is too fast.
 struct Remedy(f64, f64, Option<f64>);
 

@@ -1,0 +1,269 @@
+"""What is seen from outside: a Zenoh subscriber beside the running programs."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import sqlite3
+import subprocess
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from processes_fixture import DEADLINE_S, PATIENT, Bench, Process, free_port, goodbye
+
+from ilc_rt.events import parse_event
+
+zenoh = pytest.importorskip("zenoh")
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+RUNS = 2
+
+
+def endpoint() -> str:
+    return f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+
+
+def telemetry(*, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> str:
+    """Return the section of a cell that stays on this computer."""
+    ends = f"listen = {json.dumps(list(listen))}\nconnect = {json.dumps(list(connect))}\n"
+    return f"\n[telemetry]\nscouting = false\n{ends}"
+
+
+class Watcher:
+    """A session that keeps all that it hears."""
+
+    def __init__(self, *, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> None:
+        config = zenoh.Config()
+        config.insert_json5("listen/endpoints", json.dumps(list(listen)))
+        config.insert_json5("connect/endpoints", json.dumps(list(connect)))
+        config.insert_json5("scouting/multicast/enabled", "false")
+        self.heard: dict[str, list[dict[str, Any]]] = {}
+        self.tokens: list[str] = []
+        self._news = threading.Condition()
+        self.session = zenoh.open(config)
+        self.session.liveliness().declare_subscriber(
+            "ilc/gantry/alive", self._on_token, history=True
+        )
+        self.session.declare_subscriber("ilc/gantry/*", self._on_value)
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        with self._news:
+            self.tokens.append("gone" if str(sample.kind).endswith("DELETE") else "alive")
+            self._news.notify_all()
+
+    def _on_value(self, sample: zenoh.Sample) -> None:
+        with self._news:
+            key = str(sample.key_expr).rpartition("/")[2]
+            self.heard.setdefault(key, []).append(json.loads(sample.payload.to_bytes()))
+            self._news.notify_all()
+
+    def wait_for_tokens(self, *tokens: str) -> None:
+        with self._news:
+            assert self._news.wait_for(lambda: self.tokens == list(tokens), DEADLINE_S), self.tokens
+
+    def states_asked(self) -> list[dict[str, Any]]:
+        """Ask for the state, as a late joiner does."""
+        replies = self.session.get("ilc/gantry/state", timeout=DEADLINE_S)
+        return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
+
+
+class Watched:
+    """Two runs by the clock, what was heard of them, and what is in the library."""
+
+    def __init__(self, folder: Path) -> None:
+        ours, theirs = endpoint(), endpoint()
+        with Bench(folder) as bench:
+            more = PATIENT + telemetry(listen=[theirs], connect=[ours])
+            cell = bench.cell(short=True, more=more)
+            watcher = Watcher(listen=[ours])
+            try:
+                bench.drives(cell)
+                self.controller = start(bench, cell, runs=RUNS)
+                watcher.wait_for_tokens("alive")
+                self.controller.event(event="progress")
+                late = Watcher(connect=[theirs])
+                try:
+                    late.wait_for_tokens("alive")
+                    self.states_asked = late.states_asked()
+                finally:
+                    late.session.close()
+                self.status = self.controller.end()
+                watcher.wait_for_tokens("alive", "gone")
+                # What was published before the token went has come before it.
+                self.heard = dict(watcher.heard)
+            finally:
+                watcher.session.close()
+            connection = sqlite3.connect(bench.library)
+            query = "SELECT reference_m, input, encoder_m, tool_m FROM iteration ORDER BY iteration"
+            self.rows = [
+                [np.frombuffer(blob).reshape(-1, 2) for blob in row]
+                for row in connection.execute(query)
+            ]
+            connection.close()
+
+
+def start(bench: Bench, cell: Path, *options: str, runs: int) -> Process:
+    """Start the controller with telemetry."""
+    return bench.start(
+        "ilc-rt", "run", cell, "--bus", bench.bus, "--iterations", str(runs),
+        "--library", bench.library, "--events", *options,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Watched:
+    """Return two runs that were watched."""
+    return Watched(tmp_path_factory.mktemp("watched"))
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with Bench(tmp_path) as bench:
+        yield bench
+
+
+def test_the_same_events_are_heard_as_are_printed(watched: Watched) -> None:
+    """Under their keys, in order, none missing and none more."""
+    assert watched.status == 0, watched.controller.errors
+    assert watched.controller.errors == []
+    assert set(watched.heard) == {"state", "iteration", "latency", "servo"}
+    for key, kinds in {
+        "state": {"start", "state", "progress", "end"},
+        "iteration": {"iteration"},
+        "latency": {"latency"},
+    }.items():
+        printed = [event for event in watched.controller.events if event["event"] in kinds]
+        assert watched.heard[key] == printed
+        assert all(parse_event(json.dumps(event)) is not None for event in watched.heard[key])
+
+
+def test_the_error_is_seen_to_fall(watched: Watched) -> None:
+    """One object a run."""
+    first, second = watched.heard["iteration"]
+    assert (first["index"], second["index"]) == (0, 1)
+    assert second["tracking_rms_m"] < 0.5 * first["tracking_rms_m"]
+
+
+def test_servo_batches_are_the_samples_of_the_runs(watched: Watched) -> None:
+    """50 ms each, in order; bit for bit what the library has of the same samples."""
+    batches = watched.heard["servo"]
+    first_syncs = [batch["first_sync"] for batch in batches]
+    assert first_syncs == list(range(0, 25 * len(batches), 25))
+    signals = ("reference_m", "input", "encoder_m", "tool_m")
+    n_seen = 0
+    for batch in batches:
+        assert set(batch) == {"event", "first_sync", "iteration_and_sample", *signals}
+        assert len(batch["iteration_and_sample"]) == 25
+        arrays = [np.array(batch[name]) for name in signals]
+        assert all(array.shape == (25, 2) for array in arrays)
+        for row, at in enumerate(batch["iteration_and_sample"]):
+            if at is not None:
+                run, k = at
+                for array, kept in zip(arrays, watched.rows[run], strict=True):
+                    np.testing.assert_array_equal(array[row], kept[k])
+                n_seen += 1
+    assert n_seen == sum(len(row[0]) for row in watched.rows)
+
+
+def test_a_late_joiner_gets_the_state(watched: Watched) -> None:
+    """By asking; what passes by afterwards is only changes."""
+    (state,) = watched.states_asked
+    assert (state["event"], state["state"]) == ("state", "running")
+
+
+def test_a_fault_is_heard(bench: Bench) -> None:
+    """With the reason that is printed; then the controller is gone."""
+    ours = endpoint()
+    cell = bench.cell(short=True, more=telemetry(connect=[ours]))
+    watcher = Watcher(listen=[ours])
+    try:
+        bench.drives(cell, "--lockstep", "--mute", "1@0.5")
+        controller = start(bench, cell, "--lockstep", runs=10_000)
+        assert controller.end() == 3
+        watcher.wait_for_tokens("alive", "gone")
+        (fault,) = watcher.heard["fault"]
+        assert controller.errors[-1].endswith(fault["reason"])
+        assert watcher.heard["state"][-1]["status"] == "fault"
+    finally:
+        watcher.session.close()
+
+
+STOPPED_READER = """
+import json, os, signal, sys, zenoh
+config = zenoh.Config()
+config.insert_json5("listen/endpoints", json.dumps([sys.argv[1]]))
+config.insert_json5("scouting/multicast/enabled", "false")
+session = zenoh.open(config)
+def on_value(sample):
+    print("heard", flush=True)
+    os.kill(os.getpid(), signal.SIGSTOP)
+subscriber = session.declare_subscriber("ilc/**", on_value)
+print("ready", flush=True)
+signal.pause()
+"""
+
+
+def test_a_subscriber_that_stops_reading_holds_nobody_up(bench: Bench) -> None:
+    """Far more than the network's buffers hold: it is dropped, and the loop goes on."""
+    runs = 60
+    ours = endpoint()
+    quiet = bench.cell(short=True, name="quiet.toml")
+    cell = bench.cell(short=True, more=telemetry(connect=[ours]))
+    drives = bench.drives(cell, "--lockstep")
+    began = time.monotonic()
+    assert bench.controller(quiet, "--lockstep", runs=runs).end() == 0
+    unseen_s = time.monotonic() - began
+    goodbye(drives)
+
+    bench.drives(cell, "--lockstep")
+    reader = subprocess.Popen(
+        [sys.executable, "-c", STOPPED_READER, ours], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert reader.stdout is not None
+        assert reader.stdout.readline() == "ready\n"
+        began = time.monotonic()
+        controller = start(bench, cell, "--lockstep", runs=runs)
+        assert controller.end() == 0
+        seen_s = time.monotonic() - began
+        assert reader.stdout.readline() == "heard\n"
+    finally:
+        reader.send_signal(signal.SIGKILL)
+        reader.wait()
+        reader.stdout.close()
+    digests = [digest for _, _, digest in bench.kept()]
+    assert digests[:runs] == digests[runs:]
+    assert len(digests) == 2 * runs
+    # 60 s of motion, and no longer than 2 s for the good-bye that nobody hears.
+    assert seen_s < 2.0 * unseen_s + 4.0
+
+
+@pytest.mark.parametrize("wrong", ["tcp/203.0.113.7:7447", "tcp/127.0.0.1:1/nonsense", "nonsense"])
+def test_a_cell_runs_unseen_where_its_endpoint_cannot_be_opened(bench: Bench, wrong: str) -> None:
+    """A warning, and no more than that."""
+    cell = bench.cell(short=True, more=telemetry(listen=[wrong]))
+    bench.drives(cell, "--lockstep")
+    controller = start(bench, cell, "--lockstep", runs=2)
+    assert controller.end() == 0
+    (line,) = controller.errors
+    assert "[telemetry]" in line
+    assert "WARN" in line
+    assert "unseen" in line
+    assert len(bench.kept()) == 2
+
+
+def test_an_endpoint_that_is_not_there_is_waited_for_by_nobody(bench: Bench) -> None:
+    """A monitor's computer that is switched off."""
+    cell = bench.cell(short=True, more=telemetry(connect=[endpoint()]))
+    bench.drives(cell, "--lockstep")
+    controller = start(bench, cell, "--lockstep", runs=2)
+    assert controller.end(20.0) == 0
+    assert len(bench.kept()) == 2
