@@ -198,8 +198,7 @@ fn python_and_the_simulator_stay_outside_the_controller() {
     let mut wrong = Vec::new();
     for folder in ["crates/ilc-rt", "sim", "tests/rust"] {
         let manifest = std::fs::read_to_string(root.join(folder).join("Cargo.toml")).unwrap();
-        let dependencies =
-            manifest.lines().map(|line| line.split('#').next().unwrap_or("").trim());
+        let dependencies = manifest.lines().map(|line| line.split('#').next().unwrap_or("").trim());
         for line in dependencies {
             let name = line.split(['.', '=', ' ']).next().unwrap_or("");
             let is_forbidden = match name {
@@ -249,8 +248,7 @@ fn every_hot_file_is_fenced() {
         // The fence of a folder's head covers the folder.
         let covers = file.ancestors().skip(1).take_while(|folder| *folder != source);
         let heads = covers.map(|folder| folder.join("mod.rs")).filter(|head| head.is_file());
-        let is_fenced =
-            fenced(&file) || heads.map(|head| fenced(&head)).any(|is_fenced| is_fenced);
+        let is_fenced = fenced(&file) || heads.map(|head| fenced(&head)).any(|is_fenced| is_fenced);
         let is_listed = COLD_FILES.contains(&inside);
         let is_head = is_only_declarations(&std::fs::read_to_string(&file).unwrap());
         let is_test = inside.ends_with("/tests.rs") || inside.ends_with("/proof.rs");
