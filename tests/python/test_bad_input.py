@@ -6,7 +6,6 @@ import os
 import socket
 import subprocess
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,6 +13,7 @@ from processes_fixture import Bench, goodbye
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 #: What is replaced in the example cell, by what, and what the refusal has to name.
 CELLS = {
@@ -44,7 +44,10 @@ CELLS = {
     "one coordinate for two axes": (
         "to_m = [0.08, 0.04]", "to_m = [0.08]", ["1 to_m = [0.08]", "2 coordinates"],
     ),
-    "feed beyond the drive": ("feed_m_s = 0.1", "feed_m_s = 3.0", ["[program] (axis 1 is x)", "axis 1: acc", "limit 8 m/s^2"]),
+    "feed beyond the drive": (
+        "feed_m_s = 0.1", "feed_m_s = 3.0",
+        ["[program] (axis 1 is x)", "axis 1: acceleration", "limit 8 m/s^2"],
+    ),
     "measure without its encoder": (
         '[tcp_encoder]                    # a cross grid under the tool\n'
         'node = 10\ncounts_per_m = 1e8\n', "",

@@ -106,7 +106,7 @@ def test_a_reader_of_events_who_goes_stops_the_axes(bench: Bench, patient: Path)
 
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
 def test_drives_that_die_are_noticed(bench: Bench, pace: str) -> None:
-    """Kill -9 of all drives: exit status 3 soon, one line with axis, node and how long."""
+    """After kill -9 of all drives: exit status 3 soon, one line with axis, node and how long."""
     options = ["--lockstep"] if pace == "lockstep" else []
     cell = bench.cell(
         short=True, more="\n[safety]\nsilent_cycles_max = 100\nanswer_timeout_s = 1.0\n"
@@ -163,7 +163,7 @@ def test_a_tool_measurement_without_power_stops_both(bench: Bench) -> None:
 
 
 def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
-    """Kill -9 of the controller mid-run, then --resume with the same drives: all runs are there."""
+    """After kill -9 of the controller, --resume goes on with the same drives; all runs are there."""
     cell = bench.cell(short=True, more="\n[safety]\nsilent_cycles_max = 250\n")
     drives = bench.drives(cell)
     controller = bench.controller(cell, runs=4)

@@ -86,7 +86,7 @@ impl GantryAxis {
 /// # Real Time
 /// [`Plant::step`] allocates nothing.
 /// # Source
-/// - [haas2016], section 3.2: masses, bandwidth, the mode at 20 Hz, stiction, orthogonality.
+/// - \[haas2016\], section 3.2: masses, bandwidth, the mode at 20 Hz, stiction, orthogonality.
 #[derive(Clone, Debug)]
 pub struct Gantry {
     axes: Vec<GantryAxis>,

@@ -26,7 +26,7 @@ pub enum Method {
 /// - [`ModelError::SampleTime`] unless `dt_s` is finite and positive.
 /// - [`ModelError::Numerics`] if Tustin's rule meets a pole at `2/T`, or the exponential overflows.
 /// # Source
-/// - [franklin1998], Ch. 4 and 6.
+/// - \[franklin1998\], Ch. 4 and 6.
 pub fn discretize(model: &StateSpace, dt_s: f64, method: Method) -> Result<StateSpace, ModelError> {
     if let Some(dt_s) = model.dt_s() {
         return Err(ModelError::Discrete { action: "discretize", dt_s });

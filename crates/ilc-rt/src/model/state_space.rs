@@ -16,7 +16,7 @@ use super::ModelError;
 /// # Units
 /// - sample time in seconds; inputs and outputs in the units of the axis (SI)
 /// # Source
-/// - [haas2016], Eq. (2).
+/// - \[haas2016\], Eq. (2).
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateSpace {
     pub(super) a: DMatrix<f64>,
@@ -213,7 +213,7 @@ impl StateSpace {
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
     /// # Source
-    /// - [haas2016], Eq. (3), which leaves out the first block row and the last block column.
+    /// - \[haas2016\], Eq. (3), which leaves out the first block row and the last block column.
     pub fn lifted(&self, n_samples: usize) -> Result<DMatrix<f64>, ModelError> {
         let (p, m) = (self.n_outputs(), self.n_inputs());
         let parameters = self.markov(n_samples)?;

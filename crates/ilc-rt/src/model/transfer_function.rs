@@ -64,7 +64,7 @@ pub fn from_transfer_function(
 /// # Errors
 /// - [`ModelError::Parameter`] unless the frequency is positive and the damping is not negative.
 /// # Source
-/// - [haas2016], Eq. (13).
+/// - \[haas2016\], Eq. (13).
 pub fn second_order(natural_frequency_rad_s: f64, damping: f64) -> Result<StateSpace, ModelError> {
     let w0 = natural_frequency_rad_s;
     if !(w0.is_finite() && w0 > 0.0) {

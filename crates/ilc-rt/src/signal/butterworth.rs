@@ -22,7 +22,7 @@ pub const MAX_ORDER: usize = 12;
 /// # Errors
 /// - [`SignalError::Order`], [`SignalError::Cutoff`] or [`SignalError::SampleTime`].
 /// # Source
-/// - [oppenheim2009], Ch. 7: Butterworth poles and the bilinear rule.
+/// - \[oppenheim2009\], Ch. 7: Butterworth poles and the bilinear rule.
 pub fn butterworth(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Vec<Section>, SignalError> {
     if !(1..=MAX_ORDER).contains(&order) {
         return Err(SignalError::Order { order, max: MAX_ORDER });

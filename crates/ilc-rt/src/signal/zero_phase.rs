@@ -14,7 +14,7 @@ use super::{Section, SignalError, SosFilter};
 /// # Real Time
 /// Allocates when it is made, never in [`ZeroPhase::apply`].
 /// # Source
-/// - [gustafsson1996]: forward-backward filtering and its initial states.
+/// - \[gustafsson1996\]: forward-backward filtering and its initial states.
 #[derive(Debug, Clone)]
 pub struct ZeroPhase {
     filter: SosFilter,

@@ -2,7 +2,7 @@
 //!
 //! One request and one response type, used by the client of the controller and by the server of the
 //! simulated nodes. Block transfer is not spoken: it decodes to `None`, which a server answers with
-//! [`AbortCode::UnknownCommand`](super::AbortCode::UnknownCommand).
+//! [`AbortCode::UnknownCommand`].
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 

@@ -1,7 +1,7 @@
 //! One CAN frame in one datagram, as python-can's `udp_multicast` interface writes it.
 //!
 //! A msgpack map from the names of `can.Message`'s fields to their values. python-can refuses a map with
-//! names it does not know, so [`encode`] writes its eleven and no other; [`decode`] passes over what it
+//! names it does not know, so [`encode()`] writes its eleven and no other; [`decode()`] passes over what it
 //! does not know, in any order, and refuses what is not a classical data frame with an 11-bit identifier.
 //!
 //! Source: python-can 4, `can/interfaces/udp_multicast/utils.py`, `pack_message` and `unpack_message`.

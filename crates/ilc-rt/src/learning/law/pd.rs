@@ -48,7 +48,7 @@ enum Runner {
 /// # Real Time
 /// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples n_channels)`.
 /// # Source
-/// - [haas2016], Eq. (4); [dimarco2016], Eq. (3.2).
+/// - \[haas2016\], Eq. (4); \[dimarco2016\], Eq. (3.2).
 #[derive(Debug)]
 pub struct Pd {
     gains: PdGains,

@@ -49,7 +49,7 @@ pub trait Stages {
 /// `A~ = [A 0; 0 0]`, `B~ = [B; I]`, `C~ = [C 0; 0 -I]`, `D~ = [D; I]`, `Q~ = diag(Q, W)`, `W_0 = 0`.
 ///
 /// # Source
-/// - [haas2016], Eq. (7) and (10).
+/// - \[haas2016\], Eq. (7) and (10).
 #[derive(Debug)]
 pub struct Rate<S> {
     /// The problem without the penalty.

@@ -23,7 +23,7 @@ use pairing::Paired;
 /// # Units
 /// - only the ratios matter; with error and input in metres all four are numbers without unit
 /// # Source
-/// - [barton2010], Eq. (3.13): `q`, `s`, `r`; [haas2016], Eq. (7): `rate`, there `d`.
+/// - \[barton2010\], Eq. (3.13): `q`, `s`, `r`; \[haas2016\], Eq. (7): `rate`, there `d`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weights {
     /// Weight of the predicted error.
@@ -58,7 +58,7 @@ impl Default for Weights {
 /// # Real Time
 /// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` time and memory.
 /// # Source
-/// - [haas2016], Eq. (5) to (12); [barton2010], Eq. (3.13) to (3.15). They solve the same problem
+/// - \[haas2016\], Eq. (5) to (12); \[barton2010\], Eq. (3.13) to (3.15). They solve the same problem
 ///   with dense matrices; here it is solved by a Riccati recursion.
 #[derive(Debug)]
 pub struct NormOptimal {
