@@ -300,10 +300,14 @@ impl Rig {
 }
 
 /// Writes a number of 32 bits into an object of a node, as any master on the bus could.
+///
+/// # Panics
+/// Never: eight bytes fit a frame.
 pub fn write_object(node: u8, index: u16, value: u32) -> impl Fn(&mut Machine) {
     let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
-    let request = Frame::new(0x600 + u16::from(node), &[0x23, low, high, 0, a, b, c, d]);
-    move |machine| machine.receive(&request.expect("eight bytes"), &mut |_| {})
+    let request = Frame::new(0x600 + u16::from(node), &[0x23, low, high, 0, a, b, c, d])
+        .expect("eight bytes");
+    move |machine| machine.receive(&request, &mut |_| {})
 }
 
 /// A node number that is one.

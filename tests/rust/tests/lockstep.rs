@@ -76,23 +76,22 @@ fn parallel_learning_falls_by_four_fifths_and_stays_there() {
     assert!(kept.outcome.runs.iter().all(|(_, figures)| !figures.rolled_back));
 }
 
-/// The gantry with the PD law, gains as in the comment of each line.
-fn pd_cell(name: &str, kp: f64) -> Cell {
-    let text = example_text(name);
+/// The gantry with the PD law. The lead is the delay of its axes at low frequency: `2 d / w0`, 10
+/// samples for y and 11 for x; the low-pass is below the frequency where that no longer holds.
+fn pd_cell() -> Cell {
+    let text = example_text("01_gantry.toml");
     let learning = text.find("[learning]").unwrap();
-    let input_max =
-        if name.starts_with("01") { "input_max_m = 0.005" } else { "input_max_m_s = 0.1" };
     let text = format!(
-        "{}[learning]\nlaw = \"pd\"\nmeasure = \"tcp\"\n{input_max}\n[learning.pd]\nkp = {kp}\n\
-         lead_samples = 10\norder = 2\ncutoff_hz = 8.0\n",
+        "{}[learning]\nlaw = \"pd\"\nmeasure = \"tcp\"\ninput_max_m = 0.005\n[learning.pd]\n\
+         kp = 0.5\nlead_samples = 10\norder = 2\ncutoff_hz = 8.0\n",
         &text[..learning]
     );
-    Cell::parse(&text, name).unwrap()
+    Cell::parse(&text, "pd.toml").unwrap()
 }
 
 #[test]
 fn the_pd_law_learns_too() {
-    let kept = run(&pd_cell("01_gantry.toml", 0.5), 10, None);
+    let kept = run(&pd_cell(), 10, None);
     let rms_m = |index: usize| kept.outcome.runs[index].1.tracking_rms_m;
     println!("{}; tracking rms {} to {} m", describe(&kept), rms_m(0), rms_m(9));
     completed(&kept, 10);

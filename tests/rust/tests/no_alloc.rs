@@ -93,13 +93,13 @@ impl Watched {
         status
     }
 
-    fn into_run(&mut self, run: u32, sample: u32) {
+    fn tick_into_run(&mut self, run: u32, sample: u32) {
         while self.rig.samples.last().is_none_or(|last| last.at != Some((run, sample))) {
             assert_eq!(self.tick(0), TickStatus::Running, "{:?}", self.rig.reason);
         }
     }
 
-    fn to_end(&mut self) {
+    fn tick_to_end(&mut self) {
         while self.tick(0) == TickStatus::Running {
             assert!(self.n_ticks < 100_000, "never stopped");
         }
@@ -136,14 +136,14 @@ fn whole_campaigns_with_swapped_tables() {
     for name in CELLS {
         let mut watched = Watched::new(&short(name), 4);
         for number in 1..4 {
-            watched.into_run(number - 1, MIDDLE);
+            watched.tick_into_run(number - 1, MIDDLE);
             // Two tables at once: the older one is skipped, and both it and the last go back.
             for newer in [0, 1] {
                 let size = table(watched.rig.n_samples);
                 watched.rig.mail.send_table(2 * number + newer, size).unwrap();
             }
         }
-        watched.to_end();
+        watched.tick_to_end();
         assert_eq!(watched.rig.started, [(0, 0), (1, 3), (2, 5), (3, 7)], "{name}");
         assert_eq!(watched.rig.reason, None);
         let expected = ["disabling", "enabling", "returning", "running", "settling", "stopped"];
@@ -184,9 +184,9 @@ fn stops_of_every_kind() {
     for name in CELLS {
         for (what, break_it) in breaks {
             let mut watched = Watched::new(&short(name), 2);
-            watched.into_run(0, MIDDLE);
+            watched.tick_into_run(0, MIDDLE);
             break_it(&mut watched);
-            watched.to_end();
+            watched.tick_to_end();
             // A velocity-commanded drive has no following error of its own.
             let has_reason = !(what == "drive fault" && name == CELLS[1]);
             assert_eq!(watched.rig.reason.is_some(), has_reason, "{name} {what}");

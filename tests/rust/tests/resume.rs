@@ -134,15 +134,15 @@ impl Law for Fickle {
     }
 }
 
-fn fickle(n_good: u32, bad_gain: f64) -> Option<Box<dyn Law>> {
-    Some(Box::new(Fickle { n_good, n_updates: 0, bad_gain }))
+fn fickle(n_good: u32, bad_gain: f64) -> Box<dyn Law> {
+    Box::new(Fickle { n_good, n_updates: 0, bad_gain })
 }
 
 #[test]
 fn what_grows_is_rolled_back_twice_and_then_learning_is_off() {
     let (cell, scratch) = (short("01_gantry.toml"), Scratch::new());
     let options = options(scratch.file("library.db"), 9);
-    let law = fickle(2, -4.0);
+    let law = Some(fickle(2, -4.0));
     let outcome = supervisor::run(&cell, &options, in_process(&cell), law, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
     let rms: Vec<f64> = outcome.runs.iter().map(|(_, figures)| figures.tracking_rms_m).collect();
@@ -165,7 +165,7 @@ fn what_grows_is_rolled_back_twice_and_then_learning_is_off() {
 fn a_law_that_answers_nonsense_stops_the_axes() {
     let (cell, scratch) = (short("01_gantry.toml"), Scratch::new());
     let options = options(scratch.file("library.db"), 9);
-    let law = fickle(1, f64::NAN);
+    let law = Some(fickle(1, f64::NAN));
     let outcome = supervisor::run(&cell, &options, in_process(&cell), law, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Fault);
     assert!(outcome.reason.contains("not a finite number"), "{}", outcome.reason);

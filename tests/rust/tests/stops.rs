@@ -62,7 +62,7 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
     let dt_s = cell.cycle_s();
     let line = rig.tap.line();
     let rows: Vec<_> = line.rows().collect();
-    let stop_at = rig.stopping_at.expect("a stop");
+    let stop_at = rig.stopping_at.unwrap();
     for &axis in axes {
         let spec = &cell.axes[axis];
         let scale = spec.counts_per_m;
