@@ -77,7 +77,8 @@ pub fn run_on(cell: &Cell, bus: Box<dyn Bus>, iterations: u32, measure: Option<M
     let library = Library::open(&library).expect("the library opens");
     let rows = library.list(Some(&outcome.campaign)).expect("the library lists");
     // Loading checks each array against its digest.
-    let digests = rows.iter().map(|row| library.load(row.id).expect("a whole row").digest).collect();
+    let digests =
+        rows.iter().map(|row| library.load(row.id).expect("a whole row").digest).collect();
     Kept { outcome, digests }
 }
 

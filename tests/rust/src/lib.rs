@@ -45,7 +45,8 @@ pub fn short(name: &str) -> Cell {
     let text = example_text(name);
     let program = text.find("[[program.segment]]").expect("a program");
     let learning = text.find("[learning]").expect("a learning section");
-    let segments = "[[program.segment]]\nto_m = [0.08, 0.02]\n[[program.segment]]\nto_m = [0.06, 0.04]\n\n";
+    let segments =
+        "[[program.segment]]\nto_m = [0.08, 0.02]\n[[program.segment]]\nto_m = [0.06, 0.04]\n\n";
     let text = format!("{}{segments}{}", &text[..program], &text[learning..]);
     Cell::parse(&text, name).expect("the shortened example is valid")
 }

@@ -7,14 +7,10 @@ use std::time::Duration;
 
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{
-    Command, DriveSetup, Mode, State, bring_up, bring_up_encoder,
-};
+use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Mode, State, bring_up, bring_up_encoder};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
-use ilc_rt::servo::{
-    Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox,
-};
+use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};
 use ilc_rt::supervisor::Plan;
 use ilc_sim::Machine;
 
@@ -169,6 +165,8 @@ pub struct Rig {
     pub started: Vec<(u32, u32)>,
     /// The phase, and the SYNCs sent when it began.
     pub phase: (PhaseName, usize),
+    /// Velocity of each axis of the plant when the drives were told to switch off.
+    pub rest_m_s: Vec<f64>,
     /// Samples in a run.
     pub n_samples: usize,
     stop: Arc<AtomicI32>,
@@ -220,6 +218,7 @@ impl Rig {
             ended: Vec::new(),
             started: Vec::new(),
             phase: (PhaseName::Enabling, 0),
+            rest_m_s: Vec::new(),
             n_samples,
             stop,
         }
@@ -243,7 +242,15 @@ impl Rig {
         while let Some(message) = self.mail.read() {
             match message {
                 Message::Sample(sample) => self.samples.push(sample),
-                Message::Phase(phase, _) => self.phase = (phase, n_syncs),
+                Message::Phase(phase, _) => {
+                    self.phase = (phase, n_syncs);
+                    if phase == PhaseName::Disabling {
+                        let line = self.tap.line();
+                        let plant = line.machine().plant();
+                        let axes = 0..plant.n_axes();
+                        self.rest_m_s = axes.map(|axis| plant.encoder_velocity_m_s(axis)).collect();
+                    }
+                }
                 Message::RunStarted { run, table } => self.started.push((run, table)),
                 Message::RunEnded { run, overruns } => self.ended.push((run, overruns)),
                 Message::Stopping(reason) => {

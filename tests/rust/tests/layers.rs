@@ -79,25 +79,30 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The source without comments and without its test module, which may import what it tests with.
+/// The source without comments and without its test modules, which may import what they test with.
 fn code(text: &str) -> String {
-    let code = text.lines().map(|line| line.split("//").next().unwrap_or(""));
     let mut kept = String::new();
-    let mut attributes = String::new();
-    for line in code {
-        // A test module is the last item of a file here: what follows its attribute is left out.
-        if line.trim_start().starts_with("#[cfg(test)]") {
-            attributes.push('t');
-        }
-        if !attributes.is_empty() && line.trim_start().starts_with("mod ") {
-            if line.contains('{') {
-                break;
+    let mut is_for_tests = false;
+    let mut ends_with = None;
+    for line in text.lines() {
+        let code = line.split("//").next().unwrap_or("");
+        let indent = &line[..line.len() - line.trim_start().len()];
+        if let Some(end) = &ends_with {
+            // As it is formatted, a module ends with the first brace that is as far left as it is.
+            if line == end {
+                ends_with = None;
             }
-            attributes.clear();
-            continue;
+        } else if code.trim_start().starts_with("#[cfg(test)]") {
+            is_for_tests = true;
+        } else if is_for_tests && code.trim_start().starts_with("mod ") {
+            is_for_tests = false;
+            if code.contains('{') && !code.contains('}') {
+                ends_with = Some(format!("{indent}}}"));
+            }
+        } else {
+            kept.push_str(code);
+            kept.push('\n');
         }
-        kept.push_str(line);
-        kept.push('\n');
     }
     kept
 }
@@ -150,9 +155,10 @@ fn top_level(file: &Path, source: &Path) -> String {
 fn the_reader_of_imports_reads_what_rust_allows() {
     let code = code(
         "use crate::servo::Cycle; // crate::cli\nuse crate::{record::{Event, Meta}, rt};\n\
-         fn f() { crate::model::g(); other_crate::signal::h() }\n#[cfg(test)]\nmod tests { use crate::cli; }",
+         fn f() { crate::model::g(); other_crate::signal::h() }\n#[cfg(test)]\n\
+         #[allow(x)]\nmod tests {\n    use crate::cli;\n}\nfn k() { crate::library::l() }",
     );
-    let expected = ["model", "record", "rt", "servo"].map(str::to_owned);
+    let expected = ["library", "model", "record", "rt", "servo"].map(str::to_owned);
     assert_eq!(imports(&code), BTreeSet::from(expected));
 }
 
@@ -198,8 +204,7 @@ fn python_and_the_simulator_stay_outside_the_controller() {
     let mut wrong = Vec::new();
     for folder in ["crates/ilc-rt", "sim", "tests/rust"] {
         let manifest = std::fs::read_to_string(root.join(folder).join("Cargo.toml")).unwrap();
-        let dependencies =
-            manifest.lines().map(|line| line.split('#').next().unwrap_or("").trim());
+        let dependencies = manifest.lines().map(|line| line.split('#').next().unwrap_or("").trim());
         for line in dependencies {
             let name = line.split(['.', '=', ' ']).next().unwrap_or("");
             let is_forbidden = match name {
@@ -249,8 +254,7 @@ fn every_hot_file_is_fenced() {
         // The fence of a folder's head covers the folder.
         let covers = file.ancestors().skip(1).take_while(|folder| *folder != source);
         let heads = covers.map(|folder| folder.join("mod.rs")).filter(|head| head.is_file());
-        let is_fenced =
-            fenced(&file) || heads.map(|head| fenced(&head)).any(|is_fenced| is_fenced);
+        let is_fenced = fenced(&file) || heads.map(|head| fenced(&head)).any(|is_fenced| is_fenced);
         let is_listed = COLD_FILES.contains(&inside);
         let is_head = is_only_declarations(&std::fs::read_to_string(&file).unwrap());
         let is_test = inside.ends_with("/tests.rs") || inside.ends_with("/proof.rs");

@@ -80,7 +80,8 @@ fn parallel_learning_falls_by_four_fifths_and_stays_there() {
 fn pd_cell(name: &str, kp: f64) -> Cell {
     let text = example_text(name);
     let learning = text.find("[learning]").unwrap();
-    let input_max = if name.starts_with("01") { "input_max_m = 0.005" } else { "input_max_m_s = 0.1" };
+    let input_max =
+        if name.starts_with("01") { "input_max_m = 0.005" } else { "input_max_m_s = 0.1" };
     let text = format!(
         "{}[learning]\nlaw = \"pd\"\nmeasure = \"tcp\"\n{input_max}\n[learning.pd]\nkp = {kp}\n\
          lead_samples = 10\norder = 2\ncutoff_hz = 8.0\n",
@@ -159,8 +160,7 @@ fn the_same_over_zenoh() {
     compare("zenoh", || {
         for _ in 0..10 {
             // Free when asked; if somebody takes it before Zenoh does, the next one will do.
-            let port =
-                TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+            let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
             let open = |role: &str| {
                 let address = format!("zenoh:test/cell?{role}=tcp/127.0.0.1:{port}&scouting=off");
                 let Ok(Address::Zenoh(settings)) = address.parse() else {

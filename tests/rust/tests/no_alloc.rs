@@ -3,7 +3,11 @@
 //! Every tick of whole campaigns is counted, phase by phase: with the simulated machine inside, which
 //! allocates nothing either once it is set up.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and prints figures")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may panic, and prints figures"
+)]
 #![expect(unsafe_code, reason = "a global allocator is an unsafe trait")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
