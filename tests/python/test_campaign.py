@@ -115,7 +115,7 @@ def test_a_law_written_in_python_is_asked_between_the_runs(gantry: Path, tmp_pat
 
 
 def test_a_late_law_costs_a_run_and_is_counted(gantry: Path, tmp_path: Path) -> None:
-    """By the clock nobody waits for the law: the old input is repeated until the new one is there."""
+    """By the clock nobody waits for the law: the old input is repeated until it has answered."""
     program, first, *_ = gantry.read_text().split("[[program.segment]]")
     learning = gantry.read_text().partition("[learning]")
     cell = tmp_path / "short.toml"

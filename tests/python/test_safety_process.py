@@ -163,7 +163,7 @@ def test_a_tool_measurement_without_power_stops_both(bench: Bench) -> None:
 
 
 def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
-    """After kill -9 of the controller, --resume goes on with the same drives; all runs are there."""
+    """After kill -9 of the controller, --resume goes on with the same drives; no run is lost."""
     cell = bench.cell(short=True, more="\n[safety]\nsilent_cycles_max = 250\n")
     drives = bench.drives(cell)
     controller = bench.controller(cell, runs=4)

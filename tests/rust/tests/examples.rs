@@ -1,18 +1,13 @@
 //! The examples in Rust run, and learn.
 
-use std::path::PathBuf;
 use std::process::Command;
-
-/// Where cargo puts an example: beside the folder of this test's own binary.
-fn example(name: &str) -> PathBuf {
-    let test = std::env::current_exe().unwrap();
-    let release = test.parent().and_then(|deps| deps.parent()).unwrap();
-    release.join("examples").join(name)
-}
 
 #[test]
 fn the_gantry_learns_its_contour() {
-    let output = Command::new(example("01_gantry")).output().unwrap();
+    // Cargo puts examples beside the folder of this test's own binary.
+    let test = std::env::current_exe().unwrap();
+    let release = test.parent().and_then(|deps| deps.parent()).unwrap();
+    let output = Command::new(release.join("examples/01_gantry")).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     let contours_um: Vec<f64> = text
