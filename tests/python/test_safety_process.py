@@ -104,6 +104,22 @@ def test_a_reader_of_events_who_goes_stops_the_axes(bench: Bench, patient: Path)
     assert BOTH_OFF in goodbye(drives)
 
 
+def test_a_reader_of_the_table_who_goes_stops_nothing(bench: Bench, patient: Path) -> None:
+    """As in `ilc-rt run | head -1`: the runs are made and kept, drives off, no panic."""
+    drives = bench.drives(patient, "--lockstep")
+    reading, writing = os.pipe()
+    controller = bench.start(
+        "ilc-rt", "run", patient, "--bus", bench.bus, "--lockstep", "--iterations", "2",
+        "--library", bench.library, "--no-telemetry", stdout=writing,
+    )  # fmt: skip
+    os.close(writing)
+    os.close(reading)
+    assert controller.end() == 0
+    assert controller.errors == []
+    assert [index for _, index, _ in bench.kept()] == [0, 1]
+    assert BOTH_OFF in goodbye(drives)
+
+
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
 def test_drives_that_die_are_noticed(bench: Bench, pace: str) -> None:
     """After kill -9 of all drives: exit status 3 soon, one line with axis, node and how long."""
@@ -163,7 +179,7 @@ def test_a_tool_measurement_without_power_stops_both(bench: Bench) -> None:
 
 
 def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
-    """After kill -9 of the controller, --resume goes on with the same drives; no run is lost."""
+    """After kill -9 of the controller, --resume goes on with the same drives and loses no run."""
     cell = bench.cell(short=True, more="\n[safety]\nsilent_cycles_max = 250\n")
     drives = bench.drives(cell)
     controller = bench.controller(cell, runs=4)

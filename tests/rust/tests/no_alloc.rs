@@ -8,56 +8,16 @@
     clippy::print_stdout,
     reason = "a test may panic, and prints figures"
 )]
-#![expect(unsafe_code, reason = "a global allocator is an unsafe trait")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell as Counter;
 use std::collections::BTreeSet;
 
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::NmtCommand;
 use ilc_rt::fieldbus::transport::Responder;
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
+use ilc_tests::counting::{Counting, allocations, deallocations};
 use ilc_tests::rig::{Rig, node, write_object};
 use ilc_tests::short;
-
-struct Counting;
-
-thread_local! {
-    // Per thread, because the test harness allocates on its own threads meanwhile.
-    static COUNTING: Counter<bool> = const { Counter::new(false) };
-    static ALLOCATIONS: Counter<u64> = const { Counter::new(0) };
-    static DEALLOCATIONS: Counter<u64> = const { Counter::new(0) };
-}
-
-fn count(what: &'static std::thread::LocalKey<Counter<u64>>) {
-    if COUNTING.get() {
-        what.set(what.get() + 1);
-    }
-}
-
-// SAFETY: every call is handed to the system allocator unchanged; counting touches no memory but
-// thread-local cells that need no set-up.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(&ALLOCATIONS);
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count(&DEALLOCATIONS);
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count(&ALLOCATIONS);
-        count(&DEALLOCATIONS);
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -79,15 +39,12 @@ impl Watched {
 
     fn tick(&mut self, missed: u32) -> TickStatus {
         let n_syncs = self.rig.tap.line().n_syncs();
-        ALLOCATIONS.set(0);
-        DEALLOCATIONS.set(0);
-        COUNTING.set(true);
+        let before = (allocations(), deallocations());
         let status = self.rig.cycle.tick(missed);
-        COUNTING.set(false);
-        let counted = (ALLOCATIONS.get(), DEALLOCATIONS.get());
+        let after = (allocations(), deallocations());
         self.rig.read_mail(n_syncs);
         let phase = name(self.rig.phase.0);
-        assert_eq!(counted, (0, 0), "allocations and deallocations in {phase}");
+        assert_eq!(after, before, "allocations and deallocations in {phase}");
         self.phases.insert(phase);
         self.n_ticks += 1;
         status
@@ -125,10 +82,9 @@ fn table(n_samples: usize) -> Box<[f64]> {
 
 #[test]
 fn the_counter_counts() {
-    COUNTING.set(true);
+    let before = (allocations(), deallocations());
     drop(std::hint::black_box(Box::new(1)));
-    COUNTING.set(false);
-    assert_eq!((ALLOCATIONS.get(), DEALLOCATIONS.get()), (1, 1));
+    assert_eq!((allocations(), deallocations()), (before.0 + 1, before.1 + 1));
 }
 
 #[test]
