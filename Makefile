@@ -76,9 +76,9 @@ docs: ## Rust documentation, with warnings denied
 bench: ## Speed, as ratios
 	cargo bench --workspace
 
-rt: ## What is promised of the tick: no allocation, exact repetition; and this machine's punctuality
+rt: build ## What is promised of the tick: no allocation, exact repetition; and this machine's punctuality
 	cargo nextest run --release --workspace -E 'binary(no_alloc) | binary(no_alloc_learning) | binary(lockstep)'
-	cargo run --release --workspace --bin ilc-rt -- latency --seconds 5
+	$(BIN)/ilc-rt latency --seconds 5
 
 clean: ## Remove what was built
 	rm -rf build $(VENV)

@@ -105,9 +105,10 @@ mod tests {
     #[test]
     fn when_sync_stays_away_time_goes_on() {
         let mut clock = locked(10);
-        assert_eq!(clock.idle(CYCLE * 14), 0);
-        assert_eq!(clock.idle(CYCLE * 16), 6 * STEPS);
-        assert_eq!(clock.idle(CYCLE * 17), STEPS);
-        assert_eq!(clock.at_sync(CYCLE * 18), STEPS);
+        let lost = 10 + LOST_AFTER;
+        assert_eq!(clock.idle(CYCLE * (lost - 1)), 0);
+        assert_eq!(clock.idle(CYCLE * (lost + 1)), (LOST_AFTER + 1) * STEPS);
+        assert_eq!(clock.idle(CYCLE * (lost + 2)), STEPS);
+        assert_eq!(clock.at_sync(CYCLE * (lost + 3)), STEPS);
     }
 }

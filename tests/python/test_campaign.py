@@ -7,6 +7,7 @@ import json
 import os
 import signal
 import sys
+import threading
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ from ilc_rt.events import (
     IterationEvent,
     LatencyEvent,
     StartEvent,
+    StateEvent,
     event_payload,
     parse_event,
 )
@@ -110,6 +112,35 @@ def test_a_law_written_in_python_is_asked_between_the_runs(gantry: Path, tmp_pat
     assert law.asked
     assert set(law.asked) == {records[0].reference_m.shape}
     np.testing.assert_allclose(records[1].input, 1e-5)
+
+
+def test_a_late_law_costs_a_run_and_is_counted(gantry: Path, tmp_path: Path) -> None:
+    """By the clock nobody waits for the law: the old input is repeated until it has answered."""
+    program, first, *_ = gantry.read_text().split("[[program.segment]]")
+    learning = gantry.read_text().partition("[learning]")
+    cell = tmp_path / "short.toml"
+    cell.write_text("[[program.segment]]".join([program, first]) + "".join(learning[1:]))
+
+    class Slow:
+        def __init__(self) -> None:
+            self.may_answer = threading.Event()
+
+        def update(self, u: np.ndarray, e: np.ndarray, disturbance: object = None) -> np.ndarray:
+            del e, disturbance
+            assert self.may_answer.wait(30.0)
+            return np.full_like(u, 1e-5)
+
+    law = Slow()
+    campaign = Campaign(
+        cell, law=law, library=tmp_path / "l.db", bus="udp:239.74.163.2:43391", lockstep=False
+    )
+    for event in campaign.events(3):
+        if isinstance(event, StateEvent) and (event.state, event.iteration) == ("running", 1):
+            law.may_answer.set()
+    records = campaign.result.records
+    assert [record.late_updates for record in records] == [0, 1, 1]
+    np.testing.assert_array_equal(records[1].input, 0.0)
+    np.testing.assert_allclose(records[2].input, 1e-5)
 
 
 def test_a_law_that_fails_is_a_fault_that_names_it(gantry: Path, tmp_path: Path) -> None:

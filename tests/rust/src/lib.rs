@@ -1,1 +1,88 @@
-//! Shared set-up of the integration tests.
+//! Shared set-up of the integration tests: the example cells, whole campaigns on simulated drives, and
+//! a servo cycle that is ticked by hand.
+//!
+//! [`campaign`] runs the supervisor as a user does; [`far_side`] puts the simulated machine on a bus in
+//! a thread of its own; [`rig`] is the loop alone, on a bus that records every command and lets a test
+//! break things in the middle of a run; [`counting`] is an allocator that counts.
+
+#![expect(clippy::expect_used, reason = "a test fails where its set-up does")]
+
+pub mod campaign;
+pub mod counting;
+pub mod far_side;
+pub mod rig;
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use ilc_rt::config::Cell;
+
+/// The path of an example, as `01_gantry.toml`.
+pub fn example_path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(name)
+}
+
+/// The text of an example.
+///
+/// # Panics
+/// If there is no such example.
+pub fn example_text(name: &str) -> String {
+    std::fs::read_to_string(example_path(name)).expect("the example is there")
+}
+
+/// An example, validated.
+///
+/// # Panics
+/// If the example is not valid.
+pub fn example(name: &str) -> Cell {
+    Cell::load(&example_path(name)).expect("the example is valid")
+}
+
+/// The gantry on a program of two short moves, where a run is over in 0.7 s.
+///
+/// # Panics
+/// If the example is not valid.
+pub fn short(name: &str) -> Cell {
+    let text = example_text(name);
+    let program = text.find("[[program.segment]]").expect("a program");
+    let learning = text.find("[learning]").expect("a learning section");
+    let segments =
+        "[[program.segment]]\nto_m = [0.08, 0.02]\n[[program.segment]]\nto_m = [0.06, 0.04]\n\n";
+    let text = format!("{}{segments}{}", &text[..program], &text[learning..]);
+    Cell::parse(&text, name).expect("the shortened example is valid")
+}
+
+/// A folder that is gone when dropped.
+#[derive(Debug)]
+pub struct Scratch(PathBuf);
+
+impl Scratch {
+    /// A new, empty folder.
+    ///
+    /// # Panics
+    /// If it cannot be made.
+    pub fn new() -> Self {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("ilc-test-{}-{number}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("a folder for temporary files");
+        Self(path)
+    }
+
+    /// A file in it.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}

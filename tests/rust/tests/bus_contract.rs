@@ -11,7 +11,6 @@
     reason = "a test may panic, and prints figures and what it skips"
 )]
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::fs::File;
 use std::net::{TcpListener, UdpSocket};
@@ -19,6 +18,7 @@ use std::time::{Duration, Instant};
 
 use ilc_rt::fieldbus::transport::{self, InProcess, Responder, ZenohBus, loopback, udp_codec};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
+use ilc_tests::counting::{Counting, allocations};
 
 type Ends = (Box<dyn Bus>, Box<dyn Bus>);
 
@@ -150,33 +150,8 @@ fn allocates_nothing_in_the_callers_thread((mut a, mut b): Ends) {
     assert_ne!(allocations() - before, 0, "the count counts");
 }
 
-/// The system's allocator, counting the requests of each thread.
-struct Counting;
-
-thread_local!(static ALLOCATIONS: Cell<u64> = const { Cell::new(0) });
-
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
-
-fn allocations() -> u64 {
-    ALLOCATIONS.get()
-}
-
-#[expect(unsafe_code, reason = "an allocator is")]
-// SAFETY: every request goes on to the system's allocator as it came.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // Gone when a thread ends; what is allocated then is nobody's to count.
-        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's promises about `layout` are the ones asked for here.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: `memory` came from `alloc` above, with this layout.
-        unsafe { System.dealloc(memory, layout) }
-    }
-}
 
 macro_rules! contract {
     ($transport:ident, $make:expr, [$($case:ident),* $(,)?]) => {

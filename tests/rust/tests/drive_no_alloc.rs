@@ -1,10 +1,6 @@
 //! Simulated drives allocate nothing once they are set up: in lock-step they run inside the
 //! controller's own tick.
 
-#![expect(unsafe_code, reason = "a global allocator is an unsafe trait")]
-
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell as Counter;
 use std::path::Path;
 use std::time::Duration;
 
@@ -14,37 +10,10 @@ use ilc_rt::fieldbus::cia402::{Command, Controlword, DriveSetup, Mode, State, br
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_sim::{ClockMode, Machine};
-
-struct Counting;
-
-thread_local! {
-    // Per thread, because the test harness allocates on its own threads meanwhile.
-    static ALLOCATIONS: Counter<u64> = const { Counter::new(0) };
-}
-
-// SAFETY: every call is handed to the system allocator unchanged; counting touches no memory but a
-// thread-local cell that needs no set-up.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
+use ilc_tests::counting::{Counting, allocations};
 
 #[global_allocator]
-static COUNTING: Counting = Counting;
+static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn cycles_faults_and_questions_allocate_nothing() {
@@ -66,7 +35,7 @@ fn cycles_faults_and_questions_allocate_nothing() {
     let question = Frame::new(0x601, &[0x40, 0x08, 0x10, 0, 0, 0, 0, 0]).unwrap();
     let start_counts = 4_000_000;
 
-    let before = ALLOCATIONS.get();
+    let before = allocations();
     for cycle in 0..500 {
         let controlword = match cycle {
             0..5 => Controlword::SHUTDOWN,
@@ -83,7 +52,7 @@ fn cycles_faults_and_questions_allocate_nothing() {
         bus.send(&sync::frame()).unwrap();
         while bus.recv(Duration::ZERO).unwrap().is_some() {}
     }
-    let after = ALLOCATIONS.get();
+    let after = allocations();
 
     assert_eq!(bus.responder().drive_state(node), Some(State::Fault));
     assert_eq!(after - before, 0);

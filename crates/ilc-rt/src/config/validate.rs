@@ -18,7 +18,7 @@ pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigE
         .lines()
         .rev()
         .chain(std::iter::once(""))
-        .map(str::trim)
+        .map(|row| row.split('#').next().unwrap_or("").trim())
         .find(|row| row.starts_with('['))
         .unwrap_or("top level");
     let row = text.lines().nth(line - 1).unwrap_or("").trim();

@@ -110,13 +110,14 @@ impl Cycle {
     }
 
     fn running(&mut self, sample: u32) -> Option<(u32, u32)> {
-        self.reference = self.interpolator.next();
         let row = self.table_row(sample as usize);
         let n_axes = self.n_axes();
         if let Err(axis) = self.input.follow(&row[..n_axes]) {
             self.begin_stop(StopReason::NotFinite { axis });
-            return None;
+            // The stop has taken over the learned input, so the set point of this tick is the stop's.
+            return self.advance();
         }
+        self.reference = self.interpolator.next();
         self.phase = Phase::Running { sample: sample + 1 };
         Some((self.run, sample))
     }

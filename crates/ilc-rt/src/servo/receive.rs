@@ -45,7 +45,10 @@ impl Cycle {
             }
             // A drive sends this one last, so it completes the answer to a SYNC.
             if let Some(extra) = Extra::decode(frame, spec.node) {
-                drive.following_error_m = spec.scale.to_si(extra.following_error_counts);
+                // In a fault it has no demand any more; what led there is the last one before.
+                if !drive.faulted() {
+                    drive.following_error_m = spec.scale.to_si(extra.following_error_counts);
+                }
                 let encoder_m = drive.encoder_m;
                 self.slots.answer(axis, |sample| sample.encoder_m[axis] = encoder_m);
                 return Ok(());
@@ -81,6 +84,8 @@ impl Cycle {
 
     /// The first thing that is a reason to stop.
     pub(super) fn find_fault(&mut self) -> Option<StopReason> {
+        // Asked in every phase: a node that is lost must not be waited for again.
+        let silence = self.find_silence();
         if matches!(self.phase, Phase::Disabling { .. } | Phase::Stopped) {
             return None;
         }
@@ -91,7 +96,7 @@ impl Cycle {
         if self.overrun_streak > self.spec.overrun_cycles_max {
             return Some(StopReason::Overrun { cycles: self.overrun_streak });
         }
-        self.find_silence().or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)))
+        silence.or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)))
     }
 
     fn find_silence(&mut self) -> Option<StopReason> {

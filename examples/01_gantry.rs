@@ -1,0 +1,41 @@
+//! The gantry of `01_gantry.toml`, ten runs inside this process: what `01_gantry.py` does, in Rust.
+//!
+//! `cargo run --release -p ilc-tests --example 01_gantry`
+
+#![expect(clippy::print_stdout, reason = "an example tells what it did")]
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::transport::loopback::InProcess;
+use ilc_rt::record::Event;
+use ilc_rt::supervisor::{self, Options};
+use ilc_sim::{ClockMode, Machine};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let cell = Cell::load(&root.join("examples/01_gantry.toml"))?;
+    // The drives run in this thread, one cycle for every SYNC: no clock, the same numbers every time.
+    let drives = Machine::from_cell(&cell, ClockMode::LockStep)?;
+    let bus = Box::new(InProcess::new(drives, 1024));
+    let options = Options {
+        iterations: 10,
+        measure: None,
+        lockstep: true,
+        resume: false,
+        library: PathBuf::from(":memory:"),
+        telemetry: false,
+        stop: Arc::default(),
+    };
+    println!("run  max tracking um  max contour um");
+    let outcome = supervisor::run(&cell, &options, bus, None, &mut |event| {
+        if let Event::Iteration { index, figures, .. } = event {
+            let (tracking, contour) = (figures.tracking_inf_m * 1e6, figures.contour_inf_m * 1e6);
+            println!("{index:>3}  {tracking:>15.1}  {contour:>14.1}");
+        }
+    })?;
+    println!("{}", outcome.reason);
+    Ok(())
+}

@@ -1,0 +1,319 @@
+//! The servo cycle alone, ticked by hand, on a bus that records and that can be meddled with.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
+use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Mode, State, bring_up, bring_up_encoder};
+use ilc_rt::fieldbus::transport::{InProcess, Responder};
+use ilc_rt::fieldbus::{Bus, BusError, Frame};
+use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};
+use ilc_rt::supervisor::Plan;
+use ilc_sim::Machine;
+
+use crate::campaign::machine;
+
+/// Room for the records of a test; nothing is allocated while it is not used up.
+const ROWS: usize = 200_000;
+/// Room for answers and for frames that a test puts on the bus.
+const FRAMES: usize = 256;
+
+/// What went out with one SYNC: the last command of each axis.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row {
+    /// Target of each axis, counts or counts per second.
+    pub target_counts: Vec<i32>,
+    /// Controlword of each axis.
+    pub controlword: Vec<u16>,
+}
+
+/// What a test does to the machine; frames it hands over go to the controller.
+pub type Meddle = Box<dyn FnOnce(&mut Machine, &mut dyn FnMut(Frame)) + Send>;
+
+/// The bus between loop and machine.
+pub struct Line {
+    bus: InProcess<Machine>,
+    nodes: Vec<NodeId>,
+    /// Axis by axis, SYNC by SYNC: target and controlword.
+    rows: Vec<(i32, u16)>,
+    pending: Vec<(i32, u16)>,
+    injected: VecDeque<Frame>,
+    meddle: Option<(u32, Meddle)>,
+}
+
+impl Line {
+    /// The machine, to look at.
+    pub fn machine(&self) -> &Machine {
+        self.bus.responder()
+    }
+
+    /// Does something to the machine now.
+    pub fn meddle(&mut self, meddle: impl FnOnce(&mut Machine, &mut dyn FnMut(Frame))) {
+        let injected = &mut self.injected;
+        meddle(self.bus.responder_mut(), &mut |frame| injected.push_back(frame));
+    }
+
+    /// Does something to the machine just before the n-th SYNC from now.
+    pub fn meddle_after(&mut self, n_syncs: u32, meddle: Meddle) {
+        self.meddle = Some((n_syncs, meddle));
+    }
+
+    /// What went out with each SYNC.
+    pub fn rows(&self) -> impl Iterator<Item = Row> {
+        self.rows.chunks(self.nodes.len()).map(|row| Row {
+            target_counts: row.iter().map(|command| command.0).collect(),
+            controlword: row.iter().map(|command| command.1).collect(),
+        })
+    }
+
+    /// Number of SYNCs so far.
+    pub fn n_syncs(&self) -> usize {
+        self.rows.len() / self.nodes.len()
+    }
+
+    fn note(&mut self, frame: &Frame) {
+        for (axis, node) in self.nodes.iter().enumerate() {
+            if let Some(command) = Command::decode(frame, *node) {
+                self.pending[axis] = (command.target_counts, command.controlword.0);
+            }
+        }
+        if !sync::is_sync(frame) {
+            return;
+        }
+        self.rows.extend_from_slice(&self.pending);
+        match self.meddle.take() {
+            Some((n, meddle)) if n <= 1 => self.meddle(meddle),
+            Some((n, meddle)) => self.meddle = Some((n - 1, meddle)),
+            None => {}
+        }
+    }
+}
+
+/// One end of a [`Line`]; the other one stays with the test.
+#[derive(Clone)]
+pub struct Tap(Arc<Mutex<Line>>);
+
+impl std::fmt::Debug for Tap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Tap").finish_non_exhaustive()
+    }
+}
+
+impl std::fmt::Debug for Line {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Line").field("n_syncs", &self.n_syncs()).finish_non_exhaustive()
+    }
+}
+
+impl Tap {
+    /// A line to the simulated machine of a cell.
+    pub fn new(cell: &Cell) -> Self {
+        let nodes: Vec<NodeId> = cell.axes.iter().map(|axis| node(axis.node)).collect();
+        Self(Arc::new(Mutex::new(Line {
+            bus: InProcess::new(machine(cell), FRAMES),
+            rows: Vec::with_capacity(ROWS),
+            pending: vec![(0, 0); nodes.len()],
+            nodes,
+            injected: VecDeque::with_capacity(FRAMES),
+            meddle: None,
+        })))
+    }
+
+    /// The line itself.
+    pub fn line(&self) -> MutexGuard<'_, Line> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Bus for Tap {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        let mut line = self.line();
+        line.note(frame);
+        line.bus.send(frame)
+    }
+
+    fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        let mut line = self.line();
+        match line.injected.pop_front() {
+            Some(frame) => Ok(Some(frame)),
+            None => line.bus.recv(timeout),
+        }
+    }
+}
+
+/// The loop on a line, and all that it has reported.
+#[derive(Debug)]
+pub struct Rig {
+    /// The loop.
+    pub cycle: Cycle,
+    /// Its mailbox.
+    pub mail: Mailbox,
+    /// The bus.
+    pub tap: Tap,
+    /// Every sample so far.
+    pub samples: Vec<Sample>,
+    /// Why the axes were stopped, if they were.
+    pub reason: Option<StopReason>,
+    /// SYNCs sent before the tick in which the stop began.
+    pub stopping_at: Option<usize>,
+    /// Runs that have ended, with their overruns.
+    pub ended: Vec<(u32, u32)>,
+    /// Run and table of each start.
+    pub started: Vec<(u32, u32)>,
+    /// The phase, and the SYNCs sent when it began.
+    pub phase: (PhaseName, usize),
+    /// Velocity of each axis of the plant when the drives were told to switch off.
+    pub rest_m_s: Vec<f64>,
+    /// Samples in a run.
+    pub n_samples: usize,
+    stop: Arc<AtomicI32>,
+}
+
+impl Rig {
+    /// Brings the nodes up as the supervisor does in lock-step, and makes the loop for some runs.
+    ///
+    /// # Panics
+    /// If a node cannot be brought up.
+    pub fn new(cell: &Cell, runs: u32) -> Self {
+        let mut tap = Tap::new(cell);
+        for axis in &cell.axes {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1e6")]
+            let following_error_max_counts =
+                (axis.limits.following_error_max_m * axis.counts_per_m).round() as u32;
+            let setup = DriveSetup {
+                node: node(axis.node),
+                mode: match axis.interface {
+                    ilc_rt::config::Interface::Csp => Mode::Csp,
+                    ilc_rt::config::Interface::Csv => Mode::Csv,
+                },
+                cycle_us: cell.cell.cycle_us,
+                following_error_max_counts,
+                heartbeat_ms: 0,
+                rpdo_deadline_ms: 0,
+                answer_timeout: Duration::from_secs(1),
+            };
+            bring_up(&mut tap, &setup).expect("the drive comes up");
+        }
+        if let Some(tool) = &cell.tcp_encoder {
+            bring_up_encoder(&mut tap, node(tool.node), Duration::from_secs(1))
+                .expect("the encoder comes up");
+        }
+        tap.send(&NmtCommand::Start.frame(None)).expect("the bus carries");
+        let mut plan = Plan::new(cell, None, true).expect("the cell can be run");
+        plan.servo.runs = 0..runs;
+        let n_samples = plan.n_samples();
+        let stop = Arc::new(AtomicI32::new(0));
+        let (mail, loop_side) = mailbox(4096, Arc::clone(&stop));
+        let cycle = Cycle::new(Box::new(tap.clone()), plan.servo, plan.interpolator, loop_side);
+        Self {
+            cycle,
+            mail,
+            tap,
+            samples: Vec::new(),
+            reason: None,
+            stopping_at: None,
+            ended: Vec::new(),
+            started: Vec::new(),
+            phase: (PhaseName::Enabling, 0),
+            rest_m_s: Vec::new(),
+            n_samples,
+            stop,
+        }
+    }
+
+    /// Asks the loop to stop, as a signal does.
+    pub fn ask_to_stop(&self, signal: i32) {
+        self.stop.store(signal, Ordering::Relaxed);
+    }
+
+    /// One tick, and then all that the loop has to say.
+    pub fn tick(&mut self, missed: u32) -> TickStatus {
+        let n_syncs = self.tap.line().n_syncs();
+        let status = self.cycle.tick(missed);
+        self.read_mail(n_syncs);
+        status
+    }
+
+    /// Reads what the loop has said in a tick that began after `n_syncs` SYNCs.
+    pub fn read_mail(&mut self, n_syncs: usize) {
+        while let Some(message) = self.mail.read() {
+            match message {
+                Message::Sample(sample) => self.samples.push(sample),
+                Message::Phase(phase, _) => {
+                    self.phase = (phase, n_syncs);
+                    if phase == PhaseName::Disabling {
+                        let line = self.tap.line();
+                        let plant = line.machine().plant();
+                        let axes = 0..plant.n_axes();
+                        self.rest_m_s = axes.map(|axis| plant.encoder_velocity_m_s(axis)).collect();
+                    }
+                }
+                Message::RunStarted { run, table } => self.started.push((run, table)),
+                Message::RunEnded { run, overruns } => self.ended.push((run, overruns)),
+                Message::Stopping(reason) => {
+                    (self.reason, self.stopping_at) = (Some(reason), Some(n_syncs));
+                }
+            }
+        }
+    }
+
+    /// Ticks until `there` says so.
+    ///
+    /// # Panics
+    /// If it never does.
+    pub fn tick_until(&mut self, there: impl Fn(&Self) -> bool) {
+        for _ in 0..ROWS {
+            if there(self) {
+                return;
+            }
+            assert_eq!(self.tick(0), TickStatus::Running, "over too early: {:?}", self.reason);
+        }
+        panic!("never came there; phase {:?}, reason {:?}", self.phase, self.reason);
+    }
+
+    /// Ticks into the middle of a run: until `n` samples of it are measured.
+    pub fn tick_into_run(&mut self, run: u32, n: u32) {
+        self.tick_until(|rig| rig.samples.last().is_some_and(|last| last.at == Some((run, n))));
+    }
+
+    /// Ticks to the end.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn tick_to_end(&mut self) {
+        for _ in 0..ROWS {
+            if self.tick(0) == TickStatus::Stopped {
+                return;
+            }
+        }
+        panic!("never stopped; phase {:?}, reason {:?}", self.phase, self.reason);
+    }
+
+    /// State of each drive.
+    pub fn drive_states(&self) -> Vec<Option<State>> {
+        let line = self.tap.line();
+        line.nodes.iter().map(|node| line.machine().drive_state(*node)).collect()
+    }
+}
+
+/// Writes a number of 32 bits into an object of a node, as any master on the bus could.
+///
+/// # Panics
+/// Never: eight bytes fit a frame.
+pub fn write_object(node: u8, index: u16, value: u32) -> impl Fn(&mut Machine) {
+    let ([low, high], [a, b, c, d]) = (index.to_le_bytes(), value.to_le_bytes());
+    let request = Frame::new(0x600 + u16::from(node), &[0x23, low, high, 0, a, b, c, d])
+        .expect("eight bytes");
+    move |machine| machine.receive(&request, &mut |_| {})
+}
+
+/// A node number that is one.
+///
+/// # Panics
+/// If it is none.
+pub fn node(number: u8) -> NodeId {
+    NodeId::new(number).expect("1 to 127")
+}

@@ -1,0 +1,155 @@
+//! A tick allocates nothing and frees nothing, whatever happens in it.
+//!
+//! Every tick of whole campaigns is counted, phase by phase: with the simulated machine inside, which
+//! allocates nothing either once it is set up.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may panic, and prints figures"
+)]
+
+use std::collections::BTreeSet;
+
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::canopen::NmtCommand;
+use ilc_rt::fieldbus::transport::Responder;
+use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
+use ilc_tests::counting::{Counting, allocations, deallocations};
+use ilc_tests::rig::{Rig, node, write_object};
+use ilc_tests::short;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
+const MIDDLE: u32 = 150;
+
+/// A rig whose ticks are counted.
+struct Watched {
+    rig: Rig,
+    phases: BTreeSet<&'static str>,
+    n_ticks: u32,
+}
+
+impl Watched {
+    fn new(cell: &Cell, runs: u32) -> Self {
+        Self { rig: Rig::new(cell, runs), phases: BTreeSet::new(), n_ticks: 0 }
+    }
+
+    fn tick(&mut self, missed: u32) -> TickStatus {
+        let n_syncs = self.rig.tap.line().n_syncs();
+        let before = (allocations(), deallocations());
+        let status = self.rig.cycle.tick(missed);
+        let after = (allocations(), deallocations());
+        self.rig.read_mail(n_syncs);
+        let phase = name(self.rig.phase.0);
+        assert_eq!(after, before, "allocations and deallocations in {phase}");
+        self.phases.insert(phase);
+        self.n_ticks += 1;
+        status
+    }
+
+    fn tick_into_run(&mut self, run: u32, sample: u32) {
+        while self.rig.samples.last().is_none_or(|last| last.at != Some((run, sample))) {
+            assert_eq!(self.tick(0), TickStatus::Running, "{:?}", self.rig.reason);
+        }
+    }
+
+    fn tick_to_end(&mut self) {
+        while self.tick(0) == TickStatus::Running {
+            assert!(self.n_ticks < 100_000, "never stopped");
+        }
+    }
+}
+
+fn name(phase: PhaseName) -> &'static str {
+    match phase {
+        PhaseName::Enabling => "enabling",
+        PhaseName::Returning => "returning",
+        PhaseName::Settling => "settling",
+        PhaseName::Running => "running",
+        PhaseName::Stopping => "stopping",
+        PhaseName::Disabling => "disabling",
+        PhaseName::Stopped => "stopped",
+    }
+}
+
+/// A table that is worth swapping in.
+fn table(n_samples: usize) -> Box<[f64]> {
+    (0..2 * n_samples).map(|i| 1e-4 * (i as f64 * 0.01).sin()).collect()
+}
+
+#[test]
+fn the_counter_counts() {
+    let before = (allocations(), deallocations());
+    drop(std::hint::black_box(Box::new(1)));
+    assert_eq!((allocations(), deallocations()), (before.0 + 1, before.1 + 1));
+}
+
+#[test]
+fn whole_campaigns_with_swapped_tables() {
+    for name in CELLS {
+        let mut watched = Watched::new(&short(name), 4);
+        for number in 1..4 {
+            watched.tick_into_run(number - 1, MIDDLE);
+            // Two tables at once: the older one is skipped, and both it and the last go back.
+            for newer in [0, 1] {
+                let size = table(watched.rig.n_samples);
+                watched.rig.mail.send_table(2 * number + newer, size).unwrap();
+            }
+        }
+        watched.tick_to_end();
+        assert_eq!(watched.rig.started, [(0, 0), (1, 3), (2, 5), (3, 7)], "{name}");
+        assert_eq!(watched.rig.reason, None);
+        let expected = ["disabling", "enabling", "returning", "running", "settling", "stopped"];
+        assert_eq!(watched.phases, BTreeSet::from(expected));
+        println!("{name}: {} ticks", watched.n_ticks);
+    }
+}
+
+#[test]
+fn stops_of_every_kind() {
+    type Break = fn(&mut Watched);
+    let breaks: [(&str, Break); 7] = [
+        ("asked", |watched| watched.rig.ask_to_stop(15)),
+        ("silent drive", |watched| {
+            watched.rig.tap.line().meddle(|machine, _| assert!(machine.mute(node(1))));
+        }),
+        ("silent tool", |watched| {
+            watched.rig.tap.line().meddle(|machine, _| assert!(machine.mute(node(10))));
+        }),
+        ("drive fault", |watched| {
+            // A window of 10 um: the drive faults, with an emergency.
+            watched.rig.tap.line().meddle(|machine, _| write_object(1, 0x6065, 1000)(machine));
+        }),
+        ("node restarts", |watched| {
+            watched.rig.tap.line().meddle(|machine, reply| {
+                machine.receive(&NmtCommand::ResetNode.frame(Some(node(2))), reply);
+            });
+        }),
+        ("overrun", |watched| {
+            watched.tick(1_000_000);
+        }),
+        ("no number", |watched| {
+            let mut bad = table(watched.rig.n_samples);
+            bad[100] = f64::NAN;
+            watched.rig.mail.send_table(1, bad).unwrap();
+        }),
+    ];
+    for name in CELLS {
+        for (what, break_it) in breaks {
+            let mut watched = Watched::new(&short(name), 2);
+            watched.tick_into_run(0, MIDDLE);
+            break_it(&mut watched);
+            watched.tick_to_end();
+            // A velocity-commanded drive has no following error of its own.
+            let has_reason = !(what == "drive fault" && name == CELLS[1]);
+            assert_eq!(watched.rig.reason.is_some(), has_reason, "{name} {what}");
+            assert!(watched.phases.contains("stopping") == has_reason, "{name} {what}");
+            if what == "drive fault" && has_reason {
+                assert!(matches!(watched.rig.reason, Some(StopReason::DriveFault { .. })));
+            }
+        }
+    }
+}
