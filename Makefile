@@ -74,7 +74,7 @@ docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
 
 bench: ## Speed, as ratios
-	cargo bench --workspace
+	cargo bench --workspace --bench main_job
 
 rt: build ## What is promised of the tick: no allocation, exact repetition; and this machine's punctuality
 	cargo nextest run --release --workspace -E 'binary(no_alloc) | binary(no_alloc_learning) | binary(lockstep)'
