@@ -74,9 +74,7 @@ impl Cycle {
         let dt_s = spec.cycle.as_secs_f64();
         let n_axes = spec.axes.len();
         let (mut most, mut step_max) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
-        let mut limits =
-            [AxisLimits { velocity_max_m_s: 1.0, acceleration_max_m_s2: 1.0, jerk_max_m_s3: 1.0 };
-                MAX_AXES];
+        let limits: Vec<AxisLimits> = spec.axes.iter().map(|axis| axis.limits).collect();
         let mut start_m = [0.0; MAX_AXES];
         for (i, axis) in spec.axes.iter().enumerate().take(MAX_AXES) {
             most[i] = axis.input_max;
@@ -84,7 +82,6 @@ impl Cycle {
                 Mode::Csp => axis.limits.velocity_max_m_s * dt_s,
                 Mode::Csv => axis.limits.acceleration_max_m_s2 * dt_s,
             };
-            limits[i] = axis.limits;
             start_m[i] = spec.start_m.get(i).copied().unwrap_or(0.0);
         }
         #[expect(
@@ -112,7 +109,7 @@ impl Cycle {
             overrun_streak: 0,
             run_overruns: 0,
             stopping: None,
-            limits,
+            limits: AxisLimits::padded(&limits),
             start_m,
             table: Table { number: 0, input: Box::default() },
             spec,
