@@ -52,6 +52,16 @@ pub enum LearningError {
         /// The rule, as a sentence.
         allowed: &'static str,
     },
+    /// A weight that is no weight, or does not fit.
+    #[error("{what} at sample {sample}: {reason}")]
+    Weight {
+        /// Name of the weight.
+        what: &'static str,
+        /// The first sample at which it is wrong.
+        sample: usize,
+        /// What is wrong, and what is allowed.
+        reason: String,
+    },
     /// A count that must not be zero.
     #[error("{what} = 0; at least 1 is needed")]
     Empty {

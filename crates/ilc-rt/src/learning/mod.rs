@@ -7,6 +7,7 @@
 mod error;
 pub mod law;
 pub mod sweep;
+pub mod weights;
 
 pub use error::LearningError;
 
@@ -31,6 +32,12 @@ pub trait Law: Send {
         error: &[f64],
         next: &mut [f64],
     ) -> Result<(), LearningError>;
+
+    /// Tells the law what is known of the coming run before [`Law::update`] computes its input: one
+    /// number for each disturbance that is measured, as a temperature. Most laws have no use for it.
+    fn expect(&mut self, disturbance: &[f64]) {
+        let _ = disturbance;
+    }
 
     /// Forgets everything that earlier runs taught the law itself.
     fn reset(&mut self);

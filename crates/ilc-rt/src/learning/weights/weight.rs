@@ -1,0 +1,137 @@
+//! One weight along the run.
+
+use nalgebra::DMatrix;
+
+use crate::learning::LearningError;
+
+/// A symmetric, positive semidefinite weight of the channels of one signal at each sample.
+///
+/// # Shapes
+/// - for `p` channels and runs of `n` samples: `PerSample` `n` numbers, `Block` `(p, p)`, `Blocks` `n`
+///   matrices `(p, p)`
+#[derive(Debug, Clone, PartialEq)]
+pub enum Weight {
+    /// The same number for every channel and every sample.
+    Scalar(f64),
+    /// One number a sample, the same for every channel.
+    PerSample(Vec<f64>),
+    /// One matrix for all samples.
+    Block(DMatrix<f64>),
+    /// One matrix a sample.
+    Blocks(Vec<DMatrix<f64>>),
+}
+
+impl Weight {
+    /// Returns the weight at sample `k` of a signal with `p` channels.
+    ///
+    /// # Panics
+    /// If `k` lies beyond the run; [`Weight::check`] has been passed before.
+    pub fn at(&self, k: usize, p: usize) -> DMatrix<f64> {
+        match self {
+            Self::Scalar(weight) => DMatrix::identity(p, p) * *weight,
+            Self::PerSample(weights) => DMatrix::identity(p, p) * weights[k],
+            Self::Block(block) => block.clone(),
+            Self::Blocks(blocks) => blocks[k].clone(),
+        }
+    }
+
+    /// Returns whether the weight is the same at every sample.
+    pub fn is_constant(&self) -> bool {
+        matches!(self, Self::Scalar(_) | Self::Block(_))
+    }
+
+    /// Refuses a weight that does not fit or is not positive semidefinite.
+    ///
+    /// # Errors
+    /// - [`LearningError::Weight`] naming the weight `what`, the sample and the rule.
+    pub fn check(
+        &self,
+        what: &'static str,
+        n_samples: usize,
+        p: usize,
+    ) -> Result<(), LearningError> {
+        let refused =
+            |sample: usize, reason: String| Err(LearningError::Weight { what, sample, reason });
+        let count = match self {
+            Self::Scalar(_) | Self::Block(_) => n_samples,
+            Self::PerSample(weights) => weights.len(),
+            Self::Blocks(blocks) => blocks.len(),
+        };
+        if count != n_samples {
+            return refused(0, format!("{count} samples given; {n_samples} are needed"));
+        }
+        let check_number = |sample: usize, weight: f64| {
+            if weight.is_finite() && weight >= 0.0 {
+                return Ok(());
+            }
+            refused(sample, format!("{weight}; a weight must be finite and not negative"))
+        };
+        match self {
+            Self::Scalar(weight) => check_number(0, *weight),
+            Self::PerSample(weights) => {
+                weights.iter().enumerate().try_for_each(|(k, weight)| check_number(k, *weight))
+            }
+            Self::Block(block) => check_block(block, p).or_else(|reason| refused(0, reason)),
+            Self::Blocks(blocks) => blocks.iter().enumerate().try_for_each(|(k, block)| {
+                check_block(block, p).or_else(|reason| refused(k, reason))
+            }),
+        }
+    }
+}
+
+/// How far below zero the smallest eigenvalue may lie, as a part of the largest entry: rounding.
+const SEMIDEFINITE: f64 = 1e-10;
+
+fn check_block(block: &DMatrix<f64>, p: usize) -> Result<(), String> {
+    if block.shape() != (p, p) {
+        return Err(format!(
+            "a block of {} x {}; {p} x {p} is needed",
+            block.nrows(),
+            block.ncols()
+        ));
+    }
+    if let Some(entry) = block.iter().find(|entry| !entry.is_finite()) {
+        return Err(format!("an entry is {entry}; only finite values are allowed"));
+    }
+    let scale = block.amax();
+    let skew = (block - block.transpose()).amax();
+    if skew > SEMIDEFINITE * scale {
+        return Err(format!("a block differs from its transpose by {skew}; it must be symmetric"));
+    }
+    let lowest = block.symmetric_eigenvalues().iter().copied().fold(f64::INFINITY, f64::min);
+    if lowest < -SEMIDEFINITE * scale {
+        return Err(format!("an eigenvalue is {lowest}; a weight must be positive semidefinite"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_form_gives_its_matrix() {
+        let block = DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 3.0]);
+        assert_eq!(Weight::Scalar(3.0).at(4, 2), DMatrix::identity(2, 2) * 3.0);
+        assert_eq!(Weight::PerSample(vec![1.0, 4.0]).at(1, 2), DMatrix::identity(2, 2) * 4.0);
+        assert_eq!(Weight::Blocks(vec![block.clone(), block.clone() * 2.0]).at(1, 2), block * 2.0);
+    }
+
+    #[test]
+    fn one_wrong_thing_at_a_time_is_refused() {
+        let skew = DMatrix::from_row_slice(2, 2, &[1.0, 0.5, 0.0, 1.0]);
+        let indefinite = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]);
+        for (weight, word) in [
+            (Weight::Scalar(-1.0), "negative"),
+            (Weight::Scalar(f64::NAN), "finite"),
+            (Weight::PerSample(vec![1.0; 4]), "4 samples"),
+            (Weight::Block(DMatrix::identity(3, 3)), "3 x 3"),
+            (Weight::Block(skew), "symmetric"),
+            (Weight::Blocks(vec![indefinite; 5]), "semidefinite"),
+        ] {
+            let told = weight.check("q", 5, 2).unwrap_err().to_string();
+            assert!(told.starts_with("q at sample") && told.contains(word), "{told}");
+        }
+        assert!(Weight::Scalar(0.0).check("q", 5, 2).is_ok());
+    }
+}
