@@ -1,6 +1,6 @@
 """The motion controller that learns: iterative learning control on the machine."""
 
-from ilc_rt import signal
+from ilc_rt import control, kinematics, signal, trajectory
 from ilc_rt._native import (
     Cell,
     LearningError,
@@ -34,8 +34,11 @@ __all__ = [
     "PdIlc",
     "SignalError",
     "StateSpace",
+    "control",
     "discretize",
     "from_transfer_function",
+    "kinematics",
     "second_order",
     "signal",
+    "trajectory",
 ]

@@ -6,19 +6,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "Arc",
     "ButterworthFilter",
+    "Cascade",
     "Cell",
+    "ContourError",
+    "CrossCoupled",
+    "Delta",
     "EventStream",
+    "Gantry",
+    "KinematicsError",
     "LearningError",
     "Library",
+    "Line",
     "ModelError",
     "NormOptimalIlc",
     "PdIlc",
+    "Pid",
     "SignalError",
     "StateSpace",
     "butterworth",
+    "contour_error",
+    "coupling_gains",
     "discretize",
     "from_transfer_function",
+    "projection_across",
     "run_events",
     "second_order",
     "zero_phase",
@@ -43,6 +55,8 @@ class _ForeignModel(Protocol):
 class ModelError(ValueError): ...
 class SignalError(ValueError): ...
 class LearningError(ValueError): ...
+class KinematicsError(ValueError): ...
+class ContourError(ValueError): ...
 
 @final
 class StateSpace:
@@ -138,6 +152,103 @@ class NormOptimalIlc:
     def update(
         self, u: ArrayLike, e: ArrayLike, disturbance: object = None
     ) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
+
+@final
+class Delta:
+    def __new__(
+        cls, base_m: float = ..., crank_m: float = ..., rod_m: float = ...
+    ) -> Delta: ...
+    @property
+    def base_m(self) -> float: ...
+    @property
+    def crank_m(self) -> float: ...
+    @property
+    def rod_m(self) -> float: ...
+    def forward(self, theta_rad: ArrayLike) -> NDArray[np.float64]: ...
+    def inverse(self, p_m: ArrayLike) -> NDArray[np.float64]: ...
+    def jacobian(self, theta_rad: ArrayLike) -> NDArray[np.float64]: ...
+    def in_workspace(self, p_m: ArrayLike) -> bool: ...
+    def condition(self, theta_rad: ArrayLike) -> float: ...
+
+@final
+class Gantry:
+    def __new__(cls, orthogonality_rad: float = 0.0) -> Gantry: ...
+    @property
+    def orthogonality_rad(self) -> float: ...
+    def forward(self, axes_m: ArrayLike) -> NDArray[np.float64]: ...
+    def inverse(self, tool_m: ArrayLike) -> NDArray[np.float64]: ...
+    def jacobian(self) -> NDArray[np.float64]: ...
+
+@final
+class Line:
+    def __new__(cls, from_m: ArrayLike, to_m: ArrayLike) -> Line: ...
+
+@final
+class Arc:
+    def __new__(
+        cls,
+        from_m: ArrayLike,
+        centre_m: ArrayLike,
+        sweep_rad: float,
+        axis: ArrayLike | None = None,
+    ) -> Arc: ...
+
+def contour_error(
+    reference_m: ArrayLike | list[Line | Arc], actual_m: ArrayLike, window: int | None = None
+) -> NDArray[np.float64]: ...
+def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]: ...
+def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]: ...
+
+@final
+class Pid:
+    def __new__(
+        cls,
+        kp: float,
+        ki_per_s: float = 0.0,
+        kd_s: float = 0.0,
+        *,
+        dt_s: float,
+        derivative: Literal["difference", "delayed", "filtered"] = "difference",
+        filter_s: float = 0.01,
+        output_max: float | None = None,
+    ) -> Pid: ...
+    def step(self, error: float) -> float: ...
+    def run(self, error: ArrayLike) -> NDArray[np.float64]: ...
+    def model(self) -> StateSpace: ...
+    def reset(self) -> None: ...
+
+@final
+class Cascade:
+    def __new__(
+        cls,
+        position_gain_per_s: float,
+        velocity_gain_n_s_m: float,
+        integral_time_s: float | None = None,
+        *,
+        dt_s: float,
+        velocity_feedforward: float = 0.0,
+        acceleration_feedforward_kg: float = 0.0,
+        velocity_max_m_s: float | None = None,
+        force_max_n: float | None = None,
+    ) -> Cascade: ...
+    def step(
+        self,
+        position_m: float,
+        actual_m: float,
+        actual_m_s: float,
+        velocity_m_s: float = 0.0,
+        acceleration_m_s2: float = 0.0,
+        learned_n: float = 0.0,
+    ) -> float: ...
+    def reset(self) -> None: ...
+
+@final
+class CrossCoupled:
+    def __new__(cls, controller: Pid) -> CrossCoupled: ...
+    def step(
+        self, error_m: ArrayLike, gains: ArrayLike, curvature_per_m: float = 0.0
+    ) -> tuple[NDArray[np.float64], float]: ...
     def reset(self) -> None: ...
 
 @final

@@ -8,9 +8,13 @@
 mod argument;
 mod campaign;
 mod cell;
+mod contour;
+mod control;
 mod detached;
 mod error;
 mod exceptions;
+mod held;
+mod kinematics;
 mod laws;
 mod library;
 mod model;
@@ -26,6 +30,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
     signal::register(module)?;
+    kinematics::register(module)?;
+    contour::register(module)?;
+    control::register(module)?;
     laws::register(module)?;
     cell::register(module)?;
     library::register(module)?;

@@ -3,8 +3,6 @@
 mod norm_optimal;
 mod pd;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
@@ -15,11 +13,6 @@ fn next(law: &mut dyn Law, u: &Signal, e: &Signal) -> Result<Vec<f64>, LearningE
     let mut next = vec![0.0; u.values.len()];
     law.update(&u.values, &e.values, &mut next)?;
     Ok(next)
-}
-
-/// Locks a law. One that panicked half-way starts each update from scratch and can go on.
-fn held<T>(law: &Mutex<T>) -> MutexGuard<'_, T> {
-    law.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -6,10 +6,11 @@ use ilc_rt::learning::Law;
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
 use pyo3::prelude::*;
 
-use super::{held, next};
+use super::next;
 use crate::argument::{Signal, give_signal, misfit};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::held::held;
 use crate::model_argument::read_model;
 
 /// Norm-optimal learning, exact and in linear time.

@@ -6,10 +6,11 @@ use ilc_rt::learning::Law;
 use ilc_rt::learning::law::pd::{Pd, PdGains, QFilter};
 use pyo3::prelude::*;
 
-use super::{held, next};
+use super::next;
 use crate::argument::{Signal, give_signal};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::held::held;
 use crate::signal::PyButterworthFilter;
 
 /// Proportional-derivative learning with a low-pass filter.

@@ -114,8 +114,8 @@ impl Delta {
             // |p - k|^2 = rod^2 is `across cos(theta) + along sin(theta) = wanted`.
             let reach_squared = out * out + up * up;
             let (across, along) = (2.0 * self.crank_m * out, 2.0 * self.crank_m * up);
-            let wanted = reach_squared + side * side + self.crank_m * self.crank_m
-                - self.rod_m * self.rod_m;
+            let wanted =
+                reach_squared + side * side + self.crank_m * self.crank_m - self.rod_m * self.rod_m;
             let room = across * across + along * along - wanted * wanted;
             if room < 0.0 {
                 let reason = if wanted > 0.0 { "too far" } else { "too near" };
@@ -252,7 +252,10 @@ mod tests {
     fn what_cannot_be_is_refused_with_its_numbers() {
         let delta = Delta::default();
         let told = delta.inverse([0.0, 0.0, 0.5]).unwrap_err().to_string();
-        assert!(told.contains("(0.000000, 0.000000, 0.500000) m") && told.contains("too far"), "{told}");
+        assert!(
+            told.contains("(0.000000, 0.000000, 0.500000) m") && told.contains("too far"),
+            "{told}"
+        );
         assert!(delta.inverse([0.0, 0.0, -0.1]).is_err());
         assert!(matches!(
             delta.inverse([0.0, f64::NAN, 0.1]),

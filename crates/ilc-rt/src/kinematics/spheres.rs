@@ -43,6 +43,7 @@ pub(super) fn upper_meeting_point(
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods, reason = "tests are cold")]
 mod tests {
     use super::*;
 

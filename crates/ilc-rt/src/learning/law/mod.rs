@@ -3,3 +3,4 @@
 
 pub mod norm_optimal;
 pub mod pd;
+pub mod through_jacobian;

@@ -85,6 +85,7 @@ pub fn across<const N: usize>(reference_m: &[[f64; N]]) -> Vec<[[f64; N]; N]> {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "directions along an axis are exact")]
 mod tests {
     use super::*;
     use crate::trajectory::random::Random;
