@@ -1,6 +1,6 @@
 //! Contour geometry: `contour_error`, `coupling_gains`, `projection_across`, `Line`, `Arc`.
 
-use ilc_rt::trajectory::contour::{Arc, Line, SampledPath, Shape, coupling};
+use ilc_rt::trajectory::contour::{Arc, ContourError, Line, SampledPath, Shape, coupling};
 use ilc_rt::trajectory::contour_error_m;
 use numpy::IntoPyArray;
 use numpy::ndarray::Array3;
@@ -258,7 +258,8 @@ fn to_sampled<const N: usize>(
     detached(py, || {
         let path = SampledPath::<N>::new(reference.values.as_chunks().0)?;
         let points = actual.values.as_chunks().0.iter();
-        Ok(points.map(|p| path.nearest(p).map_or(f64::NAN, |found| found.distance_m)).collect())
+        let distance = |p| path.nearest(p).map_or(f64::NAN, |found| found.distance_m);
+        Ok::<Vec<f64>, ContourError>(points.map(distance).collect())
     })
     .or_raise()
 }
