@@ -17,13 +17,18 @@
 mod cholesky;
 mod factor;
 mod general;
+mod rate;
+mod record;
+mod recursion;
 mod single;
+mod square_root;
 mod stage;
 
-pub use factor::{FactorError, Gains};
+pub use factor::{FactorError, Form, Gains};
 pub use general::General;
+pub use rate::Rate;
 pub use single::{MAX_STATES, single};
-pub use stage::{Rate, Stage, Stages};
+pub use stage::{Stage, Stages};
 
 /// Where the signals of a solver lie among those of the whole machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
