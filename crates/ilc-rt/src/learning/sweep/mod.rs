@@ -27,7 +27,6 @@ mod stage;
 pub use factor::{FactorError, Form, Gains};
 pub use general::General;
 pub use rate::Rate;
-pub use single::{MAX_STATES, single};
 pub use stage::{Stage, Stages};
 
 /// Where the signals of a solver lie among those of the whole machine.
@@ -63,4 +62,12 @@ pub trait Sweep: Send + std::fmt::Debug {
     /// # Real Time
     /// Cold path. Allocates nothing; `O(n_samples)`.
     fn solve(&mut self, run: &mut Run);
+}
+
+/// Returns the quickest solver for the given channels.
+pub fn solver(gains: Gains, channels: Channels) -> Box<dyn Sweep> {
+    match single::single(&gains, &channels) {
+        Some(solver) => solver,
+        None => Box::new(General::new(gains, channels)),
+    }
 }

@@ -5,13 +5,13 @@ use super::record::Record;
 use super::{Channels, Run, Sweep};
 
 /// The most states, that of a rate penalty included, for which [`single`] has a solver.
-pub const MAX_STATES: usize = 6;
+const MAX_STATES: usize = 6;
 
 /// Returns the solver for one axis by itself.
 ///
 /// `None` unless the gains are for one input, one output and 1 to [`MAX_STATES`] states: the caller
 /// then takes [`super::General`].
-pub fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
+pub(super) fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
     let ([input], [output], [shift]) =
         (&channels.inputs[..], &channels.outputs[..], &channels.shifts[..])
     else {
