@@ -16,7 +16,9 @@
 
 mod cholesky;
 mod factor;
+mod fixed;
 mod general;
+mod lanes;
 mod rate;
 mod record;
 mod recursion;
