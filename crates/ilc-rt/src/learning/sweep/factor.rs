@@ -56,6 +56,7 @@ pub struct Gains {
     /// the last samples, the settled one, those of the first samples.
     back: Vec<f64>,
     fore: Vec<f64>,
+    n_stored: usize,
     /// Sets before the settled one, and for how many samples that one serves; 0 if there is none.
     n_tail: usize,
     n_settled: usize,
@@ -107,6 +108,7 @@ impl Gains {
             sizes,
             back: Vec::new(),
             fore: Vec::new(),
+            n_stored: 0,
             n_tail: 0,
             n_settled: 0,
             pivots: Pivots::NONE,
@@ -136,7 +138,7 @@ impl Gains {
         let free_from = n_samples - self.free_samples.min(n_samples.saturating_sub(1));
         self.back.clear();
         self.fore.clear();
-        (self.n_tail, self.n_settled) = (0, 0);
+        (self.n_stored, self.n_tail, self.n_settled) = (0, 0, 0);
         self.pivots = Pivots::NONE;
         self.recursion.restart();
         self.passed.fill(0.0);
@@ -205,7 +207,7 @@ impl Gains {
 
     /// Returns how many sets of gains are kept.
     pub fn n_stored(&self) -> usize {
-        self.fore.len() / self.sizes.fore().max(1)
+        self.n_stored
     }
 
     /// Returns how well the input is determined: the smallest part of any `H` that is left after
@@ -231,6 +233,7 @@ impl Gains {
 
     /// Goes one sample back, with the stage that was read last.
     fn step(&mut self) -> Pivots {
+        self.n_stored += 1;
         let (back, fore) = (self.back.len(), self.fore.len());
         self.back.resize(back + self.sizes.back(), 0.0);
         self.fore.resize(fore + self.sizes.fore(), 0.0);
@@ -256,8 +259,7 @@ impl Gains {
         let n = self.sizes.n;
         let (row, next) = (&mut self.passed[..n], &mut self.product[..n]);
         let mut size = 0.0;
-        for (value, column) in
-            next.iter_mut().zip(self.recursion.transition.chunks_exact(n.max(1)))
+        for (value, column) in next.iter_mut().zip(self.recursion.transition.chunks_exact(n.max(1)))
         {
             *value = column.iter().zip(&*row).map(|(factor, old)| factor * old).sum();
             size += value.abs();

@@ -5,23 +5,14 @@ use super::record::Sizes;
 use super::{Channels, Run};
 
 /// Solves if there is code for the sizes, otherwise touches nothing and returns `false`.
-pub(super) fn solve(
-    gains: &Gains,
-    channels: &Channels,
-    kappa: &mut [f64],
-    run: &mut Run,
-) -> bool {
+pub(super) fn solve(gains: &Gains, channels: &Channels, kappa: &mut [f64], run: &mut Run) -> bool {
     let Sizes { n, m, targets, .. } = gains.sizes();
     macro_rules! choose {
         ($($n:literal)*) => {
             match (n, m, targets) {
                 $(
                     ($n, 1, 1) => sweep::<$n, 1, 1>(gains, channels, kappa, run),
-                    ($n, 1, 2) => sweep::<$n, 1, 2>(gains, channels, kappa, run),
-                    ($n, 2, 1) => sweep::<$n, 2, 1>(gains, channels, kappa, run),
                     ($n, 2, 2) => sweep::<$n, 2, 2>(gains, channels, kappa, run),
-                    ($n, 2, 3) => sweep::<$n, 2, 3>(gains, channels, kappa, run),
-                    ($n, 3, 2) => sweep::<$n, 3, 2>(gains, channels, kappa, run),
                     ($n, 3, 3) => sweep::<$n, 3, 3>(gains, channels, kappa, run),
                 )*
                 _ => return false,
@@ -57,7 +48,12 @@ fn sweep<const N: usize, const M: usize, const P: usize>(
             for (i, column) in (0..P).zip(columns.by_ref()) {
                 // Past the end of the run the weight is zero: any finite value will do.
                 let sample = (k + shifts[i]).min(last);
-                add(&mut earlier, &mut drive, column, run.error[sample * run.n_outputs + outputs[i]]);
+                add(
+                    &mut earlier,
+                    &mut drive,
+                    column,
+                    run.error[sample * run.n_outputs + outputs[i]],
+                );
             }
             if is_held {
                 for (i, column) in (0..M).zip(columns) {

@@ -79,8 +79,11 @@ impl Cut {
         for k in (stretch..stretch + warm_up).rev() {
             let sample = |lane: usize| (starts[lane] + k).min(end.saturating_sub(place.shift));
             let error = std::array::from_fn(|lane| run.error[error_at(sample(lane))]);
-            let input =
-                if HELD { std::array::from_fn(|lane| run.input[input_at(sample(lane))]) } else { NONE };
+            let input = if HELD {
+                std::array::from_fn(|lane| run.input[input_at(sample(lane))])
+            } else {
+                NONE
+            };
             backward::<HELD, N>(gains, &mut costate, &input, &error);
         }
         if let Some(exact) = last {

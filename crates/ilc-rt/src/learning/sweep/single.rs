@@ -1,8 +1,8 @@
 //! The two sweeps for one input and one output, with everything in registers.
 
 use super::factor::Gains;
-use super::record::Record;
 use super::lanes::{Cut, Place};
+use super::record::Record;
 use super::{Channels, Run, Sweep};
 
 /// The most states, that of a rate penalty included, for which [`single`] has a solver.
@@ -64,12 +64,7 @@ impl<const N: usize> Fixed<N> {
     }
 
     #[inline]
-    fn backward<const HELD: bool>(
-        &self,
-        costate: &mut [f64; N],
-        input: f64,
-        error: f64,
-    ) -> f64 {
+    fn backward<const HELD: bool>(&self, costate: &mut [f64; N], input: f64, error: f64) -> f64 {
         let hold = |gain: f64| if HELD { gain * input } else { 0.0 };
         let kappa = self.error * error - hold(self.input) + dot(&self.costate, costate);
         let earlier = std::array::from_fn(|i| {
@@ -150,8 +145,7 @@ impl<const N: usize> Single<N> {
         let Self { before, cut, after, n_before, n_samples, place, kappa, .. } = self;
         let (kappa_before, kappa_after) = kappa.split_at_mut(*n_before);
         let first_after = *n_samples - kappa_after.len();
-        let costate =
-            backward::<HELD, N>(after, *place, run, first_after, [0.0; N], kappa_after);
+        let costate = backward::<HELD, N>(after, *place, run, first_after, [0.0; N], kappa_after);
         let mut state = [0.0; N];
         if let Some((gains, cut, n_blocks)) = cut {
             for block in 0..*n_blocks {
@@ -271,12 +265,10 @@ mod tests {
     #[test]
     fn stretches_agree_with_the_plain_sweep() {
         for n in 1..=MAX_STATES {
-            for (s, n_samples) in
-                [(0.0, 3), (0.0, 700), (0.3, 5000), (0.0, 40_000), (0.2, 100_003)]
+            for (s, n_samples) in [(0.0, 3), (0.0, 700), (0.3, 5000), (0.0, 40_000), (0.2, 100_003)]
             {
                 let gains = Gains::new(&axis(n, s, n_samples), 0).unwrap();
-                let channels =
-                    Channels { inputs: vec![1], outputs: vec![0], shifts: vec![1] };
+                let channels = Channels { inputs: vec![1], outputs: vec![0], shifts: vec![1] };
                 let wave = |seed: usize| -> Vec<f64> {
                     (0..2 * n_samples).map(|k| ((k * k + seed) as f64).sin()).collect()
                 };
@@ -285,7 +277,13 @@ mod tests {
                     let mut next = vec![0.0; input.len()];
                     let (input, error) = (&input, &error);
                     let next_run = &mut next[..];
-                    sweep.solve(&mut Run { input, error, next: next_run, n_inputs: 2, n_outputs: 2 });
+                    sweep.solve(&mut Run {
+                        input,
+                        error,
+                        next: next_run,
+                        n_inputs: 2,
+                        n_outputs: 2,
+                    });
                     next
                 };
                 let mut quick = single(&gains, &channels).unwrap();
