@@ -10,7 +10,9 @@ use super::Run;
 use super::single::Fixed;
 
 /// Stretches side by side.
-pub(super) const LANES: usize = 8;
+const LANES: usize = 8;
+/// Samples that are fetched at a time.
+const TILE: usize = 8;
 /// What is left of a state after the warm-up.
 const FORGOTTEN: f64 = 1e-20;
 /// A stretch is at least this many times as long as its warm-up.
@@ -19,7 +21,7 @@ const WORTHWHILE: usize = 4;
 const STRETCH: usize = 2048;
 
 type Lanes = [f64; LANES];
-const NONE: Lanes = [0.0; LANES];
+type Tile = [Lanes; TILE];
 
 /// Where the channel's samples lie.
 #[derive(Debug, Clone, Copy)]
@@ -32,26 +34,31 @@ pub(super) struct Place {
 /// The constant part of a run, cut into stretches.
 #[derive(Debug)]
 pub(super) struct Cut {
+    /// Both in tiles.
     warm_up: usize,
     stretch: usize,
     /// `kappa` of one block: sample by sample, lane by lane.
-    kappa: Vec<Lanes>,
+    kappa: Vec<Tile>,
 }
 
 impl Cut {
     /// Returns how to cut `n_samples` samples, or `None` if that is not worthwhile.
     pub(super) fn new<const N: usize>(gains: &Fixed<N>, n_samples: usize) -> Option<Self> {
         let longest = n_samples / (LANES * WORTHWHILE);
-        let warm_up = gains.memory(longest)?.max(1);
+        let warm_up = gains.memory(longest)?.max(1).div_ceil(TILE);
         // As few blocks as possible, all of about the same size.
-        let n_blocks = n_samples.div_ceil(LANES * STRETCH.max(WORTHWHILE * warm_up));
-        let stretch = n_samples / (LANES * n_blocks);
-        (stretch >= warm_up).then(|| Self { warm_up, stretch, kappa: vec![[0.0; LANES]; stretch] })
+        let n_blocks = n_samples.div_ceil(LANES * STRETCH.max(WORTHWHILE * warm_up * TILE));
+        let stretch = n_samples / (LANES * TILE * n_blocks);
+        (stretch >= warm_up).then(|| Self {
+            warm_up,
+            stretch,
+            kappa: vec![[[0.0; LANES]; TILE]; stretch],
+        })
     }
 
     /// Samples of one block.
     pub(super) fn block(&self) -> usize {
-        self.stretch * LANES
+        self.stretch * TILE * LANES
     }
 
     /// Solves the block that begins at sample `first` and returns the state after it.
@@ -68,42 +75,44 @@ impl Cut {
         meanwhile: impl FnOnce(&mut Run, [f64; N]) -> [f64; N],
     ) -> [f64; N] {
         let Self { warm_up, stretch, kappa } = self;
-        let (stretch, warm_up) = (*stretch, *warm_up);
-        let starts: [usize; LANES] = std::array::from_fn(|lane| first + lane * stretch);
-        let (n_inputs, n_outputs) = (run.n_inputs, run.n_outputs);
-        let error_at = |k: usize| (k + place.shift) * n_outputs + place.output;
-        let input_at = |k: usize| k * n_inputs + place.input;
+        let start = |lane: usize| first + lane * *stretch * TILE;
+        // Where the stretch that a lane warms up over begins; the very last one has none.
+        let beyond =
+            |lane: usize| start(if lane + 1 == LANES && last.is_some() { lane } else { lane + 1 });
+        let errors = Channel { offset: place.output, stride: run.n_outputs };
+        let inputs = Channel { offset: place.input, stride: run.n_inputs };
 
         let mut costate = [[0.0; LANES]; N];
-        let end = (run.input.len() / n_inputs).saturating_sub(1);
-        for k in (stretch..stretch + warm_up).rev() {
-            let sample = |lane: usize| (starts[lane] + k).min(end.saturating_sub(place.shift));
-            let error = std::array::from_fn(|lane| run.error[error_at(sample(lane))]);
-            let input = if HELD {
-                std::array::from_fn(|lane| run.input[input_at(sample(lane))])
-            } else {
-                NONE
-            };
-            backward::<HELD, N>(gains, &mut costate, &input, &error);
+        let gather = |run: &Run, tile: usize, from: &dyn Fn(usize) -> usize| {
+            let at: [usize; LANES] = std::array::from_fn(|lane| from(lane) + tile * TILE);
+            let (mut error, mut input) = (NONE, NONE);
+            errors.load(run.error, at.map(|at| at + place.shift), &mut error);
+            if HELD {
+                inputs.load(run.input, at, &mut input);
+            }
+            (error, input)
+        };
+        for tile in (0..*warm_up).rev() {
+            let (error, input) = gather(run, tile, &beyond);
+            for (error, input) in error.iter().zip(&input).rev() {
+                backward::<HELD, N>(gains, &mut costate, input, error);
+            }
         }
         if let Some(exact) = last {
             for (lanes, value) in costate.iter_mut().zip(exact) {
                 lanes[LANES - 1] = value;
             }
         }
-        for (k, kappa) in kappa.iter_mut().enumerate().rev() {
-            let error = std::array::from_fn(|lane| run.error[error_at(starts[lane] + k)]);
-            let input = if HELD {
-                std::array::from_fn(|lane| run.input[input_at(starts[lane] + k)])
-            } else {
-                NONE
-            };
-            *kappa = backward::<HELD, N>(gains, &mut costate, &input, &error);
+        for (tile, kappa) in kappa.iter_mut().enumerate().rev() {
+            let (error, input) = gather(run, tile, &start);
+            for (kappa, (error, input)) in kappa.iter_mut().zip(error.iter().zip(&input)).rev() {
+                *kappa = backward::<HELD, N>(gains, &mut costate, input, error);
+            }
         }
         let exact = meanwhile(run, std::array::from_fn(|i| costate[i][0]));
 
         let mut state = [[0.0; LANES]; N];
-        for kappa in &kappa[stretch - warm_up..] {
+        for kappa in kappa[*stretch - *warm_up..].iter().flatten() {
             // Each lane warms up over the end of the lane before.
             let before = std::array::from_fn(|lane| if lane > 0 { kappa[lane - 1] } else { 0.0 });
             forward(gains, &mut state, &before);
@@ -111,14 +120,68 @@ impl Cut {
         for (lanes, value) in state.iter_mut().zip(exact) {
             lanes[0] = value;
         }
-        for (k, kappa) in kappa.iter().enumerate() {
-            let change = forward(gains, &mut state, kappa);
-            for lane in 0..LANES {
-                let index = input_at(starts[lane] + k);
-                run.next[index] = run.input[index] + change[lane];
+        for (tile, kappa) in kappa.iter().enumerate() {
+            let at: [usize; LANES] = std::array::from_fn(|lane| start(lane) + tile * TILE);
+            let mut change = NONE;
+            for (change, kappa) in change.iter_mut().zip(kappa) {
+                *change = forward(gains, &mut state, kappa);
             }
+            inputs.store(run, at, &change);
         }
         std::array::from_fn(|i| state[i][LANES - 1])
+    }
+}
+
+const NONE: Tile = [[0.0; LANES]; TILE];
+
+/// One channel of a time-first signal.
+#[derive(Clone, Copy)]
+struct Channel {
+    offset: usize,
+    stride: usize,
+}
+
+impl Channel {
+    /// Fetches a tile for each lane, from the samples `at`.
+    #[inline(always)]
+    fn load(self, signal: &[f64], at: [usize; LANES], tile: &mut Tile) {
+        for lane in 0..LANES {
+            let from = &signal[at[lane] * self.stride + self.offset..];
+            if self.stride == 1
+                && let Some(chunk) = from.first_chunk::<TILE>()
+            {
+                for i in 0..TILE {
+                    tile[i][lane] = chunk[i];
+                }
+            } else {
+                for (row, value) in tile.iter_mut().zip(from.iter().step_by(self.stride)) {
+                    row[lane] = *value;
+                }
+            }
+        }
+    }
+
+    /// Writes the input plus its change.
+    #[inline(always)]
+    fn store(self, run: &mut Run, at: [usize; LANES], change: &Tile) {
+        for lane in 0..LANES {
+            let begin = at[lane] * self.stride + self.offset;
+            let (input, next) = (&run.input[begin..], &mut run.next[begin..]);
+            if self.stride == 1
+                && let (Some(input), Some(next)) =
+                    (input.first_chunk::<TILE>(), next.first_chunk_mut::<TILE>())
+            {
+                for i in 0..TILE {
+                    next[i] = input[i] + change[i][lane];
+                }
+            } else {
+                let pairs =
+                    next.iter_mut().step_by(self.stride).zip(input.iter().step_by(self.stride));
+                for ((next, input), row) in pairs.zip(change) {
+                    *next = input + row[lane];
+                }
+            }
+        }
     }
 }
 

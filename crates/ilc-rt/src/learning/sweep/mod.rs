@@ -17,6 +17,7 @@
 mod cholesky;
 mod factor;
 mod fixed;
+mod fixed_step;
 mod general;
 mod lanes;
 mod rate;
