@@ -2,6 +2,7 @@
 
 mod norm_optimal;
 mod pd;
+mod weight;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
