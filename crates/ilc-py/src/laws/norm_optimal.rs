@@ -84,7 +84,6 @@ impl PyNormOptimalIlc {
     #[new]
     #[pyo3(signature = (model, n_samples, q=None, s=None, r=None, rate=0.0),
            text_signature = "(model, n_samples, q=1.0, s=0.0, r=0.0, rate=0.0)")]
-    #[expect(clippy::too_many_arguments, reason = "a keyword each, as Python has it")]
     fn new(
         py: Python<'_>,
         model: &Bound<'_, PyAny>,
