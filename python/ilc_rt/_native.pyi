@@ -25,6 +25,7 @@ __all__ = [
     "Pid",
     "SignalError",
     "StateSpace",
+    "TimeVarying",
     "butterworth",
     "contour_error",
     "coupling_gains",
@@ -93,6 +94,36 @@ class StateSpace:
     def append(self, other: StateSpace | _ForeignModel) -> StateSpace: ...
     def delayed(self, n_samples: int) -> StateSpace: ...
 
+@final
+class TimeVarying:
+    def __new__(
+        cls,
+        a: ArrayLike,
+        b: ArrayLike,
+        c: ArrayLike,
+        d: ArrayLike,
+        dt_s: float,
+    ) -> TimeVarying: ...
+    @property
+    def a(self) -> NDArray[np.float64]: ...
+    @property
+    def b(self) -> NDArray[np.float64]: ...
+    @property
+    def c(self) -> NDArray[np.float64]: ...
+    @property
+    def d(self) -> NDArray[np.float64]: ...
+    @property
+    def dt_s(self) -> float | None: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def n_states(self) -> int: ...
+    @property
+    def n_inputs(self) -> int: ...
+    @property
+    def n_outputs(self) -> int: ...
+    def simulate(self, u: ArrayLike, x0: ArrayLike | None = None) -> NDArray[np.float64]: ...
+
 def from_transfer_function(
     num: ArrayLike, den: ArrayLike, dt_s: float | None = None
 ) -> StateSpace: ...
@@ -142,13 +173,25 @@ class PdIlc:
 class NormOptimalIlc:
     def __new__(
         cls,
-        model: StateSpace | _ForeignModel,
+        model: StateSpace | TimeVarying | _ForeignModel,
         n_samples: int,
-        q: float = 1.0,
-        s: float = 0.0,
-        r: float = 0.0,
+        q: ArrayLike = 1.0,
+        s: ArrayLike = 0.0,
+        r: ArrayLike = 0.0,
         rate: float = 0.0,
     ) -> NormOptimalIlc: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def q(self) -> float | NDArray[np.float64]: ...
+    @property
+    def s(self) -> float | NDArray[np.float64]: ...
+    @property
+    def r(self) -> float | NDArray[np.float64]: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def conditioning(self) -> float: ...
     def update(
         self, u: ArrayLike, e: ArrayLike, disturbance: object = None
     ) -> NDArray[np.float64]: ...

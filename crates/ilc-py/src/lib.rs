@@ -21,6 +21,7 @@ mod model;
 mod model_argument;
 mod python_law;
 mod signal;
+mod time_varying;
 
 use pyo3::prelude::*;
 
@@ -29,6 +30,7 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
+    time_varying::register(module)?;
     signal::register(module)?;
     kinematics::register(module)?;
     contour::register(module)?;

@@ -2,6 +2,7 @@
 
 mod norm_optimal;
 mod pd;
+mod weight;
 
 use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
