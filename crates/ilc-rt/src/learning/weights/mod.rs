@@ -5,14 +5,18 @@
 
 mod contour;
 mod coupled;
+mod formation;
 mod gain;
+mod objective;
 mod schedule;
 mod tangent;
 mod weight;
 
 pub use contour::{Contour, ContourTerms};
 pub use coupled::Coupled;
+pub use formation::Formation;
 pub use gain::Gain;
+pub use objective::Objective;
 pub use schedule::Schedule;
 pub use tangent::tangents;
 pub use weight::Weight;
