@@ -5,6 +5,7 @@
 
 mod contour;
 mod coupled;
+mod dynamic;
 mod formation;
 mod gain;
 mod objective;
@@ -14,6 +15,7 @@ mod weight;
 
 pub use contour::{Contour, ContourTerms};
 pub use coupled::Coupled;
+pub use dynamic::{Dynamic, ErrorFilter};
 pub use formation::Formation;
 pub use gain::Gain;
 pub use objective::Objective;
