@@ -70,31 +70,23 @@ pub enum LearningError {
     },
     /// The weights leave part of the input undetermined.
     #[error(
-        "with s = {s}, r = {r} and rate = {rate} the model does not determine the input at sample \
+        "with {weights} the model does not determine the input at sample \
          {sample}; give r, s or rate a value above 0"
     )]
     Undetermined {
-        /// Weight of the input.
-        s: f64,
-        /// Weight of the change.
-        r: f64,
-        /// Weight of the rate of the change.
-        rate: f64,
+        /// The weights of input, change and rate, as text.
+        weights: String,
         /// The last sample at which this happens.
         sample: usize,
     },
     /// The update itself is an unstable filter.
     #[error(
-        "with s = {s}, r = {r} and rate = {rate} the input would grow without bound along the run: \
+        "with {weights} the input would grow without bound along the run: \
          the model has a zero outside the unit circle; give r or s a value above 0"
     )]
     Unbounded {
-        /// Weight of the input.
-        s: f64,
-        /// Weight of the change.
-        r: f64,
-        /// Weight of the rate of the change.
-        rate: f64,
+        /// The weights of input, change and rate, as text.
+        weights: String,
     },
     /// The model was refused.
     #[error(transparent)]

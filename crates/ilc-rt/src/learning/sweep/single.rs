@@ -1,18 +1,17 @@
 //! The two sweeps for one input and one output, with everything in registers.
 
-use nalgebra::DMatrix;
-
-use super::factor::{Gains, StageGains};
+use super::factor::Gains;
+use super::record::Record;
 use super::{Channels, Run, Sweep};
 
 /// The most states, that of a rate penalty included, for which [`single`] has a solver.
-pub const MAX_STATES: usize = 6;
+const MAX_STATES: usize = 6;
 
 /// Returns the solver for one axis by itself.
 ///
 /// `None` unless the gains are for one input, one output and 1 to [`MAX_STATES`] states: the caller
 /// then takes [`super::General`].
-pub fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
+pub(super) fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
     let ([input], [output], [shift]) =
         (&channels.inputs[..], &channels.outputs[..], &channels.shifts[..])
     else {
@@ -30,7 +29,7 @@ pub fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
     })
 }
 
-/// [`StageGains`] with its sizes known to the compiler.
+/// The gains of one sample with its sizes known to the compiler.
 #[derive(Debug, Clone, Copy)]
 struct Fixed<const N: usize> {
     /// By columns: column `j` is what state `j` becomes.
@@ -45,19 +44,20 @@ struct Fixed<const N: usize> {
 }
 
 impl<const N: usize> Fixed<N> {
-    fn new(gains: &StageGains) -> Self {
-        let vector = |matrix: &DMatrix<f64>| std::array::from_fn(|i| matrix[i]);
+    fn new(record: Record, is_held: bool) -> Self {
+        let rows = N + 1;
+        let fore = |row: usize, col: usize| record.fore[col * rows + row];
+        let back = |row: usize, col: usize| record.back[col * rows + row];
+        let held = |row: usize| if is_held { back(row, N + 1) } else { 0.0 };
         Self {
-            transition: std::array::from_fn(|col| {
-                std::array::from_fn(|row| gains.transition[(row, col)])
-            }),
-            feedback: vector(&gains.feedback),
-            from_error: vector(&gains.from_error),
-            from_input: vector(&gains.from_input),
-            costate: vector(&gains.costate),
-            b: vector(&gains.b),
-            error: gains.error[0],
-            input: gains.input[0],
+            transition: std::array::from_fn(|col| std::array::from_fn(|row| fore(row, col))),
+            feedback: std::array::from_fn(|col| -fore(N, col)),
+            from_error: std::array::from_fn(|row| back(row, N)),
+            from_input: std::array::from_fn(held),
+            costate: std::array::from_fn(|col| back(N, col)),
+            b: std::array::from_fn(|row| record.fore[rows * N + row]),
+            error: back(N, N),
+            input: -held(N),
         }
     }
 
@@ -109,10 +109,12 @@ struct Single<const N: usize> {
 
 impl<const N: usize> Single<N> {
     fn new(gains: &Gains, (input, output, shift): (usize, usize, usize)) -> Self {
+        let is_held = gains.sizes().held > 0;
         let sets = (0..gains.n_stored())
+            .rev()
             .map(|place| {
                 let (count, at) = gains.set(place);
-                (count, Fixed::new(at))
+                (count, Fixed::new(at, is_held))
             })
             .collect();
         let n_samples = gains.n_samples();
