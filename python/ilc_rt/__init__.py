@@ -1,6 +1,6 @@
 """The motion controller that learns: iterative learning control on the machine."""
 
-from ilc_rt import signal
+from ilc_rt import signal, weights
 from ilc_rt._native import (
     Cell,
     LearningError,
@@ -38,4 +38,5 @@ __all__ = [
     "from_transfer_function",
     "second_order",
     "signal",
+    "weights",
 ]

@@ -106,7 +106,7 @@ pub(crate) fn misfit(name: &str, shape: &[usize], allowed: &str) -> PyErr {
 }
 
 /// Reads any array of float64 or integers in row-major order.
-fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let numpy = object.py().import("numpy")?;
     let array = numpy.call_method1("asarray", (object,)).map_err(|error| {
         PyValueError::new_err(format!("{name} is no array of numbers: {error}"))

@@ -17,6 +17,7 @@ mod model;
 mod model_argument;
 mod python_law;
 mod signal;
+mod weights;
 
 use pyo3::prelude::*;
 
@@ -27,6 +28,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     model::register(module)?;
     signal::register(module)?;
     laws::register(module)?;
+    weights::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

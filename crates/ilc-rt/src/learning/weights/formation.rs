@@ -35,7 +35,7 @@ impl Formation {
     /// - [`LearningError::Empty`] for no agents or no axes.
     pub fn new(n_agents: usize, n_axes: usize) -> Result<Self, LearningError> {
         let axes: Vec<usize> = (0..n_axes).collect();
-        Self::of_pairs(n_agents, n_axes, &all_pairs(n_agents), &axes)
+        Self::of_pairs(n_agents, n_axes, &Self::all_pairs(n_agents), &axes)
     }
 
     /// Makes a formation in which the given pairs of agents keep their offset in the given axes.
@@ -80,6 +80,11 @@ impl Formation {
             if col % n_axes == row { share } else { 0.0 }
         });
         Ok(Self { n_agents, n_axes, shape, centre })
+    }
+
+    /// Returns every pair of agents, neighbours in number first.
+    pub fn all_pairs(n_agents: usize) -> Vec<(usize, usize)> {
+        (1..n_agents).flat_map(|gap| (0..n_agents - gap).map(move |i| (i, i + gap))).collect()
     }
 
     /// Takes another definition of the formation errors: any linear map of all errors.
@@ -204,11 +209,6 @@ impl Formation {
         let n_samples = (found / n_channels).max(1);
         Err(LearningError::Length { what, found, n_samples, n_channels })
     }
-}
-
-/// Returns every pair of agents, neighbours in number first.
-fn all_pairs(n_agents: usize) -> Vec<(usize, usize)> {
-    (1..n_agents).flat_map(|gap| (0..n_agents - gap).map(move |i| (i, i + gap))).collect()
 }
 
 fn check_map(
