@@ -1,6 +1,8 @@
 //! Coordinated learning of several agents: the printed tables of [barton2010], Appendix I, and what
 //! each objective does to the agents of that example.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use ilc_rt::learning::Law;
 use ilc_rt::learning::law::norm_optimal::{Cost, NormOptimal};
 use ilc_rt::learning::weights::{Formation, Objective, Weight};

@@ -186,7 +186,7 @@ mod tests {
         let weights = Weights { r: 1.0, ..Weights::default() };
         let mut law = DynamicNormOptimal::new(&plant(), N, &dynamic, weights).unwrap();
         let mut next = vec![0.0; 2 * N];
-        let short = law.update(&vec![0.0; 2 * N], &vec![0.0; N], &mut next).unwrap_err();
+        let short = law.update(&[0.0; 2 * N], &[0.0; N], &mut next).unwrap_err();
         assert!(short.to_string().starts_with("error holds"));
     }
 

@@ -142,7 +142,7 @@ impl Formation {
     /// # Errors
     /// - [`LearningError::Length`] unless `error` holds whole samples of all agents.
     pub fn errors(&self, error: &[f64]) -> Result<Vec<f64>, LearningError> {
-        self.check_signal("error", error, self.n_channels())?;
+        check_signal("error", error, self.n_channels())?;
         let row_of = |sample: &[f64], row: usize| -> f64 {
             sample.iter().enumerate().map(|(i, value)| self.shape[(row, i)] * value).sum()
         };
@@ -161,7 +161,7 @@ impl Formation {
     /// # Errors
     /// - [`LearningError::Length`] if one of them does not fit.
     pub fn follow(&self, leader: &[f64], offsets: &[f64]) -> Result<Vec<f64>, LearningError> {
-        self.check_signal("leader", leader, self.n_axes)?;
+        check_signal("leader", leader, self.n_axes)?;
         if offsets.len() != self.n_channels() {
             return Err(LearningError::Length {
                 what: "offsets",
@@ -195,20 +195,20 @@ impl Formation {
         }
         Ok(Weight::Blocks((0..n_samples).map(at).collect()))
     }
+}
 
-    fn check_signal(
-        &self,
-        what: &'static str,
-        signal: &[f64],
-        n_channels: usize,
-    ) -> Result<(), LearningError> {
-        let found = signal.len();
-        if found > 0 && found.is_multiple_of(n_channels) {
-            return Ok(());
-        }
-        let n_samples = (found / n_channels).max(1);
-        Err(LearningError::Length { what, found, n_samples, n_channels })
+/// Refuses a signal that is no whole number of samples.
+fn check_signal(
+    what: &'static str,
+    signal: &[f64],
+    n_channels: usize,
+) -> Result<(), LearningError> {
+    let found = signal.len();
+    if found > 0 && found.is_multiple_of(n_channels) {
+        return Ok(());
     }
+    let n_samples = (found / n_channels).max(1);
+    Err(LearningError::Length { what, found, n_samples, n_channels })
 }
 
 fn check_map(

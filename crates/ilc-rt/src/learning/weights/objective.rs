@@ -126,9 +126,9 @@ impl Objective {
         let shape = per_agent(&|i| of(&self.sigma, i) * (1.0 - of(&self.tracking_share, i)));
 
         let mut q = DMatrix::zeros(formation.n_channels(), formation.n_channels());
-        for agent in 0..n_agents {
+        for (agent, tracking) in tracking.iter().enumerate() {
             let own = self.own[agent.min(self.own.len() - 1)].at(k, n_axes);
-            let scale = tracking[agent] * of(&self.own_share, agent);
+            let scale = tracking * of(&self.own_share, agent);
             let corner = agent * n_axes;
             q.view_mut((corner, corner), (n_axes, n_axes)).copy_from(&(own * scale));
         }
@@ -301,24 +301,24 @@ mod tests {
         #[test]
         fn unequal_gains_give_a_weight_and_keep_the_formation_free(
             (p, d) in (2..5_usize, 1..4_usize),
-            shares in prop::collection::vec((0.0..1.0_f64, 0.0..1.0_f64, 0.0..1.0_f64, 0.0..5.0_f64), 4),
+            shares in prop::collection::vec(prop::array::uniform4(0.0..1.0_f64), 4),
             drift in prop::array::uniform3(-2.0..2.0_f64),
         ) {
-            let of = |pick: &dyn Fn(&(f64, f64, f64, f64)) -> f64| -> Vec<Gain> {
-                shares[..p].iter().map(|share| Gain::from(pick(share))).collect()
+            let of = |i: usize| -> Vec<Gain> {
+                shares[..p].iter().map(|share| Gain::from(share[i])).collect()
             };
             let objective = Objective {
-                own_share: of(&|s| s.0),
-                centre_share: of(&|s| s.1),
-                tracking_share: of(&|s| s.2),
-                sigma: of(&|s| s.3),
+                own_share: of(0),
+                centre_share: of(1),
+                tracking_share: of(2),
+                sigma: of(3),
                 ..Objective::individual()
             };
             let formation = Formation::new(p, d).unwrap();
             let weight = formation.weight(2, &objective).unwrap();
             prop_assert!(weight.check("q", 2, p * d).is_ok());
             // What all agents share costs nothing where only the formation counts.
-            let free = Objective { sigma: of(&|s| s.3), ..Objective::shape() };
+            let free = Objective { sigma: of(3), ..Objective::shape() };
             let weight = formation.weight(2, &free).unwrap().at(0, p * d);
             let error: Vec<f64> = (0..p * d).map(|i| drift[i % d]).collect();
             prop_assert!(cost(&weight, &error).abs() < 1e-10);

@@ -81,7 +81,9 @@ impl Schedule {
             let values = self.segments.iter().map(|(_, value)| *value);
             let lowest = values.clone().fold(f64::INFINITY, f64::min);
             let highest = values.fold(f64::NEG_INFINITY, f64::max);
-            steps.iter_mut().for_each(|step| *step = step.clamp(lowest, highest));
+            for step in &mut steps {
+                *step = step.clamp(lowest, highest);
+            }
         }
         Ok(steps)
     }
