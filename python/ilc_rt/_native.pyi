@@ -16,6 +16,7 @@ __all__ = [
     "PdIlc",
     "SignalError",
     "StateSpace",
+    "TimeVarying",
     "butterworth",
     "contour_weights",
     "coupled_weights",
@@ -84,6 +85,36 @@ class StateSpace:
     def append(self, other: StateSpace | _ForeignModel) -> StateSpace: ...
     def delayed(self, n_samples: int) -> StateSpace: ...
 
+@final
+class TimeVarying:
+    def __new__(
+        cls,
+        a: ArrayLike,
+        b: ArrayLike,
+        c: ArrayLike,
+        d: ArrayLike,
+        dt_s: float,
+    ) -> TimeVarying: ...
+    @property
+    def a(self) -> NDArray[np.float64]: ...
+    @property
+    def b(self) -> NDArray[np.float64]: ...
+    @property
+    def c(self) -> NDArray[np.float64]: ...
+    @property
+    def d(self) -> NDArray[np.float64]: ...
+    @property
+    def dt_s(self) -> float | None: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def n_states(self) -> int: ...
+    @property
+    def n_inputs(self) -> int: ...
+    @property
+    def n_outputs(self) -> int: ...
+    def simulate(self, u: ArrayLike, x0: ArrayLike | None = None) -> NDArray[np.float64]: ...
+
 def from_transfer_function(
     num: ArrayLike, den: ArrayLike, dt_s: float | None = None
 ) -> StateSpace: ...
@@ -133,7 +164,7 @@ class PdIlc:
 class NormOptimalIlc:
     def __new__(
         cls,
-        model: StateSpace | _ForeignModel,
+        model: StateSpace | TimeVarying | _ForeignModel,
         n_samples: int,
         q: ArrayLike = 1.0,
         s: ArrayLike = 0.0,
@@ -142,7 +173,7 @@ class NormOptimalIlc:
     ) -> NormOptimalIlc: ...
     @staticmethod
     def contour(
-        model: StateSpace | _ForeignModel,
+        model: StateSpace | TimeVarying | _ForeignModel,
         reference: ArrayLike,
         q: ArrayLike = 1.0,
         contour: ArrayLike = 1.0,
@@ -170,7 +201,7 @@ class NormOptimalIlc:
     ) -> NormOptimalIlc: ...
     @staticmethod
     def dynamic(
-        model: StateSpace | _ForeignModel,
+        model: StateSpace | TimeVarying | _ForeignModel,
         n_samples: int,
         filter: StateSpace | _ForeignModel,
         q: ArrayLike = 1.0,
@@ -180,6 +211,18 @@ class NormOptimalIlc:
         r: ArrayLike = 0.0,
         rate: float = 0.0,
     ) -> NormOptimalIlc: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def q(self) -> float | NDArray[np.float64]: ...
+    @property
+    def s(self) -> float | NDArray[np.float64]: ...
+    @property
+    def r(self) -> float | NDArray[np.float64]: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def conditioning(self) -> float: ...
     def update(
         self, u: ArrayLike, e: ArrayLike, disturbance: object = None
     ) -> NDArray[np.float64]: ...

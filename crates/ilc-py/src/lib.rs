@@ -17,6 +17,7 @@ mod model;
 mod model_argument;
 mod python_law;
 mod signal;
+mod time_varying;
 mod weights;
 
 use pyo3::prelude::*;
@@ -26,6 +27,7 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
+    time_varying::register(module)?;
     signal::register(module)?;
     laws::register(module)?;
     weights::register(module)?;

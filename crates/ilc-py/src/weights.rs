@@ -8,79 +8,72 @@ use numpy::ndarray::Array3;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::argument::{Matrix, Signal, give_signal, misfit, read};
+use crate::argument::{Matrix, Signal, give_signal, misfit, read_array};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::laws::weight;
 
-/// A number or an array, before anyone looked at it.
-#[derive(Debug, FromPyObject)]
-pub(crate) enum Given<'py> {
-    Number(f64),
-    Array(Bound<'py, PyAny>),
+/// An argument that has a default.
+pub(crate) type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+
+/// Reads a weight, or takes the default.
+pub(crate) fn read_weight(
+    name: &str,
+    given: Given<'_, '_>,
+    default: f64,
+    n_samples: usize,
+    n_channels: usize,
+) -> PyResult<Weight> {
+    given.map_or(Ok(Weight::Scalar(default)), |given| {
+        weight::read_weight(name, given, n_samples, n_channels)
+    })
 }
 
-impl Given<'_> {
-    fn read(&self, name: &str) -> PyResult<(Vec<f64>, Vec<usize>)> {
-        match self {
-            Self::Number(value) => Ok((vec![*value], Vec::new())),
-            Self::Array(array) => read(name, array),
-        }
+/// Reads a number, or one a sample, or takes the default.
+fn read_gain(name: &str, given: Given<'_, '_>, default: f64, n_samples: usize) -> PyResult<Gain> {
+    let Some(given) = given else { return Ok(Gain::Constant(default)) };
+    let (values, shape) = read_array(name, given)?;
+    match shape[..] {
+        [] => Ok(Gain::Constant(values[0])),
+        [length] if length == n_samples => Ok(Gain::PerSample(values)),
+        _ => Err(misfit(name, &shape, &format!("() or ({n_samples},)"))),
     }
+}
 
-    /// Reads a weight: a number, one a sample `(n,)`, a block `(p, p)`, or one a sample
-    /// `(n, p, p)`.
-    pub(crate) fn weight(&self, name: &str) -> PyResult<Weight> {
-        let (values, shape) = self.read(name)?;
-        match shape[..] {
-            [] => Ok(Weight::Scalar(values[0])),
-            [_] => Ok(Weight::PerSample(values)),
-            [rows, cols] => Ok(Weight::Block(Matrix::from_row_slice(rows, cols, &values))),
-            [_, rows, cols] if !values.is_empty() => {
-                Ok(Weight::Blocks(blocks(&values, rows, cols)))
-            }
-            _ => Err(misfit(name, &shape, "a number, (n,), (p, p) or (n, p, p)")),
-        }
+/// Reads one gain for each agent from what broadcasts to `(n_samples, n_agents)`.
+fn read_gains(
+    name: &str,
+    given: Given<'_, '_>,
+    default: f64,
+    (n_samples, n_agents): (usize, usize),
+) -> PyResult<Vec<Gain>> {
+    let Some(given) = given else { return Ok(vec![Gain::Constant(default)]) };
+    let (values, shape) = read_array(name, given)?;
+    let (rows, cols) = match shape[..] {
+        [] => (1, 1),
+        [cols] => (1, cols),
+        [rows, cols] => (rows, cols),
+        _ => (0, 0),
+    };
+    let fits = (rows == 1 || rows == n_samples) && (cols == 1 || cols == n_agents);
+    if !fits || values.is_empty() {
+        let rule = format!(
+            "(), ({n_agents},) for one an agent, ({n_samples}, 1) for one a sample, or \
+             ({n_samples}, {n_agents})"
+        );
+        return Err(misfit(name, &shape, &rule));
     }
-
-    /// Reads a number, or one a sample.
-    fn gain(&self, name: &str) -> PyResult<Gain> {
-        let (values, shape) = self.read(name)?;
-        match shape[..] {
-            [] => Ok(Gain::Constant(values[0])),
-            [_] => Ok(Gain::PerSample(values)),
-            _ => Err(misfit(name, &shape, "a number or (n_samples,)")),
-        }
-    }
-
-    /// Reads one gain for each agent from what broadcasts to `(n_samples, n_agents)`.
-    fn gains(&self, name: &str, n_samples: usize, n_agents: usize) -> PyResult<Vec<Gain>> {
-        let (values, shape) = self.read(name)?;
-        let (rows, cols) = match shape[..] {
-            [] => (1, 1),
-            [cols] => (1, cols),
-            [rows, cols] => (rows, cols),
-            _ => (0, 0),
-        };
-        let fits = (rows == 1 || rows == n_samples) && (cols == 1 || cols == n_agents);
-        if !fits || values.is_empty() {
-            let rule = format!(
-                "a number, ({n_agents},) for one an agent, ({n_samples}, 1) for one a sample or \
-                 ({n_samples}, {n_agents})"
-            );
-            return Err(misfit(name, &shape, &rule));
-        }
-        let column = |agent: usize| values.iter().skip(agent).step_by(cols).copied();
-        let of = |agent: usize| match rows {
-            1 => Gain::Constant(values[agent]),
-            _ => Gain::PerSample(column(agent).collect()),
-        };
-        Ok((0..cols).map(of).collect())
-    }
+    let column = |agent: usize| values.iter().skip(agent).step_by(cols).copied();
+    let of = |agent: usize| match rows {
+        1 => Gain::Constant(values[agent]),
+        _ => Gain::PerSample(column(agent).collect()),
+    };
+    Ok((0..cols).map(of).collect())
 }
 
 /// Reads one matrix a sample, `(n_samples, rows, columns)`, or a single one.
 pub(crate) fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<Matrix>> {
-    let (values, shape) = read(name, object)?;
+    let (values, shape) = read_array(name, object)?;
     match shape[..] {
         [rows, cols] | [_, rows, cols] if !values.is_empty() => Ok(blocks(&values, rows, cols)),
         _ => Err(misfit(name, &shape, "(rows, columns) or (n_samples, rows, columns)")),
@@ -112,15 +105,17 @@ fn give_blocks<'py>(
 pub(crate) fn read_contour(
     py: Python<'_>,
     reference: &Bound<'_, PyAny>,
-    (q, contour, along): (&Given<'_>, &Given<'_>, &Given<'_>),
+    q: Given<'_, '_>,
+    contour: Given<'_, '_>,
+    along: Given<'_, '_>,
     axes: Option<Vec<usize>>,
 ) -> PyResult<(Weight, usize, usize)> {
     let reference = Signal::read("reference", reference)?;
     let (n_samples, p) = (reference.n_samples, reference.n_channels);
     let terms = ContourTerms {
-        q: q.weight("q")?,
-        contour: contour.gain("contour")?,
-        along: along.gain("along")?,
+        q: read_weight("q", q, 1.0, n_samples, p)?,
+        contour: read_gain("contour", contour, 1.0, n_samples)?,
+        along: read_gain("along", along, 0.0, n_samples)?,
     };
     let axes = axes.unwrap_or_else(|| (0..p).collect());
     let weight = detached(py, || Contour::of_axes(&reference.values, p, &axes)?.weight(&terms))
@@ -131,11 +126,11 @@ pub(crate) fn read_contour(
 /// What several agents are to do, as Python gives it.
 #[derive(Debug)]
 pub(crate) struct Task<'a, 'py> {
-    pub(crate) tracking: &'a Given<'py>,
-    pub(crate) own: &'a Given<'py>,
-    pub(crate) centre: &'a Given<'py>,
-    pub(crate) sigma: &'a Given<'py>,
-    pub(crate) weight: &'a Given<'py>,
+    pub(crate) tracking: Given<'a, 'py>,
+    pub(crate) own: Given<'a, 'py>,
+    pub(crate) centre: Given<'a, 'py>,
+    pub(crate) sigma: Given<'a, 'py>,
+    pub(crate) weight: Given<'a, 'py>,
     pub(crate) leaders: Option<Vec<usize>>,
     pub(crate) pairs: Option<Vec<(usize, usize)>>,
     pub(crate) axes: Option<Vec<usize>>,
@@ -151,18 +146,19 @@ impl Task<'_, '_> {
         n_axes: usize,
     ) -> PyResult<Weight> {
         let formation = read_formation(n_agents, n_axes, self.pairs, self.axes)?;
-        let gains = |name: &str, given: &Given<'_>| given.gains(name, n_samples, n_agents);
-        let weight = self.weight.weight("weight")?;
+        let gains =
+            |name: &str, given, default| read_gains(name, given, default, (n_samples, n_agents));
+        let weight = read_weight("weight", self.weight, 1.0, n_samples, n_axes)?;
         let objective = Objective {
             own: vec![weight.clone()],
             centre: weight,
             own_share: match self.leaders {
                 Some(leaders) => Objective::led_by(n_agents, &leaders).or_raise()?.own_share,
-                None => gains("own", self.own)?,
+                None => gains("own", self.own, 1.0)?,
             },
-            centre_share: gains("centre", self.centre)?,
-            tracking_share: gains("tracking", self.tracking)?,
-            sigma: gains("sigma", self.sigma)?,
+            centre_share: gains("centre", self.centre, 0.0)?,
+            tracking_share: gains("tracking", self.tracking, 1.0)?,
+            sigma: gains("sigma", self.sigma, 1.0)?,
         };
         detached(py, || formation.weight(n_samples, &objective)).or_raise()
     }
@@ -231,21 +227,20 @@ fn read_formation(
 #[pyo3(
     name = "contour_weights",
     signature = (
-        reference, q=Given::Number(1.0), contour=Given::Number(1.0), along=Given::Number(0.0),
+        reference, q=None, contour=None, along=None,
         axes=None
     ),
     text_signature = "(reference, q=1.0, contour=1.0, along=0.0, axes=None)"
 )]
-#[expect(clippy::needless_pass_by_value, reason = "arguments from Python are owned")]
 fn contour<'py>(
     py: Python<'py>,
     reference: &Bound<'py, PyAny>,
-    q: Given<'py>,
-    contour: Given<'py>,
-    along: Given<'py>,
+    q: Option<&Bound<'py, PyAny>>,
+    contour: Option<&Bound<'py, PyAny>>,
+    along: Option<&Bound<'py, PyAny>>,
     axes: Option<Vec<usize>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (weight, n_samples, p) = read_contour(py, reference, (&q, &contour, &along), axes)?;
+    let (weight, n_samples, p) = read_contour(py, reference, q, contour, along, axes)?;
     give_blocks(py, &weight, n_samples, p)
 }
 
@@ -289,19 +284,21 @@ fn contour<'py>(
 #[pyfunction]
 #[pyo3(
     name = "coupled_weights",
-    signature = (coupling, sigma=Given::Number(1.0), gamma=Given::Number(0.0)),
+    signature = (coupling, sigma=None, gamma=None),
     text_signature = "(coupling, sigma=1.0, gamma=0.0)"
 )]
-#[expect(clippy::needless_pass_by_value, reason = "arguments from Python are owned")]
 fn coupled<'py>(
     py: Python<'py>,
     coupling: &Bound<'py, PyAny>,
-    sigma: Given<'py>,
-    gamma: Given<'py>,
+    sigma: Option<&Bound<'py, PyAny>>,
+    gamma: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let matrices = read_matrices("coupling", coupling)?;
     let (n_samples, p) = (matrices.len(), matrices[0].ncols());
-    let shares = Coupled { sigma: sigma.gain("sigma")?, gamma: gamma.gain("gamma")? };
+    let shares = Coupled {
+        sigma: read_gain("sigma", sigma, 1.0, n_samples)?,
+        gamma: read_gain("gamma", gamma, 0.0, n_samples)?,
+    };
     let weight = detached(py, || shares.weight(n_samples, &matrices)).or_raise()?;
     give_blocks(py, &weight, n_samples, p)
 }
@@ -424,39 +421,29 @@ fn schedule(
 #[pyo3(
     name = "formation_weights",
     signature = (
-        n_agents, n_axes, n_samples, tracking=Given::Number(1.0), own=Given::Number(1.0),
-        centre=Given::Number(0.0), sigma=Given::Number(1.0), weight=Given::Number(1.0),
+        n_agents, n_axes, n_samples, tracking=None, own=None,
+        centre=None, sigma=None, weight=None,
         leaders=None, pairs=None, axes=None
     ),
     text_signature = "(n_agents, n_axes, n_samples, tracking=1.0, own=1.0, centre=0.0, sigma=1.0, \
                       weight=1.0, leaders=None, pairs=None, axes=None)"
 )]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
-#[expect(clippy::needless_pass_by_value, reason = "arguments from Python are owned")]
 fn formation<'py>(
     py: Python<'py>,
     n_agents: usize,
     n_axes: usize,
     n_samples: usize,
-    tracking: Given<'py>,
-    own: Given<'py>,
-    centre: Given<'py>,
-    sigma: Given<'py>,
-    weight: Given<'py>,
+    tracking: Option<&Bound<'py, PyAny>>,
+    own: Option<&Bound<'py, PyAny>>,
+    centre: Option<&Bound<'py, PyAny>>,
+    sigma: Option<&Bound<'py, PyAny>>,
+    weight: Option<&Bound<'py, PyAny>>,
     leaders: Option<Vec<usize>>,
     pairs: Option<Vec<(usize, usize)>>,
     axes: Option<Vec<usize>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let task = Task {
-        tracking: &tracking,
-        own: &own,
-        centre: &centre,
-        sigma: &sigma,
-        weight: &weight,
-        leaders,
-        pairs,
-        axes,
-    };
+    let task = Task { tracking, own, centre, sigma, weight, leaders, pairs, axes };
     let weight = task.read(py, n_samples, n_agents, n_axes)?;
     give_blocks(py, &weight, n_samples, n_agents * n_axes)
 }

@@ -2,6 +2,8 @@
 
 mod norm_optimal;
 mod pd;
+mod solver;
+pub(crate) mod weight;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -2,38 +2,36 @@
 
 use std::sync::Mutex;
 
-use ilc_rt::learning::law::dynamic::DynamicNormOptimal;
-use ilc_rt::learning::law::norm_optimal::{Cost, NormOptimal};
-use ilc_rt::learning::weights::{Dynamic, Weight};
-use ilc_rt::learning::{Law, LearningError};
-use ilc_rt::model::StateSpace;
-use pyo3::exceptions::PyValueError;
+use ilc_rt::learning::law::norm_optimal::Cost;
+use ilc_rt::learning::weights::Weight;
 use pyo3::prelude::*;
 
+use super::solver::{Effort, Filter, Solver, side_by_side};
+use super::weight::give_weight;
 use super::{held, next};
 use crate::argument::{Signal, give_signal, misfit};
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::model_argument::read_model;
-use crate::weights::{Given, Task, read_contour, read_matrices};
+use crate::model_argument::{AnyModel, read_any_model};
+use crate::weights::{Task, read_contour, read_weight};
 
 /// Norm-optimal learning, exact and in linear time.
 ///
-/// Minimises ``sum q |z|^2 + s |u'|^2 + r |v|^2 + rate^2 |v[k] - v[k-1]|^2`` with
-/// z the predicted error, u' the next input and v its change.
+/// Minimises ``sum z'qz + u's u + v'rv + rate^2 |v[k] - v[k-1]|^2`` with z the
+/// predicted error, u the next input and v its change.
 ///
 /// Parameters
 /// ----------
-/// model : StateSpace or compatible
+/// model : StateSpace, TimeVarying or compatible
 ///     Sampled model from the learned input to the measurement, delays of the
 ///     bus included.
 /// n_samples : int
 ///     Samples of a run.
-/// q : float or ndarray of shape (n_samples,), (p, p) or (n_samples, p, p)
-///     Weight of the predicted error of p outputs; `ilc_rt.weights` makes such.
-/// s : float or ndarray, as `q` for the inputs
+/// q : float or array_like, shape (n,), (n_outputs, n_outputs) or (n, n_outputs, n_outputs)
+///     Weight of the predicted error, each sample by its own.
+/// s : float or array_like, shape (n,), (n_inputs, n_inputs) or (n, n_inputs, n_inputs)
 ///     Weight of the next input.
-/// r : float or ndarray, as `s`
+/// r : float or array_like, shape as `s`
 ///     Weight of the change of the input.
 /// rate : float
 ///     Weight of the change from one sample to the next; enters squared.
@@ -41,10 +39,13 @@ use crate::weights::{Given, Task, read_contour, read_matrices};
 /// Raises
 /// ------
 /// LearningError
-///     If a weight is negative, or s, r and rate are all zero and the model does
-///     not determine the input or has an unstable inverse.
+///     If a weight is not positive semidefinite, or s, r and rate are zero and the
+///     model does not determine the input or has an unstable inverse.
 /// ModelError, TypeError
-///     If the model is continuous, or no model.
+///     If the model is continuous, varies over another number of samples, or is no
+///     model.
+/// ValueError, TypeError
+///     If a weight has the wrong shape, dtype or a number that is not finite.
 ///
 /// Notes
 /// -----
@@ -52,6 +53,7 @@ use crate::weights::{Given, Task, read_contour, read_matrices};
 /// law pairs each sample of the input with the first sample of the error that it
 /// reaches. The last samples of the input reach nothing within the run: there
 /// s, r and rate alone decide, and if all are zero the input stays as it was.
+/// An update takes time and memory in proportion to n_samples.
 ///
 /// References
 /// ----------
@@ -65,69 +67,37 @@ use crate::weights::{Given, Task, read_contour, read_matrices};
 /// >>> law = NormOptimalIlc(axis, 400, rate=3.0)
 /// >>> law.update(np.zeros(400), np.ones(400)).shape
 /// (400,)
+/// >>> half = np.where(np.arange(400) < 200, 1.0, 0.0)
+/// >>> NormOptimalIlc(axis, 400, q=half, r=0.01)
+/// NormOptimalIlc(n_samples=400, q=(400,), s=0, r=0.01, rate=0)
 #[pyclass(name = "NormOptimalIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyNormOptimalIlc {
-    told: String,
+    cost: Cost,
     n_samples: usize,
     n_inputs: usize,
     n_outputs: usize,
     law: Mutex<Solver>,
 }
 
-/// The law with or without a filter in front.
-#[derive(Debug)]
-enum Solver {
-    Plain(NormOptimal),
-    Dynamic(DynamicNormOptimal),
-}
-
-impl Solver {
-    fn law(&mut self) -> &mut dyn Law {
-        match self {
-            Self::Plain(law) => law,
-            Self::Dynamic(law) => law,
-        }
-    }
-}
-
-/// What a builder leaves to be said about the input.
-struct Effort<'a, 'py> {
-    s: &'a Given<'py>,
-    r: &'a Given<'py>,
-    rate: f64,
-}
-
-impl Effort<'_, '_> {
-    fn cost(&self, q: Weight) -> PyResult<Cost> {
-        Ok(Cost { q, s: self.s.weight("s")?, r: self.r.weight("r")?, rate: self.rate })
-    }
-}
-
 #[pymethods]
-#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
-#[expect(clippy::needless_pass_by_value, reason = "arguments from Python are owned")]
 impl PyNormOptimalIlc {
     #[new]
-    #[pyo3(
-        signature = (
-            model, n_samples, q=Given::Number(1.0), s=Given::Number(0.0), r=Given::Number(0.0),
-            rate=0.0
-        ),
-        text_signature = "(model, n_samples, q=1.0, s=0.0, r=0.0, rate=0.0)"
-    )]
+    #[pyo3(signature = (model, n_samples, q=None, s=None, r=None, rate=0.0),
+           text_signature = "(model, n_samples, q=1.0, s=0.0, r=0.0, rate=0.0)")]
+    #[expect(clippy::too_many_arguments, reason = "a keyword each, as Python has it")]
     fn new(
         py: Python<'_>,
         model: &Bound<'_, PyAny>,
         n_samples: usize,
-        q: Given<'_>,
-        s: Given<'_>,
-        r: Given<'_>,
+        q: Option<&Bound<'_, PyAny>>,
+        s: Option<&Bound<'_, PyAny>>,
+        r: Option<&Bound<'_, PyAny>>,
         rate: f64,
     ) -> PyResult<Self> {
-        let model = read_model("model", model)?;
-        let cost = Effort { s: &s, r: &r, rate }.cost(q.weight("q")?)?;
-        Self::plain(py, &model, n_samples, cost)
+        let model = read_any_model("model", model)?;
+        let q = read_weight("q", q, 1.0, n_samples, model.n_outputs())?;
+        Self::make(py, &model, n_samples, q, &Effort { s, r, rate }, None)
     }
 
     /// Return the law that learns the contour rather than each axis.
@@ -170,10 +140,11 @@ impl PyNormOptimalIlc {
     /// >>> law.update(np.zeros((100, 2)), np.ones((100, 2))).shape
     /// (100, 2)
     #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "a keyword each, as Python has it")]
     #[pyo3(
         signature = (
-            model, reference, q=Given::Number(1.0), contour=Given::Number(1.0),
-            along=Given::Number(0.0), s=Given::Number(0.0), r=Given::Number(0.0), rate=0.0,
+            model, reference, q=None, contour=None,
+            along=None, s=None, r=None, rate=0.0,
             axes=None
         ),
         text_signature = "(model, reference, q=1.0, contour=1.0, along=0.0, s=0.0, r=0.0, \
@@ -183,21 +154,21 @@ impl PyNormOptimalIlc {
         py: Python<'_>,
         model: &Bound<'_, PyAny>,
         reference: &Bound<'_, PyAny>,
-        q: Given<'_>,
-        contour: Given<'_>,
-        along: Given<'_>,
-        s: Given<'_>,
-        r: Given<'_>,
+        q: Option<&Bound<'_, PyAny>>,
+        contour: Option<&Bound<'_, PyAny>>,
+        along: Option<&Bound<'_, PyAny>>,
+        s: Option<&Bound<'_, PyAny>>,
+        r: Option<&Bound<'_, PyAny>>,
         rate: f64,
         axes: Option<Vec<usize>>,
     ) -> PyResult<Self> {
-        let model = read_model("model", model)?;
-        let (q, n_samples, p) = read_contour(py, reference, (&q, &contour, &along), axes)?;
+        let model = read_any_model("model", model)?;
+        let (q, n_samples, p) = read_contour(py, reference, q, contour, along, axes)?;
         if p != model.n_outputs() {
             let rule = format!("(n_samples, {}), one column an output,", model.n_outputs());
             return Err(misfit("reference", &[n_samples, p], &rule));
         }
-        Self::plain(py, &model, n_samples, Effort { s: &s, r: &r, rate }.cost(q)?)
+        Self::make(py, &model, n_samples, q, &Effort { s, r, rate }, None)
     }
 
     /// Return the law of several agents that keep a formation.
@@ -238,11 +209,12 @@ impl PyNormOptimalIlc {
     /// >>> law.update(np.zeros((100, 2)), np.ones((100, 2))).shape
     /// (100, 2)
     #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "a keyword each, as Python has it")]
     #[pyo3(
         signature = (
-            models, n_samples, tracking=Given::Number(1.0), own=Given::Number(1.0),
-            centre=Given::Number(0.0), sigma=Given::Number(1.0), weight=Given::Number(1.0),
-            s=Given::Number(0.0), r=Given::Number(0.0), rate=0.0, leaders=None, pairs=None,
+            models, n_samples, tracking=None, own=None,
+            centre=None, sigma=None, weight=None,
+            s=None, r=None, rate=0.0, leaders=None, pairs=None,
             axes=None
         ),
         text_signature = "(models, n_samples, tracking=1.0, own=1.0, centre=0.0, sigma=1.0, \
@@ -252,50 +224,23 @@ impl PyNormOptimalIlc {
         py: Python<'_>,
         models: Vec<Bound<'_, PyAny>>,
         n_samples: usize,
-        tracking: Given<'_>,
-        own: Given<'_>,
-        centre: Given<'_>,
-        sigma: Given<'_>,
-        weight: Given<'_>,
-        s: Given<'_>,
-        r: Given<'_>,
+        tracking: Option<&Bound<'_, PyAny>>,
+        own: Option<&Bound<'_, PyAny>>,
+        centre: Option<&Bound<'_, PyAny>>,
+        sigma: Option<&Bound<'_, PyAny>>,
+        weight: Option<&Bound<'_, PyAny>>,
+        s: Option<&Bound<'_, PyAny>>,
+        r: Option<&Bound<'_, PyAny>>,
         rate: f64,
         leaders: Option<Vec<usize>>,
         pairs: Option<Vec<(usize, usize)>>,
         axes: Option<Vec<usize>>,
     ) -> PyResult<Self> {
-        let agents = models
-            .iter()
-            .enumerate()
-            .map(|(i, model)| read_model(&format!("models[{i}]"), model))
-            .collect::<PyResult<Vec<_>>>()?;
-        let Some((first, others)) = agents.split_first() else {
-            return Err(PyValueError::new_err("models is empty; at least one agent is needed"));
-        };
-        let mut all = first.clone();
-        for (i, agent) in others.iter().enumerate() {
-            if agent.n_outputs() != first.n_outputs() {
-                return Err(PyValueError::new_err(format!(
-                    "models[{}] has {} outputs; {} are needed, as models[0] has",
-                    i + 1,
-                    agent.n_outputs(),
-                    first.n_outputs()
-                )));
-            }
-            all = all.append(agent).or_raise()?;
-        }
-        let task = Task {
-            tracking: &tracking,
-            own: &own,
-            centre: &centre,
-            sigma: &sigma,
-            weight: &weight,
-            leaders,
-            pairs,
-            axes,
-        };
-        let q = task.read(py, n_samples, agents.len(), first.n_outputs())?;
-        Self::plain(py, &all, n_samples, Effort { s: &s, r: &r, rate }.cost(q)?)
+        let (model, n_outputs) = side_by_side(&models)?;
+        let task = Task { tracking, own, centre, sigma, weight, leaders, pairs, axes };
+        let q = task.read(py, n_samples, models.len(), n_outputs)?;
+        let model = AnyModel::Invariant(model);
+        Self::make(py, &model, n_samples, q, &Effort { s, r, rate }, None)
     }
 
     /// Return the law that weighs the error through a filter.
@@ -347,10 +292,11 @@ impl PyNormOptimalIlc {
     /// >>> law.update(np.zeros(100), np.ones(100)).shape
     /// (100,)
     #[staticmethod]
+    #[expect(clippy::too_many_arguments, reason = "a keyword each, as Python has it")]
     #[pyo3(
         signature = (
-            model, n_samples, filter, q=Given::Number(1.0), plain=None, coupling=None,
-            s=Given::Number(0.0), r=Given::Number(0.0), rate=0.0
+            model, n_samples, filter, q=None, plain=None, coupling=None,
+            s=None, r=None, rate=0.0
         ),
         text_signature = "(model, n_samples, filter, q=1.0, plain=None, coupling=None, s=0.0, \
                           r=0.0, rate=0.0)"
@@ -360,26 +306,55 @@ impl PyNormOptimalIlc {
         model: &Bound<'_, PyAny>,
         n_samples: usize,
         filter: &Bound<'_, PyAny>,
-        q: Given<'_>,
-        plain: Option<Given<'_>>,
+        q: Option<&Bound<'_, PyAny>>,
+        plain: Option<&Bound<'_, PyAny>>,
         coupling: Option<&Bound<'_, PyAny>>,
-        s: Given<'_>,
-        r: Given<'_>,
+        s: Option<&Bound<'_, PyAny>>,
+        r: Option<&Bound<'_, PyAny>>,
         rate: f64,
     ) -> PyResult<Self> {
-        let model = read_model("model", model)?;
-        let mut dynamic = Dynamic::new(read_model("filter", filter)?).or_raise()?;
-        if let Some(coupling) = coupling {
-            let matrices = read_matrices("coupling", coupling)?;
-            dynamic = dynamic.with_coupling(matrices).or_raise()?;
-        }
-        if let Some(plain) = plain {
-            dynamic = dynamic.with_plain(plain.weight("plain")?);
-        }
-        let cost = Effort { s: &s, r: &r, rate }.cost(q.weight("q")?)?;
-        Self::make(py, &model, n_samples, cost, |model, cost| {
-            DynamicNormOptimal::new(model, n_samples, &dynamic, cost).map(Solver::Dynamic)
-        })
+        let model = read_any_model("model", model)?;
+        let filter = Filter::read(filter, n_samples, coupling, plain)?;
+        let q = read_weight("q", q, 1.0, n_samples, filter.n_outputs())?;
+        Self::make(py, &model, n_samples, q, &Effort { s, r, rate }, Some(filter))
+    }
+
+    /// Samples of a run.
+    #[getter]
+    fn n_samples(&self) -> usize {
+        self.n_samples
+    }
+
+    /// Weight of the predicted error, as it was given.
+    #[getter]
+    fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give_weight(py, &self.cost.q)
+    }
+
+    /// Weight of the next input, as it was given.
+    #[getter]
+    fn s<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give_weight(py, &self.cost.s)
+    }
+
+    /// Weight of the change of the input, as it was given.
+    #[getter]
+    fn r<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give_weight(py, &self.cost.r)
+    }
+
+    /// Weight of the change from one sample to the next; enters squared.
+    #[getter]
+    fn rate(&self) -> f64 {
+        self.cost.rate
+    }
+
+    /// How well the weights determine the input, 0 to 1.
+    ///
+    /// Below about 1e-12 noise decides on part of the input.
+    #[getter]
+    fn conditioning(&self) -> f64 {
+        held(&self.law).conditioning()
     }
 
     /// Return the input of the next run.
@@ -423,33 +398,35 @@ impl PyNormOptimalIlc {
     }
 
     fn __repr__(&self) -> String {
-        format!("NormOptimalIlc(n_samples={}, {})", self.n_samples, self.told)
+        let told = |weight: &Weight| match weight {
+            Weight::Scalar(value) => value.to_string(),
+            Weight::PerSample(values) => format!("({},)", values.len()),
+            Weight::Block(block) => format!("{:?}", block.shape()),
+            Weight::Blocks(blocks) => {
+                let p = blocks.first().map_or(0, |block| block.nrows());
+                format!("({}, {p}, {p})", blocks.len())
+            }
+        };
+        let Cost { q, s, r, rate } = &self.cost;
+        let (q, s, r) = (told(q), told(s), told(r));
+        format!("NormOptimalIlc(n_samples={}, q={q}, s={s}, r={r}, rate={rate})", self.n_samples)
     }
 }
 
 impl PyNormOptimalIlc {
-    fn plain(py: Python<'_>, model: &StateSpace, n_samples: usize, cost: Cost) -> PyResult<Self> {
-        Self::make(py, model, n_samples, cost, |model, cost| {
-            NormOptimal::new(model, n_samples, cost).map(Solver::Plain)
-        })
-    }
-
     fn make(
         py: Python<'_>,
-        model: &StateSpace,
+        model: &AnyModel,
         n_samples: usize,
-        cost: Cost,
-        solver: impl FnOnce(&StateSpace, Cost) -> Result<Solver, LearningError> + Send,
+        q: Weight,
+        effort: &Effort<'_, '_>,
+        filter: Option<Filter>,
     ) -> PyResult<Self> {
-        let told = |weight: &Weight| match weight {
-            Weight::Scalar(value) => value.to_string(),
-            _ => "...".to_owned(),
-        };
-        let Cost { q, s, r, rate } = &cost;
-        let told = format!("q={}, s={}, r={}, rate={rate}", told(q), told(s), told(r));
-        let law = Mutex::new(detached(py, || solver(model, cost)).or_raise()?);
         let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
-        Ok(Self { told, n_samples, n_inputs, n_outputs, law })
+        let cost = effort.cost(q, n_samples, n_inputs)?;
+        let solver = || Solver::new(model.plant(), n_samples, cost.clone(), filter);
+        let law = Mutex::new(detached(py, solver).or_raise()?);
+        Ok(Self { cost, n_samples, n_inputs, n_outputs, law })
     }
 
     fn read(&self, name: &str, signal: &Bound<'_, PyAny>, n_channels: usize) -> PyResult<Signal> {

@@ -14,6 +14,9 @@ const SETTLED_CHANGE: f64 = 1e-13;
 /// Growth of a settled closed loop over a run that is refused.
 const UNBOUNDED_GROWTH: f64 = 1e12;
 
+/// The same for gains that vary: higher, because here scales of the states may differ as well.
+const UNBOUNDED_PRODUCT: f64 = 1e16;
+
 /// How the recursion is written; all forms have the same solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Form {
@@ -53,13 +56,15 @@ pub struct Gains {
     /// the last samples, the settled one, those of the first samples.
     back: Vec<f64>,
     fore: Vec<f64>,
+    n_stored: usize,
     /// Sets before the settled one, and for how many samples that one serves; 0 if there is none.
     n_tail: usize,
     n_settled: usize,
     pivots: Pivots,
     stage: Stage,
     recursion: Recursion,
-    /// The closed loop over the samples passed, and room for its product with one more.
+    /// The closed loop over the samples passed, and room for its product with one more; where the
+    /// stages vary only one row of it.
     passed: Vec<f64>,
     product: Vec<f64>,
 }
@@ -103,6 +108,7 @@ impl Gains {
             sizes,
             back: Vec::new(),
             fore: Vec::new(),
+            n_stored: 0,
             n_tail: 0,
             n_settled: 0,
             pivots: Pivots::NONE,
@@ -132,10 +138,13 @@ impl Gains {
         let free_from = n_samples - self.free_samples.min(n_samples.saturating_sub(1));
         self.back.clear();
         self.fore.clear();
-        (self.n_tail, self.n_settled) = (0, 0);
+        (self.n_stored, self.n_tail, self.n_settled) = (0, 0, 0);
         self.pivots = Pivots::NONE;
         self.recursion.restart();
         self.passed.fill(0.0);
+        if constant.is_empty() {
+            self.passed.fill(1.0);
+        }
         for i in 0..n {
             self.passed[i * n + i] = 1.0;
         }
@@ -152,6 +161,9 @@ impl Gains {
             }
             self.pivots.min = self.pivots.min.min(pivots.min);
             self.pivots.max = self.pivots.max.max(pivots.max);
+            if constant.is_empty() {
+                self.grow()?;
+            }
             if !constant.contains(&k) {
                 continue;
             }
@@ -195,7 +207,7 @@ impl Gains {
 
     /// Returns how many sets of gains are kept.
     pub fn n_stored(&self) -> usize {
-        self.fore.len() / self.sizes.fore().max(1)
+        self.n_stored
     }
 
     /// Returns how well the input is determined: the smallest part of any `H` that is left after
@@ -221,6 +233,7 @@ impl Gains {
 
     /// Goes one sample back, with the stage that was read last.
     fn step(&mut self) -> Pivots {
+        self.n_stored += 1;
         let (back, fore) = (self.back.len(), self.fore.len());
         self.back.resize(back + self.sizes.back(), 0.0);
         self.fore.resize(fore + self.sizes.fore(), 0.0);
@@ -239,6 +252,30 @@ impl Gains {
             }
         }
         std::mem::swap(&mut self.passed, &mut self.product);
+    }
+
+    /// Takes one row of `passed` along and refuses growth beyond all measure since it was smallest.
+    fn grow(&mut self) -> Result<(), FactorError> {
+        let n = self.sizes.n;
+        let (row, next) = (&mut self.passed[..n], &mut self.product[..n]);
+        let mut size = 0.0;
+        for (value, column) in next.iter_mut().zip(self.recursion.transition.chunks_exact(n.max(1)))
+        {
+            *value = column.iter().zip(&*row).map(|(factor, old)| factor * old).sum();
+            size += value.abs();
+        }
+        if size > UNBOUNDED_PRODUCT {
+            return Err(FactorError::Unbounded);
+        }
+        if size < f64::MIN_POSITIVE {
+            row.fill(1.0);
+        } else {
+            let scale = if size < 1.0 { 1.0 / size } else { 1.0 };
+            for (old, value) in row.iter_mut().zip(&*next) {
+                *old = value * scale;
+            }
+        }
+        Ok(())
     }
 
     /// Refuses a closed loop whose slowest pole grows beyond all measure over the run.

@@ -2,7 +2,7 @@
 
 use super::factor::Gains;
 use super::record::Sizes;
-use super::{Channels, Run, Sweep};
+use super::{Channels, Run, Sweep, fixed};
 
 /// The solver for coupled axes, and for gains that vary along the run.
 ///
@@ -48,12 +48,10 @@ impl General {
         &mut self.gains
     }
 
-    /// [`Sweep::solve`] for `N` states, `M` inputs and `P` targets; `M = 0` for any.
-    #[inline(always)]
-    fn sized<const N: usize, const M: usize, const P: usize>(&mut self, run: &mut Run) {
+    /// [`Sweep::solve`] for any sizes.
+    fn any(&mut self, run: &mut Run) {
         let Self { gains, channels, kappa, work } = self;
-        let Sizes { n, m, targets, held, .. } = gains.sizes();
-        let (n, m, p) = if M > 0 { (N, M, P) } else { (n, m, targets) };
+        let Sizes { n, m, targets: p, held, .. } = gains.sizes();
         let rows = n + m;
         let last = gains.n_samples().saturating_sub(1);
         let (state, rest) = work.split_at_mut(n);
@@ -122,6 +120,8 @@ fn add(sum: &mut [f64], columns: &mut std::slice::ChunksExact<f64>, factors: &[f
 
 impl Sweep for General {
     fn solve(&mut self, run: &mut Run) {
-        self.sized::<0, 0, 0>(run);
+        if !fixed::solve(&self.gains, &self.channels, &mut self.kappa, run) {
+            self.any(run);
+        }
     }
 }

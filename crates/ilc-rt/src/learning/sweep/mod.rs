@@ -16,7 +16,10 @@
 
 mod cholesky;
 mod factor;
+mod fixed;
+mod fixed_step;
 mod general;
+mod lanes;
 mod rate;
 mod record;
 mod recursion;

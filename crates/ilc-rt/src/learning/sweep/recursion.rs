@@ -3,7 +3,7 @@
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
 use super::square_root::SquareRoot;
-use super::{Form, Stage};
+use super::{Form, Stage, fixed_step};
 
 /// The cost of the samples to come, and the room that one step needs.
 ///
@@ -69,30 +69,24 @@ impl Recursion {
     ///
     /// `H = S + R + D'QD + B'Pi B`, `K = H^-1 (D'QC + B'Pi A)`.
     pub(super) fn step(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
-        // With the sizes as constants the compiler unrolls and vectorises the products below.
-        match (self.sizes.n, self.sizes.m) {
-            (1, 1) => self.sized::<1, 1>(stage, back, fore),
-            (2, 1) => self.sized::<2, 1>(stage, back, fore),
-            (3, 1) => self.sized::<3, 1>(stage, back, fore),
-            (4, 1) => self.sized::<4, 1>(stage, back, fore),
-            (2, 2) => self.sized::<2, 2>(stage, back, fore),
-            (4, 2) => self.sized::<4, 2>(stage, back, fore),
-            (6, 2) => self.sized::<6, 2>(stage, back, fore),
-            (8, 2) => self.sized::<8, 2>(stage, back, fore),
-            (6, 3) => self.sized::<6, 3>(stage, back, fore),
-            _ => self.sized::<0, 0>(stage, back, fore),
+        std::mem::swap(&mut self.cost, &mut self.later);
+        if self.form == Form::Joseph
+            && let Some(pivots) = fixed_step::step(self.sizes, stage, self.room(), back, fore)
+        {
+            return pivots;
         }
+        self.any(stage, back, fore)
     }
 
-    /// [`Recursion::step`] for `N` states and `M` inputs; 0 and 0 for any.
-    fn sized<const N: usize, const M: usize>(
-        &mut self,
-        stage: &Stage,
-        back: &mut [f64],
-        fore: &mut [f64],
-    ) -> Pivots {
+    /// What a step of fixed size reads and writes.
+    fn room(&mut self) -> fixed_step::Room<'_> {
+        let Self { later, cost, transition, weighted_c, .. } = self;
+        fixed_step::Room { later, cost, transition, weighted_c }
+    }
+
+    /// [`Recursion::step`] for any sizes and forms.
+    fn any(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
         let Sizes { n, m, p, targets, held } = self.sizes;
-        let (n, m) = if M > 0 { (N, M) } else { (n, m) };
         let Self { feedback, transition, left, weighted_left, effort, lower, .. } = self;
         let (a, b) = (&stage.a.as_slice()[..n * n], &stage.b.as_slice()[..n * m]);
         let (c, d) = (&stage.c.as_slice()[..p * n], &stage.d.as_slice()[..p * m]);
@@ -101,7 +95,6 @@ impl Recursion {
         for (value, (s, r)) in effort.iter_mut().zip(s.iter().zip(r)) {
             *value = s + r;
         }
-        std::mem::swap(&mut self.cost, &mut self.later);
         multiply(&mut self.weighted_d[..p * m], q, d, p, p, m);
         multiply(&mut self.weighted_c[..p * n], q, c, p, p, n);
 
@@ -114,6 +107,7 @@ impl Recursion {
                 add_transposed(&mut lower[..m * m], d, &self.weighted_d[..p * m], m, p, m);
                 add_transposed(&mut lower[..m * m], b, &self.cost_b[..n * m], m, n, m);
                 let pivots = cholesky::factorize(&mut lower[..m * m], m, m);
+                cholesky::invert_diagonal(&mut lower[..m * m], m);
                 let feedback = &mut feedback[..m * n];
                 feedback.fill(0.0);
                 add_transposed(feedback, d, &self.weighted_c[..p * n], m, p, n);

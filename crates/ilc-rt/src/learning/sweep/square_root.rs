@@ -58,6 +58,7 @@ impl SquareRoot {
         for j in 0..m {
             lower[j * m..(j + 1) * m].copy_from_slice(&self.lower[j * w..j * w + m]);
         }
+        cholesky::invert_diagonal(lower, m);
         for (j, column) in feedback.chunks_exact_mut(m).enumerate() {
             for (i, value) in column.iter_mut().enumerate() {
                 *value = self.lower[i * w + m + j];

@@ -141,6 +141,11 @@ impl Dynamic {
         self.coupling.first().map_or(self.filter.n_inputs(), DMatrix::ncols)
     }
 
+    /// Returns the channels that the filter gives.
+    pub fn n_filtered(&self) -> usize {
+        self.filter.n_outputs()
+    }
+
     /// Returns what stands behind the plant at sample `k`: its outputs are all that is weighed, the
     /// error itself first, if it is, and then what the filter makes of it.
     ///

@@ -171,7 +171,7 @@ fn ahead(
         if shift == 0 {
             continue;
         }
-        if n_samples - shift <= k {
+        if k + shift >= n_samples {
             // Beyond the run, where its weight is zero.
             c.row_mut(row).fill(0.0);
             d.row_mut(row).fill(0.0);
