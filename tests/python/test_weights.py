@@ -37,7 +37,7 @@ def lifted_blocks(blocks):
 
 
 def dense_update(operator, q, s, r, u, e):
-    """The update by the normal equations of the lifted problem (Barton 5.8)."""
+    """Update by the normal equations of the lifted problem (Barton 5.8)."""
     h = operator.T @ q @ operator
     effort = np.eye(len(h))
     right = operator.T @ q @ e.ravel() - s * u.ravel()
