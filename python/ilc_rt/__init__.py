@@ -1,6 +1,7 @@
 """The motion controller that learns: iterative learning control on the machine."""
 
 from ilc_rt import control, kinematics, signal, trajectory
+from ilc_rt import signal, weights
 from ilc_rt._native import (
     Cell,
     LearningError,
@@ -43,4 +44,5 @@ __all__ = [
     "second_order",
     "signal",
     "trajectory",
+    "weights",
 ]

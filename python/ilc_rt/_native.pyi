@@ -1,4 +1,4 @@
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from os import PathLike
 from typing import Any, Literal, Protocol, final
 
@@ -29,10 +29,15 @@ __all__ = [
     "butterworth",
     "contour_error",
     "coupling_gains",
+    "contour_weights",
+    "coupled_weights",
     "discretize",
+    "formation_errors",
+    "formation_weights",
     "from_transfer_function",
     "projection_across",
     "run_events",
+    "schedule",
     "second_order",
     "zero_phase",
 ]
@@ -180,6 +185,46 @@ class NormOptimalIlc:
         r: ArrayLike = 0.0,
         rate: float = 0.0,
     ) -> NormOptimalIlc: ...
+    @staticmethod
+    def contour(
+        model: StateSpace | TimeVarying | _ForeignModel,
+        reference: ArrayLike,
+        q: ArrayLike = 1.0,
+        contour: ArrayLike = 1.0,
+        along: ArrayLike = 0.0,
+        s: ArrayLike = 0.0,
+        r: ArrayLike = 0.0,
+        rate: float = 0.0,
+        axes: Sequence[int] | None = None,
+    ) -> NormOptimalIlc: ...
+    @staticmethod
+    def formation(
+        models: Sequence[StateSpace | _ForeignModel],
+        n_samples: int,
+        tracking: ArrayLike = 1.0,
+        own: ArrayLike = 1.0,
+        centre: ArrayLike = 0.0,
+        sigma: ArrayLike = 1.0,
+        weight: ArrayLike = 1.0,
+        s: ArrayLike = 0.0,
+        r: ArrayLike = 0.0,
+        rate: float = 0.0,
+        leaders: Sequence[int] | None = None,
+        pairs: Sequence[tuple[int, int]] | None = None,
+        axes: Sequence[int] | None = None,
+    ) -> NormOptimalIlc: ...
+    @staticmethod
+    def dynamic(
+        model: StateSpace | TimeVarying | _ForeignModel,
+        n_samples: int,
+        filter: StateSpace | _ForeignModel,
+        q: ArrayLike = 1.0,
+        plain: ArrayLike | None = None,
+        coupling: ArrayLike | None = None,
+        s: ArrayLike = 0.0,
+        r: ArrayLike = 0.0,
+        rate: float = 0.0,
+    ) -> NormOptimalIlc: ...
     @property
     def n_samples(self) -> int: ...
     @property
@@ -196,6 +241,42 @@ class NormOptimalIlc:
         self, u: ArrayLike, e: ArrayLike, disturbance: object = None
     ) -> NDArray[np.float64]: ...
     def reset(self) -> None: ...
+
+def contour_weights(
+    reference: ArrayLike,
+    q: ArrayLike = 1.0,
+    contour: ArrayLike = 1.0,
+    along: ArrayLike = 0.0,
+    axes: Sequence[int] | None = None,
+) -> NDArray[np.float64]: ...
+def coupled_weights(
+    coupling: ArrayLike, sigma: ArrayLike = 1.0, gamma: ArrayLike = 0.0
+) -> NDArray[np.float64]: ...
+def schedule(
+    segments: Sequence[tuple[int, float]],
+    n_samples: int,
+    bandwidth_hz: float | None = None,
+    dt_s: float | None = None,
+) -> NDArray[np.float64]: ...
+def formation_weights(
+    n_agents: int,
+    n_axes: int,
+    n_samples: int,
+    tracking: ArrayLike = 1.0,
+    own: ArrayLike = 1.0,
+    centre: ArrayLike = 0.0,
+    sigma: ArrayLike = 1.0,
+    weight: ArrayLike = 1.0,
+    leaders: Sequence[int] | None = None,
+    pairs: Sequence[tuple[int, int]] | None = None,
+    axes: Sequence[int] | None = None,
+) -> NDArray[np.float64]: ...
+def formation_errors(
+    e: ArrayLike,
+    n_agents: int,
+    pairs: Sequence[tuple[int, int]] | None = None,
+    axes: Sequence[int] | None = None,
+) -> NDArray[np.float64]: ...
 
 @final
 class Delta:

@@ -22,6 +22,7 @@ mod model_argument;
 mod python_law;
 mod signal;
 mod time_varying;
+mod weights;
 
 use pyo3::prelude::*;
 
@@ -36,6 +37,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     contour::register(module)?;
     control::register(module)?;
     laws::register(module)?;
+    weights::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

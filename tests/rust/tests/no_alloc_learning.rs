@@ -3,10 +3,11 @@
 #![expect(clippy::unwrap_used, reason = "set-up shared by the tests must not fail")]
 
 use ilc_rt::learning::Law;
+use ilc_rt::learning::law::dynamic::DynamicNormOptimal;
 use ilc_rt::learning::law::norm_optimal::{Cost, NormOptimal, Paired, Weights};
 use ilc_rt::learning::law::pd::{Pd, PdGains, QFilter};
 use ilc_rt::learning::sweep::{Form, Gains};
-use ilc_rt::learning::weights::Weight;
+use ilc_rt::learning::weights::{Dynamic, Weight};
 use ilc_rt::model::{Method, StateSpace, TimeVarying, discretize, second_order};
 use ilc_rt::signal::butterworth;
 use ilc_tests::counting::{Counting, allocations};
@@ -58,7 +59,13 @@ fn no_law_allocates_in_an_update() {
     let sections = || butterworth(2, 50.0, 4e-3).unwrap();
     let gains = PdGains { kp: 1.0, kd: 3.25, lead: 1 };
     let samples = TimeVarying::new(vec![separate.clone(); N_SAMPLES]).unwrap();
+    let filter = Dynamic::new(axis(0.8).append(&axis(0.9)).unwrap()).unwrap();
+    let filter = filter.with_plain(Weight::Scalar(0.1));
+    let turning = (0..N_SAMPLES).map(|k| nalgebra::DMatrix::identity(2, 2) * (k as f64).cos());
+    let turned = filter.clone().with_coupling(turning.collect()).unwrap();
     let mut laws: Vec<Box<dyn Law>> = vec![
+        Box::new(DynamicNormOptimal::new(&separate, N_SAMPLES, &filter, weights).unwrap()),
+        Box::new(DynamicNormOptimal::new(&separate, N_SAMPLES, &turned, weights).unwrap()),
         Box::new(NormOptimal::new(&separate, N_SAMPLES, contour()).unwrap()),
         Box::new(NormOptimal::new(&samples, N_SAMPLES, weights).unwrap()),
         Box::new(NormOptimal::new(&separate, N_SAMPLES, weights).unwrap()),

@@ -2,12 +2,14 @@
 
 mod norm_optimal;
 mod pd;
-mod weight;
+mod solver;
+pub(crate) mod weight;
 
 use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use crate::argument::Signal;
+use crate::held::held;
 
 /// Runs one update and returns the next input.
 fn next(law: &mut dyn Law, u: &Signal, e: &Signal) -> Result<Vec<f64>, LearningError> {
