@@ -3,7 +3,7 @@
 mod decouple;
 #[cfg(test)]
 mod oracle;
-mod pairing;
+pub(super) mod pairing;
 
 use crate::learning::error::check;
 use crate::learning::sweep::{self, FactorError, Gains, General, Rate, Run, Sweep};
