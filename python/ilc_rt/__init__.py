@@ -2,16 +2,23 @@
 
 from ilc_rt import signal
 from ilc_rt._native import (
+    AdjointIlc,
     Cell,
+    ErrorFeedforwardIlc,
+    Gate,
+    Ladder,
     LearningError,
     Library,
     ModelError,
+    ModelInverseIlc,
     NormOptimalIlc,
     PdIlc,
+    Repeatability,
     SignalError,
     StateSpace,
     discretize,
     from_transfer_function,
+    repeatability,
     second_order,
 )
 from ilc_rt.campaign import Campaign, Law
@@ -20,22 +27,29 @@ from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 
 __all__ = [
+    "AdjointIlc",
     "BadInputError",
     "Campaign",
     "CampaignError",
     "CampaignResult",
     "Cell",
+    "ErrorFeedforwardIlc",
+    "Gate",
     "IterationRecord",
+    "Ladder",
     "Law",
     "LearningError",
     "Library",
     "ModelError",
+    "ModelInverseIlc",
     "NormOptimalIlc",
     "PdIlc",
+    "Repeatability",
     "SignalError",
     "StateSpace",
     "discretize",
     "from_transfer_function",
+    "repeatability",
     "second_order",
     "signal",
 ]

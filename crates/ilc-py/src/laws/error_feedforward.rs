@@ -38,7 +38,7 @@ use crate::signal::{kind, read_filter};
 ///
 /// References
 /// ----------
-/// Filter-based open-loop ILC, Eq. (2), with the lead of Eq. (9).
+/// [filter-based], Eq. (2), with the lead of Eq. (9).
 ///
 /// Examples
 /// --------

@@ -47,7 +47,7 @@ use crate::error::OrRaise;
 ///
 /// References
 /// ----------
-/// Filter-based open-loop ILC, Section 4 (Fig. 19) and Section 6.3.
+/// [filter-based], Section 4 (Fig. 19) and Section 6.3.
 ///
 /// Examples
 /// --------

@@ -46,7 +46,7 @@ use crate::error::OrRaise;
 ///
 /// References
 /// ----------
-/// Filter-based open-loop ILC, Section 6.2; the rule for the gain is ours.
+/// [filter-based], Section 6.2; the rule for the gain is ours.
 ///
 /// Examples
 /// --------

@@ -98,7 +98,7 @@ impl PyRepeatability {
 ///
 /// References
 /// ----------
-/// Filter-based open-loop ILC, Section 6.1.
+/// [filter-based], Section 6.1.
 ///
 /// Examples
 /// --------

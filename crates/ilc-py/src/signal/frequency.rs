@@ -33,7 +33,7 @@ use crate::error::OrRaise;
 ///
 /// References
 /// ----------
-/// Filter-based open-loop ILC, Section 5; [oppenheim2009], Ch. 12.
+/// [filter-based], Section 5; [oppenheim2009], Ch. 12.
 ///
 /// Examples
 /// --------

@@ -35,7 +35,7 @@ use crate::error::OrRaise;
 ///
 /// References
 /// ----------
-/// Filter-based open-loop ILC, Eq. (12); the cross-fade is ours.
+/// [filter-based], Eq. (12); the cross-fade is ours.
 ///
 /// Examples
 /// --------
@@ -114,7 +114,7 @@ impl PySwitchedFilter {
     ///
     /// References
     /// ----------
-    /// Filter-based open-loop ILC, Section 5.
+    /// [filter-based], Section 5.
     #[staticmethod]
     #[pyo3(signature = (reference, dt_s, low_hz, high_hz, threshold_hz, order=2, window_s=None, margin_s=None, blend_s=None))]
     #[expect(clippy::too_many_arguments, reason = "named in Python, each with its unit")]

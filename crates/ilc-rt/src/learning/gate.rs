@@ -76,7 +76,7 @@ pub enum GateState {
 /// # Real Time
 /// Cold path. Allocates in the first [`Law::update`] only, for the best input.
 /// # Source
-/// - filter-based open-loop ILC, Section 4 (Fig. 19) and Section 6.3: switching iterative learning.
+/// - \[filter-based\], Section 4 (Fig. 19) and Section 6.3: switching iterative learning.
 ///   The paper switches off by hand before the error grows; growth, roll-back and resumption are
 ///   ours.
 #[derive(Debug)]

@@ -48,7 +48,7 @@ impl LadderRule {
 /// # Real Time
 /// Cold path. Allocates in the first [`Law::update`] only.
 /// # Source
-/// - filter-based open-loop ILC, Section 6.2 (Fig. 32): average of repeated runs, and a gain that is
+/// - \[filter-based\], Section 6.2 (Fig. 32): average of repeated runs, and a gain that is
 ///   raised where the error attenuates too slowly. It gives no rule; this one is ours.
 #[derive(Debug)]
 pub struct Ladder<L> {

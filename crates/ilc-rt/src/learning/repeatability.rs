@@ -43,7 +43,7 @@ pub struct Repeatability {
 /// - [`LearningError::Empty`] for no samples or channels.
 /// - [`LearningError::Length`] or [`LearningError::NotFinite`].
 /// # Source
-/// - filter-based open-loop ILC, Section 6.1: verification that the system repeats, there by the
+/// - \[filter-based\], Section 6.1: verification that the system repeats, there by the
 ///   range of the root mean square over ten runs.
 pub fn repeatability(
     errors: &[f64],

@@ -25,7 +25,7 @@ pub struct Segment {
 /// # Units
 /// - cut-offs in hertz, `dt_s` in seconds, starts and blend in samples
 /// # Source
-/// - filter-based open-loop ILC, Eq. (12): cut-offs of 10, 50 and 10 Hz. It switches at once and
+/// - \[filter-based\], Eq. (12): cut-offs of 10, 50 and 10 Hz. It switches at once and
 ///   says nothing of the filter's state; the cross-fade is ours.
 /// # Examples
 /// ```

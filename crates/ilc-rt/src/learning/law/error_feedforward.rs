@@ -32,7 +32,7 @@ pub struct Feedforward {
 /// # Real Time
 /// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples n_channels)`.
 /// # Source
-/// - filter-based open-loop ILC, Eq. (2), with the lead of Eq. (9) and the filter of Section 4.
+/// - \[filter-based\], Eq. (2), with the lead of Eq. (9) and the filter of Section 4.
 #[derive(Debug)]
 pub struct ErrorFeedforward {
     rule: Feedforward,
