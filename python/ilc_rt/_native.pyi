@@ -121,6 +121,7 @@ class ButterworthFilter:
 def butterworth(
     order: int, cutoff_hz: float, dt_s: float, causal: bool = False
 ) -> ButterworthFilter: ...
+
 @final
 class GaussianFilter:
     def __new__(cls, bandwidth_hz: float, dt_s: float) -> GaussianFilter: ...
@@ -133,6 +134,7 @@ class GaussianFilter:
     def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
 
 def gaussian(bandwidth_hz: float, dt_s: float) -> GaussianFilter: ...
+
 @final
 class FirFilter:
     def __new__(cls, taps: ArrayLike, repeats: int = 1) -> FirFilter: ...
@@ -141,6 +143,7 @@ class FirFilter:
     def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
 
 def fir(taps: ArrayLike, repeats: int = 1) -> FirFilter: ...
+
 @final
 class SwitchedFilter:
     def __new__(
@@ -317,6 +320,7 @@ class Repeatability:
     def largest_rms(self) -> float: ...
 
 def repeatability(errors: ArrayLike) -> Repeatability: ...
+
 @final
 class NormOptimalIlc:
     def __new__(

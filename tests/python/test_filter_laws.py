@@ -218,7 +218,7 @@ LAWS = {
     [
         (np.zeros((50, 1, 1)), np.zeros(50), ValueError, r"u has shape \(50, 1, 1\)"),
         (np.zeros(50), np.zeros(49), ValueError, r"e has shape \(49,\)"),
-        (np.zeros(50), np.zeros((50, 2)), ValueError, r"e has shape \(50, 2\)"),
+        (np.zeros(50), np.ones((50, 2)), ValueError, r"e has shape \(50, 2\)"),
         (np.full(50, np.nan), np.zeros(50), ValueError, r"u holds NaN at \[0\]"),
         (np.zeros(50), np.full(50, np.inf), ValueError, r"e holds inf at \[0\]"),
         (np.zeros(50, dtype=np.float32), np.zeros(50), TypeError, "u has dtype float32"),

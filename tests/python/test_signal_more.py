@@ -123,9 +123,7 @@ def test_switched_is_a_cross_fade_of_scipy_filters():
     high = (begun(300) - begun(600))[:, None]
     expected = (1.0 - high) * filtered[10.0] + high * filtered[50.0]
     switched = signal.SwitchedFilter([10.0, 50.0, 10.0], [0, 300, 600], DT_S, blend=blend)
-    np.testing.assert_allclose(
-        switched.zero_phase(x), expected, atol=1e-10 * (1.0 + abs(x).max())
-    )
+    np.testing.assert_allclose(switched.zero_phase(x), expected, atol=1e-10 * (1.0 + abs(x).max()))
 
 
 def test_segments_are_found_where_the_motion_is_fast():
