@@ -3,17 +3,24 @@
 from ilc_rt import control, kinematics, signal, trajectory
 from ilc_rt import signal, weights
 from ilc_rt._native import (
+    AdjointIlc,
     Cell,
+    ErrorFeedforwardIlc,
+    Gate,
+    Ladder,
     LearningError,
     Library,
     ModelError,
+    ModelInverseIlc,
     NormOptimalIlc,
     PdIlc,
+    Repeatability,
     SignalError,
     StateSpace,
     TimeVarying,
     discretize,
     from_transfer_function,
+    repeatability,
     second_order,
 )
 from ilc_rt.campaign import Campaign, Law
@@ -22,18 +29,24 @@ from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 
 __all__ = [
+    "AdjointIlc",
     "BadInputError",
     "Campaign",
     "CampaignError",
     "CampaignResult",
     "Cell",
+    "ErrorFeedforwardIlc",
+    "Gate",
     "IterationRecord",
+    "Ladder",
     "Law",
     "LearningError",
     "Library",
     "ModelError",
+    "ModelInverseIlc",
     "NormOptimalIlc",
     "PdIlc",
+    "Repeatability",
     "SignalError",
     "StateSpace",
     "control",
@@ -41,6 +54,7 @@ __all__ = [
     "discretize",
     "from_transfer_function",
     "kinematics",
+    "repeatability",
     "second_order",
     "signal",
     "trajectory",

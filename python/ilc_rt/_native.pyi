@@ -1,12 +1,13 @@
 from collections.abc import Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, Protocol, final
+from typing import Any, Literal, Protocol, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "Arc",
+    "AdjointIlc",
     "ButterworthFilter",
     "Cascade",
     "Cell",
@@ -16,16 +17,24 @@ __all__ = [
     "EventStream",
     "Gantry",
     "KinematicsError",
+    "ErrorFeedforwardIlc",
+    "FirFilter",
+    "Gate",
+    "GaussianFilter",
+    "Ladder",
     "LearningError",
     "Library",
     "Line",
     "ModelError",
+    "ModelInverseIlc",
     "NormOptimalIlc",
     "PdIlc",
     "Pid",
     "SignalError",
     "StateSpace",
     "TimeVarying",
+    "Repeatability",
+    "SwitchedFilter",
     "butterworth",
     "contour_error",
     "coupling_gains",
@@ -36,6 +45,10 @@ __all__ = [
     "formation_weights",
     "from_transfer_function",
     "projection_across",
+    "fir",
+    "gaussian",
+    "instantaneous_frequency",
+    "repeatability",
     "run_events",
     "schedule",
     "second_order",
@@ -158,7 +171,67 @@ class ButterworthFilter:
 def butterworth(
     order: int, cutoff_hz: float, dt_s: float, causal: bool = False
 ) -> ButterworthFilter: ...
-def zero_phase(filter: ButterworthFilter, x: ArrayLike) -> NDArray[np.float64]: ...
+
+@final
+class GaussianFilter:
+    def __new__(cls, bandwidth_hz: float, dt_s: float) -> GaussianFilter: ...
+    @property
+    def bandwidth_hz(self) -> float: ...
+    @property
+    def dt_s(self) -> float: ...
+    @property
+    def sigma_samples(self) -> float: ...
+    def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
+
+def gaussian(bandwidth_hz: float, dt_s: float) -> GaussianFilter: ...
+
+@final
+class FirFilter:
+    def __new__(cls, taps: ArrayLike, repeats: int = 1) -> FirFilter: ...
+    @property
+    def taps(self) -> NDArray[np.float64]: ...
+    def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
+
+def fir(taps: ArrayLike, repeats: int = 1) -> FirFilter: ...
+
+@final
+class SwitchedFilter:
+    def __new__(
+        cls,
+        cutoffs_hz: Sequence[float],
+        starts: Sequence[int],
+        dt_s: float,
+        order: int = 2,
+        blend: int = 0,
+    ) -> SwitchedFilter: ...
+    @staticmethod
+    def from_signal(
+        reference: ArrayLike,
+        dt_s: float,
+        low_hz: float,
+        high_hz: float,
+        threshold_hz: float,
+        order: int = 2,
+        window_s: float | None = None,
+        margin_s: float | None = None,
+        blend_s: float | None = None,
+    ) -> SwitchedFilter: ...
+    @property
+    def cutoffs_hz(self) -> list[float]: ...
+    @property
+    def starts(self) -> list[int]: ...
+    @property
+    def order(self) -> int: ...
+    @property
+    def blend(self) -> int: ...
+    @property
+    def dt_s(self) -> float: ...
+    def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
+
+_Filter: TypeAlias = ButterworthFilter | GaussianFilter | SwitchedFilter | FirFilter | ArrayLike
+
+def zero_phase(filter: _Filter, x: ArrayLike) -> NDArray[np.float64]: ...
+def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]: ...
 
 @final
 class PdIlc:
@@ -166,13 +239,142 @@ class PdIlc:
         cls,
         kp: float,
         kd: float,
-        q_filter: ButterworthFilter | None = None,
+        q_filter: _Filter | None = None,
         lead: int = 1,
     ) -> PdIlc: ...
     def update(
         self, u: ArrayLike, e: ArrayLike, disturbance: object = None
     ) -> NDArray[np.float64]: ...
     def reset(self) -> None: ...
+
+@final
+class ErrorFeedforwardIlc:
+    def __new__(
+        cls,
+        gain: float,
+        filter: _Filter | None = None,
+        lead: int = 1,
+        limit: float | None = None,
+    ) -> ErrorFeedforwardIlc: ...
+    @property
+    def n_limited(self) -> int: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
+    ) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
+
+@final
+class AdjointIlc:
+    def __new__(
+        cls,
+        model: StateSpace | _ForeignModel,
+        n_samples: int,
+        gain: float | None = None,
+        q_filter: _Filter | None = None,
+    ) -> AdjointIlc: ...
+    @property
+    def gain(self) -> float: ...
+    @property
+    def gain_limit(self) -> float: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
+    ) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
+
+@final
+class ModelInverseIlc:
+    def __new__(
+        cls,
+        model: StateSpace | _ForeignModel,
+        n_samples: int,
+        gain: float = 1.0,
+        q_filter: _Filter | None = None,
+    ) -> ModelInverseIlc: ...
+    @property
+    def gain(self) -> float: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
+    ) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
+
+class _Law(Protocol):
+    def update(
+        self,
+        u: NDArray[np.float64],
+        e: NDArray[np.float64],
+        disturbance: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]: ...
+
+@final
+class Gate:
+    def __new__(
+        cls,
+        law: _Law,
+        tolerance: float | None = None,
+        measure: Literal["rms", "max"] = "rms",
+        resume: float = 1.5,
+        growth: float = 1.5,
+        patience: int = 2,
+    ) -> Gate: ...
+    @property
+    def law(self) -> _Law: ...
+    @property
+    def state(self) -> Literal["learning", "holding", "rolled_back"]: ...
+    @property
+    def best_error(self) -> float | None: ...
+    @property
+    def best_input(self) -> NDArray[np.float64] | None: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
+    ) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
+
+@final
+class Ladder:
+    def __new__(
+        cls,
+        law: _Law,
+        repeats: int,
+        slow: float = 0.8,
+        increase: float = 1.25,
+        lowest: float = 0.0625,
+        highest: float = 1.5,
+    ) -> Ladder: ...
+    @property
+    def law(self) -> _Law: ...
+    @property
+    def gain(self) -> float: ...
+    @property
+    def runs(self) -> int: ...
+    @property
+    def repeatable_rms(self) -> float | None: ...
+    @property
+    def noise_rms(self) -> float: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
+    ) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
+
+@final
+class Repeatability:
+    @property
+    def mean(self) -> NDArray[np.float64]: ...
+    @property
+    def spread(self) -> NDArray[np.float64]: ...
+    @property
+    def mean_rms(self) -> float: ...
+    @property
+    def spread_rms(self) -> float: ...
+    @property
+    def ratio(self) -> float: ...
+    @property
+    def learnable(self) -> float: ...
+    @property
+    def least_rms(self) -> float: ...
+    @property
+    def largest_rms(self) -> float: ...
+
+def repeatability(errors: ArrayLike) -> Repeatability: ...
 
 @final
 class NormOptimalIlc:

@@ -37,7 +37,7 @@ impl FirFilter {
     /// - [`SignalError::TapValue`] for a tap that is infinite or not a number.
     /// - [`SignalError::TapSymmetry`] for taps that are not their own mirror image.
     pub fn new(taps: &[f64]) -> Result<Self, SignalError> {
-        if taps.len() % 2 == 0 {
+        if taps.len().is_multiple_of(2) {
             return Err(SignalError::TapCount { found: taps.len() });
         }
         if let Some(index) = taps.iter().position(|tap| !tap.is_finite()) {

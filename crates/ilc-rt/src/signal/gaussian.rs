@@ -74,11 +74,22 @@ impl GaussianFilter {
         let reach = (REACH * sigma).ceil();
         // Compared as numbers, because the reach of a tiny bandwidth fits in no memory.
         if reach > n_samples as f64 {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "positive and bounded"
+            )]
             let padding = reach.min(1e15) as usize - 1;
             return Err(SignalError::TooShort { n_samples, padding });
         }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "positive and no longer than the signal"
+        )]
+        let reach = reach as usize;
         let bell = |i: usize| (-0.5 * (i as f64 / sigma).powi(2)).exp();
-        let mut weights: Vec<f64> = (0..=reach as usize).map(bell).collect();
+        let mut weights: Vec<f64> = (0..=reach).map(bell).collect();
         let area = 2.0 * weights.iter().sum::<f64>() - 1.0;
         for weight in &mut weights {
             *weight /= area;

@@ -58,7 +58,7 @@ pub fn analytic(x: &[f64]) -> Vec<Complex<f64>> {
 /// # Errors
 /// - [`SignalError::SampleTime`]; [`SignalError::TooShort`] for fewer than two samples.
 /// # Source
-/// - filter-based open-loop ILC, Section 5: time-frequency analysis of the input trajectory.
+/// - \[filter-based\], Section 5: time-frequency analysis of the input trajectory.
 pub fn instantaneous_frequency(x: &[f64], dt_s: f64) -> Result<Vec<f64>, SignalError> {
     check_sample_time(dt_s)?;
     if x.len() < 2 {

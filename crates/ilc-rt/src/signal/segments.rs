@@ -91,6 +91,11 @@ impl SwitchRule {
             return Err(SignalError::Length { found: n_samples + 1, expected: n_samples });
         }
         // No span is longer than the signal, so that none overflows.
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not negative and no longer than the signal"
+        )]
         let samples = |time_s: f64| (time_s / dt_s).round().min(n_samples as f64) as usize;
         let mut fast = vec![false; n_samples];
         for channel in 0..n_channels {

@@ -25,7 +25,7 @@ pub struct Segment {
 /// # Units
 /// - cut-offs in hertz, `dt_s` in seconds, starts and blend in samples
 /// # Source
-/// - filter-based open-loop ILC, Eq. (12): cut-offs of 10, 50 and 10 Hz. It switches at once and
+/// - \[filter-based\], Eq. (12): cut-offs of 10, 50 and 10 Hz. It switches at once and
 ///   says nothing of the filter's state; the cross-fade is ours.
 /// # Examples
 /// ```
@@ -117,14 +117,13 @@ impl SwitchedFilter {
             // Segments with the same cut-off share their filter.
             let same =
                 |(cutoff_hz, _): &(f64, Band)| cutoff_hz.to_bits() == segment.cutoff_hz.to_bits();
-            let place = match bands.iter().position(same) {
-                Some(place) => place,
-                None => {
-                    let sections = butterworth(self.order, segment.cutoff_hz, self.dt_s)?;
-                    let filter = ZeroPhase::new(sections, n_samples)?;
-                    bands.push((segment.cutoff_hz, Band { filter, weights: vec![0.0; n_samples] }));
-                    bands.len() - 1
-                }
+            let place = if let Some(place) = bands.iter().position(same) {
+                place
+            } else {
+                let sections = butterworth(self.order, segment.cutoff_hz, self.dt_s)?;
+                let filter = ZeroPhase::new(sections, n_samples)?;
+                bands.push((segment.cutoff_hz, Band { filter, weights: vec![0.0; n_samples] }));
+                bands.len() - 1
             };
             for (k, weight) in bands[place].1.weights.iter_mut().enumerate() {
                 let begun = if index == 0 { 1.0 } else { self.begun(segment.start, k) };

@@ -146,7 +146,8 @@ impl Law for ThroughJacobian {
 mod tests {
     use super::*;
     use crate::kinematics::Delta;
-    use crate::learning::law::pd::{Pd, PdGains, QFilter};
+    use crate::learning::law::pd::{Pd, PdGains};
+    use crate::learning::law::q_filter::QFilter;
 
     fn proportional(kp: f64, n_samples: usize, n_channels: usize) -> Box<dyn Law> {
         let gains = PdGains { kp, kd: 0.0, lead: 0 };
