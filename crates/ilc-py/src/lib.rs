@@ -11,6 +11,8 @@ mod cell;
 mod detached;
 mod error;
 mod exceptions;
+mod experiment;
+mod identify;
 mod laws;
 mod library;
 mod model;
@@ -25,6 +27,7 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
+    identify::register(module)?;
     signal::register(module)?;
     laws::register(module)?;
     cell::register(module)?;

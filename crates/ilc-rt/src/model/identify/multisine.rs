@@ -52,7 +52,9 @@ pub fn multisine(
     let peak = values.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
     // Rounded down: the product with the peak must not exceed the amplitude.
     let scale = amplitude / peak * (1.0 - f64::EPSILON);
-    values.iter_mut().for_each(|u| *u *= scale);
+    for u in &mut values {
+        *u *= scale;
+    }
     Ok(values)
 }
 

@@ -150,8 +150,7 @@ impl Problem {
             };
             let x = solve((0..self.points.len()).map(rows), count)?;
             let (numerator, rest) = x.split_at(self.n_zeros + 1);
-            let mut denominator = rest.to_vec();
-            denominator.push(1.0);
+            let denominator = [rest, &[1.0]].concat();
             let fraction = Fraction { numerator: numerator.to_vec(), denominator };
             let cost = self.cost(&fraction);
             before = self

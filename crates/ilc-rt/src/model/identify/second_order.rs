@@ -256,15 +256,12 @@ impl Shape {
     fn at(&self, frequency_hz: f64) -> Complex<f64> {
         let w = TAU * frequency_hz;
         let m = &self.model;
-        let fraction = match (self.sampled, m.dt_s) {
-            (Some([b1, b2, a1, a2]), Some(dt_s)) => {
-                let z = Complex::new(0.0, w * dt_s).exp();
-                (z * b1 + b2) / (z * z + z * a1 + a2)
-            }
-            _ => {
-                let share = frequency_hz / m.natural_frequency_hz;
-                Complex::new(1.0 - share * share, 2.0 * m.damping * share).inv()
-            }
+        let fraction = if let (Some([b1, b2, a1, a2]), Some(dt_s)) = (self.sampled, m.dt_s) {
+            let z = Complex::new(0.0, w * dt_s).exp();
+            (z * b1 + b2) / (z * z + z * a1 + a2)
+        } else {
+            let share = frequency_hz / m.natural_frequency_hz;
+            Complex::new(1.0 - share * share, 2.0 * m.damping * share).inv()
         };
         fraction * m.gain * Complex::new(0.0, -w * m.delay_s).exp()
     }
