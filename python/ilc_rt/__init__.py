@@ -1,6 +1,6 @@
 """The motion controller that learns: iterative learning control on the machine."""
 
-from ilc_rt import signal
+from ilc_rt import identify, signal
 from ilc_rt._native import (
     Cell,
     LearningError,
@@ -36,6 +36,7 @@ __all__ = [
     "StateSpace",
     "discretize",
     "from_transfer_function",
+    "identify",
     "second_order",
     "signal",
 ]

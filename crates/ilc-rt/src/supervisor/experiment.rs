@@ -64,20 +64,20 @@ impl Experiment {
     ) -> Result<Planned, SupervisorError> {
         let (index, axis) = self.axis(cell)?;
         let signal = self.signal(cell)?;
-        for demand in self.demands(cell, index, axis, &signal) {
-            if demand.room() < 1.0 {
-                let Demand { what, needed, allowed, unit } = demand;
-                let most = self.excitation.amplitude * allowed / needed;
-                let input = input_unit(axis);
-                return Err(self.refused(
-                    cell,
-                    &format!("amplitude {} {input}: {what}", self.excitation.amplitude),
-                    &format!("{needed:.6} {unit}"),
-                    &format!(
-                        "at most {allowed:.6} {unit}, which is an amplitude of {most:.3e} {input}"
-                    ),
-                ));
-            }
+        let demands = self.demands(cell, index, axis, &signal);
+        let tightest = demands.iter().min_by(|a, b| a.room().total_cmp(&b.room()));
+        if let Some(demand) = tightest.filter(|demand| demand.room() < 1.0) {
+            let Demand { what, needed, allowed, unit } = demand;
+            let most = self.excitation.amplitude * demand.room();
+            let input = input_unit(axis);
+            return Err(self.refused(
+                cell,
+                &format!("amplitude {} {input}: {what}", self.excitation.amplitude),
+                &format!("{needed:.6} {unit}"),
+                &format!(
+                    "at most {allowed:.6} {unit}, which is an amplitude of {most:.6e} {input}"
+                ),
+            ));
         }
         let mut cell = cell.clone();
         cell.program.start_m[index] = self.center_m(&cell, index);
