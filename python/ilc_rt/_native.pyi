@@ -19,11 +19,13 @@ __all__ = [
     "SecondOrderFit",
     "SignalError",
     "StateSpace",
+    "VelocityLoopFit",
     "butterworth",
     "discretize",
     "excitation",
     "fit_rational",
     "fit_second_order",
+    "fit_velocity_loop",
     "frequency_response",
     "from_transfer_function",
     "run_events",
@@ -149,6 +151,26 @@ class SecondOrderFit:
     def state_space(self) -> StateSpace: ...
 
 @final
+class VelocityLoopFit:
+    @property
+    def gain(self) -> float: ...
+    @property
+    def bandwidth_hz(self) -> float: ...
+    @property
+    def delay_s(self) -> float: ...
+    @property
+    def delay_samples(self) -> int: ...
+    @property
+    def gain_deviation(self) -> float: ...
+    @property
+    def bandwidth_deviation_hz(self) -> float: ...
+    @property
+    def delay_deviation_s(self) -> float: ...
+    @property
+    def residual_rms(self) -> float: ...
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]: ...
+
+@final
 class RationalFit:
     @property
     def model(self) -> StateSpace: ...
@@ -177,6 +199,15 @@ def fit_second_order(
     gain: float | None = None,
     delay_s: float | None = None,
 ) -> SecondOrderFit: ...
+def fit_velocity_loop(
+    frequency_hz: ArrayLike,
+    response: ArrayLike,
+    position_gain_per_s: float,
+    dt_s: float,
+    coherence: ArrayLike | None = None,
+    n_averages: float = 2.0,
+    delay_s: float | None = None,
+) -> VelocityLoopFit: ...
 def fit_rational(
     frequency_hz: ArrayLike,
     response: ArrayLike,

@@ -21,9 +21,11 @@ from ilc_rt._native import (
     FrequencyResponse,
     RationalFit,
     SecondOrderFit,
+    VelocityLoopFit,
     excitation,
     fit_rational,
     fit_second_order,
+    fit_velocity_loop,
     frequency_response,
     uncertainty,
 )
@@ -58,9 +60,9 @@ class Identification:
         Response from input to measured output, in the band of the excitation.
     model : SecondOrderFit
         Fitted gain, natural frequency, damping and delay.
-    described : SecondOrderFit
-        The same within what ``[axis.model]`` can say: the gain that the
-        interface has, and whole samples of delay.
+    described : SecondOrderFit or VelocityLoopFit
+        What ``[axis.model]`` can say of it: unit gain and whole samples of
+        delay; the velocity loop alone of a csv axis.
     uncertainty : tuple of two arrays
         Frequencies in Hz, and the bound there of what `described` leaves over:
         ``|H/G - 1|`` and three standard deviations of the measurement.
@@ -78,7 +80,7 @@ class Identification:
 
     measured: FrequencyResponse
     model: SecondOrderFit
-    described: SecondOrderFit
+    described: SecondOrderFit | VelocityLoopFit
     uncertainty: tuple[Array, Array]
     u: Array
     y: Array
@@ -131,16 +133,11 @@ class Identification:
         return np.where(grid_hz > frequency_hz[-1], np.maximum(found, 1.0), found)
 
     def section(self) -> str:
-        """Return the section ``[axis.model]`` that says what was found.
-
-        A velocity loop of bandwidth a in a position loop of gain kv is
-        ``a / (s^2 + a s + a kv)``: a is twice damping times frequency.
-        """
+        """Return the section ``[axis.model]`` that says what was found."""
         model = self.described
         lines = ["[axis.model]"]
-        if self.interface == "csv":
-            bandwidth_hz = 2.0 * model.damping * model.natural_frequency_hz
-            lines.append(f"velocity_bandwidth_hz = {bandwidth_hz:.3f}")
+        if isinstance(model, VelocityLoopFit):
+            lines.append(f"velocity_bandwidth_hz = {model.bandwidth_hz:.3f}")
         else:
             lines.append(f"natural_frequency_hz = {model.natural_frequency_hz:.3f}")
             lines.append(f"damping = {model.damping:.4f}")
@@ -447,12 +444,18 @@ def _evaluate(
     u, y = np.ascontiguousarray(u[used]), np.ascontiguousarray(y[used])
     whole = frequency_response(u, y, dt_s, period_samples=period)
     measured = whole.band(experiment.from_hz, experiment.to_hz)
-    data = (measured.frequency_hz, measured.response, measured.coherence, measured.n_averages)
-    model = fit_second_order(*data, dt_s=dt_s)
-    gain = {"csp": 1.0, "csv": 1.0 / (position_gain_per_s or 1.0)}.get(interface or "")
-    described = fit_second_order(
-        *data, dt_s=dt_s, gain=gain, delay_s=model.delay_samples * dt_s
-    )
+    f, h = measured.frequency_hz, measured.response
+    trust = {"coherence": measured.coherence, "n_averages": measured.n_averages}
+    model = fit_second_order(f, h, dt_s=dt_s, **trust)
+    described: SecondOrderFit | VelocityLoopFit
+    if position_gain_per_s is None:
+        gain = None if interface is None else 1.0
+        whole_s = model.delay_samples * dt_s
+        described = fit_second_order(f, h, dt_s=dt_s, gain=gain, delay_s=whole_s, **trust)
+    else:
+        free = fit_velocity_loop(f, h, position_gain_per_s, dt_s, **trust)
+        whole_s = free.delay_samples * dt_s
+        described = fit_velocity_loop(f, h, position_gain_per_s, dt_s, delay_s=whole_s, **trust)
     bound = uncertainty(measured, described.response(measured.frequency_hz))
     return Identification(
         measured, model, described, bound, u, y, period, dt_s, experiment, interface
@@ -465,9 +468,11 @@ __all__ = [
     "Identification",
     "RationalFit",
     "SecondOrderFit",
+    "VelocityLoopFit",
     "excitation",
     "fit_rational",
     "fit_second_order",
+    "fit_velocity_loop",
     "frequency_response",
     "multisine",
     "swept_sine",

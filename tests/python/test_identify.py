@@ -198,7 +198,7 @@ def test_a_velocity_loop_is_identified_through_its_position_loop(bench):
     assert found.model.gain == pytest.approx(1 / 40.0, rel=0.02)
     # 2 delta f0 of the simulated velocity loop: 30 Hz.
     line = next(line for line in found.section().splitlines() if "velocity_bandwidth" in line)
-    assert float(line.split("=")[1]) == pytest.approx(30.0, rel=0.3)
+    assert float(line.split("=")[1]) == pytest.approx(30.0, rel=0.05)
 
 
 @pytest.mark.parametrize(

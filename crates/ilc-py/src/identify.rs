@@ -3,6 +3,7 @@
 use ilc_rt::model::StateSpace;
 use ilc_rt::model::identify::{
     self, Averaging, Excitation, FrequencyResponse, Known, RationalFit, SecondOrderFit,
+    VelocityLoopFit,
 };
 use nalgebra::Complex;
 use numpy::IntoPyArray;
@@ -392,6 +393,152 @@ fn fit_second_order(
     fit.or_raise().map(PySecondOrderFit::from)
 }
 
+/// Fitted velocity loop with delay, in a position loop of known gain.
+///
+/// ``G / (1 + kv z^-1 G)`` with G the zero-order hold of
+/// ``K a / (s (s + a)) exp(-s tau)``. With a known delay the gain is 1.
+#[pyclass(name = "VelocityLoopFit", module = "ilc_rt._native", frozen)]
+#[derive(Debug)]
+struct PyVelocityLoopFit(VelocityLoopFit);
+
+#[pymethods]
+impl PyVelocityLoopFit {
+    /// Gain K of the velocity loop.
+    #[getter]
+    fn gain(&self) -> f64 {
+        self.0.model.gain
+    }
+
+    /// Bandwidth a / (2 pi) in Hz.
+    #[getter]
+    fn bandwidth_hz(&self) -> f64 {
+        self.0.model.bandwidth_hz
+    }
+
+    /// Delay tau in seconds, beyond that of the hold.
+    #[getter]
+    fn delay_s(&self) -> f64 {
+        self.0.model.delay_s
+    }
+
+    /// Delay in whole samples.
+    #[getter]
+    fn delay_samples(&self) -> usize {
+        self.0.model.delay_samples()
+    }
+
+    /// Standard deviation of the gain.
+    #[getter]
+    fn gain_deviation(&self) -> f64 {
+        self.0.gain_deviation
+    }
+
+    /// Standard deviation of the bandwidth in Hz.
+    #[getter]
+    fn bandwidth_deviation_hz(&self) -> f64 {
+        self.0.bandwidth_deviation_hz
+    }
+
+    /// Standard deviation of the delay in seconds.
+    #[getter]
+    fn delay_deviation_s(&self) -> f64 {
+        self.0.delay_deviation_s
+    }
+
+    /// Weighted RMS of the relative difference of measurement and model.
+    #[getter]
+    fn residual_rms(&self) -> f64 {
+        self.0.residual_rms
+    }
+
+    /// Return the response from velocity input to position, loop closed.
+    ///
+    /// Parameters
+    /// ----------
+    /// frequency_hz : array_like, shape (n_frequencies,)
+    ///     Frequencies in Hz.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of complex128, shape (n_frequencies,)
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     If `frequency_hz` has the wrong shape or a number that is not finite.
+    fn response<'py>(
+        &self,
+        py: Python<'py>,
+        frequency_hz: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
+        Ok(give_complex(py, self.0.model.response(&frequency_hz)))
+    }
+
+    fn __repr__(&self) -> String {
+        let model = &self.0.model;
+        format!(
+            "VelocityLoopFit(gain={:.5}, bandwidth_hz={:.4}, delay_s={:.6})",
+            model.gain, model.bandwidth_hz, model.delay_s
+        )
+    }
+}
+
+/// Fit a velocity loop in a position loop of known gain.
+///
+/// ``min sum_k w_k |ln(H_k / T(f_k))|^2`` with ``T = G / (1 + kv z^-1 G)``
+///
+/// Parameters
+/// ----------
+/// frequency_hz : array_like, shape (n_frequencies,)
+///     Frequencies in Hz, above 0 and rising.
+/// response : array_like of complex, shape (n_frequencies,)
+///     Measured response from velocity input to position.
+/// position_gain_per_s : float
+///     Gain kv of the position loop in 1/s.
+/// dt_s : float
+///     Servo cycle in seconds.
+/// coherence : array_like or None, shape (n_frequencies,)
+///     Coherence that weighs the frequencies; None for equal weights.
+/// n_averages : float
+///     Averages behind the response; with one, coherence says nothing.
+/// delay_s : float or None
+///     Known delay in seconds, with which the gain is 1; both are fitted if
+///     None.
+///
+/// Returns
+/// -------
+/// VelocityLoopFit
+///
+/// Raises
+/// ------
+/// ModelError
+///     If the response cannot be fitted.
+/// ValueError, TypeError
+///     If an array has the wrong shape, dtype or a number that is not finite.
+///
+/// References
+/// ----------
+/// [pintelon2012], section 9.8.3.
+#[pyfunction]
+#[pyo3(signature = (frequency_hz, response, position_gain_per_s, dt_s, coherence=None, n_averages=2.0, delay_s=None))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
+fn fit_velocity_loop(
+    py: Python<'_>,
+    frequency_hz: &Bound<'_, PyAny>,
+    response: &Bound<'_, PyAny>,
+    position_gain_per_s: f64,
+    dt_s: f64,
+    coherence: Option<&Bound<'_, PyAny>>,
+    n_averages: f64,
+    delay_s: Option<f64>,
+) -> PyResult<PyVelocityLoopFit> {
+    let measured = PyFrequencyResponse::new(frequency_hz, response, coherence, n_averages)?.0;
+    let fit =
+        detached(py, || identify::fit_velocity_loop(&measured, position_gain_per_s, dt_s, delay_s));
+    fit.or_raise().map(PyVelocityLoopFit)
+}
+
 /// Fitted fraction of any order.
 #[pyclass(name = "RationalFit", module = "ilc_rt._native", frozen)]
 #[derive(Debug)]
@@ -658,9 +805,11 @@ fn give_complex(py: Python<'_>, values: Vec<Complex<f64>>) -> Bound<'_, PyAny> {
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyFrequencyResponse>()?;
     module.add_class::<PySecondOrderFit>()?;
+    module.add_class::<PyVelocityLoopFit>()?;
     module.add_class::<PyRationalFit>()?;
     module.add_function(wrap_pyfunction!(frequency_response, module)?)?;
     module.add_function(wrap_pyfunction!(fit_second_order, module)?)?;
+    module.add_function(wrap_pyfunction!(fit_velocity_loop, module)?)?;
     module.add_function(wrap_pyfunction!(fit_rational, module)?)?;
     module.add_function(wrap_pyfunction!(uncertainty, module)?)?;
     module.add_function(wrap_pyfunction!(excitation, module)?)

@@ -2,11 +2,11 @@
 
 use super::error::SupervisorError;
 use super::experiment::Experiment;
-use crate::config::{Cell, Interface};
+use crate::config::Cell;
 use crate::model::ModelError;
 use crate::model::identify::{
-    Averaging, FrequencyResponse, Known, SecondOrderFit, Uncertainty, fit_second_order,
-    frequency_response, uncertainty,
+    Averaging, FrequencyResponse, Known, SecondOrder, SecondOrderFit, Uncertainty, VelocityLoop,
+    fit_second_order, fit_velocity_loop, frequency_response, uncertainty,
 };
 use crate::record::IterationRecord;
 
@@ -20,11 +20,19 @@ pub struct Identified {
     pub measured: FrequencyResponse,
     /// Second-order model with delay, sampled with the servo cycle.
     pub fit: SecondOrderFit,
-    /// The same within what `[axis.model]` can say: unit gain, whole cycles of delay (csp).
-    pub described: SecondOrderFit,
+    /// What `[axis.model]` can say of it: unit gain and whole cycles of delay.
+    pub described: Described,
     /// What the model leaves over.
     pub uncertainty: Uncertainty,
-    interface: Interface,
+}
+
+/// The model of an axis as a cell describes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Described {
+    /// The position loop of a csp axis.
+    Position(SecondOrder),
+    /// The velocity loop of a csv axis, in the position loop of the controller.
+    Velocity(VelocityLoop),
 }
 
 impl Identified {
@@ -61,18 +69,23 @@ impl Identified {
             let (u, y) = (column(&record.input, 1.0), column(&record.error_m, -1.0));
             let measured = frequency_response(&u, &y, dt_s, averaging)?.band(from_hz, to_hz);
             let fit = fit_second_order(&measured, Some(dt_s), Known::default())?;
-            let whole_s = fit.model.delay_samples() as f64 * dt_s;
-            let gain = match axis.interface {
-                Interface::Csp => Some(1.0),
-                Interface::Csv => {
-                    axis.position_loop.map(|position_loop| 1.0 / position_loop.gain_per_s)
+            let (described, model) = match axis.position_loop {
+                None => {
+                    let whole_s = fit.model.delay_samples() as f64 * dt_s;
+                    let known = Known { gain: Some(1.0), delay_s: Some(whole_s) };
+                    let model = fit_second_order(&measured, Some(dt_s), known)?.model;
+                    (Described::Position(model), model.response(&measured.frequency_hz))
+                }
+                Some(position_loop) => {
+                    let kv = position_loop.gain_per_s;
+                    let free = fit_velocity_loop(&measured, kv, dt_s, None)?.model;
+                    let whole_s = free.delay_samples() as f64 * dt_s;
+                    let model = fit_velocity_loop(&measured, kv, dt_s, Some(whole_s))?.model;
+                    (Described::Velocity(model), model.response(&measured.frequency_hz))
                 }
             };
-            let known = Known { gain, delay_s: Some(whole_s) };
-            let described = fit_second_order(&measured, Some(dt_s), known)?;
-            let model = described.model.response(&measured.frequency_hz);
             let uncertainty = uncertainty(&measured, &model, DEVIATIONS)?;
-            Ok(Self { measured, fit, described, uncertainty, interface: axis.interface })
+            Ok(Self { measured, fit, described, uncertainty })
         };
         evaluate().map_err(|source| SupervisorError::Model {
             file: cell.file.display().to_string(),
@@ -81,20 +94,19 @@ impl Identified {
     }
 
     /// Returns the section `[axis.model]` that says so, to be pasted into the cell description.
-    ///
-    /// A velocity loop of bandwidth `a` under a position loop of gain `kv` is
-    /// `a / (s^2 + a s + a kv)`, so `a = 2 delta w0`.
     pub fn section(&self) -> String {
-        let model = &self.described.model;
-        let (frequency_hz, damping) = (model.natural_frequency_hz, model.damping);
-        let loop_lines = match self.interface {
-            Interface::Csp => {
-                format!("natural_frequency_hz = {frequency_hz:.3}\ndamping = {damping:.4}")
-            }
-            Interface::Csv => {
-                format!("velocity_bandwidth_hz = {:.3}", 2.0 * damping * frequency_hz)
-            }
-        };
-        format!("[axis.model]\n{loop_lines}\ndelay_samples = {}\n", model.delay_samples())
+        match self.described {
+            Described::Position(model) => format!(
+                "[axis.model]\nnatural_frequency_hz = {:.3}\ndamping = {:.4}\ndelay_samples = {}\n",
+                model.natural_frequency_hz,
+                model.damping,
+                model.delay_samples()
+            ),
+            Described::Velocity(model) => format!(
+                "[axis.model]\nvelocity_bandwidth_hz = {:.3}\ndelay_samples = {}\n",
+                model.bandwidth_hz,
+                model.delay_samples()
+            ),
+        }
     }
 }

@@ -21,5 +21,5 @@ mod telemetry;
 pub use campaign::{Options, Outcome, identify, run};
 pub use error::SupervisorError;
 pub use experiment::Experiment;
-pub use identified::Identified;
+pub use identified::{Described, Identified};
 pub use plan::Plan;

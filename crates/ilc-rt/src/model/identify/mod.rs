@@ -14,6 +14,7 @@ mod second_order;
 mod spectra;
 mod swept_sine;
 mod uncertainty;
+mod velocity_loop;
 
 pub use excitation::{Excitation, ExcitationSignal, Waveform};
 pub use multisine::multisine;
@@ -23,3 +24,4 @@ pub use second_order::{Known, SecondOrder, SecondOrderFit, fit_second_order};
 pub use spectra::Averaging;
 pub use swept_sine::{Spacing, swept_sine};
 pub use uncertainty::{Uncertainty, uncertainty};
+pub use velocity_loop::{VelocityLoop, VelocityLoopFit, fit_velocity_loop};
