@@ -126,9 +126,7 @@ def compare_runs(errors: ArrayLike, axis_names: tuple[str, ...] = ()) -> Repeata
     """
     values = np.asarray(errors, dtype=np.float64)
     if values.ndim != 3 or values.shape[0] < 2 or 0 in values.shape:
-        message = (
-            f"errors has shape {values.shape}; (n_runs, n_samples, n_axes), 2 runs at least"
-        )
+        message = f"errors has shape {values.shape}; (n_runs, n_samples, n_axes), 2 runs at least"
         raise ValueError(message)
     if not np.isfinite(values).all():
         message = "errors holds a number that is not finite"

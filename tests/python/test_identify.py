@@ -259,7 +259,7 @@ def test_wrong_arguments_are_named_one_at_a_time():
         identify.fit_second_order(f, h, coherence=np.full(20, 2.0))
     with pytest.raises(ModelError, match="frequency_hz = 0"):
         identify.fit_second_order(f - 1.0, h)
-    with pytest.raises(ValueError, match="response holds nan"):
+    with pytest.raises(ValueError, match="response holds NaN"):
         identify.fit_second_order(f, h * np.nan)
     with pytest.raises(ModelError, match="n_zeros = 3"):
         identify.fit_rational(f, h, 3, 2)
@@ -292,9 +292,7 @@ def test_the_command_writes_figures_picture_and_section(ilc, bench, tmp_path):
 
 
 def test_what_was_identified_can_be_pasted_back(bench):
-    found = identify.multisine(
-        bench, axis="x", from_hz=1.0, to_hz=20.0, duration_s=5.0, periods=2
-    )
+    found = identify.multisine(bench, axis="x", from_hz=1.0, to_hz=20.0, duration_s=5.0, periods=2)
     old = "[axis.model]\nnatural_frequency_hz = 5.0\ndamping = 1.0\n"
     assert old in CELL
     bench.write_text(CELL.replace(old, found.section()))

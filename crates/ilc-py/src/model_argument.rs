@@ -17,11 +17,12 @@ pub(crate) fn read_model(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Stat
         return Ok(own.get().model().clone());
     }
     if !object.hasattr("A")? {
+        // python-control's have a to_ss as well, but it refuses matrices; `ninputs` tells them apart.
+        if object.hasattr("ninputs")? && object.hasattr("num")? && object.hasattr("den")? {
+            return read_transfer_matrix(name, object);
+        }
         if object.hasattr("to_ss")? {
             return read_model(name, &object.call_method0("to_ss")?);
-        }
-        if object.hasattr("num")? && object.hasattr("den")? {
-            return read_transfer_matrix(name, object);
         }
     }
     let part = |attribute: &str| -> PyResult<Matrix> {

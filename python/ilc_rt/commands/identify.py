@@ -8,11 +8,24 @@ from typing import Annotated
 
 import typer
 
-from ilc_rt.commands.options import Bus, CellFile, DriveChoice, JsonFile, Lockstep, MeasureOption
+from ilc_rt.commands.options import (
+    Bus,
+    CellFile,
+    DriveChoice,
+    DriveOption,
+    JsonFile,
+    KeepIn,
+    Lockstep,
+    MeasureOption,
+)
 from ilc_rt.errors import BadInputError
 from ilc_rt.events import Event, StartEvent
 
 PICTURE = "identify-{axis}.png"
+
+PictureFolder = Annotated[
+    Path | None, typer.Option("--report", metavar="DIR", help="Folder for the picture.")
+]
 
 
 class Method(str, Enum):
@@ -41,16 +54,10 @@ def identify(
     measure: MeasureOption = None,
     bus: Bus = None,
     lockstep: Lockstep = None,
-    library: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Keep the experiment in this library.")
-    ] = None,
+    library: KeepIn = None,
     json_file: JsonFile = None,
-    report: Annotated[
-        Path | None, typer.Option("--report", metavar="DIR", help="Folder for the picture.")
-    ] = None,
-    drives: Annotated[
-        DriveChoice, typer.Option(help="Start simulated drives; auto never does on a can: bus.")
-    ] = DriveChoice.auto,
+    report: PictureFolder = None,
+    drives: DriveOption = DriveChoice.auto,
 ) -> None:
     """Excite one axis while the others hold still, and fit a model to it.
 

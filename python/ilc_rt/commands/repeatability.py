@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ilc_rt.commands.options import Bus, CellFile, DriveChoice, JsonFile, Lockstep, MeasureOption
+from ilc_rt.commands.options import (
+    Bus,
+    CellFile,
+    DriveChoice,
+    DriveOption,
+    JsonFile,
+    KeepIn,
+    Lockstep,
+    MeasureOption,
+)
 from ilc_rt.events import Event, IterationEvent
 from ilc_rt.repeatable import check_repeatability
 from ilc_rt.result import micrometres
@@ -19,13 +27,9 @@ def repeatability(
     measure: MeasureOption = None,
     bus: Bus = None,
     lockstep: Lockstep = None,
-    library: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Keep the runs in this library.")
-    ] = None,
+    library: KeepIn = None,
     json_file: JsonFile = None,
-    drives: Annotated[
-        DriveChoice, typer.Option(help="Start simulated drives; auto never does on a can: bus.")
-    ] = DriveChoice.auto,
+    drives: DriveOption = DriveChoice.auto,
 ) -> None:
     """Run a program without learning and tell what of its error repeats.
 
