@@ -446,7 +446,7 @@ def _evaluate(
     whole = frequency_response(u, y, dt_s, period_samples=period)
     measured = whole.band(experiment.from_hz, experiment.to_hz)
     f, h = measured.frequency_hz, measured.response
-    trust = {"coherence": measured.coherence, "n_averages": measured.n_averages}
+    trust: dict[str, Any] = {"coherence": measured.coherence, "n_averages": measured.n_averages}
     model = fit_second_order(f, h, dt_s=dt_s, **trust)
     described: SecondOrderFit | VelocityLoopFit
     if position_gain_per_s is None:

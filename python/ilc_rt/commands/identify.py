@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -79,7 +79,7 @@ def identify(
             seconds = event.n_samples * event.cycle_s
             typer.echo(f"exciting axis {name} of {event.cell} for {seconds:.1f} s, {event.bus}")
 
-    options = {
+    options: dict[str, Any] = {
         "axis": name, "amplitude": amplitude, "from_hz": from_hz, "to_hz": to_hz,
         "duration_s": duration_s, "periods": periods, "at_m": at_m,
         "measure": measure.value if measure else None, "bus": bus, "lockstep": lockstep,
@@ -89,6 +89,7 @@ def identify(
         if method is Method.multisine:
             found = steps.multisine(described, **options)
         else:
+            spacing: Literal["linear", "logarithmic"]
             spacing = "linear" if method is Method.linear_sweep else "logarithmic"
             found = steps.swept_sine(described, spacing=spacing, **options)
     except ValueError as error:
