@@ -2,6 +2,7 @@
 
 from ilc_rt import control, kinematics, signal, trajectory
 from ilc_rt import signal, weights
+from ilc_rt import identify, signal
 from ilc_rt._native import (
     AdjointIlc,
     Cell,
@@ -55,6 +56,7 @@ __all__ = [
     "from_transfer_function",
     "kinematics",
     "repeatability",
+    "identify",
     "second_order",
     "signal",
     "trajectory",

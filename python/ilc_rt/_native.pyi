@@ -22,6 +22,7 @@ __all__ = [
     "Gate",
     "GaussianFilter",
     "Ladder",
+    "FrequencyResponse",
     "LearningError",
     "Library",
     "Line",
@@ -35,6 +36,9 @@ __all__ = [
     "TimeVarying",
     "Repeatability",
     "SwitchedFilter",
+    "RationalFit",
+    "SecondOrderFit",
+    "VelocityLoopFit",
     "butterworth",
     "contour_error",
     "coupling_gains",
@@ -43,6 +47,11 @@ __all__ = [
     "discretize",
     "formation_errors",
     "formation_weights",
+    "excitation",
+    "fit_rational",
+    "fit_second_order",
+    "fit_velocity_loop",
+    "frequency_response",
     "from_transfer_function",
     "projection_across",
     "fir",
@@ -52,22 +61,15 @@ __all__ = [
     "run_events",
     "schedule",
     "second_order",
+    "uncertainty",
     "zero_phase",
 ]
 
 # Docstrings are those of the compiled classes: help(ilc_rt.StateSpace).
 
 class _ForeignModel(Protocol):
-    """A state-space object of scipy.signal or python-control."""
+    """A model of scipy.signal or python-control."""
 
-    @property
-    def A(self) -> object: ...
-    @property
-    def B(self) -> object: ...
-    @property
-    def C(self) -> object: ...
-    @property
-    def D(self) -> object: ...
     @property
     def dt(self) -> object: ...
 
@@ -111,6 +113,20 @@ class StateSpace:
     def series(self, next: StateSpace | _ForeignModel) -> StateSpace: ...
     def append(self, other: StateSpace | _ForeignModel) -> StateSpace: ...
     def delayed(self, n_samples: int) -> StateSpace: ...
+    def zeros(self) -> NDArray[np.complex128]: ...
+    def dc_gain(self) -> NDArray[np.float64]: ...
+    def frequency_response(self, w_rad_s: ArrayLike) -> NDArray[np.complex128]: ...
+    def bode(
+        self, w_rad_s: ArrayLike, output: int = 0, input: int = 0
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def sensitivity(self, controller: StateSpace | _ForeignModel) -> StateSpace: ...
+    def complementary_sensitivity(self, controller: StateSpace | _ForeignModel) -> StateSpace: ...
+    def process_sensitivity(self, controller: StateSpace | _ForeignModel) -> StateSpace: ...
+    def relative_degrees(self) -> list[int | None]: ...
+    def delays(self) -> list[list[int | None]]: ...
+    def minimal(self) -> StateSpace: ...
+    def to_scipy(self) -> Any: ...  # noqa: ANN401
+    def to_control(self) -> Any: ...  # noqa: ANN401
 
 @final
 class TimeVarying:
@@ -149,6 +165,134 @@ def second_order(natural_frequency_rad_s: float, damping: float) -> StateSpace: 
 def discretize(
     model: StateSpace | _ForeignModel, dt_s: float, method: Literal["zoh", "tustin"] = "zoh"
 ) -> StateSpace: ...
+
+@final
+class FrequencyResponse:
+    def __new__(
+        cls,
+        frequency_hz: ArrayLike,
+        response: ArrayLike,
+        coherence: ArrayLike | None = None,
+        n_averages: float = 1.0,
+    ) -> FrequencyResponse: ...
+    @property
+    def frequency_hz(self) -> NDArray[np.float64]: ...
+    @property
+    def response(self) -> NDArray[np.complex128]: ...
+    @property
+    def coherence(self) -> NDArray[np.float64]: ...
+    @property
+    def n_averages(self) -> float: ...
+    def relative_deviation(self) -> NDArray[np.float64]: ...
+    def band(self, from_hz: float, to_hz: float) -> FrequencyResponse: ...
+
+@final
+class SecondOrderFit:
+    @property
+    def gain(self) -> float: ...
+    @property
+    def natural_frequency_hz(self) -> float: ...
+    @property
+    def damping(self) -> float: ...
+    @property
+    def delay_s(self) -> float: ...
+    @property
+    def delay_samples(self) -> int: ...
+    @property
+    def dt_s(self) -> float | None: ...
+    @property
+    def gain_deviation(self) -> float: ...
+    @property
+    def natural_frequency_deviation_hz(self) -> float: ...
+    @property
+    def damping_deviation(self) -> float: ...
+    @property
+    def delay_deviation_s(self) -> float: ...
+    @property
+    def residual_rms(self) -> float: ...
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]: ...
+    def state_space(self) -> StateSpace: ...
+
+@final
+class VelocityLoopFit:
+    @property
+    def gain(self) -> float: ...
+    @property
+    def bandwidth_hz(self) -> float: ...
+    @property
+    def delay_s(self) -> float: ...
+    @property
+    def delay_samples(self) -> int: ...
+    @property
+    def gain_deviation(self) -> float: ...
+    @property
+    def bandwidth_deviation_hz(self) -> float: ...
+    @property
+    def delay_deviation_s(self) -> float: ...
+    @property
+    def residual_rms(self) -> float: ...
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]: ...
+
+@final
+class RationalFit:
+    @property
+    def model(self) -> StateSpace: ...
+    @property
+    def delay_s(self) -> float: ...
+    @property
+    def reflected_poles(self) -> int: ...
+    @property
+    def residual_rms(self) -> float: ...
+    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]: ...
+
+def frequency_response(
+    u: ArrayLike,
+    y: ArrayLike,
+    dt_s: float,
+    period_samples: int | None = None,
+    segment_samples: int | None = None,
+    overlap_samples: int | None = None,
+) -> FrequencyResponse: ...
+def fit_second_order(
+    frequency_hz: ArrayLike,
+    response: ArrayLike,
+    coherence: ArrayLike | None = None,
+    n_averages: float = 2.0,
+    dt_s: float | None = None,
+    gain: float | None = None,
+    delay_s: float | None = None,
+) -> SecondOrderFit: ...
+def fit_velocity_loop(
+    frequency_hz: ArrayLike,
+    response: ArrayLike,
+    position_gain_per_s: float,
+    dt_s: float,
+    coherence: ArrayLike | None = None,
+    n_averages: float = 2.0,
+    delay_s: float | None = None,
+) -> VelocityLoopFit: ...
+def fit_rational(
+    frequency_hz: ArrayLike,
+    response: ArrayLike,
+    n_zeros: int,
+    n_poles: int,
+    coherence: ArrayLike | None = None,
+    n_averages: float = 2.0,
+    delay_s: float = 0.0,
+    dt_s: float | None = None,
+) -> RationalFit: ...
+def uncertainty(
+    measured: FrequencyResponse, model: ArrayLike, deviations: float = 3.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def excitation(
+    waveform: str,
+    amplitude: float,
+    from_hz: float,
+    to_hz: float,
+    period_s: float,
+    periods: int,
+    dt_s: float,
+) -> tuple[NDArray[np.float64], int, int]: ...
 
 @final
 class ButterworthFilter:
@@ -594,6 +738,10 @@ class Cell:
     @property
     def axis_names(self) -> list[str]: ...
     @property
+    def interfaces(self) -> list[Literal["csp", "csv"]]: ...
+    @property
+    def position_gains_per_s(self) -> list[float | None]: ...
+    @property
     def bus(self) -> str: ...
     @property
     def measure(self) -> Literal["encoder", "tcp"]: ...
@@ -622,4 +770,6 @@ def run_events(
     lockstep: bool = True,
     resume: bool = False,
     law: object | None = None,
+    learning: bool = True,
+    experiment: object | None = None,
 ) -> EventStream: ...

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from ilc_rt.experiment import Experiment
+
 DEFAULT_LIBRARY = "ilc-library.db"
 TRANSPORTS = ("can", "udp", "zenoh", "loopback")
 Drives = Literal["auto", "simulated", "external"]
@@ -65,6 +67,8 @@ class Campaign:
         where real ones may be listening.
     resume : bool
         Whether to go on from the last campaign of this cell in the library.
+    learning : bool
+        Whether to learn at all; if not, every run is like the first.
 
     Raises
     ------
@@ -89,6 +93,7 @@ class Campaign:
         lockstep: bool | None = None,
         drives: Drives = "auto",
         resume: bool = False,
+        learning: bool = True,
     ) -> None:
         self.cell = cell if isinstance(cell, Cell) else load_cell(cell)
         self.law = law
@@ -102,6 +107,9 @@ class Campaign:
         self.lockstep = self.transport == "loopback" if lockstep is None else lockstep
         self.simulated = _simulated(self.transport, drives)
         self.resume = resume
+        self.learning = learning
+        # What is run in place of the program, if an axis is to be identified.
+        self.experiment: Experiment | None = None
         self.result = CampaignResult(self.library)
         self._controller: Controller | None = None
         folder = Path(self.library).absolute().parent
@@ -168,7 +176,13 @@ class Campaign:
     def _start(self, iterations: int) -> Controller:
         cell_file = str(self.cell.path)
         if self.law is None and self.transport != "loopback":
-            arguments = ["--iterations", str(iterations), "--library", self.library]
+            verb, arguments = "run", ["--library", self.library]
+            if self.experiment is not None:
+                verb, arguments = "identify", arguments + self.experiment.arguments()
+            else:
+                arguments += ["--iterations", str(iterations)]
+                if not self.learning:
+                    arguments.append("--no-learning")
             if self.measure is not None:
                 arguments += ["--measure", self.measure]
             if self.resume:
@@ -176,6 +190,7 @@ class Campaign:
             return ProcessController(
                 cell_file,
                 arguments,
+                verb=verb,
                 bus=self.bus,
                 lockstep=self.lockstep,
                 simulated=self.simulated,
@@ -189,6 +204,8 @@ class Campaign:
             "lockstep": self.lockstep,
             "resume": self.resume,
             "law": self.law,
+            "learning": self.learning,
+            "experiment": self.experiment,
         }
         apart = self.simulated and self.transport != "loopback"
         drives = None

@@ -15,6 +15,8 @@ mod error;
 mod exceptions;
 mod held;
 mod kinematics;
+mod experiment;
+mod identify;
 mod laws;
 mod library;
 mod model;
@@ -32,6 +34,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
     time_varying::register(module)?;
+    identify::register(module)?;
     signal::register(module)?;
     kinematics::register(module)?;
     contour::register(module)?;

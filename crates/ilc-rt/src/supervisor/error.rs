@@ -71,6 +71,20 @@ pub enum SupervisorError {
         /// Why.
         source: ModelError,
     },
+    /// An experiment that the axis must not be asked for, or that shows nothing.
+    #[error("{file}: axis {axis}: {what} = {value}; {allowed}")]
+    Experiment {
+        /// Cell description.
+        file: String,
+        /// Name of the axis.
+        axis: String,
+        /// What is refused.
+        what: String,
+        /// Its value.
+        value: String,
+        /// What would be allowed.
+        allowed: String,
+    },
     /// The law refuses model or weights.
     #[error("{file}: [learning]: {source}")]
     Learning {

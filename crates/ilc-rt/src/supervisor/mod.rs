@@ -8,6 +8,8 @@ mod announce;
 mod campaign;
 mod collect;
 mod error;
+mod experiment;
+mod identified;
 mod learner;
 mod nodes;
 mod pace;
@@ -16,6 +18,8 @@ mod progress;
 mod reason;
 mod telemetry;
 
-pub use campaign::{Options, Outcome, run};
+pub use campaign::{Options, Outcome, identify, run};
 pub use error::SupervisorError;
+pub use experiment::Experiment;
+pub use identified::{Described, Identified};
 pub use plan::Plan;

@@ -55,20 +55,33 @@ impl Plan {
         lockstep: bool,
     ) -> Result<Self, SupervisorError> {
         let file = cell.file.display().to_string();
-        let mut cell = cell.clone();
-        cell.learning.measure = measure.unwrap_or(cell.learning.measure);
-        crate::config::check(&cell)?;
+        crate::config::check(cell)?;
         let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
         let interpolator =
-            Interpolator::plan(&path(&cell), &limits, cell.cycle_s()).map_err(|source| {
+            Interpolator::plan(&path(cell), &limits, cell.cycle_s()).map_err(|source| {
                 let key = match source.axis().and_then(|i| Some((i, cell.axes.get(i)?))) {
                     Some((i, axis)) => format!("[program] (axis {} is {})", i + 1, axis.name),
                     None => "[program]".to_owned(),
                 };
                 SupervisorError::Program { file: file.clone(), key, source }
             })?;
-        let bus_load = bus_load(&cell)
-            .map_err(|source| SupervisorError::Load { file: file.clone(), source })?;
+        Self::with(cell, measure, lockstep, interpolator, program_json(cell))
+    }
+
+    /// Works a cell description out with other set points than those of its program; `program` says
+    /// which, as JSON.
+    pub(super) fn with(
+        cell: &Cell,
+        measure: Option<Measure>,
+        lockstep: bool,
+        interpolator: Interpolator,
+        program: String,
+    ) -> Result<Self, SupervisorError> {
+        let file = cell.file.display().to_string();
+        let mut cell = cell.clone();
+        cell.learning.measure = measure.unwrap_or(cell.learning.measure);
+        crate::config::check(&cell)?;
+        let bus_load = bus_load(&cell).map_err(|source| SupervisorError::Load { file, source })?;
         let reference_m = interpolator.reference();
         Ok(Self {
             servo: servo_spec(&cell, lockstep)?,
@@ -85,7 +98,7 @@ impl Plan {
                     Measure::Encoder => "encoder".to_owned(),
                     Measure::Tcp => "tcp".to_owned(),
                 },
-                program: program_json(&cell),
+                program,
                 cycle_s: cell.cycle_s(),
                 n_axes: cell.n_axes(),
                 axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
@@ -198,7 +211,7 @@ fn axis_limits(axis: &Axis) -> AxisLimits {
     }
 }
 
-fn input_unit(axis: &Axis) -> &'static str {
+pub(super) fn input_unit(axis: &Axis) -> &'static str {
     match axis.interface {
         Interface::Csp => "m",
         Interface::Csv => "m/s",

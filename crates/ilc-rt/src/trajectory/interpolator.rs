@@ -2,11 +2,12 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use super::MAX_AXES;
 use super::blend::Blend;
 use super::error::TrajectoryError;
 use super::exact_stop::ExactStop;
 use super::limits::AxisLimits;
-use super::path::{CornerRule, PathSpec};
+use super::path::{self, CornerRule, PathSpec};
 use super::proof::{self, Proof};
 use super::setpoint::Setpoint;
 
@@ -15,6 +16,7 @@ use super::setpoint::Setpoint;
 enum Motion {
     ExactStop(ExactStop),
     Blend(Blend),
+    Hold(Setpoint),
 }
 
 /// A planned run: rest, path, rest.
@@ -64,6 +66,27 @@ impl Interpolator {
         Ok(Self { motion, n_axes: spec.start_m.len(), cycle_s, n_samples, tick: 0 })
     }
 
+    /// Rests at a point for some samples, as while an axis is identified.
+    ///
+    /// # Shapes
+    /// - `at_m`: one coordinate for each axis, 1 to 6
+    /// # Real Time
+    /// Cold.
+    /// # Errors
+    /// [`TrajectoryError`] for another number of axes, a point or cycle out of range, or no samples.
+    pub fn hold(at_m: &[f64], n_samples: usize, cycle_s: f64) -> Result<Self, TrajectoryError> {
+        let n_axes = at_m.len();
+        if !(1..=MAX_AXES).contains(&n_axes) {
+            return Err(TrajectoryError::Axes { n_axes });
+        }
+        path::check_time("cycle", cycle_s, path::CYCLE_S)?;
+        if n_samples == 0 {
+            return Err(TrajectoryError::Empty);
+        }
+        let setpoint = Setpoint::at_rest(path::point(at_m)?);
+        Ok(Self { motion: Motion::Hold(setpoint), n_axes, cycle_s, n_samples, tick: 0 })
+    }
+
     /// Goes back to the first set point.
     ///
     /// # Real Time
@@ -73,6 +96,7 @@ impl Interpolator {
         match &mut self.motion {
             Motion::ExactStop(moves) => moves.restart(),
             Motion::Blend(blend) => blend.restart(),
+            Motion::Hold(_) => {}
         }
     }
 
@@ -90,6 +114,7 @@ impl Interpolator {
         let setpoint = match &mut self.motion {
             Motion::ExactStop(moves) => moves.at(self.tick as f64 * self.cycle_s),
             Motion::Blend(blend) => blend.next(),
+            Motion::Hold(setpoint) => *setpoint,
         };
         if !done {
             self.tick += 1;

@@ -7,7 +7,7 @@ use super::limits::{AxisLimits, Line, is_positive};
 /// Farthest position of a plan; the blend's fixed-point numbers hold it with room to spare.
 const POSITION_MAX_M: f64 = 4096.0;
 /// Servo cycles that a plan accepts.
-const CYCLE_S: (f64, f64) = (1e-5, 1.0);
+pub(super) const CYCLE_S: (f64, f64) = (1e-5, 1.0);
 /// Longest rest before or after the motion.
 const DWELL_MAX_S: f64 = 3600.0;
 
@@ -125,7 +125,7 @@ pub(super) fn check_time(
 }
 
 /// A point in the array of the tick; unused axes are 0.
-fn point(coordinates_m: &[f64]) -> Result<[f64; MAX_AXES], TrajectoryError> {
+pub(super) fn point(coordinates_m: &[f64]) -> Result<[f64; MAX_AXES], TrajectoryError> {
     let mut point_m = [0.0; MAX_AXES];
     for (axis, (to, &position_m)) in point_m.iter_mut().zip(coordinates_m).enumerate() {
         if !(-POSITION_MAX_M..=POSITION_MAX_M).contains(&position_m) {

@@ -283,3 +283,22 @@ fn bad_values_are_refused_one_at_a_time() {
     assert!(Interpolator::plan(&good, &gantry(), f64::NAN).is_err());
     assert!(Interpolator::plan(&good, &gantry(), 0.0).is_err());
 }
+
+#[test]
+fn a_hold_rests_and_says_when_it_is_over() {
+    let mut hold = Interpolator::hold(&[0.3, -0.1], 4, 1e-3).unwrap();
+    assert_eq!((hold.n_samples(), hold.n_axes()), (4, 2));
+    for k in 0..6 {
+        let setpoint = hold.next();
+        assert_eq!(setpoint.position_m[..2], [0.3, -0.1]);
+        assert_eq!(setpoint.velocity_m_s, [0.0; MAX_AXES]);
+        assert_eq!(setpoint.done, k >= 3);
+    }
+    hold.restart();
+    assert!(!hold.next().done);
+    assert_eq!(hold.reference(), [0.3, -0.1].repeat(4));
+    assert!(Interpolator::hold(&[], 4, 1e-3).is_err());
+    assert!(Interpolator::hold(&[f64::NAN], 4, 1e-3).is_err());
+    assert!(Interpolator::hold(&[0.0], 0, 1e-3).is_err());
+    assert!(Interpolator::hold(&[0.0], 4, 0.0).is_err());
+}
