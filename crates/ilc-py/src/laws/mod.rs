@@ -1,7 +1,11 @@
 //! Learning laws for Python, one a file; what they share is here.
 
+mod flexible;
 mod norm_optimal;
 mod pd;
+mod recalled;
+mod relevance;
+mod relevance_weights;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -24,5 +28,8 @@ fn held<T>(law: &Mutex<T>) -> MutexGuard<'_, T> {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<pd::PyPdIlc>()?;
-    module.add_class::<norm_optimal::PyNormOptimalIlc>()
+    module.add_class::<norm_optimal::PyNormOptimalIlc>()?;
+    module.add_class::<relevance_weights::PyRelevanceWeights>()?;
+    module.add_class::<relevance::PyRelevanceIlc>()?;
+    module.add_class::<flexible::PyFlexibleIlc>()
 }

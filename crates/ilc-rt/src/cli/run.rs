@@ -12,7 +12,7 @@ use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show};
 use crate::config::{Cell, Measure};
 use crate::fieldbus::transport;
 use crate::record::{EndStatus, Event};
-use crate::supervisor::{self, Options, Outcome, SupervisorError};
+use crate::supervisor::{self, Disturbance, Options, Outcome, SupervisorError};
 
 #[derive(Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
@@ -101,6 +101,7 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
         lockstep: arguments.lockstep,
         resume: arguments.resume,
         library: arguments.library.clone(),
+        disturbance: Disturbance::default(),
         telemetry: !arguments.no_telemetry,
         stop: stop_on_signals(),
     };

@@ -3,7 +3,10 @@
 //! The supervisor appends the moment a run ends; Python and `--resume` read. Writers and readers of
 //! several processes may share a file (write-ahead log); a killed process loses nothing it appended.
 
+mod recall;
 mod schema;
 mod store;
+mod trim;
 
+pub use recall::{Near, Task};
 pub use store::{Library, LibraryError, Row};

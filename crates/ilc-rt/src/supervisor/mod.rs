@@ -7,6 +7,7 @@
 mod announce;
 mod campaign;
 mod collect;
+mod disturbance;
 mod error;
 mod learner;
 mod nodes;
@@ -17,5 +18,6 @@ mod reason;
 mod telemetry;
 
 pub use campaign::{Options, Outcome, run};
+pub use disturbance::Disturbance;
 pub use error::SupervisorError;
 pub use plan::Plan;

@@ -17,6 +17,7 @@ use index::{Index, index};
 use weights::normalise;
 
 pub use weights::RelevanceWeights;
+pub(crate) use weights::shares;
 
 /// Size of the runs that a [`Relevance`] law learns from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +64,8 @@ pub struct Relevance {
     weights: RelevanceWeights,
     top: Option<usize>,
     told: Expectation,
+    /// Whether runs that were remembered may come again as runs that have just been made.
+    is_replayed: bool,
     proposals: Inputs,
     disturbances: Vec<f64>,
     index: Box<dyn Index>,
@@ -112,6 +115,7 @@ impl Relevance {
             weights,
             top,
             told: Expectation::new(n_disturbances),
+            is_replayed: false,
             proposals: Inputs::new(length),
             disturbances: Vec::new(),
             index,
@@ -148,6 +152,9 @@ impl Relevance {
 
     /// Remembers a run that was made elsewhere or earlier.
     ///
+    /// When a campaign is taken up again, its runs pass through the law once more: updates from runs
+    /// that are remembered already, bit by bit, add nothing until the first one that is new.
+    ///
     /// # Errors
     /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Disturbance`], or
     ///   what the core law says.
@@ -160,6 +167,7 @@ impl Relevance {
         check_disturbance(disturbance, self.shape.n_disturbances)?;
         self.propose(input, error)?;
         self.keep(error, disturbance);
+        self.is_replayed = true;
         Ok(())
     }
 
@@ -240,6 +248,15 @@ impl Relevance {
         self.index.push(&self.weights, sum, disturbance);
     }
 
+    /// Returns whether the proposal is remembered already under this disturbance.
+    fn knows(&self, disturbance: &[f64]) -> bool {
+        let width = disturbance.len();
+        (0..self.len()).any(|run| {
+            self.disturbances[run * width..][..width] == *disturbance
+                && self.proposals.row(run) == self.proposal
+        })
+    }
+
     /// Writes the weighted mean of what counts under a disturbance.
     fn weigh(&mut self, disturbance: &[f64], next: &mut [f64]) {
         let epsilon = self.weights.epsilon;
@@ -282,7 +299,10 @@ impl Law for Relevance {
         let finished = finished.map(<[f64]>::to_vec);
         let coming = coming.to_vec();
         if let Some(finished) = finished {
-            self.keep(error, &finished);
+            self.is_replayed = self.is_replayed && self.knows(&finished);
+            if !self.is_replayed {
+                self.keep(error, &finished);
+            }
         }
         if self.is_empty() {
             next.copy_from_slice(&self.proposal);
@@ -300,6 +320,7 @@ impl Law for Relevance {
     fn reset(&mut self) {
         self.core.reset();
         self.told.forget();
+        self.is_replayed = false;
         self.proposals.clear();
         self.disturbances.clear();
         self.index.retain(&[]);

@@ -203,6 +203,23 @@ fn channels_count_together_and_do_not_mix() {
 }
 
 #[test]
+fn runs_that_pass_through_again_are_counted_once() {
+    let mut law =
+        Relevance::new(pd(1.0, 0.0, 2, 1), shape(2, 1, 1), RelevanceWeights::default(), None)
+            .unwrap();
+    let mut next = [0.0; 2];
+    for (u, d) in [(1.0, 20.0), (2.0, 30.0)] {
+        law.remember(&[u; 2], &[0.1; 2], &[d]).unwrap();
+    }
+    law.expect(&[20.0]);
+    for (u, coming, kept) in [(1.0, 30.0, 2), (2.0, 40.0, 2), (3.0, 20.0, 3), (1.0, 20.0, 4)] {
+        law.expect(&[coming]);
+        law.update(&[u; 2], &[0.1; 2], &mut next).unwrap();
+        assert_eq!(law.len(), kept);
+    }
+}
+
+#[test]
 fn wrong_use_is_refused_one_thing_at_a_time() {
     let make =
         |shape, top| Relevance::new(pd(1.0, 1.0, 4, 1), shape, RelevanceWeights::default(), top);
