@@ -17,8 +17,9 @@ use crate::error::OrRaise;
 ///     Weight of the error.
 /// er : float
 ///     Weight of the error's rate.
-/// d : float or array_like of float64, shape (n_disturbances,)
-///     Weight of the distance in disturbance; one number holds for each of them.
+/// d : float, array_like of float64, shape (n_disturbances,), or None
+///     Weight of the distance in disturbance; one number holds for each of them,
+///     None is 0.5.
 /// epsilon : float
 ///     Added to every sum: below it runs count as equally good. Choose the
 ///     weights in proportion to it.

@@ -4,9 +4,11 @@
 //! several processes may share a file (write-ahead log); a killed process loses nothing it appended.
 
 mod recall;
+mod row;
 mod schema;
 mod store;
 mod trim;
 
 pub use recall::{Near, Task};
-pub use store::{Library, LibraryError, Row};
+pub use row::Row;
+pub use store::{Library, LibraryError};

@@ -2,7 +2,8 @@
 
 use rusqlite::params;
 
-use super::store::{Library, LibraryError, Row, as_integer, numbers};
+use super::row::{Row, as_integer, numbers};
+use super::store::{Library, LibraryError};
 
 /// Which runs belong to the same task; without a name, all that a library holds.
 #[derive(Clone, Debug, Default, PartialEq)]

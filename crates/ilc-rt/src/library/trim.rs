@@ -5,7 +5,8 @@ use std::collections::HashSet;
 use rusqlite::params;
 
 use super::recall::Task;
-use super::store::{Library, LibraryError, numbers};
+use super::row::numbers;
+use super::store::{Library, LibraryError};
 use crate::learning::law::relevance::shares;
 
 /// Runs as far as trimming looks at them.
