@@ -1,4 +1,6 @@
 from collections.abc import Iterator, Sequence
+import builtins
+from collections.abc import Callable, Iterator
 from os import PathLike
 from typing import Any, Literal, Protocol, TypeAlias, final
 
@@ -23,6 +25,7 @@ __all__ = [
     "GaussianFilter",
     "Ladder",
     "FrequencyResponse",
+    "FlexibleIlc",
     "LearningError",
     "Library",
     "Line",
@@ -31,6 +34,8 @@ __all__ = [
     "NormOptimalIlc",
     "PdIlc",
     "Pid",
+    "RelevanceIlc",
+    "RelevanceWeights",
     "SignalError",
     "StateSpace",
     "TimeVarying",
@@ -425,6 +430,88 @@ class AdjointIlc:
     ) -> NDArray[np.float64]: ...
     def reset(self) -> None: ...
 
+class _Law(Protocol):
+    """Anything that learns."""
+
+    def update(
+        self, u: NDArray[np.float64], e: NDArray[np.float64], disturbance: Any = None
+    ) -> NDArray[np.float64]: ...
+
+@final
+class RelevanceWeights:
+    def __new__(
+        cls,
+        e: float = 10.0,
+        er: float = 2.0,
+        d: ArrayLike | None = None,
+        epsilon: float = 1.0,
+        rate_filter_s: float = 0.1,
+        error_gain: float = 1.0,
+        input_gain: float = 1.0,
+    ) -> RelevanceWeights: ...
+    @property
+    def e(self) -> float: ...
+    @property
+    def er(self) -> float: ...
+    @property
+    def d(self) -> NDArray[np.float64]: ...
+    @property
+    def epsilon(self) -> float: ...
+    @property
+    def rate_filter_s(self) -> float: ...
+    @property
+    def error_gain(self) -> float: ...
+    @property
+    def input_gain(self) -> float: ...
+
+@final
+class RelevanceIlc:
+    def __new__(
+        cls,
+        library: Library | None,
+        core: _Law,
+        weights: RelevanceWeights | tuple[float, float, ArrayLike],
+        top: int | None = None,
+        *,
+        dt_s: float | None = None,
+        cell: str | None = None,
+    ) -> RelevanceIlc: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
+    ) -> NDArray[np.float64]: ...
+    def expect(self, disturbance: ArrayLike) -> None: ...
+    def remember(
+        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
+    ) -> None: ...
+    def relevant(
+        self, disturbance: ArrayLike | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
+    def trim(
+        self, keep: int, disturbances: ArrayLike | None = None
+    ) -> NDArray[np.int64]: ...
+    def reset(self) -> None: ...
+    def __len__(self) -> int: ...
+
+@final
+class FlexibleIlc:
+    def __new__(
+        cls,
+        library: Library | None,
+        core: _Law,
+        tolerance: float = 0.0,
+        *,
+        cell: str | None = None,
+    ) -> FlexibleIlc: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
+    ) -> NDArray[np.float64]: ...
+    def expect(self, disturbance: ArrayLike) -> None: ...
+    def remember(
+        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
+    ) -> None: ...
+    def reset(self) -> None: ...
+    def __len__(self) -> int: ...
+
 @final
 class ModelInverseIlc:
     def __new__(
@@ -754,6 +841,23 @@ class Library:
     def __new__(cls, path: str | PathLike[str]) -> Library: ...
     def list(self, cell: str | None = None) -> list[dict[str, Any]]: ...
     def load(self, id: int) -> dict[str, Any]: ...
+    def recall(
+        self, disturbance: ArrayLike, top: int = 30, cell: str | None = None
+    ) -> builtins.list[dict[str, Any]]: ...
+    def append(
+        self,
+        u: ArrayLike,
+        e: ArrayLike,
+        cycle_s: float,
+        disturbance: ArrayLike | None = None,
+        reference_m: ArrayLike | None = None,
+        *,
+        cell: str = "elsewhere",
+        campaign: str = "elsewhere",
+        law: str = "elsewhere",
+    ) -> int: ...
+    def trim(self, keep: int, cell: str | None = None) -> int: ...
+    def export(self, id: int, path: str | PathLike[str]) -> None: ...
 
 @final
 class EventStream:
@@ -772,4 +876,5 @@ def run_events(
     law: object | None = None,
     learning: bool = True,
     experiment: object | None = None,
+    disturbance: Callable[[int], ArrayLike] | None = None,
 ) -> EventStream: ...

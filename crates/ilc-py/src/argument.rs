@@ -101,6 +101,15 @@ pub(crate) fn read_vector(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec
     if shape.len() == 1 { Ok(values) } else { Err(misfit(name, &shape, "one axis, (n,)")) }
 }
 
+/// Reads a disturbance: a single number or a list of them.
+pub(crate) fn read_disturbance(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let (values, shape) = read(name, object)?;
+    if shape.len() <= 1 && !values.is_empty() {
+        return Ok(values);
+    }
+    Err(misfit(name, &shape, "a number or (n_disturbances,)"))
+}
+
 /// Returns a time-first signal to Python, without channel axis if `is_flat`.
 pub(crate) fn give_signal(
     py: Python<'_>,

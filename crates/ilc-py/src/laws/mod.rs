@@ -3,12 +3,16 @@
 mod adjoint;
 mod any_size;
 mod error_feedforward;
+mod flexible;
 mod gate;
 mod inner;
 mod ladder;
 mod model_inverse;
 mod norm_optimal;
 mod pd;
+mod recalled;
+mod relevance;
+mod relevance_weights;
 mod repeatability;
 mod solver;
 pub(crate) mod weight;
@@ -49,5 +53,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ladder::PyLadder>()?;
     module.add_class::<repeatability::PyRepeatability>()?;
     module.add_function(wrap_pyfunction!(repeatability::repeatability, module)?)?;
-    module.add_class::<norm_optimal::PyNormOptimalIlc>()
+    module.add_class::<norm_optimal::PyNormOptimalIlc>()?;
+    module.add_class::<relevance_weights::PyRelevanceWeights>()?;
+    module.add_class::<relevance::PyRelevanceIlc>()?;
+    module.add_class::<flexible::PyFlexibleIlc>()
 }

@@ -34,6 +34,14 @@ pub enum LearningError {
         /// The offending value.
         value: f64,
     },
+    /// A disturbance with the wrong number of values, or none where one is needed.
+    #[error("the disturbance of a run holds {found} numbers; {expected} needed")]
+    Disturbance {
+        /// Numbers given; 0 if it was never announced.
+        found: usize,
+        /// Numbers that describe a disturbance.
+        expected: usize,
+    },
     /// A law that somebody else wrote refused, or gave something that is no input.
     #[error("the law {law} failed: {reason}")]
     User {

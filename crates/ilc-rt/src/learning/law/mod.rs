@@ -9,3 +9,7 @@ pub mod norm_optimal;
 pub mod pd;
 pub mod q_filter;
 pub mod through_jacobian;
+mod expectation;
+pub mod flexible;
+mod inputs;
+pub mod relevance;
