@@ -12,6 +12,7 @@ mod learner;
 mod nodes;
 mod pace;
 mod plan;
+mod program;
 mod progress;
 mod reason;
 mod telemetry;

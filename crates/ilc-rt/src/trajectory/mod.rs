@@ -20,6 +20,7 @@ mod motion;
 mod path;
 mod point_to_point;
 mod profile;
+pub mod program;
 mod proof;
 #[cfg(test)]
 mod promises;

@@ -23,8 +23,8 @@ const JERK_SHARE: f64 = 0.4;
 const SOUGHT: f64 = 1.0 - 2e-3;
 const KEPT: f64 = 1.0 - 5e-4;
 /// Attempts that slow down only where a limit is broken, and attempts in all.
-const LOCAL_ROUNDS: usize = 8;
-const ROUNDS: usize = 24;
+const LOCAL_ROUNDS: usize = 16;
+const ROUNDS: usize = 40;
 
 /// What a run along a curve may do.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,13 +97,15 @@ impl Run {
         let lowest = |of: fn(&AxisLimits) -> f64| {
             limits.axes.iter().map(of).fold(f64::INFINITY, f64::min)
         };
-        let mut acceleration = SHARE * lowest(|axis| axis.acceleration_max_m_s2);
         let jerk = JERK_SHARE * lowest(|axis| axis.jerk_max_m_s3);
+        // Not more than what the jerk lets a change of speed by the feed make use of.
+        let mut acceleration = (SHARE * lowest(|axis| axis.acceleration_max_m_s2))
+            .min((jerk * limits.feed_m_s).sqrt());
         let mut window = ticks_at_least(2.0 * acceleration / (jerk * dt_s));
         let frames: Vec<Frame> = (0..n_places).map(|i| frame(i as f64 * step_m)).collect();
         let mut speed: Vec<f64> = Vec::with_capacity(n_places);
         for (i, here) in frames.iter().enumerate() {
-            let allowed = speed_limit(here, limits, acceleration);
+            let allowed = speed_limit(here, limits);
             if !is_positive(allowed) {
                 return Err(TrajectoryError::Cusp { at_m: i as f64 * step_m });
             }
@@ -111,10 +113,16 @@ impl Run {
         }
         let mut worst = None;
         for round in 0..ROUNDS {
+            // Speeding up in a bend takes the jerk 3 K v a.
+            let accelerations: Vec<f64> = frames
+                .iter()
+                .zip(&speed)
+                .map(|(frame, v)| acceleration.min(jerk / (3.0 * norm(&frame.bend) * v)))
+                .collect();
             let law = TimeLaw {
                 length_m,
                 speed_m_s: &speed,
-                acceleration_m_s2: acceleration,
+                acceleration_m_s2: &accelerations,
                 window,
                 dt_s,
             };
@@ -182,7 +190,7 @@ fn ticks_at_least(ticks: f64) -> usize {
 }
 
 /// The speed that one place allows.
-fn speed_limit(here: &Frame, limits: &RunLimits, acceleration: f64) -> f64 {
+fn speed_limit(here: &Frame, limits: &RunLimits) -> f64 {
     let mut speed = limits.feed_m_s;
     let mut lower = |bound: f64| {
         // Not `f64::min`, which would lose what is not a number, and with it the refusal.
@@ -198,7 +206,6 @@ fn speed_limit(here: &Frame, limits: &RunLimits, acceleration: f64) -> f64 {
         let jerk = JERK_SHARE * limit.jerk_max_m_s3;
         lower(limit.velocity_max_m_s / here.tangent[axis].abs());
         lower((SHARE * limit.acceleration_max_m_s2 / here.bend[axis].abs()).sqrt());
-        lower(jerk / (3.0 * here.bend[axis].abs() * acceleration));
         lower((jerk / here.twist[axis].abs()).cbrt());
     }
     speed

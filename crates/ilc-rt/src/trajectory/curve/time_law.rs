@@ -17,7 +17,8 @@ pub(super) struct Tick {
 pub(super) struct TimeLaw<'a> {
     pub(super) length_m: f64,
     pub(super) speed_m_s: &'a [f64],
-    pub(super) acceleration_m_s2: f64,
+    /// Acceleration limits at the same places.
+    pub(super) acceleration_m_s2: &'a [f64],
     /// Ticks of each of the two averages.
     pub(super) window: usize,
     pub(super) dt_s: f64,
@@ -41,13 +42,17 @@ impl TimeLaw<'_> {
         )]
         let reach = ((reach_m / self.step_m()).ceil().min(n as f64)) as usize;
         let mut speed = sliding_minimum(self.speed_m_s, reach);
-        let gain = 2.0 * self.acceleration_m_s2 * self.step_m();
+        let step_m = self.step_m();
+        let gain = |i: usize| {
+            let [a, b] = [i, i + 1].map(|at| self.acceleration_m_s2[at]);
+            2.0 * a.min(b) * step_m
+        };
         (speed[0], speed[n - 1]) = (0.0, 0.0);
         for i in 1..n {
-            speed[i] = speed[i].min((speed[i - 1].powi(2) + gain).sqrt());
+            speed[i] = speed[i].min((speed[i - 1].powi(2) + gain(i - 1)).sqrt());
         }
         for i in (0..n - 1).rev() {
-            speed[i] = speed[i].min((speed[i + 1].powi(2) + gain).sqrt());
+            speed[i] = speed[i].min((speed[i + 1].powi(2) + gain(i)).sqrt());
         }
         speed
     }
@@ -164,7 +169,7 @@ mod tests {
         let law = TimeLaw {
             length_m: 0.2,
             speed_m_s: &speed,
-            acceleration_m_s2: 0.5,
+            acceleration_m_s2: &[0.5; 500],
             window: 12,
             dt_s: 0.002,
         };

@@ -34,7 +34,7 @@ fn oscillation(plan: &Linear) -> (f64, f64) {
 
 #[test]
 fn completing_every_move_loses_frequency_and_starting_on_time_loses_amplitude() {
-    let program = six_point(8.0);
+    let program = six_point(10.0);
     let plan = |setting| Linear::plan(&[0.0], &program, &LIMITS, setting).unwrap();
     let complete = plan(LinearSetting::CompleteEveryMove);
     let on_time = plan(LinearSetting::StartOnTime);

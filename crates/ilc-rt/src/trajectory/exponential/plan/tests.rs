@@ -165,3 +165,29 @@ fn what_cannot_be_is_refused_with_the_limit() {
         assert!(plan(feed, amplitude, 0.1).is_err());
     }
 }
+
+#[test]
+fn the_end_of_an_oscillating_leg_holds_the_jerk() {
+    let two = [limits(0.4, 5.43, 16.391_266_494_879_485), limits(1.3, 5.54, 6.865_902_474_544_553)];
+    let program = [
+        segment(&[-0.102_785_110_738_629_05, 0.056_477_312_171_151_05], 0.019_286_6, 0.0, 1.0),
+        segment(
+            &[-0.037_880_758_822_929_11, -0.021_175_691_528_672_713],
+            0.015_906_310_843_956_318,
+            4.021_501_283_935_204_6e-5,
+            1.305_710_164_878_690_8,
+        ),
+    ];
+    let plan = ExponentialSigmoid::plan(&[0.0, 0.0], &program, &two).unwrap();
+    let leg = plan.legs[1];
+    for which in [0, 1] {
+        let most = (0..100_000).fold([0.0, 0.0], |most: [f64; 2], k| {
+            let tau = 0.5 * leg.leg.duration_s * f64::from(k) / 1e5;
+            let near = leg.leg.near(which, tau).0[3].abs();
+            if near > most[0] { [near, tau] } else { most }
+        });
+        println!("{which} {most:?} {:?} {:?}", leg.line.direction, leg.leg);
+    }
+    let found = peaks(&plan, 1, 400_000)[2];
+    assert!(found <= two[1].jerk_max_m_s3 * (1.0 + 1e-9), "{found}");
+}
