@@ -1,6 +1,6 @@
 """The motion controller that learns: iterative learning control on the machine."""
 
-from ilc_rt import signal
+from ilc_rt import signal, trajectory
 from ilc_rt._native import (
     Cell,
     LearningError,
@@ -10,6 +10,7 @@ from ilc_rt._native import (
     PdIlc,
     SignalError,
     StateSpace,
+    TrajectoryError,
     discretize,
     from_transfer_function,
     second_order,
@@ -34,8 +35,10 @@ __all__ = [
     "PdIlc",
     "SignalError",
     "StateSpace",
+    "TrajectoryError",
     "discretize",
     "from_transfer_function",
     "second_order",
     "signal",
+    "trajectory",
 ]

@@ -16,11 +16,22 @@ __all__ = [
     "PdIlc",
     "SignalError",
     "StateSpace",
+    "Trajectory",
+    "TrajectoryError",
+    "butterfly",
     "butterworth",
     "discretize",
+    "exponential_sigmoid",
     "from_transfer_function",
+    "gcode",
+    "jerk_limited",
+    "modulated",
+    "raster",
     "run_events",
     "second_order",
+    "spiral",
+    "spline",
+    "tracking_index",
     "zero_phase",
 ]
 
@@ -109,6 +120,128 @@ def butterworth(
     order: int, cutoff_hz: float, dt_s: float, causal: bool = False
 ) -> ButterworthFilter: ...
 def zero_phase(filter: ButterworthFilter, x: ArrayLike) -> NDArray[np.float64]: ...
+
+class TrajectoryError(ValueError): ...
+
+@final
+class Trajectory:
+    @property
+    def dt_s(self) -> float: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def n_axes(self) -> int: ...
+    @property
+    def computing_s(self) -> float: ...
+    @property
+    def t_s(self) -> NDArray[np.float64]: ...
+    @property
+    def position_m(self) -> NDArray[np.float64]: ...
+    @property
+    def velocity_m_s(self) -> NDArray[np.float64]: ...
+    @property
+    def acceleration_m_s2(self) -> NDArray[np.float64]: ...
+    @property
+    def programmed_m(self) -> NDArray[np.float64]: ...
+    @property
+    def alphas(self) -> list[tuple[int, str, float, list[tuple[float, float]]]]: ...
+
+def jerk_limited(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float | ArrayLike,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    setting: str = "complete",
+) -> Trajectory: ...
+def exponential_sigmoid(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float | ArrayLike,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    amplitude_m: float | ArrayLike | None = None,
+    frequency_hz: float | ArrayLike | None = None,
+) -> Trajectory: ...
+def modulated(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float,
+    amplitude_m: float,
+    frequency_hz: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    interpolation: str = "exponential_sigmoid",
+) -> Trajectory: ...
+def spline(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    curvature_acceleration_max_m_s2: float = ...,
+) -> Trajectory: ...
+def butterfly(
+    *,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    feed_m_s: float = 0.004,
+    curvature_acceleration_max_m_s2: float = 0.02,
+    scale_m: float = 0.00185,
+    turns: float = 1.0,
+    center_m: tuple[float, float] = (0.0, 0.0),
+) -> Trajectory: ...
+def spiral(
+    *,
+    pitch_m: float,
+    turns: float,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    curvature_acceleration_max_m_s2: float = ...,
+    center_m: tuple[float, float] = (0.0, 0.0),
+) -> Trajectory: ...
+def raster(
+    *,
+    width_m: float,
+    pitch_m: float,
+    rows: int,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    start_m: tuple[float, float] = (0.0, 0.0),
+    there_and_back: bool = False,
+    setting: str = "complete",
+) -> Trajectory: ...
+def gcode(
+    text: str,
+    *,
+    start_m: ArrayLike,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    rapid_m_s: float | None = None,
+    blend_s: float | None = None,
+) -> Trajectory: ...
+def tracking_index(
+    trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0
+) -> tuple[float, float]: ...
 
 @final
 class PdIlc:

@@ -13,9 +13,17 @@ create_exception!(
     "A learning law, or what it was given, that cannot be used."
 );
 
+create_exception!(
+    ilc_rt,
+    TrajectoryError,
+    PyValueError,
+    "A motion that cannot be planned as asked."
+);
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     module.add("ModelError", py.get_type::<ModelError>())?;
     module.add("SignalError", py.get_type::<SignalError>())?;
+    module.add("TrajectoryError", py.get_type::<TrajectoryError>())?;
     module.add("LearningError", py.get_type::<LearningError>())
 }

@@ -17,6 +17,7 @@ mod model;
 mod model_argument;
 mod python_law;
 mod signal;
+mod trajectory;
 
 use pyo3::prelude::*;
 
@@ -26,6 +27,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
     signal::register(module)?;
+    trajectory::register(module)?;
     laws::register(module)?;
     cell::register(module)?;
     library::register(module)?;

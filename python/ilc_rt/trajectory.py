@@ -1,0 +1,27 @@
+"""Trajectories that hold the limits of every axis: moves, modulated paths, curves, part programs."""
+
+from ilc_rt._native import (
+    Trajectory,
+    butterfly,
+    exponential_sigmoid,
+    gcode,
+    jerk_limited,
+    modulated,
+    raster,
+    spiral,
+    spline,
+    tracking_index,
+)
+
+__all__ = [
+    "Trajectory",
+    "butterfly",
+    "exponential_sigmoid",
+    "gcode",
+    "jerk_limited",
+    "modulated",
+    "raster",
+    "spiral",
+    "spline",
+    "tracking_index",
+]
