@@ -23,7 +23,7 @@ impl Butterfly {
     /// # Errors
     /// [`TrajectoryError::Shape`] for a scale or turns that are out of range.
     /// # Source
-    /// - filter-based open-loop ILC paper: the contour of its experiments, `scale = 1.85 mm`
+    /// - [filter-ilc]: the contour of its experiments, `scale = 1.85 mm`
     pub fn new(scale_m: f64, turns: f64, center_m: [f64; 2]) -> Result<Self, TrajectoryError> {
         if !is_positive(scale_m) || scale_m > 10.0 {
             return Err(TrajectoryError::Shape {

@@ -65,7 +65,7 @@ impl Run {
     /// [`TrajectoryError`] for values out of range, a curve that stands still, or limits that no
     /// speed holds.
     /// # Source
-    /// - filter-based open-loop ILC paper, Section 3: curvature-limited speed
+    /// - [filter-ilc]: curvature-limited speed
     pub fn plan(
         curve: &impl Curve,
         limits: &RunLimits,
