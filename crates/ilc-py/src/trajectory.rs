@@ -548,11 +548,8 @@ fn spline(
     let points = read_points("points_m", points_m)?;
     let axes =
         read_limits(points[0].len(), velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
-    let limits = RunLimits {
-        feed_m_s,
-        curvature_acceleration_m_s2: curvature_acceleration_max_m_s2,
-        axes,
-    };
+    let limits =
+        RunLimits { feed_m_s, curvature_acceleration_m_s2: curvature_acceleration_max_m_s2, axes };
     planned(py, || sample_run(&Spline::through(&points)?, &limits, dt_s))
 }
 
@@ -616,11 +613,8 @@ fn butterfly(
     center_m: (f64, f64),
 ) -> PyResult<PyTrajectory> {
     let axes = read_limits(2, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
-    let limits = RunLimits {
-        feed_m_s,
-        curvature_acceleration_m_s2: curvature_acceleration_max_m_s2,
-        axes,
-    };
+    let limits =
+        RunLimits { feed_m_s, curvature_acceleration_m_s2: curvature_acceleration_max_m_s2, axes };
     let center = finite_pair("center_m", center_m)?;
     planned(py, || sample_run(&Butterfly::new(scale_m, turns, center)?, &limits, dt_s))
 }
@@ -696,11 +690,8 @@ fn spiral(
     center_m: (f64, f64),
 ) -> PyResult<PyTrajectory> {
     let axes = read_limits(2, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
-    let limits = RunLimits {
-        feed_m_s,
-        curvature_acceleration_m_s2: curvature_acceleration_max_m_s2,
-        axes,
-    };
+    let limits =
+        RunLimits { feed_m_s, curvature_acceleration_m_s2: curvature_acceleration_max_m_s2, axes };
     let center = finite_pair("center_m", center_m)?;
     planned(py, || sample_run(&Spiral::new(pitch_m, turns, center)?, &limits, dt_s))
 }
@@ -849,8 +840,7 @@ fn gcode(
     let spec = PathSpec {
         start_m: start,
         segments: program.segments,
-        corner: blend_s
-            .map_or(CornerRule::ExactStop, |window_s| CornerRule::Blend { window_s }),
+        corner: blend_s.map_or(CornerRule::ExactStop, |window_s| CornerRule::Blend { window_s }),
         dwell_before_s: program.dwell_before_s,
         dwell_after_s: 0.0,
     };

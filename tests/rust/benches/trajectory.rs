@@ -13,12 +13,7 @@ const LIMITS: AxisLimits =
     AxisLimits { velocity_max_m_s: 0.5, acceleration_max_m_s2: 10.0, jerk_max_m_s3: 800.0 };
 
 fn leg() -> ModulatedSegment {
-    ModulatedSegment {
-        to_m: vec![0.1],
-        feed_m_s: 0.02,
-        amplitude_m: 0.001,
-        frequency_hz: 5.0,
-    }
+    ModulatedSegment { to_m: vec![0.1], feed_m_s: 0.02, amplitude_m: 0.001, frequency_hz: 5.0 }
 }
 
 fn moves(criterion: &mut Criterion) {
@@ -43,11 +38,8 @@ fn moves(criterion: &mut Criterion) {
 }
 
 fn curves(criterion: &mut Criterion) {
-    let limits = RunLimits {
-        feed_m_s: 0.004,
-        curvature_acceleration_m_s2: 0.02,
-        axes: vec![LIMITS; 2],
-    };
+    let limits =
+        RunLimits { feed_m_s: 0.004, curvature_acceleration_m_s2: 0.02, axes: vec![LIMITS; 2] };
     let mut group = criterion.benchmark_group("curve");
     group.sample_size(10);
     group.bench_function("butterfly: plan", |bench| {

@@ -30,10 +30,7 @@ fn a_part_program_goes_where_it_says() {
     let cell = example("04_gcode.toml");
     let plan = Plan::new(&cell, None, true).unwrap();
     let nearest = |x: f64, y: f64| {
-        plan.reference_m
-            .chunks(2)
-            .map(|p| (p[0] - x).hypot(p[1] - y))
-            .fold(f64::INFINITY, f64::min)
+        plan.reference_m.chunks(2).map(|p| (p[0] - x).hypot(p[1] - y)).fold(f64::INFINITY, f64::min)
     };
     // The middle of the corner arcs and of the notch, to what the blend rounds off.
     let along = 0.02 * std::f64::consts::FRAC_1_SQRT_2;
@@ -87,10 +84,7 @@ fn refusals_name_file_place_and_what_is_allowed() {
             "kind = \"butterfly\"\n[program.butterfly]\nscale_m = 0.02",
             vec!["[program]", "axis", "it reaches"],
         ),
-        (
-            "kind = \"gcode\"\nfile = \"not-there.ngc\"",
-            vec!["not-there.ngc", "cannot be read"],
-        ),
+        ("kind = \"gcode\"\nfile = \"not-there.ngc\"", vec!["not-there.ngc", "cannot be read"]),
     ] {
         let line = cell_with(&format!("{common}{program}")).err().unwrap_or_default();
         for part in parts {

@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use super::path::{
-    ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection,
-};
+use super::path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
 
 /// `[program]`: where the tool goes.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

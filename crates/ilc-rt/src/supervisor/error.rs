@@ -81,7 +81,9 @@ pub enum SupervisorError {
         source: GcodeError,
     },
     /// The path leaves the range of an axis.
-    #[error("{file}: [program]: axis {axis} goes to {reached_m} m: it reaches {low_m} to {high_m} m")]
+    #[error(
+        "{file}: [program]: axis {axis} goes to {reached_m} m: it reaches {low_m} to {high_m} m"
+    )]
     Range {
         /// Cell description.
         file: String,

@@ -61,7 +61,8 @@ pub(super) fn interpolator(
         PathKind::Butterfly => {
             let shape = program.butterfly.unwrap_or_default();
             // The centre that puts its first point at the start.
-            let first = Butterfly::new(shape.scale_m, shape.turns, [0.0; 2]).map_err(refused)?.at(0.0)[0];
+            let first =
+                Butterfly::new(shape.scale_m, shape.turns, [0.0; 2]).map_err(refused)?.at(0.0)[0];
             let center = [start()[0] - first[0], start()[1] - first[1]];
             let curve = Butterfly::new(shape.scale_m, shape.turns, center).map_err(refused)?;
             along(cell, limits, &curve).and_then(|motion| play(&motion).map_err(refused))

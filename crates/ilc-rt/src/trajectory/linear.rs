@@ -78,9 +78,9 @@ impl Linear {
         for (line, segment) in lines.iter().zip(segments) {
             let now = moves.last().map(|last: &Move| state(last, start_s));
             let resting = now.is_none_or(|axes| {
-                axes.iter().zip(line.from_m).all(|(axis, from_m)| {
-                    *axis == AxisState { p: from_m, ..AxisState::default() }
-                })
+                axes.iter()
+                    .zip(line.from_m)
+                    .all(|(axis, from_m)| *axis == AxisState { p: from_m, ..AxisState::default() })
             });
             let course = match now {
                 Some(axes) if !resting => {
@@ -194,8 +194,7 @@ fn together(
         let cruise_m_s = feed_m_s.min(limits[axis].velocity_max_m_s);
         ToRest::plan(now[axis], line.to_m[axis], &limits[axis], cruise_m_s, duration_s)
     };
-    let slowest_s =
-        (0..MAX_AXES).map(|axis| plan(axis, 0.0).duration_s()).fold(0.0, f64::max);
+    let slowest_s = (0..MAX_AXES).map(|axis| plan(axis, 0.0).duration_s()).fold(0.0, f64::max);
     std::array::from_fn(|axis| plan(axis, slowest_s))
 }
 

@@ -21,9 +21,9 @@ mod path;
 mod point_to_point;
 mod profile;
 pub mod program;
-mod proof;
 #[cfg(test)]
 mod promises;
+mod proof;
 #[cfg(test)]
 mod random;
 mod raster;
@@ -35,8 +35,8 @@ mod tracking_index;
 
 pub use contour::contour_error_m;
 pub use error::{Quantity, TrajectoryError};
-pub use interpolator::Interpolator;
 pub use exponential::{ExponentialSigmoid, ModulatedSegment};
+pub use interpolator::Interpolator;
 pub use limits::{AxisLimits, PathLimits};
 pub use linear::{Linear, LinearSetting};
 pub use modulated::{POINTS_A_PERIOD, points_program};

@@ -5,8 +5,8 @@
 
 use super::error::TrajectoryError;
 use super::exponential::ModulatedSegment;
-use super::path::PathSegment;
 use super::limits::is_positive;
+use super::path::PathSegment;
 
 /// Points a period of the customary program.
 pub const POINTS_A_PERIOD: usize = 6;

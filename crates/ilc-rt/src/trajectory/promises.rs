@@ -24,7 +24,10 @@ fn assert_state(state: &MotionState, limits: &[AxisLimits], what: &dyn std::fmt:
             [state.velocity_m_s[axis], state.acceleration_m_s2[axis], state.jerk_m_s3[axis]];
         assert!(state.position_m[axis].is_finite(), "{what:?}");
         for ((quantity, most), value) in limit.named().into_iter().zip(values) {
-            assert!(value.abs() <= most * (1.0 + TOLERANCE), "{quantity} {value} > {most}: {what:?}");
+            assert!(
+                value.abs() <= most * (1.0 + TOLERANCE),
+                "{quantity} {value} > {most}: {what:?}"
+            );
         }
     }
 }
@@ -144,11 +147,11 @@ fn assert_run(curve: &impl Curve, limits: &RunLimits, dt_s: f64) {
     let motion = run.motion();
     let n = motion.n_axes;
     for (axis, limit) in limits.axes.iter().enumerate() {
-        let column = |values: &[f64]| -> Vec<f64> {
-            values.iter().skip(axis).step_by(n).copied().collect()
-        };
+        let column =
+            |values: &[f64]| -> Vec<f64> { values.iter().skip(axis).step_by(n).copied().collect() };
         let bounds = limit.named();
-        for (order, stated) in [&motion.velocity_m_s, &motion.acceleration_m_s2].iter().enumerate() {
+        for (order, stated) in [&motion.velocity_m_s, &motion.acceleration_m_s2].iter().enumerate()
+        {
             for value in column(stated) {
                 assert!(value.abs() <= bounds[order].1 * (1.0 + TOLERANCE));
             }
@@ -166,7 +169,12 @@ fn assert_run(curve: &impl Curve, limits: &RunLimits, dt_s: f64) {
         }
     }
     for (rest, values) in [(0, &motion.velocity_m_s), (0, &motion.acceleration_m_s2)] {
-        assert!(values[..n].iter().chain(&values[values.len() - n..]).all(|v| v.abs() <= f64::from(rest)));
+        assert!(
+            values[..n]
+                .iter()
+                .chain(&values[values.len() - n..])
+                .all(|v| v.abs() <= f64::from(rest))
+        );
     }
 }
 
@@ -176,7 +184,11 @@ fn random_curves() {
     for round in 0..30 {
         let limits = RunLimits {
             feed_m_s: random.log(0.03, 0.2),
-            curvature_acceleration_m_s2: if round % 2 == 0 { f64::INFINITY } else { random.log(0.05, 5.0) },
+            curvature_acceleration_m_s2: if round % 2 == 0 {
+                f64::INFINITY
+            } else {
+                random.log(0.05, 5.0)
+            },
             axes: vec![random_limits(&mut random), random_limits(&mut random)],
         };
         match round % 3 {
@@ -188,7 +200,8 @@ fn random_curves() {
                 assert_run(&Spline::through(&points).unwrap(), &limits, 0.002);
             }
             1 => {
-                let spiral = Spiral::new(random.log(1e-3, 1e-2), 1.0 + 4.0 * random.unit(), [0.0; 2]);
+                let spiral =
+                    Spiral::new(random.log(1e-3, 1e-2), 1.0 + 4.0 * random.unit(), [0.0; 2]);
                 assert_run(&spiral.unwrap(), &limits, 0.002);
             }
             _ => {
@@ -233,13 +246,14 @@ fn random_paths_of_lines_and_arcs_with_exact_stops() {
                 values = values.windows(2).map(|pair| (pair[1] - pair[0]) / dt_s).collect();
                 let rounding = 4e-16 / dt_s.powi(i32::try_from(order).unwrap() + 1);
                 let found = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-                assert!(found <= most * (1.0 + TOLERANCE) + rounding, "{quantity} {found} > {most} {spec:?}");
+                assert!(
+                    found <= most * (1.0 + TOLERANCE) + rounding,
+                    "{quantity} {found} > {most} {spec:?}"
+                );
             }
         }
-        let on_arc = reference
-            .chunks(2)
-            .take_while(|p| (p[0].hypot(p[1]) - radius).abs() < 1e-12)
-            .count();
+        let on_arc =
+            reference.chunks(2).take_while(|p| (p[0].hypot(p[1]) - radius).abs() < 1e-12).count();
         assert!(on_arc > 3, "the arc keeps its radius");
         let last = &reference[reference.len() - 2..];
         assert!(last.iter().all(|value| value.abs() <= 0.0));

@@ -39,9 +39,10 @@ impl TrackingIndex {
             }
         }
         let n = position_m.len();
-        for (name, found) in
-            [("samples of programmed_m", programmed_m.len()), ("samples of acceleration_m_s2", acceleration_m_s2.len())]
-        {
+        for (name, found) in [
+            ("samples of programmed_m", programmed_m.len()),
+            ("samples of acceleration_m_s2", acceleration_m_s2.len()),
+        ] {
             if found != n {
                 return Err(TrajectoryError::Shape {
                     name,

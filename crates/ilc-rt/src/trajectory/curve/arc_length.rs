@@ -83,7 +83,11 @@ impl ArcLength {
         let mut parameter = from + (to - from) * (s_m - from_m) / (to_m - from_m);
         for _ in 0..NEWTON_STEPS {
             let miss = from_m + length(curve, from, parameter) - s_m;
-            if miss > 0.0 { high = parameter } else { low = parameter }
+            if miss > 0.0 {
+                high = parameter
+            } else {
+                low = parameter
+            }
             let step = miss / norm(&curve.at(parameter)[1]);
             let next = parameter - step;
             let next = if next > low && next < high { next } else { 0.5 * (low + high) };

@@ -94,9 +94,8 @@ impl Run {
         let frame = |s_m: f64| Frame::new(curve.at(measured.parameter(curve, s_m)));
         let n_places = places(length_m, limits.feed_m_s, dt_s);
         let step_m = length_m / (n_places - 1) as f64;
-        let lowest = |of: fn(&AxisLimits) -> f64| {
-            limits.axes.iter().map(of).fold(f64::INFINITY, f64::min)
-        };
+        let lowest =
+            |of: fn(&AxisLimits) -> f64| limits.axes.iter().map(of).fold(f64::INFINITY, f64::min);
         let jerk = JERK_SHARE * lowest(|axis| axis.jerk_max_m_s3);
         // Not more than what the jerk lets a change of speed by the feed make use of.
         let mut acceleration = (SHARE * lowest(|axis| axis.acceleration_max_m_s2))
@@ -128,7 +127,8 @@ impl Run {
             };
             proof::n_ticks(law.swept_s() + 2.0 * window as f64 * dt_s, dt_s)?;
             let ticks = law.ticks();
-            let near: Vec<Frame> = ticks.iter().map(|tick| between(&frames, tick.s / step_m)).collect();
+            let near: Vec<Frame> =
+                ticks.iter().map(|tick| between(&frames, tick.s / step_m)).collect();
             let mut found = judge(&ticks, &near, limits, SOUGHT);
             if found.iter().all(Option::is_none) {
                 let exact: Vec<Frame> = ticks.iter().map(|tick| frame(tick.s)).collect();
@@ -232,12 +232,7 @@ fn between(frames: &[Frame], at: f64) -> Frame {
 }
 
 /// The worst excess of every tick over its share of the limits.
-fn judge(
-    ticks: &[Tick],
-    frames: &[Frame],
-    limits: &RunLimits,
-    kept: f64,
-) -> Vec<Option<Worst>> {
+fn judge(ticks: &[Tick], frames: &[Frame], limits: &RunLimits, kept: f64) -> Vec<Option<Worst>> {
     let mut before_j = 0.0;
     let quantities = [Quantity::Velocity, Quantity::Acceleration, Quantity::Jerk];
     ticks

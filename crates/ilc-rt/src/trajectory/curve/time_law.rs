@@ -75,8 +75,7 @@ impl TimeLaw<'_> {
         // The first average of the stepwise speed is piecewise linear: exact at its corners.
         let mut once = vec![0.0; n + 1];
         for k in 1..=n {
-            once[k] = once[k - 1]
-                + (at(&speed, k, 1) - at(&speed, k, 1 + self.window)) / m;
+            once[k] = once[k - 1] + (at(&speed, k, 1) - at(&speed, k, 1 + self.window)) / m;
         }
         let mut ticks = vec![Tick::default(); n + 1];
         for k in 1..=n {
@@ -180,7 +179,8 @@ mod tests {
         for pair in ticks.windows(2) {
             let h = 0.002;
             let v = pair[0].v + h * pair[0].a + 0.5 * h * h * pair[0].j;
-            let s = pair[0].s + h * pair[0].v + 0.5 * h * h * pair[0].a + h * h * h * pair[0].j / 6.0;
+            let s =
+                pair[0].s + h * pair[0].v + 0.5 * h * h * pair[0].a + h * h * h * pair[0].j / 6.0;
             assert!((v - pair[1].v).abs() < 1e-12 && (s - pair[1].s).abs() < 1e-11, "{pair:?}");
             assert!(pair[0].a.abs() <= 0.5 * (1.0 + 1e-9), "{pair:?}");
             assert!(pair[0].j.abs() <= 2.0 * 0.5 / (12.0 * h) * (1.0 + 1e-9), "{pair:?}");

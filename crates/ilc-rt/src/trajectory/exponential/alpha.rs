@@ -207,9 +207,9 @@ impl Place<'_> {
     }
 
     fn refusal(&self, found: &[(f64, f64)]) -> TrajectoryError {
-        let nearest = found.iter().fold((1.0, f64::INFINITY), |best, &point| {
-            if point.1 < best.1 { point } else { best }
-        });
+        let nearest = found
+            .iter()
+            .fold((1.0, f64::INFINITY), |best, &point| if point.1 < best.1 { point } else { best });
         let (_, quantity, reached, limit) = self.excess(nearest.0, true);
         TrajectoryError::Alpha {
             segment: self.segment,
@@ -263,18 +263,23 @@ fn peaks(leg: &Leg, which: usize, exact: bool) -> [f64; 3] {
             return most;
         }
         let mut peak = most;
-        let last = samples.len() - 1;
-        let mut candidates: Vec<(usize, f64)> = (0..=last)
+        // Each side of the joint has peaks of its own: samples at its edges have no neighbour beyond.
+        let (is_first, is_last) = (
+            |i: usize| i.is_multiple_of(n_samples + 1),
+            |i: usize| (i + 1).is_multiple_of(n_samples + 1),
+        );
+        let mut candidates: Vec<(usize, f64)> = (0..samples.len())
             .map(|i| (i, size(&samples[i])))
             .filter(|&(i, here)| {
-                let before = if i > 0 { size(&samples[i - 1]) } else { 0.0 };
-                let after = if i < last { size(&samples[i + 1]) } else { 0.0 };
+                let before = if is_first(i) { 0.0 } else { size(&samples[i - 1]) };
+                let after = if is_last(i) { 0.0 } else { size(&samples[i + 1]) };
                 here >= 0.97 * most && here >= before && here >= after
             })
             .collect();
         candidates.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (i, _) in candidates.into_iter().take(CANDIDATES) {
-            let (from, to) = (times_s[i.saturating_sub(1)], times_s[(i + 1).min(last)]);
+            let from = times_s[if is_first(i) { i } else { i - 1 }];
+            let to = times_s[if is_last(i) { i } else { i + 1 }];
             peak = peak.max(refined(|tau_s| size(&value(tau_s)), from, to));
         }
         peak

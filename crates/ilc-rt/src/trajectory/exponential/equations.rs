@@ -88,12 +88,8 @@ mod tests {
     fn derivatives_belong_together() {
         let mut random = Random(31);
         for _ in 0..2_000 {
-            let (m, b, alpha, omega) = (
-                random.signed(),
-                random.signed(),
-                random.log(0.5, 50.0),
-                random.log(0.5, 20.0),
-            );
+            let (m, b, alpha, omega) =
+                (random.signed(), random.signed(), random.log(0.5, 50.0), random.log(0.5, 20.0));
             let t = random.unit() * 2.0;
             let ratio = random.log(0.05, 20.0);
             assert_consistent(|t| startup_linear(t, m, b, alpha), t, 0.05);
@@ -125,7 +121,10 @@ mod tests {
                     - 2.0 * alpha * s
                     - 4.0 * alpha * w * t * c
                     - w * w * s);
-            assert!((found.0[1] - v).abs() < 1e-13 && (found.0[2] - acc).abs() < 1e-11, "2.9, 2.10");
+            assert!(
+                (found.0[1] - v).abs() < 1e-13 && (found.0[2] - acc).abs() < 1e-11,
+                "2.9, 2.10"
+            );
         }
     }
 

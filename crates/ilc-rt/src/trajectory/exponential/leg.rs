@@ -33,7 +33,6 @@ pub(super) enum End {
 /// A leg with the numbers that its motion is made of.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
-    pub(super) length_m: f64,
     pub(super) feed_m_s: f64,
     pub(super) amplitude_m: f64,
     pub(super) omega_rad_s: f64,
@@ -105,13 +104,9 @@ impl Leg {
             }
             End::Transition { neighbour_m_s, ratio } => {
                 let still = (neighbour_m_s - self.feed_m_s).abs() <= 0.0;
-                let deviation_s =
-                    if still { 0.0 } else { (GONE + ratio.ln().abs()) / alpha };
-                let window_s = if oscillates {
-                    self.clearance_s(which) + GONE_CUBE_ROOT / alpha
-                } else {
-                    0.0
-                };
+                let deviation_s = if still { 0.0 } else { (GONE + ratio.ln().abs()) / alpha };
+                let window_s =
+                    if oscillates { self.clearance_s(which) + GONE_CUBE_ROOT / alpha } else { 0.0 };
                 (deviation_s, window_s)
             }
         }

@@ -81,7 +81,8 @@ impl Listing {
         let opening = weight_after(from_corner_s - self.sine_offset_s, 1.0, self.sine_alpha);
         // The listing corrects every transition, whichever way it goes on.
         let ratio = (second.velocity_m_s / first.velocity_m_s).abs();
-        let joined = path(first, closing) * weight_before(from_corner_s, ratio, self.transition_alpha)
+        let joined = path(first, closing)
+            * weight_before(from_corner_s, ratio, self.transition_alpha)
             + path(second, opening) * weight_after(from_corner_s, ratio, self.transition_alpha);
         joined * (t.squared() * self.start_alpha).rise()
     }

@@ -98,15 +98,11 @@ impl ExponentialSigmoid {
             let groups: [(&str, Vec<(usize, usize)>); 2] = if joined {
                 [("transition", before.into_iter().chain(after).collect()), ("", Vec::new())]
             } else {
-                [
-                    ("end", before.into_iter().collect()),
-                    ("start-up", after.into_iter().collect()),
-                ]
+                [("end", before.into_iter().collect()), ("start-up", after.into_iter().collect())]
             };
             for (place, members) in groups {
                 let Some(&(segment, _)) = members.first() else { continue };
-                let along =
-                    PathLimits::along(&legs[segment].line.direction, limits, f64::INFINITY);
+                let along = PathLimits::along(&legs[segment].line.direction, limits, f64::INFINITY);
                 let near: Vec<(Leg, usize)> =
                     members.iter().map(|&(at, which)| (legs[at].leg, which)).collect();
                 let (alpha, admissible) =
@@ -191,7 +187,10 @@ impl ExponentialSigmoid {
 
 /// Each leg in time, with what its ends are.
 #[expect(clippy::disallowed_methods, reason = "cold: planned once")]
-fn placed(segments: &[ModulatedSegment], lines: &[Line]) -> Result<Vec<PlacedLeg>, TrajectoryError> {
+fn placed(
+    segments: &[ModulatedSegment],
+    lines: &[Line],
+) -> Result<Vec<PlacedLeg>, TrajectoryError> {
     let mut legs: Vec<PlacedLeg> = Vec::with_capacity(lines.len());
     let mut start_s = 0.0;
     for (index, (line, segment)) in lines.iter().zip(segments).enumerate() {
@@ -200,7 +199,6 @@ fn placed(segments: &[ModulatedSegment], lines: &[Line]) -> Result<Vec<PlacedLeg
             return Err(TrajectoryError::Duration { length_m: line.length_m, duration_s });
         }
         let mut leg = Leg {
-            length_m: line.length_m,
             feed_m_s: segment.feed_m_s,
             amplitude_m: segment.amplitude_m,
             omega_rad_s: std::f64::consts::TAU
@@ -221,10 +219,8 @@ fn placed(segments: &[ModulatedSegment], lines: &[Line]) -> Result<Vec<PlacedLeg
             };
             if let Some(sign) = sign {
                 let ratio = blending_ratio(before.leg.feed_m_s, sign * leg.feed_m_s);
-                before.leg.ends[1] =
-                    End::Transition { neighbour_m_s: sign * leg.feed_m_s, ratio };
-                leg.ends[0] =
-                    End::Transition { neighbour_m_s: sign * before.leg.feed_m_s, ratio };
+                before.leg.ends[1] = End::Transition { neighbour_m_s: sign * leg.feed_m_s, ratio };
+                leg.ends[0] = End::Transition { neighbour_m_s: sign * before.leg.feed_m_s, ratio };
             }
         }
         legs.push(PlacedLeg { leg, line: *line, start_s });
@@ -234,9 +230,8 @@ fn placed(segments: &[ModulatedSegment], lines: &[Line]) -> Result<Vec<PlacedLeg
 }
 
 fn check_oscillation(index: usize, segment: &ModulatedSegment) -> Result<(), TrajectoryError> {
-    let refuse = |name, value, unit| {
-        Err(TrajectoryError::Oscillation { segment: index, name, value, unit })
-    };
+    let refuse =
+        |name, value, unit| Err(TrajectoryError::Oscillation { segment: index, name, value, unit });
     if !(segment.amplitude_m.is_finite() && segment.amplitude_m >= 0.0) {
         return refuse("amplitude", segment.amplitude_m, "m: must be finite and not below 0");
     }

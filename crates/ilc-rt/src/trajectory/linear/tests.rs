@@ -3,19 +3,12 @@
 use super::*;
 use crate::trajectory::{ModulatedSegment, points_program};
 
-const LIMITS: [AxisLimits; 1] = [AxisLimits {
-    velocity_max_m_s: 0.5,
-    acceleration_max_m_s2: 2.0,
-    jerk_max_m_s3: 80.0,
-}];
+const LIMITS: [AxisLimits; 1] =
+    [AxisLimits { velocity_max_m_s: 0.5, acceleration_max_m_s2: 2.0, jerk_max_m_s3: 80.0 }];
 
 fn six_point(frequency_hz: f64) -> Vec<PathSegment> {
-    let segment = ModulatedSegment {
-        to_m: vec![0.06],
-        feed_m_s: 0.01,
-        amplitude_m: 0.002,
-        frequency_hz,
-    };
+    let segment =
+        ModulatedSegment { to_m: vec![0.06], feed_m_s: 0.01, amplitude_m: 0.002, frequency_hz };
     points_program(&[0.0], &segment, 6).unwrap()
 }
 
