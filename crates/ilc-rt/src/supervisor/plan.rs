@@ -61,6 +61,7 @@ impl Plan {
             .map_err(|source| SupervisorError::Load { file: file.clone(), source })?;
         let reference_m = interpolator.reference();
         super::program::check_range(&cell, &reference_m)?;
+        let program = super::program::program_json(&cell, &reference_m);
         Ok(Self {
             servo: servo_spec(&cell, lockstep)?,
             interpolator,
@@ -76,7 +77,7 @@ impl Plan {
                     Measure::Encoder => "encoder".to_owned(),
                     Measure::Tcp => "tcp".to_owned(),
                 },
-                program: super::program::program_json(&cell, &reference_m),
+                program,
                 cycle_s: cell.cycle_s(),
                 n_axes: cell.n_axes(),
                 axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
