@@ -1,4 +1,4 @@
-"""Trajectories that hold the limits of every axis: moves, modulated paths, curves, part programs."""
+"""Trajectories that hold the limits of every axis."""
 
 from ilc_rt._native import (
     Trajectory,

@@ -59,7 +59,7 @@ def test_every_limit_holds_and_derivatives_belong_together(name):
     assert abs(a).max() <= LIMITS["acceleration_max_m_s2"] * (1 + 1e-9)
     for order, key in enumerate(LIMITS, 1):
         differences = np.diff(p, order, axis=0) / dt_s**order
-        assert abs(differences).max() <= LIMITS[key] * (1 + 1e-9) + 1e-15 / dt_s**order
+        assert abs(differences).max() <= LIMITS[key] * (1 + 1e-9) + 1e-14 / dt_s**order
     # Central differences miss by a sixth of the next but one derivative times dt^2.
     bend = LIMITS["jerk_max_m_s3"] * dt_s**2
     np.testing.assert_allclose((p[2:] - p[:-2]) / (2 * dt_s), v[1:-1], atol=bend)

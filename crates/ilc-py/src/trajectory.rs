@@ -240,9 +240,9 @@ fn sample_path(
     let last = v.len();
     motion.acceleration_m_s2 = (0..last)
         .map(|i| {
-            let before = if i >= n_axes { v[i - n_axes] } else { v[i] };
-            let after = if i + n_axes < last { v[i + n_axes] } else { v[i] };
-            (after - before) / (2.0 * dt_s)
+            // At rest at both ends, where there is no neighbour.
+            let inside = i >= n_axes && i + n_axes < last;
+            if inside { (v[i + n_axes] - v[i - n_axes]) / (2.0 * dt_s) } else { 0.0 }
         })
         .collect();
     motion.programmed_m = motion.position_m.clone();
