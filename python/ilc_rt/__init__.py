@@ -1,8 +1,6 @@
 """The motion controller that learns: iterative learning control on the machine."""
 
-from ilc_rt import control, kinematics, signal, trajectory
-from ilc_rt import signal, weights
-from ilc_rt import identify, signal
+from ilc_rt import control, identify, kinematics, signal, trajectory, weights
 from ilc_rt._native import (
     AdjointIlc,
     Cell,
@@ -22,6 +20,7 @@ from ilc_rt._native import (
     SignalError,
     StateSpace,
     TimeVarying,
+    TrajectoryError,
     discretize,
     from_transfer_function,
     repeatability,
@@ -40,8 +39,8 @@ __all__ = [
     "CampaignResult",
     "Cell",
     "ErrorFeedforwardIlc",
-    "Gate",
     "FlexibleIlc",
+    "Gate",
     "IterationRecord",
     "Ladder",
     "Law",
@@ -51,18 +50,19 @@ __all__ = [
     "ModelInverseIlc",
     "NormOptimalIlc",
     "PdIlc",
-    "Repeatability",
     "RelevanceIlc",
     "RelevanceWeights",
+    "Repeatability",
     "SignalError",
     "StateSpace",
-    "control",
     "TimeVarying",
+    "TrajectoryError",
+    "control",
     "discretize",
     "from_transfer_function",
+    "identify",
     "kinematics",
     "repeatability",
-    "identify",
     "second_order",
     "signal",
     "trajectory",

@@ -8,24 +8,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "Arc",
     "AdjointIlc",
+    "Arc",
     "ButterworthFilter",
     "Cascade",
     "Cell",
     "ContourError",
     "CrossCoupled",
     "Delta",
-    "EventStream",
-    "Gantry",
-    "KinematicsError",
     "ErrorFeedforwardIlc",
+    "EventStream",
     "FirFilter",
+    "FlexibleIlc",
+    "FrequencyResponse",
+    "Gantry",
     "Gate",
     "GaussianFilter",
+    "KinematicsError",
     "Ladder",
-    "FrequencyResponse",
-    "FlexibleIlc",
     "LearningError",
     "Library",
     "Line",
@@ -34,38 +34,49 @@ __all__ = [
     "NormOptimalIlc",
     "PdIlc",
     "Pid",
+    "RationalFit",
     "RelevanceIlc",
     "RelevanceWeights",
+    "Repeatability",
+    "SecondOrderFit",
     "SignalError",
     "StateSpace",
-    "TimeVarying",
-    "Repeatability",
     "SwitchedFilter",
-    "RationalFit",
-    "SecondOrderFit",
+    "TimeVarying",
+    "Trajectory",
+    "TrajectoryError",
     "VelocityLoopFit",
+    "butterfly",
     "butterworth",
     "contour_error",
-    "coupling_gains",
     "contour_weights",
     "coupled_weights",
+    "coupling_gains",
     "discretize",
-    "formation_errors",
-    "formation_weights",
     "excitation",
+    "exponential_sigmoid",
+    "fir",
     "fit_rational",
     "fit_second_order",
     "fit_velocity_loop",
+    "formation_errors",
+    "formation_weights",
     "frequency_response",
     "from_transfer_function",
-    "projection_across",
-    "fir",
     "gaussian",
+    "gcode",
     "instantaneous_frequency",
+    "jerk_limited",
+    "modulated",
+    "projection_across",
+    "raster",
     "repeatability",
     "run_events",
     "schedule",
     "second_order",
+    "spiral",
+    "spline",
+    "tracking_index",
     "uncertainty",
     "zero_phase",
 ]
@@ -381,6 +392,128 @@ _Filter: TypeAlias = ButterworthFilter | GaussianFilter | SwitchedFilter | FirFi
 
 def zero_phase(filter: _Filter, x: ArrayLike) -> NDArray[np.float64]: ...
 def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]: ...
+
+class TrajectoryError(ValueError): ...
+
+@final
+class Trajectory:
+    @property
+    def dt_s(self) -> float: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def n_axes(self) -> int: ...
+    @property
+    def computing_s(self) -> float: ...
+    @property
+    def t_s(self) -> NDArray[np.float64]: ...
+    @property
+    def position_m(self) -> NDArray[np.float64]: ...
+    @property
+    def velocity_m_s(self) -> NDArray[np.float64]: ...
+    @property
+    def acceleration_m_s2(self) -> NDArray[np.float64]: ...
+    @property
+    def programmed_m(self) -> NDArray[np.float64]: ...
+    @property
+    def alphas(self) -> list[tuple[int, str, float, list[tuple[float, float]]]]: ...
+
+def jerk_limited(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float | ArrayLike,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    setting: str = "complete",
+) -> Trajectory: ...
+def exponential_sigmoid(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float | ArrayLike,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    amplitude_m: float | ArrayLike | None = None,
+    frequency_hz: float | ArrayLike | None = None,
+) -> Trajectory: ...
+def modulated(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float,
+    amplitude_m: float,
+    frequency_hz: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    interpolation: str = "exponential_sigmoid",
+) -> Trajectory: ...
+def spline(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    curvature_acceleration_max_m_s2: float = ...,
+) -> Trajectory: ...
+def butterfly(
+    *,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    feed_m_s: float = 0.004,
+    curvature_acceleration_max_m_s2: float = 0.02,
+    scale_m: float = 0.00185,
+    turns: float = 1.0,
+    center_m: tuple[float, float] = (0.0, 0.0),
+) -> Trajectory: ...
+def spiral(
+    *,
+    pitch_m: float,
+    turns: float,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    curvature_acceleration_max_m_s2: float = ...,
+    center_m: tuple[float, float] = (0.0, 0.0),
+) -> Trajectory: ...
+def raster(
+    *,
+    width_m: float,
+    pitch_m: float,
+    rows: int,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    start_m: tuple[float, float] = (0.0, 0.0),
+    there_and_back: bool = False,
+    setting: str = "complete",
+) -> Trajectory: ...
+def gcode(
+    text: str,
+    *,
+    start_m: ArrayLike,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    rapid_m_s: float | None = None,
+    blend_s: float | None = None,
+) -> Trajectory: ...
+def tracking_index(
+    trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0
+) -> tuple[float, float]: ...
 
 @final
 class PdIlc:

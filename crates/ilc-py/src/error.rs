@@ -1,7 +1,7 @@
 //! Which error of `ilc-rt` becomes which exception.
 
 use ilc_rt::trajectory::contour;
-use ilc_rt::{config, kinematics, learning, library, model, signal, supervisor};
+use ilc_rt::{config, kinematics, learning, library, model, signal, supervisor, trajectory};
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 
@@ -22,6 +22,12 @@ impl<T> OrRaise<T> for Result<T, model::ModelError> {
 impl<T> OrRaise<T> for Result<T, signal::SignalError> {
     fn or_raise(self) -> PyResult<T> {
         self.map_err(|error| exceptions::SignalError::new_err(error.to_string()))
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, trajectory::TrajectoryError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| exceptions::TrajectoryError::new_err(error.to_string()))
     }
 }
 

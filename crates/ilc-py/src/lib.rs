@@ -25,6 +25,7 @@ mod python_law;
 mod signal;
 mod time_varying;
 mod weights;
+mod trajectory;
 
 use pyo3::prelude::*;
 
@@ -39,6 +40,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     kinematics::register(module)?;
     contour::register(module)?;
     control::register(module)?;
+    trajectory::register(module)?;
     laws::register(module)?;
     weights::register(module)?;
     cell::register(module)?;

@@ -11,7 +11,7 @@ use crate::config::Measure;
 use crate::library::Library;
 use crate::model::identify::{Excitation, Waveform};
 use crate::record::{EndStatus, Event};
-use crate::supervisor::{self, Experiment, Identified, Options, Outcome, SupervisorError};
+use crate::supervisor::{self, Disturbance, Experiment, Identified, Options, Outcome, SupervisorError};
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -134,6 +134,7 @@ fn experiment(
         lockstep: arguments.lockstep,
         resume: false,
         library: arguments.library.clone(),
+        disturbance: Disturbance::default(),
         telemetry: !arguments.no_telemetry,
         stop: stop_on_signals(),
     };

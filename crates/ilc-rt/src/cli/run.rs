@@ -102,6 +102,7 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
         lockstep: arguments.lockstep,
         resume: arguments.resume,
         library: arguments.library.clone(),
+        disturbance: Disturbance::default(),
         telemetry: !arguments.no_telemetry,
         stop: stop_on_signals(),
     };

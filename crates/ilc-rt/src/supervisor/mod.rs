@@ -15,6 +15,7 @@ mod learner;
 mod nodes;
 mod pace;
 mod plan;
+mod program;
 mod progress;
 mod reason;
 mod telemetry;

@@ -15,7 +15,7 @@ fn limits(velocity: f64, acceleration: f64, jerk: f64) -> AxisLimits {
 }
 
 fn segment(to_m: &[f64], feed_m_s: f64) -> PathSegment {
-    PathSegment { to_m: to_m.to_vec(), feed_m_s }
+    PathSegment::line(to_m.to_vec(), feed_m_s)
 }
 
 fn contour(corner: CornerRule, feed: f64) -> PathSpec {
@@ -97,7 +97,7 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
         let mut spec = PathSpec {
             start_m: point(&mut random),
             segments: (0..5)
-                .map(|_| PathSegment { to_m: point(&mut random), feed_m_s: random.log(0.08, 0.4) })
+                .map(|_| PathSegment::line(point(&mut random), random.log(0.08, 0.4)))
                 .collect(),
             corner: CornerRule::ExactStop,
             dwell_before_s: 0.03 * random.unit(),
