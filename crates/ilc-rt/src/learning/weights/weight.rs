@@ -40,6 +40,19 @@ impl Weight {
         matches!(self, Self::Scalar(_) | Self::Block(_))
     }
 
+    /// Returns whether the weight ties channels to each other.
+    pub(in crate::learning) fn is_mixed(&self) -> bool {
+        let mixes = |block: &DMatrix<f64>| {
+            (0..block.nrows())
+                .any(|row| (0..block.ncols()).any(|col| row != col && block[(row, col)] != 0.0))
+        };
+        match self {
+            Self::Scalar(_) | Self::PerSample(_) => false,
+            Self::Block(block) => mixes(block),
+            Self::Blocks(blocks) => blocks.iter().any(mixes),
+        }
+    }
+
     /// Refuses a weight that does not fit or is not positive semidefinite.
     ///
     /// # Errors

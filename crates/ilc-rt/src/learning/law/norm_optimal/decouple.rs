@@ -6,17 +6,17 @@ use crate::model::{ModelError, StateSpace};
 
 /// One group of coupled axes: its model, and where its signals lie among those of the machine.
 #[derive(Debug)]
-pub(super) struct Part {
-    pub(super) model: StateSpace,
-    pub(super) inputs: Vec<usize>,
-    pub(super) outputs: Vec<usize>,
+pub(in crate::learning::law) struct Part {
+    pub(in crate::learning::law) model: StateSpace,
+    pub(in crate::learning::law) inputs: Vec<usize>,
+    pub(in crate::learning::law) outputs: Vec<usize>,
 }
 
 /// Returns the groups that the zeros of `A`, `B`, `C` and `D` leave unconnected, each with an input.
 ///
 /// Every input is in exactly one group. Outputs and states that no input can be connected to have no
 /// part in learning.
-pub(super) fn parts(model: &StateSpace) -> Result<Vec<Part>, ModelError> {
+pub(in crate::learning::law) fn parts(model: &StateSpace) -> Result<Vec<Part>, ModelError> {
     let (n, m, p) = (model.n_states(), model.n_inputs(), model.n_outputs());
     let (state, input, output) = (|i: usize| i, |i: usize| n + i, |i: usize| n + m + i);
     let mut group: Vec<usize> = (0..n + m + p).collect();

@@ -1,9 +1,9 @@
 //! Norm-optimal learning: the input that a quadratic cost over the whole run asks for.
 
-mod decouple;
+pub(super) mod decouple;
 #[cfg(test)]
 mod oracle;
-mod pairing;
+pub(super) mod pairing;
 
 use crate::learning::error::check;
 use crate::learning::sweep::{self, FactorError, Gains, General, Rate, Run, Sweep};

@@ -105,7 +105,7 @@ impl Stages for Paired {
 
 /// Returns, for each output, the index of its first Markov parameter that is not zero, or `None` if
 /// all are (by Cayley and Hamilton `n + 1` of them decide).
-fn relative_degrees(model: &StateSpace) -> Result<Vec<Option<usize>>, ModelError> {
+pub(in crate::learning::law) fn relative_degrees(model: &StateSpace) -> Result<Vec<Option<usize>>, ModelError> {
     let n = model.n_states();
     let parameters = model.markov(n + 1)?;
     let (a, c) = (model.a().abs(), model.c().abs());
