@@ -6,16 +6,19 @@ use super::rows::{BEND, CHANGE, OUTPUT, Rows, STEP};
 use super::solver::{Bands, Outcome, Places, Solver};
 use crate::learning::sweep::Run;
 
-/// Gap at which the search ends, as a part of the cost.
-pub(super) const GAP: f64 = 1e-10;
+/// Gap at which the search ends, as a part of the cost ...
+const GAP: f64 = 1e-13;
+/// ... and the one that is good enough where rounding lets it shrink no further.
+const GAP_ENOUGH: f64 = 1e-9;
 /// What of the cost before learning counts as nothing.
 const FLOOR: f64 = 1e-12;
 /// Part of the first violation that may be left when the search ends.
 const RESIDUAL: f64 = 1e-11;
 /// Iterations after which the search is given up.
-pub(super) const MAX_ITERATIONS: usize = 60;
-/// Part of the way to the border that a step may go.
+const MAX_ITERATIONS: usize = 60;
+/// Part of the way to the border that a step may go, at first and near the end.
 const MARGIN: f64 = 0.995;
+const MARGIN_LATE: f64 = 0.9999;
 /// The products of slack and multiplier start at this part of the cost before learning, in sum ...
 const START: f64 = 0.1;
 /// ... and, coming from an earlier solution, at this part.
@@ -45,13 +48,21 @@ pub(super) struct Interior<const N: usize, const M: usize, const P: usize, const
     /// `-S u`.
     hold: Vec<[f64; M]>,
     input: Vec<[f64; M]>,
+    /// Where the search is: the change of the input and the output that it causes.
     v: Vec<[f64; M]>,
-    v_next: Vec<[f64; M]>,
+    output: Vec<[f64; P]>,
+    /// The step from there.
+    v_step: Vec<[f64; M]>,
+    output_step: Vec<[f64; P]>,
+    /// How the cost pulls there.
+    pulls: Vec<Pull<M, P>>,
     /// Input that the last solution gave, from which the next search may start.
     last: Vec<[f64; M]>,
     has_last: bool,
     cost: f64,
     cost_before: f64,
+    /// The size of the cost that the search has to do with.
+    worth: f64,
 }
 
 /// The parts of an [`Interior`] that are given from outside.
@@ -91,11 +102,15 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
             hold: vec![[0.0; M]; n_samples],
             input: vec![[0.0; M]; n_samples],
             v: vec![[0.0; M]; n_samples],
-            v_next: vec![[0.0; M]; n_samples],
+            output: vec![[0.0; P]; n_samples],
+            v_step: vec![[0.0; M]; n_samples],
+            output_step: vec![[0.0; P]; n_samples],
+            pulls: vec![Pull::NONE; n_samples],
             last: vec![[0.0; M]; n_samples],
             has_last: false,
             cost: 0.0,
             cost_before: 0.0,
+            worth: 0.0,
         };
         interior.factorise(false);
         std::mem::swap(&mut interior.plain, &mut interior.gains);
@@ -133,12 +148,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         let begin = if with_rows { self.rows.begin } else { [None; 4] };
         let mut cost = [[0.0; NS]; NS];
         for k in (0..self.which.len()).rev() {
-            let base = &self.weighings[self.which[k]];
-            if !with_rows {
-                self.plant.earlier(base, &mut cost, &mut self.gains[k]);
-                continue;
-            }
-            let mut weighing = base.clone();
+            let mut weighing = self.weighings[self.which[k]].clone();
             if let Some(at) = begin[CHANGE] {
                 for (i, weight) in sigma[at + k * M..][..M].iter().enumerate() {
                     weighing.change[i][i] += weight;
@@ -163,7 +173,41 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         }
     }
 
-    /// Solves for the change `v_next`, with the rows or without them; writes the rows' values.
+    /// Computes the cost where the search is, and how it pulls at each sample.
+    ///
+    /// The step is solved for, and not the next point: near a bound the rows' weights exceed 1e10,
+    /// and the point itself, multiplied by them, would drown everything else.
+    #[inline(never)]
+    fn look(&mut self) {
+        let mut cost = self.cost_before;
+        let mut before = [0.0; M];
+        for (k, pull) in self.pulls.iter_mut().enumerate() {
+            let base = &self.weighings[self.which[k]];
+            let (v, output) = (&self.v[k], &self.output[k]);
+            for i in 0..P {
+                let mut own = 0.0;
+                for j in 0..P {
+                    own += base.output[i][j] * output[j];
+                }
+                pull.output[i] = self.weighted[k][i] - own;
+                cost += output[i] * (0.5 * own - self.weighted[k][i]);
+            }
+            for i in 0..M {
+                let mut own = 0.0;
+                for j in 0..M {
+                    own += base.change[i][j] * v[j];
+                }
+                pull.change[i] = self.hold[k][i] - own;
+                let step = v[i] - before[i];
+                pull.step[i] = -base.step[i] * step;
+                cost += v[i] * (0.5 * own - self.hold[k][i]) + 0.5 * base.step[i] * step * step;
+            }
+            before = *v;
+        }
+        self.cost = cost;
+    }
+
+    /// Solves for the step, with the rows or without them.
     #[inline(never)]
     fn sweep(&mut self, with_rows: bool) {
         let gains = if with_rows { &self.gains } else { &self.plain };
@@ -171,58 +215,68 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         let row_pull = &self.rows.pull[..];
         let mut slope = [0.0; NS];
         for k in (0..gains.len()).rev() {
-            let mut pull = Pull {
-                output: self.weighted[k],
-                change: self.hold[k],
-                step: [0.0; M],
-                bend: [0.0; M],
-            };
+            let mut pull = self.pulls[k];
             if let Some(at) = begin[CHANGE] {
-                for (i, share) in row_pull[at + k * M..][..M].iter().enumerate() {
-                    pull.change[i] += share;
-                }
+                add(&mut pull.change, &row_pull[at + k * M..][..M]);
             }
             if let Some(at) = begin[STEP] {
-                pull.step.copy_from_slice(&row_pull[at + k * M..][..M]);
+                add(&mut pull.step, &row_pull[at + k * M..][..M]);
             }
             if let Some(at) = begin[BEND] {
-                pull.bend.copy_from_slice(&row_pull[at + k * M..][..M]);
+                add(&mut pull.bend, &row_pull[at + k * M..][..M]);
             }
             if let Some(at) = begin[OUTPUT] {
-                for (i, share) in row_pull[at + k * P..][..P].iter().enumerate() {
-                    pull.output[i] += share;
-                }
+                add(&mut pull.output, &row_pull[at + k * P..][..P]);
             }
             self.kappa[k] = self.plant.backward(&gains[k], &pull, &mut slope);
         }
         let mut state = [0.0; NS];
         let begin = self.rows.begin;
-        let values = &mut self.rows.values[..];
         let mut before = ([0.0; M], [0.0; M]);
-        let mut cost = self.cost_before;
         for k in 0..gains.len() {
             let v = Plant::<N, M, P>::change(&gains[k], &self.kappa[k], &state);
             let output = self.plant.output(&state, &v);
-            self.v_next[k] = v;
-            let base = &self.weighings[self.which[k]];
-            cost += added_cost(base, &self.weighted[k], &self.hold[k], &output, &v, &before.0);
-            write_values(values, begin, k, &v, &before, &output);
+            (self.v_step[k], self.output_step[k]) = (v, output);
+            write_rows(&mut self.rows.steps, begin, k, &v, &before, &output);
             before = (v, before.0);
             self.plant.forward(&mut state, &v);
         }
-        self.cost = cost;
     }
 
-    /// Writes the rows' values at the change `v`.
+    /// Goes a part of the step.
+    fn advance(&mut self, length: f64) {
+        for k in 0..self.v.len() {
+            for i in 0..M {
+                self.v[k][i] += length * self.v_step[k][i];
+            }
+            for i in 0..P {
+                self.output[k][i] += length * self.output_step[k][i];
+            }
+        }
+        self.rows.advance(length);
+    }
+
+    /// Computes output and rows from the change of the input.
     fn roll(&mut self) {
         let mut state = [0.0; NS];
         let mut before = ([0.0; M], [0.0; M]);
         for (k, v) in self.v.iter().enumerate() {
-            let output = self.plant.output(&state, v);
-            write_values(&mut self.rows.values, self.rows.begin, k, v, &before, &output);
+            self.output[k] = self.plant.output(&state, v);
+            write_rows(&mut self.rows.values, self.rows.begin, k, v, &before, &self.output[k]);
             before = (*v, before.0);
             self.plant.forward(&mut state, v);
         }
+    }
+
+    /// Goes to the solution of the problem without bounds.
+    fn relax(&mut self) {
+        self.v.fill([0.0; M]);
+        self.output.fill([0.0; P]);
+        self.look();
+        self.sweep(false);
+        self.v.copy_from_slice(&self.v_step);
+        self.output.copy_from_slice(&self.output_step);
+        self.rows.values.copy_from_slice(&self.rows.steps);
     }
 
     /// Takes over the signals of a run: what pulls at the input, and where the limits lie from here.
@@ -296,33 +350,38 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         let n_limits = self.rows.count();
         let mut residual = 1.0;
         let mut gap = self.rows.gap();
+        let mut found = (false, 0, f64::INFINITY);
+        let mut part = 1.0_f64;
+        self.look();
         for iteration in 1..=MAX_ITERATIONS {
             self.rows.weigh(0.0, false);
             self.factorise(true);
             self.sweep(true);
             let length = self.rows.step(0.0, false, 1.0);
-            let part = self.rows.gap_at(length) / gap;
-            let centre = part * part * part * gap / n_limits;
+            let shrunk = self.rows.gap_at(length) / gap;
+            let centre = shrunk * shrunk * shrunk * gap / n_limits;
             self.rows.weigh(centre, true);
             self.sweep(true);
-            let length = self.rows.step(centre, true, MARGIN);
-            for (v, next) in self.v.iter_mut().zip(&self.v_next) {
-                for (v, next) in v.iter_mut().zip(next) {
-                    *v += length * (next - *v);
-                }
+            let margin = (1.0 - part).clamp(MARGIN, MARGIN_LATE);
+            let length = self.rows.step(centre, true, margin);
+            if !(length.is_finite() && self.cost.is_finite()) {
+                break;
             }
-            self.rows.advance(length);
+            self.advance(length);
+            self.look();
             residual *= 1.0 - length;
+            let before = gap;
             gap = self.rows.gap();
-            if !(gap.is_finite() && self.cost.is_finite()) {
-                return (false, iteration, f64::INFINITY);
-            }
-            let cost = self.cost.max(FLOOR * self.cost_before);
-            if residual <= RESIDUAL && gap <= GAP * cost {
-                return (true, iteration, gap / cost);
+            part = gap / self.cost.max(FLOOR * self.worth);
+            #[cfg(test)]
+            println!("  {iteration}: length {length:.4} gap {gap:e} of {:e}", self.cost);
+            let is_done = residual <= RESIDUAL && part <= GAP_ENOUGH;
+            found = (is_done, iteration, part);
+            if is_done && (part <= GAP || gap > 0.5 * before) {
+                break;
             }
         }
-        (false, MAX_ITERATIONS, gap / self.cost.max(FLOOR * self.cost_before))
+        found
     }
 
     /// Clips what rounding left outside of the bounds of input and change; returns whether all bounds
@@ -363,11 +422,14 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
 {
     fn solve(&mut self, run: &Run) -> Outcome {
         self.load(run);
-        self.sweep(false);
-        self.v.copy_from_slice(&self.v_next);
+        self.relax();
         let mut outcome = Outcome { is_solved: true, iterations: 0, gap: 0.0 };
         if !self.rows.fit() {
-            let centre = self.cost_before / self.rows.count();
+            // A cost that bounds alone cause counts as well.
+            let stiffness = self.plain[0].stiffness();
+            let overshoot = self.rows.overshoot(|_| 1.0);
+            self.worth = self.cost_before + 0.5 * stiffness * overshoot * overshoot;
+            let centre = self.worth / self.rows.count();
             let mut found = (false, 0, 0.0);
             if self.has_last {
                 for (k, v) in self.v.iter_mut().enumerate() {
@@ -381,8 +443,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
             }
             if !found.0 {
                 let wasted = found.1;
-                self.sweep(false);
-                self.v.copy_from_slice(&self.v_next);
+                self.relax();
                 self.rows.start(START * centre, false);
                 found = self.search();
                 found.1 += wasted;
@@ -425,38 +486,15 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
     }
 }
 
-/// What one sample adds to the cost beyond what it was before learning.
-#[inline(always)]
-fn added_cost<const M: usize, const P: usize>(
-    weighing: &Weighing<M, P>,
-    weighted: &[f64; P],
-    hold: &[f64; M],
-    output: &[f64; P],
-    v: &[f64; M],
-    before: &[f64; M],
-) -> f64 {
-    let mut cost = 0.0;
-    for i in 0..P {
-        let mut own = 0.0;
-        for k in 0..P {
-            own += weighing.output[i][k] * output[k];
-        }
-        cost += output[i] * (0.5 * own - weighted[i]);
+fn add(sum: &mut [f64], more: &[f64]) {
+    for (sum, more) in sum.iter_mut().zip(more) {
+        *sum += more;
     }
-    for i in 0..M {
-        let mut own = 0.0;
-        for k in 0..M {
-            own += weighing.change[i][k] * v[k];
-        }
-        let step = v[i] - before[i];
-        cost += v[i] * (0.5 * own - hold[i]) + 0.5 * weighing.step[i] * step * step;
-    }
-    cost
 }
 
 /// Writes the values of all rows of one sample.
 #[inline(always)]
-fn write_values<const M: usize, const P: usize>(
+fn write_rows<const M: usize, const P: usize>(
     values: &mut [f64],
     begin: [Option<usize>; 4],
     k: usize,

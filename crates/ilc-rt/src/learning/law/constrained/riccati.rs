@@ -35,12 +35,17 @@ pub(super) struct Gain<const M: usize, const NS: usize> {
 }
 
 /// The linear terms of one sample: of the output, of `v`, of `v - v_-` and of `v - 2 v_- + v_--`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Pull<const M: usize, const P: usize> {
     pub(super) output: [f64; P],
     pub(super) change: [f64; M],
     pub(super) step: [f64; M],
     pub(super) bend: [f64; M],
+}
+
+impl<const M: usize, const P: usize> Pull<M, P> {
+    pub(super) const NONE: Self =
+        Self { output: [0.0; P], change: [0.0; M], step: [0.0; M], bend: [0.0; M] };
 }
 
 impl<const M: usize, const NS: usize> Gain<M, NS> {
@@ -49,6 +54,11 @@ impl<const M: usize, const NS: usize> Gain<M, NS> {
     /// Returns whether some direction of the input costs nothing.
     pub(super) fn vanished(&self) -> bool {
         (0..M).any(|i| self.lower[i][i] <= 0.0)
+    }
+
+    /// Returns the first entry of `H`, what a change of the input costs.
+    pub(super) fn stiffness(&self) -> f64 {
+        if self.lower[0][0] > 0.0 { self.lower[0][0].powi(-2) } else { 0.0 }
     }
 
     fn factorise(&mut self, h: &[[f64; M]; M]) {

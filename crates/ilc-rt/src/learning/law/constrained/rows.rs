@@ -72,35 +72,44 @@ impl Side {
 
     /// Adds this side's share to the weight and the pull of each row; `centre` is the product of
     /// slack and multiplier that is aimed at.
-    fn weigh(&self, sigma: &mut [f64], pull: &mut [f64], centre: f64, is_corrector: bool) {
+    fn weigh(
+        &self,
+        at: &[f64],
+        sigma: &mut [f64],
+        pull: &mut [f64],
+        centre: f64,
+        is_corrector: bool,
+    ) {
         let order = if is_corrector { 1.0 } else { 0.0 };
         let n = sigma.len();
         let (limit, slack) = (&self.limit[..n], &self.slack[..n]);
         let (multiplier, inverse) = (&self.multiplier[..n], &self.inverse[..n]);
         let (is_on, second) = (&self.is_on[..n], &self.second_order[..n]);
-        let pull = &mut pull[..n];
+        let (at, pull) = (&at[..n], &mut pull[..n]);
         for row in 0..n {
             let ratio = multiplier[row] * inverse[row];
             let aim = is_on[row] * (centre - order * second[row]);
+            let residual = self.sign * (limit[row] - at[row]) - slack[row];
             sigma[row] += ratio;
-            pull[row] += ratio * limit[row]
-                - self.sign * (aim * inverse[row] + ratio * slack[row]);
+            pull[row] -= self.sign * (aim * inverse[row] - ratio * residual);
         }
     }
 
-    /// Computes the steps of slack and multiplier to the point where the rows have `values`; returns
-    /// the largest part by which one of them would shrink.
-    fn step_to(&mut self, values: &[f64], centre: f64, is_corrector: bool) -> f64 {
+    /// Computes the steps of slack and multiplier that belong to the `steps` of the rows; returns the
+    /// largest part by which one of them would shrink.
+    fn step(&mut self, at: &[f64], steps: &[f64], centre: f64, is_corrector: bool) -> f64 {
         let order = if is_corrector { 1.0 } else { 0.0 };
-        let n = values.len();
+        let n = steps.len();
         let (limit, slack) = (&self.limit[..n], &self.slack[..n]);
         let (multiplier, inverse) = (&self.multiplier[..n], &self.inverse[..n]);
         let (is_on, second) = (&self.is_on[..n], &mut self.second_order[..n]);
         let (slack_step, multiplier_step) =
             (&mut self.slack_step[..n], &mut self.multiplier_step[..n]);
+        let at = &at[..n];
         let mut shrink = 0.0_f64;
         for row in 0..n {
-            let ds = is_on[row] * (self.sign * (limit[row] - values[row]) - slack[row]);
+            let residual = self.sign * (limit[row] - at[row]) - slack[row];
+            let ds = is_on[row] * (residual - self.sign * steps[row]);
             let aim = is_on[row] * (centre - order * second[row]);
             let dl = (aim - multiplier[row] * ds) * inverse[row] - multiplier[row];
             slack_step[row] = ds;
@@ -133,19 +142,19 @@ impl Side {
         }
     }
 
-    /// Starts slack and multiplier where their product is `centre` or, if `keep`, where both are at
-    /// least what they were.
+    /// Starts slacks and multipliers with the product `centre`: a slack is the room that there is, or
+    /// `least` where that is less; if `keep`, it is what goes with the multiplier of the last search.
     fn start(&mut self, values: &[f64], least: &[f64], centre: f64, keep: bool) {
         for (row, value) in values.iter().enumerate() {
             if self.is_on[row] <= 0.0 {
                 (self.slack[row], self.multiplier[row], self.inverse[row]) = (1.0, 0.0, 1.0);
                 continue;
             }
-            let room = self.room(row, *value).max(least[row]);
-            let kept = if keep { self.multiplier[row] } else { 0.0 };
-            self.slack[row] = room;
-            self.inverse[row] = 1.0 / room;
-            self.multiplier[row] = kept.max(centre / room);
+            let least = if keep { (centre / self.multiplier[row]).min(least[row]) } else { least[row] };
+            let slack = self.room(row, *value).max(least);
+            self.slack[row] = slack;
+            self.inverse[row] = 1.0 / slack;
+            self.multiplier[row] = centre / slack;
         }
     }
 }
@@ -162,8 +171,10 @@ pub(super) struct Rows {
     pub(super) sigma: Vec<f64>,
     /// That weight times the row's target.
     pub(super) pull: Vec<f64>,
-    /// `T v` at the point that was computed last.
+    /// `T v` at the point where the search is.
     pub(super) values: Vec<f64>,
+    /// `T dv` of the step that was computed last.
+    pub(super) steps: Vec<f64>,
     /// The least slack to start with; then the size against which an overshoot is judged.
     least: Vec<f64>,
 }
@@ -189,6 +200,7 @@ impl Rows {
             sigma: vec![0.0; n_rows],
             pull: vec![0.0; n_rows],
             values: vec![0.0; n_rows],
+            steps: vec![0.0; n_rows],
             least: vec![0.0; n_rows],
         }
     }
@@ -231,8 +243,7 @@ impl Rows {
             for row in range.clone() {
                 let both = self.upper.is_on[row] * self.lower.is_on[row];
                 let width = both * (self.upper.limit[row] - self.lower.limit[row]);
-                let part = if is_warm { 1e-3 } else { 1.0 };
-                let least = (START_WIDTH * width).max(START_OVERSHOOT * overshoot) * part;
+                let least = (START_WIDTH * width).max(START_OVERSHOOT * overshoot);
                 self.least[row] = least.max(f64::MIN_POSITIVE.sqrt());
             }
         }
@@ -250,15 +261,15 @@ impl Rows {
         self.sigma.fill(0.0);
         self.pull.fill(0.0);
         for side in [&self.upper, &self.lower] {
-            side.weigh(&mut self.sigma, &mut self.pull, centre, is_corrector);
+            side.weigh(&self.values, &mut self.sigma, &mut self.pull, centre, is_corrector);
         }
     }
 
     /// Computes the steps to the solution; returns the part of them that keeps every slack and
     /// multiplier positive, at most 1 once `margin` is kept.
     pub(super) fn step(&mut self, centre: f64, is_corrector: bool, margin: f64) -> f64 {
-        let upper = self.upper.step_to(&self.values, centre, is_corrector);
-        let lower = self.lower.step_to(&self.values, centre, is_corrector);
+        let upper = self.upper.step(&self.values, &self.steps, centre, is_corrector);
+        let lower = self.lower.step(&self.values, &self.steps, centre, is_corrector);
         (margin / upper.max(lower)).min(1.0)
     }
 
@@ -271,5 +282,8 @@ impl Rows {
     pub(super) fn advance(&mut self, length: f64) {
         self.upper.advance(length);
         self.lower.advance(length);
+        for (value, step) in self.values.iter_mut().zip(&self.steps) {
+            *value += length * step;
+        }
     }
 }
