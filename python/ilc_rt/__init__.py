@@ -3,6 +3,7 @@
 from ilc_rt import signal
 from ilc_rt._native import (
     Cell,
+    ConstrainedIlc,
     LearningError,
     Library,
     ModelError,
@@ -10,6 +11,7 @@ from ilc_rt._native import (
     PdIlc,
     SignalError,
     StateSpace,
+    TimeVarying,
     discretize,
     from_transfer_function,
     second_order,
@@ -25,6 +27,7 @@ __all__ = [
     "CampaignError",
     "CampaignResult",
     "Cell",
+    "ConstrainedIlc",
     "IterationRecord",
     "Law",
     "LearningError",
@@ -34,6 +37,7 @@ __all__ = [
     "PdIlc",
     "SignalError",
     "StateSpace",
+    "TimeVarying",
     "discretize",
     "from_transfer_function",
     "second_order",

@@ -1,6 +1,6 @@
 from collections.abc import Iterator
 from os import PathLike
-from typing import Any, Literal, Protocol, final
+from typing import Any, Literal, Protocol, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "ButterworthFilter",
     "Cell",
+    "ConstrainedIlc",
     "EventStream",
     "LearningError",
     "Library",
@@ -16,6 +17,7 @@ __all__ = [
     "PdIlc",
     "SignalError",
     "StateSpace",
+    "TimeVarying",
     "butterworth",
     "discretize",
     "from_transfer_function",
@@ -79,6 +81,36 @@ class StateSpace:
     def append(self, other: StateSpace | _ForeignModel) -> StateSpace: ...
     def delayed(self, n_samples: int) -> StateSpace: ...
 
+@final
+class TimeVarying:
+    def __new__(
+        cls,
+        a: ArrayLike,
+        b: ArrayLike,
+        c: ArrayLike,
+        d: ArrayLike,
+        dt_s: float,
+    ) -> TimeVarying: ...
+    @property
+    def a(self) -> NDArray[np.float64]: ...
+    @property
+    def b(self) -> NDArray[np.float64]: ...
+    @property
+    def c(self) -> NDArray[np.float64]: ...
+    @property
+    def d(self) -> NDArray[np.float64]: ...
+    @property
+    def dt_s(self) -> float | None: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def n_states(self) -> int: ...
+    @property
+    def n_inputs(self) -> int: ...
+    @property
+    def n_outputs(self) -> int: ...
+    def simulate(self, u: ArrayLike, x0: ArrayLike | None = None) -> NDArray[np.float64]: ...
+
 def from_transfer_function(
     num: ArrayLike, den: ArrayLike, dt_s: float | None = None
 ) -> StateSpace: ...
@@ -128,13 +160,64 @@ class PdIlc:
 class NormOptimalIlc:
     def __new__(
         cls,
-        model: StateSpace | _ForeignModel,
+        model: StateSpace | TimeVarying | _ForeignModel,
         n_samples: int,
-        q: float = 1.0,
-        s: float = 0.0,
-        r: float = 0.0,
+        q: ArrayLike = 1.0,
+        s: ArrayLike = 0.0,
+        r: ArrayLike = 0.0,
         rate: float = 0.0,
     ) -> NormOptimalIlc: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def q(self) -> float | NDArray[np.float64]: ...
+    @property
+    def s(self) -> float | NDArray[np.float64]: ...
+    @property
+    def r(self) -> float | NDArray[np.float64]: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def conditioning(self) -> float: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
+    ) -> NDArray[np.float64]: ...
+    def reset(self) -> None: ...
+
+_Side: TypeAlias = ArrayLike | None
+_Bounds: TypeAlias = tuple[_Side, _Side] | None
+
+@final
+class ConstrainedIlc:
+    def __new__(
+        cls,
+        model: StateSpace | _ForeignModel,
+        n_samples: int,
+        q: ArrayLike = 1.0,
+        s: ArrayLike = 0.0,
+        r: ArrayLike = 0.0,
+        rate: float = 0.0,
+        *,
+        u_bounds: _Bounds = None,
+        v_bounds: _Bounds = None,
+        step_bounds: _Bounds = None,
+        reference: ArrayLike | None = None,
+        position_bounds: _Bounds = None,
+        velocity_bounds: _Bounds = None,
+        acceleration_bounds: _Bounds = None,
+        output_bounds: _Bounds = None,
+        output_reference: ArrayLike | None = None,
+    ) -> ConstrainedIlc: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def status(self) -> Literal["untried", "solved", "infeasible", "max_iterations"]: ...
+    @property
+    def message(self) -> str: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def gap(self) -> float: ...
     def update(
         self, u: ArrayLike, e: ArrayLike, disturbance: object = None
     ) -> NDArray[np.float64]: ...

@@ -17,6 +17,7 @@ mod model;
 mod model_argument;
 mod python_law;
 mod signal;
+mod time_varying;
 
 use pyo3::prelude::*;
 
@@ -25,6 +26,7 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
+    time_varying::register(module)?;
     signal::register(module)?;
     laws::register(module)?;
     cell::register(module)?;

@@ -1,7 +1,9 @@
 //! Learning laws for Python, one a file; what they share is here.
 
+mod constrained;
 mod norm_optimal;
 mod pd;
+mod weight;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -24,5 +26,6 @@ fn held<T>(law: &Mutex<T>) -> MutexGuard<'_, T> {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<pd::PyPdIlc>()?;
+    module.add_class::<constrained::PyConstrainedIlc>()?;
     module.add_class::<norm_optimal::PyNormOptimalIlc>()
 }

@@ -71,31 +71,23 @@ pub enum LearningError {
     },
     /// The weights leave part of the input undetermined.
     #[error(
-        "with s = {s}, r = {r} and rate = {rate} the model does not determine the input at sample \
+        "with {weights} the model does not determine the input at sample \
          {sample}; give r, s or rate a value above 0"
     )]
     Undetermined {
-        /// Weight of the input.
-        s: f64,
-        /// Weight of the change.
-        r: f64,
-        /// Weight of the rate of the change.
-        rate: f64,
+        /// The weights of input, change and rate, as text.
+        weights: String,
         /// The last sample at which this happens.
         sample: usize,
     },
     /// The update itself is an unstable filter.
     #[error(
-        "with s = {s}, r = {r} and rate = {rate} the input would grow without bound along the run: \
+        "with {weights} the input would grow without bound along the run: \
          the model has a zero outside the unit circle; give r or s a value above 0"
     )]
     Unbounded {
-        /// Weight of the input.
-        s: f64,
-        /// Weight of the change.
-        r: f64,
-        /// Weight of the rate of the change.
-        rate: f64,
+        /// The weights of input, change and rate, as text.
+        weights: String,
     },
     /// The bounds contradict each other.
     #[error(transparent)]
@@ -119,8 +111,16 @@ pub(crate) fn check(
         return Err(LearningError::Length { what, found: signal.len(), n_samples, n_channels });
     }
     // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
-    let poison: f64 = signal.iter().map(|value| value * 0.0).sum();
-    if poison.is_finite() {
+    // In several sums at a time, because each would wait for its last addition.
+    let chunks = signal.chunks_exact(16);
+    let rest = chunks.remainder();
+    let mut poison = [0.0; 16];
+    for chunk in chunks {
+        for (sum, value) in poison.iter_mut().zip(chunk) {
+            *sum += value * 0.0;
+        }
+    }
+    if poison.iter().chain(rest).all(|value| value.is_finite()) {
         return Ok(());
     }
     let index = signal.iter().position(|value| !value.is_finite()).unwrap_or(0);

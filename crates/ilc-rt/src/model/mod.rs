@@ -8,9 +8,11 @@ mod connect;
 mod discretize;
 mod error;
 mod state_space;
+mod time_varying;
 mod transfer_function;
 
 pub use discretize::{Method, discretize};
 pub use error::ModelError;
 pub use state_space::StateSpace;
+pub use time_varying::TimeVarying;
 pub use transfer_function::{from_transfer_function, second_order};

@@ -7,11 +7,11 @@ use super::interior::{Interior, Parts};
 use super::reach;
 use super::riccati::{Plant, Weighing};
 use super::solver::{Places, Solver};
-use super::{Bounds, Cost};
+use super::Bounds;
 use crate::learning::LearningError;
+use crate::learning::law::norm_optimal::Cost;
 use crate::learning::law::norm_optimal::decouple::Part;
-use crate::learning::law::norm_optimal::pairing::relative_degrees;
-use crate::learning::weights::Weight;
+use crate::learning::law::norm_optimal::relative_degree::relative_degrees;
 
 /// Weight of inputs that reach nothing within the run and that nothing else determines, as a part of
 /// the largest weight.
@@ -24,7 +24,7 @@ struct Problem<'a> {
     c: DMatrix<f64>,
     d: DMatrix<f64>,
     places: Places,
-    cost: &'a Cost,
+    cost: Cost,
     bounds: &'a Bounds,
     extent: Extent,
     /// Samples at the end that model and weights need not determine.
@@ -34,17 +34,18 @@ struct Problem<'a> {
 /// Makes the solver of a group.
 pub(super) fn solver(
     part: Part,
-    cost: &Cost,
     bounds: &Bounds,
     extent: Extent,
 ) -> Result<Box<dyn Solver>, LearningError> {
-    let Part { model, inputs, outputs } = part;
-    let degrees = relative_degrees(&model)?;
+    let Part { plant, cost, inputs, outputs } = part;
+    let model = plant.borrow().at(0);
+    let is_mixed = cost.q.is_mixed(outputs.len());
+    let degrees = relative_degrees(plant.borrow(), extent.n_samples)?;
     // A weight between outputs weighs samples of the same time, so they must be shifted alike.
     let least = degrees.iter().flatten().copied().min().unwrap_or(0);
     let shifts: Vec<usize> = degrees
         .iter()
-        .map(|degree| if cost.q.is_mixed() { least } else { degree.unwrap_or(0) })
+        .map(|degree| if is_mixed { least } else { degree.unwrap_or(0) })
         .collect();
     let (mut c, mut d) = (model.c().clone(), model.d().clone());
     for (row, shift) in shifts.iter().enumerate() {
@@ -55,7 +56,7 @@ pub(super) fn solver(
             c.set_row(row, &ahead);
         }
     }
-    let inner = if inputs.len() > 1 || cost.q.is_mixed() { model.n_states() } else { 0 };
+    let inner = if inputs.len() > 1 || is_mixed { model.n_states() } else { 0 };
     let free_samples = shifts.iter().copied().max().unwrap_or(0) + inner;
     let delays = if bounds.acceleration.is_some() {
         2
@@ -142,10 +143,8 @@ impl Problem<'_> {
         let mut interior =
             Interior::<N, M, P, NS>::new(Parts { plant, weighings, which, holds, places, bands });
         if let Some(sample) = interior.undetermined(self.free_samples) {
-            let number = |weight: &Weight| weight.at(0, 1)[(0, 0)];
-            let Cost { s, r, rate, .. } = self.cost;
-            let (s, r, rate) = (number(s), number(r), *rate);
-            return Err(LearningError::Undetermined { s, r, rate, sample });
+            let weights = self.cost.told();
+            return Err(LearningError::Undetermined { weights, sample });
         }
         let reach = self.d.amax().max(self.b.amax()).max(f64::MIN_POSITIVE);
         interior.settle_free(FREE * largest * reach * reach);
@@ -157,21 +156,20 @@ impl Problem<'_> {
         let Problem { places, cost, extent, .. } = self;
         let mut output = [[0.0; P]; P];
         let (mut change, mut hold) = ([[0.0; M]; M], [[0.0; M]; M]);
-        for (i, row) in places.outputs.iter().enumerate() {
-            let sample = k + places.shifts[i];
+        for (i, shift) in places.shifts.iter().enumerate() {
+            let sample = k + shift;
             if sample >= extent.n_samples {
                 continue;
             }
-            let block = cost.q.at(sample, extent.n_outputs);
-            for (j, col) in places.outputs.iter().enumerate() {
-                output[i][j] = block[(*row, *col)];
+            for j in 0..places.outputs.len() {
+                output[i][j] = cost.q.entry(sample, i, j);
             }
         }
-        let (s, r) = (cost.s.at(k, extent.n_inputs), cost.r.at(k, extent.n_inputs));
-        for (i, row) in places.inputs.iter().enumerate() {
-            for (j, col) in places.inputs.iter().enumerate() {
-                hold[i][j] = s[(*row, *col)];
-                change[i][j] = hold[i][j] + r[(*row, *col)];
+        let m = places.inputs.len();
+        for i in 0..m {
+            for j in 0..m {
+                hold[i][j] = cost.s.entry(k, i, j);
+                change[i][j] = hold[i][j] + cost.r.entry(k, i, j);
             }
         }
         // Inputs that only fill up the size stay at zero.

@@ -14,40 +14,16 @@ mod riccati;
 mod rows;
 mod solver;
 
-use super::norm_optimal::decouple::{self, Part};
+use super::norm_optimal::decouple::parts;
+use super::norm_optimal::{Cost, Plant};
 use crate::learning::error::check;
 use crate::learning::sweep::Run;
-use crate::learning::weights::Weight;
 use crate::learning::{Law, LearningError};
 use crate::model::{ModelError, StateSpace};
 
 pub use bounds::{Bound, Bounds, BoundsError, Limit};
 use bounds::Extent;
 use solver::Solver;
-
-/// What a good next input is, bounds aside.
-///
-/// `J = sum_k |z[k]|_Q^2 + |u'[k]|_S^2 + |v[k]|_R^2 + sum_{k>=1} rate^2 |v[k] - v[k-1]|^2`
-///
-/// with `z` the predicted error, `u'` the next input and `v` its change.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cost {
-    /// Weight of the predicted error at each of its samples.
-    pub q: Weight,
-    /// Weight of the next input.
-    pub s: Weight,
-    /// Weight of the change of the input.
-    pub r: Weight,
-    /// Weight of that change from one sample to the next. Enters squared.
-    pub rate: f64,
-}
-
-impl Default for Cost {
-    fn default() -> Self {
-        let (q, s, r) = (Weight::Scalar(1.0), Weight::Scalar(0.0), Weight::Scalar(0.0));
-        Self { q, s, r, rate: 0.0 }
-    }
-}
 
 /// How the last update ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +70,8 @@ pub struct Constrained {
 }
 
 impl Constrained {
-    /// Makes the law for runs of `n_samples` samples.
+    /// Makes the law for runs of `n_samples` samples; `cost` is a [`Cost`] or
+    /// [`Weights`](super::norm_optimal::Weights).
     ///
     /// # Errors
     /// - [`LearningError::Weight`] or [`LearningError::Parameter`] for a weight that is none.
@@ -107,7 +84,7 @@ impl Constrained {
     pub fn new(
         model: &StateSpace,
         n_samples: usize,
-        cost: Cost,
+        cost: impl Into<Cost>,
         bounds: Bounds,
     ) -> Result<Self, LearningError> {
         let Some(dt_s) = model.dt_s() else {
@@ -121,25 +98,13 @@ impl Constrained {
                 return Err(LearningError::Empty { what });
             }
         }
-        cost.q.check("q", n_samples, n_outputs)?;
-        cost.s.check("s", n_samples, n_inputs)?;
-        cost.r.check("r", n_samples, n_inputs)?;
-        if !(cost.rate.is_finite() && cost.rate >= 0.0) {
-            let allowed = "a weight must be finite and not negative";
-            return Err(LearningError::Parameter { what: "rate", value: cost.rate, allowed });
-        }
+        let cost = cost.into();
+        cost.check(n_samples, n_inputs, n_outputs)?;
         let extent = Extent { n_samples, n_inputs, n_outputs, dt_s };
         bounds.check(extent)?;
-        let is_mixed = cost.q.is_mixed() || cost.s.is_mixed() || cost.r.is_mixed();
-        let parts = if is_mixed {
-            let (inputs, outputs) = ((0..n_inputs).collect(), (0..n_outputs).collect());
-            vec![Part { model: model.clone(), inputs, outputs }]
-        } else {
-            decouple::parts(model)?
-        };
-        let solvers = parts
+        let solvers = parts(Plant::Invariant(model), &cost)?
             .into_iter()
-            .map(|part| group::solver(part, &cost, &bounds, extent))
+            .map(|part| group::solver(part, &bounds, extent))
             .collect::<Result<_, _>>()?;
         let (status, iterations, gap) = (Status::Untried, 0, 0.0);
         Ok(Self { cost, bounds, extent, solvers, status, iterations, gap })
@@ -209,19 +174,10 @@ impl Law for Constrained {
     }
 
     fn describe(&self) -> String {
-        let Cost { q, s, r, rate } = &self.cost;
         let Extent { n_samples, n_inputs, n_outputs, .. } = self.extent;
-        let weight = |weight: &Weight| match weight {
-            Weight::Scalar(value) => format!("{value}"),
-            Weight::PerSample(_) => r#""per sample""#.to_owned(),
-            Weight::Block(_) => r#""block""#.to_owned(),
-            Weight::Blocks(_) => r#""block per sample""#.to_owned(),
-        };
         format!(
-            r#"{{"law":"constrained","q":{},"s":{},"r":{},"rate":{rate},"bounds":{},"n_samples":{n_samples},"n_inputs":{n_inputs},"n_outputs":{n_outputs}}}"#,
-            weight(q),
-            weight(s),
-            weight(r),
+            r#"{{"law":"constrained",{},"bounds":{},"n_samples":{n_samples},"n_inputs":{n_inputs},"n_outputs":{n_outputs}}}"#,
+            self.cost.json(),
             self.bounds.describe(self.extent),
         )
     }
