@@ -13,6 +13,7 @@ __all__ = [
     "ButterworthFilter",
     "Cascade",
     "Cell",
+    "ConstrainedIlc",
     "ContourError",
     "CrossCoupled",
     "Delta",
@@ -939,6 +940,43 @@ class CrossCoupled:
     def step(
         self, error_m: ArrayLike, gains: ArrayLike, curvature_per_m: float = 0.0
     ) -> tuple[NDArray[np.float64], float]: ...
+_Side: TypeAlias = ArrayLike | None
+_Bounds: TypeAlias = tuple[_Side, _Side] | None
+
+@final
+class ConstrainedIlc:
+    def __new__(
+        cls,
+        model: StateSpace | _ForeignModel,
+        n_samples: int,
+        q: ArrayLike = 1.0,
+        s: ArrayLike = 0.0,
+        r: ArrayLike = 0.0,
+        rate: float = 0.0,
+        *,
+        u_bounds: _Bounds = None,
+        v_bounds: _Bounds = None,
+        step_bounds: _Bounds = None,
+        reference: ArrayLike | None = None,
+        position_bounds: _Bounds = None,
+        velocity_bounds: _Bounds = None,
+        acceleration_bounds: _Bounds = None,
+        output_bounds: _Bounds = None,
+        output_reference: ArrayLike | None = None,
+    ) -> ConstrainedIlc: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def status(self) -> Literal["untried", "solved", "infeasible", "max_iterations"]: ...
+    @property
+    def message(self) -> str: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def gap(self) -> float: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
+    ) -> NDArray[np.float64]: ...
     def reset(self) -> None: ...
 
 @final

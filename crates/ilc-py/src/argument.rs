@@ -143,8 +143,24 @@ pub(crate) fn misfit(name: &str, shape: &[usize], allowed: &str) -> PyErr {
     ))
 }
 
-/// Reads any array of float64 or integers in row-major order.
+/// Reads any array of finite float64 or integers in row-major order.
 pub(crate) fn read_array(
+    name: &str,
+    object: &Bound<'_, PyAny>,
+) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let (values, shape) = read_numbers(name, object)?;
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok((values, shape)),
+        Some(index) => Err(PyValueError::new_err(format!(
+            "{name} holds {} at {}; only finite numbers are allowed",
+            values[index],
+            place(index, &shape)
+        ))),
+    }
+}
+
+/// Reads any array of float64 or integers in row-major order, infinite numbers and NaN included.
+pub(crate) fn read_numbers(
     name: &str,
     object: &Bound<'_, PyAny>,
 ) -> PyResult<(Vec<f64>, Vec<usize>)> {
@@ -163,14 +179,7 @@ pub(crate) fn read_array(
     let array = array.cast::<PyArrayDyn<f64>>()?;
     let shape = array.shape().to_vec();
     let values: Vec<f64> = array.readonly().as_array().iter().copied().collect();
-    match values.iter().position(|value| !value.is_finite()) {
-        None => Ok((values, shape)),
-        Some(index) => Err(PyValueError::new_err(format!(
-            "{name} holds {} at {}; only finite numbers are allowed",
-            values[index],
-            place(index, &shape)
-        ))),
-    }
+    Ok((values, shape))
 }
 
 /// Returns the position of a flat index as Python would write it.

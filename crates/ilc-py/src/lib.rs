@@ -13,10 +13,10 @@ mod control;
 mod detached;
 mod error;
 mod exceptions;
-mod held;
-mod kinematics;
 mod experiment;
+mod held;
 mod identify;
+mod kinematics;
 mod laws;
 mod library;
 mod model;
@@ -24,8 +24,8 @@ mod model_argument;
 mod python_law;
 mod signal;
 mod time_varying;
-mod weights;
 mod trajectory;
+mod weights;
 
 use pyo3::prelude::*;
 

@@ -2,6 +2,7 @@
 
 mod adjoint;
 mod any_size;
+mod constrained;
 mod error_feedforward;
 mod flexible;
 mod gate;
@@ -54,6 +55,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<repeatability::PyRepeatability>()?;
     module.add_function(wrap_pyfunction!(repeatability::repeatability, module)?)?;
     module.add_class::<norm_optimal::PyNormOptimalIlc>()?;
+    module.add_class::<constrained::PyConstrainedIlc>()?;
     module.add_class::<relevance_weights::PyRelevanceWeights>()?;
     module.add_class::<relevance::PyRelevanceIlc>()?;
     module.add_class::<flexible::PyFlexibleIlc>()

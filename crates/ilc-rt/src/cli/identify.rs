@@ -11,7 +11,9 @@ use crate::config::Measure;
 use crate::library::Library;
 use crate::model::identify::{Excitation, Waveform};
 use crate::record::{EndStatus, Event};
-use crate::supervisor::{self, Disturbance, Experiment, Identified, Options, Outcome, SupervisorError};
+use crate::supervisor::{
+    self, Disturbance, Experiment, Identified, Options, Outcome, SupervisorError,
+};
 
 #[derive(Args)]
 #[command(after_help = "Examples:

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::learning::law::constrained::BoundsError;
 use crate::model::ModelError;
 use crate::signal::SignalError;
 
@@ -137,6 +138,9 @@ pub enum LearningError {
         /// Its distance from the origin.
         radius: f64,
     },
+    /// The bounds contradict each other.
+    #[error(transparent)]
+    Bounds(#[from] BoundsError),
     /// The model was refused.
     #[error(transparent)]
     Model(#[from] ModelError),

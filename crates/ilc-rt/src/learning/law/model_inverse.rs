@@ -6,7 +6,7 @@ use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_counts, check_place};
 use crate::learning::operator::Operator;
 use crate::learning::{Law, LearningError};
-use crate::model::{relative_degrees, ModelError, StateSpace};
+use crate::model::{ModelError, StateSpace, relative_degrees};
 
 /// A zero nearer to the unit circle than this counts as on it: the inverse would ring for the whole
 /// run.
