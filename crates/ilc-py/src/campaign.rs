@@ -12,11 +12,12 @@ use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport::{self, loopback::InProcess};
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
-use ilc_rt::supervisor::{self, Options, SupervisorError};
+use ilc_rt::supervisor::{self, Disturbance, Options, SupervisorError};
 use ilc_sim::machine::{ClockMode, Machine};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::argument::read_disturbance;
 use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
@@ -125,6 +126,9 @@ impl Drop for EventStream {
 ///     Whether to learn at all; if not, every run is like the first.
 /// experiment : object or None
 ///     What to excite instead of running the program, as ``Experiment``.
+/// disturbance : callable or None
+///     Called with the number of each run before it begins; returns its
+///     disturbance, a number or an array of shape (n_disturbances,).
 ///
 /// Returns
 /// -------
@@ -137,7 +141,7 @@ impl Drop for EventStream {
 ///     From the iterator, before anything moves, if something cannot be used.
 #[pyfunction]
 #[pyo3(signature = (cell, iterations, library, bus=None, measure=None, lockstep=true, resume=false, law=None,
-    learning=true, experiment=None))]
+    learning=true, experiment=None, disturbance=None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 fn run_events(
     cell: &Bound<'_, PyCell>,
@@ -150,6 +154,7 @@ fn run_events(
     law: Option<&Bound<'_, PyAny>>,
     learning: bool,
     experiment: Option<&Bound<'_, PyAny>>,
+    disturbance: Option<Py<PyAny>>,
 ) -> PyResult<EventStream> {
     let mut cell: Cell = cell.get().cell.clone();
     if let Some(address) = bus {
@@ -177,6 +182,7 @@ fn run_events(
         lockstep,
         resume,
         library,
+        disturbance: disturbance.map_or_else(Disturbance::default, ask),
         telemetry: !loopback,
         stop: Arc::clone(&stop),
     };
@@ -201,6 +207,17 @@ fn run_events(
         .map(drop)
     })?;
     Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop })
+}
+
+/// Asks a Python function for the disturbance of each run.
+fn ask(measure: Py<PyAny>) -> Disturbance {
+    Disturbance::measured(move |run| {
+        Python::attach(|py| {
+            let told = measure.call1(py, (run,))?;
+            read_disturbance("disturbance", told.bind(py))
+        })
+        .map_err(|error: PyErr| error.to_string().replace('\n', " "))
+    })
 }
 
 fn open(cell: &Cell) -> Result<Box<dyn Bus>, SupervisorError> {

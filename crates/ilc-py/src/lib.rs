@@ -8,9 +8,13 @@
 mod argument;
 mod campaign;
 mod cell;
+mod contour;
+mod control;
 mod detached;
 mod error;
 mod exceptions;
+mod held;
+mod kinematics;
 mod experiment;
 mod identify;
 mod laws;
@@ -19,6 +23,8 @@ mod model;
 mod model_argument;
 mod python_law;
 mod signal;
+mod time_varying;
+mod weights;
 
 use pyo3::prelude::*;
 
@@ -27,9 +33,14 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
+    time_varying::register(module)?;
     identify::register(module)?;
     signal::register(module)?;
+    kinematics::register(module)?;
+    contour::register(module)?;
+    control::register(module)?;
     laws::register(module)?;
+    weights::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

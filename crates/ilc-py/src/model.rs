@@ -56,6 +56,12 @@ impl PyStateSpace {
     }
 }
 
+impl From<StateSpace> for PyStateSpace {
+    fn from(model: StateSpace) -> Self {
+        Self(model)
+    }
+}
+
 #[pymethods]
 impl PyStateSpace {
     #[new]

@@ -1,6 +1,7 @@
 //! What is accepted wherever a model is expected.
 
-use ilc_rt::model::{StateSpace, from_transfer_matrix};
+use ilc_rt::learning::law::norm_optimal::Plant;
+use ilc_rt::model::{StateSpace, TimeVarying, from_transfer_matrix};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
@@ -8,6 +9,7 @@ use pyo3::types::PyBool;
 use crate::argument::{Matrix, read_matrix, read_vector};
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
+use crate::time_varying::PyTimeVarying;
 
 /// Reads a model: one of ours, or one of scipy.signal or python-control. State-space objects have the
 /// attributes `A`, `B`, `C`, `D` and `dt`; scipy's other kinds have a method `to_ss`, and
@@ -64,6 +66,38 @@ fn read_time_base(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Option<f64>
         )));
     }
     read_sample_time(&format!("{name}.dt"), &dt)
+}
+
+/// A model that may vary along the run.
+#[derive(Debug)]
+pub(crate) enum AnyModel {
+    Invariant(StateSpace),
+    Varying(TimeVarying),
+}
+
+impl AnyModel {
+    pub(crate) fn plant(&self) -> Plant<'_> {
+        match self {
+            Self::Invariant(model) => model.into(),
+            Self::Varying(model) => model.into(),
+        }
+    }
+
+    pub(crate) fn n_inputs(&self) -> usize {
+        self.plant().at(0).n_inputs()
+    }
+
+    pub(crate) fn n_outputs(&self) -> usize {
+        self.plant().at(0).n_outputs()
+    }
+}
+
+/// Reads a `TimeVarying`, or whatever [`read_model`] does.
+pub(crate) fn read_any_model(name: &str, object: &Bound<'_, PyAny>) -> PyResult<AnyModel> {
+    if let Ok(own) = object.cast::<PyTimeVarying>() {
+        return Ok(AnyModel::Varying(own.get().model().clone()));
+    }
+    read_model(name, object).map(AnyModel::Invariant)
 }
 
 /// Reads a sample time: `None` and 0 both mean continuous.

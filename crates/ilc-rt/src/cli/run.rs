@@ -12,7 +12,7 @@ use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show};
 use crate::config::{Cell, LawName, Measure};
 use crate::fieldbus::{Bus, transport};
 use crate::record::{EndStatus, Event};
-use crate::supervisor::{self, Options, Outcome, SupervisorError};
+use crate::supervisor::{self, Disturbance, Options, Outcome, SupervisorError};
 
 #[derive(Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]

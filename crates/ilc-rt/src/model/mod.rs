@@ -14,6 +14,7 @@ mod minimal;
 mod relative_degree;
 mod sensitivity;
 mod state_space;
+mod time_varying;
 mod transfer_function;
 mod zeros;
 
@@ -23,4 +24,5 @@ pub use frequency::{Bode, unwrap_phase};
 pub use minimal::from_transfer_matrix;
 pub use relative_degree::{delays, relative_degrees};
 pub use state_space::StateSpace;
+pub use time_varying::TimeVarying;
 pub use transfer_function::{from_transfer_function, second_order};

@@ -6,9 +6,10 @@ use std::sync::atomic::AtomicI32;
 
 use super::announce::Announcer;
 use super::collect::Collector;
+use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
-use super::learner::Learner;
+use super::learner::{Learner, expect};
 use super::pace::Pacer;
 use super::plan::Plan;
 use super::progress::{Decision, Progress, Resumed};
@@ -39,6 +40,8 @@ pub struct Options {
     pub resume: bool,
     /// Where every run is kept.
     pub library: PathBuf,
+    /// What is measured of each run's surroundings: kept with the run, and told to the law.
+    pub disturbance: Disturbance,
     /// Whether to publish on Zenoh.
     pub telemetry: bool,
     /// Set to a signal's number to bring the axes to rest.
@@ -125,10 +128,14 @@ fn carry_out(
     let rollback_ratio = if law.is_some() { cell.learning.rollback_ratio } else { f64::INFINITY };
     let mut progress = Progress::new(rollback_ratio);
     let resumed = if options.resume {
-        progress.resume(&library, &mut plan.meta, law.as_deref_mut())?
+        progress.resume(&library, &mut plan.meta, law.as_deref_mut(), &options.disturbance)?
     } else {
         plan.meta.campaign = library.new_campaign()?;
-        Resumed::default()
+        let coming = options.disturbance.of(0).map_err(SupervisorError::Disturbance)?;
+        if let Some(law) = law.as_deref_mut() {
+            expect(law, &coming);
+        }
+        Resumed { coming, ..Resumed::default() }
     };
     let learner = match law {
         Some(law) if options.lockstep => Some(Learner::in_line(law)),
@@ -198,6 +205,9 @@ fn carry_out(
         progress,
         learner,
         runs: resumed.runs,
+        disturbance: options.disturbance.clone(),
+        present: resumed.coming,
+        iterations: options.iterations,
         mail,
         stopping: None,
         failure: None,
@@ -232,6 +242,10 @@ struct Running<'a> {
     progress: Progress,
     learner: Option<Learner>,
     runs: Vec<(u32, Figures)>,
+    disturbance: Disturbance,
+    /// Disturbance of the run that is on, or about to be.
+    present: Vec<f64>,
+    iterations: u32,
     mail: Mailbox,
     stopping: Option<StopReason>,
     /// Why no more runs can be kept, if so: the axes are stopped, as nothing may be lost.
@@ -285,16 +299,29 @@ impl Running<'_> {
             return;
         };
         record.figures.overruns = overruns;
-        self.progress.note(&mut record);
-        match self.progress.decide(&mut record) {
-            Decision::Learn => {
-                if let Some(learner) = &mut self.learner {
-                    self.progress.asked();
-                    learner.begin(&record.input, &record.error_m);
+        record.disturbance = std::mem::take(&mut self.present);
+        if record.index + 1 < self.iterations {
+            match self.disturbance.of(record.index + 1) {
+                Ok(coming) => self.present = coming,
+                Err(why) => {
+                    self.keep(&record);
+                    self.fail(why);
+                    return;
                 }
             }
-            Decision::RollBack(input) => self.progress.send(&mut self.mail, input, 0.0),
-            Decision::Hold => {}
+        }
+        self.progress.note(&mut record);
+        let decision = self.progress.decide(&mut record);
+        if let Some(learner) = &mut self.learner {
+            if decision == Decision::Learn {
+                self.progress.asked();
+                learner.begin(&record.input, &record.error_m, &self.present);
+            } else {
+                learner.pass(&self.present);
+            }
+        }
+        if let Decision::RollBack(input) = decision {
+            self.progress.send(&mut self.mail, input, 0.0);
         }
         self.keep(&record);
     }

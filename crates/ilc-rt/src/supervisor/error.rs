@@ -12,6 +12,9 @@ use crate::trajectory::TrajectoryError;
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
 pub enum SupervisorError {
+    /// The disturbance of the first run could not be had.
+    #[error("{0}")]
+    Disturbance(String),
     /// The cell description.
     #[error("{0}")]
     Config(#[from] ConfigError),

@@ -7,6 +7,7 @@
 mod announce;
 mod campaign;
 mod collect;
+mod disturbance;
 mod error;
 mod experiment;
 mod identified;
@@ -19,6 +20,7 @@ mod reason;
 mod telemetry;
 
 pub use campaign::{Options, Outcome, identify, run};
+pub use disturbance::Disturbance;
 pub use error::SupervisorError;
 pub use experiment::Experiment;
 pub use identified::{Described, Identified};

@@ -12,7 +12,8 @@ use crate::fieldbus::cia402::{Mode, Scale};
 use crate::fieldbus::load;
 use crate::learning::Law;
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
-use crate::learning::law::pd::{Pd, PdGains, QFilter};
+use crate::learning::law::pd::{Pd, PdGains};
+use crate::learning::law::q_filter::QFilter;
 use crate::model::{
     Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
 };
