@@ -49,6 +49,9 @@ FROM_HZ = 1.0
 TO_HZ = 50.0
 DURATION_S = 8.0
 PERIODS = 5
+# Below this median coherence, and above this relative residual, a model is not to be used.
+COHERENCE_MIN = 0.7
+RESIDUAL_MAX = 0.4
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,23 @@ class Identification:
     def coherence(self) -> Array:
         """Coherence of input and output, shape (n_frequencies,)."""
         return self.measured.coherence
+
+    @property
+    def doubt(self) -> str | None:
+        """Why the model should not be used; None if nothing speaks against it."""
+        trust = float(np.median(self.coherence))
+        if trust < COHERENCE_MIN:
+            return (
+                f"the output hardly follows the input (median coherence {trust:.2f}, "
+                f"{COHERENCE_MIN} is needed): the axis sticks or the amplitude is lost in noise"
+            )
+        left = self.described.residual_rms
+        if left > RESIDUAL_MAX:
+            return (
+                f"the model leaves {left * 100:.0f} % unexplained ({RESIDUAL_MAX * 100:.0f} % at "
+                "most): friction, or a resonance that a second-order model does not have"
+            )
+        return None
 
     def uncertainty_on_grid(self, count: int = 257) -> Array:
         """Return the bound at equally spaced frequencies from 0 to Nyquist.
@@ -187,6 +207,7 @@ class Identification:
             },
             "uncertainty": {"frequency_hz": bound[0].tolist(), "bound": bound[1].tolist()},
             "axis_model": self.section(),
+            "doubt": self.doubt,
         }
 
     def write_json(self, path: str | Path) -> None:

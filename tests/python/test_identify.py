@@ -291,6 +291,19 @@ def test_the_command_writes_figures_picture_and_section(ilc, bench, tmp_path):
     assert "--amplitude-m" in wrong.stderr
 
 
+def test_an_axis_that_sticks_gets_no_model(ilc, bench, tmp_path):
+    friction = "mass_kg = 20.0\ncoulomb_n = 60.0\nstatic_n = 90.0"
+    bench.write_text(CELL.replace("mass_kg = 20.0", friction))
+    done = ilc(
+        "identify", bench, "--axis", "x", "--amplitude-m", "0.00002", "--to-hz", "20",
+        "--duration-s", "5", "--periods", "2", "--json", "x.json",
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "no model for axis x" in done.stderr
+    assert "[axis.model]" not in done.stdout
+    assert json.loads((tmp_path / "x.json").read_text())["doubt"]
+
+
 def test_what_was_identified_can_be_pasted_back(bench):
     found = identify.multisine(bench, axis="x", from_hz=1.0, to_hz=20.0, duration_s=5.0, periods=2)
     old = "[axis.model]\nnatural_frequency_hz = 5.0\ndamping = 1.0\n"

@@ -69,7 +69,7 @@ pub(crate) struct Runs {
 impl Runs {
     /// Reads `(n_runs, n_samples)` or `(n_runs, n_samples, n_channels)`.
     pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (values, shape) = read(name, object)?;
+        let (values, shape) = read_array(name, object)?;
         let (n_runs, n_samples, n_channels, is_flat) = match shape[..] {
             [n_runs, n_samples] => (n_runs, n_samples, 1, true),
             [n_runs, n_samples, n_channels] => (n_runs, n_samples, n_channels, false),
@@ -103,7 +103,7 @@ pub(crate) fn read_vector(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec
 
 /// Reads a disturbance: a single number or a list of them.
 pub(crate) fn read_disturbance(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let (values, shape) = read(name, object)?;
+    let (values, shape) = read_array(name, object)?;
     if shape.len() <= 1 && !values.is_empty() {
         return Ok(values);
     }

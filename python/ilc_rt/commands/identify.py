@@ -18,7 +18,7 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
-from ilc_rt.errors import BadInputError
+from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import Event, StartEvent
 
 PICTURE = "identify-{axis}.png"
@@ -101,6 +101,11 @@ def identify(
     if report is not None:
         typer.echo(f"picture: {_draw(found, report, PICTURE.format(axis=name))}")
 
+    if found.doubt is not None:
+        # What was measured is written all the same: it shows what is wrong.
+        message = f"no model for axis {name}: {found.doubt}; try a larger amplitude or another band"
+        raise CampaignError(message)
+
 
 def _amplitude(interface: str, in_m: float | None, in_m_s: float | None) -> float | None:
     """Return the one amplitude that fits the interface of the axis."""
@@ -123,7 +128,8 @@ def _tell(found: object) -> None:
     )
     for name, value, deviation in found.rows():
         typer.echo(f"  {name:<24} {value:>10}{f'  +- {deviation}' if deviation else ''}")
-    typer.echo(f"\n{found.section()}")
+    if found.doubt is None:
+        typer.echo(f"\n{found.section()}")
 
 
 def _draw(found: object, folder: Path, name: str) -> Path:

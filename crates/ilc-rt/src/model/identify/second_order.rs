@@ -13,7 +13,13 @@ const FREQUENCIES: usize = 16;
 /// Damping ratios tried to begin from.
 const DAMPINGS: [f64; 4] = [0.05, 0.2, 0.7, 1.5];
 /// Starts that are followed to their minimum.
-const FOLLOWED: usize = 4;
+const FOLLOWED: usize = 6;
+/// Delays tried to begin from, in periods of the highest frequency.
+const DELAYS: [f64; 5] = [0.0, 0.1, 0.25, 0.5, 1.0];
+/// Natural frequencies may lie outside the band by this factor.
+const BEYOND_BAND: f64 = 30.0;
+/// Damping ratios that are searched.
+const DAMPING_RANGE: (f64, f64) = (1e-4, 100.0);
 
 /// A second-order model with delay.
 ///
@@ -137,13 +143,35 @@ struct Fit<'a> {
     known: Known,
     /// Unit of the delay: a radian at the highest frequency.
     tau_0: f64,
+    /// Delays that are searched: from half a period of the highest frequency too early to where the
+    /// spacing of the frequencies no longer tells turns apart.
+    delay_range_s: (f64, f64),
 }
 
 impl<'a> Fit<'a> {
     fn new(measured: &'a FrequencyResponse, dt_s: Option<f64>, known: Known) -> Self {
         let highest_hz = measured.frequency_hz.last().copied().unwrap_or(1.0);
         let root_weight = measured.weights().iter().map(|weight| weight.sqrt()).collect();
-        Self { measured, root_weight, dt_s, known, tau_0: 1.0 / (TAU * highest_hz) }
+        let f = &measured.frequency_hz;
+        let gap_hz = f.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+        Self {
+            measured,
+            root_weight,
+            dt_s,
+            known,
+            tau_0: 1.0 / (TAU * highest_hz),
+            delay_range_s: (-0.5 / highest_hz, 0.5 / gap_hz),
+        }
+    }
+
+    /// Whether a model lies where one is looked for.
+    fn is_searched(&self, model: &SecondOrder) -> bool {
+        let f = &self.measured.frequency_hz;
+        let (low_hz, high_hz) = (f[0] / BEYOND_BAND, f[f.len() - 1] * BEYOND_BAND);
+        let (early_s, late_s) = self.delay_range_s;
+        (low_hz..=high_hz).contains(&model.natural_frequency_hz)
+            && (DAMPING_RANGE.0..=DAMPING_RANGE.1).contains(&model.damping)
+            && (self.known.delay_s.is_some() || (early_s..=late_s).contains(&model.delay_s))
     }
 
     fn model(&self, x: &[f64], sign: Sign) -> SecondOrder {
@@ -161,6 +189,9 @@ impl<'a> Fit<'a> {
     fn residuals(&self, x: &[f64], sign: Sign) -> DVector<f64> {
         let model = self.model(x, sign);
         let n = self.root_weight.len();
+        if !self.is_searched(&model) {
+            return DVector::from_element(2 * n, f64::INFINITY);
+        }
         let mut residuals = DVector::zeros(2 * n);
         let shape = model.shape();
         for (k, weight) in self.root_weight.iter().enumerate() {
@@ -213,10 +244,16 @@ impl<'a> Fit<'a> {
                     if self.known.gain.is_none() {
                         start.push(log / all);
                     }
-                    if self.known.delay_s.is_none() {
-                        start.push(num / den / self.tau_0);
+                    if self.known.delay_s.is_some() {
+                        starts.push((start, sign));
+                        continue;
                     }
-                    starts.push((start, sign));
+                    // The phase's slope says what the delay is, unless noise made it jump.
+                    for tau in DELAYS.iter().map(|t| TAU * t).chain([num / den / self.tau_0]) {
+                        let mut start = start.clone();
+                        start.push(tau);
+                        starts.push((start, sign));
+                    }
                 }
             }
         }
@@ -394,6 +431,26 @@ mod tests {
         assert!(
             found.natural_frequency_deviation_hz < 1e-3 * fooled.natural_frequency_deviation_hz
         );
+    }
+
+    #[test]
+    fn a_response_without_sense_ends_in_some_model_and_says_how_bad_it_is() {
+        let mut state = 7_u64;
+        let mut random = || {
+            state =
+                state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let frequency_hz = band();
+        let response = frequency_hz.iter().map(|_| Complex::new(random(), random())).collect();
+        let n = frequency_hz.len();
+        let noise =
+            FrequencyResponse { frequency_hz, response, coherence: vec![0.5; n], n_averages: 2.0 };
+        for dt_s in [None, Some(2e-3)] {
+            let found = fit_second_order(&noise, dt_s, Known::default()).unwrap();
+            assert!(found.residual_rms > 0.8, "{found:?}");
+            assert!(found.model.delay_s.abs() <= 1.0 && found.model.natural_frequency_hz < 2400.0);
+        }
     }
 
     #[test]

@@ -11,6 +11,8 @@ use crate::model::ModelError;
 
 /// Bandwidths tried over the band, and above it, to begin from.
 const BANDWIDTHS: usize = 8;
+/// Bandwidths may lie outside the band by this factor.
+const BEYOND_BAND: f64 = 100.0;
 
 /// A first-order velocity loop with delay, in a position loop that is closed in the controller.
 ///
@@ -89,6 +91,12 @@ pub fn fit_velocity_loop(
     };
     let residuals = |x: &[f64]| {
         let model = model(x);
+        let bandwidths_hz = f[0] / BEYOND_BAND..=f[f.len() - 1] * BEYOND_BAND;
+        let is_plausible =
+            delay_s.is_some() || (-0.5..=10.0).contains(&(model.delay_s * f[f.len() - 1]));
+        if !bandwidths_hz.contains(&model.bandwidth_hz) || !is_plausible {
+            return DVector::from_element(2 * f.len(), f64::INFINITY);
+        }
         let mut residuals = DVector::zeros(2 * f.len());
         for (k, weight) in root_weight.iter().enumerate() {
             let ratio = measured.response[k] / model.at(f[k]);
