@@ -87,6 +87,11 @@ impl Weight {
         }
     }
 
+    /// Returns whether the weight ties any of `p` channels to another.
+    pub fn is_mixed(&self, p: usize) -> bool {
+        (0..p).any(|row| (0..row).any(|col| self.couples(row, col)))
+    }
+
     /// Refuses a weight that does not fit or is not positive semidefinite.
     ///
     /// # Errors

@@ -104,12 +104,12 @@ impl Cost {
     }
 
     /// Returns what the errors say of the weights that keep the input determined.
-    pub(super) fn told(&self) -> String {
+    pub(in crate::learning::law) fn told(&self) -> String {
         format!("s = {}, r = {} and rate = {}", told(&self.s), told(&self.r), self.rate)
     }
 
     /// Returns the weights as members of a JSON object.
-    pub(super) fn json(&self) -> String {
+    pub(in crate::learning::law) fn json(&self) -> String {
         let json = |weight: &Weight| match weight {
             Weight::Scalar(value) => value.to_string(),
             other => format!(r#""{}""#, told(other)),

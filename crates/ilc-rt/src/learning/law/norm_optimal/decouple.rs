@@ -9,11 +9,11 @@ use crate::model::{ModelError, StateSpace, TimeVarying};
 /// One group of coupled axes: its model, its cost, and where its signals lie among those of the
 /// machine.
 #[derive(Debug)]
-pub(super) struct Part {
-    pub(super) plant: OwnPlant,
-    pub(super) cost: Cost,
-    pub(super) inputs: Vec<usize>,
-    pub(super) outputs: Vec<usize>,
+pub(in crate::learning::law) struct Part {
+    pub(in crate::learning::law) plant: OwnPlant,
+    pub(in crate::learning::law) cost: Cost,
+    pub(in crate::learning::law) inputs: Vec<usize>,
+    pub(in crate::learning::law) outputs: Vec<usize>,
 }
 
 /// Returns the groups that the zeros of `A`, `B`, `C`, `D` and of the weights leave unconnected at
@@ -21,7 +21,7 @@ pub(super) struct Part {
 ///
 /// Every input is in exactly one group. Outputs and states that no input can be connected to have no
 /// part in learning.
-pub(super) fn parts(plant: Plant, cost: &Cost) -> Result<Vec<Part>, ModelError> {
+pub(in crate::learning::law) fn parts(plant: Plant, cost: &Cost) -> Result<Vec<Part>, ModelError> {
     let first = plant.at(0);
     let (n, m, p) = (first.n_states(), first.n_inputs(), first.n_outputs());
     let (state, input, output) = (|i: usize| i, |i: usize| n + i, |i: usize| n + m + i);

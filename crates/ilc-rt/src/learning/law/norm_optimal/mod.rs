@@ -1,12 +1,12 @@
 //! Norm-optimal learning: the input that a quadratic cost over the whole run asks for.
 
 mod cost;
-mod decouple;
+pub(super) mod decouple;
 #[cfg(test)]
 mod oracle;
 mod pairing;
-mod plant;
-mod relative_degree;
+pub(super) mod plant;
+pub(super) mod relative_degree;
 
 pub use cost::{Cost, Weights};
 pub use pairing::Paired;

@@ -64,13 +64,13 @@ impl<'a> Plant<'a> {
 
 /// A model that a group of axes owns.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum OwnPlant {
+pub(in crate::learning::law) enum OwnPlant {
     Invariant(StateSpace),
     Varying(TimeVarying),
 }
 
 impl OwnPlant {
-    pub(super) fn borrow(&self) -> Plant<'_> {
+    pub(in crate::learning::law) fn borrow(&self) -> Plant<'_> {
         match self {
             Self::Invariant(model) => Plant::Invariant(model),
             Self::Varying(model) => Plant::Varying(model),

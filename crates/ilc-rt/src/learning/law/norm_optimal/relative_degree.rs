@@ -8,7 +8,7 @@ const ROUNDING: f64 = 1e-13;
 
 /// Returns, for each output, the smallest lag at which some input shows in it, or `None` if none
 /// ever does.
-pub(super) fn relative_degrees(
+pub(in crate::learning::law) fn relative_degrees(
     plant: Plant,
     n_samples: usize,
 ) -> Result<Vec<Option<usize>>, ModelError> {
