@@ -37,7 +37,7 @@ impl Pivots {
 /// Replaces the lower triangle of `h` (m x m, by columns) by `L` with `h = L L'`.
 ///
 /// The column of a direction that vanished is zero. Only the first `counted` pivots are reported.
-#[inline(always)]
+#[inline]
 pub(super) fn factorize(h: &mut [f64], m: usize, counted: usize) -> Pivots {
     let (mut pivots, mut others) = (Pivots::NONE, Pivots::NONE);
     for j in 0..m {
@@ -67,7 +67,7 @@ pub(super) fn factorize(h: &mut [f64], m: usize, counted: usize) -> Pivots {
 
 /// Replaces each entry of the diagonal by its reciprocal, or 0 where the direction vanished: the
 /// form that [`solve`] takes, because a product is much quicker than a quotient.
-#[inline(always)]
+#[inline]
 pub(super) fn invert_diagonal(lower: &mut [f64], m: usize) {
     for j in 0..m {
         let pivot = &mut lower[j * m + j];
@@ -77,7 +77,7 @@ pub(super) fn invert_diagonal(lower: &mut [f64], m: usize) {
 
 /// Replaces `x` by `H^-1 x`, zero in the directions that vanished; `lower` by columns, its diagonal
 /// [inverted](invert_diagonal).
-#[inline(always)]
+#[inline]
 pub(super) fn solve(lower: &[f64], m: usize, x: &mut [f64]) {
     for row in 0..m {
         let mut value = x[row];
@@ -90,7 +90,7 @@ pub(super) fn solve(lower: &[f64], m: usize, x: &mut [f64]) {
 }
 
 /// Replaces `x` by `L'^-1 x`, zero in the directions that vanished.
-#[inline(always)]
+#[inline]
 pub(super) fn solve_transposed(lower: &[f64], m: usize, x: &mut [f64]) {
     for row in (0..m).rev() {
         let mut value = x[row];

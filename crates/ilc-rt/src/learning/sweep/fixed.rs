@@ -94,7 +94,7 @@ fn sweep<const N: usize, const M: usize, const P: usize>(
 }
 
 /// Adds a column times a factor, its first rows to one sum and the others to another.
-#[inline(always)]
+#[inline]
 fn add<const N: usize, const M: usize>(
     first: &mut [f64; N],
     others: &mut [f64; M],

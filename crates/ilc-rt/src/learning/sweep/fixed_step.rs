@@ -124,7 +124,7 @@ fn sized<const N: usize, const M: usize, const P: usize>(
     pivots
 }
 
-#[inline(always)]
+#[inline]
 fn read<const R: usize, const C: usize>(values: &[f64]) -> Columns<R, C> {
     let mut matrix = [[0.0; R]; C];
     for (column, values) in matrix.iter_mut().zip(values.chunks_exact(R)) {
@@ -133,12 +133,12 @@ fn read<const R: usize, const C: usize>(values: &[f64]) -> Columns<R, C> {
     matrix
 }
 
-#[inline(always)]
+#[inline]
 fn transposed<const R: usize, const C: usize>(matrix: &Columns<R, C>) -> Columns<C, R> {
     std::array::from_fn(|col| std::array::from_fn(|row| matrix[row][col]))
 }
 
-#[inline(always)]
+#[inline]
 fn product<const R: usize, const K: usize, const C: usize>(
     left: &Columns<R, K>,
     right: &Columns<K, C>,
@@ -149,7 +149,7 @@ fn product<const R: usize, const K: usize, const C: usize>(
 }
 
 /// `sum += left right`.
-#[inline(always)]
+#[inline]
 fn add_product<const R: usize, const K: usize, const C: usize>(
     sum: &mut Columns<R, C>,
     left: &Columns<R, K>,

@@ -109,7 +109,7 @@ impl General {
 }
 
 /// Adds each column times its factor.
-#[inline(always)]
+#[inline]
 fn add(sum: &mut [f64], columns: &mut std::slice::ChunksExact<f64>, factors: &[f64]) {
     for (factor, column) in factors.iter().zip(columns) {
         for (value, entry) in sum.iter_mut().zip(column) {

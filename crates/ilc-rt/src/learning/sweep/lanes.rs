@@ -65,7 +65,7 @@ impl Cut {
     ///
     /// `last` is the costate after the last block; `meanwhile` is told the costate at the start of
     /// this one and returns the state there.
-    #[inline(always)]
+    #[inline]
     pub(super) fn solve<const HELD: bool, const N: usize>(
         &mut self,
         gains: &Fixed<N>,
@@ -143,7 +143,7 @@ struct Channel {
 
 impl Channel {
     /// Fetches a tile for each lane, from the samples `at`.
-    #[inline(always)]
+    #[inline]
     fn load(self, signal: &[f64], at: [usize; LANES], tile: &mut Tile) {
         for lane in 0..LANES {
             let from = &signal[at[lane] * self.stride + self.offset..];
@@ -162,7 +162,7 @@ impl Channel {
     }
 
     /// Writes the input plus its change.
-    #[inline(always)]
+    #[inline]
     fn store(self, run: &mut Run, at: [usize; LANES], change: &Tile) {
         for lane in 0..LANES {
             let begin = at[lane] * self.stride + self.offset;
@@ -185,7 +185,7 @@ impl Channel {
     }
 }
 
-#[inline(always)]
+#[inline]
 fn backward<const HELD: bool, const N: usize>(
     gains: &Fixed<N>,
     costate: &mut [Lanes; N],
@@ -222,7 +222,7 @@ fn backward<const HELD: bool, const N: usize>(
     kappa
 }
 
-#[inline(always)]
+#[inline]
 fn forward<const N: usize>(gains: &Fixed<N>, state: &mut [Lanes; N], kappa: &Lanes) -> Lanes {
     let mut change = *kappa;
     let mut later = [[0.0; LANES]; N];

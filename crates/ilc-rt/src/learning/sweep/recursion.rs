@@ -222,7 +222,7 @@ impl Recursion {
 }
 
 /// `out = left right`, (rows, inner) times (inner, cols).
-#[inline(always)]
+#[inline]
 fn multiply(out: &mut [f64], left: &[f64], right: &[f64], rows: usize, inner: usize, cols: usize) {
     for j in 0..cols {
         let out = &mut out[j * rows..(j + 1) * rows];
@@ -238,7 +238,7 @@ fn multiply(out: &mut [f64], left: &[f64], right: &[f64], rows: usize, inner: us
 }
 
 /// `out -= left right`, (rows, inner) times (inner, cols).
-#[inline(always)]
+#[inline]
 fn subtract(out: &mut [f64], left: &[f64], right: &[f64], rows: usize, inner: usize, cols: usize) {
     for j in 0..cols {
         let out = &mut out[j * rows..(j + 1) * rows];
@@ -253,7 +253,7 @@ fn subtract(out: &mut [f64], left: &[f64], right: &[f64], rows: usize, inner: us
 }
 
 /// `out += left' right`, left (inner, rows), right (inner, cols).
-#[inline(always)]
+#[inline]
 fn add_transposed(
     out: &mut [f64],
     left: &[f64],
