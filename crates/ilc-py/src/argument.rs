@@ -21,7 +21,7 @@ pub(crate) struct Signal {
 impl Signal {
     /// Reads `(n_samples,)` or `(n_samples, n_channels)`.
     pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (values, shape) = read(name, object)?;
+        let (values, shape) = read_array(name, object)?;
         let (n_samples, n_channels, is_flat) = match shape[..] {
             [n_samples] => (n_samples, 1, true),
             [n_samples, n_channels] => (n_samples, n_channels, false),
@@ -69,7 +69,7 @@ pub(crate) struct Runs {
 impl Runs {
     /// Reads `(n_runs, n_samples)` or `(n_runs, n_samples, n_channels)`.
     pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (values, shape) = read(name, object)?;
+        let (values, shape) = read_array(name, object)?;
         let (n_runs, n_samples, n_channels, is_flat) = match shape[..] {
             [n_runs, n_samples] => (n_runs, n_samples, 1, true),
             [n_runs, n_samples, n_channels] => (n_runs, n_samples, n_channels, false),
@@ -87,7 +87,7 @@ impl Runs {
 
 /// Reads a matrix; a single number stands for a 1 x 1 one.
 pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Matrix> {
-    let (values, shape) = read(name, object)?;
+    let (values, shape) = read_array(name, object)?;
     match shape[..] {
         [] => Ok(Matrix::from_element(1, 1, values[0])),
         [rows, cols] => Ok(Matrix::from_row_slice(rows, cols, &values)),
@@ -97,8 +97,17 @@ pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Mat
 
 /// Reads a list of numbers with exactly one axis.
 pub(crate) fn read_vector(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let (values, shape) = read(name, object)?;
+    let (values, shape) = read_array(name, object)?;
     if shape.len() == 1 { Ok(values) } else { Err(misfit(name, &shape, "one axis, (n,)")) }
+}
+
+/// Reads a disturbance: a single number or a list of them.
+pub(crate) fn read_disturbance(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let (values, shape) = read_array(name, object)?;
+    if shape.len() <= 1 && !values.is_empty() {
+        return Ok(values);
+    }
+    Err(misfit(name, &shape, "a number or (n_disturbances,)"))
 }
 
 /// Returns a time-first signal to Python, without channel axis if `is_flat`.
@@ -134,8 +143,27 @@ pub(crate) fn misfit(name: &str, shape: &[usize], allowed: &str) -> PyErr {
     ))
 }
 
-/// Reads any array of float64 or integers in row-major order.
-fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+/// Reads any array of finite float64 or integers in row-major order.
+pub(crate) fn read_array(
+    name: &str,
+    object: &Bound<'_, PyAny>,
+) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let (values, shape) = read_numbers(name, object)?;
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok((values, shape)),
+        Some(index) => Err(PyValueError::new_err(format!(
+            "{name} holds {} at {}; only finite numbers are allowed",
+            values[index],
+            place(index, &shape)
+        ))),
+    }
+}
+
+/// Reads any array of float64 or integers in row-major order, infinite numbers and NaN included.
+pub(crate) fn read_numbers(
+    name: &str,
+    object: &Bound<'_, PyAny>,
+) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let numpy = object.py().import("numpy")?;
     let array = numpy.call_method1("asarray", (object,)).map_err(|error| {
         PyValueError::new_err(format!("{name} is no array of numbers: {error}"))
@@ -151,14 +179,7 @@ fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>
     let array = array.cast::<PyArrayDyn<f64>>()?;
     let shape = array.shape().to_vec();
     let values: Vec<f64> = array.readonly().as_array().iter().copied().collect();
-    match values.iter().position(|value| !value.is_finite()) {
-        None => Ok((values, shape)),
-        Some(index) => Err(PyValueError::new_err(format!(
-            "{name} holds {} at {}; only finite numbers are allowed",
-            values[index],
-            place(index, &shape)
-        ))),
-    }
+    Ok((values, shape))
 }
 
 /// Returns the position of a flat index as Python would write it.

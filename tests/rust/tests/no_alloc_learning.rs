@@ -6,12 +6,15 @@ use ilc_rt::learning::Law;
 use ilc_rt::learning::gate::{Gate, GateRule};
 use ilc_rt::learning::ladder::{Ladder, LadderRule};
 use ilc_rt::learning::law::adjoint::Adjoint;
+use ilc_rt::learning::law::dynamic::DynamicNormOptimal;
 use ilc_rt::learning::law::error_feedforward::{ErrorFeedforward, Feedforward};
 use ilc_rt::learning::law::model_inverse::ModelInverse;
-use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
+use ilc_rt::learning::law::norm_optimal::{Cost, NormOptimal, Paired, Weights};
 use ilc_rt::learning::law::pd::{Pd, PdGains};
 use ilc_rt::learning::law::q_filter::QFilter;
-use ilc_rt::model::{Method, StateSpace, discretize, second_order};
+use ilc_rt::learning::sweep::{Form, Gains};
+use ilc_rt::learning::weights::{Dynamic, Weight};
+use ilc_rt::model::{Method, StateSpace, TimeVarying, discretize, second_order};
 use ilc_rt::signal::{FirFilter, GaussianFilter, Segment, SwitchedFilter, butterworth};
 use ilc_tests::counting::{Counting, allocations};
 
@@ -61,7 +64,16 @@ fn no_law_allocates_in_an_update() {
     let weights = Weights { q: 1.0, s: 0.0, r: 1e-6, rate: 3.0 };
     let sections = || butterworth(2, 50.0, 4e-3).unwrap();
     let gains = PdGains { kp: 1.0, kd: 3.25, lead: 1 };
+    let samples = TimeVarying::new(vec![separate.clone(); N_SAMPLES]).unwrap();
+    let filter = Dynamic::new(axis(0.8).append(&axis(0.9)).unwrap()).unwrap();
+    let filter = filter.with_plain(Weight::Scalar(0.1));
+    let turning = (0..N_SAMPLES).map(|k| nalgebra::DMatrix::identity(2, 2) * (k as f64).cos());
+    let turned = filter.clone().with_coupling(turning.collect()).unwrap();
     let mut laws: Vec<Box<dyn Law>> = vec![
+        Box::new(DynamicNormOptimal::new(&separate, N_SAMPLES, &filter, weights).unwrap()),
+        Box::new(DynamicNormOptimal::new(&separate, N_SAMPLES, &turned, weights).unwrap()),
+        Box::new(NormOptimal::new(&separate, N_SAMPLES, contour()).unwrap()),
+        Box::new(NormOptimal::new(&samples, N_SAMPLES, weights).unwrap()),
         Box::new(NormOptimal::new(&separate, N_SAMPLES, weights).unwrap()),
         Box::new(NormOptimal::new(&coupled, N_SAMPLES, weights).unwrap()),
     ];
@@ -83,6 +95,28 @@ fn no_law_allocates_in_an_update() {
     }
     for law in &mut laws {
         assert_eq!(allocations_of_an_update(law.as_mut()), 0, "{}", law.describe());
+    }
+}
+
+/// A weight that couples the axes, another at every sample.
+fn contour() -> Cost {
+    let block = |k: usize| {
+        let (s, c) = (k as f64 * 0.01).sin_cos();
+        nalgebra::DMatrix::from_row_slice(2, 2, &[c * c + 0.1, c * s, c * s, s * s + 0.1])
+    };
+    let q = Weight::Blocks((0..N_SAMPLES).map(block).collect());
+    Cost { q, ..Weights { q: 1.0, s: 1e-3, r: 1e-2, rate: 0.0 }.into() }
+}
+
+#[test]
+fn factorising_again_allocates_nothing() {
+    let model = axis(1.0).append(&axis(0.6).delayed(1).unwrap()).unwrap();
+    let paired = Paired::new(&model, N_SAMPLES, contour()).unwrap();
+    for form in [Form::Joseph, Form::Cholesky, Form::SquareRoot] {
+        let mut gains = Gains::with_form(&paired, paired.free_samples(), form).unwrap();
+        let before = allocations();
+        gains.refactor(&paired).unwrap();
+        assert_eq!(allocations() - before, 0, "{form:?}");
     }
 }
 

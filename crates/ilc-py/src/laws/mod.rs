@@ -2,21 +2,27 @@
 
 mod adjoint;
 mod any_size;
+mod constrained;
 mod error_feedforward;
+mod flexible;
 mod gate;
 mod inner;
 mod ladder;
 mod model_inverse;
 mod norm_optimal;
 mod pd;
+mod recalled;
+mod relevance;
+mod relevance_weights;
 mod repeatability;
-
-use std::sync::{Mutex, MutexGuard, PoisonError};
+mod solver;
+pub(crate) mod weight;
 
 use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use crate::argument::{Signal, misfit};
+use crate::held::held;
 
 /// Runs one update and returns the next input.
 fn next(law: &mut dyn Law, u: &Signal, e: &Signal) -> Result<Vec<f64>, LearningError> {
@@ -39,11 +45,6 @@ fn fixed_size(
     Err(misfit(name, &signal.shape(), &format!("({n_samples}, {n_channels})")))
 }
 
-/// Locks a law. One that panicked half-way starts each update from scratch and can go on.
-fn held<T>(law: &Mutex<T>) -> MutexGuard<'_, T> {
-    law.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<pd::PyPdIlc>()?;
     module.add_class::<error_feedforward::PyErrorFeedforwardIlc>()?;
@@ -53,5 +54,9 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ladder::PyLadder>()?;
     module.add_class::<repeatability::PyRepeatability>()?;
     module.add_function(wrap_pyfunction!(repeatability::repeatability, module)?)?;
-    module.add_class::<norm_optimal::PyNormOptimalIlc>()
+    module.add_class::<norm_optimal::PyNormOptimalIlc>()?;
+    module.add_class::<constrained::PyConstrainedIlc>()?;
+    module.add_class::<relevance_weights::PyRelevanceWeights>()?;
+    module.add_class::<relevance::PyRelevanceIlc>()?;
+    module.add_class::<flexible::PyFlexibleIlc>()
 }

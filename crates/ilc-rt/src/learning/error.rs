@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::learning::law::constrained::BoundsError;
 use crate::model::ModelError;
 use crate::signal::SignalError;
 
@@ -33,6 +34,14 @@ pub enum LearningError {
         channel: usize,
         /// The offending value.
         value: f64,
+    },
+    /// A disturbance with the wrong number of values, or none where one is needed.
+    #[error("the disturbance of a run holds {found} numbers; {expected} needed")]
+    Disturbance {
+        /// Numbers given; 0 if it was never announced.
+        found: usize,
+        /// Numbers that describe a disturbance.
+        expected: usize,
     },
     /// A law that somebody else wrote refused, or gave something that is no input.
     #[error("the law {law} failed: {reason}")]
@@ -70,31 +79,23 @@ pub enum LearningError {
     },
     /// The weights leave part of the input undetermined.
     #[error(
-        "with s = {s}, r = {r} and rate = {rate} the model does not determine the input at sample \
+        "with {weights} the model does not determine the input at sample \
          {sample}; give r, s or rate a value above 0"
     )]
     Undetermined {
-        /// Weight of the input.
-        s: f64,
-        /// Weight of the change.
-        r: f64,
-        /// Weight of the rate of the change.
-        rate: f64,
+        /// The weights of input, change and rate, as text.
+        weights: String,
         /// The last sample at which this happens.
         sample: usize,
     },
     /// The update itself is an unstable filter.
     #[error(
-        "with s = {s}, r = {r} and rate = {rate} the input would grow without bound along the run: \
+        "with {weights} the input would grow without bound along the run: \
          the model has a zero outside the unit circle; give r or s a value above 0"
     )]
     Unbounded {
-        /// Weight of the input.
-        s: f64,
-        /// Weight of the change.
-        r: f64,
-        /// Weight of the rate of the change.
-        rate: f64,
+        /// The weights of input, change and rate, as text.
+        weights: String,
     },
     /// A gain at which learning diverges.
     #[error(
@@ -137,6 +138,9 @@ pub enum LearningError {
         /// Its distance from the origin.
         radius: f64,
     },
+    /// The bounds contradict each other.
+    #[error(transparent)]
+    Bounds(#[from] BoundsError),
     /// The model was refused.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -156,8 +160,16 @@ pub(crate) fn check(
         return Err(LearningError::Length { what, found: signal.len(), n_samples, n_channels });
     }
     // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
-    let poison: f64 = signal.iter().map(|value| value * 0.0).sum();
-    if poison.is_finite() {
+    // In several sums at a time, because each would wait for its last addition.
+    let chunks = signal.chunks_exact(16);
+    let rest = chunks.remainder();
+    let mut poison = [0.0; 16];
+    for chunk in chunks {
+        for (sum, value) in poison.iter_mut().zip(chunk) {
+            *sum += value * 0.0;
+        }
+    }
+    if poison.iter().chain(rest).all(|value| value.is_finite()) {
         return Ok(());
     }
     let index = signal.iter().position(|value| !value.is_finite()).unwrap_or(0);

@@ -2,12 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use super::norm_optimal::pairing::relative_degrees;
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_counts, check_place};
 use crate::learning::operator::Operator;
 use crate::learning::{Law, LearningError};
-use crate::model::{ModelError, StateSpace};
+use crate::model::{ModelError, StateSpace, relative_degrees};
 
 /// A zero nearer to the unit circle than this counts as on it: the inverse would ring for the whole
 /// run.
