@@ -60,7 +60,7 @@ impl Signal {
 #[derive(Debug)]
 pub(crate) struct Runs {
     pub(crate) values: Vec<f64>,
-    pub(crate) n_runs: usize,
+    pub(crate) count: usize,
     pub(crate) n_samples: usize,
     pub(crate) n_channels: usize,
     pub(crate) is_flat: bool,
@@ -81,7 +81,7 @@ impl Runs {
         if values.is_empty() {
             return Err(misfit(name, &shape, "at least one sample of one channel"));
         }
-        Ok(Self { values, n_runs, n_samples, n_channels, is_flat })
+        Ok(Self { values, count: n_runs, n_samples, n_channels, is_flat })
     }
 }
 

@@ -136,14 +136,14 @@ pub(super) fn update_around<'py, W: Around>(
     let u = Signal::read("u", u)?;
     let e = Signal::read("e", e)?.with_samples("e", u.n_samples)?;
     let disturbance = disturbance.map(|given| given.clone().unbind());
-    let result = look(py, law, |law| {
+    let (result, raised) = look(py, law, |law| {
         law.inner_mut().prepare(&u, &e, disturbance);
-        next(law, &u, &e).map_err(|error| (error, law.inner_mut().raised.take()))
+        let result = next(law, &u, &e);
+        (result, law.inner_mut().raised.take())
     });
-    match result {
-        Ok(values) => give_signal(py, values, u.n_channels, u.is_flat),
-        Err((_, Some(raised))) => Err(raised),
-        Err((error, None)) => Err(error).or_raise(),
+    match raised {
+        Some(raised) => Err(raised),
+        None => give_signal(py, result.or_raise()?, u.n_channels, u.is_flat),
     }
 }
 

@@ -85,7 +85,7 @@ impl PyModelInverseIlc {
         let law = detached(py, || ModelInverse::new(&model, n_samples, gain, q_filter.clone()))
             .or_raise()?;
         let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
-        Ok(Self { gain: gain, q_filter, n_samples, n_inputs, n_outputs, law: Mutex::new(law) })
+        Ok(Self { gain, q_filter, n_samples, n_inputs, n_outputs, law: Mutex::new(law) })
     }
 
     /// Gain of the step.

@@ -112,9 +112,9 @@ pub(super) fn repeatability(
     errors: &Bound<'_, PyAny>,
 ) -> PyResult<PyRepeatability> {
     let runs = Runs::read("errors", errors)?;
-    let Runs { n_runs, n_samples, n_channels, is_flat, .. } = runs;
+    let Runs { count, n_samples, n_channels, is_flat, .. } = runs;
     let found =
-        detached(py, || learning::repeatability(&runs.values, n_runs, n_samples, n_channels))
+        detached(py, || learning::repeatability(&runs.values, count, n_samples, n_channels))
             .or_raise()?;
     Ok(PyRepeatability { found, n_channels, is_flat })
 }
