@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import ilc_rt
@@ -24,10 +25,14 @@ from ilc_rt import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    import subprocess
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
+    Ilc = Callable[..., subprocess.CompletedProcess[str]]
+
+GANTRY = Path(__file__).resolve().parents[2] / "examples" / "01_gantry.toml"
 N = 60
 DT_S = 0.01
 WEIGHTS = (10.0, 2.0, 0.5)
@@ -232,7 +237,7 @@ def test_a_library_feeds_a_law(tmp_path: Path) -> None:
     assert len(table) == 8
 
 
-def test_the_library_recalls_trims_and_exports(tmp_path: Path) -> None:
+def test_the_library_recalls_trims_and_exports(tmp_path: Path, ilc: Ilc) -> None:
     library = Library(tmp_path / "runs.db")
     for d, scale in [(20.0, 3.0), (20.0, 1.0), (80.0, 2.0), (80.0, 0.5)]:
         library.append(np.zeros(5), np.full(5, scale), 0.01, d, cell="motor")
@@ -253,7 +258,12 @@ def test_the_library_recalls_trims_and_exports(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match="ending"):
         library.export(1, tmp_path / "run.xyz")
     assert library.trim(2, cell="other") == 0
-    assert library.trim(2) == 2
+    trimmed = ilc("library", "trim", "runs.db", "2")
+    assert trimmed.stdout.startswith("2 runs deleted"), trimmed.stderr
+    shown = ilc("library", "show", "runs.db", "4").stdout
+    assert [line.split() for line in shown.splitlines() if line.startswith("dist")] == [
+        ["disturbance", "80"]
+    ]
     assert [row["id"] for row in library.list()] == [2, 4]
     with pytest.raises(ValueError, match="e has shape"):
         library.append(np.zeros(5), np.zeros(4), 0.01)
@@ -275,17 +285,9 @@ def test_a_library_of_the_first_version_still_opens(tmp_path: Path) -> None:
 
 
 def campaign(folder: Path, law: Any, **options: Any) -> Campaign:
-    return Campaign(
-        "examples/01_gantry.toml", law, folder / "runs.db", bus="loopback:", **options
-    )
+    return Campaign(GANTRY, law, folder / "runs.db", bus="loopback:", **options)
 
 
-@pytest.fixture
-def in_root(monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config) -> None:
-    monkeypatch.chdir(pytestconfig.rootpath)
-
-
-@pytest.mark.usefixtures("in_root")
 def test_a_campaign_measures_keeps_and_tells_the_disturbance(tmp_path: Path) -> None:
     told: list[Any] = []
 
@@ -314,7 +316,6 @@ def test_a_campaign_measures_keeps_and_tells_the_disturbance(tmp_path: Path) -> 
     assert [row["index"] for row in Library(tmp_path / "runs.db").recall(21.9, 1)] == [2]
 
 
-@pytest.mark.usefixtures("in_root")
 def test_a_resumed_campaign_weighs_what_the_whole_one_does(tmp_path: Path) -> None:
     def law(library: Library | None = None) -> RelevanceIlc:
         weights = RelevanceWeights(e=1e6, er=0.0, d=1e-3, epsilon=1e-3)
@@ -331,7 +332,6 @@ def test_a_resumed_campaign_weighs_what_the_whole_one_does(tmp_path: Path) -> No
         assert [record.digest for record in resumed] == [record.digest for record in whole[3:]]
 
 
-@pytest.mark.usefixtures("in_root")
 def test_a_disturbance_that_cannot_be_used_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInputError, match="at least 3 runs"):
         list(campaign(tmp_path, None, disturbance=[20.0, 21.0]).run(3))

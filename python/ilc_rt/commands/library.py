@@ -23,7 +23,7 @@ from ilc_rt.result import library_rows, micrometres
 
 app = Typer(
     no_args_is_help=True,
-    help="List, show and export the runs in a library.",
+    help="List, show, export and trim the runs in a library.",
 )
 
 RunId = Annotated[int, typer.Argument(metavar="ID", help="Number of the run in the library.")]
@@ -31,6 +31,7 @@ CellName = Annotated[str | None, typer.Option("--cell", metavar="NAME", help="On
 CampaignOption = Annotated[
     str | None, typer.Option("--campaign", metavar="ID", help="Only this campaign's.")
 ]
+Keep = Annotated[int, typer.Argument(min=0, metavar="KEEP", help="How many runs stay.")]
 ExportFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="The file; .npz, .csv or .json says the format.")
 ]
@@ -92,6 +93,20 @@ def export(library: LibraryArgument, run_id: RunId, file: ExportFile) -> None:
     """
     export_run(_load(library, run_id), file)
     typer.echo(f"run {run_id} written to {file}")
+
+
+@app.command("trim")
+def trim(library: LibraryArgument, keep: Keep, cell: CellName = None) -> None:
+    """Delete all but the most relevant runs: small errors, spread over disturbances.
+
+    Example: ilc library trim ilc-library.db 500 --cell gantry
+    """
+    library_rows(library)
+    try:
+        deleted = Library(str(library)).trim(keep, cell)
+    except OSError as error:
+        raise BadInputError(str(error)) from error
+    typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")
 
 
 def _load(library: Path, run_id: int) -> dict[str, Any]:

@@ -5,7 +5,8 @@ use std::sync::Mutex;
 use ilc_rt::learning::law::flexible::Flexible;
 use ilc_rt::learning::law::relevance::Relevance;
 use ilc_rt::learning::{Law, LearningError};
-use ilc_rt::library::Task;
+use ilc_rt::library::{LibraryError, Task};
+use ilc_rt::record::IterationRecord;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -197,11 +198,7 @@ impl<L: Remember> Recalled<L> {
     }
 
     /// Reads the runs of the library that fit.
-    fn runs(
-        &self,
-        py: Python<'_>,
-        size: &mut Size,
-    ) -> PyResult<Vec<ilc_rt::record::IterationRecord>> {
+    fn runs(&self, py: Python<'_>, size: &mut Size) -> PyResult<Vec<IterationRecord>> {
         let Some(library) = &self.library else {
             return Ok(Vec::new());
         };
@@ -210,7 +207,7 @@ impl<L: Remember> Recalled<L> {
         if n_inputs != n_outputs {
             return Ok(Vec::new());
         }
-        detached(py, || {
+        detached(py, || -> Result<Vec<IterationRecord>, LibraryError> {
             let library = library.lock();
             let (ids, dt_s) = library.fitting(n_samples, n_inputs, n_disturbances, &self.task)?;
             size.library_dt_s = dt_s;

@@ -198,12 +198,11 @@ impl PyRelevanceIlc {
     /// ValueError, TypeError
     ///     If it is no disturbance of this law.
     #[pyo3(signature = (disturbance=None))]
-    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
     fn relevant<'py>(
         &self,
         py: Python<'py>,
         disturbance: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<RunsAndWeights<'py>> {
         let disturbance = optional(disturbance)?;
         let found = match self.recalled.with(py, |law| law.relevant(&disturbance)) {
             Some(found) => found.or_raise()?,
@@ -289,6 +288,9 @@ impl PyRelevanceIlc {
         Relevance::new(core, shape, self.weights.clone(), self.top).or_raise()
     }
 }
+
+/// Numbers of runs, and their weights.
+type RunsAndWeights<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
 
 fn no_sample_time(weights: &RelevanceWeights) -> PyErr {
     PyValueError::new_err(format!(

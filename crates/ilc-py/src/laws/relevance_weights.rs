@@ -61,7 +61,6 @@ pub(super) struct PyRelevanceWeights {
 impl PyRelevanceWeights {
     #[new]
     #[pyo3(signature = (e=10.0, er=2.0, d=None, epsilon=1.0, rate_filter_s=0.1, error_gain=1.0, input_gain=1.0))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
     fn new(
         e: f64,
         er: f64,

@@ -22,11 +22,19 @@ pub(super) enum Decision {
     Hold,
 }
 
+/// The best run so far.
+#[derive(Debug)]
+struct Best {
+    rms: f64,
+    input: Vec<f64>,
+    disturbance: Vec<f64>,
+}
+
 /// The state of learning in a campaign.
 #[derive(Debug)]
 pub(super) struct Progress {
     rollback_ratio: f64,
-    best: Option<(f64, Vec<f64>)>,
+    best: Option<Best>,
     rollbacks: u32,
     /// Number of the table that the next run shall use.
     promised: u32,
@@ -79,19 +87,24 @@ impl Progress {
     /// Growth is measured in the RMS error over the best run so far. After two restorations the law
     /// has shown that it does not converge here, and learning stays off. A run that the computer
     /// disturbed (overruns, missing samples) is no evidence: unless it is the best all the same, its
-    /// input is repeated.
+    /// input is repeated. Nor is a larger error under another disturbance than the best run's evidence
+    /// against the law: it goes on learning.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
         let rms = record.figures.tracking_rms_m;
         let off = self.rollbacks >= ROLLBACKS_MAX;
         let disturbed = record.figures.overruns > 0 || record.figures.missing_samples > 0;
         match &self.best {
-            Some((best, _)) if disturbed && rms >= *best => Decision::Hold,
-            Some((best, input)) if rms > best * self.rollback_ratio && !off => {
+            Some(best) if disturbed && rms >= best.rms => Decision::Hold,
+            Some(best)
+                if rms > best.rms * self.rollback_ratio
+                    && !off
+                    && record.disturbance == best.disturbance =>
+            {
                 self.rollbacks += 1;
                 record.figures.rolled_back = true;
-                Decision::RollBack(input.clone())
+                Decision::RollBack(best.input.clone())
             }
-            Some((best, _)) if rms >= *best => {
+            Some(best) if rms >= best.rms => {
                 if off {
                     Decision::Hold
                 } else {
@@ -99,7 +112,8 @@ impl Progress {
                 }
             }
             _ => {
-                self.best = Some((rms, record.input.clone()));
+                let (input, disturbance) = (record.input.clone(), record.disturbance.clone());
+                self.best = Some(Best { rms, input, disturbance });
                 if off { Decision::Hold } else { Decision::Learn }
             }
         }
@@ -205,6 +219,16 @@ mod tests {
         assert_eq!(progress.decide(&mut record(f64::INFINITY)), Decision::RollBack(vec![0.4]));
         assert_eq!(progress.decide(&mut record(0.4)), Decision::Hold);
         assert_eq!(progress.decide(&mut record(9.0)), Decision::Hold);
+    }
+
+    #[test]
+    fn an_error_under_another_disturbance_is_not_held_against_the_law() {
+        let under =
+            |rms, disturbance| IterationRecord { disturbance: vec![disturbance], ..record(rms) };
+        let mut progress = Progress::new(1.5);
+        assert_eq!(progress.decide(&mut under(0.4, 20.0)), Decision::Learn);
+        assert_eq!(progress.decide(&mut under(9.0, 80.0)), Decision::Learn);
+        assert_eq!(progress.decide(&mut under(9.0, 20.0)), Decision::RollBack(vec![0.4]));
     }
 
     #[test]
