@@ -113,7 +113,7 @@ impl Blend {
     pub(super) fn restart(&mut self) {
         self.current = 0;
         self.ticks_ahead = 0;
-        let start_m = self.legs.first().map_or([0.0; MAX_AXES], |leg| leg.element.from_m());
+        let start_m = self.legs.first().map_or([0.0; MAX_AXES], |leg| leg.element.start_m());
         let window = self.filters.first().map_or(1, |(window, _)| window.ring.len()) as i128;
         for ((averaged, rounded), position_m) in self.filters.iter_mut().zip(start_m) {
             averaged.fill(units(position_m));
@@ -165,7 +165,7 @@ impl Blend {
         }
         let Some(leg) = self.legs.get(self.current) else { return [0.0; MAX_AXES] };
         if t_s >= leg.end_s {
-            leg.element.to_m()
+            leg.element.end_m()
         } else {
             leg.element.point_m(leg.feed_m_s * (t_s - leg.start_s).max(0.0))
         }

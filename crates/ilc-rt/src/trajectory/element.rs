@@ -14,14 +14,14 @@ pub(super) enum Element {
 }
 
 impl Element {
-    pub(super) fn from_m(&self) -> [f64; MAX_AXES] {
+    pub(super) fn start_m(&self) -> [f64; MAX_AXES] {
         match self {
             Self::Line(line) => line.from_m,
             Self::Arc(arc) => arc.from_m,
         }
     }
 
-    pub(super) fn to_m(&self) -> [f64; MAX_AXES] {
+    pub(super) fn end_m(&self) -> [f64; MAX_AXES] {
         match self {
             Self::Line(line) => line.to_m,
             Self::Arc(arc) => arc.to_m,

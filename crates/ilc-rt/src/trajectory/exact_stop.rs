@@ -72,7 +72,7 @@ impl ExactStop {
             return Setpoint::at_rest([0.0; MAX_AXES]);
         };
         if t_s >= now.end_s {
-            return Setpoint::at_rest(now.element.to_m());
+            return Setpoint::at_rest(now.element.end_m());
         }
         let state = now.profile.at(t_s - now.start_s);
         Setpoint {

@@ -25,6 +25,10 @@ pub enum LinearSetting {
 
 /// How a move is carried out.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a tick reads one of a table; boxes would scatter it"
+)]
 enum Course {
     /// Straight, from rest to rest.
     Straight(Line, JerkLimited),

@@ -84,9 +84,9 @@ impl ArcLength {
         for _ in 0..NEWTON_STEPS {
             let miss = from_m + length(curve, from, parameter) - s_m;
             if miss > 0.0 {
-                high = parameter
+                high = parameter;
             } else {
-                low = parameter
+                low = parameter;
             }
             let step = miss / norm(&curve.at(parameter)[1]);
             let next = parameter - step;

@@ -146,7 +146,9 @@ impl Run {
                 slow_down(&mut speed, &ticks, &found, step_m, window);
             } else {
                 let factor = most.slower.min(0.98);
-                speed.iter_mut().for_each(|v| *v *= factor);
+                for v in &mut speed {
+                    *v *= factor;
+                }
                 acceleration *= factor * factor;
                 window = ticks_at_least(window as f64 / factor);
             }
@@ -194,10 +196,7 @@ fn speed_limit(here: &Frame, limits: &RunLimits) -> f64 {
     let mut speed = limits.feed_m_s;
     let mut lower = |bound: f64| {
         // Not `f64::min`, which would lose what is not a number, and with it the refusal.
-        if !bound.is_finite() && !bound.is_nan() {
-            return;
-        }
-        if !(bound >= speed) {
+        if bound < speed || bound.is_nan() {
             speed = bound;
         }
     };

@@ -81,16 +81,14 @@ fn second_derivatives(knots: &[f64], points_m: &[[f64; MAX_AXES]]) -> Vec<[f64; 
         let (before, after) = (knots[i] - knots[i - 1], knots[i + 1] - knots[i]);
         let pivot = 2.0 * (before + after) - before * upper[i - 1];
         upper[i] = after / pivot;
-        for axis in 0..MAX_AXES {
+        second[i] = std::array::from_fn(|axis| {
             let [left, here, right] = [i - 1, i, i + 1].map(|at| points_m[at][axis]);
             let bend = 6.0 * ((right - here) / after - (here - left) / before);
-            second[i][axis] = (bend - before * second[i - 1][axis]) / pivot;
-        }
+            (bend - before * second[i - 1][axis]) / pivot
+        });
     }
     for i in (1..n - 1).rev() {
-        for axis in 0..MAX_AXES {
-            second[i][axis] -= upper[i] * second[i + 1][axis];
-        }
+        second[i] = std::array::from_fn(|axis| second[i][axis] - upper[i] * second[i + 1][axis]);
     }
     second
 }
@@ -109,17 +107,16 @@ impl Curve for Spline {
         let i = self.knots.partition_point(|knot| *knot <= parameter).saturating_sub(1).min(last);
         let h = self.knots[i + 1] - self.knots[i];
         let (b, a) = ((parameter - self.knots[i]) / h, (self.knots[i + 1] - parameter) / h);
-        let mut values = [[0.0; MAX_AXES]; 4];
-        for axis in 0..MAX_AXES {
+        let per_axis: [[f64; 4]; MAX_AXES] = std::array::from_fn(|axis| {
             let (from, to) = (self.points_m[i][axis], self.points_m[i + 1][axis]);
             let (m, n) = (self.second[i][axis], self.second[i + 1][axis]);
-            values[0][axis] =
-                a * from + b * to + ((a * a * a - a) * m + (b * b * b - b) * n) * h * h / 6.0;
-            values[1][axis] =
-                (to - from) / h + ((3.0 * b * b - 1.0) * n - (3.0 * a * a - 1.0) * m) * h / 6.0;
-            values[2][axis] = a * m + b * n;
-            values[3][axis] = (n - m) / h;
-        }
-        values
+            [
+                a * from + b * to + ((a * a * a - a) * m + (b * b * b - b) * n) * h * h / 6.0,
+                (to - from) / h + ((3.0 * b * b - 1.0) * n - (3.0 * a * a - 1.0) * m) * h / 6.0,
+                a * m + b * n,
+                (n - m) / h,
+            ]
+        });
+        std::array::from_fn(|order| per_axis.map(|axis| axis[order]))
     }
 }

@@ -21,6 +21,7 @@ impl Jet {
     }
 
     /// `f(self)`, from `f` and its derivatives at the value of `self` (Faà di Bruno).
+    #[must_use]
     pub fn compose(self, [f0, f1, f2, f3]: [f64; 4]) -> Self {
         let [_, u1, u2, u3] = self.0;
         Self([
@@ -32,24 +33,28 @@ impl Jet {
     }
 
     /// `sin(self)`.
+    #[must_use]
     pub fn sin(self) -> Self {
         let (s, c) = self.0[0].sin_cos();
         self.compose([s, c, -s, -c])
     }
 
     /// `1 - exp(-self)`, exact where it is small.
+    #[must_use]
     pub fn rise(self) -> Self {
         let e = (-self.0[0]).exp();
         self.compose([-(-self.0[0]).exp_m1(), e, -e, e])
     }
 
     /// `exp(-self)`.
+    #[must_use]
     pub fn decay(self) -> Self {
         let e = (-self.0[0]).exp();
         self.compose([e, -e, e, -e])
     }
 
     /// `1 / (1 + exp(-self))`, with no overflow at either end.
+    #[must_use]
     pub fn logistic(self) -> Self {
         let x = self.0[0];
         let small = (-x.abs()).exp();
@@ -64,16 +69,19 @@ impl Jet {
     }
 
     /// `self` to the power of 2.
+    #[must_use]
     pub fn squared(self) -> Self {
         self * self
     }
 
     /// `self` to the power of 3.
+    #[must_use]
     pub fn cubed(self) -> Self {
         self * self * self
     }
 
     /// The same function read backwards in time.
+    #[must_use]
     pub fn reversed(self) -> Self {
         let [value, first, second, third] = self.0;
         Self([value, -first, second, -third])

@@ -74,7 +74,7 @@ impl ExponentialSigmoid {
     /// over before its ends are.
     /// # Source
     /// - [dimarco2016], Section 2.1
-    #[expect(clippy::disallowed_methods, clippy::disallowed_types, reason = "cold: planned once")]
+    #[expect(clippy::disallowed_methods, reason = "cold: planned once")]
     pub fn plan(
         start_m: &[f64],
         segments: &[ModulatedSegment],

@@ -199,7 +199,7 @@ impl Modal {
                 return Err(refuse(*at, &word.text, "once in a block".to_owned()));
             }
         }
-        if let Some(feed) = self.number(words, 'F') {
+        if let Some(feed) = number(words, 'F') {
             let feed_m_s = feed * self.unit_m / 60.0;
             if feed_m_s <= 0.0 {
                 let text = written(words, 'F');
@@ -219,13 +219,9 @@ impl Modal {
         Ok(ends)
     }
 
-    fn number(&self, words: &[(Word, usize)], letter: char) -> Option<f64> {
-        words.iter().find(|(word, _)| word.letter == letter).map(|(word, _)| word.number)
-    }
-
     /// `G4 P`, in seconds.
     fn dwell(&mut self, words: &[(Word, usize)], line: usize) -> Result<(), GcodeError> {
-        match self.number(words, 'P') {
+        match number(words, 'P') {
             Some(seconds) if (0.0..=3600.0).contains(&seconds) => {
                 match self.program.segments.last_mut() {
                     Some(last) => last.dwell_s += seconds,
@@ -247,24 +243,23 @@ impl Modal {
         };
         let mut to_m = self.position_m.clone();
         for (axis, letter) in AXES.into_iter().enumerate() {
-            let Some(number) = self.number(words, letter) else { continue };
+            let Some(value) = number(words, letter) else { continue };
             let Some(to) = to_m.get_mut(axis) else {
                 let allowed = format!("the cell has {} axes", self.position_m.len());
                 return Err(refuse(line, &written(words, letter), allowed));
             };
-            *to = number * self.unit_m + if self.incremental { *to } else { 0.0 };
+            *to = value * self.unit_m + if self.incremental { *to } else { 0.0 };
         }
-        let arc = match motion {
-            Motion::Arc { clockwise } => Some(self.arc(words, &to_m, clockwise, line)?),
-            _ => {
-                for letter in ['I', 'J', 'R'] {
-                    if self.number(words, letter).is_some() {
-                        let allowed = "I, J and R only with G2 and G3".to_owned();
-                        return Err(refuse(line, &written(words, letter), allowed));
-                    }
+        let arc = if let Motion::Arc { clockwise } = motion {
+            Some(self.arc(words, &to_m, clockwise, line)?)
+        } else {
+            for letter in ['I', 'J', 'R'] {
+                if number(words, letter).is_some() {
+                    let allowed = "I, J and R only with G2 and G3".to_owned();
+                    return Err(refuse(line, &written(words, letter), allowed));
                 }
-                None
             }
+            None
         };
         let still = to_m.iter().zip(&self.position_m).all(|(to, from)| (to - from).abs() <= 0.0);
         if arc.is_some() || !still {
@@ -292,8 +287,8 @@ impl Modal {
         let (&[x, y, ..], &[to_x, to_y, ..]) = (&self.position_m[..], to_m) else {
             return Err(refuse(line, code, "arcs need two axes".to_owned()));
         };
-        let offset = ['I', 'J'].map(|letter| self.number(words, letter));
-        let center_m = match (offset, self.number(words, 'R')) {
+        let offset = ['I', 'J'].map(|letter| number(words, letter));
+        let center_m = match (offset, number(words, 'R')) {
             ([None, None], Some(radius)) => {
                 let radius_m = radius * self.unit_m;
                 let [dx, dy] = [to_x - x, to_y - y];
@@ -331,6 +326,10 @@ impl Modal {
         }
         Ok(ArcSpec { plane: [0, 1], center_m, clockwise })
     }
+}
+
+fn number(words: &[(Word, usize)], letter: char) -> Option<f64> {
+    words.iter().find(|(word, _)| word.letter == letter).map(|(word, _)| word.number)
 }
 
 fn written(words: &[(Word, usize)], letter: char) -> String {
