@@ -30,9 +30,8 @@ fn largest(values: &[f64], width: usize, order: usize) -> f64 {
 
 fn bench(criterion: &mut Criterion, name: &str, model: &StateSpace) -> Result<(), Box<dyn Error>> {
     let m = model.n_inputs();
-    let error: Vec<f64> = (0..N_SAMPLES * m)
-        .map(|k| 1e-3 * ((k / m) as f64 * 0.03 + (k % m) as f64).sin())
-        .collect();
+    let error: Vec<f64> =
+        (0..N_SAMPLES * m).map(|k| 1e-3 * ((k / m) as f64 * 0.03 + (k % m) as f64).sin()).collect();
     let input = vec![0.0; error.len()];
     let mut free = input.clone();
     NormOptimal::new(model, N_SAMPLES, WEIGHTS)?.update(&input, &error, &mut free)?;

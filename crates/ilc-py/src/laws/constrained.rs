@@ -166,8 +166,7 @@ impl PyConstrainedIlc {
         // Bounds of the output alone may come with the reference of the outputs as `reference`.
         let is_setpoint = n_inputs == n_outputs
             || [position_bounds, velocity_bounds, acceleration_bounds].iter().any(Option::is_some);
-        let (width, target) =
-            if is_setpoint { (n_inputs, None) } else { (n_outputs, reference) };
+        let (width, target) = if is_setpoint { (n_inputs, None) } else { (n_outputs, reference) };
         let given_reference = signal("reference", reference, width)?;
         let bounds = Bounds {
             input: limits("u_bounds", u_bounds, n_inputs)?,

@@ -339,7 +339,12 @@ impl Bounds {
                     if lower > upper {
                         let (first, second) = (first.0, second.0);
                         return Err(BoundsError::Disjoint {
-                            first, second, sample, channel, lower, upper,
+                            first,
+                            second,
+                            sample,
+                            channel,
+                            lower,
+                            upper,
                         });
                     }
                 }
@@ -348,13 +353,16 @@ impl Bounds {
         };
         let none = ("", None);
         let zero = |_: usize, _: usize| 0.0;
-        let input =
-            band(("input", self.input.as_ref()), ("position", self.position.as_ref()), 1.0, &values)?;
+        let input = band(
+            ("input", self.input.as_ref()),
+            ("position", self.position.as_ref()),
+            1.0,
+            &values,
+        )?;
         let change = band(("change", self.change.as_ref()), none, 1.0, &zero)?;
         let step =
             band(("step", self.step.as_ref()), ("velocity", self.velocity.as_ref()), dt_s, &steps)?;
-        let bend =
-            band(none, ("acceleration", self.acceleration.as_ref()), dt_s * dt_s, &bends)?;
+        let bend = band(none, ("acceleration", self.acceleration.as_ref()), dt_s * dt_s, &bends)?;
         let output = match (&self.output, self.target(extent)) {
             (Some(bound), Some(target)) => {
                 let mut band = Band::open(n_samples * p);

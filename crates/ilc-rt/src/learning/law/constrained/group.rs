@@ -2,12 +2,12 @@
 
 use nalgebra::DMatrix;
 
+use super::Bounds;
 use super::bounds::Extent;
 use super::interior::{Interior, Parts};
 use super::reach;
 use super::riccati::{Plant, Weighing};
 use super::solver::{Places, Solver};
-use super::Bounds;
 use crate::learning::LearningError;
 use crate::learning::law::norm_optimal::Cost;
 use crate::learning::law::norm_optimal::decouple::Part;
@@ -43,10 +43,8 @@ pub(super) fn solver(
     let degrees = relative_degrees(plant.borrow(), extent.n_samples)?;
     // A weight between outputs weighs samples of the same time, so they must be shifted alike.
     let least = degrees.iter().flatten().copied().min().unwrap_or(0);
-    let shifts: Vec<usize> = degrees
-        .iter()
-        .map(|degree| if is_mixed { least } else { degree.unwrap_or(0) })
-        .collect();
+    let shifts: Vec<usize> =
+        degrees.iter().map(|degree| if is_mixed { least } else { degree.unwrap_or(0) }).collect();
     let (mut c, mut d) = (model.c().clone(), model.d().clone());
     for (row, shift) in shifts.iter().enumerate() {
         for _ in 0..*shift {
@@ -60,10 +58,8 @@ pub(super) fn solver(
     let free_samples = shifts.iter().copied().max().unwrap_or(0) + inner;
     let delays = if bounds.acceleration.is_some() {
         2
-    } else if cost.rate > 0.0 || bounds.step.is_some() || bounds.velocity.is_some() {
-        1
     } else {
-        0
+        usize::from(cost.rate > 0.0 || bounds.step.is_some() || bounds.velocity.is_some())
     };
     let (n, m, p) = (model.n_states(), inputs.len(), outputs.len());
     let (a, b) = (model.a().clone(), model.b().clone());
@@ -152,7 +148,10 @@ impl Problem<'_> {
     }
 
     /// The weights at one sample, and that of the input alone.
-    fn weighing<const M: usize, const P: usize>(&self, k: usize) -> (Weighing<M, P>, [[f64; M]; M]) {
+    fn weighing<const M: usize, const P: usize>(
+        &self,
+        k: usize,
+    ) -> (Weighing<M, P>, [[f64; M]; M]) {
         let Problem { places, cost, extent, .. } = self;
         let mut output = [[0.0; P]; P];
         let (mut change, mut hold) = ([[0.0; M]; M], [[0.0; M]; M]);
@@ -161,8 +160,8 @@ impl Problem<'_> {
             if sample >= extent.n_samples {
                 continue;
             }
-            for j in 0..places.outputs.len() {
-                output[i][j] = cost.q.entry(sample, i, j);
+            for (j, entry) in output[i].iter_mut().enumerate().take(places.outputs.len()) {
+                *entry = cost.q.entry(sample, i, j);
             }
         }
         let m = places.inputs.len();

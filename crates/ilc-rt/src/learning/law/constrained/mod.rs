@@ -7,12 +7,14 @@
 mod bounds;
 mod group;
 mod interior;
+mod load;
 #[cfg(test)]
 mod proof;
 mod reach;
 mod riccati;
 mod rows;
 mod solver;
+mod sweeps;
 
 use super::norm_optimal::decouple::parts;
 use super::norm_optimal::{Cost, Plant};
@@ -21,8 +23,8 @@ use crate::learning::sweep::Run;
 use crate::learning::{Law, LearningError};
 use crate::model::{ModelError, StateSpace};
 
-pub use bounds::{Bound, Bounds, BoundsError, Limit};
 use bounds::Extent;
+pub use bounds::{Bound, Bounds, BoundsError, Limit};
 use solver::Solver;
 
 /// How the last update ended.

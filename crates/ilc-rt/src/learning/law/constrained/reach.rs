@@ -14,10 +14,8 @@ pub(super) fn conflict(
     width: usize,
     run: &Run,
 ) -> Option<BoundsError> {
-    if bands.change.is_none() {
-        // Nothing depends on the run: it was checked when the law was made.
-        return None;
-    }
+    // Without them nothing depends on the run: it was checked when the law was made.
+    bands.change.as_ref()?;
     let before = |k: usize, i: usize| run.input[k * run.n_inputs + inputs[i]];
     search(bands, inputs, width, &before)
 }
@@ -55,7 +53,12 @@ fn search(
             if low > high + slip {
                 let (sample, channel) = (k, *channel);
                 return Some(BoundsError::OutOfReach {
-                    sample, channel, lowest, highest, least, most,
+                    sample,
+                    channel,
+                    lowest,
+                    highest,
+                    least,
+                    most,
                 });
             }
             high = high.max(low);

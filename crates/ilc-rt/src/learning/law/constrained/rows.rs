@@ -150,7 +150,8 @@ impl Side {
                 (self.slack[row], self.multiplier[row], self.inverse[row]) = (1.0, 0.0, 1.0);
                 continue;
             }
-            let least = if keep { (centre / self.multiplier[row]).min(least[row]) } else { least[row] };
+            let least =
+                if keep { (centre / self.multiplier[row]).min(least[row]) } else { least[row] };
             let slack = self.room(row, *value).max(least);
             self.slack[row] = slack;
             self.inverse[row] = 1.0 / slack;
@@ -213,7 +214,8 @@ impl Rows {
     /// Returns whether no row overshoots its limits.
     pub(super) fn fit(&self) -> bool {
         let fits = |side: &Side| {
-            let room = |(row, value): (usize, &f64)| side.is_on[row] * side.room(row, *value) >= 0.0;
+            let room =
+                |(row, value): (usize, &f64)| side.is_on[row] * side.room(row, *value) >= 0.0;
             self.values.iter().enumerate().all(room)
         };
         fits(&self.upper) && fits(&self.lower)

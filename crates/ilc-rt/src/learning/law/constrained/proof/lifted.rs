@@ -64,7 +64,9 @@ pub(super) fn lift(
         first[(i, i)] = 0.0;
     }
     let (u, e) = (DVector::from_column_slice(u), DVector::from_column_slice(e));
-    let h = plant.transpose() * &q * &plant + &s + r
+    let h = plant.transpose() * &q * &plant
+        + &s
+        + r
         + first.transpose() * &first * cost.rate * cost.rate;
     let f = &s * &u - plant.transpose() * &q * &e;
     let constant = 0.5 * (e.dot(&(&q * &e)) + u.dot(&(&s * &u)));

@@ -6,7 +6,6 @@ mod lifted;
 mod random;
 
 use nalgebra::{DMatrix, DVector};
-use proptest::prelude::*;
 
 use super::{Bound, Bounds, BoundsError, Constrained, Limit, Status};
 use crate::learning::law::norm_optimal::{Cost, NormOptimal, Weights};
@@ -14,7 +13,7 @@ use crate::learning::weights::Weight;
 use crate::learning::{Law, LearningError};
 use crate::model::{Method, StateSpace, discretize, from_transfer_function, second_order};
 
-use lifted::{differences, lift};
+use lifted::lift;
 
 fn noise(count: usize, seed: u32) -> Vec<f64> {
     let mut word = seed.wrapping_mul(2_654_435_761) | 1;
@@ -95,8 +94,7 @@ impl Case {
 }
 
 fn haas(n_samples: usize, bounds: Bounds) -> Case {
-    let r: Vec<f64> =
-        (0..n_samples).map(|k| 0.02 * (1.0 - (k as f64 / 9.0).cos())).collect();
+    let r: Vec<f64> = (0..n_samples).map(|k| 0.02 * (1.0 - (k as f64 / 9.0).cos())).collect();
     let e: Vec<f64> = (0..n_samples).map(|k| 3e-3 * (k as f64 / 9.0).sin()).collect();
     let bounds = Bounds { reference: Some(r), ..bounds };
     let u = vec![0.0; n_samples];
@@ -115,14 +113,8 @@ fn one_sample_by_hand() {
         (Bounds { input: within(2.5), ..Bounds::default() }, 2.5),
         (Bounds { change: within(0.25), ..Bounds::default() }, 3.75),
         (Bounds { step: within(2.0), ..Bounds::default() }, 2.0),
-        (
-            Bounds { position: within(3.5), reference: Some(vec![1.0]), ..Bounds::default() },
-            2.5,
-        ),
-        (
-            Bounds { velocity: within(1.5), reference: Some(vec![9.0]), ..Bounds::default() },
-            1.5,
-        ),
+        (Bounds { position: within(3.5), reference: Some(vec![1.0]), ..Bounds::default() }, 2.5),
+        (Bounds { velocity: within(1.5), reference: Some(vec![9.0]), ..Bounds::default() }, 1.5),
         (
             Bounds { acceleration: within(1.25), reference: Some(vec![9.0]), ..Bounds::default() },
             1.25,
@@ -284,7 +276,13 @@ fn starting_from_the_last_solution_is_faster_and_as_good() {
     let n_samples = 200;
     let plain = haas(n_samples, Bounds::default()).update().0;
     let largest = plain.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-    let case = haas(n_samples, Bounds { input: within(0.6 * largest), ..Bounds::default() });
+    let bounds = Bounds {
+        input: within(0.8 * largest),
+        step: within(0.1 * largest),
+        acceleration: within(150.0),
+        ..Bounds::default()
+    };
+    let case = haas(n_samples, bounds);
     let mut law = case.law();
     let mut input = case.u.clone();
     let mut error = case.e.clone();
@@ -317,13 +315,19 @@ fn bounds_that_contradict_each_other_are_refused_by_name() {
     };
     let crossed = Some(Bound::within(1.0, -1.0));
     let told = refused(Bounds { velocity: crossed, ..Bounds::default() });
-    assert!(told.contains("lower velocity bound 1 lies above the upper one -1 at sample 0"), "{told}");
+    assert!(
+        told.contains("lower velocity bound 1 lies above the upper one -1 at sample 0"),
+        "{told}"
+    );
     let mut upper = vec![1.0; 9];
     upper[4] = f64::NAN;
     let nan = Bound { lower: Limit::Scalar(-1.0), upper: Limit::PerSample(upper) };
     let told = refused(Bounds { step: Some(nan), ..Bounds::default() });
     assert!(told.contains("upper step bound is NaN at sample 4"), "{told}");
-    let told = refused(Bounds { input: Some(Bound::within(f64::INFINITY, f64::INFINITY)), ..Bounds::default() });
+    let told = refused(Bounds {
+        input: Some(Bound::within(f64::INFINITY, f64::INFINITY)),
+        ..Bounds::default()
+    });
     assert!(told.contains("lower input bound is inf at sample 0"), "{told}");
     let told = refused(Bounds {
         input: within(1e-3),
@@ -362,7 +366,10 @@ fn an_input_from_which_the_bounds_cannot_be_honoured_is_kept() {
     );
     assert_eq!(next, u);
     // Outputs that no input can bring about are found out by the search.
-    let case = haas(30, Bounds { output: Some(Bound::within(5.0, 6.0)), input: within(0.1), ..Bounds::default() });
+    let case = haas(
+        30,
+        Bounds { output: Some(Bound::within(5.0, 6.0)), input: within(0.1), ..Bounds::default() },
+    );
     let (next, law) = case.update();
     assert_eq!((law.status(), next), (Status::MaxIterations, case.u));
 }

@@ -59,7 +59,8 @@ fn random_case() -> impl Strategy<Value = Case> {
             };
             let inside = DVector::from_column_slice(&inner);
             let change = DVector::from_fn(size, |i, _| inner[i] - u[i]);
-            let setpoint = DVector::from_fn(size, |i, _| inner[i] + reference[i] - reference[i % m]);
+            let setpoint =
+                DVector::from_fn(size, |i, _| inner[i] + reference[i] - reference[i % m]);
             let output = model.lifted(n_samples).unwrap() * &change
                 + DVector::from_fn(n_samples * p, |i, _| output_reference[i] - e[i]);
             let bounds = Bounds {
