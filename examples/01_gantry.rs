@@ -11,7 +11,7 @@ use std::sync::Arc;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::transport::loopback::InProcess;
 use ilc_rt::record::Event;
-use ilc_rt::supervisor::{self, Options};
+use ilc_rt::supervisor::{self, Disturbance, Options};
 use ilc_sim::{ClockMode, Machine};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -26,6 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         lockstep: true,
         resume: false,
         library: PathBuf::from(":memory:"),
+        disturbance: Disturbance::default(),
         telemetry: false,
         stop: Arc::default(),
     };

@@ -7,6 +7,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+import numpy as np
+
 from ilc_rt._native import Cell
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
 from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
@@ -17,10 +19,11 @@ from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Callable, Generator, Iterator
 
-    import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
+
+    from ilc_rt.experiment import Experiment
 
 DEFAULT_LIBRARY = "ilc-library.db"
 TRANSPORTS = ("can", "udp", "zenoh", "loopback")
@@ -65,6 +68,14 @@ class Campaign:
         where real ones may be listening.
     resume : bool
         Whether to go on from the last campaign of this cell in the library.
+    learning : bool
+        Whether to learn at all; if not, every run is like the first.
+    disturbance : callable, array_like of float64 or None
+        What is measured of each run's surroundings before it, as a temperature:
+        kept with the run in the library, and given to the law for the coming
+        run. Either one row a run, shape (n_runs,) or (n_runs, n_disturbances),
+        or a function of the run's number (from 0) that is asked while the axes
+        return. The controller then runs inside this process.
 
     Raises
     ------
@@ -89,6 +100,8 @@ class Campaign:
         lockstep: bool | None = None,
         drives: Drives = "auto",
         resume: bool = False,
+        learning: bool = True,
+        disturbance: Callable[[int], ArrayLike] | ArrayLike | None = None,
     ) -> None:
         self.cell = cell if isinstance(cell, Cell) else load_cell(cell)
         self.law = law
@@ -102,6 +115,10 @@ class Campaign:
         self.lockstep = self.transport == "loopback" if lockstep is None else lockstep
         self.simulated = _simulated(self.transport, drives)
         self.resume = resume
+        self.learning = learning
+        # What is run in place of the program, if an axis is to be identified.
+        self.experiment: Experiment | None = None
+        self.disturbance = disturbance
         self.result = CampaignResult(self.library)
         self._controller: Controller | None = None
         folder = Path(self.library).absolute().parent
@@ -139,9 +156,10 @@ class Campaign:
         if iterations < 1:
             message = f"iterations = {iterations}: at least 1"
             raise BadInputError(message)
+        measure = _measure(self.disturbance, iterations)
         self.result = CampaignResult(self.library)
         with ControlledStop(self.interrupt) as stop:
-            controller = self._controller = self._start(iterations)
+            controller = self._controller = self._start(iterations, measure)
             try:
                 if stop.received is not None:
                     controller.interrupt(stop.received)
@@ -165,10 +183,16 @@ class Campaign:
         if self._controller is not None:
             self._controller.interrupt(number)
 
-    def _start(self, iterations: int) -> Controller:
+    def _start(self, iterations: int, measure: Callable[[int], ArrayLike] | None) -> Controller:
         cell_file = str(self.cell.path)
-        if self.law is None and self.transport != "loopback":
-            arguments = ["--iterations", str(iterations), "--library", self.library]
+        if self.law is None and measure is None and self.transport != "loopback":
+            verb, arguments = "run", ["--library", self.library]
+            if self.experiment is not None:
+                verb, arguments = "identify", arguments + self.experiment.arguments()
+            else:
+                arguments += ["--iterations", str(iterations)]
+                if not self.learning:
+                    arguments.append("--no-learning")
             if self.measure is not None:
                 arguments += ["--measure", self.measure]
             if self.resume:
@@ -176,6 +200,7 @@ class Campaign:
             return ProcessController(
                 cell_file,
                 arguments,
+                verb=verb,
                 bus=self.bus,
                 lockstep=self.lockstep,
                 simulated=self.simulated,
@@ -189,6 +214,9 @@ class Campaign:
             "lockstep": self.lockstep,
             "resume": self.resume,
             "law": self.law,
+            "learning": self.learning,
+            "experiment": self.experiment,
+            "disturbance": measure,
         }
         apart = self.simulated and self.transport != "loopback"
         drives = None
@@ -242,6 +270,26 @@ def transport_of(bus: str) -> str:
         message = f"bus = {bus}: allowed can:INTERFACE, udp:ADDRESS[:PORT], zenoh:KEY or loopback:"
         raise BadInputError(message)
     return kind
+
+
+def _measure(
+    disturbance: Callable[[int], ArrayLike] | ArrayLike | None, iterations: int
+) -> Callable[[int], ArrayLike] | None:
+    """Return a function that gives the disturbance of each run."""
+    if disturbance is None or callable(disturbance):
+        return disturbance
+    rows = np.asarray(disturbance)
+    if rows.ndim not in {1, 2} or rows.shape[0] < iterations:
+        message = (
+            f"disturbance has shape {rows.shape}; (n_runs,) or (n_runs, n_disturbances) "
+            f"with at least {iterations} runs is needed"
+        )
+        raise BadInputError(message)
+    if rows.dtype.kind not in "iuf" or not np.isfinite(rows).all():
+        message = "disturbance: only finite numbers are allowed"
+        raise BadInputError(message)
+    table = rows.astype(np.float64)
+    return lambda run: np.atleast_1d(table[run])
 
 
 def _simulated(transport: str, drives: str) -> bool:

@@ -49,6 +49,9 @@ def export_run(row: Mapping[str, Any], path: str | Path) -> None:
     if target.suffix == ".npz":
         _write_npz(target, signals, rest)
     elif target.suffix == ".csv":
+        # One value a run, not one a sample: it stands at the head.
+        disturbance = signals.pop("disturbance", None)
+        rest["disturbance"] = None if disturbance is None else disturbance.tolist()
         write_text(target, _csv_text(signals, rest))
     else:
         content = {**rest, **{name: signal.tolist() for name, signal in signals.items()}}

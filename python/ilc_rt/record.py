@@ -127,6 +127,11 @@ class IterationRecord:
         return self._optional("contour_m")
 
     @property
+    def disturbance(self) -> NDArray[np.float64] | None:
+        """What was measured before the run, shape (n_disturbances,), or None."""
+        return self._optional("disturbance")
+
+    @property
     def tool_or_encoder_m(self) -> NDArray[np.float64]:
         """The tool where it is measured, else the encoders: what contour is of."""
         tool = self.tool_m

@@ -25,7 +25,9 @@ def axis(w0=157.0, damping=0.5):
 
 def repeated(model, n_samples):
     """Return a model with the same matrices at every sample."""
-    parts = (np.repeat(part[None], n_samples, axis=0) for part in (model.a, model.b, model.c, model.d))
+    parts = (
+        np.repeat(part[None], n_samples, axis=0) for part in (model.a, model.b, model.c, model.d)
+    )
     return TimeVarying(*parts, DT_S)
 
 

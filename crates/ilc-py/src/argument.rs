@@ -56,6 +56,35 @@ impl Signal {
     }
 }
 
+/// Several runs of one size, time first within each.
+#[derive(Debug)]
+pub(crate) struct Runs {
+    pub(crate) values: Vec<f64>,
+    pub(crate) n_runs: usize,
+    pub(crate) n_samples: usize,
+    pub(crate) n_channels: usize,
+    pub(crate) is_flat: bool,
+}
+
+impl Runs {
+    /// Reads `(n_runs, n_samples)` or `(n_runs, n_samples, n_channels)`.
+    pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (values, shape) = read_array(name, object)?;
+        let (n_runs, n_samples, n_channels, is_flat) = match shape[..] {
+            [n_runs, n_samples] => (n_runs, n_samples, 1, true),
+            [n_runs, n_samples, n_channels] => (n_runs, n_samples, n_channels, false),
+            _ => {
+                let rule = "(n_runs, n_samples) or (n_runs, n_samples, n_channels)";
+                return Err(misfit(name, &shape, rule));
+            }
+        };
+        if values.is_empty() {
+            return Err(misfit(name, &shape, "at least one sample of one channel"));
+        }
+        Ok(Self { values, n_runs, n_samples, n_channels, is_flat })
+    }
+}
+
 /// Reads a matrix; a single number stands for a 1 x 1 one.
 pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Matrix> {
     let (values, shape) = read_array(name, object)?;
@@ -70,6 +99,15 @@ pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Mat
 pub(crate) fn read_vector(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let (values, shape) = read_array(name, object)?;
     if shape.len() == 1 { Ok(values) } else { Err(misfit(name, &shape, "one axis, (n,)")) }
+}
+
+/// Reads a disturbance: a single number or a list of them.
+pub(crate) fn read_disturbance(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let (values, shape) = read_array(name, object)?;
+    if shape.len() <= 1 && !values.is_empty() {
+        return Ok(values);
+    }
+    Err(misfit(name, &shape, "a number or (n_disturbances,)"))
 }
 
 /// Returns a time-first signal to Python, without channel axis if `is_flat`.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Cell, LawName, Measure};
+use ilc_rt::config::{Axis, Cell, Interface, LawName, Measure};
 use ilc_rt::supervisor::Plan;
 use pyo3::prelude::*;
 
@@ -88,6 +88,23 @@ impl PyCell {
     #[getter]
     fn axis_names(&self) -> Vec<String> {
         self.cell.axes.iter().map(|axis| axis.name.clone()).collect()
+    }
+
+    /// Command interface of each axis: `csp` (input in m) or `csv` (in m/s).
+    #[getter]
+    fn interfaces(&self) -> Vec<&'static str> {
+        let name = |axis: &Axis| match axis.interface {
+            Interface::Csp => "csp",
+            Interface::Csv => "csv",
+        };
+        self.cell.axes.iter().map(name).collect()
+    }
+
+    /// Gain kv of each axis' position loop in 1/s; None where it is in the drive.
+    #[getter]
+    fn position_gains_per_s(&self) -> Vec<Option<f64>> {
+        let gain = |axis: &Axis| axis.position_loop.map(|position_loop| position_loop.gain_per_s);
+        self.cell.axes.iter().map(gain).collect()
     }
 
     /// Bus address.

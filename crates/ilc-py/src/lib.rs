@@ -8,9 +8,15 @@
 mod argument;
 mod campaign;
 mod cell;
+mod contour;
+mod control;
 mod detached;
 mod error;
 mod exceptions;
+mod experiment;
+mod held;
+mod identify;
+mod kinematics;
 mod laws;
 mod library;
 mod model;
@@ -18,6 +24,8 @@ mod model_argument;
 mod python_law;
 mod signal;
 mod time_varying;
+mod trajectory;
+mod weights;
 
 use pyo3::prelude::*;
 
@@ -27,8 +35,14 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
     time_varying::register(module)?;
+    identify::register(module)?;
     signal::register(module)?;
+    kinematics::register(module)?;
+    contour::register(module)?;
+    control::register(module)?;
+    trajectory::register(module)?;
     laws::register(module)?;
+    weights::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

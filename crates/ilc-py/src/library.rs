@@ -3,11 +3,13 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use ilc_rt::library::{Library, Row};
+use ilc_rt::library::{Library, Row, Task};
+use ilc_rt::record::{Figures, IterationRecord, Meta, fingerprint, infinity_norm, rms};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::argument::give_signal;
+use crate::argument::{Signal, give_signal, misfit, read_disturbance};
 use crate::detached::detached;
 use crate::error::OrRaise;
 
@@ -30,7 +32,7 @@ use crate::error::OrRaise;
 /// []
 #[pyclass(name = "Library", module = "ilc_rt", frozen)]
 #[derive(Debug)]
-struct PyLibrary {
+pub(crate) struct PyLibrary {
     library: Mutex<Library>,
 }
 
@@ -80,7 +82,8 @@ impl PyLibrary {
     ///     What `list` gives, and ``law_parameters`` and ``program`` (JSON),
     ///     ``reference_m``, ``input``, ``encoder_m``, ``tool_m`` (or None),
     ///     ``error_m`` of shape (n_samples, n_axes), ``contour_m`` of shape
-    ///     (n_samples,), ``disturbance`` (None: none is measured).
+    ///     (n_samples,), ``disturbance`` of shape (n_disturbances,) (None: none is
+    ///     measured).
     ///
     /// Raises
     /// ------
@@ -101,13 +104,226 @@ impl PyLibrary {
         run.set_item("tool_m", tool_m)?;
         run.set_item("error_m", signal(record.error_m)?)?;
         run.set_item("contour_m", give_signal(py, record.contour_m, 1, true)?)?;
-        run.set_item("disturbance", py.None())?;
+        let disturbance = record.disturbance;
+        let disturbance = (!disturbance.is_empty()).then(|| give_signal(py, disturbance, 1, true));
+        run.set_item("disturbance", disturbance.transpose()?)?;
         Ok(run)
+    }
+
+    /// Return the runs made under a disturbance like this one, nearest first.
+    ///
+    /// Parameters
+    /// ----------
+    /// disturbance : float or array_like of float64, shape (n_disturbances,)
+    ///     The disturbance.
+    /// top : int
+    ///     How many runs at most.
+    /// cell : str or None
+    ///     Only runs of the cell of this name.
+    ///
+    /// Returns
+    /// -------
+    /// list of dict
+    ///     What `list` gives of each, and ``distance``, in the unit of the
+    ///     disturbance. Of equally near runs the older comes first.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     If the disturbance is no number, or not finite.
+    /// OSError
+    ///     If the file cannot be read.
+    #[pyo3(signature = (disturbance, top=30, cell=None))]
+    fn recall<'py>(
+        &self,
+        py: Python<'py>,
+        disturbance: &Bound<'py, PyAny>,
+        top: usize,
+        cell: Option<String>,
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let disturbance = read_disturbance("disturbance", disturbance)?;
+        let task = Task { cell };
+        let found = detached(py, || self.lock().recall(&disturbance, top, &task)).or_raise()?;
+        found
+            .iter()
+            .map(|near| {
+                let run = describe(py, &near.row)?;
+                run.set_item("distance", near.distance)?;
+                Ok(run)
+            })
+            .collect()
+    }
+
+    /// Keep a run that was made elsewhere.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : ndarray of float64, shape (n_samples,) or (n_samples, n_axes)
+    ///     Its learned input, in m or m/s.
+    /// e : ndarray of float64, same shape as `u`
+    ///     Its error in m, reference minus measurement.
+    /// cycle_s : float
+    ///     Its sample time in s.
+    /// disturbance : float, array_like of float64 or None
+    ///     The disturbance it was made under, shape (n_disturbances,).
+    /// reference_m : ndarray of float64 or None
+    ///     Its set points in m, same shape as `u`; None: zero.
+    /// cell, campaign, law : str
+    ///     Names; its number follows the last one of the campaign.
+    ///
+    /// Returns
+    /// -------
+    /// int
+    ///     Key of the run.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     If an array has the wrong shape, dtype or a number that is not finite,
+    ///     or cycle_s is not above 0.
+    /// OSError
+    ///     If the file cannot be written.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> from ilc_rt import Library
+    /// >>> library = Library(":memory:")
+    /// >>> library.append(np.zeros(3), np.ones(3), cycle_s=0.01, disturbance=21.5)
+    /// 1
+    /// >>> library.recall(20.0)[0]["distance"]
+    /// 1.5
+    #[pyo3(signature = (u, e, cycle_s, disturbance=None, reference_m=None, *, cell="elsewhere", campaign="elsewhere", law="elsewhere"))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
+    fn append(
+        &self,
+        py: Python<'_>,
+        u: &Bound<'_, PyAny>,
+        e: &Bound<'_, PyAny>,
+        cycle_s: f64,
+        disturbance: Option<&Bound<'_, PyAny>>,
+        reference_m: Option<&Bound<'_, PyAny>>,
+        cell: &str,
+        campaign: &str,
+        law: &str,
+    ) -> PyResult<i64> {
+        let u = Signal::read("u", u)?;
+        let alike = |name: &str, signal: &Bound<'_, PyAny>| {
+            let signal = Signal::read(name, signal)?;
+            if (signal.n_samples, signal.n_channels) == (u.n_samples, u.n_channels) {
+                return Ok(signal.values);
+            }
+            let allowed = format!("({}, {})", u.n_samples, u.n_channels);
+            Err(misfit(name, &signal.shape(), &allowed))
+        };
+        let error_m = alike("e", e)?;
+        let reference_m = match reference_m {
+            Some(reference_m) => alike("reference_m", reference_m)?,
+            None => vec![0.0; error_m.len()],
+        };
+        if !(cycle_s.is_finite() && cycle_s > 0.0) {
+            let line = format!("cycle_s = {cycle_s}: a sample time must be finite and above 0");
+            return Err(PyValueError::new_err(line));
+        }
+        let disturbance = match disturbance.filter(|given| !given.is_none()) {
+            Some(given) => read_disturbance("disturbance", given)?,
+            None => Vec::new(),
+        };
+        let n_axes = u.n_channels;
+        let meta = Meta {
+            cell: cell.to_owned(),
+            campaign: campaign.to_owned(),
+            fingerprint: fingerprint(&format!("elsewhere {cell} {campaign} {law}")),
+            law: law.to_owned(),
+            law_parameters: "{}".to_owned(),
+            measure: "encoder".to_owned(),
+            program: "[]".to_owned(),
+            cycle_s,
+            n_axes,
+            axis_names: (1..=n_axes).map(|axis| format!("axis {axis}")).collect(),
+            input_units: vec!["m".to_owned(); n_axes],
+        };
+        let figures = Figures {
+            tracking_inf_m: infinity_norm(&error_m),
+            tracking_rms_m: rms(&error_m, n_axes),
+            ..Figures::default()
+        };
+        let encoder_m = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
+        let contour_m = vec![0.0; u.n_samples];
+        let input = u.values;
+        detached(py, || {
+            let library = self.lock();
+            let index = library.next_index(campaign)?;
+            let record = IterationRecord {
+                index,
+                reference_m,
+                input,
+                encoder_m,
+                tool_m: Vec::new(),
+                error_m,
+                contour_m,
+                disturbance,
+                figures,
+            };
+            library.append(&meta, &record)
+        })
+        .or_raise()
+    }
+
+    /// Delete all but the most relevant runs, and return how many were deleted.
+    ///
+    /// Parameters
+    /// ----------
+    /// keep : int
+    ///     How many runs stay.
+    /// cell : str or None
+    ///     Only among runs of the cell of this name.
+    ///
+    /// Returns
+    /// -------
+    /// int
+    ///     Runs deleted.
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     If the file cannot be written, or the runs have different numbers of
+    ///     disturbances; nothing is deleted then.
+    ///
+    /// Notes
+    /// -----
+    /// The relevance of DPW-ILC with RMS error and disturbance in units of their
+    /// spread over these runs, summed over the disturbances of all of them; without
+    /// disturbances the smallest errors stay. The space in the file is used again.
+    #[pyo3(signature = (keep, cell=None))]
+    fn trim(&self, py: Python<'_>, keep: usize, cell: Option<String>) -> PyResult<usize> {
+        let task = Task { cell };
+        detached(py, || self.lock().trim(keep, &task)).or_raise()
+    }
+
+    /// Write one run to a file: ``.npz``, ``.csv`` or ``.json`` by its ending.
+    ///
+    /// Parameters
+    /// ----------
+    /// id : int
+    ///     Key of the run, as `list` gives it.
+    /// path : str or os.PathLike
+    ///     The file.
+    ///
+    /// Raises
+    /// ------
+    /// BadInputError
+    ///     If the ending is unknown or the file cannot be written.
+    /// OSError
+    ///     If there is no such run, or its arrays do not match their digest.
+    fn export(&self, py: Python<'_>, id: i64, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        let run = self.load(py, id)?;
+        py.import("ilc_rt.export")?.call_method1("export_run", (run, path)).map(drop)
     }
 }
 
 impl PyLibrary {
-    fn lock(&self) -> std::sync::MutexGuard<'_, Library> {
+    pub(crate) fn lock(&self) -> std::sync::MutexGuard<'_, Library> {
         self.library.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -127,6 +343,8 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     run.set_item("cycle_s", row.meta.cycle_s)?;
     run.set_item("axis_names", &row.meta.axis_names)?;
     run.set_item("input_units", &row.meta.input_units)?;
+    let disturbance = &row.record.disturbance;
+    run.set_item("disturbance", (!disturbance.is_empty()).then_some(disturbance))?;
     run.set_item("tracking_inf_m", figures.tracking_inf_m)?;
     run.set_item("tracking_rms_m", figures.tracking_rms_m)?;
     run.set_item("contour_inf_m", figures.contour_inf_m)?;

@@ -94,7 +94,8 @@ impl PyTimeVarying {
             ("d", &d, [n_samples, p, m]),
         ] {
             if *shape != needed {
-                return Err(misfit(name, shape, &format!("{needed:?} to fit the others")));
+                let [n_samples, rows, cols] = needed;
+                return Err(misfit(name, shape, &format!("({n_samples}, {rows}, {cols})")));
             }
         }
         let at = |(values, [_, rows, cols]): &(Vec<f64>, [usize; 3]), k: usize| {

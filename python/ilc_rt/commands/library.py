@@ -74,7 +74,9 @@ def show(library: LibraryArgument, run_id: RunId) -> None:
     Example: ilc library show ilc-library.db 12
     """
     for key, value in _load(library, run_id).items():
-        if isinstance(value, np.ndarray):
+        if key == "disturbance" and value is not None:
+            typer.echo(f"{key:22} {', '.join(f'{number:g}' for number in value)}")
+        elif isinstance(value, np.ndarray):
             size = " x ".join(str(length) for length in value.shape)
             largest = float(np.abs(value).max()) if value.size else 0.0
             typer.echo(f"{key:22} {size} samples, largest {largest:.6g}")

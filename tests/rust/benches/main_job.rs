@@ -13,7 +13,7 @@ use ilc_rt::fieldbus::transport::loopback::InProcess;
 use ilc_rt::learning::Law;
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
 use ilc_rt::model::{Method, StateSpace, discretize, second_order};
-use ilc_rt::supervisor::{self, Options};
+use ilc_rt::supervisor::{self, Disturbance, Options};
 use ilc_sim::{ClockMode, Machine};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -98,6 +98,7 @@ fn lockstep_against_real_time(n_runs: u32) -> Result<(), Box<dyn Error>> {
         lockstep: true,
         resume: false,
         library: PathBuf::from(&library),
+        disturbance: Disturbance::default(),
         telemetry: false,
         stop: Arc::default(),
     };

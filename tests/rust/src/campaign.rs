@@ -8,7 +8,7 @@ use ilc_rt::config::{Cell, Measure};
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::library::Library;
-use ilc_rt::supervisor::{self, Options, Outcome};
+use ilc_rt::supervisor::{self, Disturbance, Options, Outcome};
 use ilc_sim::{ClockMode, Machine};
 
 use crate::Scratch;
@@ -37,6 +37,7 @@ pub fn options(library: PathBuf, iterations: u32) -> Options {
         lockstep: true,
         resume: false,
         library,
+        disturbance: Disturbance::default(),
         telemetry: false,
         stop: Arc::new(AtomicI32::new(0)),
     }

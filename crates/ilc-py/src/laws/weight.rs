@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use crate::argument::{Matrix, give_matrix, misfit, read_array};
 
 /// Reads a number, `(n,)`, `(p, p)` or `(n, p, p)`.
-pub(super) fn read_weight(
+pub(crate) fn read_weight(
     name: &str,
     object: &Bound<'_, PyAny>,
     n_samples: usize,

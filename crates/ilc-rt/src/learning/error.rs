@@ -35,6 +35,14 @@ pub enum LearningError {
         /// The offending value.
         value: f64,
     },
+    /// A disturbance with the wrong number of values, or none where one is needed.
+    #[error("the disturbance of a run holds {found} numbers; {expected} needed")]
+    Disturbance {
+        /// Numbers given; 0 if it was never announced.
+        found: usize,
+        /// Numbers that describe a disturbance.
+        expected: usize,
+    },
     /// A law that somebody else wrote refused, or gave something that is no input.
     #[error("the law {law} failed: {reason}")]
     User {
@@ -89,6 +97,47 @@ pub enum LearningError {
         /// The weights of input, change and rate, as text.
         weights: String,
     },
+    /// A gain at which learning diverges.
+    #[error(
+        "gain = {gain}; it must be less than 2 / |P|^2 = {limit} for this model, or the error grows \
+         from run to run unless a Q filter takes that part away"
+    )]
+    GainBound {
+        /// The gain given.
+        gain: f64,
+        /// The gain from which on the error grows.
+        limit: f64,
+    },
+    /// A model with another number of inputs than outputs.
+    #[error(
+        "the model has {n_inputs} inputs and {n_outputs} outputs; only one with as many inputs as \
+         outputs can be inverted"
+    )]
+    NotSquare {
+        /// Inputs of the model.
+        n_inputs: usize,
+        /// Outputs of the model.
+        n_outputs: usize,
+    },
+    /// A model that cannot be inverted.
+    #[error("the model has no inverse: {reason}")]
+    NoInverse {
+        /// Why not.
+        reason: &'static str,
+    },
+    /// A model whose inverse is unstable.
+    #[error(
+        "the model has a zero at {re:.6} {im:+.6}i, {radius:.6} from the origin: its inverse is stable only \
+         if all lie inside the unit circle; use norm-optimal learning with r above 0"
+    )]
+    NonMinimumPhase {
+        /// Real part of the outermost zero.
+        re: f64,
+        /// Imaginary part of it.
+        im: f64,
+        /// Its distance from the origin.
+        radius: f64,
+    },
     /// The bounds contradict each other.
     #[error(transparent)]
     Bounds(#[from] BoundsError),
@@ -130,4 +179,24 @@ pub(crate) fn check(
         channel: index % n_channels,
         value: signal[index],
     })
+}
+
+/// Checks the length of the place for a result.
+pub(crate) fn check_place(
+    next: &[f64],
+    n_samples: usize,
+    n_channels: usize,
+) -> Result<(), LearningError> {
+    if next.len() == n_samples * n_channels {
+        return Ok(());
+    }
+    Err(LearningError::Length { what: "next", found: next.len(), n_samples, n_channels })
+}
+
+/// Refuses counts that are zero.
+pub(crate) fn check_counts(counts: &[(&'static str, usize)]) -> Result<(), LearningError> {
+    match counts.iter().find(|(_, count)| *count == 0) {
+        Some((what, _)) => Err(LearningError::Empty { what }),
+        None => Ok(()),
+    }
 }

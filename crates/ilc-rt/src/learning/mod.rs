@@ -1,15 +1,21 @@
 //! Learning laws: from one run's error to the next run's input.
 //!
-//! This folder holds the [`Law`] trait, one law a file under [`law`], and the linear-time solver
-//! ([`sweep`]) that the optimal ones share. It runs between iterations, never in the tick;
+//! This folder holds the [`Law`] trait, one law a file under [`law`], the linear-time solver
+//! ([`sweep`]) that the optimal ones share, and what goes round any law: when to stop ([`gate`]) and
+//! how many runs to average ([`ladder`]). It runs between iterations, never in the tick;
 //! `config`, `supervisor` and the Python bindings may import it.
 
 mod error;
+pub mod gate;
+pub mod ladder;
 pub mod law;
+mod operator;
+mod repeatability;
 pub mod sweep;
 pub mod weights;
 
 pub use error::LearningError;
+pub use repeatability::{Repeatability, repeatability};
 
 /// A rule that turns the error of one run into the input of the next.
 ///
@@ -44,4 +50,27 @@ pub trait Law: Send {
 
     /// Returns the law and its parameters as one line of JSON, for the record of the run.
     fn describe(&self) -> String;
+}
+
+impl<L: Law + ?Sized> Law for Box<L> {
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError> {
+        (**self).update(input, error, next)
+    }
+
+    fn expect(&mut self, disturbance: &[f64]) {
+        (**self).expect(disturbance);
+    }
+
+    fn reset(&mut self) {
+        (**self).reset();
+    }
+
+    fn describe(&self) -> String {
+        (**self).describe()
+    }
 }

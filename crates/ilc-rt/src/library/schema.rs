@@ -1,9 +1,13 @@
 //! The tables, and how they come to be.
 
 /// Version of the schema, in SQLite's `user_version`.
-pub(super) const VERSION: i64 = 1;
+pub(super) const VERSION: i64 = 2;
+/// The oldest version that [`CREATE`] brings up to date: it names only what is missing.
+///
+/// Version 1 had the column for the disturbance, and nothing in it.
+pub(super) const OLDEST: i64 = 1;
 
-/// Arrays are little-endian float64, time first; lists of names are JSON; times are UTC in ISO 8601.
+/// Arrays are little-endian float64, time first; lists of names and disturbances are JSON; times are UTC in ISO 8601.
 pub(super) const CREATE: &str = "
 CREATE TABLE IF NOT EXISTS iteration (
     id              INTEGER PRIMARY KEY,
@@ -22,7 +26,7 @@ CREATE TABLE IF NOT EXISTS iteration (
     input_units     TEXT NOT NULL,
     n_samples       INTEGER NOT NULL,
     reference_m     BLOB NOT NULL,
-    disturbance     BLOB,
+    disturbance     TEXT,
     input           BLOB NOT NULL,
     encoder_m       BLOB NOT NULL,
     tool_m          BLOB,
@@ -43,4 +47,6 @@ CREATE TABLE IF NOT EXISTS iteration (
     UNIQUE (campaign, iteration)
 );
 CREATE INDEX IF NOT EXISTS iteration_by_fingerprint ON iteration (fingerprint, id);
+CREATE INDEX IF NOT EXISTS iteration_by_disturbance ON iteration (cell, disturbance)
+    WHERE disturbance IS NOT NULL;
 ";

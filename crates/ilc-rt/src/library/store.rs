@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use rusqlite::{Connection, OptionalExtension, params};
 
+use super::row::{ARRAYS, COLUMNS, Row, as_integer, blob, json_list, json_numbers, read_row};
 use super::schema;
-use crate::record::{Figures, IterationRecord, Meta};
+use crate::record::{IterationRecord, Meta};
 
 /// How long to wait for another process that is writing.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
@@ -14,25 +15,8 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// An open iteration library.
 #[derive(Debug)]
 pub struct Library {
-    connection: Connection,
-    path: String,
-}
-
-/// One kept run with its provenance.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Row {
-    /// Key in the library.
-    pub id: i64,
-    /// When it was appended, UTC.
-    pub created_utc: String,
-    /// Where it comes from.
-    pub meta: Meta,
-    /// SHA-256 of the arrays, as they were appended.
-    pub digest: String,
-    /// Samples in the run.
-    pub n_samples: usize,
-    /// Arrays and figures; the arrays are empty in listings.
-    pub record: IterationRecord,
+    pub(super) connection: Connection,
+    pub(super) path: String,
 }
 
 /// Why the library could not be used.
@@ -75,6 +59,14 @@ pub enum LibraryError {
         /// Key asked for.
         id: i64,
     },
+    /// There is no such disturbance.
+    #[error("library {path}: {what}")]
+    Disturbance {
+        /// File.
+        path: String,
+        /// What is wrong, and what is allowed.
+        what: String,
+    },
     /// The stored arrays do not have the digest that was stored with them.
     #[error("library {path}: iteration {id} is damaged: its arrays do not match its digest")]
     Damaged {
@@ -84,13 +76,6 @@ pub enum LibraryError {
         id: i64,
     },
 }
-
-const COLUMNS: &str = "id, created_utc, cell, campaign, fingerprint, iteration, program, law, \
-    law_parameters, measure, cycle_s, n_axes, n_samples, digest, tracking_inf_m, tracking_rms_m, \
-    contour_inf_m, contour_rms_m, encoder_tracking_inf_m, tool_tracking_inf_m, overruns, \
-    missing_samples, late_updates, update_ms, rolled_back, axis_names, input_units";
-
-const ARRAYS: &str = "reference_m, input, encoder_m, tool_m, error_m, contour_m";
 
 impl Library {
     /// Opens a library, creating file and tables if they are not there.
@@ -109,7 +94,7 @@ impl Library {
         let found: i64 =
             connection.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fail)?;
         match found {
-            0 => {
+            0 | schema::OLDEST..schema::VERSION => {
                 connection.execute_batch(schema::CREATE).map_err(fail)?;
                 connection.pragma_update(None, "user_version", schema::VERSION).map_err(fail)?;
             }
@@ -140,9 +125,10 @@ impl Library {
             law, law_parameters, measure, cycle_s, n_axes, n_samples, reference_m, input, \
             encoder_m, tool_m, error_m, contour_m, digest, tracking_inf_m, tracking_rms_m, \
             contour_inf_m, contour_rms_m, encoder_tracking_inf_m, tool_tracking_inf_m, overruns, \
-            missing_samples, late_updates, update_ms, rolled_back, axis_names, input_units) VALUES (?1, ?2, ?3, ?4, ?5, \
+            missing_samples, late_updates, update_ms, rolled_back, axis_names, input_units, \
+            disturbance) VALUES (?1, ?2, ?3, ?4, ?5, \
             ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21, ?22, ?23, \
-            ?24, ?25, ?26, ?27, ?28, ?29, ?30, ?31)";
+            ?24, ?25, ?26, ?27, ?28, ?29, ?30, ?31, ?32)";
         let tool = (!record.tool_m.is_empty()).then(|| blob(&record.tool_m));
         self.connection
             .prepare_cached(statement)
@@ -179,6 +165,7 @@ impl Library {
                     f.rolled_back,
                     json_list(&meta.axis_names),
                     json_list(&meta.input_units),
+                    (!record.disturbance.is_empty()).then(|| json_numbers(&record.disturbance)),
                 ])
             })
             .map_err(|source| self.fail(source))
@@ -215,6 +202,30 @@ impl Library {
         Ok(row)
     }
 
+    /// Reads one run without its arrays.
+    pub(super) fn figures(&self, id: i64) -> Result<Row, LibraryError> {
+        let query = format!("SELECT {COLUMNS} FROM iteration WHERE id = ?1");
+        self.connection
+            .query_row(&query, [id], |row| read_row(row, false))
+            .optional()
+            .map_err(|source| self.fail(source))?
+            .ok_or_else(|| LibraryError::NoSuchRow { path: self.path.clone(), id })
+    }
+
+    /// Returns the number that the next run of a campaign gets.
+    ///
+    /// # Errors
+    /// [`LibraryError::Sqlite`] if the file cannot be read.
+    pub fn next_index(&self, campaign: &str) -> Result<u32, LibraryError> {
+        self.connection
+            .query_row(
+                "SELECT coalesce(max(iteration) + 1, 0) FROM iteration WHERE campaign = ?1",
+                [campaign],
+                |row| row.get(0),
+            )
+            .map_err(|source| self.fail(source))
+    }
+
     /// Returns the name of the newest campaign with this fingerprint, if there is one.
     ///
     /// # Errors
@@ -244,94 +255,18 @@ impl Library {
             .map_err(|source| self.fail(source))
     }
 
-    fn fail(&self, source: rusqlite::Error) -> LibraryError {
+    pub(super) fn fail(&self, source: rusqlite::Error) -> LibraryError {
         LibraryError::Sqlite { path: self.path.clone(), source }
     }
 }
 
-fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row> {
-    let count = |name: &str| row.get::<_, i64>(name).map(|n| usize::try_from(n).unwrap_or(0));
-    let list = |name: &str| -> rusqlite::Result<Vec<String>> {
-        Ok(serde_json::from_str(&row.get::<_, String>(name)?).unwrap_or_default())
-    };
-    let array = |name: &str| -> rusqlite::Result<Vec<f64>> {
-        if with_arrays {
-            Ok(floats(&row.get::<_, Option<Vec<u8>>>(name)?.unwrap_or_default()))
-        } else {
-            Ok(Vec::new())
-        }
-    };
-    Ok(Row {
-        id: row.get("id")?,
-        created_utc: row.get("created_utc")?,
-        meta: Meta {
-            cell: row.get("cell")?,
-            campaign: row.get("campaign")?,
-            fingerprint: row.get("fingerprint")?,
-            law: row.get("law")?,
-            law_parameters: row.get("law_parameters")?,
-            measure: row.get("measure")?,
-            program: row.get("program")?,
-            cycle_s: row.get("cycle_s")?,
-            n_axes: count("n_axes")?,
-            axis_names: list("axis_names")?,
-            input_units: list("input_units")?,
-        },
-        digest: row.get("digest")?,
-        n_samples: count("n_samples")?,
-        record: IterationRecord {
-            index: row.get("iteration")?,
-            reference_m: array("reference_m")?,
-            input: array("input")?,
-            encoder_m: array("encoder_m")?,
-            tool_m: array("tool_m")?,
-            error_m: array("error_m")?,
-            contour_m: array("contour_m")?,
-            figures: Figures {
-                tracking_inf_m: row.get("tracking_inf_m")?,
-                tracking_rms_m: row.get("tracking_rms_m")?,
-                contour_inf_m: row.get("contour_inf_m")?,
-                contour_rms_m: row.get("contour_rms_m")?,
-                encoder_tracking_inf_m: row.get("encoder_tracking_inf_m")?,
-                tool_tracking_inf_m: row.get("tool_tracking_inf_m")?,
-                overruns: row.get("overruns")?,
-                missing_samples: row.get("missing_samples")?,
-                late_updates: row.get("late_updates")?,
-                update_ms: row.get("update_ms")?,
-                rolled_back: row.get("rolled_back")?,
-            },
-        },
-    })
-}
-
-fn json_list(names: &[String]) -> String {
-    serde_json::Value::from(names).to_string()
-}
-
-fn as_integer(count: usize) -> i64 {
-    i64::try_from(count).unwrap_or(i64::MAX)
-}
-
-fn blob(values: &[f64]) -> Vec<u8> {
-    values.iter().flat_map(|value| value.to_le_bytes()).collect()
-}
-
-fn floats(bytes: &[u8]) -> Vec<f64> {
-    let mut word = [0; 8];
-    bytes
-        .chunks_exact(8)
-        .map(|chunk| {
-            word.copy_from_slice(chunk);
-            f64::from_le_bytes(word)
-        })
-        .collect()
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use super::super::recall::Task;
     use super::*;
+    use crate::record::Figures;
 
-    fn meta(campaign: &str) -> Meta {
+    pub(in crate::library) fn meta(campaign: &str) -> Meta {
         Meta {
             cell: "gantry".into(),
             campaign: campaign.into(),
@@ -347,7 +282,7 @@ mod tests {
         }
     }
 
-    fn record(index: u32) -> IterationRecord {
+    pub(in crate::library) fn record(index: u32) -> IterationRecord {
         IterationRecord {
             index,
             reference_m: vec![1.0, 2.0, 3.0, 4.0],
@@ -356,6 +291,7 @@ mod tests {
             tool_m: vec![0.2; 4],
             error_m: vec![0.3; 4],
             contour_m: vec![0.4; 2],
+            disturbance: vec![0.1 + 0.2, -1e300],
             figures: Figures { update_ms: 0.5, rolled_back: true, ..Default::default() },
         }
     }
@@ -394,6 +330,31 @@ mod tests {
         library.append(&meta("b"), &record(0)).unwrap();
         assert_eq!(library.newest_campaign("f").unwrap().as_deref(), Some("b"));
         assert_eq!(library.newest_campaign("g").unwrap(), None);
+    }
+
+    #[test]
+    fn a_file_of_the_first_version_is_brought_up_to_date() {
+        let path = std::env::temp_dir().join(format!("ilc-library-v1-{}", std::process::id()));
+        let library = Library::open(&path).unwrap();
+        let old = IterationRecord { disturbance: Vec::new(), ..record(0) };
+        let id = library.append(&meta("a"), &old).unwrap();
+        library.connection.execute_batch("DROP INDEX iteration_by_disturbance").unwrap();
+        library.connection.pragma_update(None, "user_version", 1).unwrap();
+        drop(library);
+        let library = Library::open(&path).unwrap();
+        assert_eq!(library.load(id).unwrap().record, old);
+        let id = library.append(&meta("a"), &record(1)).unwrap();
+        assert_eq!(library.load(id).unwrap().record.disturbance, record(1).disturbance);
+        assert_eq!(library.recall(&[0.3, 0.0], 5, &Task::default()).unwrap().len(), 1);
+        drop(library);
+        let version: i64 = Connection::open(&path)
+            .unwrap()
+            .pragma_query_value(None, "user_version", |row| row.get(0))
+            .unwrap();
+        assert_eq!(version, schema::VERSION);
+        for ending in ["", "-wal", "-shm"] {
+            let _ = std::fs::remove_file(format!("{}{ending}", path.display()));
+        }
     }
 
     #[test]

@@ -53,6 +53,8 @@ pub struct IterationRecord {
     pub error_m: Vec<f64>,
     /// Distance of the tool (of the encoders, without a tool measurement) from the reference path.
     pub contour_m: Vec<f64>,
+    /// What was measured of the run's surroundings before it, as a temperature; empty if nothing.
+    pub disturbance: Vec<f64>,
     /// Figures.
     pub figures: Figures,
 }
@@ -74,6 +76,10 @@ impl IterationRecord {
             for value in array {
                 hash.update(value.to_le_bytes());
             }
+        }
+        // Only where there is one, so that runs kept before disturbances were still match.
+        for value in &self.disturbance {
+            hash.update(value.to_le_bytes());
         }
         hex(&hash.finalize())
     }
@@ -106,5 +112,7 @@ mod tests {
         assert_ne!(a.digest(), b.digest());
         let c = IterationRecord { input: vec![1.0], encoder_m: vec![2.0], ..Default::default() };
         assert_ne!(a.digest(), c.digest());
+        let warm = IterationRecord { disturbance: vec![20.0], ..a.clone() };
+        assert_ne!(a.digest(), warm.digest());
     }
 }

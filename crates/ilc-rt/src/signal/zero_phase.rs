@@ -1,6 +1,7 @@
 //! Filtering forward and backward: no lag, the square of the gain.
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use super::channel::check_channel;
 use super::{Section, SignalError, SosFilter};
 
 /// A zero-phase filter with its workspace.
@@ -60,10 +61,7 @@ impl ZeroPhase {
         n_channels: usize,
     ) -> Result<(), SignalError> {
         let expected = self.n_samples();
-        if n_channels == 0 || channel >= n_channels || signal.len() != expected * n_channels {
-            let found = signal.len().checked_div(n_channels).unwrap_or(0);
-            return Err(SignalError::Length { found, expected });
-        }
+        check_channel(signal, channel, n_channels, expected)?;
         let at = |sample: usize| sample * n_channels + channel;
         let last = expected - 1;
         let (first_level, last_level) = (signal[at(0)], signal[at(last)]);

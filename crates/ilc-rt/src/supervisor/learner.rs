@@ -18,8 +18,10 @@ pub(super) struct Lesson {
 
 /// A run to learn from.
 pub(super) struct Job {
-    input: Vec<f64>,
-    error: Vec<f64>,
+    /// Input and error; none if nothing is to be learned from it.
+    signals: Option<(Vec<f64>, Vec<f64>)>,
+    /// Disturbance of the run to come.
+    coming: Vec<f64>,
 }
 
 /// A law, and where it computes.
@@ -42,7 +44,9 @@ impl Learner {
             .name("ilc-learn".to_owned())
             .spawn(move || {
                 for job in todo {
-                    if done.send(learn(law.as_mut(), &job.input, &job.error)).is_err() {
+                    expect(law.as_mut(), &job.coming);
+                    let Some((input, error)) = job.signals else { continue };
+                    if done.send(learn(law.as_mut(), &input, &error)).is_err() {
                         return;
                     }
                 }
@@ -51,13 +55,28 @@ impl Learner {
         Ok(Self::Thread { jobs: Some(jobs), lessons, thread: Some(thread) })
     }
 
-    /// Begins to learn from a run.
-    pub(super) fn begin(&mut self, input: &[f64], error: &[f64]) {
+    /// Begins to learn from a run, for the one to come under this disturbance.
+    pub(super) fn begin(&mut self, input: &[f64], error: &[f64], coming: &[f64]) {
         match self {
-            Self::InLine { law, done } => *done = Some(learn(law.as_mut(), input, error)),
+            Self::InLine { law, done } => {
+                expect(law.as_mut(), coming);
+                *done = Some(learn(law.as_mut(), input, error));
+            }
             Self::Thread { jobs: Some(jobs), .. } => {
+                let signals = Some((input.to_vec(), error.to_vec()));
                 // A thread that is gone never answers; the old input is then repeated and counted.
-                let _ = jobs.send(Job { input: input.to_vec(), error: error.to_vec() });
+                let _ = jobs.send(Job { signals, coming: coming.to_vec() });
+            }
+            Self::Thread { .. } => {}
+        }
+    }
+
+    /// Tells the law of the run to come when there is nothing to learn from the last one.
+    pub(super) fn pass(&mut self, coming: &[f64]) {
+        match self {
+            Self::InLine { law, .. } => expect(law.as_mut(), coming),
+            Self::Thread { jobs: Some(jobs), .. } => {
+                let _ = jobs.send(Job { signals: None, coming: coming.to_vec() });
             }
             Self::Thread { .. } => {}
         }
@@ -80,6 +99,13 @@ impl Drop for Learner {
                 let _ = thread.join();
             }
         }
+    }
+}
+
+/// Tells a law of the run to come, if there is something to tell.
+pub(super) fn expect(law: &mut dyn Law, coming: &[f64]) {
+    if !coming.is_empty() {
+        law.expect(coming);
     }
 }
 

@@ -7,15 +7,22 @@
 mod announce;
 mod campaign;
 mod collect;
+mod disturbance;
 mod error;
+mod experiment;
+mod identified;
 mod learner;
 mod nodes;
 mod pace;
 mod plan;
+mod program;
 mod progress;
 mod reason;
 mod telemetry;
 
-pub use campaign::{Options, Outcome, run};
+pub use campaign::{Options, Outcome, identify, run};
+pub use disturbance::Disturbance;
 pub use error::SupervisorError;
+pub use experiment::Experiment;
+pub use identified::{Described, Identified};
 pub use plan::Plan;

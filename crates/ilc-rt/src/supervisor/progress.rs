@@ -1,8 +1,9 @@
 //! What the next run gets: a lesson, the best input so far, or the old input once more.
 
+use super::disturbance::Disturbance;
 use super::error::SupervisorError;
-use super::learner::learn;
-use crate::learning::Law;
+use super::learner::{expect, learn};
+use crate::learning::{Law, LearningError};
 use crate::library::Library;
 use crate::record::{Figures, IterationRecord, Meta};
 use crate::servo::Mailbox;
@@ -116,11 +117,14 @@ impl Progress {
 
     /// Takes up the newest campaign of the same fingerprint where it ended: its runs, and the input
     /// of the next one with the time that it took to learn it.
+    ///
+    /// All runs pass through the law again, so that it knows what it would know without the break.
     pub(super) fn resume(
         &mut self,
         library: &Library,
         meta: &mut Meta,
-        law: Option<&mut (dyn Law + '_)>,
+        mut law: Option<&mut (dyn Law + '_)>,
+        disturbance: &Disturbance,
     ) -> Result<Resumed, SupervisorError> {
         let Some(campaign) = library.newest_campaign(&meta.fingerprint)? else {
             return Err(SupervisorError::Resume(
@@ -129,11 +133,22 @@ impl Progress {
         };
         let rows = library.list(Some(&campaign))?;
         meta.campaign = campaign;
-        let mut last = None;
+        let mut last: Option<(Decision, IterationRecord)> = None;
         for row in &rows {
             let mut record = library.load(row.id)?.record;
+            if let Some(law) = law.as_deref_mut() {
+                expect(law, &record.disturbance);
+                if let Some((Decision::Learn, before)) = last.take() {
+                    learn(law, &before.input, &before.error_m).input.map_err(refused)?;
+                }
+            }
             let decision = self.decide(&mut record);
             last = Some((decision, record));
+        }
+        let coming = last.as_ref().map_or(0, |(_, record)| record.index + 1);
+        let coming = disturbance.of(coming).map_err(SupervisorError::Disturbance)?;
+        if let Some(law) = law.as_deref_mut() {
+            expect(law, &coming);
         }
         let next = match (last, law) {
             (Some((Decision::RollBack(input), _)), _) => Some(Ok((input, 0.0))),
@@ -144,12 +159,14 @@ impl Progress {
             (Some((_, record)), _) => Some(Ok((record.input, 0.0))),
             (None, _) => None,
         };
-        let next = next.transpose().map_err(|error| {
-            SupervisorError::Resume(format!("the law refused the last run: {error}"))
-        })?;
+        let next = next.transpose().map_err(refused)?;
         let runs = rows.into_iter().map(|row| (row.record.index, row.record.figures)).collect();
-        Ok(Resumed { runs, next })
+        Ok(Resumed { runs, next, coming })
     }
+}
+
+fn refused(error: LearningError) -> SupervisorError {
+    SupervisorError::Resume(format!("the law refused a run: {error}"))
 }
 
 /// A campaign taken up again.
@@ -159,6 +176,8 @@ pub(super) struct Resumed {
     pub(super) runs: Vec<(u32, Figures)>,
     /// Input of the next run, and how long it took to learn it.
     pub(super) next: Option<(Vec<f64>, f64)>,
+    /// Disturbance of the next run.
+    pub(super) coming: Vec<f64>,
 }
 
 #[cfg(test)]

@@ -1,0 +1,352 @@
+//! Disturbance- and performance-weighted learning (DPW-ILC): the coming run's input from all past
+//! runs, each weighted by how like its disturbance was and how small its error.
+
+mod index;
+#[cfg(test)]
+mod proof;
+mod weights;
+
+use std::fmt;
+
+use super::expectation::{Expectation, check as check_disturbance};
+use super::inputs::Inputs;
+use crate::learning::error::check;
+use crate::learning::{Law, LearningError};
+
+use index::{Index, index};
+use weights::normalise;
+
+pub use weights::RelevanceWeights;
+pub(crate) use weights::shares;
+
+/// Size of the runs that a [`Relevance`] law learns from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunShape {
+    /// Samples of a run.
+    pub n_samples: usize,
+    /// Channels of the input.
+    pub n_inputs: usize,
+    /// Channels of the error.
+    pub n_outputs: usize,
+    /// Numbers that describe the disturbance of a run; 0 to 7.
+    pub n_disturbances: usize,
+    /// Time between two samples.
+    pub dt_s: f64,
+}
+
+/// Learning from every past run, weighted by its relevance for the coming one.
+///
+/// `u_i = sum_j w_j (Gamma_2 u_j + Gamma_1 (L(u_j, e_j) - u_j))`, `w_j = N_j / sum_k N_k`
+///
+/// with `N_j` the relevance ([`RelevanceWeights`]) and `L` the core law: what it proposes after a run
+/// depends on that run alone, so it is computed once and only the proposal is kept. With both gains
+/// 1 the next input is the weighted mean of all proposals. With `top` the sum and the weights run
+/// over the `top` most relevant runs only, exactly those that a search through all would give; of
+/// equally relevant ones the older.
+///
+/// The disturbance of each run is announced before it ([`Law::expect`]), that of the first one too. A
+/// run whose disturbance was never announced is not kept; a single kept run has weight 1.
+///
+/// # Shapes
+/// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`; disturbance:
+///   `n_disturbances`
+/// # Real Time
+/// Cold path. `O(n_samples top + log n_runs)`, or `O(n_samples n_runs)` without `top`. An update
+/// allocates for what is kept (a block of about a megabyte at a time, nothing up to the number given
+/// to [`Relevance::with_capacity`]), for the index (made anew after about `4 sqrt(n_runs)` runs), and
+/// lists of `top` numbers. What is kept is never moved by growth.
+/// # Source
+/// - \[dimarco2016\], Eq. (4.2) to (4.14), Appendix C. The listing computes the sum over all runs
+///   anew after each; `top` and [`Relevance::trim`] are its future work (Sec. 5.1).
+pub struct Relevance {
+    core: Box<dyn Law>,
+    shape: RunShape,
+    weights: RelevanceWeights,
+    top: Option<usize>,
+    told: Expectation,
+    /// Whether runs that were remembered may come again as runs that have just been made.
+    is_replayed: bool,
+    proposals: Inputs,
+    disturbances: Vec<f64>,
+    index: Box<dyn Index>,
+    proposal: Vec<f64>,
+    found: Vec<(usize, f64)>,
+    sums: Vec<f64>,
+}
+
+impl Relevance {
+    /// Makes the law around a core law, with nothing remembered.
+    ///
+    /// # Errors
+    /// - [`LearningError::Empty`] for no samples or channels, or `top` = 0.
+    /// - [`LearningError::Parameter`] for a weight or a sample time out of its range, or more than 7
+    ///   disturbances; [`LearningError::Disturbance`] for the wrong number of disturbance weights.
+    pub fn new(
+        core: Box<dyn Law>,
+        shape: RunShape,
+        weights: RelevanceWeights,
+        top: Option<usize>,
+    ) -> Result<Self, LearningError> {
+        let RunShape { n_samples, n_inputs, n_outputs, n_disturbances, dt_s } = shape;
+        for (what, count) in [
+            ("n_samples", n_samples),
+            ("n_inputs", n_inputs),
+            ("n_outputs", n_outputs),
+            ("top", top.unwrap_or(1)),
+        ] {
+            if count == 0 {
+                return Err(LearningError::Empty { what });
+            }
+        }
+        if !(dt_s.is_finite() && dt_s > 0.0) {
+            let allowed = "a sample time must be finite and above 0";
+            return Err(LearningError::Parameter { what: "dt_s", value: dt_s, allowed });
+        }
+        let Some(index) = index(n_samples, n_disturbances) else {
+            let allowed = "at most 7 disturbances can describe a run";
+            let (what, value) = ("n_disturbances", n_disturbances as f64);
+            return Err(LearningError::Parameter { what, value, allowed });
+        };
+        let weights = weights.spread(n_disturbances)?;
+        let length = n_samples * n_inputs;
+        Ok(Self {
+            core,
+            shape,
+            weights,
+            top,
+            told: Expectation::new(n_disturbances),
+            is_replayed: false,
+            proposals: Inputs::new(length),
+            disturbances: Vec::new(),
+            index,
+            proposal: vec![0.0; length],
+            found: Vec::with_capacity(top.map_or(0, |top| top.min(1024))),
+            sums: Vec::new(),
+        })
+    }
+
+    /// Makes room for `n_runs`, so that nothing is allocated for what is kept of them.
+    #[must_use]
+    pub fn with_capacity(mut self, n_runs: usize) -> Self {
+        self.proposals.reserve(n_runs);
+        self.disturbances.reserve(n_runs * self.shape.n_disturbances);
+        self.index.reserve(n_runs);
+        self.sums.reserve(n_runs);
+        self
+    }
+
+    /// Returns how many runs are remembered.
+    pub fn len(&self) -> usize {
+        self.proposals.len()
+    }
+
+    /// Returns whether no run is remembered.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns the size of the runs.
+    pub fn shape(&self) -> RunShape {
+        self.shape
+    }
+
+    /// Remembers a run that was made elsewhere or earlier.
+    ///
+    /// When a campaign is taken up again, its runs pass through the law once more: updates from runs
+    /// that are remembered already, bit by bit, add nothing until the first one that is new.
+    ///
+    /// # Errors
+    /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Disturbance`], or
+    ///   what the core law says.
+    pub fn remember(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        disturbance: &[f64],
+    ) -> Result<(), LearningError> {
+        check_disturbance(disturbance, self.shape.n_disturbances)?;
+        self.propose(input, error)?;
+        self.keep(error, disturbance);
+        self.is_replayed = true;
+        Ok(())
+    }
+
+    /// Returns the runs that count under a disturbance with their weights, the most relevant first.
+    ///
+    /// # Errors
+    /// - [`LearningError::Disturbance`], [`LearningError::NotFinite`].
+    pub fn relevant(&self, disturbance: &[f64]) -> Result<Vec<(usize, f64)>, LearningError> {
+        check_disturbance(disturbance, self.shape.n_disturbances)?;
+        let mut found = Vec::new();
+        self.index.nearest(&self.weights, disturbance, self.top.unwrap_or(self.len()), &mut found);
+        let mut weights: Vec<f64> = found.iter().map(|(_, sum)| *sum).collect();
+        normalise(&mut weights, self.weights.epsilon);
+        Ok(found.into_iter().zip(weights).map(|((number, _), weight)| (number, weight)).collect())
+    }
+
+    /// Drops all but the `keep` runs that hold most weight under the disturbances to come.
+    ///
+    /// A run's share is the sum of its weights (Eq. 4.13, over all runs) under each of
+    /// `disturbances`, one after the other; without any, under the disturbance of every remembered
+    /// run, as if the past came again. The largest shares stay; of equal ones the older. With one
+    /// disturbance these are exactly the runs most relevant for it. Returns the numbers of the runs
+    /// kept, in rising order. `O(n_runs n_disturbances_given)`.
+    ///
+    /// # Errors
+    /// - [`LearningError::Disturbance`] if `disturbances` holds no whole number of them;
+    ///   [`LearningError::NotFinite`].
+    pub fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>, LearningError> {
+        let width = self.shape.n_disturbances;
+        let given = if disturbances.is_empty() { &self.disturbances } else { disturbances };
+        let mut shares = vec![0.0; self.len()];
+        let mut sums = Vec::new();
+        // Without disturbances to tell runs apart, one look says all.
+        let mut looks = given.chunks(width.max(1));
+        let no_disturbance: &[f64] = &[];
+        let mut first = (width == 0).then_some(no_disturbance);
+        while let Some(disturbance) = first.take().or_else(|| looks.next()) {
+            check_disturbance(disturbance, width)?;
+            self.index.sums(&self.weights, disturbance, &mut sums);
+            normalise(&mut sums, self.weights.epsilon);
+            for (share, weight) in shares.iter_mut().zip(&sums) {
+                *share += weight;
+            }
+        }
+        let mut kept: Vec<usize> = (0..shares.len()).collect();
+        kept.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(a.cmp(&b)));
+        kept.truncate(keep);
+        kept.sort_unstable();
+        self.proposals.retain(&kept);
+        self.index.retain(&kept);
+        let old = std::mem::take(&mut self.disturbances);
+        for &number in &kept {
+            self.disturbances.extend_from_slice(&old[number * width..][..width]);
+        }
+        Ok(kept)
+    }
+
+    /// Computes what a run adds to the memory.
+    fn propose(&mut self, input: &[f64], error: &[f64]) -> Result<(), LearningError> {
+        let RunShape { n_samples, n_inputs, n_outputs, .. } = self.shape;
+        check("input", input, n_samples, n_inputs)?;
+        check("error", error, n_samples, n_outputs)?;
+        self.core.update(input, error, &mut self.proposal)?;
+        let RelevanceWeights { error_gain, input_gain, .. } = self.weights;
+        #[expect(clippy::float_cmp, reason = "gains of exactly 1 leave every bit as it is")]
+        if error_gain != 1.0 || input_gain != 1.0 {
+            for (next, u) in self.proposal.iter_mut().zip(input) {
+                *next = input_gain * u + error_gain * (*next - u);
+            }
+        }
+        check("next", &self.proposal, n_samples, n_inputs)
+    }
+
+    fn keep(&mut self, error: &[f64], disturbance: &[f64]) {
+        let sum = self.weights.error_sum(error, self.shape.n_outputs, self.shape.dt_s);
+        self.proposals.push(&self.proposal);
+        self.disturbances.extend_from_slice(disturbance);
+        self.index.push(&self.weights, sum, disturbance);
+    }
+
+    /// Returns whether the proposal is remembered already under this disturbance.
+    fn knows(&self, disturbance: &[f64]) -> bool {
+        let width = disturbance.len();
+        (0..self.len()).any(|run| {
+            self.disturbances[run * width..][..width] == *disturbance
+                && self.proposals.row(run) == self.proposal
+        })
+    }
+
+    /// Writes the weighted mean of what counts under a disturbance.
+    fn weigh(&mut self, disturbance: &[f64], next: &mut [f64]) {
+        let epsilon = self.weights.epsilon;
+        next.fill(0.0);
+        match self.top {
+            None => {
+                self.index.sums(&self.weights, disturbance, &mut self.sums);
+                normalise(&mut self.sums, epsilon);
+                for (number, &weight) in self.sums.iter().enumerate() {
+                    self.proposals.add(number, weight, next);
+                }
+            }
+            Some(top) => {
+                self.index.nearest(&self.weights, disturbance, top, &mut self.found);
+                self.sums.clear();
+                self.sums.extend(self.found.iter().map(|(_, sum)| *sum));
+                normalise(&mut self.sums, epsilon);
+                for ((number, _), &weight) in self.found.iter().zip(&self.sums) {
+                    self.proposals.add(*number, weight, next);
+                }
+            }
+        }
+    }
+}
+
+impl Law for Relevance {
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError> {
+        let RunShape { n_samples, n_inputs, .. } = self.shape;
+        if next.len() != n_samples * n_inputs {
+            let (what, found, n_channels) = ("next", next.len(), n_inputs);
+            return Err(LearningError::Length { what, found, n_samples, n_channels });
+        }
+        self.propose(input, error)?;
+        let (finished, coming) = self.told.settle()?;
+        let finished = finished.map(<[f64]>::to_vec);
+        let coming = coming.to_vec();
+        if let Some(finished) = finished {
+            self.is_replayed = self.is_replayed && self.knows(&finished);
+            if !self.is_replayed {
+                self.keep(error, &finished);
+            }
+        }
+        if self.is_empty() {
+            next.copy_from_slice(&self.proposal);
+        } else {
+            self.weigh(&coming, next);
+        }
+        check("next", next, n_samples, n_inputs)
+    }
+
+    fn expect(&mut self, disturbance: &[f64]) {
+        self.told.announce(disturbance);
+        self.core.expect(disturbance);
+    }
+
+    fn reset(&mut self) {
+        self.core.reset();
+        self.told.forget();
+        self.is_replayed = false;
+        self.proposals.clear();
+        self.disturbances.clear();
+        self.index.retain(&[]);
+    }
+
+    fn describe(&self) -> String {
+        let RelevanceWeights {
+            error,
+            error_rate,
+            disturbance,
+            epsilon,
+            rate_filter_s,
+            error_gain,
+            input_gain,
+        } = &self.weights;
+        let RunShape { n_samples, n_inputs, n_outputs, n_disturbances, dt_s } = self.shape;
+        let top = self.top.map_or_else(|| "null".to_owned(), |top| top.to_string());
+        let core = self.core.describe();
+        format!(
+            r#"{{"law":"relevance","core":{core},"error":{error},"error_rate":{error_rate},"disturbance":{disturbance:?},"epsilon":{epsilon},"rate_filter_s":{rate_filter_s},"error_gain":{error_gain},"input_gain":{input_gain},"top":{top},"dt_s":{dt_s},"n_samples":{n_samples},"n_inputs":{n_inputs},"n_outputs":{n_outputs},"n_disturbances":{n_disturbances}}}"#
+        )
+    }
+}
+
+impl fmt::Debug for Relevance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} with {:?}", self.describe(), self.index)
+    }
+}

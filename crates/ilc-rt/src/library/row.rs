@@ -1,0 +1,117 @@
+//! One row of the table, as it is written and read.
+
+use crate::record::{Figures, IterationRecord, Meta};
+
+/// One kept run with its provenance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Key in the library.
+    pub id: i64,
+    /// When it was appended, UTC.
+    pub created_utc: String,
+    /// Where it comes from.
+    pub meta: Meta,
+    /// SHA-256 of the arrays, as they were appended.
+    pub digest: String,
+    /// Samples in the run.
+    pub n_samples: usize,
+    /// Arrays and figures; the arrays are empty in listings.
+    pub record: IterationRecord,
+}
+
+pub(super) const COLUMNS: &str = "id, created_utc, cell, campaign, fingerprint, iteration, program, law, \
+    law_parameters, measure, cycle_s, n_axes, n_samples, digest, tracking_inf_m, tracking_rms_m, \
+    contour_inf_m, contour_rms_m, encoder_tracking_inf_m, tool_tracking_inf_m, overruns, \
+    missing_samples, late_updates, update_ms, rolled_back, axis_names, input_units, \
+    disturbance";
+
+pub(super) const ARRAYS: &str = "reference_m, input, encoder_m, tool_m, error_m, contour_m";
+
+pub(super) fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row> {
+    let count = |name: &str| row.get::<_, i64>(name).map(|n| usize::try_from(n).unwrap_or(0));
+    let list = |name: &str| -> rusqlite::Result<Vec<String>> {
+        Ok(serde_json::from_str(&row.get::<_, String>(name)?).unwrap_or_default())
+    };
+    let array = |name: &str| -> rusqlite::Result<Vec<f64>> {
+        if with_arrays {
+            Ok(floats(&row.get::<_, Option<Vec<u8>>>(name)?.unwrap_or_default()))
+        } else {
+            Ok(Vec::new())
+        }
+    };
+    Ok(Row {
+        id: row.get("id")?,
+        created_utc: row.get("created_utc")?,
+        meta: Meta {
+            cell: row.get("cell")?,
+            campaign: row.get("campaign")?,
+            fingerprint: row.get("fingerprint")?,
+            law: row.get("law")?,
+            law_parameters: row.get("law_parameters")?,
+            measure: row.get("measure")?,
+            program: row.get("program")?,
+            cycle_s: row.get("cycle_s")?,
+            n_axes: count("n_axes")?,
+            axis_names: list("axis_names")?,
+            input_units: list("input_units")?,
+        },
+        digest: row.get("digest")?,
+        n_samples: count("n_samples")?,
+        record: IterationRecord {
+            index: row.get("iteration")?,
+            reference_m: array("reference_m")?,
+            input: array("input")?,
+            encoder_m: array("encoder_m")?,
+            tool_m: array("tool_m")?,
+            error_m: array("error_m")?,
+            contour_m: array("contour_m")?,
+            disturbance: numbers(row.get::<_, Option<String>>("disturbance")?.as_deref()),
+            figures: Figures {
+                tracking_inf_m: row.get("tracking_inf_m")?,
+                tracking_rms_m: row.get("tracking_rms_m")?,
+                contour_inf_m: row.get("contour_inf_m")?,
+                contour_rms_m: row.get("contour_rms_m")?,
+                encoder_tracking_inf_m: row.get("encoder_tracking_inf_m")?,
+                tool_tracking_inf_m: row.get("tool_tracking_inf_m")?,
+                overruns: row.get("overruns")?,
+                missing_samples: row.get("missing_samples")?,
+                late_updates: row.get("late_updates")?,
+                update_ms: row.get("update_ms")?,
+                rolled_back: row.get("rolled_back")?,
+            },
+        },
+    })
+}
+
+pub(super) fn json_list(names: &[String]) -> String {
+    serde_json::Value::from(names).to_string()
+}
+
+/// Writes a disturbance so that reading it gives the same bits.
+pub(super) fn json_numbers(values: &[f64]) -> String {
+    serde_json::Value::from(values.to_vec()).to_string()
+}
+
+/// Reads a disturbance; one that cannot be read is none.
+pub(super) fn numbers(text: Option<&str>) -> Vec<f64> {
+    text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
+}
+
+pub(super) fn as_integer(count: usize) -> i64 {
+    i64::try_from(count).unwrap_or(i64::MAX)
+}
+
+pub(super) fn blob(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+fn floats(bytes: &[u8]) -> Vec<f64> {
+    let mut word = [0; 8];
+    bytes
+        .chunks_exact(8)
+        .map(|chunk| {
+            word.copy_from_slice(chunk);
+            f64::from_le_bytes(word)
+        })
+        .collect()
+}
