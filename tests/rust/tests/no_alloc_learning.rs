@@ -6,6 +6,7 @@ use ilc_rt::learning::Law;
 use ilc_rt::learning::gate::{Gate, GateRule};
 use ilc_rt::learning::ladder::{Ladder, LadderRule};
 use ilc_rt::learning::law::adjoint::Adjoint;
+use ilc_rt::learning::law::constrained::{Bound, Bounds, Constrained};
 use ilc_rt::learning::law::dynamic::DynamicNormOptimal;
 use ilc_rt::learning::law::error_feedforward::{ErrorFeedforward, Feedforward};
 use ilc_rt::learning::law::model_inverse::ModelInverse;
@@ -77,6 +78,11 @@ fn no_law_allocates_in_an_update() {
         Box::new(NormOptimal::new(&separate, N_SAMPLES, weights).unwrap()),
         Box::new(NormOptimal::new(&coupled, N_SAMPLES, weights).unwrap()),
     ];
+    // The input at hand is twice as large as it may be, so that the search has work to do.
+    for model in [&separate, &coupled] {
+        let bounds = Bounds { input: Some(Bound::within(-0.5, 0.5)), ..Bounds::default() };
+        laws.push(Box::new(Constrained::new(model, N_SAMPLES, weights, bounds).unwrap()));
+    }
     let segments = [(0, 10.0), (600, 50.0)].map(|(start, cutoff_hz)| Segment { start, cutoff_hz });
     let filters = [
         QFilter::None,

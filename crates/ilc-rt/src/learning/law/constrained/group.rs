@@ -58,10 +58,8 @@ pub(super) fn solver(
     let free_samples = shifts.iter().copied().max().unwrap_or(0) + inner;
     let delays = if bounds.acceleration.is_some() {
         2
-    } else if cost.rate > 0.0 || bounds.step.is_some() || bounds.velocity.is_some() {
-        1
     } else {
-        0
+        usize::from(cost.rate > 0.0 || bounds.step.is_some() || bounds.velocity.is_some())
     };
     let (n, m, p) = (model.n_states(), inputs.len(), outputs.len());
     let (a, b) = (model.a().clone(), model.b().clone());
@@ -162,8 +160,8 @@ impl Problem<'_> {
             if sample >= extent.n_samples {
                 continue;
             }
-            for j in 0..places.outputs.len() {
-                output[i][j] = cost.q.entry(sample, i, j);
+            for (j, entry) in output[i].iter_mut().enumerate().take(places.outputs.len()) {
+                *entry = cost.q.entry(sample, i, j);
             }
         }
         let m = places.inputs.len();

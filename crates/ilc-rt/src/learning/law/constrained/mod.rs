@@ -7,12 +7,14 @@
 mod bounds;
 mod group;
 mod interior;
+mod load;
 #[cfg(test)]
 mod proof;
 mod reach;
 mod riccati;
 mod rows;
 mod solver;
+mod sweeps;
 
 use super::norm_optimal::decouple::parts;
 use super::norm_optimal::{Cost, Plant};

@@ -14,10 +14,8 @@ pub(super) fn conflict(
     width: usize,
     run: &Run,
 ) -> Option<BoundsError> {
-    if bands.change.is_none() {
-        // Nothing depends on the run: it was checked when the law was made.
-        return None;
-    }
+    // Without them nothing depends on the run: it was checked when the law was made.
+    bands.change.as_ref()?;
     let before = |k: usize, i: usize| run.input[k * run.n_inputs + inputs[i]];
     search(bands, inputs, width, &before)
 }

@@ -4,6 +4,7 @@
 //! multiplied; only `interior` imports this.
 
 #![expect(clippy::needless_range_loop, reason = "matrices are written with their indices")]
+#![expect(clippy::inline_always, reason = "one copy in each sweep, its matrices in registers")]
 
 /// What is left of a pivot below this part of its diagonal entry is rounding.
 const VANISHED: f64 = 1e-13;
@@ -132,6 +133,18 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         cost: &mut [[f64; NS]; NS],
         gain: &mut Gain<M, NS>,
     ) {
+        self.answer(weighing, cost, gain);
+        self.follow(weighing, cost, gain);
+    }
+
+    /// Writes the gain, given the cost of the next state.
+    #[inline(always)]
+    fn answer<const NS: usize>(
+        &self,
+        weighing: &Weighing<M, P>,
+        cost: &[[f64; NS]; NS],
+        gain: &mut Gain<M, NS>,
+    ) {
         let Self { a, b, c, d } = self;
         let Weighing { output, change, step, bend } = weighing;
         let delays = Self::delays(NS);
@@ -205,6 +218,22 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         gain.factorise(&h);
         gain.solve(&mut feedback);
         gain.feedback = feedback;
+    }
+
+    /// Replaces the cost of the next state by that of this one, given the gain between.
+    #[inline(always)]
+    #[expect(clippy::too_many_lines, reason = "one sum, term by term")]
+    fn follow<const NS: usize>(
+        &self,
+        weighing: &Weighing<M, P>,
+        cost: &mut [[f64; NS]; NS],
+        gain: &Gain<M, NS>,
+    ) {
+        let Self { a, b, c, d } = self;
+        let Weighing { output, change, step, bend } = weighing;
+        let delays = Self::delays(NS);
+        let (one, two) = (N, N + M);
+        let feedback = &gain.feedback;
 
         // The next state as a function of this one: x+ by `moved`, v by `answer`, v_- by itself.
         let mut moved = [[0.0; NS]; N];

@@ -6,7 +6,6 @@ mod lifted;
 mod random;
 
 use nalgebra::{DMatrix, DVector};
-use proptest::prelude::*;
 
 use super::{Bound, Bounds, BoundsError, Constrained, Limit, Status};
 use crate::learning::law::norm_optimal::{Cost, NormOptimal, Weights};
@@ -14,7 +13,7 @@ use crate::learning::weights::Weight;
 use crate::learning::{Law, LearningError};
 use crate::model::{Method, StateSpace, discretize, from_transfer_function, second_order};
 
-use lifted::{differences, lift};
+use lifted::lift;
 
 fn noise(count: usize, seed: u32) -> Vec<f64> {
     let mut word = seed.wrapping_mul(2_654_435_761) | 1;
@@ -277,7 +276,13 @@ fn starting_from_the_last_solution_is_faster_and_as_good() {
     let n_samples = 200;
     let plain = haas(n_samples, Bounds::default()).update().0;
     let largest = plain.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-    let case = haas(n_samples, Bounds { input: within(0.6 * largest), ..Bounds::default() });
+    let bounds = Bounds {
+        input: within(0.8 * largest),
+        step: within(0.1 * largest),
+        acceleration: within(150.0),
+        ..Bounds::default()
+    };
+    let case = haas(n_samples, bounds);
     let mut law = case.law();
     let mut input = case.u.clone();
     let mut error = case.e.clone();
