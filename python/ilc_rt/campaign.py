@@ -186,11 +186,11 @@ class Campaign:
     def _start(self, iterations: int, measure: Callable[[int], ArrayLike] | None) -> Controller:
         cell_file = str(self.cell.path)
         if self.law is None and measure is None and self.transport != "loopback":
-            verb, arguments = "run", ["--library", self.library]
+            library = ["--library", self.library]
             if self.experiment is not None:
-                verb, arguments = "identify", arguments + self.experiment.arguments()
+                verb, arguments = "identify", library + self.experiment.arguments()
             else:
-                arguments += ["--iterations", str(iterations)]
+                verb, arguments = "run", ["--iterations", str(iterations), *library]
                 if not self.learning:
                     arguments.append("--no-learning")
             if self.measure is not None:

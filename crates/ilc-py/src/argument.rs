@@ -180,7 +180,7 @@ pub(crate) fn read_numbers(
     if !(matches!(kind.as_str(), "i" | "u") || kind == "f" && size == 8) {
         return Err(PyTypeError::new_err(format!("{name} has dtype {dtype}; float64 is needed")));
     }
-    let array = array.call_method1("astype", ("float64", "K", "unsafe", false, false))?;
+    let array = array.call_method1("astype", ("float64", "C", "unsafe", false, false))?;
     let array = array.cast::<PyArrayDyn<f64>>()?;
     let shape = array.shape().to_vec();
     let array = array.readonly();
