@@ -96,6 +96,41 @@ pub enum LearningError {
         /// Weight of the rate of the change.
         rate: f64,
     },
+    /// The analysis of the law says that it will not converge.
+    #[error(
+        "this law will not converge: {why}; change the law, or allow it with allow_divergent = true"
+    )]
+    Divergent {
+        /// The figures, as a sentence.
+        why: String,
+    },
+    /// A law that cannot be analysed because it is not linear.
+    #[error(
+        "the law is not linear: two updates differ from their sum's by {difference:.3e} of it; \
+         only linear laws can be analysed"
+    )]
+    NotLinear {
+        /// Difference relative to the update.
+        difference: f64,
+    },
+    /// A figure that needs the whole matrix of a run that is too long for it.
+    #[error("{what} needs n_samples x n_channels <= {allowed} for this law; it is {found}")]
+    TooLong {
+        /// Which figure.
+        what: &'static str,
+        /// Rows of the matrix.
+        found: usize,
+        /// Most rows allowed.
+        allowed: usize,
+    },
+    /// An eigenvalue or a fixed point could not be computed.
+    #[error("{what} could not be computed: {reason}")]
+    Numerics {
+        /// Which figure.
+        what: &'static str,
+        /// Why.
+        reason: &'static str,
+    },
     /// The model was refused.
     #[error(transparent)]
     Model(#[from] ModelError),

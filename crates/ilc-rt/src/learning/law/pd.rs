@@ -1,7 +1,7 @@
 //! Proportional-derivative learning with a low-pass filter.
 
 use crate::learning::error::check;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Structure};
 use crate::signal::{Section, SosFilter, ZeroPhase};
 
 /// The numbers of a [`Pd`] law.
@@ -128,6 +128,47 @@ impl Law for Pd {
             }
         }
         check("next", next, n_samples, n_channels)
+    }
+
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let (n_samples, n_channels) = (self.n_samples, self.n_channels);
+        for (what, signal) in [("dual", dual), ("to_input", to_input), ("to_error", to_error)] {
+            check(what, signal, n_samples, n_channels)?;
+        }
+        to_input.copy_from_slice(dual);
+        to_error.fill(0.0);
+        let PdGains { kp, kd, lead } = self.gains;
+        let last = n_samples - 1;
+        for channel in 0..n_channels {
+            let at = |sample: usize| sample.min(last) * n_channels + channel;
+            match &mut self.runner {
+                Runner::None => {}
+                Runner::ZeroPhase(filter) => {
+                    filter.apply_transposed(to_input, channel, n_channels)?;
+                }
+                Runner::Causal(filter) => {
+                    filter.reset();
+                    for k in (0..n_samples).rev() {
+                        to_input[at(k)] = filter.step(to_input[at(k)]);
+                    }
+                }
+            }
+            for k in 0..n_samples {
+                let value = to_input[at(k)];
+                to_error[at(k.saturating_add(lead))] += (kp + kd) * value;
+                to_error[at(k.saturating_add(lead).saturating_sub(1))] -= kd * value;
+            }
+        }
+        Ok(true)
+    }
+
+    fn structure(&self) -> Structure<'_> {
+        Structure::Pd(self.gains)
     }
 
     fn reset(&mut self) {

@@ -7,7 +7,7 @@ mod pairing;
 
 use crate::learning::error::check;
 use crate::learning::sweep::{self, FactorError, Gains, General, Rate, Run, Sweep};
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Structure};
 use crate::model::{ModelError, StateSpace};
 
 use decouple::{Part, parts};
@@ -62,6 +62,7 @@ impl Default for Weights {
 ///   with dense matrices; here it is solved by a Riccati recursion.
 #[derive(Debug)]
 pub struct NormOptimal {
+    model: StateSpace,
     n_samples: usize,
     n_inputs: usize,
     n_outputs: usize,
@@ -106,7 +107,7 @@ impl NormOptimal {
             .into_iter()
             .map(|part| solver(part, n_samples, weights))
             .collect::<Result<_, _>>()?;
-        Ok(Self { n_samples, n_inputs, n_outputs, weights, parts })
+        Ok(Self { model: model.clone(), n_samples, n_inputs, n_outputs, weights, parts })
     }
 
     /// Returns the number of groups of axes that are solved by themselves.
@@ -159,6 +160,10 @@ impl Law for NormOptimal {
             part.solve(&mut run);
         }
         check("next", run.next, n_samples, n_inputs)
+    }
+
+    fn structure(&self) -> Structure<'_> {
+        Structure::Optimal { model: &self.model, weights: self.weights }
     }
 
     fn reset(&mut self) {}

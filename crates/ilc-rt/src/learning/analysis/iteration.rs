@@ -1,0 +1,420 @@
+//! One iteration of learning as a linear map of the input: `u_{j+1} = T u_j + L_e r`.
+
+use super::plant::{Plant, first_effects};
+use crate::learning::law::norm_optimal::{NormOptimal, Weights};
+use crate::learning::{Law, LearningError, Structure};
+use crate::model::StateSpace;
+
+/// Difference from linearity, relative to the update, that rounding is granted.
+const LINEAR: f64 = 1e-6;
+
+/// How the transpose of the law is applied.
+#[derive(Debug)]
+enum Transpose {
+    /// The law knows it.
+    Law,
+    /// The law is optimal; see [`Hessian`].
+    Optimal(Box<Hessian>),
+    /// Not at all.
+    None,
+}
+
+/// A law with its plant: `T = L_u - L_e P`, `u` and `e` being whole runs.
+///
+/// The law is used as it is, through [`Law::update`]: whatever it does at the ends of the run is in
+/// the figures. Inputs at the end of the run that reach no output and that the law keeps apart from
+/// the others have no part in convergence; they are left out.
+pub(super) struct Iteration<'a> {
+    law: &'a mut dyn Law,
+    pub(super) plant: Plant,
+    pub(super) n_samples: usize,
+    pub(super) n_inputs: usize,
+    pub(super) n_outputs: usize,
+    /// What the law makes of nothing.
+    offset: Vec<f64>,
+    transpose: Transpose,
+    /// Indices of inputs that are left out.
+    free: Vec<usize>,
+    error: Vec<f64>,
+    dual: Vec<f64>,
+    input: Vec<f64>,
+}
+
+impl<'a> Iteration<'a> {
+    pub(super) fn new(
+        law: &'a mut dyn Law,
+        model: &StateSpace,
+        n_samples: usize,
+    ) -> Result<Self, LearningError> {
+        if n_samples == 0 {
+            return Err(LearningError::Empty { what: "n_samples" });
+        }
+        let plant = Plant::new(model)?;
+        let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+        let hessian = match law.structure() {
+            Structure::Optimal { model, weights } => Hessian::new(model, n_samples, weights)?,
+            _ => None,
+        };
+        let (n_u, n_e) = (n_samples * n_inputs, n_samples * n_outputs);
+        law.reset();
+        let mut offset = vec![0.0; n_u];
+        law.update(&vec![0.0; n_u], &vec![0.0; n_e], &mut offset)?;
+        let mut iteration = Self {
+            law,
+            plant,
+            n_samples,
+            n_inputs,
+            n_outputs,
+            offset,
+            transpose: Transpose::None,
+            free: Vec::new(),
+            error: vec![0.0; n_e],
+            dual: vec![0.0; n_e],
+            input: vec![0.0; n_u],
+        };
+        iteration.transpose = match hessian {
+            Some(hessian) => Transpose::Optimal(Box::new(hessian)),
+            None => {
+                let zero = vec![0.0; n_u];
+                let Self { law, input, dual, .. } = &mut iteration;
+                if law.transposed(&zero, input, dual)? { Transpose::Law } else { Transpose::None }
+            }
+        };
+        iteration.leave_out(model)?;
+        Ok(iteration)
+    }
+
+    /// Refuses a law that is not linear, by trying.
+    pub(super) fn check_linear(&mut self) -> Result<(), LearningError> {
+        let (n_u, n_e) = (self.n_u(), self.n_e());
+        let signals =
+            [noise(n_u, 1), noise(n_u, 2), noise(n_e, 3), noise(n_e, 4)];
+        let sum = |a: &[f64], b: &[f64]| -> Vec<f64> {
+            a.iter().zip(b).map(|(a, b)| 2.0 * a - 3.0 * b).collect()
+        };
+        let [u, v, e, d] = &signals;
+        let mut found = [vec![0.0; n_u], vec![0.0; n_u], vec![0.0; n_u]];
+        self.law_linear(u, e, &mut found[0])?;
+        self.law_linear(v, d, &mut found[1])?;
+        self.law_linear(&sum(u, v), &sum(e, d), &mut found[2])?;
+        let expected = sum(&found[0], &found[1]);
+        let scale = norm(&found[0]).max(norm(&found[1])).max(norm(&expected));
+        let apart: Vec<f64> = expected.iter().zip(&found[2]).map(|(a, b)| a - b).collect();
+        let difference = norm(&apart) / scale.max(f64::MIN_POSITIVE);
+        if difference <= LINEAR {
+            return Ok(());
+        }
+        Err(LearningError::NotLinear { difference })
+    }
+
+    pub(super) fn n_u(&self) -> usize {
+        self.n_samples * self.n_inputs
+    }
+
+    pub(super) fn n_e(&self) -> usize {
+        self.n_samples * self.n_outputs
+    }
+
+    /// Indices of inputs that have no part in convergence.
+    pub(super) fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    /// Whether [`Iteration::apply_transposed`] works.
+    pub(super) fn has_transpose(&self) -> bool {
+        !matches!(self.transpose, Transpose::None)
+    }
+
+    /// `out = L_u u + L_e e`
+    pub(super) fn law_linear(
+        &mut self,
+        u: &[f64],
+        e: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), LearningError> {
+        self.law.reset();
+        self.law.update(u, e, out)?;
+        for (value, offset) in out.iter_mut().zip(&self.offset) {
+            *value -= offset;
+        }
+        Ok(())
+    }
+
+    /// `out = law(u, e)`, offset included.
+    pub(super) fn law(
+        &mut self,
+        u: &[f64],
+        e: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), LearningError> {
+        self.law.reset();
+        self.law.update(u, e, out)
+    }
+
+    /// `out = T u`
+    pub(super) fn apply(&mut self, u: &[f64], out: &mut [f64]) -> Result<(), LearningError> {
+        let mut input = std::mem::take(&mut self.input);
+        let mut error = std::mem::take(&mut self.error);
+        input.copy_from_slice(u);
+        self.clear(&mut input);
+        self.plant.apply(&input, &mut error);
+        for value in &mut error {
+            *value = -*value;
+        }
+        let done = self.law_linear(&input, &error, out);
+        self.input = input;
+        self.error = error;
+        done?;
+        self.clear(out);
+        Ok(())
+    }
+
+    /// `out = T' x`
+    pub(super) fn apply_transposed(
+        &mut self,
+        x: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), LearningError> {
+        let mut input = x.to_vec();
+        self.clear(&mut input);
+        match &mut self.transpose {
+            Transpose::Optimal(hessian) => hessian.transposed(&input, out)?,
+            Transpose::Law => {
+                self.law.transposed(&input, out, &mut self.dual)?;
+                self.plant.apply_transposed(&self.dual, &mut self.input);
+                for (value, through) in out.iter_mut().zip(&self.input) {
+                    *value -= through;
+                }
+            }
+            Transpose::None => {
+                return Err(LearningError::Numerics {
+                    what: "monotonic factor",
+                    reason: "the law has no transpose",
+                });
+            }
+        }
+        self.clear(out);
+        Ok(())
+    }
+
+    fn clear(&self, signal: &mut [f64]) {
+        for index in &self.free {
+            signal[*index] = 0.0;
+        }
+    }
+
+    /// Finds the inputs that reach no output within the run, and leaves them out if the law carries
+    /// nothing of them over to the others.
+    fn leave_out(&mut self, model: &StateSpace) -> Result<(), LearningError> {
+        let effects = first_effects(model)?;
+        let mut free = Vec::new();
+        for (channel, effect) in effects.iter().enumerate() {
+            let late = effect.unwrap_or(self.n_samples).min(self.n_samples);
+            free.extend((self.n_samples - late..self.n_samples).map(|k| k * self.n_inputs + channel));
+        }
+        if free.len() == self.n_u() {
+            return Ok(());
+        }
+        let mut probe = vec![0.0; self.n_u()];
+        let mut out = vec![0.0; self.n_u()];
+        let zero = vec![0.0; self.n_e()];
+        for (place, index) in free.iter().enumerate() {
+            // Without pattern, so that no two of them cancel in what they reach.
+            probe[*index] = 1.0 + 0.37 * ((place * 7919) % 101) as f64 / 101.0;
+        }
+        self.law_linear(&probe, &zero, &mut out)?;
+        let reach = norm(&out);
+        for index in &free {
+            out[*index] = 0.0;
+        }
+        if norm(&out) <= 1e-9 * reach {
+            self.free = free;
+        }
+        Ok(())
+    }
+}
+
+/// The transpose of an optimal law's iteration.
+///
+/// `T = H^-1 M` with `H = P'QP + S + R + W` and `M = R + W`, so `T' = M H^-1`. What solves with `H` is
+/// the law itself, with `S + R` as weight of the input: `H^-1 g` is its change for the input
+/// `-(S + R)^-1 g`. With a rate penalty alone `W` is singular; then `g = W z + c P'Q e0` is taken
+/// apart, `H^-1 W z = T z` and `H^-1 P'Q e0` being updates of the law.
+struct Hessian {
+    solver: NormOptimal,
+    plant: Plant,
+    weights: Weights,
+    n_samples: usize,
+    n_inputs: usize,
+    n_outputs: usize,
+    /// Only for a rate penalty alone: the change that restores the means.
+    means: Option<Means>,
+}
+
+impl std::fmt::Debug for Hessian {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Hessian").field("weights", &self.weights).finish_non_exhaustive()
+    }
+}
+
+/// For each input channel a signal `P'Q e0` with its `H^-1 P'Q e0`, and the inverse of their sums.
+struct Means {
+    signals: Vec<Vec<f64>>,
+    solutions: Vec<Vec<f64>>,
+    inverse: nalgebra::DMatrix<f64>,
+}
+
+impl Hessian {
+    /// Returns `None` where the transpose cannot be had this way.
+    fn new(
+        model: &StateSpace,
+        n_samples: usize,
+        weights: Weights,
+    ) -> Result<Option<Self>, LearningError> {
+        let hold = weights.s + weights.r;
+        let solver = Weights { s: hold, r: 0.0, ..weights };
+        let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+        let mut hessian = Self {
+            solver: NormOptimal::new(model, n_samples, solver)?,
+            plant: Plant::new(model)?,
+            weights,
+            n_samples,
+            n_inputs,
+            n_outputs,
+            means: None,
+        };
+        if hold > 0.0 || weights.rate == 0.0 {
+            return Ok(Some(hessian));
+        }
+        let n_u = n_samples * n_inputs;
+        let mut sums = nalgebra::DMatrix::zeros(n_inputs, n_inputs);
+        let (mut signals, mut solutions) = (Vec::new(), Vec::new());
+        for channel in 0..n_inputs {
+            // An error that this input could have made.
+            let mut step = vec![0.0; n_u];
+            for sample in step.chunks_exact_mut(n_inputs) {
+                sample[channel] = 1.0;
+            }
+            let mut error = vec![0.0; n_samples * n_outputs];
+            hessian.plant.apply(&step, &mut error);
+            let mut signal = vec![0.0; n_u];
+            hessian.plant.apply_transposed(&error, &mut signal);
+            for value in &mut signal {
+                *value *= weights.q;
+            }
+            let mut solution = vec![0.0; n_u];
+            hessian.solver.update(&vec![0.0; n_u], &error, &mut solution)?;
+            for sample in signal.chunks_exact(n_inputs) {
+                for (row, value) in sample.iter().enumerate() {
+                    sums[(row, channel)] += value;
+                }
+            }
+            signals.push(signal);
+            solutions.push(solution);
+        }
+        let Some(inverse) = sums.try_inverse() else { return Ok(None) };
+        hessian.means = Some(Means { signals, solutions, inverse });
+        Ok(Some(hessian))
+    }
+
+    /// `out = T' x = M H^-1 x`
+    fn transposed(&mut self, x: &[f64], out: &mut [f64]) -> Result<(), LearningError> {
+        let Weights { s, r, rate, .. } = self.weights;
+        if r + rate == 0.0 {
+            out.fill(0.0);
+            return Ok(());
+        }
+        let hold = s + r;
+        let solved = if hold > 0.0 {
+            let zero = vec![0.0; self.n_samples * self.n_outputs];
+            let input: Vec<f64> = x.iter().map(|value| -value / hold).collect();
+            self.solver.update(&input, &zero, out)?;
+            out.iter().zip(&input).map(|(next, input)| next - input).collect()
+        } else {
+            self.solve_rate(x)?
+        };
+        self.penalise(&solved, out);
+        Ok(())
+    }
+
+    /// `H^-1 x` where the rate of the change is all that is penalised.
+    fn solve_rate(&mut self, x: &[f64]) -> Result<Vec<f64>, LearningError> {
+        let Some(means) = &self.means else {
+            return Err(LearningError::Numerics {
+                what: "monotonic factor",
+                reason: "an input has no effect at rest",
+            });
+        };
+        let m = self.n_inputs;
+        let mut sums = nalgebra::DVector::zeros(m);
+        for sample in x.chunks_exact(m) {
+            for (sum, value) in sums.iter_mut().zip(sample) {
+                *sum += value;
+            }
+        }
+        let shares = &means.inverse * sums;
+        let mut rest = x.to_vec();
+        for (signal, share) in means.signals.iter().zip(shares.iter()) {
+            for (value, part) in rest.iter_mut().zip(signal) {
+                *value -= share * part;
+            }
+        }
+        // W z = rest: the differences of z are running sums of the rest.
+        let weight = self.weights.rate * self.weights.rate;
+        let mut z = vec![0.0; x.len()];
+        let mut error = vec![0.0; self.n_samples * self.n_outputs];
+        for channel in 0..m {
+            let (mut sum, mut value) = (0.0, 0.0);
+            for k in 0..self.n_samples {
+                z[k * m + channel] = value;
+                sum += rest[k * m + channel];
+                value -= sum / weight;
+            }
+        }
+        self.plant.apply(&z, &mut error);
+        for value in &mut error {
+            *value = -*value;
+        }
+        let mut solved = vec![0.0; x.len()];
+        self.solver.update(&z, &error, &mut solved)?;
+        for (solution, share) in means.solutions.iter().zip(shares.iter()) {
+            for (value, part) in solved.iter_mut().zip(solution) {
+                *value += share * part;
+            }
+        }
+        Ok(solved)
+    }
+
+    /// `out = (R + W) x`
+    fn penalise(&self, x: &[f64], out: &mut [f64]) {
+        let (m, n) = (self.n_inputs, x.len());
+        let weight = self.weights.rate * self.weights.rate;
+        for (i, value) in out.iter_mut().enumerate() {
+            *value = self.weights.r * x[i];
+            if i >= m {
+                *value += weight * (x[i] - x[i - m]);
+            }
+            if i + m < n {
+                *value -= weight * (x[i + m] - x[i]);
+            }
+        }
+    }
+}
+
+/// Returns the Euclidean norm.
+pub(super) fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+/// Returns numbers without pattern between -1 and 1, the same each time.
+pub(super) fn noise(count: usize, seed: u64) -> Vec<f64> {
+    let mut word = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    (0..count)
+        .map(|_| {
+            word ^= word << 13;
+            word ^= word >> 7;
+            word ^= word << 17;
+            (word >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        })
+        .collect()
+}

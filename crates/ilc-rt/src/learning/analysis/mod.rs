@@ -1,0 +1,26 @@
+//! What a law will do, said before the first run.
+//!
+//! A linear law and a model make each iteration a linear map of the input,
+//! `u_{j+1} = T u_j + L_e r` with `T = L_u - L_e P`; this folder works its figures out, from whole
+//! matrices in short runs and from products with signals in long ones. `supervisor` (which refuses a
+//! law that diverges), [`tune`](super::tune) and the Python bindings import it.
+
+mod condition;
+mod dense;
+mod figures;
+mod frequency;
+mod iteration;
+mod krylov;
+mod plant;
+mod question;
+mod refuse;
+mod verdict;
+
+#[cfg(test)]
+mod oracle;
+
+pub use condition::PdCondition;
+pub use figures::{Analysis, Method};
+pub use krylov::Estimate;
+pub use question::{DENSE_MAX, Question, Uncertainty, analyze};
+pub use refuse::{Verdict, divergence, refuse_divergent};
