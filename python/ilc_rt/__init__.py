@@ -2,6 +2,7 @@
 
 from ilc_rt import signal
 from ilc_rt._native import (
+    Analysis,
     Cell,
     LearningError,
     Library,
@@ -10,9 +11,12 @@ from ilc_rt._native import (
     PdIlc,
     SignalError,
     StateSpace,
+    Tuning,
+    analyze,
     discretize,
     from_transfer_function,
     second_order,
+    tune,
 )
 from ilc_rt.campaign import Campaign, Law
 from ilc_rt.errors import BadInputError, CampaignError
@@ -20,6 +24,7 @@ from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 
 __all__ = [
+    "Analysis",
     "BadInputError",
     "Campaign",
     "CampaignError",
@@ -34,8 +39,11 @@ __all__ = [
     "PdIlc",
     "SignalError",
     "StateSpace",
+    "Tuning",
+    "analyze",
     "discretize",
     "from_transfer_function",
     "second_order",
     "signal",
+    "tune",
 ]

@@ -7,7 +7,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from ilc_rt._native import Cell
+from ilc_rt._native import Cell, refuse_divergent
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
 from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
 from ilc_rt.events import EndEvent, Event, IterationEvent, parse_event
@@ -65,11 +65,16 @@ class Campaign:
         where real ones may be listening.
     resume : bool
         Whether to go on from the last campaign of this cell in the library.
+    allow_divergent : bool
+        Whether to start a law of which the analysis says that it will not
+        converge. A law written in Python is not analysed: it always starts.
 
     Raises
     ------
     CampaignError
         If the cell, the bus or a program cannot be used.
+    BadInputError
+        If the law will not converge with the cell's model.
 
     Examples
     --------
@@ -89,14 +94,22 @@ class Campaign:
         lockstep: bool | None = None,
         drives: Drives = "auto",
         resume: bool = False,
+        allow_divergent: bool = False,
     ) -> None:
-        self.cell = cell if isinstance(cell, Cell) else load_cell(cell)
+        if isinstance(cell, Cell):
+            self.cell = cell
+        else:
+            # The cell's own law does not matter if another one is given.
+            self.cell = load_cell(cell, allow_divergent=allow_divergent or law is not None)
+        self.allow_divergent = allow_divergent
         self.law = law
         self.library = str(library)
         self.bus = bus if bus is not None else str(self.cell.bus)
         if law is not None and not callable(getattr(law, "update", None)):
             message = f"law = {law!r}: an object with update(u, e, disturbance=None), or None"
             raise BadInputError(message)
+        if law is not None and not allow_divergent:
+            _refuse_divergent(law, self.cell)
         self.measure = measure
         self.transport = transport_of(self.bus)
         self.lockstep = self.transport == "loopback" if lockstep is None else lockstep
@@ -173,6 +186,8 @@ class Campaign:
                 arguments += ["--measure", self.measure]
             if self.resume:
                 arguments.append("--resume")
+            if self.allow_divergent:
+                arguments.append("--allow-divergent")
             return ProcessController(
                 cell_file,
                 arguments,
@@ -210,8 +225,15 @@ class Campaign:
             raise CampaignError(message)
 
 
-def load_cell(path: str | Path) -> Cell:
+def load_cell(path: str | Path, *, allow_divergent: bool = False) -> Cell:
     """Read and validate a cell description.
+
+    Parameters
+    ----------
+    path : path
+        The TOML file.
+    allow_divergent : bool
+        Whether its law is accepted also if it will not converge.
 
     Raises
     ------
@@ -219,7 +241,7 @@ def load_cell(path: str | Path) -> Cell:
         With file, key, value and what is allowed.
     """
     try:
-        return Cell.load(path)
+        return Cell.load(path, allow_divergent=allow_divergent)
     except (ValueError, OSError, RuntimeError) as error:
         raise BadInputError(" ".join(str(error).split())) from error
 
@@ -242,6 +264,14 @@ def transport_of(bus: str) -> str:
         message = f"bus = {bus}: allowed can:INTERFACE, udp:ADDRESS[:PORT], zenoh:KEY or loopback:"
         raise BadInputError(message)
     return kind
+
+
+def _refuse_divergent(law: Law, cell: Cell) -> None:
+    try:
+        refuse_divergent(law, cell.model(), cell.n_samples)
+    except ValueError as error:
+        message = f"law = {law!r}: {' '.join(str(error).split())}"
+        raise BadInputError(message) from error
 
 
 def _simulated(transport: str, drives: str) -> bool:

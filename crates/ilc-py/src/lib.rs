@@ -5,6 +5,7 @@
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
+mod analysis;
 mod argument;
 mod campaign;
 mod cell;
@@ -17,6 +18,7 @@ mod model;
 mod model_argument;
 mod python_law;
 mod signal;
+mod tuning;
 
 use pyo3::prelude::*;
 
@@ -27,6 +29,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     model::register(module)?;
     signal::register(module)?;
     laws::register(module)?;
+    analysis::register(module)?;
+    tuning::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

@@ -49,6 +49,12 @@ use crate::model_argument::{read_model, read_sample_time};
 #[derive(Debug)]
 pub(crate) struct PyStateSpace(StateSpace);
 
+impl From<StateSpace> for PyStateSpace {
+    fn from(model: StateSpace) -> Self {
+        Self(model)
+    }
+}
+
 impl PyStateSpace {
     pub(crate) fn model(&self) -> &StateSpace {
         &self.0

@@ -2,8 +2,8 @@
 
 use std::sync::Mutex;
 
-use ilc_rt::learning::Law;
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
+use ilc_rt::learning::{Law, LearningError, Structure};
 use pyo3::prelude::*;
 
 use super::{held, next};
@@ -137,6 +137,20 @@ impl PyNormOptimalIlc {
 }
 
 impl PyNormOptimalIlc {
+    /// Returns the samples of a run.
+    pub(super) fn n_samples(&self) -> usize {
+        self.n_samples
+    }
+
+    /// Makes the law anew.
+    pub(super) fn own(&self) -> Result<Box<dyn Law>, LearningError> {
+        let law = held(&self.law);
+        let Structure::Optimal { model, weights } = law.structure() else {
+            return Err(LearningError::Empty { what: "model" });
+        };
+        Ok(Box::new(NormOptimal::new(model, self.n_samples, weights)?))
+    }
+
     fn read(&self, name: &str, signal: &Bound<'_, PyAny>, n_channels: usize) -> PyResult<Signal> {
         let signal = Signal::read(name, signal)?;
         if (signal.n_samples, signal.n_channels) == (self.n_samples, n_channels) {

@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use ilc_rt::learning::Law;
+use ilc_rt::learning::{Law, LearningError};
 use ilc_rt::learning::law::pd::{Pd, PdGains, QFilter};
 use pyo3::prelude::*;
 
@@ -55,6 +55,17 @@ pub(super) struct PyPdIlc {
     q_filter: QFilter,
     /// The law for the size of run seen last.
     law: Mutex<Option<(usize, usize, Pd)>>,
+}
+
+impl PyPdIlc {
+    /// Makes the law anew, for runs of the given size.
+    pub(super) fn own(
+        &self,
+        n_samples: usize,
+        n_channels: usize,
+    ) -> Result<Box<dyn Law>, LearningError> {
+        Ok(Box::new(Pd::new(self.gains, n_samples, n_channels, self.q_filter.clone())?))
+    }
 }
 
 #[pymethods]

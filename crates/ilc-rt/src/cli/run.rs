@@ -47,6 +47,9 @@ pub(super) struct RunArguments {
     /// Print one JSON object a line instead of a table.
     #[arg(long)]
     events: bool,
+    /// Start also if the analysis says that learning will not converge.
+    #[arg(long)]
+    allow_divergent: bool,
     /// Do not publish on Zenoh.
     #[arg(long)]
     no_telemetry: bool,
@@ -81,6 +84,7 @@ pub(super) fn run(arguments: &RunArguments) -> u8 {
 
 fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
     let mut cell = Cell::load(&arguments.cell)?;
+    cell.learning.allow_divergent |= arguments.allow_divergent;
     if let Some(address) = &arguments.bus {
         cell.bus.address.clone_from(address);
     }

@@ -113,16 +113,6 @@ pub enum LearningError {
         /// Difference relative to the update.
         difference: f64,
     },
-    /// A figure that needs the whole matrix of a run that is too long for it.
-    #[error("{what} needs n_samples x n_channels <= {allowed} for this law; it is {found}")]
-    TooLong {
-        /// Which figure.
-        what: &'static str,
-        /// Rows of the matrix.
-        found: usize,
-        /// Most rows allowed.
-        allowed: usize,
-    },
     /// An eigenvalue or a fixed point could not be computed.
     #[error("{what} could not be computed: {reason}")]
     Numerics {

@@ -8,6 +8,7 @@ mod announce;
 mod campaign;
 mod collect;
 mod error;
+mod forecast;
 mod learner;
 mod nodes;
 mod pace;
@@ -18,4 +19,5 @@ mod telemetry;
 
 pub use campaign::{Options, Outcome, run};
 pub use error::SupervisorError;
+pub use forecast::{first_error, learning_model};
 pub use plan::Plan;

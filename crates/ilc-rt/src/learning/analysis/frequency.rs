@@ -9,7 +9,8 @@ use rustfft::FftPlanner;
 
 use super::iteration::Iteration;
 use crate::learning::LearningError;
-use crate::model::StateSpace;
+use crate::learning::law::norm_optimal::Weights;
+use crate::model::{ModelError, StateSpace};
 
 type Matrix = DMatrix<Complex<f64>>;
 
@@ -24,8 +25,8 @@ const GROWING: f64 = 1.0 + 1e-9;
 
 /// Law and plant at one frequency.
 #[derive(Debug)]
-pub(super) struct Bin {
-    pub(super) frequency_hz: f64,
+pub(in crate::learning) struct Bin {
+    pub(in crate::learning) frequency_hz: f64,
     /// `L_u`
     keep: Matrix,
     /// `L_e`
@@ -38,8 +39,8 @@ pub(super) struct Bin {
 
 /// Law and plant over frequency.
 #[derive(Debug)]
-pub(super) struct Spectrum {
-    pub(super) bins: Vec<Bin>,
+pub(in crate::learning) struct Spectrum {
+    pub(in crate::learning) bins: Vec<Bin>,
 }
 
 impl Spectrum {
@@ -79,10 +80,8 @@ impl Spectrum {
         };
         let keep: Vec<_> = keep.iter().map(transform).collect();
         let learn: Vec<_> = learn.iter().map(transform).collect();
-        let n = model.n_states().max(4);
-        let n_bins = (4_000_000 / (n * n * n)).clamp(64, 1024).min(n_fft / 2);
-        let stride = (n_fft / 2) / n_bins;
-        let mut bins = Vec::with_capacity(n_bins + 1);
+        let stride = (n_fft / 2) / n_bins(model).min(n_fft / 2);
+        let mut bins = Vec::new();
         for at in (0..=n_fft / 2).step_by(stride) {
             let frequency_hz = at as f64 / (n_fft as f64 * dt_s);
             let Some(plant) = response(model, std::f64::consts::TAU * at as f64 / n_fft as f64)
@@ -98,8 +97,45 @@ impl Spectrum {
         Ok(Some(Self { bins }))
     }
 
+    /// Returns the spectrum of an optimal law without rate penalty, from its equation:
+    /// `L_e = (q P*P + s + r)^-1 q P*`, `L_u = (q P*P + s + r)^-1 (q P*P + r)`.
+    ///
+    /// # Errors
+    /// - [`ModelError::Continuous`] for a continuous model.
+    pub(in crate::learning) fn optimal(
+        model: &StateSpace,
+        weights: Weights,
+    ) -> Result<Self, ModelError> {
+        let Some(dt_s) = model.dt_s() else {
+            return Err(ModelError::Continuous { action: "tuning" });
+        };
+        let m = model.n_inputs();
+        let eye = Matrix::identity(m, m);
+        let real = |value: f64| Complex::new(value, 0.0);
+        let n_bins = n_bins(model);
+        let mut bins = Vec::new();
+        for at in 0..=n_bins {
+            let omega_rad = std::f64::consts::PI * at as f64 / n_bins as f64;
+            let Some(plant) = response(model, omega_rad) else { continue };
+            let square = plant.adjoint() * &plant * real(weights.q);
+            let cost = &square + &eye * real(weights.s + weights.r);
+            let Some(inverse) = cost.try_inverse() else { continue };
+            let learn = &inverse * plant.adjoint() * real(weights.q);
+            let keep = &inverse * (square + &eye * real(weights.r));
+            let t = &inverse * real(weights.r);
+            let frequency_hz = omega_rad / (std::f64::consts::TAU * dt_s);
+            bins.push(Bin { frequency_hz, keep, learn, plant, t });
+        }
+        Ok(Self { bins })
+    }
+
+    /// Returns the largest singular value of the plant at each frequency.
+    pub(in crate::learning) fn plant_gain(&self) -> Vec<f64> {
+        self.bins.iter().map(|bin| gain(&bin.plant)).collect()
+    }
+
     /// Returns the largest singular value of `T` at each frequency.
-    pub(super) fn contraction(&self) -> Vec<f64> {
+    pub(in crate::learning) fn contraction(&self) -> Vec<f64> {
         self.bins.iter().map(|bin| gain(&bin.t)).collect()
     }
 
@@ -125,7 +161,7 @@ impl Spectrum {
 
     /// Returns the largest `|T| + |W| |L_e P|` over frequency, and the largest uncertainty `w`, the
     /// same at all frequencies, for which that sum would stay below 1.
-    pub(super) fn robust(&self, weight: impl Fn(f64) -> f64) -> (f64, f64) {
+    pub(in crate::learning) fn robust(&self, weight: impl Fn(f64) -> f64) -> (f64, f64) {
         let (mut factor, mut allowed) = (0.0_f64, f64::INFINITY);
         for bin in &self.bins {
             let (kept, learned) = (gain(&bin.t), gain(&(&bin.learn * &bin.plant)));
@@ -139,7 +175,7 @@ impl Spectrum {
 
     /// Returns `tr(P Sigma_j P')` for a sample, averaged over frequency, for white noise of variance 1:
     /// for the runs `0..n_runs`, and in the limit if there is one.
-    pub(super) fn noise(&self, n_runs: usize) -> (Vec<f64>, Option<f64>) {
+    pub(in crate::learning) fn noise(&self, n_runs: usize) -> (Vec<f64>, Option<f64>) {
         const DOUBLINGS: usize = 40;
         let mut shares = vec![0.0; n_runs];
         let (mut limit, mut weights) = (0.0, 0.0);
@@ -213,6 +249,12 @@ fn response(model: &StateSpace, omega_rad: f64) -> Option<Matrix> {
     let states = system.lu().solve(&complex(model.b()))?;
     let found = complex(model.c()) * states + d;
     found.iter().all(|value| value.norm() < 1e9).then_some(found)
+}
+
+/// How many frequencies are looked at: fewer for models with many states.
+fn n_bins(model: &StateSpace) -> usize {
+    let n = model.n_states().max(4);
+    (4_000_000 / (n * n * n)).clamp(64, 1024)
 }
 
 /// Returns the largest singular value.

@@ -21,6 +21,7 @@ mod oracle;
 
 pub use condition::PdCondition;
 pub use figures::{Analysis, Method};
+pub(in crate::learning) use frequency::Spectrum;
 pub use krylov::Estimate;
 pub use question::{DENSE_MAX, Question, Uncertainty, analyze};
 pub use refuse::{Verdict, divergence, refuse_divergent};

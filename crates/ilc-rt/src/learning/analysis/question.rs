@@ -227,7 +227,7 @@ pub(super) fn structured(
 ) -> Result<(Estimate, Option<Estimate>, f64), LearningError> {
     let n = iteration.n_u();
     // Fewer vectors in long runs: they are what takes the memory.
-    let n_basis = (6_000_000 / n).clamp(20, 60);
+    let n_basis = if n <= 1000 { 200 } else { (6_000_000 / n).clamp(20, 60) };
     let radius = spectral_radius(n, &mut |u, out| iteration.apply(u, out), 20, n_basis)?;
     let factor = if iteration.has_transpose() {
         let mut middle = vec![0.0; n];
@@ -248,7 +248,7 @@ pub(super) fn structured(
     } else {
         None
     };
-    let growth = transient_growth(iteration, 60)?;
+    let (growth, _) = transient_growth(iteration, 60)?;
     Ok((radius, factor, growth))
 }
 

@@ -15,7 +15,9 @@ pub struct Verdict {
     pub spectral_radius: f64,
     /// Largest growth of an error without pattern on its way.
     pub transient_growth: f64,
-    /// The two as a sentence.
+    /// Whether that error grew in any run.
+    pub rises: bool,
+    /// The figures as a sentence.
     pub why: String,
 }
 
@@ -36,8 +38,13 @@ pub fn divergence(
     let is_known = match law.structure() {
         Structure::Optimal { model: own, .. } if own == model => {
             let why = "the law minimises a cost of its own model".to_owned();
-            let (spectral_radius, transient_growth) = (1.0, 1.0);
-            return Ok(Some(Verdict { converges: true, spectral_radius, transient_growth, why }));
+            return Ok(Some(Verdict {
+                converges: true,
+                spectral_radius: 1.0,
+                transient_growth: 1.0,
+                rises: false,
+                why,
+            }));
         }
         Structure::Unknown => false,
         _ => true,
@@ -50,7 +57,7 @@ pub fn divergence(
         }
     }
     let n = iteration.n_u();
-    let growth = transient_growth(&mut iteration, 30)?;
+    let (growth, rises) = transient_growth(&mut iteration, 30)?;
     let radius = if growth < GROWTH_MAX {
         spectral_radius(n, &mut |u, out| iteration.apply(u, out), 10, 24)?
     } else {
@@ -66,6 +73,7 @@ pub fn divergence(
         converges: fine,
         spectral_radius: radius.value,
         transient_growth: growth,
+        rises,
         why,
     }))
 }
@@ -88,12 +96,12 @@ pub fn refuse_divergent(
     }
 }
 
-/// Returns the largest growth over some runs of a start without pattern, at least 1; infinite as soon
-/// as nothing can save it.
+/// Returns the largest growth over some runs of a start without pattern, at least 1, and whether any
+/// run made it grow; infinite as soon as nothing can save it.
 pub(super) fn transient_growth(
     iteration: &mut Iteration,
     n_runs: usize,
-) -> Result<f64, LearningError> {
+) -> Result<(f64, bool), LearningError> {
     const HOPELESS: f64 = 1e6;
     let n = iteration.n_u();
     let mut state = noise(n, 21);
@@ -102,7 +110,7 @@ pub(super) fn transient_growth(
     }
     let start = norm(&state);
     let mut next = vec![0.0; n];
-    let mut largest: f64 = 1.0;
+    let (mut largest, mut before, mut rises) = (1.0_f64, 1.0, false);
     for _ in 0..n_runs {
         if start == 0.0 {
             break;
@@ -111,12 +119,14 @@ pub(super) fn transient_growth(
         std::mem::swap(&mut state, &mut next);
         let growth = norm(&state) / start;
         largest = largest.max(growth);
-        if !(growth < HOPELESS) {
-            return Ok(f64::INFINITY);
+        rises |= growth > before * (1.0 + 1e-9);
+        before = growth;
+        if growth.is_nan() || growth >= HOPELESS {
+            return Ok((f64::INFINITY, true));
         }
         if growth < 1e-9 {
             break;
         }
     }
-    Ok(largest)
+    Ok((largest, rises))
 }
