@@ -6,6 +6,7 @@
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
 mod analysis;
+mod analyze;
 mod argument;
 mod campaign;
 mod cell;
@@ -30,6 +31,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     signal::register(module)?;
     laws::register(module)?;
     analysis::register(module)?;
+    analyze::register(module)?;
     tuning::register(module)?;
     cell::register(module)?;
     library::register(module)?;

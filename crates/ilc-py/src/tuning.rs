@@ -4,7 +4,8 @@ use ilc_rt::learning::tune::{self, Knowledge, Tuning};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::analysis::{PyAnalysis, read_reference, read_uncertainty};
+use crate::analysis::PyAnalysis;
+use crate::analyze::{read_reference, read_uncertainty};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::read_model;

@@ -2,8 +2,8 @@
 
 use std::sync::Mutex;
 
-use ilc_rt::learning::{Law, LearningError};
 use ilc_rt::learning::law::pd::{Pd, PdGains, QFilter};
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use super::{held, next};

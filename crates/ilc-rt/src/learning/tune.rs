@@ -384,13 +384,11 @@ mod tests {
         let found = tune(&axis(), 200, &Knowledge::default()).unwrap();
         assert!(found.s > 0.0 && found.analysis.monotonic);
         let outside = from_transfer_function(&[0.5, -0.65], &[1.0, -1.1, 0.3], Some(1e-3)).unwrap();
-        let sure = Knowledge { uncertainty: Some(Uncertainty::Scalar(0.1)), ..Knowledge::default() };
+        let sure =
+            Knowledge { uncertainty: Some(Uncertainty::Scalar(0.1)), ..Knowledge::default() };
         let found = tune(&outside, 300, &sure).unwrap();
         assert!(found.r > 0.0 && found.steps[2].why.contains("not bounded"), "{:?}", found.steps);
         let none = Knowledge { n_runs: 0, ..Knowledge::default() };
-        assert!(matches!(
-            tune(&axis(), 200, &none),
-            Err(LearningError::Empty { what: "n_runs" })
-        ));
+        assert!(matches!(tune(&axis(), 200, &none), Err(LearningError::Empty { what: "n_runs" })));
     }
 }

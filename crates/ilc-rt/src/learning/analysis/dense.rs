@@ -1,7 +1,7 @@
 //! The same figures from whole matrices, for runs that are short enough.
 
-use faer::linalg::solvers::Solve;
 use faer::Mat;
+use faer::linalg::solvers::Solve;
 
 use super::iteration::Iteration;
 use super::krylov::{Estimate, radius};

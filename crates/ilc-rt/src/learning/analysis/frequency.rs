@@ -152,9 +152,10 @@ impl Spectrum {
                 return (bin.frequency_hz, None);
             }
             let m = bin.keep.nrows();
-            let contraction = bin.keep.clone().try_inverse().map(|inverse| {
-                gain(&(Matrix::identity(m, m) - inverse * &bin.learn * &bin.plant))
-            });
+            let contraction =
+                bin.keep.clone().try_inverse().map(|inverse| {
+                    gain(&(Matrix::identity(m, m) - inverse * &bin.learn * &bin.plant))
+                });
             (bin.frequency_hz, contraction)
         }))
     }

@@ -9,11 +9,13 @@ mod condition;
 mod dense;
 mod figures;
 mod frequency;
+mod hessian;
 mod iteration;
 mod krylov;
 mod plant;
 mod question;
 mod refuse;
+mod uncertainty;
 mod verdict;
 
 #[cfg(test)]
@@ -23,5 +25,6 @@ pub use condition::PdCondition;
 pub use figures::{Analysis, Method};
 pub(in crate::learning) use frequency::Spectrum;
 pub use krylov::Estimate;
-pub use question::{DENSE_MAX, Question, Uncertainty, analyze};
+pub use question::{DENSE_MAX, Question, analyze};
 pub use refuse::{Verdict, divergence, refuse_divergent};
+pub use uncertainty::Uncertainty;

@@ -88,7 +88,8 @@ fn without(matrix: &DMatrix<f64>, late: usize) -> DMatrix<f64> {
 fn the_servo_example_agrees_with_its_equations() {
     let (model, n) = (servo(), 401);
     let reference = triangle();
-    for w in [weights(1.0, 1.0, 1.0, 0.0), weights(0.1, 1.0, 1.0, 0.0), weights(1.0, 0.01, 5.0, 0.0)]
+    for w in
+        [weights(1.0, 1.0, 1.0, 0.0), weights(0.1, 1.0, 1.0, 0.0), weights(1.0, 0.01, 5.0, 0.0)]
     {
         let question = Question {
             reference: Some(reference.clone()),
@@ -239,8 +240,7 @@ fn products_with_signals_give_what_whole_matrices_give() {
         let [keep, learn] = columns(law.as_mut(), 2 * n, 2 * n);
         let t = keep - learn * model.lifted(n).unwrap();
         let mut iteration = Iteration::new(law.as_mut(), &model, n).unwrap();
-        let kept: Vec<usize> =
-            (0..2 * n).filter(|i| !iteration.free().contains(i)).collect();
+        let kept: Vec<usize> = (0..2 * n).filter(|i| !iteration.free().contains(i)).collect();
         let cut = DMatrix::from_fn(kept.len(), kept.len(), |i, j| t[(kept[i], kept[j])]);
         let (radius, factor, _) = structured(&mut iteration).unwrap();
         let factor = factor.unwrap();
@@ -264,9 +264,8 @@ fn products_with_signals_give_what_whole_matrices_give() {
 fn long_runs_agree_with_short_ones_of_the_same_law() {
     // Above the limit of whole matrices the same law has nearly the same figures.
     let model = axis(2e-3);
-    let reference = |n: usize| -> Vec<f64> {
-        (0..n).map(|k| 0.01 * (1.0 - (k as f64 / 60.0).cos())).collect()
-    };
+    let reference =
+        |n: usize| -> Vec<f64> { (0..n).map(|k| 0.01 * (1.0 - (k as f64 / 60.0).cos())).collect() };
     let figures = |n: usize, w: Weights| {
         let mut law = NormOptimal::new(&model, n, w).unwrap();
         let question = Question {
@@ -303,8 +302,7 @@ fn a_long_run_of_a_filtered_law_ends_where_its_fixed_point_says() {
     let gains = PdGains { kp: 0.5, kd: 0.0, lead: 8 };
     let filter = QFilter::ZeroPhase(butterworth(2, 8.0, 2e-3).unwrap());
     let mut law = Pd::new(gains, n, 1, filter).unwrap();
-    let reference: Vec<f64> =
-        (0..n).map(|k| 0.01 * (1.0 - (k as f64 / 90.0).cos())).collect();
+    let reference: Vec<f64> = (0..n).map(|k| 0.01 * (1.0 - (k as f64 / 90.0).cos())).collect();
     let question = Question { reference: Some(reference.clone()), ..Question::default() };
     let found = analyze(&mut law, &model, n, &question).unwrap();
     assert!(found.converges, "{}", found.why);
@@ -459,9 +457,8 @@ fn laws_that_say_nothing_are_tried() {
 fn wrong_questions_are_refused_one_at_a_time() {
     let (model, n) = (axis(2e-3), 50);
     let mut law = NormOptimal::new(&model, n, weights(1.0, 0.0, 0.1, 0.0)).unwrap();
-    let mut line = |question: Question| {
-        analyze(&mut law, &model, n, &question).unwrap_err().to_string()
-    };
+    let mut line =
+        |question: Question| analyze(&mut law, &model, n, &question).unwrap_err().to_string();
     let plain = Question::default;
     let found = line(Question { reference: Some(vec![0.0; 49]), ..plain() });
     assert!(found.contains("reference holds 49 values"), "{found}");
