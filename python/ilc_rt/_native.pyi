@@ -234,9 +234,8 @@ def analyze(
     noise_std: float | None = None,
     n_runs: int = 20,
 ) -> Analysis: ...
-def refuse_divergent(
-    law: object, model: StateSpace | _ForeignModel, n_samples: int
-) -> None: ...
+def refuse_divergent(law: object, model: StateSpace | _ForeignModel, n_samples: int) -> None: ...
+
 @final
 class Tuning:
     @property
@@ -260,6 +259,7 @@ def tune(
     reference: ArrayLike | None = None,
     n_runs: int = 10,
 ) -> Tuning: ...
+
 @final
 class Library:
     def __new__(cls, path: str | PathLike[str]) -> Library: ...

@@ -1,6 +1,7 @@
 """Analysis and tuning against dense NumPy solutions of the lifted problem."""
 
 import json
+from pathlib import Path
 
 import control
 import numpy as np
@@ -73,9 +74,7 @@ def test_the_servo_example_agrees_with_its_equations(q, s, r):
     found = analyze({"q": q, "s": s, "r": r}, model, reference=reference, noise_std=1e-3, n_runs=5)
     keep, learn, p = optimal(model, n, q, s, r)
     t = keep - learn @ p
-    np.testing.assert_allclose(
-        found.monotonic_factor, np.linalg.norm(t[:-1, :-1], 2), rtol=1e-9
-    )
+    np.testing.assert_allclose(found.monotonic_factor, np.linalg.norm(t[:-1, :-1], 2), rtol=1e-9)
     np.testing.assert_allclose(
         found.spectral_radius, np.abs(np.linalg.eigvals(t[:-1, :-1])).max(), rtol=1e-9
     )
@@ -100,9 +99,7 @@ def test_a_filtered_law_agrees_with_its_columns():
     keep, learn = columns(law, N)
     t = keep - learn @ lifted(model, N)
     np.testing.assert_allclose(found.monotonic_factor, np.linalg.norm(t, 2), rtol=1e-9)
-    np.testing.assert_allclose(
-        found.spectral_radius, np.abs(np.linalg.eigvals(t)).max(), rtol=1e-9
-    )
+    np.testing.assert_allclose(found.spectral_radius, np.abs(np.linalg.eigvals(t)).max(), rtol=1e-9)
     assert found.method == "dense"
 
 
@@ -238,9 +235,7 @@ def test_ilc_tune_prints_and_writes(tmp_path, capsys):
 
 def divergent_cell(tmp_path):
     """Write the gantry with a proportional law that is far too eager."""
-    with open(GANTRY, encoding="utf-8") as file:
-        text = file.read()
-    text = text.replace('law = "norm_optimal"', 'law = "pd"')
+    text = Path(GANTRY).read_text(encoding="utf-8").replace('law = "norm_optimal"', 'law = "pd"')
     path = tmp_path / "cell.toml"
     path.write_text(text + "\n[learning.pd]\nkp = 5.0\ncutoff_hz = 100.0\n", encoding="utf-8")
     return path

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from ilc_rt._native import tune as propose
 from ilc_rt.campaign import load_cell
-from ilc_rt.commands.options import CellFile, JsonFile
+from ilc_rt.commands.options import CellFile, JsonFile  # noqa: TC001 - typer reads them
 from ilc_rt.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -94,9 +94,7 @@ def _figures(analysis: Analysis) -> list[str]:
         "error that stays, RMS": analysis.converged_error_rms,
         "expected with the noise, RMS": analysis.expected_rms_limit,
     }
-    return [
-        f"{name:30} {1e6 * value:.3f} µm" for name, value in named.items() if value is not None
-    ]
+    return [f"{name:30} {1e6 * value:.3f} µm" for name, value in named.items() if value is not None]
 
 
 def _write(path: Path, name: str, tuning: Tuning) -> None:
