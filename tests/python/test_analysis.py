@@ -99,7 +99,8 @@ def test_a_filtered_law_agrees_with_its_columns():
     keep, learn = columns(law, N)
     t = keep - learn @ lifted(model, N)
     np.testing.assert_allclose(found.monotonic_factor, np.linalg.norm(t, 2), rtol=1e-9)
-    np.testing.assert_allclose(found.spectral_radius, np.abs(np.linalg.eigvals(t)).max(), rtol=1e-9)
+    # Far from normal: an eigenvalue moves by much more than the rounding of the matrix.
+    np.testing.assert_allclose(found.spectral_radius, np.abs(np.linalg.eigvals(t)).max(), rtol=1e-6)
     assert found.method == "dense"
 
 
