@@ -7,7 +7,7 @@
 use nalgebra::{Complex, DMatrix};
 use rustfft::FftPlanner;
 
-use super::iteration::Iteration;
+use super::iteration::{FLOOR, Iteration};
 use crate::learning::LearningError;
 use crate::learning::law::norm_optimal::Weights;
 use crate::model::{ModelError, StateSpace};
@@ -215,7 +215,7 @@ type Responses = (Vec<Vec<f64>>, Vec<Vec<f64>>);
 fn responses(iteration: &mut Iteration, at: usize) -> Result<Responses, LearningError> {
     let (m, p) = (iteration.n_inputs, iteration.n_outputs);
     let (n_u, n_e) = (iteration.n_u(), iteration.n_e());
-    let (mut u, mut e, mut out) = (vec![0.0; n_u], vec![0.0; n_e], vec![0.0; n_u]);
+    let (mut u, mut e, mut out) = (vec![FLOOR; n_u], vec![FLOOR; n_e], vec![0.0; n_u]);
     let (mut keep, mut learn) = (Vec::new(), Vec::new());
     let split = |out: &[f64], into: &mut Vec<Vec<f64>>| {
         for row in 0..m {
@@ -225,13 +225,13 @@ fn responses(iteration: &mut Iteration, at: usize) -> Result<Responses, Learning
     for col in 0..m {
         u[at * m + col] = 1.0;
         iteration.law_linear(&u, &e, &mut out)?;
-        u[at * m + col] = 0.0;
+        u[at * m + col] = FLOOR;
         split(&out, &mut keep);
     }
     for col in 0..p {
         e[at * p + col] = 1.0;
         iteration.law_linear(&u, &e, &mut out)?;
-        e[at * p + col] = 0.0;
+        e[at * p + col] = FLOOR;
         split(&out, &mut learn);
     }
     Ok((keep, learn))

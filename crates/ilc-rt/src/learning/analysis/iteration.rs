@@ -8,6 +8,9 @@ use crate::model::StateSpace;
 /// Difference from linearity, relative to the update, that rounding is granted.
 const LINEAR: f64 = 1e-6;
 
+/// What [`lift`] puts in place of zero.
+pub(super) const FLOOR: f64 = 1e-60;
+
 /// How the transpose of the law is applied.
 #[derive(Debug)]
 enum Transpose {
@@ -156,6 +159,7 @@ impl<'a> Iteration<'a> {
         let mut error = std::mem::take(&mut self.error);
         input.copy_from_slice(u);
         self.clear(&mut input);
+        lift(&mut input);
         self.plant.apply(&input, &mut error);
         for value in &mut error {
             *value = -*value;
@@ -176,6 +180,7 @@ impl<'a> Iteration<'a> {
     ) -> Result<(), LearningError> {
         let mut input = x.to_vec();
         self.clear(&mut input);
+        lift(&mut input);
         match &mut self.transpose {
             Transpose::Optimal(hessian) => hessian.transposed(&input, out)?,
             Transpose::Law => {
@@ -232,6 +237,16 @@ impl<'a> Iteration<'a> {
             self.free = free;
         }
         Ok(())
+    }
+}
+
+/// Keeps a signal of about unit size away from zero by less than any rounding: what decays along a
+/// long silent stretch would otherwise end in denormal numbers, which are a hundred times slower.
+pub(super) fn lift(signal: &mut [f64]) {
+    for value in signal {
+        if value.abs() < FLOOR {
+            *value = FLOOR;
+        }
     }
 }
 

@@ -168,7 +168,7 @@ pub(super) fn structured(
     let radius = spectral_radius(n, &mut |u, out| iteration.apply(u, out), 20, n_basis)?;
     let factor = if iteration.has_transpose() {
         let mut middle = vec![0.0; n];
-        let products = (30_000_000 / n).clamp(60, 1500);
+        let products = (10_000_000 / n).clamp(60, 1500);
         let square = largest_symmetric(
             n,
             &mut |u, out| {
