@@ -3,6 +3,7 @@
 from ilc_rt import control, identify, kinematics, signal, trajectory, weights
 from ilc_rt._native import (
     AdjointIlc,
+    Analysis,
     Cell,
     ConstrainedIlc,
     ErrorFeedforwardIlc,
@@ -22,10 +23,13 @@ from ilc_rt._native import (
     StateSpace,
     TimeVarying,
     TrajectoryError,
+    Tuning,
+    analyze,
     discretize,
     from_transfer_function,
     repeatability,
     second_order,
+    tune,
 )
 from ilc_rt.campaign import Campaign, Law
 from ilc_rt.errors import BadInputError, CampaignError
@@ -34,6 +38,7 @@ from ilc_rt.result import CampaignResult
 
 __all__ = [
     "AdjointIlc",
+    "Analysis",
     "BadInputError",
     "Campaign",
     "CampaignError",
@@ -59,6 +64,8 @@ __all__ = [
     "StateSpace",
     "TimeVarying",
     "TrajectoryError",
+    "Tuning",
+    "analyze",
     "control",
     "discretize",
     "from_transfer_function",
@@ -68,5 +75,6 @@ __all__ = [
     "second_order",
     "signal",
     "trajectory",
+    "tune",
     "weights",
 ]

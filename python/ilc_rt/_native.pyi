@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "AdjointIlc",
+    "Analysis",
     "Arc",
     "ButterworthFilter",
     "Cascade",
@@ -46,7 +47,9 @@ __all__ = [
     "TimeVarying",
     "Trajectory",
     "TrajectoryError",
+    "Tuning",
     "VelocityLoopFit",
+    "analyze",
     "butterfly",
     "butterworth",
     "contour_error",
@@ -71,6 +74,7 @@ __all__ = [
     "modulated",
     "projection_across",
     "raster",
+    "refuse_divergent",
     "repeatability",
     "run_events",
     "schedule",
@@ -78,6 +82,7 @@ __all__ = [
     "spiral",
     "spline",
     "tracking_index",
+    "tune",
     "uncertainty",
     "zero_phase",
 ]
@@ -980,7 +985,7 @@ class ConstrainedIlc:
 @final
 class Cell:
     @staticmethod
-    def load(path: str | PathLike[str]) -> Cell: ...
+    def load(path: str | PathLike[str], allow_divergent: bool = False) -> Cell: ...
     @property
     def name(self) -> str: ...
     @property
@@ -1004,6 +1009,97 @@ class Cell:
     @property
     def law(self) -> Literal["norm_optimal", "pd", "none"]: ...
     def reference(self) -> NDArray[np.float64]: ...
+    def model(self) -> StateSpace: ...
+    def first_error(self) -> NDArray[np.float64]: ...
+
+@final
+class Analysis:
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def method(self) -> Literal["dense", "structured"]: ...
+    @property
+    def converges(self) -> bool: ...
+    @property
+    def monotonic(self) -> bool: ...
+    @property
+    def why(self) -> str: ...
+    @property
+    def spectral_radius(self) -> float: ...
+    @property
+    def spectral_radius_error(self) -> float: ...
+    @property
+    def monotonic_factor(self) -> float | None: ...
+    @property
+    def monotonic_factor_error(self) -> float | None: ...
+    @property
+    def transient_growth(self) -> float: ...
+    @property
+    def frequency_hz(self) -> NDArray[np.float64]: ...
+    @property
+    def contraction(self) -> NDArray[np.float64]: ...
+    @property
+    def critical_frequency_hz(self) -> float | None: ...
+    @property
+    def learnable_frequency_hz(self) -> float | None: ...
+    @property
+    def robust_factor(self) -> float | None: ...
+    @property
+    def robust_lifted(self) -> float | None: ...
+    @property
+    def uncertainty_allowed(self) -> float | None: ...
+    @property
+    def initial_error_rms(self) -> float | None: ...
+    @property
+    def converged_error_rms(self) -> float | None: ...
+    @property
+    def converged_input(self) -> NDArray[np.float64] | None: ...
+    @property
+    def converged_error(self) -> NDArray[np.float64] | None: ...
+    @property
+    def expected_rms(self) -> NDArray[np.float64]: ...
+    @property
+    def expected_rms_limit(self) -> float | None: ...
+    @property
+    def pd_factor(self) -> float | None: ...
+    @property
+    def pd_gain_range(self) -> tuple[float, float] | None: ...
+    def to_dict(self) -> dict[str, Any]: ...
+
+def analyze(
+    law: object,
+    model: StateSpace | _ForeignModel,
+    n_samples: int | None = None,
+    uncertainty: float | ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+    noise_std: float | None = None,
+    n_runs: int = 20,
+) -> Analysis: ...
+def refuse_divergent(law: object, model: StateSpace | _ForeignModel, n_samples: int) -> None: ...
+
+@final
+class Tuning:
+    @property
+    def q(self) -> float: ...
+    @property
+    def s(self) -> float: ...
+    @property
+    def r(self) -> float: ...
+    @property
+    def smoothing_hz(self) -> float | None: ...
+    @property
+    def steps(self) -> list[dict[str, Any]]: ...
+    @property
+    def analysis(self) -> Analysis: ...
+
+def tune(
+    model: StateSpace | _ForeignModel,
+    n_samples: int,
+    uncertainty: float | ArrayLike | None = None,
+    noise_std: float | None = None,
+    reference: ArrayLike | None = None,
+    n_runs: int = 10,
+) -> Tuning: ...
 
 @final
 class Library:

@@ -5,6 +5,8 @@
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
+mod analysis;
+mod analyze;
 mod argument;
 mod campaign;
 mod cell;
@@ -25,6 +27,7 @@ mod python_law;
 mod signal;
 mod time_varying;
 mod trajectory;
+mod tuning;
 mod weights;
 
 use pyo3::prelude::*;
@@ -43,6 +46,9 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     trajectory::register(module)?;
     laws::register(module)?;
     weights::register(module)?;
+    analysis::register(module)?;
+    analyze::register(module)?;
+    tuning::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

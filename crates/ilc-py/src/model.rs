@@ -50,15 +50,15 @@ use crate::model_argument::{read_model, read_sample_time};
 #[derive(Debug)]
 pub(crate) struct PyStateSpace(pub(crate) StateSpace);
 
-impl PyStateSpace {
-    pub(crate) fn model(&self) -> &StateSpace {
-        &self.0
-    }
-}
-
 impl From<StateSpace> for PyStateSpace {
     fn from(model: StateSpace) -> Self {
         Self(model)
+    }
+}
+
+impl PyStateSpace {
+    pub(crate) fn model(&self) -> &StateSpace {
+        &self.0
     }
 }
 

@@ -69,7 +69,7 @@ fn read_time_base(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Option<f64>
 }
 
 /// A model that may vary along the run.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) enum AnyModel {
     Invariant(StateSpace),
     Varying(TimeVarying),

@@ -4,6 +4,7 @@ use std::sync::Mutex;
 
 use ilc_rt::learning::law::norm_optimal::Cost;
 use ilc_rt::learning::weights::Weight;
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use super::solver::{Effort, Filter, Solver, side_by_side};
@@ -73,6 +74,8 @@ use crate::weights::{Task, read_contour, read_weight};
 #[pyclass(name = "NormOptimalIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyNormOptimalIlc {
+    model: AnyModel,
+    filter: Option<Filter>,
     cost: Cost,
     n_samples: usize,
     n_inputs: usize,
@@ -424,9 +427,22 @@ impl PyNormOptimalIlc {
     ) -> PyResult<Self> {
         let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
         let cost = effort.cost(q, n_samples, n_inputs)?;
-        let solver = || Solver::new(model.plant(), n_samples, cost.clone(), filter);
+        let solver = || Solver::new(model.plant(), n_samples, cost.clone(), filter.clone());
         let law = Mutex::new(detached(py, solver).or_raise()?);
-        Ok(Self { cost, n_samples, n_inputs, n_outputs, law })
+        let model = model.clone();
+        Ok(Self { model, filter, cost, n_samples, n_inputs, n_outputs, law })
+    }
+
+    /// Returns the samples of a run.
+    pub(super) fn n_samples(&self) -> usize {
+        self.n_samples
+    }
+
+    /// Makes the law anew.
+    pub(super) fn own(&self) -> Result<Box<dyn Law>, LearningError> {
+        let Self { model, filter, cost, n_samples, .. } = self;
+        let solver = Solver::new(model.plant(), *n_samples, cost.clone(), filter.clone())?;
+        Ok(solver.into_law())
     }
 
     fn read(&self, name: &str, signal: &Bound<'_, PyAny>, n_channels: usize) -> PyResult<Signal> {

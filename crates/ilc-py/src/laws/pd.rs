@@ -2,6 +2,7 @@
 
 use ilc_rt::learning::law::pd::{Pd, PdGains};
 use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use super::any_size::AnySize;
@@ -53,6 +54,17 @@ pub(super) struct PyPdIlc {
     gains: PdGains,
     q_filter: QFilter,
     law: AnySize<Pd>,
+}
+
+impl PyPdIlc {
+    /// Makes the law anew, for runs of the given size.
+    pub(super) fn own(
+        &self,
+        n_samples: usize,
+        n_channels: usize,
+    ) -> Result<Box<dyn Law>, LearningError> {
+        Ok(Box::new(Pd::new(self.gains, n_samples, n_channels, self.q_filter.clone())?))
+    }
 }
 
 #[pymethods]

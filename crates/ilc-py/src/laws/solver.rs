@@ -42,6 +42,13 @@ impl Solver {
         }
     }
 
+    pub(super) fn into_law(self) -> Box<dyn Law> {
+        match self {
+            Self::Plain(law) => Box::new(law),
+            Self::Dynamic(law) => Box::new(law),
+        }
+    }
+
     pub(super) fn conditioning(&self) -> f64 {
         match self {
             Self::Plain(law) => law.conditioning(),
@@ -66,7 +73,7 @@ impl Effort<'_, '_> {
 }
 
 /// The filter of a dynamic weight.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Filter(Dynamic);
 
 impl Filter {

@@ -50,6 +50,9 @@ pub(super) struct RunArguments {
     /// Print one JSON object a line instead of a table.
     #[arg(long)]
     events: bool,
+    /// Start also if the analysis says that learning will not converge.
+    #[arg(long)]
+    allow_divergent: bool,
     /// Do not publish on Zenoh.
     #[arg(long)]
     no_telemetry: bool,
@@ -93,6 +96,7 @@ pub(super) fn run(arguments: &RunArguments) -> u8 {
 
 fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
     let (mut cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
+    cell.learning.allow_divergent |= arguments.allow_divergent;
     if arguments.no_learning {
         cell.learning.law = LawName::None;
     }

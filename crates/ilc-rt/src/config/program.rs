@@ -113,6 +113,8 @@ pub struct Learning {
     pub input_max_m_s: f64,
     /// Growth of the RMS error over the best run at which the best input is restored.
     pub rollback_ratio: f64,
+    /// Whether a law may start of which the analysis says that it will not converge.
+    pub allow_divergent: bool,
     /// `[learning.norm_optimal]`
     pub norm_optimal: NormOptimalSection,
     /// `[learning.pd]`
@@ -127,6 +129,7 @@ impl Default for Learning {
             input_max_m: 0.005,
             input_max_m_s: 0.05,
             rollback_ratio: 1.5,
+            allow_divergent: false,
             norm_optimal: NormOptimalSection::default(),
             pd: PdSection::default(),
         }

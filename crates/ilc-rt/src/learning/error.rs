@@ -141,6 +141,31 @@ pub enum LearningError {
     /// The bounds contradict each other.
     #[error(transparent)]
     Bounds(#[from] BoundsError),
+    /// The analysis of the law says that it will not converge.
+    #[error(
+        "this law will not converge: {why}; change the law, or allow it with allow_divergent = true"
+    )]
+    Divergent {
+        /// The figures, as a sentence.
+        why: String,
+    },
+    /// A law that cannot be analysed because it is not linear.
+    #[error(
+        "the law is not linear: two updates differ from their sum's by {difference:.3e} of it; \
+         only linear laws can be analysed"
+    )]
+    NotLinear {
+        /// Difference relative to the update.
+        difference: f64,
+    },
+    /// An eigenvalue or a fixed point could not be computed.
+    #[error("{what} could not be computed: {reason}")]
+    Numerics {
+        /// Which figure.
+        what: &'static str,
+        /// Why.
+        reason: &'static str,
+    },
     /// The model was refused.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::error::SupervisorError;
+use super::forecast;
 use crate::config::{Axis, Cell, ConfigError, Interface, LawName, Measure};
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
@@ -108,9 +109,21 @@ impl Plan {
 
     /// Makes the law that the cell names; `None` if it shall not learn.
     ///
+    /// A law that will not converge with the cell's own model is refused, unless the cell says
+    /// `allow_divergent`.
+    ///
     /// # Errors
-    /// [`SupervisorError::Model`] or [`SupervisorError::Learning`] if model or weights are unusable.
+    /// [`SupervisorError::Model`] or [`SupervisorError::Learning`] if model or weights are unusable, or
+    /// the law will not converge.
     pub fn law(&self, cell: &Cell) -> Result<Option<Box<dyn Law>>, SupervisorError> {
+        let mut law = self.named_law(cell)?;
+        if let Some(law) = &mut law {
+            forecast::refuse(law.as_mut(), cell, self.n_samples())?;
+        }
+        Ok(law)
+    }
+
+    fn named_law(&self, cell: &Cell) -> Result<Option<Box<dyn Law>>, SupervisorError> {
         let file = || cell.file.display().to_string();
         let n_samples = self.n_samples();
         let refused = |source| SupervisorError::Learning { file: file(), source };
@@ -164,7 +177,7 @@ impl Plan {
 }
 
 /// The model that learning uses: the axes' closed loops side by side.
-fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
+pub(super) fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
     let mut models = cell.axes.iter().map(|axis| axis_model(axis, cell.cycle_s()));
     let first =
         models.next().unwrap_or_else(|| StateSpace::static_gain(nalgebra::dmatrix![1.0], None))?;

@@ -2,7 +2,7 @@
 
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_counts, check_place};
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Structure};
 
 /// The numbers of a [`Pd`] law.
 ///
@@ -88,6 +88,38 @@ impl Law for Pd {
         }
         self.runner.apply(next, n_channels)?;
         check("next", next, n_samples, n_channels)
+    }
+
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let (n_samples, n_channels) = (self.n_samples, self.n_channels);
+        for (what, signal) in [("dual", dual), ("to_input", &*to_input), ("to_error", &*to_error)] {
+            check(what, signal, n_samples, n_channels)?;
+        }
+        to_input.copy_from_slice(dual);
+        to_error.fill(0.0);
+        if !self.runner.apply_transposed(to_input, n_channels)? {
+            return Ok(false);
+        }
+        let PdGains { kp, kd, lead } = self.gains;
+        let last = n_samples - 1;
+        for channel in 0..n_channels {
+            let at = |sample: usize| sample.min(last) * n_channels + channel;
+            for k in 0..n_samples {
+                let value = to_input[at(k)];
+                to_error[at(k.saturating_add(lead))] += (kp + kd) * value;
+                to_error[at(k.saturating_add(lead).saturating_sub(1))] -= kd * value;
+            }
+        }
+        Ok(true)
+    }
+
+    fn structure(&self) -> Structure<'_> {
+        Structure::Pd(self.gains)
     }
 
     fn reset(&mut self) {}

@@ -121,6 +121,38 @@ impl QRunner {
             Kind::Switched(filter) => filter.apply(signal, channel, n_channels),
         })
     }
+
+    /// Applies the transpose of the filter to every channel in place, for the analysis of laws that
+    /// filter; returns whether there is one for this kind.
+    ///
+    /// # Shapes
+    /// - as [`QRunner::apply`]
+    /// # Errors
+    /// - [`SignalError::Length`] if the signal has another length than the filter was set up for.
+    pub fn apply_transposed(
+        &mut self,
+        signal: &mut [f64],
+        n_channels: usize,
+    ) -> Result<bool, SignalError> {
+        match &mut self.0 {
+            Kind::None => {}
+            Kind::ZeroPhase(filter) => {
+                for channel in 0..n_channels {
+                    filter.apply_transposed(signal, channel, n_channels)?;
+                }
+            }
+            Kind::Causal(filter) => {
+                for channel in 0..n_channels {
+                    filter.reset();
+                    for value in signal.iter_mut().skip(channel).step_by(n_channels).rev() {
+                        *value = filter.step(*value);
+                    }
+                }
+            }
+            Kind::Symmetric(_) | Kind::Switched(_) => return Ok(false),
+        }
+        Ok(true)
+    }
 }
 
 #[cfg(test)]

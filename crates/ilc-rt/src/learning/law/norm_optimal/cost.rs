@@ -98,6 +98,16 @@ impl Cost {
         Self { q: q.select(outputs), s: s.select(inputs), r: r.select(inputs), rate: *rate }
     }
 
+    /// Returns the weights as numbers, if that is what they are.
+    pub fn scalars(&self) -> Option<Weights> {
+        match (&self.q, &self.s, &self.r) {
+            (Weight::Scalar(q), Weight::Scalar(s), Weight::Scalar(r)) => {
+                Some(Weights { q: *q, s: *s, r: *r, rate: self.rate })
+            }
+            _ => None,
+        }
+    }
+
     /// Returns whether all weights are the same at every sample.
     pub fn is_constant(&self) -> bool {
         [&self.q, &self.s, &self.r].iter().all(|weight| weight.is_constant())

@@ -14,7 +14,8 @@ pub use plant::Plant;
 
 use crate::learning::error::check;
 use crate::learning::sweep::{self, Channels, FactorError, Form, Gains, Rate, Run, Stages, Sweep};
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Structure};
+use crate::model::StateSpace;
 
 use decouple::{Part, parts};
 
@@ -43,6 +44,8 @@ pub struct NormOptimal {
     n_inputs: usize,
     n_outputs: usize,
     weights: String,
+    /// Model and weights, where one model and four numbers say it all.
+    plain: Option<(StateSpace, Weights)>,
     conditioning: f64,
     parts: Vec<Box<dyn Sweep>>,
 }
@@ -99,6 +102,7 @@ impl NormOptimal {
             n_inputs,
             n_outputs,
             weights: cost.json(),
+            plain: plant.invariant().cloned().zip(cost.scalars()),
             conditioning: 1.0,
             parts: Vec::new(),
         };
@@ -145,6 +149,7 @@ impl NormOptimal {
             n_inputs,
             n_outputs,
             weights: format!(r#""weights":{told:?}"#),
+            plain: None,
             conditioning: 1.0,
             parts: Vec::new(),
         };
@@ -205,6 +210,13 @@ impl Law for NormOptimal {
             part.solve(&mut run);
         }
         check("next", run.next, n_samples, n_inputs)
+    }
+
+    fn structure(&self) -> Structure<'_> {
+        self.plain.as_ref().map_or(Structure::Unknown, |(model, weights)| Structure::Optimal {
+            model,
+            weights: *weights,
+        })
     }
 
     fn reset(&mut self) {}

@@ -24,6 +24,14 @@ impl<'a> From<&'a TimeVarying> for Plant<'a> {
 }
 
 impl<'a> Plant<'a> {
+    /// Returns the model if it is the same at every sample.
+    pub fn invariant(self) -> Option<&'a StateSpace> {
+        match self {
+            Self::Invariant(model) => Some(model),
+            Self::Varying(_) => None,
+        }
+    }
+
     /// Returns the model at sample `k`.
     ///
     /// # Panics
