@@ -324,7 +324,7 @@ impl PyNormOptimalIlc {
 
     /// Samples of a run.
     #[getter]
-    fn n_samples(&self) -> usize {
+    pub(super) fn n_samples(&self) -> usize {
         self.n_samples
     }
 
@@ -431,11 +431,6 @@ impl PyNormOptimalIlc {
         let law = Mutex::new(detached(py, solver).or_raise()?);
         let model = model.clone();
         Ok(Self { model, filter, cost, n_samples, n_inputs, n_outputs, law })
-    }
-
-    /// Returns the samples of a run.
-    pub(super) fn n_samples(&self) -> usize {
-        self.n_samples
     }
 
     /// Makes the law anew.
