@@ -211,13 +211,13 @@ def test_each_bad_weight_is_refused_by_name(name, bad, error):
 
 def test_a_block_that_is_no_weight_is_refused():
     two = axis().append(axis())
-    with pytest.raises(LearningError, match="^q at sample 0: .* symmetric"):
+    with pytest.raises(LearningError, match=r"^q at sample 0: .* symmetric"):
         NormOptimalIlc(two, 50, q=[[1.0, 0.5], [0.0, 1.0]])
-    with pytest.raises(LearningError, match="^q at sample 3: .* semidefinite"):
+    with pytest.raises(LearningError, match=r"^q at sample 3: .* semidefinite"):
         blocks = np.repeat(np.eye(2)[None], 50, axis=0)
         blocks[3] = [[1.0, 2.0], [2.0, 1.0]]
         NormOptimalIlc(two, 50, q=blocks)
-    with pytest.raises(LearningError, match="^rate = nan|^rate = NaN"):
+    with pytest.raises(LearningError, match=r"^rate = nan|^rate = NaN"):
         NormOptimalIlc(two, 50, rate=float("nan"))
     weights = np.ones(50)
     weights[20:30] = 0.0
@@ -253,5 +253,5 @@ def test_a_varying_model_of_another_run_is_refused():
         TimeVarying(*(np.ones((5, 1, 1)) for _ in range(4)), 0.0)
     with pytest.raises(ModelError, match="0 values"):
         TimeVarying(*(np.ones((0, 1, 1)) for _ in range(4)), DT_S)
-    with pytest.raises(ValueError, match="^u has"):
+    with pytest.raises(ValueError, match=r"^u has"):
         repeated(axis(), 5).simulate(np.ones(4))
