@@ -93,6 +93,19 @@ impl<L: Law + ?Sized> Law for Box<L> {
         (**self).expect(disturbance);
     }
 
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        (**self).transposed(dual, to_input, to_error)
+    }
+
+    fn structure(&self) -> Structure<'_> {
+        (**self).structure()
+    }
+
     fn reset(&mut self) {
         (**self).reset();
     }

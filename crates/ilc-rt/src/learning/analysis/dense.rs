@@ -143,6 +143,7 @@ impl Dense {
     ///
     /// `Sigma_{j+1} = T Sigma_j T' + L_e L_e'`, from zero: white noise of variance 1 in every error.
     pub(super) fn noise(&self, n_runs: usize, converges: bool) -> (Vec<f64>, Option<f64>) {
+        const DOUBLINGS: usize = 48;
         let gram = self.plant.transpose() * &self.plant;
         let share = |sigma: &Mat<f64>| -> f64 {
             let mut sum = 0.0;
@@ -167,7 +168,6 @@ impl Dense {
             return (shares, None);
         }
         // Doubling: after k steps sigma holds 2^k runs.
-        const DOUBLINGS: usize = 48;
         let (mut sigma, mut power) = (fresh, self.t.clone());
         let mut before = share(&sigma);
         for _ in 0..DOUBLINGS {

@@ -75,13 +75,12 @@ impl<'a> Iteration<'a> {
             dual: vec![0.0; n_e],
             input: vec![0.0; n_u],
         };
-        iteration.transpose = match hessian {
-            Some(hessian) => Transpose::Optimal(Box::new(hessian)),
-            None => {
-                let zero = vec![0.0; n_u];
-                let Self { law, input, dual, .. } = &mut iteration;
-                if law.transposed(&zero, input, dual)? { Transpose::Law } else { Transpose::None }
-            }
+        iteration.transpose = if let Some(hessian) = hessian {
+            Transpose::Optimal(Box::new(hessian))
+        } else {
+            let zero = vec![0.0; n_u];
+            let Self { law, input, dual, .. } = &mut iteration;
+            if law.transposed(&zero, input, dual)? { Transpose::Law } else { Transpose::None }
         };
         iteration.leave_out(model)?;
         Ok(iteration)
