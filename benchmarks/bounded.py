@@ -15,8 +15,8 @@ STEP_MAX = 0.02
 
 def compare(n_samples: int) -> dict[str, float]:
     """Return the median seconds of a bounded update by each solver, to 1e-8 or better."""
-    import clarabel  # noqa: PLC0415 - slow to import, and not needed to be importable elsewhere
-    import piqp  # noqa: PLC0415
+    import clarabel
+    import piqp
 
     task = problem(n_samples, dense=False)
     zero = np.zeros(n_samples)

@@ -50,8 +50,8 @@ def compare(n_samples: int) -> dict[str, float]:
 
 def by_quadratic_programs(task: object, check: object) -> dict[str, float]:
     """Return the seconds of the solvers for quadratic programs, to 1e-8."""
-    import clarabel  # noqa: PLC0415 - slow to import, and not needed to be importable elsewhere
-    import osqp  # noqa: PLC0415
+    import clarabel
+    import osqp
 
     n_rows = task.equality.shape[0]
     zeros = np.zeros(n_rows)

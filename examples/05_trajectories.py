@@ -37,18 +37,14 @@ def main() -> None:
             interpolation=way, **LIMITS,
         )  # fmt: skip
         tracking, _ = trajectory.tracking_index(path, k_e=600.0, k_a=0.0)
-        print(
-            f"{title:38s}{path.t_s[-1]:6.2f} s{tracking:14.3e}{path.computing_s * 1e3:10.1f} ms"
-        )
+        print(f"{title:38s}{path.t_s[-1]:6.2f} s{tracking:14.3e}{path.computing_s * 1e3:10.1f} ms")
         over_time.plot(path.t_s[:1000], path.position_m[:1000, 0] * 1e3, label=title)
     over_time.set(xlabel="time (s)", ylabel="position (mm)", title="Modulated tool path, 8 Hz")
     over_time.legend(fontsize="small")
 
     contour = trajectory.butterfly(dt_s=0.002, **LIMITS)
     speed_m_s = np.hypot(*contour.velocity_m_s.T)
-    print(
-        f"{'butterfly':38s}{contour.t_s[-1]:6.2f} s{'':14s}{contour.computing_s * 1e3:10.1f} ms"
-    )
+    print(f"{'butterfly':38s}{contour.t_s[-1]:6.2f} s{'':14s}{contour.computing_s * 1e3:10.1f} ms")
     points = plane.scatter(*(contour.position_m.T * 1e3), c=speed_m_s * 1e3, s=2)
     figure.colorbar(points, ax=plane, label="speed (mm/s)")
     plane.set(xlabel="x (mm)", ylabel="y (mm)", title="Butterfly, speed limited by curvature")

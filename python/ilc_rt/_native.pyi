@@ -1,6 +1,5 @@
-from collections.abc import Iterator, Sequence
 import builtins
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
 from typing import Any, Literal, Protocol, TypeAlias, final
 
@@ -850,9 +849,7 @@ def formation_errors(
 
 @final
 class Delta:
-    def __new__(
-        cls, base_m: float = ..., crank_m: float = ..., rod_m: float = ...
-    ) -> Delta: ...
+    def __new__(cls, base_m: float = ..., crank_m: float = ..., rod_m: float = ...) -> Delta: ...
     @property
     def base_m(self) -> float: ...
     @property
@@ -943,6 +940,7 @@ class CrossCoupled:
     def step(
         self, error_m: ArrayLike, gains: ArrayLike, curvature_per_m: float = 0.0
     ) -> tuple[NDArray[np.float64], float]: ...
+
 _Side: TypeAlias = ArrayLike | None
 _Bounds: TypeAlias = tuple[_Side, _Side] | None
 

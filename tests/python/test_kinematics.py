@@ -57,7 +57,9 @@ def test_jacobian_is_the_derivative() -> None:
 def test_an_unreachable_pose_is_named_with_its_sample() -> None:
     delta = Delta()
     good = delta.forward([0.5, 0.6, 0.7])
-    with pytest.raises(KinematicsError, match=r"sample 1: pose \(0\.000000, 0\.000000, 0\.900000\)"):
+    with pytest.raises(
+        KinematicsError, match=r"sample 1: pose \(0\.000000, 0\.000000, 0\.900000\)"
+    ):
         delta.inverse(np.stack([good, [0.0, 0.0, 0.9]]))
     assert not delta.in_workspace([0.0, 0.0, 0.9])
     assert issubclass(KinematicsError, ValueError)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import ilc_rt
 import numpy as np
 import pytest
+
+import ilc_rt
 from ilc_rt import (
     BadInputError,
     Campaign,
@@ -119,8 +121,8 @@ def test_any_law_can_be_the_core_and_shapes_are_kept() -> None:
 
     u = np.arange(10.0).reshape(5, 2)
     law = RelevanceIlc(None, Doubling(), (1.0, 0.0, 1.0))
-    np.testing.assert_array_equal(law.update(u, u), 2.0 * u)
-    np.testing.assert_array_equal(law.update(u, 0.0 * u, None), 2.0 * u)
+    np.testing.assert_allclose(law.update(u, u), 2.0 * u, rtol=1e-15)
+    np.testing.assert_allclose(law.update(u, 0.0 * u, None), 2.0 * u, rtol=1e-15)
     assert len(law) == 2
     axis = discretize(second_order(157.0, 0.5), 0.002)
     core = NormOptimalIlc(axis, N, rate=3.0)
@@ -189,7 +191,7 @@ def bad_update(**change: Any) -> None:
 )
 def test_one_wrong_thing_at_a_time_is_refused(change: dict[str, Any], match: str) -> None:
     bad_update()
-    with pytest.raises(ValueError, match=match.replace("nan", "(?i)nan")):
+    with pytest.raises(ValueError, match=re.compile(match, re.IGNORECASE)):
         bad_update(**change)
 
 

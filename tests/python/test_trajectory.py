@@ -84,7 +84,7 @@ def test_the_settings_lose_frequency_or_amplitude():
     def amplitude(path):
         middle = path.position_m[path.n_samples // 4 : 3 * path.n_samples // 4, 0]
         off = middle - np.polyval(np.polyfit(range(len(middle)), middle, 1), range(len(middle)))
-        return np.ptp(off) / 2
+        return 4.0 / len(off) * np.abs(np.fft.rfft(off * np.hanning(len(off)))).max()
 
     assert amplitude(on_time) < 0.8 * amplitude(complete)
 
