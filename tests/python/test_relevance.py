@@ -7,9 +7,10 @@ import sqlite3
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import ilc_rt
 import numpy as np
 import pytest
+
+import ilc_rt
 from ilc_rt import (
     BadInputError,
     Campaign,
@@ -120,7 +121,7 @@ def test_any_law_can_be_the_core_and_shapes_are_kept() -> None:
     u = np.arange(10.0).reshape(5, 2)
     law = RelevanceIlc(None, Doubling(), (1.0, 0.0, 1.0))
     np.testing.assert_array_equal(law.update(u, u), 2.0 * u)
-    np.testing.assert_array_equal(law.update(u, 0.0 * u, None), 2.0 * u)
+    np.testing.assert_allclose(law.update(u, 0.0 * u, None), 2.0 * u, rtol=1e-15)
     assert len(law) == 2
     axis = discretize(second_order(157.0, 0.5), 0.002)
     core = NormOptimalIlc(axis, N, rate=3.0)
@@ -137,7 +138,7 @@ def test_a_core_that_fails_says_so() -> None:
             raise ValueError(message)
 
     law = RelevanceIlc(None, Broken(), (1.0, 0.0, 1.0))  # type: ignore[arg-type]
-    with pytest.raises(LearningError, match="Broken failed: .*no idea"):
+    with pytest.raises(LearningError, match=r"Broken failed: .*no idea"):
         law.update(np.zeros(3), np.zeros(3))
 
 
@@ -180,7 +181,7 @@ def bad_update(**change: Any) -> None:
         ({"u": np.zeros(3)}, "shape"),
         ({"u": np.zeros((4, 2))}, "u has shape"),
         ({"e": np.zeros(3)}, "e has shape"),
-        ({"e": np.array([0.0, np.nan, 0.0, 0.0])}, "e holds nan"),
+        ({"e": np.array([0.0, np.nan, 0.0, 0.0])}, "e holds NaN"),
         ({"disturbance": 1.0}, "1 numbers; 2 needed"),
         ({"disturbance": [1.0, np.inf]}, "disturbance holds inf"),
         ({"disturbance": [[1.0, 2.0]]}, "disturbance has shape"),
@@ -189,7 +190,7 @@ def bad_update(**change: Any) -> None:
 )
 def test_one_wrong_thing_at_a_time_is_refused(change: dict[str, Any], match: str) -> None:
     bad_update()
-    with pytest.raises(ValueError, match=match.replace("nan", "(?i)nan")):
+    with pytest.raises(ValueError, match=match):
         bad_update(**change)
 
 
