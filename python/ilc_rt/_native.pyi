@@ -572,7 +572,10 @@ class _Law(Protocol):
     """Anything that learns."""
 
     def update(
-        self, u: NDArray[np.float64], e: NDArray[np.float64], disturbance: Any = None
+        self,
+        u: NDArray[np.float64],
+        e: NDArray[np.float64],
+        disturbance: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]: ...
 
 @final

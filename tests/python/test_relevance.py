@@ -121,7 +121,11 @@ def test_any_law_can_be_the_core_and_shapes_are_kept() -> None:
 
     u = np.arange(10.0).reshape(5, 2)
     law = RelevanceIlc(None, Doubling(), (1.0, 0.0, 1.0))
+<<<<<<< HEAD
     np.testing.assert_allclose(law.update(u, u), 2.0 * u, rtol=1e-15)
+=======
+    np.testing.assert_array_equal(law.update(u, u), 2.0 * u)
+>>>>>>> relevance
     np.testing.assert_allclose(law.update(u, 0.0 * u, None), 2.0 * u, rtol=1e-15)
     assert len(law) == 2
     axis = discretize(second_order(157.0, 0.5), 0.002)
@@ -139,7 +143,7 @@ def test_a_core_that_fails_says_so() -> None:
             raise ValueError(message)
 
     law = RelevanceIlc(None, Broken(), (1.0, 0.0, 1.0))  # type: ignore[arg-type]
-    with pytest.raises(LearningError, match="Broken failed: .*no idea"):
+    with pytest.raises(LearningError, match=r"Broken failed: .*no idea"):
         law.update(np.zeros(3), np.zeros(3))
 
 
@@ -182,7 +186,7 @@ def bad_update(**change: Any) -> None:
         ({"u": np.zeros(3)}, "shape"),
         ({"u": np.zeros((4, 2))}, "u has shape"),
         ({"e": np.zeros(3)}, "e has shape"),
-        ({"e": np.array([0.0, np.nan, 0.0, 0.0])}, "e holds nan"),
+        ({"e": np.array([0.0, np.nan, 0.0, 0.0])}, "e holds NaN"),
         ({"disturbance": 1.0}, "1 numbers; 2 needed"),
         ({"disturbance": [1.0, np.inf]}, "disturbance holds inf"),
         ({"disturbance": [[1.0, 2.0]]}, "disturbance has shape"),
@@ -191,7 +195,11 @@ def bad_update(**change: Any) -> None:
 )
 def test_one_wrong_thing_at_a_time_is_refused(change: dict[str, Any], match: str) -> None:
     bad_update()
+<<<<<<< HEAD
     with pytest.raises(ValueError, match=re.compile(match, re.IGNORECASE)):
+=======
+    with pytest.raises(ValueError, match=match):
+>>>>>>> relevance
         bad_update(**change)
 
 
