@@ -26,8 +26,8 @@ R = 1e-2
 class Problem:
     """A second-order axis of 157 rad/s at 1 ms: ``min |e - P v|^2 + R |v|^2``.
 
-    ``variables = (x_1 .. x_N, v_0 .. v_(N-1))`` with ``x_(k+1) = A x_k + B v_k``, so that all sparse
-    solvers see ``min 1/2 z'Hz + g(e)'z`` subject to ``E z = 0``.
+    ``variables = (x_1 .. x_N, v_0 .. v_(N-1))`` with ``x_(k+1) = A x_k + B v_k``, so that all
+    sparse solvers see ``min 1/2 z'Hz + g(e)'z`` subject to ``E z = 0``.
     """
 
     n_samples: int

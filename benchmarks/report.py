@@ -22,15 +22,15 @@ def main() -> None:
     lines = [
         "# Benchmarks",
         "",
-        "Written by `make bench`; every ratio compares two figures of the same run on the same machine.",
+        "Written by `make bench`; every ratio compares two figures of the same run.",
         f"Machine: {processor()}, {os.cpu_count()} cores; Python {platform.python_version()}, "
         + ", ".join(f"{name} {metadata.version(name)}" for name in PEERS)
         + f"; {command('rustc', '--version')}.",
         "",
         "## One update of norm-optimal learning, from Python",
         "",
-        "A second-order axis of 157 rad/s at 1 ms, `r = 0.01`. Factors are kept from run to run where a",
-        "solver can keep them; results agree with ours (dense and SuperLU to 1e-8).",
+        "A second-order axis of 157 rad/s at 1 ms, `r = 0.01`. Factors are kept from run to run",
+        "where a solver can keep them; results agree with ours (dense and SuperLU to 1e-8).",
         "",
     ]
     lengths = (400, 1300, 4000)
@@ -39,8 +39,8 @@ def main() -> None:
         "",
         "## One update within bounds, from Python",
         "",
-        "The same axis with bounds on the input and on its change from sample to sample, both binding;",
-        "solved from scratch, ours to a gap of 1e-9.",
+        "The same axis with bounds on the input and on its change from sample to sample, both",
+        "binding; solved from scratch, ours to a gap of 1e-9.",
         "",
     ]
     lines += table({1300: progress("bounded, N = 1300", bounded.compare, 1300)})
@@ -49,8 +49,8 @@ def main() -> None:
         "",
         "## A million samples",
         "",
-        f"One update takes {1e3 * million['seconds']:.1f} ms and {million['mb']:.0f} MB over input and "
-        "error, the copies at the border to Python and the next input included.",
+        f"One update takes {1e3 * million['seconds']:.1f} ms and {million['mb']:.0f} MB over input "
+        "and error, the copies at the border to Python and the next input included.",
         "",
         "## In Rust",
         "",

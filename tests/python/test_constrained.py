@@ -227,7 +227,7 @@ def test_wrong_arguments_are_refused_one_at_a_time(name, value, error, words):
 
 def test_bounds_that_exclude_each_other_are_refused_with_the_sample():
     r = np.linspace(0.0, 0.08, 9)
-    with pytest.raises(LearningError, match="input and position bounds leave no value.* sample 6"):
+    with pytest.raises(LearningError, match=r"input and position bounds leave no value.* sample 6"):
         ConstrainedIlc(
             axis(), 9, rate=3.0, u_bounds=(-0.005, 0.005), position_bounds=(0.0, 0.051), reference=r
         )

@@ -165,7 +165,7 @@ def test_one_wrong_thing_at_a_time(change, match):
 
 def test_what_no_alpha_holds_is_refused_with_the_limit():
     limits = LIMITS | {"velocity_max_m_s": 0.1}
-    with pytest.raises(TrajectoryError, match="no alpha holds every limit.*velocity"):
+    with pytest.raises(TrajectoryError, match=r"no alpha holds every limit.*velocity"):
         trajectory.exponential_sigmoid([0.0, 0.5], feed_m_s=0.09, dt_s=0.001, **limits)
 
 
