@@ -213,9 +213,9 @@ def test_a_block_that_is_no_weight_is_refused():
     two = axis().append(axis())
     with pytest.raises(LearningError, match=r"^q at sample 0: .* symmetric"):
         NormOptimalIlc(two, 50, q=[[1.0, 0.5], [0.0, 1.0]])
+    blocks = np.repeat(np.eye(2)[None], 50, axis=0)
+    blocks[3] = [[1.0, 2.0], [2.0, 1.0]]
     with pytest.raises(LearningError, match=r"^q at sample 3: .* semidefinite"):
-        blocks = np.repeat(np.eye(2)[None], 50, axis=0)
-        blocks[3] = [[1.0, 2.0], [2.0, 1.0]]
         NormOptimalIlc(two, 50, q=blocks)
     with pytest.raises(LearningError, match=r"^rate = nan|^rate = NaN"):
         NormOptimalIlc(two, 50, rate=float("nan"))
