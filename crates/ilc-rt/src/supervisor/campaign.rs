@@ -80,7 +80,7 @@ pub fn run(
         Some(law) => ("user", Some(law)),
         None => (law_name(cell), plan.law(cell)?),
     };
-    let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), |law| law.describe());
+    let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
     plan.name_law(cell, name, &parameters);
     carry_out(cell, options, bus, Work { plan, law, input: None }, observe)
 }
@@ -110,6 +110,7 @@ struct Work {
     input: Option<Vec<f64>>,
 }
 
+#[expect(clippy::too_many_lines, reason = "the course of a campaign, step by step")]
 fn carry_out(
     cell: &Cell,
     options: &Options,

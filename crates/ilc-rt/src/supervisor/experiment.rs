@@ -49,7 +49,7 @@ impl Experiment {
             .map(Demand::room)
             .fold(f64::INFINITY, f64::min);
         self.excitation.amplitude *= AMPLITUDE_SHARE * tightest;
-        if !(self.excitation.amplitude > 0.0) {
+        if self.excitation.amplitude.is_nan() || self.excitation.amplitude <= 0.0 {
             return Err(self.refused(cell, "amplitude", "0", "the limits leave no room at all"));
         }
         Ok(self)

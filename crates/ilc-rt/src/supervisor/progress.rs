@@ -179,6 +179,7 @@ impl Progress {
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
 fn refused(error: LearningError) -> SupervisorError {
     SupervisorError::Resume(format!("the law refused a run: {error}"))
 }

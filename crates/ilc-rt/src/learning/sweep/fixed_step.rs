@@ -1,5 +1,11 @@
 //! One step of the backward recursion in Joseph's form for sizes that the compiler knows.
 
+#![expect(
+    clippy::needless_range_loop,
+    clippy::needless_pass_by_value,
+    reason = "the indices are those of the equations; room is lent and given back"
+)]
+
 use super::Stage;
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;

@@ -6,6 +6,8 @@
 //! stretches side by side keep the processor busy, and the run is taken a block at a time so that
 //! what the backward sweep leaves for the forward one stays in the cache.
 
+#![expect(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+
 use super::Run;
 use super::single::Fixed;
 

@@ -85,6 +85,7 @@ impl Recursion {
     }
 
     /// [`Recursion::step`] for any sizes and forms.
+    #[expect(clippy::too_many_lines, reason = "one recursion, product by product")]
     fn any(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
         let Sizes { n, m, p, targets, held } = self.sizes;
         let Self { feedback, transition, left, weighted_left, effort, lower, .. } = self;

@@ -33,8 +33,9 @@ impl Default for Weights {
 
 /// A cost that may differ from sample to sample and couple the channels.
 ///
-/// `J = sum_k |z[k]|^2_{q[k]} + |u'[k]|^2_{s[k]} + |v[k]|^2_{r[k]}
-///    + sum_{k>=1} rate^2 |v[k] - v[k-1]|^2`
+/// `J = sum_k |z[k]|^2_{q[k]} + |u'[k]|^2_{s[k]} + |v[k]|^2_{r[k]} + rate^2 |v[k] - v[k-1]|^2`
+///
+/// with `v[-1] = v[0]`.
 ///
 /// `q[k]` weighs the error at sample `k`, whichever input reaches it.
 ///

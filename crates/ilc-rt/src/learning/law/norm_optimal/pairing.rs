@@ -231,7 +231,7 @@ mod tests {
         let paired = paired(&both, 10, cost);
         assert_eq!(paired.shifts(), [1, 1]);
         assert_eq!(paired.stage(8).q, block);
-        assert_eq!(paired.stage(9).q.amax(), 0.0);
+        assert!(paired.stage(9).q.amax() <= 0.0);
     }
 
     #[test]

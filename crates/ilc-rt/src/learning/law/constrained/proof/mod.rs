@@ -1,6 +1,12 @@
 //! The law against an active-set method on the dense, lifted problem, against its optimality
 //! conditions, and against hand calculation.
 
+#![allow(
+    clippy::unnecessary_wraps,
+    clippy::manual_range_contains,
+    reason = "as the bounds are given"
+)]
+
 mod active_set;
 mod lifted;
 mod random;

@@ -1,5 +1,7 @@
 //! Random problems with bounds of every kind.
 
+#![allow(clippy::decimal_bitwise_operands, reason = "bits that switch features of a case on")]
+
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 

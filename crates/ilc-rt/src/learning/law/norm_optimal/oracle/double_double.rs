@@ -1,5 +1,7 @@
 //! Numbers of twice the precision, for reference solutions only: 32 digits.
 
+#![allow(clippy::float_cmp, reason = "exact where exactness is what is tested")]
+
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `high + low`, with `low` below half a unit in the last place of `high`.

@@ -1,5 +1,12 @@
 //! Weights and models that vary along the run, against the dense reference.
 
+#![allow(
+    clippy::decimal_bitwise_operands,
+    clippy::float_cmp,
+    clippy::cast_possible_truncation,
+    reason = "bits that switch features of a case on, exact results, small counts"
+)]
+
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 
