@@ -63,7 +63,6 @@ struct PyPid {
 impl PyPid {
     #[new]
     #[pyo3(signature = (kp, ki_per_s=0.0, kd_s=0.0, *, dt_s, derivative="difference", filter_s=0.01, output_max=None))]
-    #[expect(clippy::too_many_arguments, reason = "all but the gains are named in Python")]
     fn new(
         kp: f64,
         ki_per_s: f64,

@@ -754,6 +754,7 @@ fn uncertainty<'py>(
 /// >>> values.shape, first, period
 /// ((24000,), 0, 8000)
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "a keyword each, as Python has it")]
 fn excitation<'py>(
     py: Python<'py>,
     waveform: &str,

@@ -88,7 +88,6 @@ impl PyNormOptimalIlc {
     #[new]
     #[pyo3(signature = (model, n_samples, q=None, s=None, r=None, rate=0.0),
            text_signature = "(model, n_samples, q=1.0, s=0.0, r=0.0, rate=0.0)")]
-    #[expect(clippy::too_many_arguments, reason = "a keyword each, as Python has it")]
     fn new(
         py: Python<'_>,
         model: &Bound<'_, PyAny>,
@@ -223,6 +222,7 @@ impl PyNormOptimalIlc {
         text_signature = "(models, n_samples, tracking=1.0, own=1.0, centre=0.0, sigma=1.0, \
                           weight=1.0, s=0.0, r=0.0, rate=0.0, leaders=None, pairs=None, axes=None)"
     )]
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn formation(
         py: Python<'_>,
         models: Vec<Bound<'_, PyAny>>,
@@ -406,7 +406,7 @@ impl PyNormOptimalIlc {
             Weight::PerSample(values) => format!("({},)", values.len()),
             Weight::Block(block) => format!("{:?}", block.shape()),
             Weight::Blocks(blocks) => {
-                let p = blocks.first().map_or(0, |block| block.nrows());
+                let p = blocks.first().map_or(0, nalgebra::DMatrix::nrows);
                 format!("({}, {p}, {p})", blocks.len())
             }
         };

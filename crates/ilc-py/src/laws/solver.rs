@@ -15,6 +15,7 @@ use crate::weights::{Given, read_matrices, read_weight};
 
 /// The law with or without a filter in front.
 #[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "one a law")]
 pub(super) enum Solver {
     Plain(NormOptimal),
     Dynamic(DynamicNormOptimal),
