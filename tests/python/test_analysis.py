@@ -229,6 +229,8 @@ def test_ilc_tune_prints_and_writes(tmp_path, capsys):
     assert "s3" in text
     figures = json.loads(file.read_text(encoding="utf-8"))
     assert figures["analysis"]["converges"] is True
+    assert figures["analysis"]["robust_factor"] < 1
+    assert figures["analysis"]["expected_rms_limit"] > 1e-6
     assert figures["q"] == 1
     assert main(["tune", GANTRY, "--noise-m", "-1"]) == 2
     assert "noise_std" in capsys.readouterr().err

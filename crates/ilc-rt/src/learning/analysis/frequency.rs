@@ -54,17 +54,17 @@ impl Spectrum {
         let (keep, learn) = responses(iteration, n_samples / 2)?;
         let (keep_early, learn_early) = responses(iteration, n_samples / 3)?;
         let shift = n_samples / 2 - n_samples / 3;
-        let pairs = keep.iter().zip(&keep_early).chain(learn.iter().zip(&learn_early));
-        for (late, early) in pairs {
-            let peak = late.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
+        let largest = |part: &[f64]| part.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
+        for (late, early) in [(&keep, &keep_early), (&learn, &learn_early)] {
+            // Of all channels together: one that does not act on another leaves nothing but rounding.
+            let peak = late.iter().map(|response| largest(response)).fold(0.0, f64::max);
             let edge = n_samples / 16;
-            let ends = late[..edge].iter().chain(&late[n_samples - edge..]);
-            if ends.fold(0.0_f64, |peak, value| peak.max(value.abs())) > CUT_OFF * peak {
-                return Ok(None);
-            }
-            let apart = late[shift..].iter().zip(early).map(|(a, b)| (a - b).abs());
-            if apart.fold(0.0, f64::max) > VARYING * peak {
-                return Ok(None);
+            for (late, early) in late.iter().zip(early) {
+                let ends = largest(&late[..edge]).max(largest(&late[n_samples - edge..]));
+                let apart = late[shift..].iter().zip(early).map(|(a, b)| (a - b).abs());
+                if ends > CUT_OFF * peak || apart.fold(0.0, f64::max) > VARYING * peak {
+                    return Ok(None);
+                }
             }
         }
         let n_fft = (2 * n_samples).max(2048).next_power_of_two();
@@ -97,8 +97,9 @@ impl Spectrum {
         Ok(Some(Self { bins }))
     }
 
-    /// Returns the spectrum of an optimal law without rate penalty, from its equation:
-    /// `L_e = (q P*P + s + r)^-1 q P*`, `L_u = (q P*P + s + r)^-1 (q P*P + r)`.
+    /// Returns the spectrum of an optimal law, from its equation:
+    /// `L_e = (q P*P + s + h)^-1 q P*`, `L_u = (q P*P + s + h)^-1 (q P*P + h)`, with
+    /// `h = r + rate^2 |1 - z^-1|^2`.
     ///
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
@@ -118,11 +119,12 @@ impl Spectrum {
             let omega_rad = std::f64::consts::PI * at as f64 / n_bins as f64;
             let Some(plant) = response(model, omega_rad) else { continue };
             let square = plant.adjoint() * &plant * real(weights.q);
-            let cost = &square + &eye * real(weights.s + weights.r);
+            let hold = weights.r + (2.0 * weights.rate * (0.5 * omega_rad).sin()).powi(2);
+            let cost = &square + &eye * real(weights.s + hold);
             let Some(inverse) = cost.try_inverse() else { continue };
             let learn = &inverse * plant.adjoint() * real(weights.q);
-            let keep = &inverse * (square + &eye * real(weights.r));
-            let t = &inverse * real(weights.r);
+            let keep = &inverse * (square + &eye * real(hold));
+            let t = &inverse * real(hold);
             let frequency_hz = omega_rad / (std::f64::consts::TAU * dt_s);
             bins.push(Bin { frequency_hz, keep, learn, plant, t });
         }

@@ -353,6 +353,36 @@ fn the_critical_frequency_is_where_the_equation_crosses_one() {
 }
 
 #[test]
+fn a_law_seen_from_outside_has_the_spectrum_of_its_equation() {
+    let (one, dt_s) = (axis(2e-3), 2e-3);
+    let model = one.append(&one.delayed(1).unwrap()).unwrap();
+    let n = 700;
+    for w in [weights(1.0, 0.01, 0.1, 0.0), weights(1.0, 0.05, 0.02, 0.5)] {
+        let mut law = NormOptimal::new(&model, n, w).unwrap();
+        let mut iteration = Iteration::new(&mut law, &model, n).unwrap();
+        let seen = Spectrum::new(&mut iteration, &model).unwrap().unwrap();
+        let equation = Spectrum::optimal(&model, w).unwrap();
+        let expected: Vec<(f64, f64)> = equation
+            .bins
+            .iter()
+            .map(|bin| bin.frequency_hz)
+            .zip(equation.contraction())
+            .collect();
+        for (bin, found) in seen.bins.iter().zip(seen.contraction()) {
+            let nearest = expected
+                .iter()
+                .min_by(|a, b| {
+                    (a.0 - bin.frequency_hz).abs().total_cmp(&(b.0 - bin.frequency_hz).abs())
+                })
+                .unwrap();
+            if (nearest.0 - bin.frequency_hz).abs() < 1e-6 / dt_s {
+                assert!((found - nearest.1).abs() < 1e-3, "{}: {found}", bin.frequency_hz);
+            }
+        }
+    }
+}
+
+#[test]
 fn uncertainty_is_bounded_as_the_equations_say() {
     let (model, n) = (servo(), 200);
     let mut law = NormOptimal::new(&model, n, weights(1.0, 0.5, 2.0, 0.0)).unwrap();

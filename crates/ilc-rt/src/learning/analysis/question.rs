@@ -88,7 +88,10 @@ pub fn analyze(
     };
     let certain = optimal.is_some_and(|(own, _)| own);
     let converges = certain || verdict::converges(radius, growth);
-    let spectrum = Spectrum::new(&mut iteration, model)?;
+    let spectrum = match optimal {
+        Some((true, weights)) => Some(Spectrum::optimal(model, weights)?),
+        _ => Spectrum::new(&mut iteration, model)?,
+    };
     let mut analysis = Analysis {
         n_samples,
         method,
