@@ -34,6 +34,10 @@ $(VENV)/.test: $(VENV)/.built
 	wheel=$$(ls build/wheels/*.whl) && $(BIN)/pip install --quiet "$$wheel[test]"
 	@touch $@
 
+$(VENV)/.bench: $(VENV)/.built
+	wheel=$$(ls build/wheels/*.whl) && $(BIN)/pip install --quiet "$$wheel[bench]"
+	@touch $@
+
 build: $(VENV)/.built ## Build the binaries and the Python package into .venv
 
 demo: build ## Ten runs on simulated drives, the error falling, and a report
@@ -73,8 +77,9 @@ lint: $(VENV)/.test ## Formatting, lints, types, layers
 docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
 
-bench: ## Speed, as ratios
-	cargo bench --workspace --bench main_job
+bench: $(VENV)/.bench ## Speed, as ratios; writes docs/benchmarks.md
+	cargo bench --workspace --bench main_job --bench learning --bench constrained --bench relevance --bench trajectory
+	$(BIN)/python benchmarks/report.py
 
 rt: build ## What is promised of the tick: no allocation, exact repetition; and this machine's punctuality
 	cargo nextest run --release --workspace -E 'binary(no_alloc) | binary(no_alloc_learning) | binary(lockstep)'

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
-from ilc_rt._native import Cell
+from ilc_rt._native import Cell, refuse_divergent
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
 from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
 from ilc_rt.events import EndEvent, Event, IterationEvent, parse_event
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
 
     from numpy.typing import ArrayLike, NDArray
+
+    from ilc_rt.experiment import Experiment
 
 DEFAULT_LIBRARY = "ilc-library.db"
 TRANSPORTS = ("can", "udp", "zenoh", "loopback")
@@ -66,17 +68,24 @@ class Campaign:
         where real ones may be listening.
     resume : bool
         Whether to go on from the last campaign of this cell in the library.
+    learning : bool
+        Whether to learn at all; if not, every run is like the first.
     disturbance : callable, array_like of float64 or None
         What is measured of each run's surroundings before it, as a temperature:
         kept with the run in the library, and given to the law for the coming
         run. Either one row a run, shape (n_runs,) or (n_runs, n_disturbances),
         or a function of the run's number (from 0) that is asked while the axes
         return. The controller then runs inside this process.
+    allow_divergent : bool
+        Whether to start a law of which the analysis says that it will not
+        converge. A law written in Python is not analysed: it always starts.
 
     Raises
     ------
     CampaignError
         If the cell, the bus or a program cannot be used.
+    BadInputError
+        If the law will not converge with the cell's model.
 
     Examples
     --------
@@ -96,20 +105,32 @@ class Campaign:
         lockstep: bool | None = None,
         drives: Drives = "auto",
         resume: bool = False,
+        learning: bool = True,
         disturbance: Callable[[int], ArrayLike] | ArrayLike | None = None,
+        allow_divergent: bool = False,
     ) -> None:
-        self.cell = cell if isinstance(cell, Cell) else load_cell(cell)
+        if isinstance(cell, Cell):
+            self.cell = cell
+        else:
+            # The cell's own law does not matter if another one is given.
+            self.cell = load_cell(cell, allow_divergent=allow_divergent or law is not None)
+        self.allow_divergent = allow_divergent
         self.law = law
         self.library = str(library)
         self.bus = bus if bus is not None else str(self.cell.bus)
         if law is not None and not callable(getattr(law, "update", None)):
             message = f"law = {law!r}: an object with update(u, e, disturbance=None), or None"
             raise BadInputError(message)
+        if law is not None and not allow_divergent:
+            _refuse_divergent(law, self.cell)
         self.measure = measure
         self.transport = transport_of(self.bus)
         self.lockstep = self.transport == "loopback" if lockstep is None else lockstep
         self.simulated = _simulated(self.transport, drives)
         self.resume = resume
+        self.learning = learning
+        # What is run in place of the program, if an axis is to be identified.
+        self.experiment: Experiment | None = None
         self.disturbance = disturbance
         self.result = CampaignResult(self.library)
         self._controller: Controller | None = None
@@ -178,14 +199,23 @@ class Campaign:
     def _start(self, iterations: int, measure: Callable[[int], ArrayLike] | None) -> Controller:
         cell_file = str(self.cell.path)
         if self.law is None and measure is None and self.transport != "loopback":
-            arguments = ["--iterations", str(iterations), "--library", self.library]
+            library = ["--library", self.library]
+            if self.experiment is not None:
+                verb, arguments = "identify", library + self.experiment.arguments()
+            else:
+                verb, arguments = "run", ["--iterations", str(iterations), *library]
+                if not self.learning:
+                    arguments.append("--no-learning")
             if self.measure is not None:
                 arguments += ["--measure", self.measure]
             if self.resume:
                 arguments.append("--resume")
+            if self.allow_divergent:
+                arguments.append("--allow-divergent")
             return ProcessController(
                 cell_file,
                 arguments,
+                verb=verb,
                 bus=self.bus,
                 lockstep=self.lockstep,
                 simulated=self.simulated,
@@ -199,6 +229,8 @@ class Campaign:
             "lockstep": self.lockstep,
             "resume": self.resume,
             "law": self.law,
+            "learning": self.learning,
+            "experiment": self.experiment,
             "disturbance": measure,
         }
         apart = self.simulated and self.transport != "loopback"
@@ -221,8 +253,15 @@ class Campaign:
             raise CampaignError(message)
 
 
-def load_cell(path: str | Path) -> Cell:
+def load_cell(path: str | Path, *, allow_divergent: bool = False) -> Cell:
     """Read and validate a cell description.
+
+    Parameters
+    ----------
+    path : path
+        The TOML file.
+    allow_divergent : bool
+        Whether its law is accepted also if it will not converge.
 
     Raises
     ------
@@ -230,7 +269,7 @@ def load_cell(path: str | Path) -> Cell:
         With file, key, value and what is allowed.
     """
     try:
-        return Cell.load(path)
+        return Cell.load(path, allow_divergent=allow_divergent)
     except (ValueError, OSError, RuntimeError) as error:
         raise BadInputError(" ".join(str(error).split())) from error
 
@@ -273,6 +312,14 @@ def _measure(
         raise BadInputError(message)
     table = rows.astype(np.float64)
     return lambda run: np.atleast_1d(table[run])
+
+
+def _refuse_divergent(law: Law, cell: Cell) -> None:
+    try:
+        refuse_divergent(law, cell.model(), cell.n_samples)
+    except ValueError as error:
+        message = f"law = {law!r}: {' '.join(str(error).split())}"
+        raise BadInputError(message) from error
 
 
 def _simulated(transport: str, drives: str) -> bool:

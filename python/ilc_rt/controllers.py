@@ -43,14 +43,16 @@ class Controller(Protocol):
 
 
 class ProcessController:
-    """`ilc-rt run --events` in a process, with or without simulated drives.
+    """`ilc-rt run --events`, or another verb, in a process, with or without simulated drives.
 
     Parameters
     ----------
     cell_file : str
         The cell description.
     arguments : list of str
-        Further arguments of ``ilc-rt run``.
+        Further arguments of the verb.
+    verb : str
+        ``"run"`` or ``"identify"``.
     bus : str or None
         Bus address in place of the cell's.
     lockstep : bool
@@ -67,13 +69,14 @@ class ProcessController:
         bus: str | None,
         lockstep: bool,
         simulated: bool,
+        verb: str = "run",
     ) -> None:
         controller = find_program("ilc-rt")
         self._drives: Program | None = None
         self._stop_by: float | None = None
         if simulated:
             self._drives = start_simulated_drives(cell_file, bus, lockstep=lockstep)
-        argv = [str(controller), "run", cell_file, "--events", *arguments]
+        argv = [str(controller), verb, cell_file, "--events", *arguments]
         if bus is not None:
             argv += ["--bus", bus]
         if lockstep:

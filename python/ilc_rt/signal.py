@@ -1,5 +1,29 @@
-"""Filters: Butterworth low-pass, forward only or forward and backward."""
+"""Filters, and the frequency that a signal has at each moment.
 
-from ilc_rt._native import ButterworthFilter, butterworth, zero_phase
+Butterworth, Gaussian, symmetric and switched low-passes; each can be applied by
+itself or given to a law.
+"""
 
-__all__ = ["ButterworthFilter", "butterworth", "zero_phase"]
+from ilc_rt._native import (
+    ButterworthFilter,
+    FirFilter,
+    GaussianFilter,
+    SwitchedFilter,
+    butterworth,
+    fir,
+    gaussian,
+    instantaneous_frequency,
+    zero_phase,
+)
+
+__all__ = [
+    "ButterworthFilter",
+    "FirFilter",
+    "GaussianFilter",
+    "SwitchedFilter",
+    "butterworth",
+    "fir",
+    "gaussian",
+    "instantaneous_frequency",
+    "zero_phase",
+]

@@ -41,3 +41,12 @@ def test_a_law_of_ones_own_learns(gantry: Path, tmp_path: Path) -> None:
     assert len(errors_um) == 4
     assert errors_um == sorted(errors_um, reverse=True)
     assert errors_um[3] < 0.4 * errors_um[0]
+
+
+def test_trajectories_are_planned_and_drawn(gantry: Path, tmp_path: Path) -> None:
+    """One line a trajectory, E/S the best, and a picture."""
+    said = run_example(gantry.with_name("05_trajectories.py"), tmp_path)
+    tracking = [float(value) for value in re.findall(r" s\s+([\d.]+e[+-]\d+)", said)]
+    assert len(tracking) == 3
+    assert tracking[0] < tracking[1]
+    assert (tmp_path / "05_trajectories.png").stat().st_size > 10_000

@@ -21,7 +21,7 @@ pub(crate) struct Signal {
 impl Signal {
     /// Reads `(n_samples,)` or `(n_samples, n_channels)`.
     pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (values, shape) = read(name, object)?;
+        let (values, shape) = read_array(name, object)?;
         let (n_samples, n_channels, is_flat) = match shape[..] {
             [n_samples] => (n_samples, 1, true),
             [n_samples, n_channels] => (n_samples, n_channels, false),
@@ -56,9 +56,38 @@ impl Signal {
     }
 }
 
+/// Several runs of one size, time first within each.
+#[derive(Debug)]
+pub(crate) struct Runs {
+    pub(crate) values: Vec<f64>,
+    pub(crate) count: usize,
+    pub(crate) n_samples: usize,
+    pub(crate) n_channels: usize,
+    pub(crate) is_flat: bool,
+}
+
+impl Runs {
+    /// Reads `(n_runs, n_samples)` or `(n_runs, n_samples, n_channels)`.
+    pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (values, shape) = read_array(name, object)?;
+        let (n_runs, n_samples, n_channels, is_flat) = match shape[..] {
+            [n_runs, n_samples] => (n_runs, n_samples, 1, true),
+            [n_runs, n_samples, n_channels] => (n_runs, n_samples, n_channels, false),
+            _ => {
+                let rule = "(n_runs, n_samples) or (n_runs, n_samples, n_channels)";
+                return Err(misfit(name, &shape, rule));
+            }
+        };
+        if values.is_empty() {
+            return Err(misfit(name, &shape, "at least one sample of one channel"));
+        }
+        Ok(Self { values, count: n_runs, n_samples, n_channels, is_flat })
+    }
+}
+
 /// Reads a matrix; a single number stands for a 1 x 1 one.
 pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Matrix> {
-    let (values, shape) = read(name, object)?;
+    let (values, shape) = read_array(name, object)?;
     match shape[..] {
         [] => Ok(Matrix::from_element(1, 1, values[0])),
         [rows, cols] => Ok(Matrix::from_row_slice(rows, cols, &values)),
@@ -68,13 +97,13 @@ pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Mat
 
 /// Reads a list of numbers with exactly one axis.
 pub(crate) fn read_vector(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let (values, shape) = read(name, object)?;
+    let (values, shape) = read_array(name, object)?;
     if shape.len() == 1 { Ok(values) } else { Err(misfit(name, &shape, "one axis, (n,)")) }
 }
 
 /// Reads a disturbance: a single number or a list of them.
 pub(crate) fn read_disturbance(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let (values, shape) = read(name, object)?;
+    let (values, shape) = read_array(name, object)?;
     if shape.len() <= 1 && !values.is_empty() {
         return Ok(values);
     }
@@ -114,8 +143,32 @@ pub(crate) fn misfit(name: &str, shape: &[usize], allowed: &str) -> PyErr {
     ))
 }
 
-/// Reads any array of float64 or integers in row-major order.
-fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+/// Reads any array of finite float64 or integers in row-major order.
+pub(crate) fn read_array(
+    name: &str,
+    object: &Bound<'_, PyAny>,
+) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let (values, shape) = read_numbers(name, object)?;
+    // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
+    let poison: f64 = values.iter().map(|value| value * 0.0).sum();
+    if poison.is_finite() {
+        return Ok((values, shape));
+    }
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok((values, shape)),
+        Some(index) => Err(PyValueError::new_err(format!(
+            "{name} holds {} at {}; only finite numbers are allowed",
+            values[index],
+            place(index, &shape)
+        ))),
+    }
+}
+
+/// Reads any array of float64 or integers in row-major order, infinite numbers and NaN included.
+pub(crate) fn read_numbers(
+    name: &str,
+    object: &Bound<'_, PyAny>,
+) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let numpy = object.py().import("numpy")?;
     let array = numpy.call_method1("asarray", (object,)).map_err(|error| {
         PyValueError::new_err(format!("{name} is no array of numbers: {error}"))
@@ -127,18 +180,16 @@ fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>
     if !(matches!(kind.as_str(), "i" | "u") || kind == "f" && size == 8) {
         return Err(PyTypeError::new_err(format!("{name} has dtype {dtype}; float64 is needed")));
     }
-    let array = array.call_method1("astype", ("float64",))?;
+    let array = array.call_method1("astype", ("float64", "C", "unsafe", false, false))?;
     let array = array.cast::<PyArrayDyn<f64>>()?;
     let shape = array.shape().to_vec();
-    let values: Vec<f64> = array.readonly().as_array().iter().copied().collect();
-    match values.iter().position(|value| !value.is_finite()) {
-        None => Ok((values, shape)),
-        Some(index) => Err(PyValueError::new_err(format!(
-            "{name} holds {} at {}; only finite numbers are allowed",
-            values[index],
-            place(index, &shape)
-        ))),
-    }
+    let array = array.readonly();
+    // One plain copy where the numbers lie in order, as they nearly always do.
+    let values = match array.as_slice() {
+        Ok(values) => values.to_vec(),
+        Err(_) => array.as_array().iter().copied().collect(),
+    };
+    Ok((values, shape))
 }
 
 /// Returns the position of a flat index as Python would write it.

@@ -7,10 +7,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use ilc_rt::config::{Cell, Measure};
+use ilc_rt::config::{Cell, LawName, Measure};
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport::{self, loopback::InProcess};
 use ilc_rt::learning::Law;
+use ilc_rt::record::Event;
 use ilc_rt::supervisor::{self, Disturbance, Options, SupervisorError};
 use ilc_sim::machine::{ClockMode, Machine};
 use pyo3::exceptions::PyValueError;
@@ -20,6 +21,7 @@ use crate::argument::read_disturbance;
 use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::experiment::read_experiment;
 use crate::python_law::PythonLaw;
 
 /// Frames that may wait for the loop on the bus inside the process.
@@ -120,6 +122,10 @@ impl Drop for EventStream {
 ///     Whether to go on with the newest campaign of the same kind.
 /// law : object or None
 ///     A law with ``update(u, e, disturbance=None)`` instead of the cell's.
+/// learning : bool
+///     Whether to learn at all; if not, every run is like the first.
+/// experiment : object or None
+///     What to excite instead of running the program, as ``Experiment``.
 /// disturbance : callable or None
 ///     Called with the number of each run before it begins; returns its
 ///     disturbance, a number or an array of shape (n_disturbances,).
@@ -134,7 +140,8 @@ impl Drop for EventStream {
 /// ValueError
 ///     From the iterator, before anything moves, if something cannot be used.
 #[pyfunction]
-#[pyo3(signature = (cell, iterations, library, bus=None, measure=None, lockstep=true, resume=false, law=None, disturbance=None))]
+#[pyo3(signature = (cell, iterations, library, bus=None, measure=None, lockstep=true, resume=false, law=None,
+    learning=true, experiment=None, disturbance=None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 fn run_events(
     cell: &Bound<'_, PyCell>,
@@ -145,12 +152,18 @@ fn run_events(
     lockstep: bool,
     resume: bool,
     law: Option<&Bound<'_, PyAny>>,
+    learning: bool,
+    experiment: Option<&Bound<'_, PyAny>>,
     disturbance: Option<Py<PyAny>>,
 ) -> PyResult<EventStream> {
     let mut cell: Cell = cell.get().cell.clone();
     if let Some(address) = bus {
         cell.bus.address = address;
     }
+    if !learning {
+        cell.learning.law = LawName::None;
+    }
+    let experiment = experiment.map(|object| read_experiment(object, &cell)).transpose()?;
     let measure = match measure {
         None => None,
         Some("encoder") => Some(Measure::Encoder),
@@ -182,11 +195,15 @@ fn run_events(
     let thread = std::thread::Builder::new().name("ilc-campaign".to_owned()).spawn(move || {
         let bus = open(&cell)?;
         let law = law.map(|law| -> Box<dyn Law> { Box::new(law) });
-        supervisor::run(&cell, &options, bus, law, &mut |event| {
+        let mut send = |event: &Event| {
             if let Ok(text) = serde_json::to_string(event) {
                 let _ = sender.send(text);
             }
-        })
+        };
+        match experiment {
+            None => supervisor::run(&cell, &options, bus, law, &mut send),
+            Some(experiment) => supervisor::identify(&cell, &experiment, &options, bus, &mut send),
+        }
         .map(drop)
     })?;
     Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop })

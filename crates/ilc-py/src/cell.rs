@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Cell, LawName, Measure};
-use ilc_rt::supervisor::Plan;
+use ilc_rt::config::{Axis, Cell, Interface, LawName, Measure};
+use ilc_rt::supervisor::{self, Plan};
 use pyo3::prelude::*;
 
 use crate::argument::give_signal;
 use crate::error::OrRaise;
+use crate::model::PyStateSpace;
 
 /// A cell description, read and validated.
 ///
@@ -35,6 +36,9 @@ impl PyCell {
     /// ----------
     /// path : str or os.PathLike
     ///     The file.
+    /// allow_divergent : bool
+    ///     Whether a law that will not converge with the cell's model is
+    ///     accepted, whatever the file says.
     ///
     /// Returns
     /// -------
@@ -45,9 +49,11 @@ impl PyCell {
     /// ValueError
     ///     In one line: file, key, value and what is allowed.
     #[staticmethod]
+    #[pyo3(signature = (path, allow_divergent=false))]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
-    fn load(path: std::path::PathBuf) -> PyResult<Self> {
-        let cell = Cell::load(Path::new(&path)).or_raise()?;
+    fn load(path: std::path::PathBuf, allow_divergent: bool) -> PyResult<Self> {
+        let mut cell = Cell::load(Path::new(&path)).or_raise()?;
+        cell.learning.allow_divergent |= allow_divergent;
         let plan = Plan::new(&cell, None, false).or_raise()?;
         // Refuses a model or weights that cannot learn, before any drive is touched.
         plan.law(&cell).or_raise()?;
@@ -90,6 +96,23 @@ impl PyCell {
         self.cell.axes.iter().map(|axis| axis.name.clone()).collect()
     }
 
+    /// Command interface of each axis: `csp` (input in m) or `csv` (in m/s).
+    #[getter]
+    fn interfaces(&self) -> Vec<&'static str> {
+        let name = |axis: &Axis| match axis.interface {
+            Interface::Csp => "csp",
+            Interface::Csv => "csv",
+        };
+        self.cell.axes.iter().map(name).collect()
+    }
+
+    /// Gain kv of each axis' position loop in 1/s; None where it is in the drive.
+    #[getter]
+    fn position_gains_per_s(&self) -> Vec<Option<f64>> {
+        let gain = |axis: &Axis| axis.position_loop.map(|position_loop| position_loop.gain_per_s);
+        self.cell.axes.iter().map(gain).collect()
+    }
+
     /// Bus address.
     #[getter]
     fn bus(&self) -> &str {
@@ -123,6 +146,27 @@ impl PyCell {
     ///     Positions in metres.
     fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give_signal(py, self.reference_m.clone(), self.cell.n_axes(), false)
+    }
+
+    /// Return the model that learning believes in, learned input to position.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     Inputs in the unit of each axis's interface, positions in metres.
+    fn model(&self) -> PyResult<PyStateSpace> {
+        supervisor::learning_model(&self.cell).or_raise().map(PyStateSpace::from)
+    }
+
+    /// Return the error of a run without learning, by the model.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (n_samples, n_axes)
+    ///     Set point minus response in metres.
+    fn first_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let error = supervisor::first_error(&self.cell, &self.reference_m).or_raise()?;
+        give_signal(py, error, self.cell.n_axes(), false)
     }
 
     fn __repr__(&self) -> String {

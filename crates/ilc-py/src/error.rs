@@ -1,6 +1,7 @@
 //! Which error of `ilc-rt` becomes which exception.
 
-use ilc_rt::{config, learning, library, model, signal, supervisor};
+use ilc_rt::trajectory::contour;
+use ilc_rt::{config, kinematics, learning, library, model, signal, supervisor, trajectory};
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 
@@ -21,6 +22,12 @@ impl<T> OrRaise<T> for Result<T, model::ModelError> {
 impl<T> OrRaise<T> for Result<T, signal::SignalError> {
     fn or_raise(self) -> PyResult<T> {
         self.map_err(|error| exceptions::SignalError::new_err(error.to_string()))
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, trajectory::TrajectoryError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| exceptions::TrajectoryError::new_err(error.to_string()))
     }
 }
 
@@ -50,5 +57,17 @@ impl<T> OrRaise<T> for Result<T, library::LibraryError> {
 impl<T> OrRaise<T> for Result<T, supervisor::SupervisorError> {
     fn or_raise(self) -> PyResult<T> {
         self.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, kinematics::KinematicsError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| exceptions::KinematicsError::new_err(error.to_string()))
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, contour::ContourError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| exceptions::ContourError::new_err(error.to_string()))
     }
 }

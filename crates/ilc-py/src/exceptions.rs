@@ -13,9 +13,21 @@ create_exception!(
     "A learning law, or what it was given, that cannot be used."
 );
 
+create_exception!(ilc_rt, KinematicsError, PyValueError, "A pose or mechanism that cannot be.");
+create_exception!(ilc_rt, ContourError, PyValueError, "A path or an arc that is none.");
+create_exception!(
+    ilc_rt,
+    TrajectoryError,
+    PyValueError,
+    "A motion that cannot be planned as asked."
+);
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     module.add("ModelError", py.get_type::<ModelError>())?;
     module.add("SignalError", py.get_type::<SignalError>())?;
-    module.add("LearningError", py.get_type::<LearningError>())
+    module.add("TrajectoryError", py.get_type::<TrajectoryError>())?;
+    module.add("LearningError", py.get_type::<LearningError>())?;
+    module.add("KinematicsError", py.get_type::<KinematicsError>())?;
+    module.add("ContourError", py.get_type::<ContourError>())
 }

@@ -5,18 +5,30 @@
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
+mod analysis;
+mod analyze;
 mod argument;
 mod campaign;
 mod cell;
+mod contour;
+mod control;
 mod detached;
 mod error;
 mod exceptions;
+mod experiment;
+mod held;
+mod identify;
+mod kinematics;
 mod laws;
 mod library;
 mod model;
 mod model_argument;
 mod python_law;
 mod signal;
+mod time_varying;
+mod trajectory;
+mod tuning;
+mod weights;
 
 use pyo3::prelude::*;
 
@@ -25,8 +37,18 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     exceptions::register(module)?;
     model::register(module)?;
+    time_varying::register(module)?;
+    identify::register(module)?;
     signal::register(module)?;
+    kinematics::register(module)?;
+    contour::register(module)?;
+    control::register(module)?;
+    trajectory::register(module)?;
     laws::register(module)?;
+    weights::register(module)?;
+    analysis::register(module)?;
+    analyze::register(module)?;
+    tuning::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

@@ -5,6 +5,7 @@ use numpy::IntoPyArray;
 use numpy::ndarray::{Array1, Array3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
 use crate::detached::detached;
@@ -47,7 +48,13 @@ use crate::model_argument::{read_model, read_sample_time};
 /// array([0., 2., 1.])
 #[pyclass(name = "StateSpace", module = "ilc_rt", frozen)]
 #[derive(Debug)]
-pub(crate) struct PyStateSpace(StateSpace);
+pub(crate) struct PyStateSpace(pub(crate) StateSpace);
+
+impl From<StateSpace> for PyStateSpace {
+    fn from(model: StateSpace) -> Self {
+        Self(model)
+    }
+}
 
 impl PyStateSpace {
     pub(crate) fn model(&self) -> &StateSpace {
@@ -301,6 +308,248 @@ impl PyStateSpace {
     ///     If the model is continuous.
     fn delayed(&self, n_samples: usize) -> PyResult<Self> {
         self.0.delayed(n_samples).or_raise().map(Self)
+    }
+
+    /// Return the invariant zeros, where an input cancels in every output.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of complex128, shape (n_zeros,)
+    ///     Finite zeros in no particular order.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If the transfer matrix has dependent rows or columns everywhere.
+    ///
+    /// References
+    /// ----------
+    /// [emami1982].
+    fn zeros<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let zeros = detached(py, || self.0.zeros()).or_raise()?;
+        Ok(Array1::from(zeros).into_pyarray(py).into_any())
+    }
+
+    /// Return the static gain, G(0) or G(z = 1).
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (n_outputs, n_inputs)
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If the model integrates.
+    fn dc_gain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(give_matrix(py, &self.0.dc_gain().or_raise()?))
+    }
+
+    /// Return the response to sinusoids, C (q I - A)^-1 B + D.
+    ///
+    /// Parameters
+    /// ----------
+    /// w_rad_s : array_like, shape (n_frequencies,)
+    ///     Frequencies in rad/s.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of complex128, shape (n_frequencies, n_outputs, n_inputs)
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If a frequency is a pole of the model.
+    /// ValueError, TypeError
+    ///     If `w_rad_s` has the wrong shape or holds a number that is not finite.
+    fn frequency_response<'py>(
+        &self,
+        py: Python<'py>,
+        w_rad_s: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let w = read_vector("w_rad_s", w_rad_s)?;
+        let response = detached(py, || self.0.frequency_response(&w)).or_raise()?;
+        let shape = (w.len(), self.0.n_outputs(), self.0.n_inputs());
+        let array = Array3::from_shape_fn(shape, |(k, row, col)| response[k][(row, col)]);
+        Ok(array.into_pyarray(py).into_any())
+    }
+
+    /// Return magnitude and phase of one channel, the phase without jumps.
+    ///
+    /// Parameters
+    /// ----------
+    /// w_rad_s : array_like, shape (n_frequencies,)
+    ///     Frequencies in rad/s.
+    /// output, input : int
+    ///     Which channel, counted from 0.
+    ///
+    /// Returns
+    /// -------
+    /// magnitude : ndarray of float64, shape (n_frequencies,)
+    /// phase_rad : ndarray of float64, shape (n_frequencies,)
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If there is no such channel, or a frequency is a pole.
+    #[pyo3(signature = (w_rad_s, output=0, input=0))]
+    fn bode<'py>(
+        &self,
+        py: Python<'py>,
+        w_rad_s: &Bound<'py, PyAny>,
+        output: usize,
+        input: usize,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let w = read_vector("w_rad_s", w_rad_s)?;
+        let bode = detached(py, || self.0.bode(&w, output, input)).or_raise()?;
+        let give = |values| Array1::from(values).into_pyarray(py).into_any();
+        Ok((give(bode.magnitude), give(bode.phase_rad)))
+    }
+
+    /// Return the sensitivity to a controller, S = (I + P K)^-1.
+    ///
+    /// Parameters
+    /// ----------
+    /// controller : StateSpace or compatible
+    ///     K, from the outputs to the inputs of this model P.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     From set point to control error.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If sample times or signals do not match, or the loop is not well posed.
+    fn sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let controller = read_model("controller", controller)?;
+        self.0.sensitivity(&controller).or_raise().map(Self)
+    }
+
+    /// Return the complementary sensitivity, T = P K (I + P K)^-1.
+    ///
+    /// Parameters
+    /// ----------
+    /// controller : StateSpace or compatible
+    ///     K, from the outputs to the inputs of this model P.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     From set point to output.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If sample times or signals do not match, or the loop is not well posed.
+    fn complementary_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let controller = read_model("controller", controller)?;
+        self.0.complementary_sensitivity(&controller).or_raise().map(Self)
+    }
+
+    /// Return the process sensitivity, P (I + K P)^-1.
+    ///
+    /// Parameters
+    /// ----------
+    /// controller : StateSpace or compatible
+    ///     K, from the outputs to the inputs of this model P.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     From an input added to the controller's to the output: what parallel
+    ///     learning works on.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If sample times or signals do not match, or the loop is not well posed.
+    fn process_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let controller = read_model("controller", controller)?;
+        self.0.process_sensitivity(&controller).or_raise().map(Self)
+    }
+
+    /// Return after how many samples each output answers to some input.
+    ///
+    /// Returns
+    /// -------
+    /// list of (int or None), one for each output
+    ///     Index of the first Markov parameter that is not zero; None for an
+    ///     output that answers to nothing.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If a Markov parameter overflows.
+    fn relative_degrees(&self) -> PyResult<Vec<Option<usize>>> {
+        model::relative_degrees(&self.0).or_raise()
+    }
+
+    /// Return after how many samples each output answers to each input.
+    ///
+    /// Returns
+    /// -------
+    /// list of list of (int or None)
+    ///     One row for each output with one entry for each input.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If a Markov parameter overflows.
+    fn delays(&self) -> PyResult<Vec<Vec<Option<usize>>>> {
+        model::delays(&self.0).or_raise()
+    }
+
+    /// Return a model of the same response without superfluous states.
+    ///
+    /// Returns
+    /// -------
+    /// StateSpace
+    ///     Only states that an input reaches and an output sees.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If the numbers overflow on the way.
+    fn minimal(&self) -> PyResult<Self> {
+        self.0.minimal().or_raise().map(Self)
+    }
+
+    /// Return the model as an object of scipy.signal.
+    ///
+    /// Returns
+    /// -------
+    /// scipy.signal.StateSpace
+    ///     Discrete if this model is.
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     If SciPy is not installed.
+    fn to_scipy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let arguments = (self.a(py), self.b(py), self.c(py), self.d(py));
+        let keywords = PyDict::new(py);
+        if let Some(dt_s) = self.0.dt_s() {
+            keywords.set_item("dt", dt_s)?;
+        }
+        py.import("scipy.signal")?.getattr("StateSpace")?.call(arguments, Some(&keywords))
+    }
+
+    /// Return the model as an object of python-control.
+    ///
+    /// Returns
+    /// -------
+    /// control.StateSpace
+    ///     Discrete if this model is.
+    ///
+    /// Raises
+    /// ------
+    /// ImportError
+    ///     If python-control is not installed.
+    fn to_control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let dt_s = self.0.dt_s().unwrap_or(0.0);
+        let arguments = (self.a(py), self.b(py), self.c(py), self.d(py), dt_s);
+        py.import("control")?.getattr("StateSpace")?.call1(arguments)
     }
 
     fn __repr__(&self) -> String {

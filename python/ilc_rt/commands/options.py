@@ -53,8 +53,14 @@ Lockstep = Annotated[
 LibraryFile = Annotated[
     Path, typer.Option("--library", metavar="FILE", help="Where the runs are kept.")
 ]
+KeepIn = Annotated[
+    Path | None, typer.Option("--library", metavar="FILE", help="Keep the runs in this library.")
+]
 JsonFile = Annotated[
     Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to this file.")
+]
+DriveOption = Annotated[
+    DriveChoice, typer.Option(help="Start simulated drives; auto never does on a can: bus.")
 ]
 LibraryArgument = Annotated[Path, typer.Argument(metavar="LIBRARY", help="Library file.")]
 REPORT_NAME = "ilc-report.html"

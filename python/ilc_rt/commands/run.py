@@ -31,6 +31,9 @@ ReportFile = Annotated[
 Resume = Annotated[
     bool, typer.Option("--resume", help="Go on from the last campaign of this cell.")
 ]
+AllowDivergent = Annotated[
+    bool, typer.Option("--allow-divergent", help="Start also a law that will not converge.")
+]
 DriveOption = Annotated[
     DriveChoice,
     typer.Option(help="Start simulated drives; auto never does on a can: bus."),
@@ -48,6 +51,7 @@ def run(
     json_file: JsonFile = None,
     report: ReportFile = None,
     drives: DriveOption = DriveChoice.auto,
+    allow_divergent: AllowDivergent = False,
 ) -> None:
     """Run a cell's program again and again, each run better than the last.
 
@@ -61,6 +65,7 @@ def run(
         lockstep=lockstep,
         drives=drives.value,
         resume=resume,
+        allow_divergent=allow_divergent,
     )
     carry_out(campaign, iterations, json_file, report)
 

@@ -7,7 +7,8 @@ use std::error::Error;
 use std::time::{Duration, Instant};
 
 use ilc_rt::learning::Law;
-use ilc_rt::learning::law::pd::{Pd, PdGains, QFilter};
+use ilc_rt::learning::law::pd::{Pd, PdGains};
+use ilc_rt::learning::law::q_filter::QFilter;
 use ilc_rt::learning::law::relevance::{Relevance, RelevanceWeights, RunShape};
 
 /// Samples of the modulated tool path in \[dimarco2016\], Appendix A.

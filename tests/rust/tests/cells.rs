@@ -40,6 +40,24 @@ fn the_examples_are_not_refused() {
     }
 }
 
+#[test]
+fn a_law_that_will_not_converge_is_refused_unless_it_is_allowed() {
+    let pd = "law = \"pd\"";
+    let tuned = |numbers: &str| {
+        format!("{}\n[learning.pd]\n{numbers}\n", edited("law = \"norm_optimal\"", pd))
+    };
+    for sound in ["", "kp = 0.5\nlead_samples = 8", "kp = 0.3\ncutoff_hz = 5.0"] {
+        assert_eq!(refusal(&tuned(sound)), None, "{sound}");
+    }
+    let eager = tuned("kp = 5.0\ncutoff_hz = 100.0");
+    let line = refusal(&eager).unwrap();
+    for part in [FILE, "[learning]", "will not converge", "allow_divergent = true"] {
+        assert!(line.contains(part), "{line}");
+    }
+    let allowed = eager.replacen(pd, "law = \"pd\"\nallow_divergent = true", 1);
+    assert_eq!(refusal(&allowed), None);
+}
+
 /// A piece of the first example, what replaces it, and parts of the line that refuses it.
 type Edit = (&'static str, &'static str, &'static [&'static str]);
 

@@ -3,10 +3,20 @@
 #![expect(clippy::unwrap_used, reason = "set-up shared by the tests must not fail")]
 
 use ilc_rt::learning::Law;
-use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
-use ilc_rt::learning::law::pd::{Pd, PdGains, QFilter};
-use ilc_rt::model::{Method, StateSpace, discretize, second_order};
-use ilc_rt::signal::butterworth;
+use ilc_rt::learning::gate::{Gate, GateRule};
+use ilc_rt::learning::ladder::{Ladder, LadderRule};
+use ilc_rt::learning::law::adjoint::Adjoint;
+use ilc_rt::learning::law::constrained::{Bound, Bounds, Constrained};
+use ilc_rt::learning::law::dynamic::DynamicNormOptimal;
+use ilc_rt::learning::law::error_feedforward::{ErrorFeedforward, Feedforward};
+use ilc_rt::learning::law::model_inverse::ModelInverse;
+use ilc_rt::learning::law::norm_optimal::{Cost, NormOptimal, Paired, Weights};
+use ilc_rt::learning::law::pd::{Pd, PdGains};
+use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::learning::sweep::{Form, Gains};
+use ilc_rt::learning::weights::{Dynamic, Weight};
+use ilc_rt::model::{Method, StateSpace, TimeVarying, discretize, second_order};
+use ilc_rt::signal::{FirFilter, GaussianFilter, Segment, SwitchedFilter, butterworth};
 use ilc_tests::counting::{Counting, allocations};
 
 #[global_allocator]
@@ -55,14 +65,92 @@ fn no_law_allocates_in_an_update() {
     let weights = Weights { q: 1.0, s: 0.0, r: 1e-6, rate: 3.0 };
     let sections = || butterworth(2, 50.0, 4e-3).unwrap();
     let gains = PdGains { kp: 1.0, kd: 3.25, lead: 1 };
+    let samples = TimeVarying::new(vec![separate.clone(); N_SAMPLES]).unwrap();
+    let filter = Dynamic::new(axis(0.8).append(&axis(0.9)).unwrap()).unwrap();
+    let filter = filter.with_plain(Weight::Scalar(0.1));
+    let turning = (0..N_SAMPLES).map(|k| nalgebra::DMatrix::identity(2, 2) * (k as f64).cos());
+    let turned = filter.clone().with_coupling(turning.collect()).unwrap();
     let mut laws: Vec<Box<dyn Law>> = vec![
+        Box::new(DynamicNormOptimal::new(&separate, N_SAMPLES, &filter, weights).unwrap()),
+        Box::new(DynamicNormOptimal::new(&separate, N_SAMPLES, &turned, weights).unwrap()),
+        Box::new(NormOptimal::new(&separate, N_SAMPLES, contour()).unwrap()),
+        Box::new(NormOptimal::new(&samples, N_SAMPLES, weights).unwrap()),
         Box::new(NormOptimal::new(&separate, N_SAMPLES, weights).unwrap()),
         Box::new(NormOptimal::new(&coupled, N_SAMPLES, weights).unwrap()),
-        Box::new(Pd::new(gains, N_SAMPLES, 2, QFilter::None).unwrap()),
-        Box::new(Pd::new(gains, N_SAMPLES, 2, QFilter::ZeroPhase(sections())).unwrap()),
-        Box::new(Pd::new(gains, N_SAMPLES, 2, QFilter::Causal(sections())).unwrap()),
     ];
+    // The input at hand is twice as large as it may be, so that the search has work to do.
+    for model in [&separate, &coupled] {
+        let bounds = Bounds { input: Some(Bound::within(-0.5, 0.5)), ..Bounds::default() };
+        laws.push(Box::new(Constrained::new(model, N_SAMPLES, weights, bounds).unwrap()));
+    }
+    let segments = [(0, 10.0), (600, 50.0)].map(|(start, cutoff_hz)| Segment { start, cutoff_hz });
+    let filters = [
+        QFilter::None,
+        QFilter::ZeroPhase(sections()),
+        QFilter::Causal(sections()),
+        QFilter::Gaussian(GaussianFilter::new(20.0, 4e-3).unwrap()),
+        QFilter::Switched(SwitchedFilter::new(2, &segments, 50, 4e-3).unwrap()),
+        QFilter::Fir(FirFilter::new(&[0.25, 0.5, 0.25]).unwrap()),
+    ];
+    for filter in filters {
+        laws.push(Box::new(Pd::new(gains, N_SAMPLES, 2, filter.clone()).unwrap()));
+        let rule = Feedforward { gain: 0.5, lead: 1, limit: 0.8 };
+        laws.push(Box::new(ErrorFeedforward::new(rule, N_SAMPLES, 2, filter.clone()).unwrap()));
+        laws.push(Box::new(Adjoint::new(&coupled, N_SAMPLES, None, filter.clone()).unwrap()));
+        laws.push(Box::new(ModelInverse::new(&coupled, N_SAMPLES, 0.5, filter).unwrap()));
+    }
     for law in &mut laws {
         assert_eq!(allocations_of_an_update(law.as_mut()), 0, "{}", law.describe());
+    }
+}
+
+/// A weight that couples the axes, another at every sample.
+fn contour() -> Cost {
+    let block = |k: usize| {
+        let (s, c) = (k as f64 * 0.01).sin_cos();
+        nalgebra::DMatrix::from_row_slice(2, 2, &[c * c + 0.1, c * s, c * s, s * s + 0.1])
+    };
+    let q = Weight::Blocks((0..N_SAMPLES).map(block).collect());
+    Cost { q, ..Weights { q: 1.0, s: 1e-3, r: 1e-2, rate: 0.0 }.into() }
+}
+
+#[test]
+fn factorising_again_allocates_nothing() {
+    let model = axis(1.0).append(&axis(0.6).delayed(1).unwrap()).unwrap();
+    let paired = Paired::new(&model, N_SAMPLES, contour()).unwrap();
+    for form in [Form::Joseph, Form::Cholesky, Form::SquareRoot] {
+        let mut gains = Gains::with_form(&paired, paired.free_samples(), form).unwrap();
+        let before = allocations();
+        gains.refactor(&paired).unwrap();
+        assert_eq!(allocations() - before, 0, "{form:?}");
+    }
+}
+
+#[test]
+fn what_goes_round_a_law_allocates_in_its_first_update_only() {
+    let law = || {
+        let gains = PdGains { kp: 1.0, kd: 0.0, lead: 1 };
+        Pd::new(gains, N_SAMPLES, 2, QFilter::None).unwrap()
+    };
+    let signal = |size: f64| -> Vec<f64> {
+        (0..2 * N_SAMPLES).map(|k| size * (k as f64 * 0.11).cos()).collect()
+    };
+    let rule = GateRule { tolerance: 0.1, patience: 1, ..GateRule::default() };
+    let laws: [Box<dyn Law>; 3] = [
+        Box::new(Gate::new(law(), rule).unwrap()),
+        Box::new(Ladder::new(law(), LadderRule::new(2)).unwrap()),
+        Box::new(Gate::new(Ladder::new(law(), LadderRule::new(3)).unwrap(), rule).unwrap()),
+    ];
+    for mut law in laws {
+        let (mut input, mut next) = (signal(0.0), signal(0.0));
+        // Learn, improve, grow, roll back, hold, leave the tolerance.
+        for (run, size) in [1.0, 0.5, 0.4, 0.9, 0.4, 0.05, 0.05, 0.9, 0.8].into_iter().enumerate() {
+            let error = signal(size);
+            let before = allocations();
+            law.update(&input, &error, &mut next).unwrap();
+            let count = allocations() - before;
+            assert!(count == 0 || run == 0, "{count} in run {run} of {}", law.describe());
+            input.copy_from_slice(&next);
+        }
     }
 }

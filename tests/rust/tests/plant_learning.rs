@@ -22,9 +22,8 @@ fn cell() -> Cell {
 
 fn plan(cell: &Cell) -> Interpolator {
     let program = &cell.program;
-    let segment = |segment: &ilc_rt::config::Segment| PathSegment {
-        to_m: segment.to_m.clone(),
-        feed_m_s: segment.feed_m_s.unwrap_or(program.feed_m_s),
+    let segment = |segment: &ilc_rt::config::Segment| {
+        PathSegment::line(segment.to_m.clone(), segment.feed_m_s.unwrap_or(program.feed_m_s))
     };
     let spec = PathSpec {
         start_m: program.start_m.clone(),

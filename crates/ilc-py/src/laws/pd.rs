@@ -1,16 +1,13 @@
 //! `PdIlc`.
 
-use std::sync::Mutex;
-
-use ilc_rt::learning::Law;
-use ilc_rt::learning::law::pd::{Pd, PdGains, QFilter};
+use ilc_rt::learning::law::pd::{Pd, PdGains};
+use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
-use super::{held, next};
-use crate::argument::{Signal, give_signal};
-use crate::detached::detached;
+use super::any_size::AnySize;
 use crate::error::OrRaise;
-use crate::signal::PyButterworthFilter;
+use crate::signal::{kind, read_filter};
 
 /// Proportional-derivative learning with a low-pass filter.
 ///
@@ -22,8 +19,9 @@ use crate::signal::PyButterworthFilter;
 ///     Proportional gain.
 /// kd : float
 ///     Gain of the error's difference from sample to sample.
-/// q_filter : ButterworthFilter or None
-///     Filter Q, applied without lag unless it is causal.
+/// q_filter : ButterworthFilter, GaussianFilter, SwitchedFilter, FirFilter, array or None
+///     Filter Q, applied without lag unless it is causal; an array holds the taps
+///     of a symmetric one.
 /// lead : int
 ///     How many samples ahead the error is taken: 1 for an axis without delay,
 ///     1 more for each sample of delay.
@@ -32,6 +30,8 @@ use crate::signal::PyButterworthFilter;
 /// ------
 /// LearningError
 ///     If a gain is not finite.
+/// SignalError, TypeError
+///     If `q_filter` is none.
 ///
 /// Notes
 /// -----
@@ -53,25 +53,29 @@ use crate::signal::PyButterworthFilter;
 pub(super) struct PyPdIlc {
     gains: PdGains,
     q_filter: QFilter,
-    /// The law for the size of run seen last.
-    law: Mutex<Option<(usize, usize, Pd)>>,
+    law: AnySize<Pd>,
+}
+
+impl PyPdIlc {
+    /// Makes the law anew, for runs of the given size.
+    pub(super) fn own(
+        &self,
+        n_samples: usize,
+        n_channels: usize,
+    ) -> Result<Box<dyn Law>, LearningError> {
+        Ok(Box::new(Pd::new(self.gains, n_samples, n_channels, self.q_filter.clone())?))
+    }
 }
 
 #[pymethods]
 impl PyPdIlc {
     #[new]
     #[pyo3(signature = (kp, kd, q_filter=None, lead=1))]
-    fn new(
-        kp: f64,
-        kd: f64,
-        q_filter: Option<&Bound<'_, PyButterworthFilter>>,
-        lead: usize,
-    ) -> PyResult<Self> {
+    fn new(kp: f64, kd: f64, q_filter: Option<&Bound<'_, PyAny>>, lead: usize) -> PyResult<Self> {
         let gains = PdGains { kp, kd, lead };
         // Made once for nothing, so that a wrong gain shows here and not after the first run.
         Pd::new(gains, 1, 1, QFilter::None).or_raise()?;
-        let q_filter = q_filter.map_or(QFilter::None, |filter| filter.get().q_filter());
-        Ok(Self { gains, q_filter, law: Mutex::new(None) })
+        Ok(Self { gains, q_filter: read_filter("q_filter", q_filter)?, law: AnySize::new() })
     }
 
     /// Return the input of the next run.
@@ -105,41 +109,19 @@ impl PyPdIlc {
         disturbance: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let _ = disturbance;
-        let u = Signal::read("u", u)?;
-        let e = Signal::read("e", e)?
-            .with_samples("e", u.n_samples)?
-            .with_channels("e", u.n_channels)?;
-        let (n_samples, n_channels) = (u.n_samples, u.n_channels);
-        let next = detached(py, || {
-            let mut kept = held(&self.law);
-            match &mut *kept {
-                Some((n, m, law)) if (*n, *m) == (n_samples, n_channels) => next(law, &u, &e),
-                _ => {
-                    let mut law =
-                        Pd::new(self.gains, n_samples, n_channels, self.q_filter.clone())?;
-                    let result = next(&mut law, &u, &e);
-                    *kept = Some((n_samples, n_channels, law));
-                    result
-                }
-            }
-        });
-        give_signal(py, next.or_raise()?, u.n_channels, u.is_flat)
+        self.law.update(py, u, e, |n_samples, n_channels| {
+            Pd::new(self.gains, n_samples, n_channels, self.q_filter.clone())
+        })
     }
 
     /// Forget what earlier runs taught: nothing, for this law.
     fn reset(&self) {
-        if let Some((_, _, law)) = &mut *held(&self.law) {
-            law.reset();
-        }
+        self.law.reset();
     }
 
     fn __repr__(&self) -> String {
         let PdGains { kp, kd, lead } = self.gains;
-        let filtered = match &self.q_filter {
-            QFilter::None => "None",
-            QFilter::ZeroPhase(_) => "zero-phase",
-            QFilter::Causal(_) => "causal",
-        };
-        format!("PdIlc(kp={kp}, kd={kd}, q_filter={filtered}, lead={lead})")
+        let filter = kind(&self.q_filter);
+        format!("PdIlc(kp={kp}, kd={kd}, q_filter={filter}, lead={lead})")
     }
 }

@@ -211,7 +211,9 @@ impl<L: Remember> Recalled<L> {
             let library = library.lock();
             let (ids, dt_s) = library.fitting(n_samples, n_inputs, n_disturbances, &self.task)?;
             size.library_dt_s = dt_s;
-            ids.into_iter().map(|id| library.load(id).map(|row| row.record)).collect()
+            ids.into_iter()
+                .map(|id| library.load(id).map(|row| row.record))
+                .collect::<Result<Vec<_>, _>>()
         })
         .or_raise()
     }

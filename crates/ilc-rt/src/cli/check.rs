@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
-use crate::config::Cell;
+use crate::config::{Cell, PathKind};
 use crate::supervisor::{Plan, SupervisorError};
 
 #[derive(Args)]
@@ -49,6 +49,7 @@ fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
             axis.name, axis.node, low, high, axis.limits.position_min_m, axis.limits.position_max_m
         ));
     }
+    show::say(&format!("  path: {}", path(&cell, &plan)));
     show::say(&format!(
         "  a run: {} samples, {:.3} s; then {:.3} s rest in which {}",
         plan.n_samples(),
@@ -60,4 +61,28 @@ fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
         )
     ));
     Ok(())
+}
+
+/// What kind of path it is, how long, and how fast at most.
+fn path(cell: &Cell, plan: &Plan) -> String {
+    let program = &cell.program;
+    let kind = match program.kind {
+        PathKind::Points => format!("{} segments", program.segments.len()),
+        PathKind::Spline => format!("spline through {} points", program.segments.len() + 1),
+        PathKind::Butterfly => "butterfly".to_owned(),
+        PathKind::Spiral => "spiral".to_owned(),
+        PathKind::Raster => "raster".to_owned(),
+        PathKind::Modulated => format!("{} modulated legs", program.segments.len()),
+        PathKind::Gcode => {
+            let file = program.file.as_deref().unwrap_or(std::path::Path::new(""));
+            format!("part program {}", file.display())
+        }
+    };
+    let rows = || plan.reference_m.chunks_exact(cell.n_axes());
+    let steps_m = rows().zip(rows().skip(1)).map(|(from, to)| {
+        from.iter().zip(to).fold(0.0_f64, |sum, (from, to)| sum.hypot(to - from))
+    });
+    let (length_m, fastest_m) =
+        steps_m.fold((0.0, 0.0_f64), |(sum, most), step| (sum + step, most.max(step)));
+    format!("{kind}, {length_m:.4} m long, {:.4} m/s at most", fastest_m / cell.cycle_s())
 }

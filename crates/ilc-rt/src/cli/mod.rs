@@ -4,6 +4,7 @@
 
 mod check;
 mod figures;
+mod identify;
 mod latency;
 mod run;
 mod show;
@@ -37,6 +38,8 @@ struct Arguments {
 enum Verb {
     /// Run a cell: bring the drives up, repeat the program, learn after every run.
     Run(run::RunArguments),
+    /// Excite one axis while all hold still, and fit a model to what it does.
+    Identify(identify::IdentifyArguments),
     /// Read a cell description and tell what it would do; touches no bus.
     Check(check::CheckArguments),
     /// Measure how late this machine wakes the loop's thread.
@@ -68,6 +71,7 @@ pub fn main() -> ExitCode {
     };
     let status = match arguments.verb {
         Verb::Run(arguments) => run::run(&arguments),
+        Verb::Identify(arguments) => identify::identify(&arguments),
         Verb::Check(arguments) => check::check(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),
     };

@@ -1,6 +1,6 @@
 //! `ilc-rt run`: a campaign on a bus.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 
@@ -9,8 +9,8 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 
 use super::figures::FiguresFile;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show};
-use crate::config::{Cell, Measure};
-use crate::fieldbus::transport;
+use crate::config::{Cell, LawName, Measure};
+use crate::fieldbus::{Bus, transport};
 use crate::record::{EndStatus, Event};
 use crate::supervisor::{self, Disturbance, Options, Outcome, SupervisorError};
 
@@ -35,6 +35,9 @@ pub(super) struct RunArguments {
     /// Pace the loop by the drives' answers instead of the clock: exact repetition, no wall clock.
     #[arg(long)]
     lockstep: bool,
+    /// Repeat the program without learning, whatever the cell says.
+    #[arg(long)]
+    no_learning: bool,
     /// Where every run is kept.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     library: PathBuf,
@@ -47,15 +50,27 @@ pub(super) struct RunArguments {
     /// Print one JSON object a line instead of a table.
     #[arg(long)]
     events: bool,
+    /// Start also if the analysis says that learning will not converge.
+    #[arg(long)]
+    allow_divergent: bool,
     /// Do not publish on Zenoh.
     #[arg(long)]
     no_telemetry: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum MeasureName {
+pub(super) enum MeasureName {
     Encoder,
     Tcp,
+}
+
+impl From<MeasureName> for Measure {
+    fn from(name: MeasureName) -> Self {
+        match name {
+            MeasureName::Encoder => Self::Encoder,
+            MeasureName::Tcp => Self::Tcp,
+        }
+    }
 }
 
 /// Runs a campaign; returns the exit status.
@@ -80,24 +95,14 @@ pub(super) fn run(arguments: &RunArguments) -> u8 {
 }
 
 fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
-    let mut cell = Cell::load(&arguments.cell)?;
-    if let Some(address) = &arguments.bus {
-        cell.bus.address.clone_from(address);
-    }
-    let place = match &arguments.bus {
-        Some(_) => "--bus".to_owned(),
-        None => format!("{}: [bus] address", cell.file.display()),
-    };
-    let address = &cell.bus.address;
-    if address.starts_with("loopback:") {
-        return Err(SupervisorError::Loopback { place });
+    let (mut cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
+    cell.learning.allow_divergent |= arguments.allow_divergent;
+    if arguments.no_learning {
+        cell.learning.law = LawName::None;
     }
     let options = Options {
         iterations: arguments.iterations,
-        measure: arguments.measure.map(|measure| match measure {
-            MeasureName::Encoder => Measure::Encoder,
-            MeasureName::Tcp => Measure::Tcp,
-        }),
+        measure: arguments.measure.map(Measure::from),
         lockstep: arguments.lockstep,
         resume: arguments.resume,
         library: arguments.library.clone(),
@@ -105,25 +110,50 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
         telemetry: !arguments.no_telemetry,
         stop: stop_on_signals(),
     };
-    let bus = transport::open(address).map_err(|source| SupervisorError::Bus { place, source })?;
     let mut first_contour_m = None;
     let mut observe = |event: &Event| {
-        if !arguments.events {
-            if let Some(text) = show::sentence(event, &mut first_contour_m) {
-                show::say(&text);
-            }
-        } else if let Ok(text) = serde_json::to_string(event)
-            && !show::say(&text)
-        {
-            // Whoever asked for the events is gone, and with it whoever would notice trouble.
-            options.stop.store(SIGPIPE, Ordering::Relaxed);
+        if arguments.events {
+            say_event(event, &options.stop);
+        } else if let Some(text) = show::sentence(event, &mut first_contour_m) {
+            show::say(&text);
         }
     };
     supervisor::run(&cell, &options, bus, None, &mut observe)
 }
 
+/// Prints an event as one line of JSON.
+pub(super) fn say_event(event: &Event, stop: &AtomicI32) {
+    if let Ok(text) = serde_json::to_string(event)
+        && !show::say(&text)
+    {
+        // Whoever asked for the events is gone, and with it whoever would notice trouble.
+        stop.store(SIGPIPE, Ordering::Relaxed);
+    }
+}
+
+/// Reads a cell description and opens its bus, or the one of the command line.
+pub(super) fn open(
+    file: &Path,
+    bus: Option<&str>,
+) -> Result<(Cell, Box<dyn Bus>), SupervisorError> {
+    let mut cell = Cell::load(file)?;
+    if let Some(address) = bus {
+        address.clone_into(&mut cell.bus.address);
+    }
+    let place = match bus {
+        Some(_) => "--bus".to_owned(),
+        None => format!("{}: [bus] address", cell.file.display()),
+    };
+    let address = &cell.bus.address;
+    if address.starts_with("loopback:") {
+        return Err(SupervisorError::Loopback { place });
+    }
+    let bus = transport::open(address).map_err(|source| SupervisorError::Bus { place, source })?;
+    Ok((cell, bus))
+}
+
 /// A number that becomes a signal's when it comes: the loop reads it and brings the axes to rest.
-fn stop_on_signals() -> Arc<AtomicI32> {
+pub(super) fn stop_on_signals() -> Arc<AtomicI32> {
     let stop = Arc::new(AtomicI32::new(0));
     for signal in [SIGINT, SIGTERM, SIGHUP] {
         if signal == SIGHUP && is_ignored(signal) {
@@ -178,6 +208,11 @@ fn finish(figures_file: Option<&FiguresFile>, outcome: &Outcome) -> u8 {
         });
         written = file.write(&text);
     }
+    exit_status(outcome, written)
+}
+
+/// The exit status of a campaign; complains if a fault ended it.
+pub(super) fn exit_status(outcome: &Outcome, written: bool) -> u8 {
     match outcome.status {
         EndStatus::Completed if written => 0,
         EndStatus::Completed => EXIT_FAILURE,

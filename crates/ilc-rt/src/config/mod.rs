@@ -5,6 +5,7 @@
 
 mod cell;
 mod error;
+mod path;
 mod program;
 mod validate;
 
@@ -13,6 +14,7 @@ pub use cell::{
     PositionLoop, Safety, Simulation, TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
+pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
 pub use program::{
     Corner, LawName, Learning, Measure, NormOptimalSection, PdSection, Program, Segment,
 };

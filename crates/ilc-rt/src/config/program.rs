@@ -1,6 +1,10 @@
 //! The sections of a cell description that concern the job: the program and the learning.
 
+use std::path::PathBuf;
+
 use serde::Deserialize;
+
+use super::path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
 
 /// `[program]`: where the tool goes.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -10,7 +14,25 @@ pub struct Program {
     pub start_m: Vec<f64>,
     /// Speed along the path where a segment names none.
     pub feed_m_s: f64,
-    /// How corners are taken.
+    /// What kind of path it is.
+    #[serde(default)]
+    pub kind: PathKind,
+    /// Part program of `kind = "gcode"`; a relative path begins at the cell description.
+    pub file: Option<PathBuf>,
+    /// Speed of G0; `feed_m_s` if it is not given.
+    pub rapid_m_s: Option<f64>,
+    /// Highest acceleration across a smooth curve; the axes' own limits if it is not given.
+    pub curvature_acceleration_m_s2: Option<f64>,
+    /// `[program.butterfly]`
+    pub butterfly: Option<ButterflySection>,
+    /// `[program.spiral]`
+    pub spiral: Option<SpiralSection>,
+    /// `[program.raster]`
+    pub raster: Option<RasterSection>,
+    /// `[program.modulated]`
+    pub modulated: Option<ModulatedSection>,
+    /// How corners are taken; not read where there are none.
+    #[serde(default = "default_corner")]
     pub corner: Corner,
     /// Length of the averaging window of `corner = "blend"`.
     #[serde(default = "default_blend_s")]
@@ -24,9 +46,13 @@ pub struct Program {
     /// Rest between the return to the start and the next run: the gap in which learning computes.
     #[serde(default = "default_settle_s")]
     pub settle_s: f64,
-    /// `[[program.segment]]`, straight moves in order.
-    #[serde(rename = "segment")]
+    /// `[[program.segment]]`, moves in order.
+    #[serde(rename = "segment", default)]
     pub segments: Vec<Segment>,
+}
+
+fn default_corner() -> Corner {
+    Corner::ExactStop
 }
 
 fn default_blend_s() -> f64 {
@@ -45,7 +71,7 @@ fn default_settle_s() -> f64 {
     0.3
 }
 
-/// `[[program.segment]]`: a straight move.
+/// `[[program.segment]]`: a straight move, or an arc if it has a centre.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Segment {
@@ -53,6 +79,14 @@ pub struct Segment {
     pub to_m: Vec<f64>,
     /// Speed along this segment.
     pub feed_m_s: Option<f64>,
+    /// Centre of an arc, in the first two axes.
+    pub center_m: Option<[f64; 2]>,
+    /// Which way round the arc is.
+    #[serde(default)]
+    pub clockwise: bool,
+    /// Rest at its end.
+    #[serde(default)]
+    pub dwell_s: f64,
 }
 
 /// How corners are taken.
@@ -79,6 +113,8 @@ pub struct Learning {
     pub input_max_m_s: f64,
     /// Growth of the RMS error over the best run at which the best input is restored.
     pub rollback_ratio: f64,
+    /// Whether a law may start of which the analysis says that it will not converge.
+    pub allow_divergent: bool,
     /// `[learning.norm_optimal]`
     pub norm_optimal: NormOptimalSection,
     /// `[learning.pd]`
@@ -93,6 +129,7 @@ impl Default for Learning {
             input_max_m: 0.005,
             input_max_m_s: 0.05,
             rollback_ratio: 1.5,
+            allow_divergent: false,
             norm_optimal: NormOptimalSection::default(),
             pd: PdSection::default(),
         }

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::learning::law::constrained::BoundsError;
 use crate::model::ModelError;
 use crate::signal::SignalError;
 
@@ -78,31 +79,92 @@ pub enum LearningError {
     },
     /// The weights leave part of the input undetermined.
     #[error(
-        "with s = {s}, r = {r} and rate = {rate} the model does not determine the input at sample \
+        "with {weights} the model does not determine the input at sample \
          {sample}; give r, s or rate a value above 0"
     )]
     Undetermined {
-        /// Weight of the input.
-        s: f64,
-        /// Weight of the change.
-        r: f64,
-        /// Weight of the rate of the change.
-        rate: f64,
+        /// The weights of input, change and rate, as text.
+        weights: String,
         /// The last sample at which this happens.
         sample: usize,
     },
     /// The update itself is an unstable filter.
     #[error(
-        "with s = {s}, r = {r} and rate = {rate} the input would grow without bound along the run: \
+        "with {weights} the input would grow without bound along the run: \
          the model has a zero outside the unit circle; give r or s a value above 0"
     )]
     Unbounded {
-        /// Weight of the input.
-        s: f64,
-        /// Weight of the change.
-        r: f64,
-        /// Weight of the rate of the change.
-        rate: f64,
+        /// The weights of input, change and rate, as text.
+        weights: String,
+    },
+    /// A gain at which learning diverges.
+    #[error(
+        "gain = {gain}; it must be less than 2 / |P|^2 = {limit} for this model, or the error grows \
+         from run to run unless a Q filter takes that part away"
+    )]
+    GainBound {
+        /// The gain given.
+        gain: f64,
+        /// The gain from which on the error grows.
+        limit: f64,
+    },
+    /// A model with another number of inputs than outputs.
+    #[error(
+        "the model has {n_inputs} inputs and {n_outputs} outputs; only one with as many inputs as \
+         outputs can be inverted"
+    )]
+    NotSquare {
+        /// Inputs of the model.
+        n_inputs: usize,
+        /// Outputs of the model.
+        n_outputs: usize,
+    },
+    /// A model that cannot be inverted.
+    #[error("the model has no inverse: {reason}")]
+    NoInverse {
+        /// Why not.
+        reason: &'static str,
+    },
+    /// A model whose inverse is unstable.
+    #[error(
+        "the model has a zero at {re:.6} {im:+.6}i, {radius:.6} from the origin: its inverse is stable only \
+         if all lie inside the unit circle; use norm-optimal learning with r above 0"
+    )]
+    NonMinimumPhase {
+        /// Real part of the outermost zero.
+        re: f64,
+        /// Imaginary part of it.
+        im: f64,
+        /// Its distance from the origin.
+        radius: f64,
+    },
+    /// The bounds contradict each other.
+    #[error(transparent)]
+    Bounds(#[from] BoundsError),
+    /// The analysis of the law says that it will not converge.
+    #[error(
+        "this law will not converge: {why}; change the law, or allow it with allow_divergent = true"
+    )]
+    Divergent {
+        /// The figures, as a sentence.
+        why: String,
+    },
+    /// A law that cannot be analysed because it is not linear.
+    #[error(
+        "the law is not linear: two updates differ from their sum's by {difference:.3e} of it; \
+         only linear laws can be analysed"
+    )]
+    NotLinear {
+        /// Difference relative to the update.
+        difference: f64,
+    },
+    /// An eigenvalue or a fixed point could not be computed.
+    #[error("{what} could not be computed: {reason}")]
+    Numerics {
+        /// Which figure.
+        what: &'static str,
+        /// Why.
+        reason: &'static str,
     },
     /// The model was refused.
     #[error(transparent)]
@@ -123,8 +185,16 @@ pub(crate) fn check(
         return Err(LearningError::Length { what, found: signal.len(), n_samples, n_channels });
     }
     // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
-    let poison: f64 = signal.iter().map(|value| value * 0.0).sum();
-    if poison.is_finite() {
+    // In several sums at a time, because each would wait for its last addition.
+    let chunks = signal.chunks_exact(16);
+    let rest = chunks.remainder();
+    let mut poison = [0.0; 16];
+    for chunk in chunks {
+        for (sum, value) in poison.iter_mut().zip(chunk) {
+            *sum += value * 0.0;
+        }
+    }
+    if poison.iter().chain(rest).all(|value| value.is_finite()) {
         return Ok(());
     }
     let index = signal.iter().position(|value| !value.is_finite()).unwrap_or(0);
@@ -134,4 +204,24 @@ pub(crate) fn check(
         channel: index % n_channels,
         value: signal[index],
     })
+}
+
+/// Checks the length of the place for a result.
+pub(crate) fn check_place(
+    next: &[f64],
+    n_samples: usize,
+    n_channels: usize,
+) -> Result<(), LearningError> {
+    if next.len() == n_samples * n_channels {
+        return Ok(());
+    }
+    Err(LearningError::Length { what: "next", found: next.len(), n_samples, n_channels })
+}
+
+/// Refuses counts that are zero.
+pub(crate) fn check_counts(counts: &[(&'static str, usize)]) -> Result<(), LearningError> {
+    match counts.iter().find(|(_, count)| *count == 0) {
+        Some((what, _)) => Err(LearningError::Empty { what }),
+        None => Ok(()),
+    }
 }

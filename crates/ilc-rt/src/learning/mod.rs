@@ -1,15 +1,26 @@
 //! Learning laws: from one run's error to the next run's input.
 //!
-//! This folder holds the [`Law`] trait, one law a file under [`law`], and the linear-time solver
-//! ([`sweep`]) that the optimal ones share. It runs between iterations, never in the tick;
-//! `config`, `supervisor` and the Python bindings may import it.
+//! This folder holds the [`Law`] trait, one law a file under [`law`], the linear-time solver
+//! ([`sweep`]) that the optimal ones share, and what goes round any law: when to stop ([`gate`]) and
+//! how many runs to average ([`ladder`]); [`analysis`] says before the first run whether a law will
+//! converge, and [`tune`] proposes weights. It runs between iterations, never in the tick; `config`,
+//! `supervisor` and the Python bindings may import it.
 
+pub mod analysis;
 mod error;
+pub mod gate;
+pub mod ladder;
 pub mod law;
+mod operator;
+mod repeatability;
+mod structure;
 pub mod sweep;
+pub mod tune;
 pub mod weights;
 
 pub use error::LearningError;
+pub use repeatability::{Repeatability, repeatability};
+pub use structure::Structure;
 
 /// A rule that turns the error of one run into the input of the next.
 ///
@@ -39,9 +50,67 @@ pub trait Law: Send {
         let _ = disturbance;
     }
 
+    /// Applies the transpose of the update's linear part: `to_input = L_u' dual`,
+    /// `to_error = L_e' dual`, where the update is `next = L_u input + L_e error`.
+    ///
+    /// Returns whether the law can; one that cannot is analysed by its columns, in short runs only.
+    ///
+    /// # Errors
+    /// - as [`Law::update`].
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let _ = (dual, to_input, to_error);
+        Ok(false)
+    }
+
+    /// Returns what is known of the law beyond its update; [`analysis`] uses it where it can.
+    fn structure(&self) -> Structure<'_> {
+        Structure::Unknown
+    }
+
     /// Forgets everything that earlier runs taught the law itself.
     fn reset(&mut self);
 
     /// Returns the law and its parameters as one line of JSON, for the record of the run.
     fn describe(&self) -> String;
+}
+
+impl<L: Law + ?Sized> Law for Box<L> {
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError> {
+        (**self).update(input, error, next)
+    }
+
+    fn expect(&mut self, disturbance: &[f64]) {
+        (**self).expect(disturbance);
+    }
+
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        (**self).transposed(dual, to_input, to_error)
+    }
+
+    fn structure(&self) -> Structure<'_> {
+        (**self).structure()
+    }
+
+    fn reset(&mut self) {
+        (**self).reset();
+    }
+
+    fn describe(&self) -> String {
+        (**self).describe()
+    }
 }

@@ -84,6 +84,14 @@ pub enum ModelError {
         /// The rule, as a sentence.
         allowed: String,
     },
+    /// The model of one sample does not fit the others.
+    #[error("at sample {sample}: {source}")]
+    AtSample {
+        /// The first such sample.
+        sample: usize,
+        /// What is wrong there.
+        source: Box<ModelError>,
+    },
     /// The instantaneous loop has no solution.
     #[error("the feedback loop is not well posed: I + D_c D_p is singular")]
     AlgebraicLoop,

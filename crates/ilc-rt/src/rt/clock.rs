@@ -1,8 +1,7 @@
-//! Integer time and the two clocks: the machine's monotonic one, and one that is set by hand.
+//! Integer time and the machine's monotonic clock.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use std::cell::Cell;
 use std::time::Duration;
 
 /// A time or a span in nanoseconds; integer, so that a grid of ticks never drifts.
@@ -99,42 +98,9 @@ impl Clock for MonotonicClock {
     }
 }
 
-/// A clock that moves only when told, for tests and for lock-step.
-#[derive(Clone, Debug, Default)]
-pub struct ManualClock {
-    now: Cell<Nanos>,
-}
-
-impl ManualClock {
-    /// Moves the clock on by `span`.
-    pub fn advance(&self, span: Nanos) {
-        self.now.set(self.now.get().plus(span));
-    }
-}
-
-impl Clock for ManualClock {
-    fn now(&self) -> Nanos {
-        self.now.get()
-    }
-
-    fn sleep_until(&self, deadline: Nanos) {
-        if deadline > self.now.get() {
-            self.now.set(deadline);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_manual_clock_never_goes_back() {
-        let clock = ManualClock::default();
-        clock.sleep_until(Nanos(50));
-        clock.sleep_until(Nanos(20));
-        assert_eq!(clock.now(), Nanos(50));
-    }
 
     #[test]
     fn the_monotonic_clock_does_not_wake_early() {

@@ -31,12 +31,92 @@ pub enum SignalError {
         dt_s: f64,
     },
     /// A signal too short to be extended at its ends.
-    #[error("the signal has {n_samples} samples; this zero-phase filter needs more than {padding}")]
+    #[error("the signal has {n_samples} samples; more than {padding} are needed here")]
     TooShort {
         /// Samples given.
         n_samples: usize,
         /// Samples of extension at either end.
         padding: usize,
+    },
+    /// A frequency that the sample time does not allow.
+    #[error(
+        "{what} = {value_hz} Hz; it must lie above 0 Hz and below half the sampling rate, \
+         {limit_hz} Hz"
+    )]
+    Frequency {
+        /// Name of the parameter.
+        what: &'static str,
+        /// The frequency given, in hertz.
+        value_hz: f64,
+        /// Half the sampling rate, in hertz.
+        limit_hz: f64,
+    },
+    /// A time that is negative or no number.
+    #[error("{what} = {value_s} s; a time must be finite and not negative")]
+    Time {
+        /// Name of the parameter.
+        what: &'static str,
+        /// The time given, in seconds.
+        value_s: f64,
+    },
+    /// Two cut-offs in the wrong order.
+    #[error("low_hz = {low_hz} Hz and high_hz = {high_hz} Hz; low_hz must be the smaller one")]
+    CutoffOrder {
+        /// The lower cut-off given, in hertz.
+        low_hz: f64,
+        /// The higher cut-off given, in hertz.
+        high_hz: f64,
+    },
+    /// Segments that do not follow each other.
+    #[error(
+        "segment {index} starts at sample {start}; the first one starts at 0 and each other one \
+         after the one before"
+    )]
+    SegmentOrder {
+        /// Which segment.
+        index: usize,
+        /// Where it starts.
+        start: usize,
+    },
+    /// No segment at all.
+    #[error("0 segments; a switched filter has at least 1")]
+    NoSegment,
+    /// A segment that starts after the end of the signal.
+    #[error("segment {index} starts at sample {start}; the signal has {n_samples} samples")]
+    SegmentBeyondEnd {
+        /// Which segment.
+        index: usize,
+        /// Where it starts.
+        start: usize,
+        /// Samples of the signal.
+        n_samples: usize,
+    },
+    /// Taps without a middle.
+    #[error("{found} taps; a symmetric filter has an odd number of them")]
+    TapCount {
+        /// Taps given.
+        found: usize,
+    },
+    /// A tap that is infinite or not a number.
+    #[error("tap {index} = {value}; only finite numbers are allowed")]
+    TapValue {
+        /// Which tap.
+        index: usize,
+        /// The value given.
+        value: f64,
+    },
+    /// Taps that would shift the signal.
+    #[error(
+        "tap {index} = {value} but its mirror image = {mirrored}; only symmetric taps filter \
+         without lag"
+    )]
+    TapSymmetry {
+        /// Which tap.
+        index: usize,
+        /// The value given.
+        value: f64,
+        /// The tap at the same distance from the other end.
+        mirrored: f64,
     },
     /// A signal of another length than the filter was set up for.
     #[error("the signal has {found} samples; this filter was set up for {expected}")]

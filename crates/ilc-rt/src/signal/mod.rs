@@ -1,14 +1,29 @@
-//! Filters of signals: Butterworth as second-order sections, causal and zero-phase.
+//! Filters of signals, and the frequency that a signal has at each moment.
 //!
-//! This folder designs filters when things are set up and runs them without allocating. It knows
-//! nothing of axes or learning; every other module may import it, the hot ones only [`SosFilter`].
+//! Butterworth low-pass as second-order sections, causal, zero-phase or switched along the run;
+//! Gaussian and symmetric smoothers. This folder designs filters when things are set up and runs
+//! them without allocating. It knows nothing of axes or learning; every other module may import it,
+//! the hot ones only [`SosFilter`].
 
 mod butterworth;
+mod channel;
 mod error;
+mod fir;
+mod gaussian;
+mod hilbert;
+mod segments;
 mod sos;
+mod switched;
+mod symmetric;
 mod zero_phase;
 
 pub use butterworth::{MAX_ORDER, butterworth};
 pub use error::SignalError;
+pub use fir::FirFilter;
+pub use gaussian::GaussianFilter;
+pub use hilbert::{analytic, instantaneous_frequency};
+pub use segments::SwitchRule;
 pub use sos::{Section, SosFilter};
+pub use switched::{Segment, Switched, SwitchedFilter};
+pub use symmetric::Symmetric;
 pub use zero_phase::ZeroPhase;

@@ -1,6 +1,7 @@
 //! Filtering forward and backward: no lag, the square of the gain.
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use super::channel::check_channel;
 use super::{Section, SignalError, SosFilter};
 
 /// A zero-phase filter with its workspace.
@@ -60,10 +61,7 @@ impl ZeroPhase {
         n_channels: usize,
     ) -> Result<(), SignalError> {
         let expected = self.n_samples();
-        if n_channels == 0 || channel >= n_channels || signal.len() != expected * n_channels {
-            let found = signal.len().checked_div(n_channels).unwrap_or(0);
-            return Err(SignalError::Length { found, expected });
-        }
+        check_channel(signal, channel, n_channels, expected)?;
         let at = |sample: usize| sample * n_channels + channel;
         let last = expected - 1;
         let (first_level, last_level) = (signal[at(0)], signal[at(last)]);
@@ -87,6 +85,64 @@ impl ZeroPhase {
         }
         for k in 0..expected {
             signal[at(k)] = self.extended[self.padding + k];
+        }
+        Ok(())
+    }
+
+    /// Applies the transpose of [`ZeroPhase::apply`], for the analysis of laws that filter.
+    ///
+    /// The filter itself is symmetric; its ends are not, as each sample of the extension is made of
+    /// two samples of the signal.
+    ///
+    /// # Shapes
+    /// - as [`ZeroPhase::apply`]
+    /// # Errors
+    /// - [`SignalError::Length`] if the signal has another length.
+    pub fn apply_transposed(
+        &mut self,
+        signal: &mut [f64],
+        channel: usize,
+        n_channels: usize,
+    ) -> Result<(), SignalError> {
+        let expected = self.n_samples();
+        if n_channels == 0 || channel >= n_channels || signal.len() != expected * n_channels {
+            let found = signal.len().checked_div(n_channels).unwrap_or(0);
+            return Err(SignalError::Length { found, expected });
+        }
+        let at = |sample: usize| sample * n_channels + channel;
+        let (padding, last) = (self.padding, expected - 1);
+        self.extended.fill(0.0);
+        for k in 0..expected {
+            self.extended[padding + k] = signal[at(k)];
+        }
+        // A pass that starts settled on x[0] is `H x + (g - H 1) x[0]`: its transpose runs the other
+        // way from rest and puts what the constants took back on the first sample.
+        let gain: f64 = self.filter.sections().iter().map(super::Section::static_gain).product();
+        let before: f64 = self.extended.iter().sum();
+        self.filter.reset();
+        for value in &mut self.extended {
+            *value = self.filter.step(*value);
+        }
+        let after: f64 = self.extended.iter().sum();
+        if let Some(end) = self.extended.last_mut() {
+            *end += gain * before - after;
+        }
+        let before: f64 = self.extended.iter().sum();
+        self.filter.reset();
+        for value in self.extended.iter_mut().rev() {
+            *value = self.filter.step(*value);
+        }
+        let after: f64 = self.extended.iter().sum();
+        self.extended[0] += gain * before - after;
+        for k in 0..expected {
+            signal[at(k)] = self.extended[padding + k];
+        }
+        for i in 0..padding {
+            let (early, late) = (self.extended[i], self.extended[padding + expected + i]);
+            signal[at(0)] += 2.0 * early;
+            signal[at(padding - i)] -= early;
+            signal[at(last)] += 2.0 * late;
+            signal[at(last - 1 - i)] -= late;
         }
         Ok(())
     }
@@ -128,6 +184,20 @@ mod tests {
             assert!((pulse[k] - pulse[400 - k]).abs() < 1e-12);
         }
         assert!((pulse.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_transpose_has_the_same_inner_products() {
+        let wave = |step: i32| -> Vec<f64> {
+            (0..60).map(|k| f64::from((k * k * step) % 23) - 11.0).collect()
+        };
+        let (x, y) = (wave(3), wave(7));
+        let (mut forward, mut backward) = (x.clone(), y.clone());
+        filter(60).apply(&mut forward, 0, 1).unwrap();
+        filter(60).apply_transposed(&mut backward, 0, 1).unwrap();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (left, right) = (dot(&forward, &y), dot(&x, &backward));
+        assert!((left - right).abs() < 1e-10 * left.abs(), "{left} {right}");
     }
 
     #[test]

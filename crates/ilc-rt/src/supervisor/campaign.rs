@@ -8,6 +8,7 @@ use super::announce::Announcer;
 use super::collect::Collector;
 use super::disturbance::Disturbance;
 use super::error::SupervisorError;
+use super::experiment::Experiment;
 use super::learner::{Learner, expect};
 use super::pace::Pacer;
 use super::plan::Plan;
@@ -70,24 +71,62 @@ pub struct Outcome {
 pub fn run(
     cell: &Cell,
     options: &Options,
-    mut bus: Box<dyn Bus>,
+    bus: Box<dyn Bus>,
     law: Option<Box<dyn Law>>,
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, SupervisorError> {
     let mut plan = Plan::new(cell, options.measure, options.lockstep)?;
-    let (name, mut law) = match law {
+    let (name, law) = match law {
         Some(law) => ("user", Some(law)),
         None => (law_name(cell), plan.law(cell)?),
     };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), |law| law.describe());
     plan.name_law(cell, name, &parameters);
+    carry_out(cell, options, bus, Work { plan, law, input: None }, observe)
+}
+
+/// Excites one axis while all hold still, `options.iterations` times, and keeps what was measured; the
+/// records name the law `excitation`, with the experiment as its parameters.
+///
+/// # Errors
+/// [`SupervisorError`] before anything has moved, as for an experiment beyond the limits of its axis.
+pub fn identify(
+    cell: &Cell,
+    experiment: &Experiment,
+    options: &Options,
+    bus: Box<dyn Bus>,
+    observe: &mut dyn FnMut(&Event),
+) -> Result<Outcome, SupervisorError> {
+    let planned = experiment.plan(cell, options.measure, options.lockstep)?;
+    let work = Work { plan: planned.plan, law: None, input: Some(planned.input) };
+    carry_out(cell, options, bus, work, observe)
+}
+
+/// What a campaign shall do.
+struct Work {
+    plan: Plan,
+    law: Option<Box<dyn Law>>,
+    /// Input of the first run, if it is not to be zero.
+    input: Option<Vec<f64>>,
+}
+
+fn carry_out(
+    cell: &Cell,
+    options: &Options,
+    mut bus: Box<dyn Bus>,
+    work: Work,
+    observe: &mut dyn FnMut(&Event),
+) -> Result<Outcome, SupervisorError> {
+    let Work { mut plan, mut law, input } = work;
     if options.resume && !options.library.exists() {
         // Opening it would leave an empty file where a name was mistyped.
         let path = options.library.display();
         return Err(SupervisorError::Resume(format!("there is no library {path} to go on with")));
     }
     let library = Library::open(&options.library)?;
-    let mut progress = Progress::new(cell.learning.rollback_ratio);
+    // Without a law there is nothing to take back when a run is worse than another.
+    let rollback_ratio = if law.is_some() { cell.learning.rollback_ratio } else { f64::INFINITY };
+    let mut progress = Progress::new(rollback_ratio);
     let resumed = if options.resume {
         progress.resume(&library, &mut plan.meta, law.as_deref_mut(), &options.disturbance)?
     } else {
@@ -121,7 +160,7 @@ pub fn run(
 
     plan.servo.runs = first..options.iterations;
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&options.stop));
-    if let Some((input, update_ms)) = resumed.next {
+    if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next) {
         progress.send(&mut mail, input, update_ms);
     }
     let cycle = Cycle::new(bus, plan.servo.clone(), plan.interpolator.clone(), loop_side);

@@ -8,6 +8,7 @@ use crate::learning::LearningError;
 use crate::library::LibraryError;
 use crate::model::ModelError;
 use crate::trajectory::TrajectoryError;
+use crate::trajectory::program::GcodeError;
 
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
@@ -66,6 +67,38 @@ pub enum SupervisorError {
         /// Why.
         source: TrajectoryError,
     },
+    /// The part program cannot be read.
+    #[error("{file}: cannot be read: {reason}; allowed: a text file of G-code")]
+    PartProgramFile {
+        /// Part program.
+        file: String,
+        /// What the system said.
+        reason: String,
+    },
+    /// The part program is refused.
+    #[error("{file}: {source}")]
+    PartProgram {
+        /// Part program.
+        file: String,
+        /// Line, word, and what is allowed.
+        source: GcodeError,
+    },
+    /// The path leaves the range of an axis.
+    #[error(
+        "{file}: [program]: axis {axis} goes to {reached_m} m: it reaches {low_m} to {high_m} m"
+    )]
+    Range {
+        /// Cell description.
+        file: String,
+        /// Name of the axis.
+        axis: String,
+        /// The farthest position beyond the range.
+        reached_m: f64,
+        /// Smallest allowed.
+        low_m: f64,
+        /// Largest allowed.
+        high_m: f64,
+    },
     /// The model of an axis is unusable.
     #[error("{file}: [axis.model]: {source}")]
     Model {
@@ -73,6 +106,20 @@ pub enum SupervisorError {
         file: String,
         /// Why.
         source: ModelError,
+    },
+    /// An experiment that the axis must not be asked for, or that shows nothing.
+    #[error("{file}: axis {axis}: {what} = {value}; {allowed}")]
+    Experiment {
+        /// Cell description.
+        file: String,
+        /// Name of the axis.
+        axis: String,
+        /// What is refused.
+        what: String,
+        /// Its value.
+        value: String,
+        /// What would be allowed.
+        allowed: String,
     },
     /// The law refuses model or weights.
     #[error("{file}: [learning]: {source}")]

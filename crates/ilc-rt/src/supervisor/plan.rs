@@ -2,17 +2,17 @@
 
 use std::time::Duration;
 
-use serde_json::json;
-
 use super::error::SupervisorError;
-use crate::config::{Axis, Cell, ConfigError, Corner, Interface, LawName, Measure};
+use super::forecast;
+use crate::config::{Axis, Cell, ConfigError, Interface, LawName, Measure};
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
 use crate::fieldbus::load;
 use crate::learning::Law;
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
-use crate::learning::law::pd::{Pd, PdGains, QFilter};
+use crate::learning::law::pd::{Pd, PdGains};
+use crate::learning::law::q_filter::QFilter;
 use crate::model::{
     Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
 };
@@ -20,7 +20,7 @@ use crate::record::{Meta, fingerprint};
 use crate::rt::Nanos;
 use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
 use crate::signal::butterworth;
-use crate::trajectory::{AxisLimits, CornerRule, Interpolator, PathSegment, PathSpec};
+use crate::trajectory::{AxisLimits, Interpolator};
 
 /// How long drives may take to be switched on.
 const ENABLE_S: f64 = 3.0;
@@ -53,21 +53,29 @@ impl Plan {
         measure: Option<Measure>,
         lockstep: bool,
     ) -> Result<Self, SupervisorError> {
+        crate::config::check(cell)?;
+        let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
+        let interpolator = super::program::interpolator(cell, &limits)?;
+        let reference_m = interpolator.reference();
+        super::program::check_range(cell, &reference_m)?;
+        let program = super::program::program_json(cell, &reference_m);
+        Self::with(cell, measure, lockstep, interpolator, program)
+    }
+
+    /// Works a cell description out with other set points than those of its program; `program` says
+    /// which, as JSON.
+    pub(super) fn with(
+        cell: &Cell,
+        measure: Option<Measure>,
+        lockstep: bool,
+        interpolator: Interpolator,
+        program: String,
+    ) -> Result<Self, SupervisorError> {
         let file = cell.file.display().to_string();
         let mut cell = cell.clone();
         cell.learning.measure = measure.unwrap_or(cell.learning.measure);
         crate::config::check(&cell)?;
-        let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
-        let interpolator =
-            Interpolator::plan(&path(&cell), &limits, cell.cycle_s()).map_err(|source| {
-                let key = match source.axis().and_then(|i| Some((i, cell.axes.get(i)?))) {
-                    Some((i, axis)) => format!("[program] (axis {} is {})", i + 1, axis.name),
-                    None => "[program]".to_owned(),
-                };
-                SupervisorError::Program { file: file.clone(), key, source }
-            })?;
-        let bus_load = bus_load(&cell)
-            .map_err(|source| SupervisorError::Load { file: file.clone(), source })?;
+        let bus_load = bus_load(&cell).map_err(|source| SupervisorError::Load { file, source })?;
         let reference_m = interpolator.reference();
         Ok(Self {
             servo: servo_spec(&cell, lockstep)?,
@@ -84,7 +92,7 @@ impl Plan {
                     Measure::Encoder => "encoder".to_owned(),
                     Measure::Tcp => "tcp".to_owned(),
                 },
-                program: program_json(&cell),
+                program,
                 cycle_s: cell.cycle_s(),
                 n_axes: cell.n_axes(),
                 axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
@@ -101,9 +109,21 @@ impl Plan {
 
     /// Makes the law that the cell names; `None` if it shall not learn.
     ///
+    /// A law that will not converge with the cell's own model is refused, unless the cell says
+    /// `allow_divergent`.
+    ///
     /// # Errors
-    /// [`SupervisorError::Model`] or [`SupervisorError::Learning`] if model or weights are unusable.
+    /// [`SupervisorError::Model`] or [`SupervisorError::Learning`] if model or weights are unusable, or
+    /// the law will not converge.
     pub fn law(&self, cell: &Cell) -> Result<Option<Box<dyn Law>>, SupervisorError> {
+        let mut law = self.named_law(cell)?;
+        if let Some(law) = &mut law {
+            forecast::refuse(law.as_mut(), cell, self.n_samples())?;
+        }
+        Ok(law)
+    }
+
+    fn named_law(&self, cell: &Cell) -> Result<Option<Box<dyn Law>>, SupervisorError> {
         let file = || cell.file.display().to_string();
         let n_samples = self.n_samples();
         let refused = |source| SupervisorError::Learning { file: file(), source };
@@ -157,7 +177,7 @@ impl Plan {
 }
 
 /// The model that learning uses: the axes' closed loops side by side.
-fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
+pub(super) fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
     let mut models = cell.axes.iter().map(|axis| axis_model(axis, cell.cycle_s()));
     let first =
         models.next().unwrap_or_else(|| StateSpace::static_gain(nalgebra::dmatrix![1.0], None))?;
@@ -197,54 +217,11 @@ fn axis_limits(axis: &Axis) -> AxisLimits {
     }
 }
 
-fn input_unit(axis: &Axis) -> &'static str {
+pub(super) fn input_unit(axis: &Axis) -> &'static str {
     match axis.interface {
         Interface::Csp => "m",
         Interface::Csv => "m/s",
     }
-}
-
-fn path(cell: &Cell) -> PathSpec {
-    let program = &cell.program;
-    PathSpec {
-        start_m: program.start_m.clone(),
-        segments: program
-            .segments
-            .iter()
-            .map(|segment| PathSegment {
-                to_m: segment.to_m.clone(),
-                feed_m_s: segment.feed_m_s.unwrap_or(program.feed_m_s),
-            })
-            .collect(),
-        corner: match program.corner {
-            Corner::ExactStop => CornerRule::ExactStop,
-            Corner::Blend => CornerRule::Blend { window_s: program.blend_s },
-        },
-        dwell_before_s: program.dwell_before_s,
-        dwell_after_s: program.dwell_after_s,
-    }
-}
-
-fn program_json(cell: &Cell) -> String {
-    let program = &cell.program;
-    let segments: Vec<_> = program
-        .segments
-        .iter()
-        .map(|s| json!({ "to_m": s.to_m, "feed_m_s": s.feed_m_s.unwrap_or(program.feed_m_s) }))
-        .collect();
-    let corner = match program.corner {
-        Corner::ExactStop => json!("exact_stop"),
-        Corner::Blend => json!({ "blend_s": program.blend_s }),
-    };
-    json!({
-        "start_m": program.start_m,
-        "segments": segments,
-        "corner": corner,
-        "dwell_before_s": program.dwell_before_s,
-        "dwell_after_s": program.dwell_after_s,
-        "settle_s": program.settle_s,
-    })
-    .to_string()
 }
 
 /// Cyclic frames: a command and two answers a drive, one answer of the tool, SYNC, and room for one

@@ -7,7 +7,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::MAX_AXES;
-use super::limits::Line;
+use super::element::Element;
 use super::path::PathSpec;
 use super::setpoint::Setpoint;
 
@@ -17,7 +17,7 @@ const UNITS_PER_M: f64 = 1_125_899_906_842_624.0;
 /// A segment at constant speed.
 #[derive(Clone, Debug)]
 struct Leg {
-    line: Line,
+    element: Element,
     feed_m_s: f64,
     start_s: f64,
     end_s: f64,
@@ -73,18 +73,18 @@ impl Blend {
     /// Lays the lines out in time and sizes the filters. Cold.
     pub(super) fn plan(
         spec: &PathSpec,
-        lines: &[Line],
+        elements: &[Element],
         cycle_s: f64,
         (window, rounding): (usize, usize),
     ) -> Self {
         let mut start_s = spec.dwell_before_s;
-        let mut leg = |(line, segment): (&Line, &super::path::PathSegment)| {
-            let end_s = start_s + line.length_m / segment.feed_m_s;
-            let leg = Leg { line: *line, feed_m_s: segment.feed_m_s, start_s, end_s };
-            start_s = end_s;
+        let mut leg = |(element, segment): (&Element, &super::path::PathSegment)| {
+            let end_s = start_s + element.length_m() / segment.feed_m_s;
+            let leg = Leg { element: *element, feed_m_s: segment.feed_m_s, start_s, end_s };
+            start_s = end_s + segment.dwell_s;
             leg
         };
-        let legs = lines.iter().zip(&spec.segments).map(&mut leg).collect();
+        let legs = elements.iter().zip(&spec.segments).map(&mut leg).collect();
         let pair = (MovingSum::filled(window, 0), MovingSum::filled(rounding, 0));
         let mut plan = Self {
             legs,
@@ -113,7 +113,7 @@ impl Blend {
     pub(super) fn restart(&mut self) {
         self.current = 0;
         self.ticks_ahead = 0;
-        let start_m = self.legs.first().map_or([0.0; MAX_AXES], |leg| leg.line.from_m);
+        let start_m = self.legs.first().map_or([0.0; MAX_AXES], |leg| leg.element.start_m());
         let window = self.filters.first().map_or(1, |(window, _)| window.ring.len()) as i128;
         for ((averaged, rounded), position_m) in self.filters.iter_mut().zip(start_m) {
             averaged.fill(units(position_m));
@@ -165,9 +165,9 @@ impl Blend {
         }
         let Some(leg) = self.legs.get(self.current) else { return [0.0; MAX_AXES] };
         if t_s >= leg.end_s {
-            leg.line.to_m
+            leg.element.end_m()
         } else {
-            leg.line.point_m(leg.feed_m_s * (t_s - leg.start_s).max(0.0))
+            leg.element.point_m(leg.feed_m_s * (t_s - leg.start_s).max(0.0))
         }
     }
 }

@@ -122,13 +122,114 @@ pub enum TrajectoryError {
         /// Which segment.
         segment: usize,
     },
+    /// An arc is not in the plane of two of the axes.
+    #[error("segment {}: an arc in the plane of axes {} and {}: must be two of the path's own", segment + 1, plane[0] + 1, plane[1] + 1)]
+    Plane {
+        /// Which segment.
+        segment: usize,
+        /// The two axes, from 0.
+        plane: [usize; 2],
+    },
+    /// The ends of an arc are not equally far from its centre.
+    #[error(
+        "segment {}: an arc that starts {} m from its centre and ends {} m from it: must be equal to \
+         a thousandth, finite and above 0", segment + 1, Figure(*from_radius_m), Figure(*to_radius_m)
+    )]
+    Arc {
+        /// Which segment.
+        segment: usize,
+        /// Distance of the start.
+        from_radius_m: f64,
+        /// Distance of the end.
+        to_radius_m: f64,
+    },
+    /// An arc where only lines can be.
+    #[error("segment {}: an arc: only straight segments are interpolated in this way", segment + 1)]
+    NotStraight {
+        /// Which segment.
+        segment: usize,
+    },
+    /// Amplitude or frequency of an oscillation is not usable.
+    #[error("segment {}: {name} {value} {unit}", segment + 1)]
+    Oscillation {
+        /// Which segment.
+        segment: usize,
+        /// `amplitude` or `frequency`.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// Unit, and what is allowed.
+        unit: &'static str,
+    },
+    /// No α holds the limits.
+    #[error(
+        "segment {} {place}: no alpha holds every limit: at alpha {} the {quantity} along the path \
+         reaches {} {unit}, limit {} {unit}; lower the feed or the oscillation",
+        segment + 1, Figure(*alpha), Figure(*reached), Figure(*limit), unit = quantity.unit()
+    )]
+    Alpha {
+        /// Which segment.
+        segment: usize,
+        /// `start-up`, `transition` or `end`.
+        place: &'static str,
+        /// The α that comes nearest.
+        alpha: f64,
+        /// The limit that it breaks most.
+        quantity: Quantity,
+        /// What is reached there.
+        reached: f64,
+        /// The limit along the path.
+        limit: f64,
+    },
+    /// A leg is over before its ends can be.
+    #[error(
+        "segment {}: lasts {} s at its feed, and its oscillation has to be 0 for {} s of that near \
+         the corners: lower the amplitude, or make the segment longer",
+        segment + 1, Figure(*lasts_s), Figure(*needs_s)
+    )]
+    Hurried {
+        /// Which segment.
+        segment: usize,
+        /// How long it lasts.
+        lasts_s: f64,
+        /// What both ends need.
+        needs_s: f64,
+    },
+    /// A parameter of a shape is not usable.
+    #[error("{name} = {value}: allowed {allowed}")]
+    Shape {
+        /// Name of the parameter.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// A curve has a point at which its direction is not defined.
+    #[error("the curve stands still or has a corner at {} m from its start: two points may not be the same", Figure(*at_m))]
+    Cusp {
+        /// Where.
+        at_m: f64,
+    },
+    /// No speed was found at which a curve holds the limits.
+    #[error("axis {}: {quantity} is {} times its limit on the curve after {rounds} attempts to slow down: raise the limit or smooth the curve", axis + 1, Figure(*ratio))]
+    Unproven {
+        /// Which axis.
+        axis: usize,
+        /// Which limit.
+        quantity: Quantity,
+        /// Reached over allowed.
+        ratio: f64,
+        /// Attempts made.
+        rounds: usize,
+    },
     /// There is no segment.
     #[error("a path of 0 segments: at least 1 is needed")]
     Empty,
     /// The cycle, a dwell or the blend window is not in its range.
     #[error("{name} {value_s} s: allowed {low_s} to {high_s} s")]
     Time {
-        /// `cycle`, `dwell before`, `dwell after` or `blend window`.
+        /// `cycle`, `sample time`, `dwell`, `dwell before`, `dwell after` or `blend window`.
         name: &'static str,
         /// The value given.
         value_s: f64,
@@ -179,6 +280,7 @@ impl TrajectoryError {
         match *self {
             Self::AxisLimit { axis, .. }
             | Self::Position { axis, .. }
+            | Self::Unproven { axis, .. }
             | Self::Exceeds { axis, .. } => Some(axis),
             _ => None,
         }

@@ -6,8 +6,9 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::MAX_AXES;
+use super::element::Element;
 use super::error::TrajectoryError;
-use super::limits::{AxisLimits, Line, PathLimits};
+use super::limits::AxisLimits;
 use super::path::PathSpec;
 use super::profile::JerkLimited;
 use super::setpoint::Setpoint;
@@ -15,7 +16,7 @@ use super::setpoint::Setpoint;
 /// One segment: its line, its profile, and when it starts.
 #[derive(Clone, Debug)]
 struct Move {
-    line: Line,
+    element: Element,
     profile: JerkLimited,
     start_s: f64,
     end_s: f64,
@@ -32,19 +33,19 @@ impl ExactStop {
     /// Plans one move a segment. Cold.
     pub(super) fn plan(
         spec: &PathSpec,
-        lines: &[Line],
+        elements: &[Element],
         limits: &[AxisLimits],
     ) -> Result<Self, TrajectoryError> {
         let mut start_s = spec.dwell_before_s;
-        let mut plan_move = |(line, segment): (&Line, &super::path::PathSegment)| {
-            let along = PathLimits::along(&line.direction, limits, segment.feed_m_s);
-            let profile = JerkLimited::along(line.length_m, &along)?;
+        let mut plan_move = |(element, segment): (&Element, &super::path::PathSegment)| {
+            let along = element.limits(limits, segment.feed_m_s);
+            let profile = JerkLimited::along(element.length_m(), &along)?;
             let end_s = start_s + profile.duration_s();
-            let planned = Move { line: *line, profile, start_s, end_s };
-            start_s = end_s;
+            let planned = Move { element: *element, profile, start_s, end_s };
+            start_s = end_s + segment.dwell_s;
             Ok(planned)
         };
-        let moves = lines
+        let moves = elements
             .iter()
             .zip(&spec.segments)
             .map(&mut plan_move)
@@ -71,12 +72,12 @@ impl ExactStop {
             return Setpoint::at_rest([0.0; MAX_AXES]);
         };
         if t_s >= now.end_s {
-            return Setpoint::at_rest(now.line.to_m);
+            return Setpoint::at_rest(now.element.end_m());
         }
         let state = now.profile.at(t_s - now.start_s);
         Setpoint {
-            position_m: now.line.point_m(state.s_m),
-            velocity_m_s: now.line.along(state.v_m_s),
+            position_m: now.element.point_m(state.s_m),
+            velocity_m_s: now.element.along(state.s_m, state.v_m_s),
             done: false,
         }
     }

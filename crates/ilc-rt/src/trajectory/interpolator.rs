@@ -2,19 +2,24 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use super::MAX_AXES;
 use super::blend::Blend;
 use super::error::TrajectoryError;
 use super::exact_stop::ExactStop;
 use super::limits::AxisLimits;
-use super::path::{CornerRule, PathSpec};
+use super::motion::SampledMotion;
+use super::path::{self, CornerRule, DWELL_MAX_S, PathSpec, check_time};
 use super::proof::{self, Proof};
 use super::setpoint::Setpoint;
+use super::table::Table;
 
 /// How the corners of this run are taken.
 #[derive(Clone, Debug)]
 enum Motion {
     ExactStop(ExactStop),
     Blend(Blend),
+    Hold(Setpoint),
+    Table(Table),
 }
 
 /// A planned run: rest, path, rest.
@@ -47,21 +52,71 @@ impl Interpolator {
         limits: &[AxisLimits],
         cycle_s: f64,
     ) -> Result<Self, TrajectoryError> {
-        let lines = spec.lines(limits, cycle_s)?;
+        let elements = spec.elements(limits, cycle_s)?;
         let (motion, rest_tick) = match spec.corner {
             CornerRule::ExactStop => {
-                let moves = ExactStop::plan(spec, &lines, limits)?;
+                let moves = ExactStop::plan(spec, &elements, limits)?;
                 let rest_tick = proof::n_ticks_after(moves.end_s(), cycle_s)?;
                 (Motion::ExactStop(moves), rest_tick)
             }
             CornerRule::Blend { window_s } => {
                 let (blend, rest_tick) =
-                    Proof { spec, lines: &lines, limits, cycle_s }.plan(window_s)?;
+                    Proof { spec, elements: &elements, limits, cycle_s }.plan(window_s)?;
                 (Motion::Blend(blend), rest_tick)
             }
         };
         let n_samples = rest_tick + proof::n_ticks(spec.dwell_after_s, cycle_s)? + 1;
         Ok(Self { motion, n_axes: spec.start_m.len(), cycle_s, n_samples, tick: 0 })
+    }
+
+    /// Rests at a point for some samples, as while an axis is identified.
+    ///
+    /// # Shapes
+    /// - `at_m`: one coordinate for each axis, 1 to 6
+    /// # Real Time
+    /// Cold.
+    /// # Errors
+    /// [`TrajectoryError`] for another number of axes, a point or cycle out of range, or no samples.
+    pub fn hold(at_m: &[f64], n_samples: usize, cycle_s: f64) -> Result<Self, TrajectoryError> {
+        let n_axes = at_m.len();
+        if !(1..=MAX_AXES).contains(&n_axes) {
+            return Err(TrajectoryError::Axes { n_axes });
+        }
+        check_time("cycle", cycle_s, path::CYCLE_S)?;
+        if n_samples == 0 {
+            return Err(TrajectoryError::Empty);
+        }
+        let setpoint = Setpoint::at_rest(path::point(at_m)?);
+        Ok(Self { motion: Motion::Hold(setpoint), n_axes, cycle_s, n_samples, tick: 0 })
+    }
+
+    /// Plays a motion that was worked out beforehand, from rest to rest, with rests around it.
+    ///
+    /// # Real Time
+    /// Cold: copies the motion.
+    /// # Errors
+    /// [`TrajectoryError`] for a rest out of range, a motion of no samples, or too many.
+    pub fn play(
+        motion: &SampledMotion,
+        dwell_before_s: f64,
+        dwell_after_s: f64,
+    ) -> Result<Self, TrajectoryError> {
+        check_time("dwell before", dwell_before_s, (0.0, DWELL_MAX_S))?;
+        check_time("dwell after", dwell_after_s, (0.0, DWELL_MAX_S))?;
+        if motion.n_samples() == 0 {
+            return Err(TrajectoryError::Empty);
+        }
+        let cycle_s = motion.dt_s;
+        let table = Table::new(motion, proof::n_ticks(dwell_before_s, cycle_s)?);
+        let n_samples = table.rest_tick() + proof::n_ticks(dwell_after_s, cycle_s)? + 1;
+        let motion = Self {
+            motion: Motion::Table(table),
+            n_axes: motion.n_axes,
+            cycle_s,
+            n_samples,
+            tick: 0,
+        };
+        Ok(motion)
     }
 
     /// Goes back to the first set point.
@@ -73,6 +128,7 @@ impl Interpolator {
         match &mut self.motion {
             Motion::ExactStop(moves) => moves.restart(),
             Motion::Blend(blend) => blend.restart(),
+            Motion::Hold(_) | Motion::Table(_) => {}
         }
     }
 
@@ -90,6 +146,8 @@ impl Interpolator {
         let setpoint = match &mut self.motion {
             Motion::ExactStop(moves) => moves.at(self.tick as f64 * self.cycle_s),
             Motion::Blend(blend) => blend.next(),
+            Motion::Hold(setpoint) => *setpoint,
+            Motion::Table(table) => table.at(self.tick),
         };
         if !done {
             self.tick += 1;

@@ -1,23 +1,47 @@
-//! What a run shall do: a path of straight segments, how corners are taken, and rests. Cold.
+//! What a run shall do: a path of lines and arcs, how corners are taken, and rests. Cold.
 
 use super::MAX_AXES;
+use super::arc::Arc;
+use super::element::Element;
 use super::error::TrajectoryError;
 use super::limits::{AxisLimits, Line, is_positive};
 
 /// Farthest position of a plan; the blend's fixed-point numbers hold it with room to spare.
 const POSITION_MAX_M: f64 = 4096.0;
 /// Servo cycles that a plan accepts.
-const CYCLE_S: (f64, f64) = (1e-5, 1.0);
+pub(super) const CYCLE_S: (f64, f64) = (1e-5, 1.0);
 /// Longest rest before or after the motion.
-const DWELL_MAX_S: f64 = 3600.0;
+pub(super) const DWELL_MAX_S: f64 = 3600.0;
 
-/// A straight move.
+/// A move along a line or an arc.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathSegment {
     /// End point, one coordinate an axis.
     pub to_m: Vec<f64>,
     /// Speed along the segment.
     pub feed_m_s: f64,
+    /// What makes it an arc; none for a line.
+    pub arc: Option<ArcSpec>,
+    /// Rest at its end.
+    pub dwell_s: f64,
+}
+
+impl PathSegment {
+    /// A straight move without rest.
+    pub fn line(to_m: Vec<f64>, feed_m_s: f64) -> Self {
+        Self { to_m, feed_m_s, arc: None, dwell_s: 0.0 }
+    }
+}
+
+/// An arc in the plane of two axes; the others go along in proportion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArcSpec {
+    /// The two axes; anticlockwise is from the first to the second.
+    pub plane: [usize; 2],
+    /// Centre, in the two axes.
+    pub center_m: [f64; 2],
+    /// Which way round.
+    pub clockwise: bool,
 }
 
 /// How corners are taken.
@@ -37,7 +61,7 @@ pub enum CornerRule {
 pub struct PathSpec {
     /// Start, one coordinate an axis.
     pub start_m: Vec<f64>,
-    /// Straight moves in order.
+    /// Moves in order.
     pub segments: Vec<PathSegment>,
     /// How corners are taken.
     pub corner: CornerRule,
@@ -48,52 +72,22 @@ pub struct PathSpec {
 }
 
 impl PathSpec {
-    /// Checks every value, and gives each segment as a line.
+    /// Checks every value, and gives each segment as an element.
     ///
     /// # Errors
     /// [`TrajectoryError`] for the first value that is out of its range.
-    pub(super) fn lines(
+    pub(super) fn elements(
         &self,
         limits: &[AxisLimits],
         cycle_s: f64,
-    ) -> Result<Vec<Line>, TrajectoryError> {
-        let n_axes = self.start_m.len();
-        if !(1..=MAX_AXES).contains(&n_axes) {
-            return Err(TrajectoryError::Axes { n_axes });
-        }
-        if limits.len() != n_axes {
-            return Err(TrajectoryError::LimitCount { found: limits.len(), expected: n_axes });
-        }
-        for (axis, limit) in limits.iter().enumerate() {
-            limit.check(axis)?;
-        }
+    ) -> Result<Vec<Element>, TrajectoryError> {
         check_time("cycle", cycle_s, CYCLE_S)?;
         check_time("dwell before", self.dwell_before_s, (0.0, DWELL_MAX_S))?;
         check_time("dwell after", self.dwell_after_s, (0.0, DWELL_MAX_S))?;
-        if self.segments.is_empty() {
-            return Err(TrajectoryError::Empty);
+        for segment in &self.segments {
+            check_time("dwell", segment.dwell_s, (0.0, DWELL_MAX_S))?;
         }
-        let mut from_m = point(&self.start_m)?;
-        let mut lines = Vec::with_capacity(self.segments.len());
-        for (index, segment) in self.segments.iter().enumerate() {
-            if segment.to_m.len() != n_axes {
-                return Err(TrajectoryError::Coordinates {
-                    segment: index,
-                    found: segment.to_m.len(),
-                    expected: n_axes,
-                });
-            }
-            if !is_positive(segment.feed_m_s) {
-                return Err(TrajectoryError::Feed { segment: index, feed_m_s: segment.feed_m_s });
-            }
-            let line = Line::new(from_m, point(&segment.to_m)?);
-            if line.length_m == 0.0 {
-                return Err(TrajectoryError::ZeroLength { segment: index });
-            }
-            from_m = line.to_m;
-            lines.push(line);
-        }
-        Ok(lines)
+        checked_elements(&self.start_m, &self.segments, limits)
     }
 
     /// The same path with every feed times `factor`.
@@ -111,6 +105,86 @@ impl PathSpec {
     }
 }
 
+/// Checks points, feeds and limits, and gives each segment as an element.
+fn checked_elements(
+    start_m: &[f64],
+    segments: &[PathSegment],
+    limits: &[AxisLimits],
+) -> Result<Vec<Element>, TrajectoryError> {
+    check_limits(start_m.len(), limits)?;
+    if segments.is_empty() {
+        return Err(TrajectoryError::Empty);
+    }
+    let mut from_m = point(start_m)?;
+    let mut elements = Vec::with_capacity(segments.len());
+    for (index, segment) in segments.iter().enumerate() {
+        if segment.to_m.len() != start_m.len() {
+            return Err(TrajectoryError::Coordinates {
+                segment: index,
+                found: segment.to_m.len(),
+                expected: start_m.len(),
+            });
+        }
+        if !is_positive(segment.feed_m_s) {
+            return Err(TrajectoryError::Feed { segment: index, feed_m_s: segment.feed_m_s });
+        }
+        let to_m = point(&segment.to_m)?;
+        let element = match segment.arc {
+            None => Element::Line(Line::new(from_m, to_m)),
+            Some(ArcSpec { plane, center_m, clockwise }) => {
+                let [p, q] = plane;
+                if p == q || p.max(q) >= start_m.len() {
+                    return Err(TrajectoryError::Plane { segment: index, plane });
+                }
+                Element::Arc(Arc::new(from_m, to_m, plane, center_m, clockwise).ok_or_else(
+                    || TrajectoryError::Arc {
+                        segment: index,
+                        from_radius_m: (from_m[p] - center_m[0]).hypot(from_m[q] - center_m[1]),
+                        to_radius_m: (to_m[p] - center_m[0]).hypot(to_m[q] - center_m[1]),
+                    },
+                )?)
+            }
+        };
+        if element.length_m() == 0.0 {
+            return Err(TrajectoryError::ZeroLength { segment: index });
+        }
+        from_m = to_m;
+        elements.push(element);
+    }
+    Ok(elements)
+}
+
+/// As [`checked_elements`], for segments without arcs.
+pub(super) fn checked_lines(
+    start_m: &[f64],
+    segments: &[PathSegment],
+    limits: &[AxisLimits],
+) -> Result<Vec<Line>, TrajectoryError> {
+    let elements = checked_elements(start_m, segments, limits)?;
+    elements
+        .into_iter()
+        .enumerate()
+        .map(|(segment, element)| match element {
+            Element::Line(line) => Ok(line),
+            Element::Arc(_) => Err(TrajectoryError::NotStraight { segment }),
+        })
+        .collect()
+}
+
+/// Refuses a number of axes or limits that cannot be, and limits that are not positive.
+pub(super) fn check_limits(n_axes: usize, limits: &[AxisLimits]) -> Result<(), TrajectoryError> {
+    if !(1..=MAX_AXES).contains(&n_axes) {
+        return Err(TrajectoryError::Axes { n_axes });
+    }
+    if limits.len() != n_axes {
+        return Err(TrajectoryError::LimitCount { found: limits.len(), expected: n_axes });
+    }
+    for (axis, limit) in limits.iter().enumerate() {
+        limit.check(axis)?;
+    }
+    Ok(())
+}
+
 /// Refuses a time that is not finite or not in its range.
 pub(super) fn check_time(
     name: &'static str,
@@ -125,7 +199,7 @@ pub(super) fn check_time(
 }
 
 /// A point in the array of the tick; unused axes are 0.
-fn point(coordinates_m: &[f64]) -> Result<[f64; MAX_AXES], TrajectoryError> {
+pub(super) fn point(coordinates_m: &[f64]) -> Result<[f64; MAX_AXES], TrajectoryError> {
     let mut point_m = [0.0; MAX_AXES];
     for (axis, (to, &position_m)) in point_m.iter_mut().zip(coordinates_m).enumerate() {
         if !(-POSITION_MAX_M..=POSITION_MAX_M).contains(&position_m) {

@@ -5,8 +5,9 @@
 
 use super::MAX_AXES;
 use super::blend::Blend;
+use super::element::Element;
 use super::error::{Quantity, TrajectoryError};
-use super::limits::{AxisLimits, Line, PathLimits};
+use super::limits::AxisLimits;
 use super::path::{PathSpec, check_time};
 
 /// Most samples of one run.
@@ -30,7 +31,7 @@ struct Excess {
 /// A path with the things that its proof needs.
 pub(super) struct Proof<'a> {
     pub(super) spec: &'a PathSpec,
-    pub(super) lines: &'a [Line],
+    pub(super) elements: &'a [Element],
     pub(super) limits: &'a [AxisLimits],
     pub(super) cycle_s: f64,
 }
@@ -61,7 +62,7 @@ impl Proof<'_> {
 
     /// The plan for a pair of windows, and the tick at which it is at rest at its end.
     fn candidate(&self, window: usize, rounding: usize) -> Result<(Blend, usize), TrajectoryError> {
-        let blend = Blend::plan(self.spec, self.lines, self.cycle_s, (window, rounding));
+        let blend = Blend::plan(self.spec, self.elements, self.cycle_s, (window, rounding));
         let rest_tick = n_ticks_after(blend.end_s(), self.cycle_s)? + blend.ticks_late();
         Ok((blend, rest_tick))
     }
@@ -136,8 +137,8 @@ impl Proof<'_> {
     /// A longer window that holds every limit; none up to the longest one allowed, and none if a
     /// segment by itself is too fast for an axis, as averaging does not slow a straight line down.
     fn window_ticks(&self, window: usize, ratio: f64) -> Option<usize> {
-        for (line, segment) in self.lines.iter().zip(&self.spec.segments) {
-            let path = PathLimits::along(&line.direction, self.limits, segment.feed_m_s);
+        for (element, segment) in self.elements.iter().zip(&self.spec.segments) {
+            let path = element.limits(self.limits, segment.feed_m_s);
             if path.velocity_m_s < segment.feed_m_s * (1.0 - TOLERANCE) {
                 return None;
             }

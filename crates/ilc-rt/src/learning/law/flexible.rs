@@ -226,7 +226,8 @@ impl fmt::Debug for Flexible {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learning::law::pd::{Pd, PdGains, QFilter};
+    use crate::learning::law::pd::{Pd, PdGains};
+    use crate::learning::law::q_filter::QFilter;
 
     /// The core proposes `u + e`.
     fn law(n_disturbances: usize, tolerance: f64) -> Flexible {

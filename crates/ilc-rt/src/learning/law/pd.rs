@@ -1,8 +1,8 @@
 //! Proportional-derivative learning with a low-pass filter.
 
-use crate::learning::error::check;
-use crate::learning::{Law, LearningError};
-use crate::signal::{Section, SosFilter, ZeroPhase};
+use super::q_filter::{QFilter, QRunner};
+use crate::learning::error::{check, check_counts, check_place};
+use crate::learning::{Law, LearningError, Structure};
 
 /// The numbers of a [`Pd`] law.
 ///
@@ -16,24 +16,6 @@ pub struct PdGains {
     pub kd: f64,
     /// How many samples ahead the error is taken: the relative degree of the axis, 1 without delay.
     pub lead: usize,
-}
-
-/// The filter through which the next input passes.
-#[derive(Debug, Clone, PartialEq)]
-pub enum QFilter {
-    /// None: the law converges only where the model allows it.
-    None,
-    /// Forward and backward: no lag.
-    ZeroPhase(Vec<Section>),
-    /// Forward only: lags, shown for comparison.
-    Causal(Vec<Section>),
-}
-
-#[derive(Debug)]
-enum Runner {
-    None,
-    ZeroPhase(ZeroPhase),
-    Causal(SosFilter),
 }
 
 /// Proportional-derivative learning, each channel by itself.
@@ -55,7 +37,7 @@ pub struct Pd {
     n_samples: usize,
     n_channels: usize,
     q_filter: QFilter,
-    runner: Runner,
+    runner: QRunner,
 }
 
 impl Pd {
@@ -64,7 +46,7 @@ impl Pd {
     /// # Errors
     /// - [`LearningError::Parameter`] for a gain that is not finite.
     /// - [`LearningError::Empty`] for no samples or no channels.
-    /// - [`LearningError::Signal`] if the run is too short for the zero-phase filter.
+    /// - [`LearningError::Signal`] if the run is too short for the filter.
     pub fn new(
         gains: PdGains,
         n_samples: usize,
@@ -77,18 +59,8 @@ impl Pd {
                 return Err(LearningError::Parameter { what, value, allowed });
             }
         }
-        for (what, count) in [("n_samples", n_samples), ("n_channels", n_channels)] {
-            if count == 0 {
-                return Err(LearningError::Empty { what });
-            }
-        }
-        let runner = match &q_filter {
-            QFilter::None => Runner::None,
-            QFilter::ZeroPhase(sections) => {
-                Runner::ZeroPhase(ZeroPhase::new(sections.clone(), n_samples)?)
-            }
-            QFilter::Causal(sections) => Runner::Causal(SosFilter::new(sections.clone())),
-        };
+        check_counts(&[("n_samples", n_samples), ("n_channels", n_channels)])?;
+        let runner = q_filter.for_samples(n_samples)?;
         Ok(Self { gains, n_samples, n_channels, q_filter, runner })
     }
 }
@@ -103,10 +75,7 @@ impl Law for Pd {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
         check("input", input, n_samples, n_channels)?;
         check("error", error, n_samples, n_channels)?;
-        if next.len() != input.len() {
-            let found = next.len();
-            return Err(LearningError::Length { what: "next", found, n_samples, n_channels });
-        }
+        check_place(next, n_samples, n_channels)?;
         let PdGains { kp, kd, lead } = self.gains;
         let last = n_samples - 1;
         for channel in 0..n_channels {
@@ -116,35 +85,54 @@ impl Law for Pd {
                 let before = error[at(k.saturating_add(lead).saturating_sub(1))];
                 next[at(k)] = input[at(k)] + kp * ahead + kd * (ahead - before);
             }
-            match &mut self.runner {
-                Runner::None => {}
-                Runner::ZeroPhase(filter) => filter.apply(next, channel, n_channels)?,
-                Runner::Causal(filter) => {
-                    filter.reset();
-                    for k in 0..n_samples {
-                        next[at(k)] = filter.step(next[at(k)]);
-                    }
-                }
-            }
         }
+        self.runner.apply(next, n_channels)?;
         check("next", next, n_samples, n_channels)
     }
 
-    fn reset(&mut self) {
-        if let Runner::Causal(filter) = &mut self.runner {
-            filter.reset();
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let (n_samples, n_channels) = (self.n_samples, self.n_channels);
+        for (what, signal) in [("dual", dual), ("to_input", &*to_input), ("to_error", &*to_error)] {
+            check(what, signal, n_samples, n_channels)?;
         }
+        to_input.copy_from_slice(dual);
+        to_error.fill(0.0);
+        if !self.runner.apply_transposed(to_input, n_channels)? {
+            return Ok(false);
+        }
+        let PdGains { kp, kd, lead } = self.gains;
+        let last = n_samples - 1;
+        for channel in 0..n_channels {
+            let at = |sample: usize| sample.min(last) * n_channels + channel;
+            for k in 0..n_samples {
+                let value = to_input[at(k)];
+                to_error[at(k.saturating_add(lead))] += (kp + kd) * value;
+                to_error[at(k.saturating_add(lead).saturating_sub(1))] -= kd * value;
+            }
+        }
+        Ok(true)
     }
 
+    fn structure(&self) -> Structure<'_> {
+        Structure::Pd(self.gains)
+    }
+
+    fn reset(&mut self) {}
+
     fn describe(&self) -> String {
-        let (filter, n_sections) = match &self.q_filter {
-            QFilter::None => ("none", 0),
-            QFilter::ZeroPhase(sections) => ("zero_phase", sections.len()),
-            QFilter::Causal(sections) => ("causal", sections.len()),
-        };
         format!(
-            r#"{{"law":"pd","kp":{},"kd":{},"lead":{},"q_filter":"{filter}","q_sections":{n_sections},"n_samples":{},"n_channels":{}}}"#,
-            self.gains.kp, self.gains.kd, self.gains.lead, self.n_samples, self.n_channels
+            r#"{{"law":"pd","kp":{},"kd":{},"lead":{},"q_filter":{},"n_samples":{},"n_channels":{}}}"#,
+            self.gains.kp,
+            self.gains.kd,
+            self.gains.lead,
+            self.q_filter.describe(),
+            self.n_samples,
+            self.n_channels
         )
     }
 }

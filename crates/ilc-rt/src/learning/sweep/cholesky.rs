@@ -1,65 +1,103 @@
-//! Cholesky factor of a small matrix that may be singular.
-
-use nalgebra::DMatrix;
+//! Cholesky factor of a small matrix that may be singular, in place and without allocating.
+//!
+//! A direction in which the matrix vanishes costs nothing, so its share of every solution is set to
+//! zero: of all minimisers this is one, and the one that leaves that input as it was.
 
 /// Below this part of a diagonal entry, what is left of it after elimination is rounding.
-const VANISHED: f64 = 1e-13;
+pub(super) const VANISHED: f64 = 1e-13;
 
-/// `H = L L'` for a positive semidefinite `H`.
-///
-/// A direction in which `H` vanishes costs nothing, so its share of every solution is set to zero:
-/// of all minimisers this is one, and the one that leaves that input as it was.
-pub(super) struct Cholesky {
-    lower: DMatrix<f64>,
-    vanished: bool,
+/// What the pivots of a factor say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pivots {
+    /// Whether some direction vanished.
+    pub(super) vanished: bool,
+    /// Smallest pivot that did not vanish.
+    pub(super) min: f64,
+    /// Largest pivot.
+    pub(super) max: f64,
 }
 
-impl Cholesky {
-    pub(super) fn new(h: &DMatrix<f64>) -> Self {
-        let m = h.nrows();
-        let mut lower = DMatrix::zeros(m, m);
-        let mut vanished = false;
-        for j in 0..m {
-            let pivot = h[(j, j)] - (0..j).map(|i| lower[(j, i)] * lower[(j, i)]).sum::<f64>();
-            if pivot <= VANISHED * h[(j, j)] || pivot <= 0.0 {
-                vanished = true;
-                continue;
-            }
-            let root = f64::sqrt(pivot);
-            lower[(j, j)] = root;
-            for row in j + 1..m {
-                let known: f64 = (0..j).map(|i| lower[(row, i)] * lower[(j, i)]).sum();
-                lower[(row, j)] = (h[(row, j)] - known) / root;
-            }
-        }
-        Self { lower, vanished }
-    }
+impl Pivots {
+    /// Before any pivot.
+    pub(super) const NONE: Self = Self { vanished: false, min: f64::INFINITY, max: 0.0 };
 
-    /// Returns whether some direction vanished.
-    pub(super) fn vanished(&self) -> bool {
-        self.vanished
-    }
-
-    /// Returns `H^-1 right`, zero in the directions that vanished.
-    pub(super) fn solve(&self, right: &DMatrix<f64>) -> DMatrix<f64> {
-        let m = self.lower.nrows();
-        let mut solution = right.clone();
-        for col in 0..right.ncols() {
-            for row in 0..m {
-                let pivot = self.lower[(row, row)];
-                let known: f64 = (0..row).map(|i| self.lower[(row, i)] * solution[(i, col)]).sum();
-                solution[(row, col)] =
-                    if pivot > 0.0 { (solution[(row, col)] - known) / pivot } else { 0.0 };
-            }
-            for row in (0..m).rev() {
-                let pivot = self.lower[(row, row)];
-                let known: f64 =
-                    (row + 1..m).map(|i| self.lower[(i, row)] * solution[(i, col)]).sum();
-                solution[(row, col)] =
-                    if pivot > 0.0 { (solution[(row, col)] - known) / pivot } else { 0.0 };
-            }
+    /// Counts one pivot and returns whether it stands.
+    #[inline]
+    pub(super) fn count(&mut self, pivot: f64, diagonal: f64) -> bool {
+        if pivot <= VANISHED * diagonal || pivot <= 0.0 {
+            self.vanished = true;
+            return false;
         }
-        solution
+        self.min = self.min.min(pivot);
+        self.max = self.max.max(pivot);
+        true
+    }
+}
+
+/// Replaces the lower triangle of `h` (m x m, by columns) by `L` with `h = L L'`.
+///
+/// The column of a direction that vanished is zero. Only the first `counted` pivots are reported.
+#[inline]
+pub(super) fn factorize(h: &mut [f64], m: usize, counted: usize) -> Pivots {
+    let (mut pivots, mut others) = (Pivots::NONE, Pivots::NONE);
+    for j in 0..m {
+        let mut pivot = h[j * m + j];
+        for i in 0..j {
+            pivot -= h[i * m + j] * h[i * m + j];
+        }
+        let report = if j < counted { &mut pivots } else { &mut others };
+        if !report.count(pivot, h[j * m + j]) {
+            for row in j..m {
+                h[j * m + row] = 0.0;
+            }
+            continue;
+        }
+        let root = f64::sqrt(pivot);
+        h[j * m + j] = root;
+        for row in j + 1..m {
+            let mut value = h[j * m + row];
+            for i in 0..j {
+                value -= h[i * m + row] * h[i * m + j];
+            }
+            h[j * m + row] = value / root;
+        }
+    }
+    pivots
+}
+
+/// Replaces each entry of the diagonal by its reciprocal, or 0 where the direction vanished: the
+/// form that [`solve`] takes, because a product is much quicker than a quotient.
+#[inline]
+pub(super) fn invert_diagonal(lower: &mut [f64], m: usize) {
+    for j in 0..m {
+        let pivot = &mut lower[j * m + j];
+        *pivot = if *pivot > 0.0 { 1.0 / *pivot } else { 0.0 };
+    }
+}
+
+/// Replaces `x` by `H^-1 x`, zero in the directions that vanished; `lower` by columns, its diagonal
+/// [inverted](invert_diagonal).
+#[inline]
+pub(super) fn solve(lower: &[f64], m: usize, x: &mut [f64]) {
+    for row in 0..m {
+        let mut value = x[row];
+        for i in 0..row {
+            value -= lower[i * m + row] * x[i];
+        }
+        x[row] = value * lower[row * m + row];
+    }
+    solve_transposed(lower, m, x);
+}
+
+/// Replaces `x` by `L'^-1 x`, zero in the directions that vanished.
+#[inline]
+pub(super) fn solve_transposed(lower: &[f64], m: usize, x: &mut [f64]) {
+    for row in (0..m).rev() {
+        let mut value = x[row];
+        for i in row + 1..m {
+            value -= lower[row * m + i] * x[i];
+        }
+        x[row] = value * lower[row * m + row];
     }
 }
 
@@ -69,19 +107,22 @@ mod tests {
 
     #[test]
     fn a_regular_system_is_solved() {
-        let h = DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 3.0]);
-        let factor = Cholesky::new(&h);
-        let found = factor.solve(&DMatrix::from_row_slice(2, 1, &[8.0, 8.0]));
-        assert!(!factor.vanished());
-        assert!((found[(0, 0)] - 1.0).abs() < 1e-14 && (found[(1, 0)] - 2.0).abs() < 1e-14);
+        let mut h = [4.0, 2.0, 2.0, 3.0];
+        let mut x = [8.0, 8.0];
+        let pivots = factorize(&mut h, 2, 2);
+        invert_diagonal(&mut h, 2);
+        solve(&h, 2, &mut x);
+        assert_eq!(pivots, Pivots { vanished: false, min: 2.0, max: 4.0 });
+        assert!((x[0] - 1.0).abs() < 1e-14 && (x[1] - 2.0).abs() < 1e-14);
     }
 
     #[test]
     fn a_singular_system_leaves_the_free_direction_alone() {
-        let h = DMatrix::from_row_slice(2, 2, &[4.0, 2.0, 2.0, 1.0]);
-        let factor = Cholesky::new(&h);
-        let found = factor.solve(&DMatrix::from_row_slice(2, 1, &[8.0, 4.0]));
-        assert!(factor.vanished());
-        assert!((found[(0, 0)] - 2.0).abs() < 1e-14 && found[(1, 0)].abs() < 1e-14);
+        let mut h = [4.0, 2.0, 2.0, 1.0];
+        let mut x = [8.0, 4.0];
+        assert!(factorize(&mut h, 2, 2).vanished);
+        invert_diagonal(&mut h, 2);
+        solve(&h, 2, &mut x);
+        assert!((x[0] - 2.0).abs() < 1e-14 && x[1].abs() < 1e-14);
     }
 }

@@ -1,17 +1,33 @@
-//! The backward Riccati recursion: gains from model and weights.
+//! The backward Riccati recursion along a run: gains from model and weights.
 
-use nalgebra::DMatrix;
 use thiserror::Error;
 
-use super::cholesky::Cholesky;
+use super::cholesky::Pivots;
+use super::record::{Record, Sizes};
+use super::recursion::Recursion;
 use super::{Stage, Stages};
 
 /// The closed loop counts as settled once its transition over the samples passed is below this ...
 const SETTLED_TRANSITION: f64 = 1e-9;
 /// ... and one more sample changes the cost by less than this part of it.
 const SETTLED_CHANGE: f64 = 1e-13;
-/// Growth of the closed loop over a run that is refused.
+/// Growth of a settled closed loop over a run that is refused.
 const UNBOUNDED_GROWTH: f64 = 1e12;
+
+/// The same for gains that vary: higher, because here scales of the states may differ as well.
+const UNBOUNDED_PRODUCT: f64 = 1e16;
+
+/// How the recursion is written; all forms have the same solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Form {
+    /// The cost as a sum of squares, Joseph's form.
+    #[default]
+    Joseph,
+    /// A square root of the cost, by a Cholesky factor of the sample's whole cost.
+    Cholesky,
+    /// A square root of the cost, by orthogonal reflections: nothing is squared, at twice the time.
+    SquareRoot,
+}
 
 /// Why a problem has no usable solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
@@ -27,31 +43,6 @@ pub enum FactorError {
     Unbounded,
 }
 
-/// The gains of one sample, in the fused form of the two sweeps.
-///
-/// `p_k = transition' p_{k+1} + from_error e_k + from_input u_k`,
-/// `kappa_k = costate p_{k+1} + error e_k - input u_k`,
-/// `x_{k+1} = transition x_k + b kappa_k`, `v_k = kappa_k - feedback x_k`.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct StageGains {
-    /// `A - B K`, (n, n).
-    pub(super) transition: DMatrix<f64>,
-    /// `K`, (m, n).
-    pub(super) feedback: DMatrix<f64>,
-    /// `(C - D K)' Q`, (n, p).
-    pub(super) from_error: DMatrix<f64>,
-    /// `K' S`, (n, m).
-    pub(super) from_input: DMatrix<f64>,
-    /// `H^-1 B'`, (m, n).
-    pub(super) costate: DMatrix<f64>,
-    /// `H^-1 D' Q`, (m, p).
-    pub(super) error: DMatrix<f64>,
-    /// `H^-1 S`, (m, m).
-    pub(super) input: DMatrix<f64>,
-    /// `B`, (n, m).
-    pub(super) b: DMatrix<f64>,
-}
-
 /// The gains along a run.
 ///
 /// Where the stages are constant the gains settle while the recursion comes from the end; one set
@@ -59,20 +50,27 @@ pub(super) struct StageGains {
 #[derive(Debug, Clone)]
 pub struct Gains {
     n_samples: usize,
-    /// Gains of the samples before the constant range.
-    head: Vec<StageGains>,
-    /// Gains of the samples from the end of the head to the start of the tail.
-    settled: Option<StageGains>,
-    /// Gains of the last samples.
-    tail: Vec<StageGains>,
+    free_samples: usize,
+    sizes: Sizes,
+    /// [`Record::back`] and [`Record::fore`] of each set, in the order of the recursion: those of
+    /// the last samples, the settled one, those of the first samples.
+    back: Vec<f64>,
+    fore: Vec<f64>,
+    n_stored: usize,
+    /// Sets before the settled one, and for how many samples that one serves; 0 if there is none.
+    n_tail: usize,
+    n_settled: usize,
+    pivots: Pivots,
+    stage: Stage,
+    recursion: Recursion,
+    /// The closed loop over the samples passed, and room for its product with one more; where the
+    /// stages vary only one row of it.
+    passed: Vec<f64>,
+    product: Vec<f64>,
 }
 
 impl Gains {
-    /// Runs the recursion from the end of the run to its start.
-    ///
-    /// `H = S + R + D'QD + B'Pi B`, `K = H^-1 (D'QC + B'Pi A)`, and Joseph's form
-    /// `Pi <- (C-DK)'Q(C-DK) + K'(S+R)K + (A-BK)'Pi(A-BK)`, a sum of squares that keeps its sign
-    /// under rounding.
+    /// Runs the recursion from the end of the run to its start, in Joseph's form.
     ///
     /// `free_samples` at the end of the run may be undetermined by model and weights, because the
     /// run ends before their effect shows; their input then stays as it was.
@@ -81,53 +79,110 @@ impl Gains {
     /// - [`FactorError::Undetermined`] if an earlier sample is not determined.
     /// - [`FactorError::Unbounded`] if the solution would grow beyond all measure along the run.
     pub fn new(stages: &impl Stages, free_samples: usize) -> Result<Self, FactorError> {
+        Self::with_form(stages, free_samples, Form::default())
+    }
+
+    /// Runs the recursion in the given form.
+    ///
+    /// # Errors
+    /// - as [`Gains::new`].
+    pub fn with_form(
+        stages: &impl Stages,
+        free_samples: usize,
+        form: Form,
+    ) -> Result<Self, FactorError> {
         let n_samples = stages.n_samples();
-        let n_targets = stages.n_targets();
+        let stage = stages.stage(0);
+        let m = stage.n_inputs();
+        let sizes = Sizes {
+            n: stage.n_states(),
+            m,
+            p: stage.n_outputs(),
+            targets: stages.n_targets(),
+            held: if stages.holds_input() { m } else { 0 },
+        };
+        let room = || vec![0.0; sizes.n * sizes.n];
+        let mut gains = Self {
+            n_samples,
+            free_samples,
+            sizes,
+            back: Vec::new(),
+            fore: Vec::new(),
+            n_stored: 0,
+            n_tail: 0,
+            n_settled: 0,
+            pivots: Pivots::NONE,
+            stage,
+            recursion: Recursion::new(form, sizes),
+            passed: room(),
+            product: room(),
+        };
+        if stages.constant().is_empty() {
+            gains.back.reserve_exact(n_samples * sizes.back());
+            gains.fore.reserve_exact(n_samples * sizes.fore());
+        }
+        gains.refactor(stages)?;
+        Ok(gains)
+    }
+
+    /// Runs the recursion again, for other matrices of the same shapes.
+    ///
+    /// # Real Time
+    /// Cold path. Without a constant range of stages it allocates nothing, unless
+    /// [`Stages::stage_into`] does.
+    /// # Errors
+    /// - as [`Gains::new`]; the gains are then not to be used.
+    pub fn refactor(&mut self, stages: &impl Stages) -> Result<(), FactorError> {
+        let (n_samples, n) = (self.n_samples, self.sizes.n);
         let constant = stages.constant();
-        let free_from = n_samples - free_samples.min(n_samples.saturating_sub(1));
-        let n_states = if n_samples == 0 { 0 } else { stages.stage(0).a.nrows() };
-        let mut cost = DMatrix::zeros(n_states, n_states);
-        let mut passed = DMatrix::identity(n_states, n_states);
-        let (mut head, mut tail, mut settled) = (Vec::new(), Vec::new(), None);
+        let free_from = n_samples - self.free_samples.min(n_samples.saturating_sub(1));
+        self.back.clear();
+        self.fore.clear();
+        (self.n_stored, self.n_tail, self.n_settled) = (0, 0, 0);
+        self.pivots = Pivots::NONE;
+        self.recursion.restart();
+        self.passed.fill(0.0);
+        if constant.is_empty() {
+            self.passed.fill(1.0);
+        }
+        for i in 0..n {
+            self.passed[i * n + i] = 1.0;
+        }
         let mut k = n_samples;
         while k > 0 {
             k -= 1;
-            let stage = stages.stage(k);
-            let (gains, vanished) = solve(&stage, &cost, n_targets);
-            if vanished && k < free_from {
+            // The stages of the constant range are read once.
+            if !constant.contains(&k) || k + 1 == constant.end {
+                stages.stage_into(k, &mut self.stage);
+            }
+            let pivots = self.step();
+            if pivots.vanished && k < free_from {
                 return Err(FactorError::Undetermined { sample: k });
             }
-            let earlier = joseph(&stage, &gains, &cost);
-            let change = (&earlier - &cost).amax();
-            cost = earlier;
-            if k < constant.start {
-                head.push(gains);
-                continue;
+            self.pivots.min = self.pivots.min.min(pivots.min);
+            self.pivots.max = self.pivots.max.max(pivots.max);
+            if constant.is_empty() {
+                self.grow()?;
             }
             if !constant.contains(&k) {
-                tail.push(gains);
                 continue;
             }
-            passed *= &gains.transition;
-            let scale = cost.amax() + (stage.c.transpose() * &stage.q * &stage.c).amax();
-            let is_settled =
-                one_norm(&passed) < SETTLED_TRANSITION && change <= SETTLED_CHANGE * scale;
+            self.pass();
+            let is_settled = one_norm(&self.passed, n) < SETTLED_TRANSITION
+                && self.recursion.change() <= SETTLED_CHANGE * self.recursion.scale(&self.stage);
             if is_settled || k == constant.start {
-                bounded(&gains, constant.len())?;
+                self.bounded(constant.len())?;
             }
-            if is_settled && vanished && k > constant.start {
+            if is_settled && pivots.vanished && k > constant.start {
                 return Err(FactorError::Undetermined { sample: k - 1 });
             }
             if is_settled {
-                settled = Some(gains);
+                self.n_tail = n_samples - k - 1;
+                self.n_settled = k - constant.start + 1;
                 k = constant.start;
-            } else {
-                tail.push(gains);
             }
         }
-        head.reverse();
-        tail.reverse();
-        Ok(Self { n_samples, head, settled, tail })
+        Ok(())
     }
 
     /// Returns the number of samples of a run.
@@ -137,77 +192,113 @@ impl Gains {
 
     /// Returns the number of states, those of penalties included.
     pub fn n_states(&self) -> usize {
-        if self.n_stored() == 0 { 0 } else { self.set(0).1.transition.nrows() }
+        self.sizes.n
+    }
+
+    /// Returns the number of inputs.
+    pub fn n_inputs(&self) -> usize {
+        self.sizes.m
+    }
+
+    /// Returns the number of outputs that have a target.
+    pub fn n_targets(&self) -> usize {
+        self.sizes.targets
     }
 
     /// Returns how many sets of gains are kept.
     pub fn n_stored(&self) -> usize {
-        self.head.len() + usize::from(self.settled.is_some()) + self.tail.len()
+        self.n_stored
     }
 
-    /// Returns the set with the given place in time, and for how many samples it serves.
-    pub(super) fn set(&self, place: usize) -> (usize, &StageGains) {
-        if let Some(gains) = self.head.get(place) {
-            return (1, gains);
-        }
-        let place = place - self.head.len();
-        match &self.settled {
-            Some(gains) if place == 0 => {
-                (self.n_samples - self.head.len() - self.tail.len(), gains)
+    /// Returns how well the input is determined: the smallest part of any `H` that is left after
+    /// elimination, over the largest. Below about `1e-12` digits of the input are noise.
+    pub fn conditioning(&self) -> f64 {
+        if self.pivots.max > 0.0 { self.pivots.min / self.pivots.max } else { 0.0 }
+    }
+
+    pub(super) fn sizes(&self) -> Sizes {
+        self.sizes
+    }
+
+    /// Returns a set, counted from the end of the run, and for how many samples it serves.
+    pub(super) fn set(&self, place: usize) -> (usize, Record<'_>) {
+        let (back, fore) = (self.sizes.back(), self.sizes.fore());
+        let count = if self.n_settled > 0 && place == self.n_tail { self.n_settled } else { 1 };
+        let record = Record {
+            back: &self.back[place * back..(place + 1) * back],
+            fore: &self.fore[place * fore..(place + 1) * fore],
+        };
+        (count, record)
+    }
+
+    /// Goes one sample back, with the stage that was read last.
+    fn step(&mut self) -> Pivots {
+        self.n_stored += 1;
+        let (back, fore) = (self.back.len(), self.fore.len());
+        self.back.resize(back + self.sizes.back(), 0.0);
+        self.fore.resize(fore + self.sizes.fore(), 0.0);
+        self.recursion.step(&self.stage, &mut self.back[back..], &mut self.fore[fore..])
+    }
+
+    /// `passed <- passed (A - B K)`.
+    fn pass(&mut self) {
+        let n = self.sizes.n;
+        self.product.fill(0.0);
+        for (j, column) in self.recursion.transition.chunks_exact(n.max(1)).enumerate() {
+            for (k, factor) in column.iter().enumerate() {
+                for i in 0..n {
+                    self.product[j * n + i] += self.passed[k * n + i] * factor;
+                }
             }
-            Some(_) => (1, &self.tail[place - 1]),
-            None => (1, &self.tail[place]),
         }
+        std::mem::swap(&mut self.passed, &mut self.product);
+    }
+
+    /// Takes one row of `passed` along and refuses growth beyond all measure since it was smallest.
+    fn grow(&mut self) -> Result<(), FactorError> {
+        let n = self.sizes.n;
+        let (row, next) = (&mut self.passed[..n], &mut self.product[..n]);
+        let mut size = 0.0;
+        for (value, column) in next.iter_mut().zip(self.recursion.transition.chunks_exact(n.max(1)))
+        {
+            *value = column.iter().zip(&*row).map(|(factor, old)| factor * old).sum();
+            size += value.abs();
+        }
+        if size > UNBOUNDED_PRODUCT {
+            return Err(FactorError::Unbounded);
+        }
+        if size < f64::MIN_POSITIVE {
+            row.fill(1.0);
+        } else {
+            let scale = if size < 1.0 { 1.0 / size } else { 1.0 };
+            for (old, value) in row.iter_mut().zip(&*next) {
+                *old = value * scale;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a closed loop whose slowest pole grows beyond all measure over the run.
+    fn bounded(&self, n_samples: usize) -> Result<(), FactorError> {
+        const MAX_SWEEPS: usize = 10_000;
+        let n = self.sizes.n;
+        if n == 0 {
+            return Ok(());
+        }
+        let transition = nalgebra::DMatrix::from_column_slice(n, n, &self.recursion.transition);
+        let radius = nalgebra::Schur::try_new(transition, f64::EPSILON, MAX_SWEEPS)
+            .map_or(0.0, |schur| {
+                schur.complex_eigenvalues().iter().map(|pole| pole.norm()).fold(0.0, f64::max)
+            });
+        if radius.ln() * n_samples as f64 > UNBOUNDED_GROWTH.ln() {
+            return Err(FactorError::Unbounded);
+        }
+        Ok(())
     }
 }
 
-/// Returns the gains of one sample, and whether part of its input is undetermined.
-fn solve(stage: &Stage, cost: &DMatrix<f64>, n_targets: usize) -> (StageGains, bool) {
-    let Stage { a, b, c, d, q, s, r } = stage;
-    let weighted = d.transpose() * q;
-    let reached = b.transpose() * cost;
-    let h = s + r + &weighted * d + &reached * b;
-    let factor = Cholesky::new(&h);
-    let feedback = factor.solve(&(&weighted * c + &reached * a));
-    let from_error = (c - d * &feedback).transpose() * q;
-    let gains = StageGains {
-        transition: a - b * &feedback,
-        from_error: from_error.columns(0, n_targets).into_owned(),
-        from_input: feedback.transpose() * s,
-        costate: factor.solve(&b.transpose()),
-        error: factor.solve(&weighted.columns(0, n_targets).into_owned()),
-        input: factor.solve(s),
-        b: b.clone(),
-        feedback,
-    };
-    (gains, factor.vanished())
-}
-
-fn joseph(stage: &Stage, gains: &StageGains, cost: &DMatrix<f64>) -> DMatrix<f64> {
-    let left = &stage.c - &stage.d * &gains.feedback;
-    let effort = &stage.s + &stage.r;
-    left.transpose() * &stage.q * &left
-        + gains.feedback.transpose() * effort * &gains.feedback
-        + gains.transition.transpose() * cost * &gains.transition
-}
-
-/// Refuses a closed loop whose slowest pole grows beyond all measure over the run.
-fn bounded(gains: &StageGains, n_samples: usize) -> Result<(), FactorError> {
-    const MAX_SWEEPS: usize = 10_000;
-    let transition = &gains.transition;
-    if transition.is_empty() {
-        return Ok(());
-    }
-    let radius = nalgebra::Schur::try_new(transition.clone(), f64::EPSILON, MAX_SWEEPS)
-        .map_or(0.0, |schur| {
-            schur.complex_eigenvalues().iter().map(|pole| pole.norm()).fold(0.0, f64::max)
-        });
-    if radius.ln() * n_samples as f64 > UNBOUNDED_GROWTH.ln() {
-        return Err(FactorError::Unbounded);
-    }
-    Ok(())
-}
-
-fn one_norm(matrix: &DMatrix<f64>) -> f64 {
-    matrix.column_iter().map(|column| column.abs().sum()).fold(0.0, f64::max)
+/// Largest column sum of a square matrix.
+fn one_norm(matrix: &[f64], n: usize) -> f64 {
+    let columns = matrix.chunks_exact(n.max(1));
+    columns.map(|column| column.iter().map(|value| value.abs()).sum()).fold(0.0, f64::max)
 }

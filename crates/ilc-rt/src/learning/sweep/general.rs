@@ -1,111 +1,127 @@
 //! The two sweeps for any number of states, inputs and outputs.
 
-use super::factor::{Gains, StageGains};
-use super::{Channels, Run, Sweep};
+use super::factor::Gains;
+use super::record::Sizes;
+use super::{Channels, Run, Sweep, fixed};
 
-/// The solver for coupled axes.
+/// The solver for coupled axes, and for gains that vary along the run.
 ///
 /// # Real Time
 /// Cold path. Allocates when it is made, never in [`Sweep::solve`]; each sample costs about
-/// `2 n^2 + 4 n m + 2 n p` multiply-adds.
-#[derive(Debug)]
+/// `(n + m)(n + p + m) + (n + m)(n + m)` multiply-adds.
+#[derive(Debug, Clone)]
 pub struct General {
     gains: Gains,
     channels: Channels,
     /// One `kappa` per sample and input.
     kappa: Vec<f64>,
-    state: Vec<f64>,
     work: Vec<f64>,
-    input: Vec<f64>,
-    error: Vec<f64>,
 }
 
 impl General {
     /// Makes the solver for the given channels.
     pub fn new(gains: Gains, channels: Channels) -> Self {
-        let n_states = gains.n_states();
-        let (m, p) = (channels.inputs.len(), channels.outputs.len());
-        Self {
-            kappa: vec![0.0; gains.n_samples() * m],
-            state: vec![0.0; n_states],
-            work: vec![0.0; n_states],
-            input: vec![0.0; m],
-            error: vec![0.0; p],
-            gains,
-            channels,
-        }
+        let Sizes { n, m, targets, .. } = gains.sizes();
+        let (kappa, work) =
+            (vec![0.0; gains.n_samples() * m], vec![0.0; 2 * (n + m) + targets + m]);
+        Self { gains, channels, kappa, work }
     }
-}
 
-impl Sweep for General {
-    fn solve(&mut self, run: &mut Run) {
-        let Self { gains, channels, kappa, state, work, input, error } = self;
-        let m = channels.inputs.len();
-        let last = gains.n_samples().saturating_sub(1);
-        let gather = |k: usize, input: &mut [f64]| {
-            for (value, channel) in input.iter_mut().zip(&channels.inputs) {
-                *value = run.input[k * run.n_inputs + channel];
-            }
+    /// Makes the solver for signals that are its own: every input, and a target for every output
+    /// that has one, already paired.
+    pub fn alone(gains: Gains) -> Self {
+        let channels = Channels {
+            inputs: (0..gains.n_inputs()).collect(),
+            outputs: (0..gains.n_targets()).collect(),
+            shifts: vec![0; gains.n_targets()],
         };
+        Self::new(gains, channels)
+    }
+
+    /// Returns the gains.
+    pub fn gains(&self) -> &Gains {
+        &self.gains
+    }
+
+    /// Returns the gains to [refactor](Gains::refactor) them.
+    pub fn gains_mut(&mut self) -> &mut Gains {
+        &mut self.gains
+    }
+
+    /// [`Sweep::solve`] for any sizes.
+    fn any(&mut self, run: &mut Run) {
+        let Self { gains, channels, kappa, work } = self;
+        let Sizes { n, m, targets: p, held, .. } = gains.sizes();
+        let rows = n + m;
+        let last = gains.n_samples().saturating_sub(1);
+        let (state, rest) = work.split_at_mut(n);
+        let (sum, rest) = rest.split_at_mut(rows);
+        let (error, rest) = rest.split_at_mut(p);
+        let input = &mut rest[..m];
+        let (inputs, outputs) = (&channels.inputs[..m], &channels.outputs[..p]);
+        let shifts = &channels.shifts[..p];
 
         state.fill(0.0);
         let mut k = gains.n_samples();
-        for set in (0..gains.n_stored()).rev() {
-            let (count, at) = gains.set(set);
+        for place in 0..gains.n_stored() {
+            let (count, at) = gains.set(place);
             for _ in 0..count {
                 k -= 1;
-                gather(k, input);
-                for (i, value) in error.iter_mut().enumerate() {
+                for i in 0..p {
                     // Past the end of the run the weight is zero: any finite value will do.
-                    let sample = (k + channels.shifts[i]).min(last);
-                    *value = run.error[sample * run.n_outputs + channels.outputs[i]];
+                    let sample = (k + shifts[i]).min(last);
+                    error[i] = run.error[sample * run.n_outputs + outputs[i]];
                 }
-                backward(at, state, input, error, &mut kappa[k * m..(k + 1) * m], work);
-                std::mem::swap(state, work);
+                sum.fill(0.0);
+                let mut columns = at.back[n * rows..].chunks_exact(rows);
+                add(sum, &mut columns, error);
+                if held > 0 {
+                    let values = &run.input[k * run.n_inputs..(k + 1) * run.n_inputs];
+                    for i in 0..m {
+                        input[i] = values[inputs[i]];
+                    }
+                    add(sum, &mut columns, input);
+                }
+                add(sum, &mut at.back[..n * rows].chunks_exact(rows), state);
+                state.copy_from_slice(&sum[..n]);
+                kappa[k * m..(k + 1) * m].copy_from_slice(&sum[n..]);
             }
         }
 
         state.fill(0.0);
-        for set in 0..gains.n_stored() {
-            let (count, at) = gains.set(set);
+        for place in (0..gains.n_stored()).rev() {
+            let (count, at) = gains.set(place);
             for _ in 0..count {
                 let kappa = &kappa[k * m..(k + 1) * m];
-                gather(k, input);
-                for (i, channel) in channels.inputs.iter().enumerate() {
-                    let back: f64 = (0..state.len()).map(|j| at.feedback[(i, j)] * state[j]).sum();
-                    run.next[k * run.n_inputs + channel] = input[i] + (kappa[i] - back);
+                sum[..n].fill(0.0);
+                sum[n..].copy_from_slice(kappa);
+                add(&mut sum[..n], &mut at.fore[n * rows..].chunks_exact(n.max(1)), kappa);
+                add(sum, &mut at.fore[..n * rows].chunks_exact(rows), state);
+                state.copy_from_slice(&sum[..n]);
+                for i in 0..m {
+                    let index = k * run.n_inputs + inputs[i];
+                    run.next[index] = run.input[index] + sum[n + i];
                 }
-                for (i, value) in work.iter_mut().enumerate() {
-                    let kept: f64 =
-                        (0..state.len()).map(|j| at.transition[(i, j)] * state[j]).sum();
-                    *value = kept + (0..m).map(|j| at.b[(i, j)] * kappa[j]).sum::<f64>();
-                }
-                std::mem::swap(state, work);
                 k += 1;
             }
         }
     }
 }
 
-/// Writes `kappa_k` and, into `earlier`, `p_k`, from `costate = p_{k+1}`.
-fn backward(
-    at: &StageGains,
-    costate: &[f64],
-    input: &[f64],
-    error: &[f64],
-    kappa: &mut [f64],
-    earlier: &mut [f64],
-) {
-    for (i, value) in kappa.iter_mut().enumerate() {
-        let cost: f64 = (0..costate.len()).map(|j| at.costate[(i, j)] * costate[j]).sum();
-        let pull: f64 = (0..error.len()).map(|j| at.error[(i, j)] * error[j]).sum();
-        let hold: f64 = (0..input.len()).map(|j| at.input[(i, j)] * input[j]).sum();
-        *value = cost + pull - hold;
+/// Adds each column times its factor.
+#[inline]
+fn add(sum: &mut [f64], columns: &mut std::slice::ChunksExact<f64>, factors: &[f64]) {
+    for (factor, column) in factors.iter().zip(columns) {
+        for (value, entry) in sum.iter_mut().zip(column) {
+            *value += entry * factor;
+        }
     }
-    for (i, value) in earlier.iter_mut().enumerate() {
-        let cost: f64 = (0..costate.len()).map(|j| at.transition[(j, i)] * costate[j]).sum();
-        let pull: f64 = (0..error.len()).map(|j| at.from_error[(i, j)] * error[j]).sum();
-        let hold: f64 = (0..input.len()).map(|j| at.from_input[(i, j)] * input[j]).sum();
-        *value = cost + pull + hold;
+}
+
+impl Sweep for General {
+    fn solve(&mut self, run: &mut Run) {
+        if !fixed::solve(&self.gains, &self.channels, &mut self.kappa, run) {
+            self.any(run);
+        }
     }
 }

@@ -16,14 +16,21 @@
 
 mod cholesky;
 mod factor;
+mod fixed;
+mod fixed_step;
 mod general;
+mod lanes;
+mod rate;
+mod record;
+mod recursion;
 mod single;
+mod square_root;
 mod stage;
 
-pub use factor::{FactorError, Gains};
+pub use factor::{FactorError, Form, Gains};
 pub use general::General;
-pub use single::{MAX_STATES, single};
-pub use stage::{Rate, Stage, Stages};
+pub use rate::Rate;
+pub use stage::{Stage, Stages};
 
 /// Where the signals of a solver lie among those of the whole machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,4 +65,12 @@ pub trait Sweep: Send + std::fmt::Debug {
     /// # Real Time
     /// Cold path. Allocates nothing; `O(n_samples)`.
     fn solve(&mut self, run: &mut Run);
+}
+
+/// Returns the quickest solver for the given channels.
+pub fn solver(gains: Gains, channels: Channels) -> Box<dyn Sweep> {
+    match single::single(&gains, &channels) {
+        Some(solver) => solver,
+        None => Box::new(General::new(gains, channels)),
+    }
 }

@@ -1,24 +1,25 @@
 //! The two sweeps for one input and one output, with everything in registers.
 
-use nalgebra::DMatrix;
-
-use super::factor::{Gains, StageGains};
+use super::factor::Gains;
+use super::lanes::{Cut, Place};
+use super::record::Record;
 use super::{Channels, Run, Sweep};
 
 /// The most states, that of a rate penalty included, for which [`single`] has a solver.
-pub const MAX_STATES: usize = 6;
+#[cfg(test)]
+const MAX_STATES: usize = 6;
 
 /// Returns the solver for one axis by itself.
 ///
-/// `None` unless the gains are for one input, one output and 1 to [`MAX_STATES`] states: the caller
+/// `None` unless the gains are for one input, one output and 1 to 6 states: the caller
 /// then takes [`super::General`].
-pub fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
+pub(super) fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
     let ([input], [output], [shift]) =
         (&channels.inputs[..], &channels.outputs[..], &channels.shifts[..])
     else {
         return None;
     };
-    let at = (*input, *output, *shift);
+    let at = Place { input: *input, output: *output, shift: *shift };
     Some(match gains.n_states() {
         1 => Box::new(Single::<1>::new(gains, at)),
         2 => Box::new(Single::<2>::new(gains, at)),
@@ -30,43 +31,45 @@ pub fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
     })
 }
 
-/// [`StageGains`] with its sizes known to the compiler.
+/// The gains of one sample with its sizes known to the compiler.
 #[derive(Debug, Clone, Copy)]
-struct Fixed<const N: usize> {
+pub(super) struct Fixed<const N: usize> {
     /// By columns: column `j` is what state `j` becomes.
-    transition: [[f64; N]; N],
-    feedback: [f64; N],
-    from_error: [f64; N],
-    from_input: [f64; N],
-    costate: [f64; N],
-    b: [f64; N],
-    error: f64,
-    input: f64,
+    pub(super) transition: [[f64; N]; N],
+    pub(super) feedback: [f64; N],
+    pub(super) from_error: [f64; N],
+    pub(super) from_input: [f64; N],
+    pub(super) costate: [f64; N],
+    pub(super) b: [f64; N],
+    pub(super) error: f64,
+    pub(super) input: f64,
 }
 
 impl<const N: usize> Fixed<N> {
-    fn new(gains: &StageGains) -> Self {
-        let vector = |matrix: &DMatrix<f64>| std::array::from_fn(|i| matrix[i]);
+    fn new(record: Record, is_held: bool) -> Self {
+        let rows = N + 1;
+        let fore = |row: usize, col: usize| record.fore[col * rows + row];
+        let back = |row: usize, col: usize| record.back[col * rows + row];
+        let held = |row: usize| if is_held { back(row, N + 1) } else { 0.0 };
         Self {
-            transition: std::array::from_fn(|col| {
-                std::array::from_fn(|row| gains.transition[(row, col)])
-            }),
-            feedback: vector(&gains.feedback),
-            from_error: vector(&gains.from_error),
-            from_input: vector(&gains.from_input),
-            costate: vector(&gains.costate),
-            b: vector(&gains.b),
-            error: gains.error[0],
-            input: gains.input[0],
+            transition: std::array::from_fn(|col| std::array::from_fn(|row| fore(row, col))),
+            feedback: std::array::from_fn(|col| -fore(N, col)),
+            from_error: std::array::from_fn(|row| back(row, N)),
+            from_input: std::array::from_fn(held),
+            costate: std::array::from_fn(|col| back(N, col)),
+            b: std::array::from_fn(|row| record.fore[rows * N + row]),
+            error: back(N, N),
+            input: -held(N),
         }
     }
 
     #[inline]
-    fn backward(&self, costate: &mut [f64; N], input: f64, error: f64) -> f64 {
-        let kappa = self.error * error - self.input * input + dot(&self.costate, costate);
+    fn backward<const HELD: bool>(&self, costate: &mut [f64; N], input: f64, error: f64) -> f64 {
+        let hold = |gain: f64| if HELD { gain * input } else { 0.0 };
+        let kappa = self.error * error - hold(self.input) + dot(&self.costate, costate);
         let earlier = std::array::from_fn(|i| {
             // The part that does not wait for the previous sample first: it shortens the chain.
-            let fresh = self.from_error[i] * error + self.from_input[i] * input;
+            let fresh = self.from_error[i] * error + hold(self.from_input[i]);
             fresh + dot(&self.transition[i], costate)
         });
         *costate = earlier;
@@ -96,52 +99,205 @@ fn dot<const N: usize>(left: &[f64; N], right: &[f64; N]) -> f64 {
     sum
 }
 
+/// Gains in order of time, each with the number of samples that it serves.
+type Sets<const N: usize> = Vec<(usize, Fixed<N>)>;
+
 #[derive(Debug)]
 struct Single<const N: usize> {
-    /// Each set of gains and for how many samples it serves, in order of time.
-    sets: Vec<(usize, Fixed<N>)>,
+    /// The samples before and after those that are cut into stretches.
+    before: Sets<N>,
+    cut: Option<(Fixed<N>, Cut, usize)>,
+    after: Sets<N>,
+    n_before: usize,
     n_samples: usize,
-    input: usize,
-    output: usize,
-    shift: usize,
+    is_held: bool,
+    place: Place,
+    /// `kappa` before and after.
     kappa: Vec<f64>,
 }
 
 impl<const N: usize> Single<N> {
-    fn new(gains: &Gains, (input, output, shift): (usize, usize, usize)) -> Self {
-        let sets = (0..gains.n_stored())
-            .map(|place| {
-                let (count, at) = gains.set(place);
-                (count, Fixed::new(at))
-            })
-            .collect();
-        let n_samples = gains.n_samples();
-        Self { sets, n_samples, input, output, shift, kappa: vec![0.0; n_samples] }
+    fn new(gains: &Gains, place: Place) -> Self {
+        let (n_samples, is_held) = (gains.n_samples(), gains.sizes().held > 0);
+        let (mut before, mut after, mut cut) = (Vec::new(), Vec::new(), None);
+        for index in (0..gains.n_stored()).rev() {
+            let (count, record) = gains.set(index);
+            let fixed = Fixed::new(record, is_held);
+            match Cut::new(&fixed, count) {
+                // The samples that fill no stretch come last, where the costate is exact.
+                Some(stretches) if count > 1 => {
+                    let n_blocks = count / stretches.block();
+                    before = std::mem::take(&mut after);
+                    after.push((count - n_blocks * stretches.block(), fixed));
+                    cut = Some((fixed, stretches, n_blocks));
+                }
+                _ => after.push((count, fixed)),
+            }
+        }
+        let n_before = before.len();
+        let n_after: usize = after.iter().map(|(count, _)| count).sum();
+        let kappa = vec![0.0; n_before + n_after];
+        Self { before, cut, after, n_before, n_samples, is_held, place, kappa }
+    }
+
+    /// Solves with (`HELD`) or without a weight of the input.
+    fn sweep<const HELD: bool>(&mut self, run: &mut Run) {
+        let Self { before, cut, after, n_before, n_samples, place, kappa, .. } = self;
+        let (kappa_before, kappa_after) = kappa.split_at_mut(*n_before);
+        let first_after = *n_samples - kappa_after.len();
+        let costate = backward::<HELD, N>(after, *place, run, first_after, [0.0; N], kappa_after);
+        let mut state = [0.0; N];
+        if let Some((gains, cut, n_blocks)) = cut {
+            for block in 0..*n_blocks {
+                let first = *n_before + block * cut.block();
+                let exact = (block + 1 == *n_blocks).then_some(costate);
+                let at = (*place, first);
+                state = cut.solve::<HELD, N>(gains, at, run, exact, |run, costate| {
+                    if block > 0 {
+                        return state;
+                    }
+                    backward::<HELD, N>(before, *place, run, 0, costate, kappa_before);
+                    forward(before, *place, run, 0, state, kappa_before)
+                });
+            }
+        }
+        forward(after, *place, run, first_after, state, kappa_after);
     }
 }
 
 impl<const N: usize> Sweep for Single<N> {
     fn solve(&mut self, run: &mut Run) {
-        let last = self.n_samples.saturating_sub(1);
-        let mut k = self.n_samples;
-        let mut costate = [0.0; N];
-        for (count, at) in self.sets.iter().rev() {
-            let at = *at;
-            for _ in 0..*count {
-                k -= 1;
-                // Past the end of the run the weight is zero: any finite value will do.
-                let error = run.error[(k + self.shift).min(last) * run.n_outputs + self.output];
-                let input = run.input[k * run.n_inputs + self.input];
-                self.kappa[k] = at.backward(&mut costate, input, error);
-            }
+        if self.is_held { self.sweep::<true>(run) } else { self.sweep::<false>(run) }
+    }
+}
+
+/// Goes back over the samples from `first` on and returns the costate at their start.
+fn backward<const HELD: bool, const N: usize>(
+    sets: &Sets<N>,
+    place: Place,
+    run: &Run,
+    first: usize,
+    mut costate: [f64; N],
+    kappa: &mut [f64],
+) -> [f64; N] {
+    let last = (run.error.len() / run.n_outputs).saturating_sub(1);
+    let mut k = kappa.len();
+    for (count, gains) in sets.iter().rev() {
+        let gains = *gains;
+        for _ in 0..*count {
+            k -= 1;
+            // Past the end of the run the weight is zero: any finite value will do.
+            let sample = (first + k + place.shift).min(last);
+            let error = run.error[sample * run.n_outputs + place.output];
+            let input =
+                if HELD { run.input[(first + k) * run.n_inputs + place.input] } else { 0.0 };
+            kappa[k] = gains.backward::<HELD>(&mut costate, input, error);
         }
-        let mut state = [0.0; N];
-        for (count, at) in &self.sets {
-            let at = *at;
-            for _ in 0..*count {
-                let index = k * run.n_inputs + self.input;
-                run.next[index] = run.input[index] + at.forward(&mut state, self.kappa[k]);
-                k += 1;
+    }
+    costate
+}
+
+/// Goes over the samples from `first` on and returns the state at their end.
+fn forward<const N: usize>(
+    sets: &Sets<N>,
+    place: Place,
+    run: &mut Run,
+    first: usize,
+    mut state: [f64; N],
+    kappa: &[f64],
+) -> [f64; N] {
+    let mut k = 0;
+    for (count, gains) in sets {
+        let gains = *gains;
+        for _ in 0..*count {
+            let index = (first + k) * run.n_inputs + place.input;
+            run.next[index] = run.input[index] + gains.forward(&mut state, kappa[k]);
+            k += 1;
+        }
+    }
+    state
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{General, Stage, Stages};
+    use super::*;
+    use nalgebra::DMatrix;
+
+    /// One axis with constant weights.
+    struct Axis {
+        stage: Stage,
+        n_samples: usize,
+    }
+
+    impl Stages for Axis {
+        fn n_samples(&self) -> usize {
+            self.n_samples
+        }
+
+        fn n_targets(&self) -> usize {
+            1
+        }
+
+        fn stage(&self, _: usize) -> Stage {
+            self.stage.clone()
+        }
+
+        fn constant(&self) -> std::ops::Range<usize> {
+            1..self.n_samples.saturating_sub(2)
+        }
+
+        fn holds_input(&self) -> bool {
+            self.stage.s[0] > 0.0
+        }
+    }
+
+    fn axis(n: usize, s: f64, n_samples: usize) -> Axis {
+        let value = |i: usize, j: usize| (((i * 7 + j * 3 + n) as f64) * 1.7).sin();
+        let a = DMatrix::from_fn(n, n, |i, j| 1.6 * value(i, j) / n as f64);
+        let b = DMatrix::from_fn(n, 1, |i, _| value(i, 11));
+        let c = DMatrix::from_fn(1, n, |_, j| value(13, j));
+        let one = |value: f64| DMatrix::from_element(1, 1, value);
+        let stage = Stage { a, b, c, d: one(0.7), q: one(2.0), s: one(s), r: one(0.1) };
+        Axis { stage, n_samples }
+    }
+
+    #[test]
+    fn stretches_agree_with_the_plain_sweep() {
+        for n in 1..=MAX_STATES {
+            for (s, n_samples) in [(0.0, 3), (0.0, 700), (0.3, 5000), (0.0, 40_000), (0.2, 100_003)]
+            {
+                let gains = Gains::new(&axis(n, s, n_samples), 0).unwrap();
+                let channels = Channels { inputs: vec![1], outputs: vec![0], shifts: vec![1] };
+                let wave = |seed: usize| -> Vec<f64> {
+                    (0..2 * n_samples).map(|k| ((k * k + seed) as f64).sin()).collect()
+                };
+                let (input, error) = (wave(1), wave(2));
+                let solve = |sweep: &mut dyn Sweep| {
+                    let mut next = vec![0.0; input.len()];
+                    let (input, error) = (&input, &error);
+                    let next_run = &mut next[..];
+                    sweep.solve(&mut Run {
+                        input,
+                        error,
+                        next: next_run,
+                        n_inputs: 2,
+                        n_outputs: 2,
+                    });
+                    next
+                };
+                let mut quick = single(&gains, &channels).unwrap();
+                let is_cut = format!("{quick:?}").contains("warm_up");
+                assert!(is_cut || n_samples < 5000, "{n} states, {n_samples} samples");
+                let quick = solve(quick.as_mut());
+                let plain = solve(&mut General::new(gains, channels));
+                let scale = plain.iter().fold(1.0_f64, |scale, value| scale.max(value.abs()));
+                for (k, (quick, plain)) in quick.iter().zip(&plain).enumerate() {
+                    assert!(
+                        (quick - plain).abs() <= 1e-14 * scale,
+                        "{n} states, {n_samples} samples, at {k}: {quick} and {plain}"
+                    );
+                }
             }
         }
     }

@@ -27,7 +27,26 @@ pub struct Stage {
     pub r: DMatrix<f64>,
 }
 
+impl Stage {
+    /// Returns the number of states.
+    pub fn n_states(&self) -> usize {
+        self.a.nrows()
+    }
+
+    /// Returns the number of inputs.
+    pub fn n_inputs(&self) -> usize {
+        self.b.ncols()
+    }
+
+    /// Returns the number of outputs, those of penalties included.
+    pub fn n_outputs(&self) -> usize {
+        self.c.nrows()
+    }
+}
+
 /// A tracking problem: its stages along the run.
+///
+/// All stages of a problem have the same shapes.
 pub trait Stages {
     /// Number of samples of a run.
     fn n_samples(&self) -> usize;
@@ -38,57 +57,54 @@ pub trait Stages {
     /// The matrices at sample `k`.
     fn stage(&self, k: usize) -> Stage;
 
+    /// Overwrites `stage`, one of this problem's, with the matrices at sample `k`.
+    ///
+    /// Whoever factorises often writes this without allocating; by default it replaces the stage.
+    fn stage_into(&self, k: usize, stage: &mut Stage) {
+        *stage = self.stage(k);
+    }
+
     /// A range of samples at which all stages are equal; empty if there is none.
     fn constant(&self) -> Range<usize>;
+
+    /// Whether the input itself costs anything at any sample: whether an `s` is not zero.
+    fn holds_input(&self) -> bool {
+        true
+    }
+
+    /// Whether `a` and `b` are the same at every sample, and the rows with a target of `c` and `d`
+    /// as well, so that only weights and penalties vary.
+    fn has_constant_plant(&self) -> bool {
+        self.constant() == (0..self.n_samples())
+    }
 }
 
-/// A problem with a penalty on how fast the input's change varies.
-///
-/// Adds `sum_{k>=1} |v_k - v_{k-1}|^2_W`. The change one sample ago joins the state, and `m` more
-/// outputs with target 0 carry the penalty:
-/// `A~ = [A 0; 0 0]`, `B~ = [B; I]`, `C~ = [C 0; 0 -I]`, `D~ = [D; I]`, `Q~ = diag(Q, W)`, `W_0 = 0`.
-///
-/// # Source
-/// - \[haas2016\], Eq. (7) and (10).
-#[derive(Debug)]
-pub struct Rate<S> {
-    /// The problem without the penalty.
-    pub inner: S,
-    /// The weight `W` of each input, the square of `d` in the source.
-    pub weight: f64,
-}
-
-impl<S: Stages> Stages for Rate<S> {
+impl<S: Stages + ?Sized> Stages for &S {
     fn n_samples(&self) -> usize {
-        self.inner.n_samples()
+        (**self).n_samples()
     }
 
     fn n_targets(&self) -> usize {
-        self.inner.n_targets()
+        (**self).n_targets()
     }
 
     fn stage(&self, k: usize) -> Stage {
-        let Stage { a, b, c, d, q, s, r } = self.inner.stage(k);
-        let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
-        let weight = if k == 0 { 0.0 } else { self.weight };
-        let grown = |top: &DMatrix<f64>, rows: usize, cols: usize| {
-            let mut matrix = DMatrix::zeros(top.nrows() + rows, top.ncols() + cols);
-            matrix.view_mut((0, 0), top.shape()).copy_from(top);
-            matrix
-        };
-        let (mut b, mut c, mut d, mut q) =
-            (grown(&b, m, 0), grown(&c, m, m), grown(&d, m, 0), grown(&q, m, m));
-        for i in 0..m {
-            b[(n + i, i)] = 1.0;
-            c[(p + i, n + i)] = -1.0;
-            d[(p + i, i)] = 1.0;
-            q[(p + i, p + i)] = weight;
-        }
-        Stage { a: grown(&a, m, m), b, c, d, q, s, r }
+        (**self).stage(k)
+    }
+
+    fn stage_into(&self, k: usize, stage: &mut Stage) {
+        (**self).stage_into(k, stage);
     }
 
     fn constant(&self) -> Range<usize> {
-        let inner = self.inner.constant();
-        inner.start.max(1)..inner.end.max(1)
+        (**self).constant()
+    }
+
+    fn holds_input(&self) -> bool {
+        (**self).holds_input()
+    }
+
+    fn has_constant_plant(&self) -> bool {
+        (**self).has_constant_plant()
     }
 }

@@ -3,6 +3,22 @@
 //! A [`Weight`] says what one term of the cost is at each sample; the other files build such weights
 //! from what they mean (contour, formation, dynamic filters). Laws, analysis and tuning import it.
 
+mod contour;
+mod coupled;
+mod dynamic;
+mod formation;
+mod gain;
+mod objective;
+mod schedule;
+mod tangent;
 mod weight;
 
+pub use contour::{Contour, ContourTerms};
+pub use coupled::Coupled;
+pub use dynamic::{Dynamic, ErrorFilter};
+pub use formation::Formation;
+pub use gain::Gain;
+pub use objective::Objective;
+pub use schedule::Schedule;
+pub use tangent::tangents;
 pub use weight::Weight;

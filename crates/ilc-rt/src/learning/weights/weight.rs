@@ -40,6 +40,58 @@ impl Weight {
         matches!(self, Self::Scalar(_) | Self::Block(_))
     }
 
+    /// Returns one entry of the weight at sample `k`.
+    ///
+    /// # Panics
+    /// If `k` lies beyond the run; [`Weight::check`] has been passed before.
+    pub fn entry(&self, k: usize, row: usize, col: usize) -> f64 {
+        match self {
+            Self::Block(block) => block[(row, col)],
+            Self::Blocks(blocks) => blocks[k][(row, col)],
+            _ if row != col => 0.0,
+            Self::Scalar(weight) => *weight,
+            Self::PerSample(weights) => weights[k],
+        }
+    }
+
+    /// Returns the weight of some of the channels only.
+    #[must_use]
+    pub fn select(&self, channels: &[usize]) -> Self {
+        let pick = |block: &DMatrix<f64>| {
+            let p = channels.len();
+            DMatrix::from_fn(p, p, |row, col| block[(channels[row], channels[col])])
+        };
+        match self {
+            Self::Block(block) => Self::Block(pick(block)),
+            Self::Blocks(blocks) => Self::Blocks(blocks.iter().map(pick).collect()),
+            _ => self.clone(),
+        }
+    }
+
+    /// Returns whether two channels cost anything together at any sample.
+    pub fn couples(&self, row: usize, col: usize) -> bool {
+        match self {
+            Self::Block(block) => block[(row, col)] != 0.0,
+            Self::Blocks(blocks) => blocks.iter().any(|block| block[(row, col)] != 0.0),
+            _ => false,
+        }
+    }
+
+    /// Returns whether nothing costs anything at any sample.
+    pub fn is_zero(&self) -> bool {
+        match self {
+            Self::Scalar(weight) => *weight == 0.0,
+            Self::PerSample(weights) => weights.iter().all(|weight| *weight == 0.0),
+            Self::Block(block) => block.amax() == 0.0,
+            Self::Blocks(blocks) => blocks.iter().all(|block| block.amax() == 0.0),
+        }
+    }
+
+    /// Returns whether the weight ties any of `p` channels to another.
+    pub fn is_mixed(&self, p: usize) -> bool {
+        (0..p).any(|row| (0..row).any(|col| self.couples(row, col)))
+    }
+
     /// Refuses a weight that does not fit or is not positive semidefinite.
     ///
     /// # Errors

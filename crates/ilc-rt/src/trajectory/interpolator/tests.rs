@@ -15,7 +15,7 @@ fn limits(velocity: f64, acceleration: f64, jerk: f64) -> AxisLimits {
 }
 
 fn segment(to_m: &[f64], feed_m_s: f64) -> PathSegment {
-    PathSegment { to_m: to_m.to_vec(), feed_m_s }
+    PathSegment::line(to_m.to_vec(), feed_m_s)
 }
 
 fn contour(corner: CornerRule, feed: f64) -> PathSpec {
@@ -97,7 +97,7 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
         let mut spec = PathSpec {
             start_m: point(&mut random),
             segments: (0..5)
-                .map(|_| PathSegment { to_m: point(&mut random), feed_m_s: random.log(0.08, 0.4) })
+                .map(|_| PathSegment::line(point(&mut random), random.log(0.08, 0.4)))
                 .collect(),
             corner: CornerRule::ExactStop,
             dwell_before_s: 0.03 * random.unit(),
@@ -282,4 +282,23 @@ fn bad_values_are_refused_one_at_a_time() {
     assert!(broken(&|s| s.segments[0].feed_m_s = 1e-7).contains("samples"));
     assert!(Interpolator::plan(&good, &gantry(), f64::NAN).is_err());
     assert!(Interpolator::plan(&good, &gantry(), 0.0).is_err());
+}
+
+#[test]
+fn a_hold_rests_and_says_when_it_is_over() {
+    let mut hold = Interpolator::hold(&[0.3, -0.1], 4, 1e-3).unwrap();
+    assert_eq!((hold.n_samples(), hold.n_axes()), (4, 2));
+    for k in 0..6 {
+        let setpoint = hold.next();
+        assert_eq!(setpoint.position_m[..2], [0.3, -0.1]);
+        assert_eq!(setpoint.velocity_m_s, [0.0; MAX_AXES]);
+        assert_eq!(setpoint.done, k >= 3);
+    }
+    hold.restart();
+    assert!(!hold.next().done);
+    assert_eq!(hold.reference(), [0.3, -0.1].repeat(4));
+    assert!(Interpolator::hold(&[], 4, 1e-3).is_err());
+    assert!(Interpolator::hold(&[f64::NAN], 4, 1e-3).is_err());
+    assert!(Interpolator::hold(&[0.0], 0, 1e-3).is_err());
+    assert!(Interpolator::hold(&[0.0], 4, 0.0).is_err());
 }

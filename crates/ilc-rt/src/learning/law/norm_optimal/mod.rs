@@ -1,57 +1,35 @@
 //! Norm-optimal learning: the input that a quadratic cost over the whole run asks for.
 
-mod decouple;
+mod cost;
+pub(super) mod decouple;
 #[cfg(test)]
 mod oracle;
 mod pairing;
+pub(super) mod plant;
+pub(super) mod relative_degree;
+
+pub use cost::{Cost, Weights};
+pub use pairing::Paired;
+pub use plant::Plant;
 
 use crate::learning::error::check;
-use crate::learning::sweep::{self, FactorError, Gains, General, Rate, Run, Sweep};
-use crate::learning::{Law, LearningError};
-use crate::model::{ModelError, StateSpace};
+use crate::learning::sweep::{self, Channels, FactorError, Form, Gains, Rate, Run, Stages, Sweep};
+use crate::learning::{Law, LearningError, Structure};
+use crate::model::StateSpace;
 
 use decouple::{Part, parts};
-use pairing::Paired;
 
-/// What a good next input is.
+/// Norm-optimal learning, exact and in linear time.
 ///
-/// `J = sum_k q |z[k]|^2 + s |u'[k]|^2 + r |v[k]|^2 + sum_{k>=1} rate^2 |v[k] - v[k-1]|^2`
-///
-/// with `z` the predicted error, `u'` the next input and `v` its change; each number holds for every
-/// channel.
-///
-/// # Units
-/// - only the ratios matter; with error and input in metres all four are numbers without unit
-/// # Source
-/// - \[barton2010\], Eq. (3.13): `q`, `s`, `r`; \[haas2016\], Eq. (7): `rate`, there `d`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Weights {
-    /// Weight of the predicted error.
-    pub q: f64,
-    /// Weight of the next input: keeps it small, at the price of an error that stays.
-    pub s: f64,
-    /// Weight of the change of the input: slows learning down, and evens noise out.
-    pub r: f64,
-    /// Weight of the change from one sample to the next: keeps the input smooth. Enters squared.
-    pub rate: f64,
-}
-
-impl Default for Weights {
-    fn default() -> Self {
-        Self { q: 1.0, s: 0.0, r: 0.0, rate: 0.0 }
-    }
-}
-
-/// Norm-optimal learning for a time-invariant model, exact and in linear time.
-///
-/// `u_{j+1} = u_j + argmin_v J(v)` with `z = e_j - P v`, `P` the lifted operator of the model.
+/// `u_{j+1} = u_j + argmin_v J(v)` with `z = e_j - P v`, `P` the lifted operator of the model,
+/// which may vary along the run as the weights may.
 ///
 /// With `s = r = 0` and `rate = d` this is convex-optimisation learning. The law pairs `e[k + l]`
 /// with `u[k]`, where `l` is the first Markov parameter of that output that is not zero: 1 for an
 /// axis without delay, 1 more for each sample of delay in the model. So the last `l` samples of the
 /// input reach nothing within the run: there `s`, `r` and `rate` alone decide (with `rate` alone the
 /// change is held at its last useful value), and if all three are zero the input stays as it was.
-/// Axes that do not act on each other are solved one by one.
+/// Axes that neither act on each other nor cost anything together are solved one by one.
 ///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
@@ -65,79 +43,152 @@ pub struct NormOptimal {
     n_samples: usize,
     n_inputs: usize,
     n_outputs: usize,
-    weights: Weights,
+    weights: String,
+    /// Model and weights, where one model and four numbers say it all.
+    plain: Option<(StateSpace, Weights)>,
+    conditioning: f64,
     parts: Vec<Box<dyn Sweep>>,
 }
 
 impl NormOptimal {
     /// Makes the law: factorises the problem for runs of `n_samples` samples.
     ///
+    /// `model` is a [`StateSpace`](crate::model::StateSpace) or a
+    /// [`TimeVarying`](crate::model::TimeVarying), `weights` are [`Weights`] or a [`Cost`].
+    ///
     /// # Errors
     /// - [`LearningError::Parameter`] for a weight that is negative or not finite.
+    /// - [`LearningError::Weight`] for a weight that does not fit or is not positive semidefinite.
     /// - [`LearningError::Empty`] for no samples, or a model without inputs or outputs.
     /// - [`LearningError::Undetermined`] if `s`, `r` and `rate` are zero and the model does not
     ///   determine the input.
     /// - [`LearningError::Unbounded`] if they are zero and the model's inverse is unstable.
-    /// - [`LearningError::Model`] for a continuous model.
-    pub fn new(
-        model: &StateSpace,
+    /// - [`LearningError::Model`] for a continuous model, or one with another number of samples.
+    pub fn new<'a>(
+        model: impl Into<Plant<'a>>,
         n_samples: usize,
-        weights: Weights,
+        weights: impl Into<Cost>,
     ) -> Result<Self, LearningError> {
-        if model.dt_s().is_none() {
-            return Err(ModelError::Continuous { action: "norm-optimal learning" }.into());
+        Self::with_form(model, n_samples, weights, Form::default())
+    }
+
+    /// [`NormOptimal::new`] with the recursion in another form: for problems in which a weight is so
+    /// small that [`NormOptimal::conditioning`] calls for a square-root form.
+    ///
+    /// # Errors
+    /// - as [`NormOptimal::new`].
+    pub fn with_form<'a>(
+        model: impl Into<Plant<'a>>,
+        n_samples: usize,
+        weights: impl Into<Cost>,
+        form: Form,
+    ) -> Result<Self, LearningError> {
+        let (plant, cost) = (model.into(), weights.into());
+        let none = |what| Err(LearningError::Empty { what });
+        if n_samples == 0 {
+            return none("n_samples");
         }
-        let Weights { q, s, r, rate } = weights;
-        for (what, value) in [("q", q), ("s", s), ("r", r), ("rate", rate)] {
-            if !(value.is_finite() && value >= 0.0) {
-                let allowed = "a weight must be finite and not negative";
-                return Err(LearningError::Parameter { what, value, allowed });
+        plant.check(n_samples)?;
+        let (n_inputs, n_outputs) = (plant.at(0).n_inputs(), plant.at(0).n_outputs());
+        if n_inputs == 0 {
+            return none("n_inputs");
+        }
+        if n_outputs == 0 {
+            return none("n_outputs");
+        }
+        cost.check(n_samples, n_inputs, n_outputs)?;
+        let mut law = Self {
+            n_samples,
+            n_inputs,
+            n_outputs,
+            weights: cost.json(),
+            plain: plant.invariant().cloned().zip(cost.scalars()),
+            conditioning: 1.0,
+            parts: Vec::new(),
+        };
+        for Part { plant, cost, inputs, outputs } in parts(plant, &cost)? {
+            let (told, rate) = (cost.told(), cost.rate);
+            let paired = Paired::new(plant.borrow(), n_samples, cost)?;
+            let channels = Channels { inputs, outputs, shifts: paired.shifts().to_vec() };
+            let free_samples = paired.free_samples();
+            if rate > 0.0 {
+                let rated = Rate { inner: paired, weight: rate * rate };
+                law.add(&rated, channels, free_samples, form, &told)?;
+            } else {
+                law.add(&paired, channels, free_samples, form, &told)?;
             }
         }
-        let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
-        for (what, count) in
-            [("n_samples", n_samples), ("n_inputs", n_inputs), ("n_outputs", n_outputs)]
-        {
-            if count == 0 {
-                return Err(LearningError::Empty { what });
-            }
+        Ok(law)
+    }
+
+    /// Makes the law of any tracking problem, with all channels of the machine in one group.
+    ///
+    /// `shifts` says for each output how many samples ahead of the input its error is taken;
+    /// `free_samples` as in [`Gains::new`]; `told` describes the weights, for errors.
+    ///
+    /// # Errors
+    /// - [`LearningError::Empty`], [`LearningError::Undetermined`] or [`LearningError::Unbounded`].
+    pub fn from_stages(
+        stages: &impl Stages,
+        shifts: &[usize],
+        free_samples: usize,
+        told: &str,
+    ) -> Result<Self, LearningError> {
+        if stages.n_samples() == 0 {
+            return Err(LearningError::Empty { what: "n_samples" });
         }
-        let parts = parts(model)?
-            .into_iter()
-            .map(|part| solver(part, n_samples, weights))
-            .collect::<Result<_, _>>()?;
-        Ok(Self { n_samples, n_inputs, n_outputs, weights, parts })
+        let n_inputs = stages.stage(0).n_inputs();
+        let n_outputs = stages.n_targets();
+        let channels = Channels {
+            inputs: (0..n_inputs).collect(),
+            outputs: (0..n_outputs).collect(),
+            shifts: shifts.to_vec(),
+        };
+        let mut law = Self {
+            n_samples: stages.n_samples(),
+            n_inputs,
+            n_outputs,
+            weights: format!(r#""weights":{told:?}"#),
+            plain: None,
+            conditioning: 1.0,
+            parts: Vec::new(),
+        };
+        law.add(stages, channels, free_samples, Form::default(), told)?;
+        Ok(law)
+    }
+
+    /// Factorises one group of channels.
+    fn add(
+        &mut self,
+        stages: &impl Stages,
+        channels: Channels,
+        free_samples: usize,
+        form: Form,
+        told: &str,
+    ) -> Result<(), LearningError> {
+        let weights = || told.to_owned();
+        let gains = Gains::with_form(stages, free_samples, form).map_err(|error| match error {
+            FactorError::Undetermined { sample } => {
+                LearningError::Undetermined { weights: weights(), sample }
+            }
+            FactorError::Unbounded => LearningError::Unbounded { weights: weights() },
+        })?;
+        self.conditioning = self.conditioning.min(gains.conditioning());
+        self.parts.push(sweep::solver(gains, channels));
+        Ok(())
+    }
+
+    /// Returns how well the weights determine the input: the smallest part of the cost of any
+    /// direction of the input that no other direction explains, over the largest. With less than
+    /// about `1e-12` only noise decides on part of the input.
+    pub fn conditioning(&self) -> f64 {
+        self.conditioning
     }
 
     /// Returns the number of groups of axes that are solved by themselves.
     pub fn n_parts(&self) -> usize {
         self.parts.len()
     }
-}
-
-/// Factorises one group of coupled axes.
-fn solver(part: Part, n_samples: usize, weights: Weights) -> Result<Box<dyn Sweep>, LearningError> {
-    let Weights { s, r, rate, .. } = weights;
-    let paired = Paired::new(&part.model, n_samples, weights)?;
-    let channels = sweep::Channels {
-        inputs: part.inputs,
-        outputs: part.outputs,
-        shifts: paired.shifts().to_vec(),
-    };
-    let free_samples = paired.free_samples();
-    let gains = if rate > 0.0 {
-        Gains::new(&Rate { inner: paired, weight: rate * rate }, free_samples)
-    } else {
-        Gains::new(&paired, free_samples)
-    };
-    let gains = gains.map_err(|error| match error {
-        FactorError::Undetermined { sample } => LearningError::Undetermined { s, r, rate, sample },
-        FactorError::Unbounded => LearningError::Unbounded { s, r, rate },
-    })?;
-    Ok(match sweep::single(&gains, &channels) {
-        Some(solver) => solver,
-        None => Box::new(General::new(gains, channels)),
-    })
 }
 
 impl Law for NormOptimal {
@@ -161,12 +212,19 @@ impl Law for NormOptimal {
         check("next", run.next, n_samples, n_inputs)
     }
 
+    fn structure(&self) -> Structure<'_> {
+        self.plain.as_ref().map_or(Structure::Unknown, |(model, weights)| Structure::Optimal {
+            model,
+            weights: *weights,
+        })
+    }
+
     fn reset(&mut self) {}
 
     fn describe(&self) -> String {
-        let Weights { q, s, r, rate } = self.weights;
+        let Self { weights, .. } = self;
         format!(
-            r#"{{"law":"norm_optimal","q":{q},"s":{s},"r":{r},"rate":{rate},"n_samples":{},"n_inputs":{},"n_outputs":{}}}"#,
+            r#"{{"law":"norm_optimal",{weights},"n_samples":{},"n_inputs":{},"n_outputs":{}}}"#,
             self.n_samples, self.n_inputs, self.n_outputs
         )
     }

@@ -5,7 +5,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::learning::law::flexible::{Flexible, TableShape};
-use crate::learning::law::pd::{Pd, PdGains, QFilter};
+use crate::learning::law::pd::{Pd, PdGains};
+use crate::learning::law::q_filter::QFilter;
 use crate::model::{Method, StateSpace, discretize, from_transfer_function};
 use crate::signal::butterworth;
 

@@ -1,5 +1,5 @@
-//! Contour error: how far measured points are from the path, wherever on it they should have been.
-//! Cold.
+//! Contour error near a point's own time: how far measured points are from where they should have
+//! been, give or take a window. Cold.
 
 /// Distance of each measured point to the path near its own time.
 ///

@@ -1,11 +1,12 @@
-//! Filters: `ButterworthFilter`, `butterworth`, `zero_phase`.
+//! `ButterworthFilter`, `butterworth`.
 
-use ilc_rt::learning::law::pd::QFilter;
-use ilc_rt::signal::{self, Section, SosFilter, ZeroPhase};
+use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::signal::{self, Section, SosFilter};
 use numpy::IntoPyArray;
 use numpy::ndarray::Array2;
 use pyo3::prelude::*;
 
+use super::filtered;
 use crate::argument::{Signal, give_signal};
 use crate::detached::detached;
 use crate::error::OrRaise;
@@ -134,13 +135,7 @@ impl PyButterworthFilter {
         py: Python<'py>,
         x: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let mut x = Signal::read("x", x)?;
-        let mut filter = ZeroPhase::new(self.sections.clone(), x.n_samples).or_raise()?;
-        detached(py, || {
-            (0..x.n_channels).try_for_each(|i| filter.apply(&mut x.values, i, x.n_channels))
-        })
-        .or_raise()?;
-        give_signal(py, x.values, x.n_channels, x.is_flat)
+        filtered(py, &QFilter::ZeroPhase(self.sections.clone()), x)
     }
 
     fn __repr__(&self) -> String {
@@ -182,54 +177,11 @@ impl PyButterworthFilter {
 /// ButterworthFilter(order=2, cutoff_hz=50, dt_s=0.002, causal=False)
 #[pyfunction]
 #[pyo3(signature = (order, cutoff_hz, dt_s, causal=false))]
-fn butterworth(
+pub(super) fn butterworth(
     order: usize,
     cutoff_hz: f64,
     dt_s: f64,
     causal: bool,
 ) -> PyResult<PyButterworthFilter> {
     PyButterworthFilter::new(order, cutoff_hz, dt_s, causal)
-}
-
-/// Return a signal filtered forward and backward, without lag.
-///
-/// Parameters
-/// ----------
-/// filter : ButterworthFilter
-///     Filter of one pass.
-/// x : ndarray of float64, shape (n_samples,) or (n_samples, n_channels)
-///     Signal.
-///
-/// Returns
-/// -------
-/// ndarray of float64, same shape
-///     Filtered signal.
-///
-/// Raises
-/// ------
-/// SignalError
-///     If the signal is too short to be extended at its ends.
-/// ValueError, TypeError
-///     If `x` has the wrong shape, dtype or a number that is not finite.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np
-/// >>> from ilc_rt import signal
-/// >>> smooth = signal.zero_phase(signal.butterworth(2, 50.0, 0.002), np.ones(100))
-/// >>> bool(np.allclose(smooth, 1.0))
-/// True
-#[pyfunction]
-fn zero_phase<'py>(
-    py: Python<'py>,
-    filter: &Bound<'py, PyButterworthFilter>,
-    x: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    filter.get().zero_phase(py, x)
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyButterworthFilter>()?;
-    module.add_function(wrap_pyfunction!(butterworth, module)?)?;
-    module.add_function(wrap_pyfunction!(zero_phase, module)?)
 }

@@ -1,0 +1,33 @@
+"""A run of a million samples: time and memory of one update, as figures on standard output."""
+
+from __future__ import annotations
+
+import json
+import resource
+
+import numpy as np
+from problem import R, axis, median_s
+
+from ilc_rt import NormOptimalIlc
+
+
+def peak_mb() -> float:
+    """Return the largest memory that this process ever had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def main() -> None:
+    """Print the median seconds and the memory over that of input and error themselves."""
+    n_samples = 1_000_000
+    u, e = np.zeros(n_samples), np.sin(0.01 * np.arange(n_samples))
+    law = NormOptimalIlc(axis(), 100, r=R)
+    law.update(u[:100], e[:100])
+    before = peak_mb()
+    law = NormOptimalIlc(axis(), n_samples, r=R)
+    law.update(u, e)
+    after = peak_mb()
+    print(json.dumps({"seconds": median_s(lambda: law.update(u, e)), "mb": after - before}))
+
+
+if __name__ == "__main__":
+    main()

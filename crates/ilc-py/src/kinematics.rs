@@ -1,0 +1,387 @@
+//! Mechanisms: `Delta`, `Gantry`.
+
+use ilc_rt::kinematics::{Delta, Gantry, KinematicsError};
+use numpy::IntoPyArray;
+use numpy::ndarray::{Array2, Array3};
+use pyo3::prelude::*;
+
+use crate::argument::{Signal, give_signal, misfit};
+use crate::error::OrRaise;
+use crate::exceptions;
+
+/// Three-leg parallel mechanism.
+///
+/// Cranks at 0, 120 and 240 degrees around a base, each with a rod to the tool,
+/// which stands above the knees:
+/// ``|p - k_i| = rod``, ``k_i = Rz(phi_i) (base + crank cos theta_i, 0, crank sin theta_i)``
+///
+/// Parameters
+/// ----------
+/// base_m : float
+///     Radius at which the cranks turn, less the radius at which the rods are
+///     fixed to the tool, in m.
+/// crank_m : float
+///     Length of a crank in m.
+/// rod_m : float
+///     Length of a rod in m.
+///
+/// Raises
+/// ------
+/// KinematicsError
+///     If the lengths make no mechanism.
+///
+/// References
+/// ----------
+/// [barton2010], Ch. 7, with the lengths of App. C as defaults.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from ilc_rt.kinematics import Delta
+/// >>> delta = Delta()
+/// >>> theta_rad = delta.inverse([0.01, 0.0, 0.18])
+/// >>> bool(np.allclose(delta.forward(theta_rad), [0.01, 0.0, 0.18]))
+/// True
+#[pyclass(name = "Delta", module = "ilc_rt.kinematics", frozen)]
+#[derive(Debug)]
+struct PyDelta {
+    delta: Delta,
+}
+
+#[pymethods]
+impl PyDelta {
+    #[new]
+    #[pyo3(signature = (base_m=0.037, crank_m=0.060, rod_m=0.145))]
+    fn new(base_m: f64, crank_m: f64, rod_m: f64) -> PyResult<Self> {
+        Ok(Self { delta: Delta::new(base_m, crank_m, rod_m).or_raise()? })
+    }
+
+    /// Base radius in m.
+    #[getter]
+    fn base_m(&self) -> f64 {
+        self.delta.lengths_m()[0]
+    }
+
+    /// Crank length in m.
+    #[getter]
+    fn crank_m(&self) -> f64 {
+        self.delta.lengths_m()[1]
+    }
+
+    /// Rod length in m.
+    #[getter]
+    fn rod_m(&self) -> f64 {
+        self.delta.lengths_m()[2]
+    }
+
+    /// Return where the tool is.
+    ///
+    /// Parameters
+    /// ----------
+    /// theta_rad : ndarray of float64, shape (3,) or (n_samples, 3)
+    ///     Crank angles in rad.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, same shape
+    ///     Tool positions in m.
+    ///
+    /// Raises
+    /// ------
+    /// KinematicsError
+    ///     If the rods do not meet; it names the angles and the sample.
+    /// ValueError, TypeError
+    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    fn forward<'py>(
+        &self,
+        py: Python<'py>,
+        theta_rad: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut poses = Poses::read("theta_rad", theta_rad)?;
+        poses.each(|joints| self.delta.forward(joints))?;
+        poses.give(py)
+    }
+
+    /// Return the crank angles that bring the tool to a place, knees outward.
+    ///
+    /// Parameters
+    /// ----------
+    /// p_m : ndarray of float64, shape (3,) or (n_samples, 3)
+    ///     Tool positions in m.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, same shape
+    ///     Crank angles in rad.
+    ///
+    /// Raises
+    /// ------
+    /// KinematicsError
+    ///     If a pose is out of reach; it names the pose, the leg and the sample.
+    /// ValueError, TypeError
+    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    fn inverse<'py>(
+        &self,
+        py: Python<'py>,
+        p_m: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut poses = Poses::read("p_m", p_m)?;
+        poses.each(|pose| self.delta.inverse(pose))?;
+        poses.give(py)
+    }
+
+    /// Return how crank velocities become tool velocities, in m/rad.
+    ///
+    /// Parameters
+    /// ----------
+    /// theta_rad : ndarray of float64, shape (3,) or (n_samples, 3)
+    ///     Crank angles in rad.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (3, 3) or (n_samples, 3, 3)
+    ///     Jacobians, ``dp = J dtheta``.
+    ///
+    /// Raises
+    /// ------
+    /// KinematicsError
+    ///     If the rods do not meet, or the mechanism is singular there.
+    /// ValueError, TypeError
+    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        theta_rad: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let poses = Poses::read("theta_rad", theta_rad)?;
+        let mut rows = Vec::with_capacity(poses.values.len());
+        for (sample, joints) in poses.values.iter().enumerate() {
+            let jacobian = self.delta.jacobian(*joints);
+            rows.push(jacobian.map_err(|error| poses.raise(&error, sample))?);
+        }
+        if poses.is_single {
+            let jacobian = Array2::from_shape_fn((3, 3), |(row, col)| rows[0][row][col]);
+            return Ok(jacobian.into_pyarray(py).into_any());
+        }
+        let jacobians =
+            Array3::from_shape_fn((rows.len(), 3, 3), |(k, row, col)| rows[k][row][col]);
+        Ok(jacobians.into_pyarray(py).into_any())
+    }
+
+    /// Return whether the tool can be at a place and move on in every direction.
+    ///
+    /// Parameters
+    /// ----------
+    /// p_m : ndarray of float64, shape (3,)
+    ///     Tool position in m.
+    ///
+    /// Returns
+    /// -------
+    /// bool
+    ///     False where it is out of reach or singular.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    fn in_workspace(&self, p_m: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let poses = Poses::read("p_m", p_m)?;
+        Ok(poses.values.iter().all(|pose| self.delta.is_in_workspace(*pose)))
+    }
+
+    /// Return how unevenly the cranks move the tool.
+    ///
+    /// Parameters
+    /// ----------
+    /// theta_rad : ndarray of float64, shape (3,)
+    ///     Crank angles in rad.
+    ///
+    /// Returns
+    /// -------
+    /// float
+    ///     Largest over smallest singular value of the Jacobian; 1 is even.
+    ///
+    /// Raises
+    /// ------
+    /// KinematicsError
+    ///     As `jacobian`.
+    /// ValueError, TypeError
+    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    fn condition(&self, theta_rad: &Bound<'_, PyAny>) -> PyResult<f64> {
+        let poses = Poses::read("theta_rad", theta_rad)?;
+        if !poses.is_single {
+            return Err(misfit("theta_rad", &[poses.values.len(), 3], "(3,)"));
+        }
+        self.delta.condition(poses.values[0]).or_raise()
+    }
+
+    fn __repr__(&self) -> String {
+        let [base_m, crank_m, rod_m] = self.delta.lengths_m();
+        format!("Delta(base_m={base_m}, crank_m={crank_m}, rod_m={rod_m})")
+    }
+}
+
+/// Gantry whose second axis is out of square.
+///
+/// ``x_tool = x + orthogonality_rad y``, ``y_tool = y``
+///
+/// Parameters
+/// ----------
+/// orthogonality_rad : float
+///     Error of the right angle in rad.
+///
+/// Raises
+/// ------
+/// KinematicsError
+///     If the angle is not a number.
+///
+/// References
+/// ----------
+/// [haas2016], Sect. 4.
+///
+/// Examples
+/// --------
+/// >>> from ilc_rt.kinematics import Gantry
+/// >>> Gantry(0.002).forward([0.0, 1.0])
+/// array([0.002, 1.   ])
+#[pyclass(name = "Gantry", module = "ilc_rt.kinematics", frozen)]
+#[derive(Debug)]
+struct PyGantry {
+    gantry: Gantry,
+}
+
+#[pymethods]
+impl PyGantry {
+    #[new]
+    #[pyo3(signature = (orthogonality_rad=0.0))]
+    fn new(orthogonality_rad: f64) -> PyResult<Self> {
+        Ok(Self { gantry: Gantry::new(orthogonality_rad).or_raise()? })
+    }
+
+    /// Error of the right angle in rad.
+    #[getter]
+    fn orthogonality_rad(&self) -> f64 {
+        self.gantry.orthogonality_rad()
+    }
+
+    /// Return where the tool is.
+    ///
+    /// Parameters
+    /// ----------
+    /// axes_m : ndarray of float64, shape (2,) or (n_samples, 2)
+    ///     Axis positions in m.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, same shape
+    ///     Tool positions in m.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    fn forward<'py>(
+        &self,
+        py: Python<'py>,
+        axes_m: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        pairs(py, "axes_m", axes_m, |axes| self.gantry.forward(axes))
+    }
+
+    /// Return the axis positions that bring the tool to a place.
+    ///
+    /// Parameters
+    /// ----------
+    /// tool_m : ndarray of float64, shape (2,) or (n_samples, 2)
+    ///     Tool positions in m.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, same shape
+    ///     Axis positions in m.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    fn inverse<'py>(
+        &self,
+        py: Python<'py>,
+        tool_m: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        pairs(py, "tool_m", tool_m, |tool| self.gantry.inverse(tool))
+    }
+
+    /// Return how axis velocities become tool velocities.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (2, 2)
+    ///     Jacobian; the same everywhere.
+    fn jacobian<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        let rows = self.gantry.jacobian();
+        Array2::from_shape_fn((2, 2), |(row, col)| rows[row][col]).into_pyarray(py).into_any()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Gantry(orthogonality_rad={})", self.gantry.orthogonality_rad())
+    }
+}
+
+/// One triple, or one a sample.
+struct Poses {
+    values: Vec<[f64; 3]>,
+    is_single: bool,
+}
+
+impl Poses {
+    fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let signal = Signal::read(name, object)?;
+        let is_single = signal.is_flat;
+        let coordinates = if is_single { signal.n_samples } else { signal.n_channels };
+        if coordinates != 3 {
+            return Err(misfit(name, &signal.shape(), "(3,) or (n_samples, 3)"));
+        }
+        Ok(Self { values: signal.values.as_chunks().0.to_vec(), is_single })
+    }
+
+    fn each(
+        &mut self,
+        map: impl Fn([f64; 3]) -> Result<[f64; 3], KinematicsError>,
+    ) -> PyResult<()> {
+        for sample in 0..self.values.len() {
+            let mapped = map(self.values[sample]);
+            self.values[sample] = mapped.map_err(|error| self.raise(&error, sample))?;
+        }
+        Ok(())
+    }
+
+    fn raise(&self, error: &KinematicsError, sample: usize) -> PyErr {
+        let place = if self.is_single { String::new() } else { format!("sample {sample}: ") };
+        exceptions::KinematicsError::new_err(format!("{place}{error}"))
+    }
+
+    fn give(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        give_signal(py, self.values.concat(), 3, self.is_single)
+    }
+}
+
+fn pairs<'py>(
+    py: Python<'py>,
+    name: &str,
+    object: &Bound<'py, PyAny>,
+    map: impl Fn([f64; 2]) -> [f64; 2],
+) -> PyResult<Bound<'py, PyAny>> {
+    let signal = Signal::read(name, object)?;
+    let coordinates = if signal.is_flat { signal.n_samples } else { signal.n_channels };
+    if coordinates != 2 {
+        return Err(misfit(name, &signal.shape(), "(2,) or (n_samples, 2)"));
+    }
+    let mapped: Vec<f64> = signal.values.as_chunks().0.iter().flat_map(|pair| map(*pair)).collect();
+    give_signal(py, mapped, 2, signal.is_flat)
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyDelta>()?;
+    module.add_class::<PyGantry>()
+}

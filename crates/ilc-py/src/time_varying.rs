@@ -1,0 +1,212 @@
+//! `TimeVarying`.
+
+use ilc_rt::model::{StateSpace, TimeVarying};
+use numpy::IntoPyArray;
+use numpy::ndarray::Array3;
+use pyo3::prelude::*;
+
+use crate::argument::{Matrix, Signal, give_signal, misfit, read_array, read_vector};
+use crate::detached::detached;
+use crate::error::OrRaise;
+
+/// Linear model whose matrices vary along the run.
+///
+/// ``x[k+1] = A[k] x[k] + B[k] u[k]``, ``y[k] = C[k] x[k] + D[k] u[k]``.
+///
+/// Parameters
+/// ----------
+/// a : array_like, shape (n_samples, n_states, n_states)
+///     State matrices.
+/// b : array_like, shape (n_samples, n_states, n_inputs)
+///     Input matrices.
+/// c : array_like, shape (n_samples, n_outputs, n_states)
+///     Output matrices.
+/// d : array_like, shape (n_samples, n_outputs, n_inputs)
+///     Feedthrough matrices.
+/// dt_s : float
+///     Sample time in seconds.
+///
+/// Raises
+/// ------
+/// ModelError
+///     If there is no sample or the sample time is not positive.
+/// ValueError, TypeError
+///     If a matrix has the wrong shape, holds a number that is not finite, or is
+///     not of real numbers.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from ilc_rt import TimeVarying
+/// >>> one = np.ones((3, 1, 1))
+/// >>> c = np.array([1.0, 2.0, 10.0]).reshape(3, 1, 1)
+/// >>> TimeVarying(0.5 * one, one, c, 0 * one, 0.001).simulate(np.array([1.0, 0.0, 0.0]))
+/// array([0., 2., 5.])
+#[pyclass(name = "TimeVarying", module = "ilc_rt", frozen)]
+#[derive(Debug)]
+pub(crate) struct PyTimeVarying(TimeVarying);
+
+impl PyTimeVarying {
+    pub(crate) fn model(&self) -> &TimeVarying {
+        &self.0
+    }
+
+    fn give<'py>(
+        &self,
+        py: Python<'py>,
+        part: impl Fn(&StateSpace) -> &Matrix,
+    ) -> Bound<'py, PyAny> {
+        let (rows, cols) = part(self.0.at(0)).shape();
+        Array3::from_shape_fn((self.0.n_samples(), rows, cols), |(k, row, col)| {
+            part(self.0.at(k))[(row, col)]
+        })
+        .into_pyarray(py)
+        .into_any()
+    }
+}
+
+/// One matrix a sample.
+fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, [usize; 3])> {
+    let (values, shape) = read_array(name, object)?;
+    match shape[..] {
+        [n_samples, rows, cols] => Ok((values, [n_samples, rows, cols])),
+        _ => Err(misfit(name, &shape, "three axes, (n_samples, rows, columns)")),
+    }
+}
+
+#[pymethods]
+impl PyTimeVarying {
+    #[new]
+    fn new(
+        a: &Bound<'_, PyAny>,
+        b: &Bound<'_, PyAny>,
+        c: &Bound<'_, PyAny>,
+        d: &Bound<'_, PyAny>,
+        dt_s: f64,
+    ) -> PyResult<Self> {
+        let (a, b) = (read_matrices("a", a)?, read_matrices("b", b)?);
+        let (c, d) = (read_matrices("c", c)?, read_matrices("d", d)?);
+        let ([n_samples, n, _], [_, _, m], [_, p, _]) = (a.1, b.1, c.1);
+        for (name, (_, shape), needed) in [
+            ("a", &a, [n_samples, n, n]),
+            ("b", &b, [n_samples, n, m]),
+            ("c", &c, [n_samples, p, n]),
+            ("d", &d, [n_samples, p, m]),
+        ] {
+            if *shape != needed {
+                let [n_samples, rows, cols] = needed;
+                return Err(misfit(name, shape, &format!("({n_samples}, {rows}, {cols})")));
+            }
+        }
+        let at = |(values, [_, rows, cols]): &(Vec<f64>, [usize; 3]), k: usize| {
+            let size = rows * cols;
+            Matrix::from_row_slice(*rows, *cols, &values[k * size..(k + 1) * size])
+        };
+        let samples: Result<Vec<_>, _> = (0..n_samples)
+            .map(|k| StateSpace::discrete(at(&a, k), at(&b, k), at(&c, k), at(&d, k), dt_s))
+            .collect();
+        TimeVarying::new(samples.or_raise()?).or_raise().map(Self)
+    }
+
+    /// State matrices, shape (n_samples, n_states, n_states).
+    #[getter]
+    fn a<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        self.give(py, StateSpace::a)
+    }
+
+    /// Input matrices, shape (n_samples, n_states, n_inputs).
+    #[getter]
+    fn b<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        self.give(py, StateSpace::b)
+    }
+
+    /// Output matrices, shape (n_samples, n_outputs, n_states).
+    #[getter]
+    fn c<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        self.give(py, StateSpace::c)
+    }
+
+    /// Feedthrough matrices, shape (n_samples, n_outputs, n_inputs).
+    #[getter]
+    fn d<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        self.give(py, StateSpace::d)
+    }
+
+    /// Sample time in seconds.
+    #[getter]
+    fn dt_s(&self) -> Option<f64> {
+        self.0.dt_s()
+    }
+
+    /// Number of samples of the run.
+    #[getter]
+    fn n_samples(&self) -> usize {
+        self.0.n_samples()
+    }
+
+    /// Number of states.
+    #[getter]
+    fn n_states(&self) -> usize {
+        self.0.n_states()
+    }
+
+    /// Number of inputs.
+    #[getter]
+    fn n_inputs(&self) -> usize {
+        self.0.n_inputs()
+    }
+
+    /// Number of outputs.
+    #[getter]
+    fn n_outputs(&self) -> usize {
+        self.0.n_outputs()
+    }
+
+    /// Return the output that an input produces.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : ndarray of float64, shape (n_samples,) or (n_samples, n_inputs)
+    ///     Input.
+    /// x0 : array_like or None, shape (n_states,)
+    ///     State at the first sample; zero if None.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (n_samples,) or (n_samples, n_outputs)
+    ///     Output; without channel axis if `u` has none and there is one output.
+    ///
+    /// Raises
+    /// ------
+    /// ModelError
+    ///     If `x0` does not fit.
+    /// ValueError, TypeError
+    ///     If `u` has the wrong shape, dtype or a number that is not finite.
+    #[pyo3(signature = (u, x0=None))]
+    fn simulate<'py>(
+        &self,
+        py: Python<'py>,
+        u: &Bound<'py, PyAny>,
+        x0: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let u = Signal::read("u", u)?
+            .with_samples("u", self.0.n_samples())?
+            .with_channels("u", self.0.n_inputs())?;
+        let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
+        let y = detached(py, || self.0.simulate(&u.values, x0.as_deref())).or_raise()?;
+        let n_outputs = self.0.n_outputs();
+        give_signal(py, y, n_outputs, u.is_flat && n_outputs == 1)
+    }
+
+    fn __repr__(&self) -> String {
+        let (n, m, p) = (self.0.n_states(), self.0.n_inputs(), self.0.n_outputs());
+        let (n_samples, dt_s) = (self.0.n_samples(), self.0.dt_s().unwrap_or_default());
+        format!(
+            "TimeVarying(n_samples={n_samples}, n_states={n}, n_inputs={m}, n_outputs={p}, dt_s={dt_s})"
+        )
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyTimeVarying>()
+}

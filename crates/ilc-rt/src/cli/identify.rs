@@ -1,0 +1,215 @@
+//! `ilc-rt identify`: an experiment with one axis, and the model that comes of it.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::figures::FiguresFile;
+use super::run::{MeasureName, exit_status, open, say_event, stop_on_signals};
+use super::{EXIT_BAD_INPUT, show};
+use crate::config::Measure;
+use crate::library::Library;
+use crate::model::identify::{Excitation, Waveform};
+use crate::record::{EndStatus, Event};
+use crate::supervisor::{
+    self, Disturbance, Experiment, Identified, Options, Outcome, SupervisorError,
+};
+
+#[derive(Args)]
+#[command(after_help = "Examples:
+  ilc-rt identify gantry.toml --axis x
+  ilc-rt identify gantry.toml --axis x --amplitude 0.0002 --from-hz 1 --to-hz 40 --json x.json")]
+pub(super) struct IdentifyArguments {
+    /// Cell description.
+    cell: PathBuf,
+    /// Name of the axis.
+    #[arg(long)]
+    axis: String,
+    /// What the axis is excited with.
+    #[arg(long, value_enum, default_value = "multisine")]
+    waveform: WaveformName,
+    /// Peak of the excitation, m (csp) or m/s (csv); half of what the limits allow if not given.
+    #[arg(long)]
+    amplitude: Option<f64>,
+    /// Lowest frequency.
+    #[arg(long, default_value_t = 1.0)]
+    from_hz: f64,
+    /// Highest frequency.
+    #[arg(long, default_value_t = 50.0)]
+    to_hz: f64,
+    /// Length of a period.
+    #[arg(long, default_value_t = 8.0)]
+    period_s: f64,
+    /// Periods that are evaluated.
+    #[arg(long, default_value_t = 5)]
+    periods: usize,
+    /// Where the axis is excited, instead of the program's start.
+    #[arg(long, allow_negative_numbers = true)]
+    at_m: Option<f64>,
+    /// Bus instead of the cell's: can:IFACE, udp:GROUP[:PORT], zenoh:KEY.
+    #[arg(long, value_name = "ADDRESS")]
+    bus: Option<String>,
+    /// Measurement to look at instead of the cell's.
+    #[arg(long, value_enum)]
+    measure: Option<MeasureName>,
+    /// Pace the loop by the drives' answers instead of the clock.
+    #[arg(long)]
+    lockstep: bool,
+    /// Where the experiment is kept.
+    #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
+    library: PathBuf,
+    /// Write response, coherence, model and uncertainty to a file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Print one JSON object a line, and leave the evaluation to whoever reads them.
+    #[arg(long)]
+    events: bool,
+    /// Do not publish on Zenoh.
+    #[arg(long)]
+    no_telemetry: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum WaveformName {
+    Sweep,
+    LinearSweep,
+    Multisine,
+}
+
+/// Makes the experiment; returns the exit status.
+pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
+    let file = match &arguments.json {
+        None => None,
+        Some(path) => match FiguresFile::reserve(path) {
+            None => return EXIT_BAD_INPUT,
+            reserved => reserved,
+        },
+    };
+    match experiment(arguments) {
+        Ok((outcome, identified)) => {
+            let written = match (&file, identified) {
+                (Some(file), Some(found)) => file.write(&figures(&arguments.axis, &found)),
+                (Some(file), None) => {
+                    file.give_up();
+                    true
+                }
+                (None, _) => true,
+            };
+            exit_status(&outcome, written)
+        }
+        Err(error) => {
+            if let Some(file) = file {
+                file.give_up();
+            }
+            show::complain(&error);
+            EXIT_BAD_INPUT
+        }
+    }
+}
+
+fn experiment(
+    arguments: &IdentifyArguments,
+) -> Result<(Outcome, Option<Identified>), SupervisorError> {
+    let (cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
+    let mut experiment = Experiment {
+        axis: arguments.axis.clone(),
+        excitation: Excitation {
+            waveform: match arguments.waveform {
+                WaveformName::Sweep => Waveform::LogarithmicSweep,
+                WaveformName::LinearSweep => Waveform::LinearSweep,
+                WaveformName::Multisine => Waveform::Multisine,
+            },
+            amplitude: arguments.amplitude.unwrap_or(1.0),
+            from_hz: arguments.from_hz,
+            to_hz: arguments.to_hz,
+            period_s: arguments.period_s,
+            periods: arguments.periods,
+        },
+        at_m: arguments.at_m,
+    };
+    if arguments.amplitude.is_none() {
+        experiment = experiment.with_default_amplitude(&cell)?;
+    }
+    let options = Options {
+        iterations: 1,
+        measure: arguments.measure.map(Measure::from),
+        lockstep: arguments.lockstep,
+        resume: false,
+        library: arguments.library.clone(),
+        disturbance: Disturbance::default(),
+        telemetry: !arguments.no_telemetry,
+        stop: stop_on_signals(),
+    };
+    let mut kept = None;
+    let mut observe = |event: &Event| {
+        if let Event::Iteration { id, .. } = event {
+            kept = Some(*id);
+        }
+        if arguments.events {
+            say_event(event, &options.stop);
+        } else if let Event::Fault { reason } = event {
+            show::say(reason);
+        }
+    };
+    let outcome = supervisor::identify(&cell, &experiment, &options, bus, &mut observe)?;
+    let (Some(id), EndStatus::Completed, false) = (kept, outcome.status, arguments.events) else {
+        return Ok((outcome, None));
+    };
+    let record = Library::open(&arguments.library)?.load(id)?.record;
+    let identified = Identified::new(&cell, &experiment, &record)?;
+    show::say(&describe(&experiment, &identified));
+    Ok((outcome, Some(identified)))
+}
+
+fn describe(experiment: &Experiment, found: &Identified) -> String {
+    let (fit, model) = (&found.fit, &found.fit.model);
+    let worst = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
+    format!(
+        "axis {}: {} frequencies from {} to {} Hz, amplitude {:.3e}, coherence at least {:.4}\n\
+         gain               {:>10.5} +- {:.1e}\n\
+         natural frequency  {:>10.4} +- {:.1e} Hz\n\
+         damping            {:>10.5} +- {:.1e}\n\
+         delay              {:>10.4} +- {:.1e} ms\n\
+         left over          {:>10.2} % rms\n\n{}",
+        experiment.axis,
+        found.measured.frequency_hz.len(),
+        experiment.excitation.from_hz,
+        experiment.excitation.to_hz,
+        experiment.excitation.amplitude,
+        worst(&found.measured.coherence),
+        model.gain,
+        fit.gain_deviation,
+        model.natural_frequency_hz,
+        fit.natural_frequency_deviation_hz,
+        model.damping,
+        fit.damping_deviation,
+        model.delay_s * 1e3,
+        fit.delay_deviation_s * 1e3,
+        fit.residual_rms * 100.0,
+        found.section()
+    )
+}
+
+fn figures(axis: &str, found: &Identified) -> serde_json::Value {
+    let (fit, measured) = (&found.fit, &found.measured);
+    serde_json::json!({
+        "axis": axis,
+        "frequency_hz": measured.frequency_hz,
+        "response_real": measured.response.iter().map(|h| h.re).collect::<Vec<_>>(),
+        "response_imag": measured.response.iter().map(|h| h.im).collect::<Vec<_>>(),
+        "coherence": measured.coherence,
+        "n_averages": measured.n_averages,
+        "model": {
+            "gain": fit.model.gain,
+            "natural_frequency_hz": fit.model.natural_frequency_hz,
+            "damping": fit.model.damping,
+            "delay_s": fit.model.delay_s,
+            "residual_rms": fit.residual_rms,
+        },
+        "uncertainty": {
+            "frequency_hz": found.uncertainty.frequency_hz,
+            "bound": found.uncertainty.bound,
+        },
+        "axis_model": found.section(),
+    })
+}

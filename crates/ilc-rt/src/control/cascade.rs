@@ -1,0 +1,182 @@
+//! The full cascade: proportional position control around proportional-integral velocity control.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::{Bounded, clamp_finite};
+
+/// The numbers of a cascade.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CascadeGains {
+    /// Velocity per position error, `k_v`.
+    pub position_gain_per_s: f64,
+    /// Force per velocity error, `k_p`.
+    pub velocity_gain_n_s_m: f64,
+    /// Integral time of the velocity controller, `T_n`; infinite for none.
+    pub integral_time_s: f64,
+    /// Share of the reference velocity that is fed forward, 0 to 1.
+    pub velocity_feedforward: f64,
+    /// Force per reference acceleration: the mass that is fed forward.
+    pub acceleration_feedforward_kg: f64,
+    /// Largest velocity that is asked for.
+    pub velocity_max_m_s: f64,
+    /// Largest force.
+    pub force_max_n: f64,
+}
+
+impl CascadeGains {
+    /// Returns the gains that make a mass follow as `omega^2 / (s^2 + 2 delta omega s + omega^2)`, but for
+    /// the integral part; without feed-forward and limits.
+    ///
+    /// `k_v = omega / (2 delta)`, `k_p = 2 delta omega m`
+    ///
+    /// # Source
+    /// - \[haas2016\], Sect. 3: the model of the closed loop.
+    pub fn for_second_order(
+        natural_frequency_rad_s: f64,
+        damping: f64,
+        mass_kg: f64,
+        integral_time_s: f64,
+    ) -> Self {
+        Self {
+            position_gain_per_s: natural_frequency_rad_s / (2.0 * damping),
+            velocity_gain_n_s_m: 2.0 * damping * natural_frequency_rad_s * mass_kg,
+            integral_time_s,
+            velocity_feedforward: 0.0,
+            acceleration_feedforward_kg: 0.0,
+            velocity_max_m_s: f64::INFINITY,
+            force_max_n: f64::INFINITY,
+        }
+    }
+}
+
+/// What the cascade shall follow in one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CascadeReference {
+    /// Position.
+    pub position_m: f64,
+    /// Velocity.
+    pub velocity_m_s: f64,
+    /// Acceleration.
+    pub acceleration_m_s2: f64,
+}
+
+/// A cascade of position and velocity control.
+///
+/// `v* = k_v (r - y) + f r'`, `F = k_p (v* - y') + k_p dt / T_n sum_{i<k} (v* - y')[i] + m r''`
+///
+/// The force is cut to its limit; while it is, an error that would push it further is not summed up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cascade {
+    gains: CascadeGains,
+    dt_s: f64,
+    integral_n: f64,
+}
+
+impl Cascade {
+    /// Starts at rest.
+    pub fn new(gains: CascadeGains, dt_s: f64) -> Self {
+        Self { gains, dt_s, integral_n: 0.0 }
+    }
+
+    /// Returns the force of this tick; `learned_n` is added before the limit.
+    ///
+    /// # Real Time
+    /// Hot. What is not finite gives a force of 0, flagged, and is not remembered.
+    pub fn step(
+        &mut self,
+        reference: CascadeReference,
+        actual_m: f64,
+        actual_m_s: f64,
+        learned_n: f64,
+    ) -> Bounded {
+        let gains = &self.gains;
+        let asked = gains.position_gain_per_s * (reference.position_m - actual_m)
+            + gains.velocity_feedforward * reference.velocity_m_s;
+        let velocity = clamp_finite(asked, gains.velocity_max_m_s);
+        let error_m_s = velocity.value - actual_m_s;
+        let forward_n = gains.acceleration_feedforward_kg * reference.acceleration_m_s2 + learned_n;
+        let force = gains.velocity_gain_n_s_m * error_m_s + self.integral_n + forward_n;
+        if !velocity.finite || !force.is_finite() {
+            return clamp_finite(f64::NAN, gains.force_max_n);
+        }
+        let output = clamp_finite(force, gains.force_max_n);
+        let winds_up = output.saturated && error_m_s * output.value > 0.0;
+        if gains.integral_time_s > 0.0 && !winds_up {
+            let share = self.dt_s / gains.integral_time_s;
+            self.integral_n += gains.velocity_gain_n_s_m * share * error_m_s;
+        }
+        output
+    }
+
+    /// Starts again from rest.
+    pub fn reset(&mut self) {
+        self.integral_n = 0.0;
+    }
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hand_computed_force() {
+        let gains = CascadeGains {
+            position_gain_per_s: 50.0,
+            velocity_gain_n_s_m: 100.0,
+            integral_time_s: 0.1,
+            velocity_feedforward: 1.0,
+            acceleration_feedforward_kg: 2.0,
+            velocity_max_m_s: f64::INFINITY,
+            force_max_n: 30.0,
+        };
+        let mut cascade = Cascade::new(gains, 0.01);
+        let reference =
+            CascadeReference { position_m: 0.001, velocity_m_s: 0.1, acceleration_m_s2: 1.0 };
+        // v* = 0.05 + 0.1; F = 100 * 0.05 + 2 + 0.5.
+        assert!((cascade.step(reference, 0.0, 0.1, 0.5).value - 7.5).abs() < 1e-12);
+        // The integral adds 100 * 0.01 / 0.1 * 0.05.
+        assert!((cascade.step(reference, 0.0, 0.1, 0.5).value - 8.0).abs() < 1e-12);
+        assert_eq!(cascade.step(reference, -1.0, 0.0, 0.0).value, 30.0);
+        assert!(!cascade.step(reference, f64::NAN, 0.0, 0.0).finite);
+    }
+
+    #[test]
+    fn a_mass_follows_a_step_as_the_second_order_it_was_tuned_for() {
+        let (omega, damping, mass): (f64, f64, f64) = (94.0, 0.6, 20.0);
+        let gains = CascadeGains::for_second_order(omega, damping, mass, f64::INFINITY);
+        let dt = 1e-5;
+        let mut cascade = Cascade::new(gains, dt);
+        let reference = CascadeReference { position_m: 1.0, ..CascadeReference::default() };
+        let (mut position, mut velocity) = (0.0, 0.0);
+        let damped = omega * (1.0 - damping * damping).sqrt();
+        for k in 0..10_000 {
+            let t = f64::from(k) * dt;
+            let decay = (-damping * omega * t).exp();
+            let lag = damping * omega / damped;
+            let wanted = 1.0 - decay * ((damped * t).cos() + lag * (damped * t).sin());
+            assert!((position - wanted).abs() < 2e-3, "{t}: {position} {wanted}");
+            let force = cascade.step(reference, position, velocity, 0.0).value;
+            velocity += dt * force / mass;
+            position += dt * velocity;
+        }
+    }
+
+    #[test]
+    fn after_saturation_it_does_not_overshoot_for_long() {
+        let mut gains = CascadeGains::for_second_order(94.0, 1.0, 20.0, 0.1);
+        gains.force_max_n = 10.0;
+        let mut cascade = Cascade::new(gains, 1e-3);
+        let ahead = CascadeReference { position_m: 1.0, ..CascadeReference::default() };
+        for _ in 0..5000 {
+            assert_eq!(cascade.step(ahead, 0.0, 0.0, 0.0).value, 10.0);
+        }
+        assert!(cascade.step(CascadeReference::default(), 0.1, 0.0, 0.0).value < 0.0);
+    }
+}

@@ -1,0 +1,199 @@
+//! The same figures from whole matrices, for runs that are short enough.
+
+use faer::Mat;
+use faer::linalg::solvers::Solve;
+
+use super::iteration::Iteration;
+use super::krylov::{Estimate, radius};
+use crate::learning::LearningError;
+
+/// The matrices of one iteration, without the inputs that have no part in convergence.
+#[derive(Debug)]
+pub(super) struct Dense {
+    /// `T`
+    pub(super) t: Mat<f64>,
+    /// `L_e`
+    pub(super) learn: Mat<f64>,
+    /// `P`
+    pub(super) plant: Mat<f64>,
+    /// Index among all inputs of each one that was kept.
+    pub(super) kept: Vec<usize>,
+    n_inputs: usize,
+}
+
+impl Dense {
+    /// Forms the matrices, one column an update.
+    pub(super) fn new(iteration: &mut Iteration) -> Result<Self, LearningError> {
+        let (n_u, n_e) = (iteration.n_u(), iteration.n_e());
+        let kept: Vec<usize> = (0..n_u).filter(|i| !iteration.free().contains(i)).collect();
+        let n = kept.len();
+        let (mut t, mut learn, mut plant) =
+            (Mat::zeros(n, n), Mat::zeros(n, n_e), Mat::zeros(n_e, n));
+        let mut unit = vec![0.0; n_u];
+        let mut out = vec![0.0; n_u];
+        let mut error = vec![0.0; n_e];
+        for (col, index) in kept.iter().enumerate() {
+            unit[*index] = 1.0;
+            iteration.apply(&unit, &mut out)?;
+            iteration.plant.apply(&unit, &mut error);
+            unit[*index] = 0.0;
+            for (row, at) in kept.iter().enumerate() {
+                t[(row, col)] = out[*at];
+            }
+            for (row, value) in error.iter().enumerate() {
+                plant[(row, col)] = *value;
+            }
+        }
+        let zero = vec![0.0; n_u];
+        error.fill(0.0);
+        for col in 0..n_e {
+            error[col] = 1.0;
+            iteration.law_linear(&zero, &error, &mut out)?;
+            error[col] = 0.0;
+            for (row, at) in kept.iter().enumerate() {
+                learn[(row, col)] = out[*at];
+            }
+        }
+        Ok(Self { t, learn, plant, kept, n_inputs: iteration.n_inputs })
+    }
+
+    /// Returns the spectral radius.
+    ///
+    /// A law that looks back only has a block lower-triangular `T`: its eigenvalues are those of the
+    /// blocks on the diagonal, while a general eigenvalue solver finds the spectrum that rounding
+    /// makes of it.
+    pub(super) fn spectral_radius(&self) -> Result<Estimate, LearningError> {
+        let n = self.t.nrows();
+        if n == 0 {
+            return Ok(Estimate::exact(0.0));
+        }
+        let m = self.n_inputs;
+        let sample = |i: usize| self.kept[i] / m;
+        let largest = self.t.norm_max();
+        let looks_back = (0..n).all(|col| {
+            (0..n)
+                .take_while(|row| sample(*row) < sample(col))
+                .all(|row| self.t[(row, col)].abs() <= 1e-14 * largest)
+        });
+        if looks_back {
+            let mut value: f64 = 0.0;
+            let mut first = 0;
+            while first < n {
+                let count = (first..n).take_while(|i| sample(*i) == sample(first)).count();
+                let block = nalgebra::DMatrix::from_fn(count, count, |row, col| {
+                    self.t[(first + row, first + col)]
+                });
+                value = value.max(radius(&block)?);
+                first += count;
+            }
+            return Ok(Estimate::exact(value));
+        }
+        let failed = LearningError::Numerics {
+            what: "spectral radius",
+            reason: "the eigenvalue iteration did not end",
+        };
+        let values = self.t.eigenvalues().map_err(|_| failed)?;
+        let value = values.iter().map(|value| value.re.hypot(value.im)).fold(0.0, f64::max);
+        Ok(Estimate::exact(value))
+    }
+
+    /// Returns the largest singular value of `T`.
+    pub(super) fn monotonic_factor(&self) -> Result<Estimate, LearningError> {
+        largest_singular_value(&self.t).map(Estimate::exact)
+    }
+
+    /// Returns the largest singular value of `L_e P`, what uncertainty of the model multiplies.
+    pub(super) fn learned_share(&self) -> Result<f64, LearningError> {
+        largest_singular_value(&(&self.learn * &self.plant))
+    }
+
+    /// Returns the largest norm among `T, T^2, T^4, ...`: how far the error may first grow.
+    pub(super) fn transient_growth(&self) -> Result<f64, LearningError> {
+        const DOUBLINGS: usize = 10;
+        let mut power = self.t.clone();
+        let mut largest: f64 = 1.0;
+        for _ in 0..DOUBLINGS {
+            let size = power.norm_max() * power.nrows() as f64;
+            if !(size.is_finite() && size < 1e100) {
+                return Ok(f64::INFINITY);
+            }
+            if size < 1e-3 {
+                break;
+            }
+            largest = largest.max(largest_singular_value(&power)?);
+            power = &power * &power;
+        }
+        Ok(largest)
+    }
+
+    /// Solves `(I - T) u = right`; the inputs that were left out stay zero.
+    pub(super) fn fixed_point(&self, right: &[f64]) -> Vec<f64> {
+        let n = self.t.nrows();
+        let system = Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j)) - self.t[(i, j)]);
+        let target = Mat::from_fn(n, 1, |i, _| right[self.kept[i]]);
+        let solution = system.partial_piv_lu().solve(&target);
+        let mut input = vec![0.0; right.len()];
+        for (i, at) in self.kept.iter().enumerate() {
+            input[*at] = solution[(i, 0)];
+        }
+        input
+    }
+
+    /// Returns `tr(P Sigma_j P')` for the runs `0..n_runs` and, if learning converges, in the limit.
+    ///
+    /// `Sigma_{j+1} = T Sigma_j T' + L_e L_e'`, from zero: white noise of variance 1 in every error.
+    pub(super) fn noise(&self, n_runs: usize, converges: bool) -> (Vec<f64>, Option<f64>) {
+        const DOUBLINGS: usize = 48;
+        let gram = self.plant.transpose() * &self.plant;
+        let share = |sigma: &Mat<f64>| -> f64 {
+            let mut sum = 0.0;
+            for j in 0..sigma.ncols() {
+                for i in 0..sigma.nrows() {
+                    sum += sigma[(i, j)] * gram[(i, j)];
+                }
+            }
+            sum
+        };
+        let fresh = &self.learn * self.learn.transpose();
+        let n = self.t.nrows();
+        let mut sigma = Mat::<f64>::zeros(n, n);
+        let mut shares = Vec::with_capacity(n_runs);
+        for run in 0..n_runs {
+            shares.push(share(&sigma));
+            if run + 1 < n_runs {
+                sigma = &self.t * &sigma * self.t.transpose() + &fresh;
+            }
+        }
+        if !converges {
+            return (shares, None);
+        }
+        // Doubling: after k steps sigma holds 2^k runs.
+        let (mut sigma, mut power) = (fresh, self.t.clone());
+        let mut before = share(&sigma);
+        for _ in 0..DOUBLINGS {
+            sigma = &sigma + &power * &sigma * power.transpose();
+            let now = share(&sigma);
+            if !now.is_finite() {
+                return (shares, None);
+            }
+            if (now - before).abs() <= 1e-14 * now {
+                return (shares, Some(now));
+            }
+            before = now;
+            power = &power * &power;
+        }
+        (shares, None)
+    }
+}
+
+fn largest_singular_value(matrix: &Mat<f64>) -> Result<f64, LearningError> {
+    if matrix.nrows() == 0 || matrix.ncols() == 0 {
+        return Ok(0.0);
+    }
+    let failed = LearningError::Numerics {
+        what: "monotonic factor",
+        reason: "the singular value iteration did not end",
+    };
+    let values = matrix.singular_values().map_err(|_| failed)?;
+    Ok(values.iter().copied().fold(0.0, f64::max))
+}

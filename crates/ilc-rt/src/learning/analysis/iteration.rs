@@ -1,0 +1,268 @@
+//! One iteration of learning as a linear map of the input: `u_{j+1} = T u_j + L_e r`.
+
+use super::hessian::Hessian;
+use super::plant::{Plant, first_effects};
+use crate::learning::{Law, LearningError, Structure};
+use crate::model::StateSpace;
+
+/// Difference from linearity, relative to the update, that rounding is granted.
+const LINEAR: f64 = 1e-6;
+
+/// What [`lift`] puts in place of zero.
+pub(super) const FLOOR: f64 = 1e-60;
+
+/// How the transpose of the law is applied.
+#[derive(Debug)]
+enum Transpose {
+    /// The law knows it.
+    Law,
+    /// The law is optimal; see [`Hessian`].
+    Optimal(Box<Hessian>),
+    /// Not at all.
+    None,
+}
+
+/// A law with its plant: `T = L_u - L_e P`, `u` and `e` being whole runs.
+///
+/// The law is used as it is, through [`Law::update`]: whatever it does at the ends of the run is in
+/// the figures. Inputs at the end of the run that reach no output and that the law keeps apart from
+/// the others have no part in convergence; they are left out.
+pub(super) struct Iteration<'a> {
+    law: &'a mut dyn Law,
+    pub(super) plant: Plant,
+    pub(super) n_samples: usize,
+    pub(super) n_inputs: usize,
+    pub(super) n_outputs: usize,
+    /// What the law makes of nothing.
+    offset: Vec<f64>,
+    transpose: Transpose,
+    /// Indices of inputs that are left out.
+    free: Vec<usize>,
+    error: Vec<f64>,
+    dual: Vec<f64>,
+    input: Vec<f64>,
+}
+
+impl<'a> Iteration<'a> {
+    pub(super) fn new(
+        law: &'a mut dyn Law,
+        model: &StateSpace,
+        n_samples: usize,
+    ) -> Result<Self, LearningError> {
+        if n_samples == 0 {
+            return Err(LearningError::Empty { what: "n_samples" });
+        }
+        let plant = Plant::new(model)?;
+        let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+        let hessian = match law.structure() {
+            Structure::Optimal { model, weights } => Hessian::new(model, n_samples, weights)?,
+            _ => None,
+        };
+        let (n_u, n_e) = (n_samples * n_inputs, n_samples * n_outputs);
+        law.reset();
+        let mut offset = vec![0.0; n_u];
+        law.update(&vec![0.0; n_u], &vec![0.0; n_e], &mut offset)?;
+        let mut iteration = Self {
+            law,
+            plant,
+            n_samples,
+            n_inputs,
+            n_outputs,
+            offset,
+            transpose: Transpose::None,
+            free: Vec::new(),
+            error: vec![0.0; n_e],
+            dual: vec![0.0; n_e],
+            input: vec![0.0; n_u],
+        };
+        iteration.transpose = if let Some(hessian) = hessian {
+            Transpose::Optimal(Box::new(hessian))
+        } else {
+            let zero = vec![0.0; n_u];
+            let Self { law, input, dual, .. } = &mut iteration;
+            if law.transposed(&zero, input, dual)? { Transpose::Law } else { Transpose::None }
+        };
+        iteration.leave_out(model)?;
+        Ok(iteration)
+    }
+
+    /// Refuses a law that is not linear, by trying.
+    pub(super) fn check_linear(&mut self) -> Result<(), LearningError> {
+        let (n_u, n_e) = (self.n_u(), self.n_e());
+        let signals = [noise(n_u, 1), noise(n_u, 2), noise(n_e, 3), noise(n_e, 4)];
+        let sum = |a: &[f64], b: &[f64]| -> Vec<f64> {
+            a.iter().zip(b).map(|(a, b)| 2.0 * a - 3.0 * b).collect()
+        };
+        let [u, v, e, d] = &signals;
+        let mut found = [vec![0.0; n_u], vec![0.0; n_u], vec![0.0; n_u]];
+        self.law_linear(u, e, &mut found[0])?;
+        self.law_linear(v, d, &mut found[1])?;
+        self.law_linear(&sum(u, v), &sum(e, d), &mut found[2])?;
+        let expected = sum(&found[0], &found[1]);
+        let scale = norm(&found[0]).max(norm(&found[1])).max(norm(&expected));
+        let apart: Vec<f64> = expected.iter().zip(&found[2]).map(|(a, b)| a - b).collect();
+        let difference = norm(&apart) / scale.max(f64::MIN_POSITIVE);
+        if difference <= LINEAR {
+            return Ok(());
+        }
+        Err(LearningError::NotLinear { difference })
+    }
+
+    pub(super) fn n_u(&self) -> usize {
+        self.n_samples * self.n_inputs
+    }
+
+    pub(super) fn n_e(&self) -> usize {
+        self.n_samples * self.n_outputs
+    }
+
+    /// Indices of inputs that have no part in convergence.
+    pub(super) fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    /// Whether [`Iteration::apply_transposed`] works.
+    pub(super) fn has_transpose(&self) -> bool {
+        !matches!(self.transpose, Transpose::None)
+    }
+
+    /// `out = L_u u + L_e e`
+    pub(super) fn law_linear(
+        &mut self,
+        u: &[f64],
+        e: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), LearningError> {
+        self.law.reset();
+        self.law.update(u, e, out)?;
+        for (value, offset) in out.iter_mut().zip(&self.offset) {
+            *value -= offset;
+        }
+        Ok(())
+    }
+
+    /// `out = law(u, e)`, offset included.
+    pub(super) fn law(
+        &mut self,
+        u: &[f64],
+        e: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), LearningError> {
+        self.law.reset();
+        self.law.update(u, e, out)
+    }
+
+    /// `out = T u`
+    pub(super) fn apply(&mut self, u: &[f64], out: &mut [f64]) -> Result<(), LearningError> {
+        let mut input = std::mem::take(&mut self.input);
+        let mut error = std::mem::take(&mut self.error);
+        input.copy_from_slice(u);
+        self.clear(&mut input);
+        lift(&mut input);
+        self.plant.apply(&input, &mut error);
+        for value in &mut error {
+            *value = -*value;
+        }
+        let done = self.law_linear(&input, &error, out);
+        self.input = input;
+        self.error = error;
+        done?;
+        self.clear(out);
+        Ok(())
+    }
+
+    /// `out = T' x`
+    pub(super) fn apply_transposed(
+        &mut self,
+        x: &[f64],
+        out: &mut [f64],
+    ) -> Result<(), LearningError> {
+        let mut input = x.to_vec();
+        self.clear(&mut input);
+        lift(&mut input);
+        match &mut self.transpose {
+            Transpose::Optimal(hessian) => hessian.transposed(&input, out)?,
+            Transpose::Law => {
+                self.law.transposed(&input, out, &mut self.dual)?;
+                self.plant.apply_transposed(&self.dual, &mut self.input);
+                for (value, through) in out.iter_mut().zip(&self.input) {
+                    *value -= through;
+                }
+            }
+            Transpose::None => {
+                return Err(LearningError::Numerics {
+                    what: "monotonic factor",
+                    reason: "the law has no transpose",
+                });
+            }
+        }
+        self.clear(out);
+        Ok(())
+    }
+
+    fn clear(&self, signal: &mut [f64]) {
+        for index in &self.free {
+            signal[*index] = 0.0;
+        }
+    }
+
+    /// Finds the inputs that reach no output within the run, and leaves them out if the law carries
+    /// nothing of them over to the others.
+    fn leave_out(&mut self, model: &StateSpace) -> Result<(), LearningError> {
+        let effects = first_effects(model)?;
+        let mut free = Vec::new();
+        for (channel, effect) in effects.iter().enumerate() {
+            let late = effect.unwrap_or(self.n_samples).min(self.n_samples);
+            free.extend(
+                (self.n_samples - late..self.n_samples).map(|k| k * self.n_inputs + channel),
+            );
+        }
+        if free.len() == self.n_u() {
+            return Ok(());
+        }
+        let mut probe = vec![0.0; self.n_u()];
+        let mut out = vec![0.0; self.n_u()];
+        let zero = vec![0.0; self.n_e()];
+        for (place, index) in free.iter().enumerate() {
+            // Without pattern, so that no two of them cancel in what they reach.
+            probe[*index] = 1.0 + 0.37 * ((place * 7919) % 101) as f64 / 101.0;
+        }
+        self.law_linear(&probe, &zero, &mut out)?;
+        let reach = norm(&out);
+        for index in &free {
+            out[*index] = 0.0;
+        }
+        if norm(&out) <= 1e-9 * reach {
+            self.free = free;
+        }
+        Ok(())
+    }
+}
+
+/// Keeps a signal of about unit size away from zero by less than any rounding: what decays along a
+/// long silent stretch would otherwise end in denormal numbers, which are a hundred times slower.
+pub(super) fn lift(signal: &mut [f64]) {
+    for value in signal {
+        if value.abs() < FLOOR {
+            *value = FLOOR;
+        }
+    }
+}
+
+/// Returns the Euclidean norm.
+pub(super) fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+/// Returns numbers without pattern between -1 and 1, the same each time.
+pub(super) fn noise(count: usize, seed: u64) -> Vec<f64> {
+    let mut word = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    (0..count)
+        .map(|_| {
+            word ^= word << 13;
+            word ^= word >> 7;
+            word ^= word << 17;
+            (word >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        })
+        .collect()
+}

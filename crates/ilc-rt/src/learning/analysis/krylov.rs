@@ -1,0 +1,243 @@
+//! Largest eigenvalues and fixed points of maps that are only known by what they do to a signal.
+//!
+//! Lanczos for symmetric maps, Arnoldi for the others, GMRES for fixed points; nothing of the square
+//! of the run's length is ever stored. Used by this folder only.
+
+use nalgebra::{DMatrix, DVector, Schur, SymmetricEigen};
+
+use super::iteration::{noise, norm};
+use crate::learning::LearningError;
+
+/// A figure with how far off it may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The figure.
+    pub value: f64,
+    /// Its error, at most about this.
+    pub error: f64,
+}
+
+impl Estimate {
+    /// A figure that is exact up to rounding.
+    pub(super) fn exact(value: f64) -> Self {
+        Self { value, error: value.abs() * 1e-12 }
+    }
+}
+
+type Map<'a> = dyn FnMut(&[f64], &mut [f64]) -> Result<(), LearningError> + 'a;
+
+/// Returns the largest eigenvalue of a symmetric, positive semidefinite map.
+///
+/// Lanczos with full orthogonalisation, restarted with the best vectors. The error is the residual of
+/// the eigenvector, within which an eigenvalue lies.
+pub(super) fn largest_symmetric(
+    n: usize,
+    map: &mut Map,
+    n_basis: usize,
+    n_products_max: usize,
+    tolerance: f64,
+) -> Result<Estimate, LearningError> {
+    let n_basis = n_basis.min(n).max(1);
+    let n_kept = n_basis / 3;
+    let mut basis: Vec<Vec<f64>> = vec![unit(noise(n, 5))];
+    let mut small = DMatrix::<f64>::zeros(n_basis, n_basis);
+    let mut n_products = 0;
+    let mut at = 0;
+    loop {
+        let mut left = 0.0;
+        while at < n_basis {
+            let mut next = vec![0.0; n];
+            map(&basis[at], &mut next)?;
+            n_products += 1;
+            for (i, value) in orthogonalise(&basis, &mut next).into_iter().enumerate() {
+                small[(i, at)] = value;
+                small[(at, i)] = value;
+            }
+            left = norm(&next);
+            at += 1;
+            if left <= 1e-14 * small[(0, 0)].abs().max(f64::MIN_POSITIVE) {
+                // The basis is closed: what is in it is exact.
+                break;
+            }
+            basis.push(unit(next));
+        }
+        let eigen = SymmetricEigen::new(small.view((0, 0), (at, at)).into_owned());
+        let mut order: Vec<usize> = (0..at).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        let value = eigen.eigenvalues[order[0]];
+        let residual = left * eigen.eigenvectors[(at - 1, order[0])].abs();
+        let done = residual <= tolerance * value.abs() || at == n || basis.len() <= at;
+        if done || n_products >= n_products_max || n_kept == 0 {
+            let error = residual.min(value.abs()).max(1e-14 * value.abs());
+            return Ok(Estimate { value, error });
+        }
+        let Some(last) = basis.pop() else { return Ok(Estimate { value, error: residual }) };
+        let kept: Vec<Vec<f64>> = order[..n_kept]
+            .iter()
+            .map(|column| combine(&basis, eigen.eigenvectors.column(*column).iter()))
+            .collect();
+        basis = kept;
+        small.fill(0.0);
+        for (i, column) in order[..n_kept].iter().enumerate() {
+            small[(i, i)] = eigen.eigenvalues[*column];
+        }
+        let mut last = last;
+        orthogonalise(&basis, &mut last);
+        basis.push(unit(last));
+        at = n_kept;
+    }
+}
+
+/// Returns the largest absolute eigenvalue of a map, by Arnoldi after some plain steps.
+///
+/// The error is how much the estimate still moved over the last sixth of the basis.
+pub(super) fn spectral_radius(
+    n: usize,
+    map: &mut Map,
+    n_plain: usize,
+    n_basis: usize,
+) -> Result<Estimate, LearningError> {
+    let n_basis = n_basis.min(n).max(1);
+    let mut start = unit(noise(n, 9));
+    let mut next = vec![0.0; n];
+    for _ in 0..n_plain {
+        map(&start, &mut next)?;
+        let size = norm(&next);
+        if size == 0.0 {
+            // A map whose powers vanish, as that of a law that inverts at once.
+            return Ok(Estimate { value: 0.0, error: 0.0 });
+        }
+        for (value, from) in start.iter_mut().zip(&next) {
+            *value = from / size;
+        }
+    }
+    let mut basis = vec![start];
+    let mut small = DMatrix::<f64>::zeros(n_basis, n_basis);
+    let mut size = n_basis;
+    for at in 0..n_basis {
+        map(&basis[at], &mut next)?;
+        for (i, value) in orthogonalise(&basis, &mut next).into_iter().enumerate() {
+            small[(i, at)] = value;
+        }
+        let left = norm(&next);
+        if left <= 1e-13 * small.column(at).norm().max(f64::MIN_POSITIVE) {
+            size = at + 1;
+            break;
+        }
+        if at + 1 < n_basis {
+            small[(at + 1, at)] = left;
+            basis.push(unit(next.clone()));
+        }
+    }
+    let value = radius(&small.view((0, 0), (size, size)).into_owned())?;
+    if size < n_basis || size == n {
+        return Ok(Estimate { value, error: 1e-10 * value });
+    }
+    let before = size - (size / 6).max(1).min(size - 1);
+    let earlier = radius(&small.view((0, 0), (before, before)).into_owned())?;
+    Ok(Estimate { value, error: (value - earlier).abs().max(1e-12 * value) })
+}
+
+/// Solves `x = map(x) + right` by restarted GMRES; returns the solution and its relative residual.
+pub(super) fn fixed_point(
+    map: &mut Map,
+    right: &[f64],
+    n_basis: usize,
+    n_restarts: usize,
+    tolerance: f64,
+) -> Result<(Vec<f64>, f64), LearningError> {
+    let n = right.len();
+    let n_basis = n_basis.min(n);
+    let scale = norm(right);
+    let mut x = vec![0.0; n];
+    if scale == 0.0 {
+        return Ok((x, 0.0));
+    }
+    let mut image = vec![0.0; n];
+    let mut residual = right.to_vec();
+    for _ in 0..n_restarts {
+        let start = norm(&residual);
+        if start <= tolerance * scale {
+            break;
+        }
+        let mut basis = vec![unit(residual.clone())];
+        let mut small = DMatrix::<f64>::zeros(n_basis + 1, n_basis);
+        let mut size = n_basis;
+        for at in 0..n_basis {
+            map(&basis[at], &mut image)?;
+            let mut next: Vec<f64> = basis[at].iter().zip(&image).map(|(x, t)| x - t).collect();
+            for (i, value) in orthogonalise(&basis, &mut next).into_iter().enumerate() {
+                small[(i, at)] = value;
+            }
+            let left = norm(&next);
+            small[(at + 1, at)] = left;
+            if left <= 1e-14 * start {
+                size = at + 1;
+                break;
+            }
+            basis.push(unit(next));
+        }
+        let mut target = DVector::zeros(size + 1);
+        target[0] = start;
+        let system = small.view((0, 0), (size + 1, size)).into_owned();
+        let Ok(weights) = system.svd(true, true).solve(&target, 1e-14) else { break };
+        for (weight, vector) in weights.iter().zip(&basis) {
+            for (value, part) in x.iter_mut().zip(vector) {
+                *value += weight * part;
+            }
+        }
+        map(&x, &mut image)?;
+        for i in 0..n {
+            residual[i] = right[i] - (x[i] - image[i]);
+        }
+    }
+    let left = norm(&residual) / scale;
+    Ok((x, left))
+}
+
+/// Returns the largest absolute eigenvalue of a small matrix.
+pub(super) fn radius(matrix: &DMatrix<f64>) -> Result<f64, LearningError> {
+    const MAX_SWEEPS: usize = 10_000;
+    let schur = Schur::try_new(matrix.clone(), f64::EPSILON, MAX_SWEEPS).ok_or(
+        LearningError::Numerics {
+            what: "spectral radius",
+            reason: "the QR iteration did not converge",
+        },
+    )?;
+    Ok(schur.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max))
+}
+
+/// Removes the basis from `next`, twice for the rounding of the first time; returns its parts.
+fn orthogonalise(basis: &[Vec<f64>], next: &mut [f64]) -> Vec<f64> {
+    let mut parts = vec![0.0; basis.len()];
+    for _ in 0..2 {
+        for (vector, part) in basis.iter().zip(&mut parts) {
+            let share: f64 = vector.iter().zip(&*next).map(|(v, x)| v * x).sum();
+            for (value, v) in next.iter_mut().zip(vector) {
+                *value -= share * v;
+            }
+            *part += share;
+        }
+    }
+    parts
+}
+
+fn combine<'a>(basis: &[Vec<f64>], weights: impl Iterator<Item = &'a f64>) -> Vec<f64> {
+    let mut sum = vec![0.0; basis[0].len()];
+    for (vector, weight) in basis.iter().zip(weights) {
+        for (value, part) in sum.iter_mut().zip(vector) {
+            *value += weight * part;
+        }
+    }
+    sum
+}
+
+fn unit(mut vector: Vec<f64>) -> Vec<f64> {
+    let size = norm(&vector);
+    if size > 0.0 {
+        for value in &mut vector {
+            *value /= size;
+        }
+    }
+    vector
+}

@@ -1,0 +1,30 @@
+//! What a law will do, said before the first run.
+//!
+//! A linear law and a model make each iteration a linear map of the input,
+//! `u_{j+1} = T u_j + L_e r` with `T = L_u - L_e P`; this folder works its figures out, from whole
+//! matrices in short runs and from products with signals in long ones. `supervisor` (which refuses a
+//! law that diverges), [`tune`](super::tune) and the Python bindings import it.
+
+mod condition;
+mod dense;
+mod figures;
+mod frequency;
+mod hessian;
+mod iteration;
+mod krylov;
+mod plant;
+mod question;
+mod refuse;
+mod uncertainty;
+mod verdict;
+
+#[cfg(test)]
+mod oracle;
+
+pub use condition::PdCondition;
+pub use figures::{Analysis, Method};
+pub(in crate::learning) use frequency::Spectrum;
+pub use krylov::Estimate;
+pub use question::{DENSE_MAX, Question, analyze};
+pub use refuse::{Verdict, divergence, refuse_divergent};
+pub use uncertainty::Uncertainty;

@@ -1,0 +1,66 @@
+//! From figures to a verdict, in words.
+
+use super::figures::{Analysis, Method};
+use super::krylov::Estimate;
+
+/// Growth of an error beyond which no machine waits for it to fall again.
+pub(super) const GROWTH_MAX: f64 = 1e3;
+/// What a spectral radius may lie above 1 by rounding alone.
+const ROUNDING: f64 = 1e-9;
+
+/// Whether the error dies out, without growing beyond all measure before.
+///
+/// A law whose eigenvalues promise convergence after a growth of many powers of ten does not converge
+/// on any machine, nor in floating-point numbers.
+pub(super) fn converges(radius: Estimate, growth: f64) -> bool {
+    radius.value < 1.0 + ROUNDING && growth < GROWTH_MAX
+}
+
+/// Fills in the verdict.
+pub(super) fn tell(analysis: &mut Analysis, certain: bool) {
+    let radius = analysis.spectral_radius.value;
+    let factor = analysis.monotonic_factor.map(|factor| factor.value);
+    let growing = analysis.critical_frequency_hz.map_or_else(String::new, |hz| {
+        format!("; from {hz:.3} Hz on the error grows (largest contraction {:.4})", peak(analysis))
+    });
+    // Where no whole-run norm is at hand the contraction over frequency bounds it, ends left aside.
+    let worst = factor.or_else(|| {
+        (analysis.method == Method::Structured && !analysis.contraction.is_empty())
+            .then(|| peak(analysis))
+    });
+    analysis.monotonic = analysis.converges && worst.is_some_and(|worst| worst < 1.0 + ROUNDING);
+    analysis.why = if !analysis.converges {
+        if radius >= 1.0 + ROUNDING {
+            format!("each run multiplies the error by {radius:.6} in the long run{growing}")
+        } else {
+            format!(
+                "the error grows {:.3e}-fold before it falls (spectral radius {radius:.6}){growing}",
+                analysis.transient_growth
+            )
+        }
+    } else if let (true, Some(worst)) = (analysis.monotonic, worst) {
+        format!(
+            "every run brings the input nearer to its final value: the worst factor of a run is \
+             {worst:.6}, in the long run {radius:.6}"
+        )
+    } else if certain {
+        format!(
+            "the law minimises a cost of its own model, so that the error converges (factor {radius:.6} \
+             in the long run); a single run may take the input away from its end by up to {}",
+            worst.map_or_else(|| "an unknown factor".to_owned(), |worst| format!("{worst:.6}"))
+        )
+    } else {
+        format!(
+            "the error converges (factor {radius:.6} in the long run), but not in every run: it may \
+             first grow {:.3}-fold{}{growing}",
+            analysis.transient_growth,
+            worst.map_or_else(String::new, |worst| format!(
+                ", the worst factor of a run being {worst:.6}"
+            )),
+        )
+    };
+}
+
+fn peak(analysis: &Analysis) -> f64 {
+    analysis.contraction.iter().copied().fold(0.0, f64::max)
+}

@@ -1,0 +1,344 @@
+//! The switching mechanism: when any law is to learn, to rest, or to go back to what was best.
+
+use super::{Law, LearningError};
+
+/// What a run is judged by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Root of the mean square over all samples and channels.
+    Rms,
+    /// Largest magnitude of any sample of any channel.
+    Max,
+}
+
+impl Measure {
+    /// Returns the figure of a run's error.
+    pub fn of(self, error: &[f64]) -> f64 {
+        match self {
+            Self::Rms => {
+                let sum: f64 = error.iter().map(|e| e * e).sum();
+                (sum / error.len().max(1) as f64).sqrt()
+            }
+            Self::Max => error.iter().fold(0.0, |largest: f64, e| largest.max(e.abs())),
+        }
+    }
+}
+
+/// When a [`Gate`] opens and closes.
+///
+/// # Units
+/// - `tolerance` in units of the error; the others are ratios and numbers of runs
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GateRule {
+    /// What a run is judged by.
+    pub measure: Measure,
+    /// Figure up to which the error is good enough; 0 to learn for ever.
+    pub tolerance: f64,
+    /// By what factor the error must leave the tolerance before learning resumes; 1 or more.
+    pub resume: f64,
+    /// By what factor the error may exceed the best one so far; 1 or more, infinite to let it grow.
+    pub growth: f64,
+    /// For how many runs in a row it may do so.
+    pub patience: usize,
+}
+
+impl Default for GateRule {
+    fn default() -> Self {
+        Self { measure: Measure::Rms, tolerance: 0.0, resume: 1.5, growth: 1.5, patience: 2 }
+    }
+}
+
+/// What a [`Gate`] is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GateState {
+    /// The law learns.
+    Learning,
+    /// The error is inside the tolerance: the input is kept.
+    Holding,
+    /// The error grew: the best input so far is kept.
+    RolledBack,
+}
+
+/// A law that stops learning when the error is good enough, or before it diverges.
+///
+/// - *Learning*, and the error is inside the tolerance: *holding*, with the input as it is.
+/// - *Learning*, and for `patience` runs in a row the error exceeded `growth` times the best one:
+///   *rolled back*, to the input of the best run.
+/// - *Holding*, and the error exceeds `resume` times the tolerance: *learning* again.
+/// - *Rolled back*, and for `patience` runs in a row the error exceeds `growth` times what the same
+///   input once gave: the machine is not what it was, so *learning* again. An error inside the
+///   tolerance makes it *holding*.
+///
+/// When learning resumes, what was best before is forgotten: it was so on another machine.
+///
+/// # Shapes
+/// - those of the law inside
+/// # Real Time
+/// Cold path. Allocates in the first [`Law::update`] only, for the best input.
+/// # Source
+/// - \[filter-based\], Section 4 (Fig. 19) and Section 6.3: switching iterative learning.
+///   The paper switches off by hand before the error grows; growth, roll-back and resumption are
+///   ours.
+#[derive(Debug)]
+pub struct Gate<L> {
+    law: L,
+    rule: GateRule,
+    state: GateState,
+    best_input: Vec<f64>,
+    best_figure: Option<f64>,
+    runs_grown: usize,
+}
+
+impl<L: Law> Gate<L> {
+    /// Puts the gate round a law.
+    ///
+    /// # Errors
+    /// - [`LearningError::Parameter`] for a tolerance that is negative or not finite, or a ratio
+    ///   below 1.
+    /// - [`LearningError::Empty`] for a patience of 0.
+    pub fn new(law: L, rule: GateRule) -> Result<Self, LearningError> {
+        let GateRule { tolerance, resume, growth, patience, .. } = rule;
+        if !(tolerance.is_finite() && tolerance >= 0.0) {
+            let allowed = "a tolerance must be finite and not negative";
+            return Err(LearningError::Parameter { what: "tolerance", value: tolerance, allowed });
+        }
+        for (what, value) in [("resume", resume), ("growth", growth)] {
+            if value.is_nan() || value < 1.0 {
+                let allowed = "a ratio must be at least 1";
+                return Err(LearningError::Parameter { what, value, allowed });
+            }
+        }
+        if patience == 0 {
+            return Err(LearningError::Empty { what: "patience" });
+        }
+        Ok(Self {
+            law,
+            rule,
+            state: GateState::Learning,
+            best_input: Vec::new(),
+            best_figure: None,
+            runs_grown: 0,
+        })
+    }
+
+    /// Returns what the gate is doing.
+    pub fn state(&self) -> GateState {
+        self.state
+    }
+
+    /// Returns the figure of the best run since learning began or resumed.
+    pub fn best_figure(&self) -> Option<f64> {
+        self.best_figure
+    }
+
+    /// Returns the input of that run; empty before the first one.
+    pub fn best_input(&self) -> &[f64] {
+        &self.best_input
+    }
+
+    /// Returns the law inside.
+    pub fn law(&self) -> &L {
+        &self.law
+    }
+
+    /// Returns the law inside.
+    pub fn law_mut(&mut self) -> &mut L {
+        &mut self.law
+    }
+
+    /// Decides what to do after a run with this input and this figure.
+    fn judge(&mut self, input: &[f64], figure: f64) {
+        let GateRule { tolerance, resume, growth, patience, .. } = self.rule;
+        let left = self.state == GateState::Holding && figure > resume * tolerance;
+        let has_grown = self.best_figure.is_some_and(|best| figure > growth * best);
+        self.runs_grown = if has_grown { self.runs_grown + 1 } else { 0 };
+        let too_long = self.runs_grown >= patience;
+        if left || self.state == GateState::RolledBack && too_long {
+            self.state = GateState::Learning;
+            self.best_figure = None;
+            self.runs_grown = 0;
+        } else if self.state != GateState::Holding && figure <= tolerance {
+            self.state = GateState::Holding;
+        } else if self.state == GateState::Learning && too_long {
+            self.state = GateState::RolledBack;
+            self.runs_grown = 0;
+        }
+        if self.best_figure.is_none_or(|best| figure < best) {
+            self.best_figure = Some(figure);
+            self.best_input.clear();
+            self.best_input.extend_from_slice(input);
+        }
+    }
+}
+
+impl<L: Law> Law for Gate<L> {
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError> {
+        let figure = self.rule.measure.of(error);
+        if next.len() != input.len() || !figure.is_finite() {
+            // The law inside knows the shapes and says what is wrong, without having learned.
+            self.law.update(input, error, next)?;
+            let allowed = "the figure of an error must be finite";
+            return Err(LearningError::Parameter { what: "error", value: figure, allowed });
+        }
+        if self.best_input.len() != input.len() {
+            // The first run, or runs of another size: nothing can be compared.
+            self.best_figure = None;
+        }
+        self.judge(input, figure);
+        match self.state {
+            GateState::Learning => return self.law.update(input, error, next),
+            GateState::Holding => next.copy_from_slice(input),
+            GateState::RolledBack => next.copy_from_slice(&self.best_input),
+        }
+        Ok(())
+    }
+
+    fn expect(&mut self, disturbance: &[f64]) {
+        self.law.expect(disturbance);
+    }
+
+    fn reset(&mut self) {
+        self.law.reset();
+        self.state = GateState::Learning;
+        self.best_figure = None;
+        self.runs_grown = 0;
+    }
+
+    fn describe(&self) -> String {
+        let GateRule { measure, tolerance, resume, growth, patience } = self.rule;
+        let measure = match measure {
+            Measure::Rms => "rms",
+            Measure::Max => "max",
+        };
+        let ratio = |value: f64| if value.is_finite() { value.to_string() } else { "null".into() };
+        format!(
+            r#"{{"law":"gate","measure":"{measure}","tolerance":{tolerance},"resume":{},"growth":{},"patience":{patience},"inner":{}}}"#,
+            ratio(resume),
+            ratio(growth),
+            self.law.describe()
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Adds 1 to the input in every update, so that updates can be counted.
+    #[derive(Debug, Default)]
+    struct Counter {
+        expected: Vec<f64>,
+        resets: usize,
+    }
+
+    impl Law for Counter {
+        fn update(&mut self, u: &[f64], _: &[f64], next: &mut [f64]) -> Result<(), LearningError> {
+            crate::learning::error::check("input", u, 2, 1)?;
+            for (next, u) in next.iter_mut().zip(u) {
+                *next = u + 1.0;
+            }
+            Ok(())
+        }
+        fn expect(&mut self, disturbance: &[f64]) {
+            self.expected = disturbance.to_vec();
+        }
+        fn reset(&mut self) {
+            self.resets += 1;
+        }
+        fn describe(&self) -> String {
+            r#"{"law":"counter"}"#.into()
+        }
+    }
+
+    fn gate(tolerance: f64) -> Gate<Counter> {
+        let rule = GateRule { tolerance, ..GateRule::default() };
+        Gate::new(Counter::default(), rule).unwrap()
+    }
+
+    /// Runs errors of these sizes and returns the inputs of the runs after them, and the states.
+    fn play(gate: &mut Gate<Counter>, errors: &[f64]) -> (Vec<f64>, Vec<GateState>) {
+        let mut input = [0.0; 2];
+        let mut next = [0.0; 2];
+        errors
+            .iter()
+            .map(|size| {
+                gate.update(&input, &[*size, -size], &mut next).unwrap();
+                input = next;
+                (next[0], gate.state())
+            })
+            .unzip()
+    }
+
+    use GateState::{Holding, Learning, RolledBack};
+
+    #[test]
+    fn inside_the_tolerance_the_input_is_kept_and_learning_resumes_with_hysteresis() {
+        let (inputs, states) = play(&mut gate(1.0), &[5.0, 2.0, 0.9, 1.4, 0.5, 1.6, 1.1, 1.0]);
+        let expected = [Learning, Learning, Holding, Holding, Holding, Learning, Learning, Holding];
+        assert_eq!(states, expected);
+        assert_eq!(inputs, [1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 4.0, 4.0]);
+    }
+
+    #[test]
+    fn growth_for_two_runs_in_a_row_goes_back_to_the_best_input() {
+        // The best run is the second one, with input 1; its error may grow to 3.
+        let (inputs, states) = play(&mut gate(0.0), &[5.0, 2.0, 3.1, 2.9, 3.1, 3.2, 2.1, 2.0]);
+        assert_eq!(states[..5], [Learning; 5]);
+        assert_eq!(states[5..], [RolledBack; 3]);
+        assert_eq!(inputs, [1.0, 2.0, 3.0, 4.0, 5.0, 1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_machine_that_changed_is_learned_again_and_a_good_one_is_held() {
+        let mut gate = gate(1.0);
+        let (_, states) = play(&mut gate, &[2.0, 9.0, 9.0, 2.0, 9.0, 2.0, 9.0, 9.0]);
+        let expected = [
+            Learning, Learning, RolledBack, RolledBack, RolledBack, RolledBack, RolledBack,
+            Learning,
+        ];
+        assert_eq!(states, expected);
+        assert_eq!(gate.best_figure().map(f64::to_bits), Some(9_f64.to_bits()));
+        gate.reset();
+        assert_eq!((gate.state(), gate.best_figure(), gate.law().resets), (Learning, None, 1));
+        let (inputs, states) = play(&mut gate, &[2.0, 9.0, 9.0, 0.5]);
+        assert_eq!(states[2..], [RolledBack, Holding]);
+        assert_eq!(inputs[3].to_bits(), 0_f64.to_bits());
+    }
+
+    #[test]
+    fn the_measures_are_those_of_their_names() {
+        assert!((Measure::Rms.of(&[3.0, -4.0]) - 12.5_f64.sqrt()).abs() < 1e-15);
+        assert_eq!(Measure::Max.of(&[3.0, -4.0]).to_bits(), 4_f64.to_bits());
+        let rule = GateRule { tolerance: 3.9, measure: Measure::Max, ..GateRule::default() };
+        let mut gate = Gate::new(Counter::default(), rule).unwrap();
+        gate.update(&[0.0; 2], &[3.0, -4.0], &mut [0.0; 2]).unwrap();
+        assert_eq!(gate.state(), Learning);
+    }
+
+    #[test]
+    fn what_is_expected_and_what_is_wrong_reach_the_law_inside() {
+        let mut gate = gate(1.0);
+        gate.expect(&[21.5]);
+        assert_eq!(gate.law().expected, [21.5]);
+        assert!(gate.describe().contains(r#""inner":{"law":"counter"}"#));
+        assert!(gate.update(&[0.0; 3], &[9.0; 3], &mut [0.0; 3]).is_err());
+        let error = gate.update(&[0.0; 2], &[f64::NAN; 2], &mut [0.0; 2]).unwrap_err();
+        assert!(error.to_string().contains("error = NaN"));
+        assert_eq!(gate.best_figure().map(f64::to_bits), Some(9_f64.to_bits()));
+    }
+
+    #[test]
+    fn wrong_rules_are_refused_one_at_a_time() {
+        let refuse = |rule| Gate::new(Counter::default(), rule).unwrap_err().to_string();
+        let rule = GateRule::default();
+        assert!(refuse(GateRule { tolerance: -1.0, ..rule }).contains("tolerance = -1"));
+        assert!(refuse(GateRule { resume: 0.9, ..rule }).contains("resume = 0.9"));
+        assert!(refuse(GateRule { growth: f64::NAN, ..rule }).contains("growth = NaN"));
+        assert!(refuse(GateRule { patience: 0, ..rule }).contains("patience = 0"));
+    }
+}

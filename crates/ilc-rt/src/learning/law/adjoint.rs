@@ -1,0 +1,193 @@
+//! Gradient learning: the error, run backward through the model.
+
+use super::q_filter::{QFilter, QRunner};
+use crate::learning::error::{check, check_counts, check_place};
+use crate::learning::operator::Operator;
+use crate::learning::{Law, LearningError};
+use crate::model::{ModelError, StateSpace};
+
+/// Gradient learning: one step down the squared error.
+///
+/// `u_{j+1} = Q (u_j + alpha P' e_j)`, `P` the lifted operator of the model
+///
+/// With the model right and without filter, `|e|` falls in every run if `0 < alpha < 2 / |P|^2`:
+/// `e_{j+1} = (I - alpha P P') e_j`. It falls quickly where the model's gain is near its largest and
+/// slowly elsewhere, and is the least sensitive of the model-based laws to noise and to a wrong
+/// model: it converges as long as the real axis stays within 90 degrees of the model. Delays and
+/// the pairing of samples are in `P` already.
+///
+/// # Shapes
+/// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
+/// # Real Time
+/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` through a
+/// backward simulation.
+/// # Source
+/// - \[barton2010\], Ch. 3: the lifted operator; the law is the gradient of Eq. (3.13) with Q = I,
+///   S = R = 0.
+#[derive(Debug)]
+pub struct Adjoint {
+    operator: Operator,
+    gain: f64,
+    gain_limit: f64,
+    n_samples: usize,
+    n_inputs: usize,
+    n_outputs: usize,
+    q_filter: QFilter,
+    runner: QRunner,
+}
+
+impl Adjoint {
+    /// Makes the law for runs of `n_samples` samples; without a gain it takes `1 / |P|^2`, half the
+    /// limit.
+    ///
+    /// # Errors
+    /// - [`LearningError::Parameter`] for a gain that is not positive and finite, or a model that
+    ///   answers to nothing or without bound.
+    /// - [`LearningError::GainBound`] for a gain from the limit on and no filter.
+    /// - [`LearningError::Empty`] for no samples, inputs or outputs.
+    /// - [`LearningError::Model`] for a continuous model.
+    /// - [`LearningError::Signal`] if the run is too short for the filter.
+    pub fn new(
+        model: &StateSpace,
+        n_samples: usize,
+        gain: Option<f64>,
+        q_filter: QFilter,
+    ) -> Result<Self, LearningError> {
+        if model.dt_s().is_none() {
+            return Err(ModelError::Continuous { action: "gradient learning" }.into());
+        }
+        let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+        check_counts(&[
+            ("n_samples", n_samples),
+            ("n_inputs", n_inputs),
+            ("n_outputs", n_outputs),
+        ])?;
+        if let Some(value) = gain.filter(|gain| !(gain.is_finite() && *gain > 0.0)) {
+            let allowed = "a gain must be finite and greater than 0";
+            return Err(LearningError::Parameter { what: "gain", value, allowed });
+        }
+        let mut operator = Operator::new(model);
+        let norm = operator.norm(n_samples);
+        let gain_limit = 2.0 / (norm * norm);
+        if !(gain_limit.is_finite() && gain_limit > 0.0) {
+            let allowed = "the model must answer to its input, and within bounds over the run";
+            return Err(LearningError::Parameter { what: "|P|", value: norm, allowed });
+        }
+        let gain = gain.unwrap_or(0.5 * gain_limit);
+        if gain >= gain_limit && q_filter == QFilter::None {
+            return Err(LearningError::GainBound { gain, limit: gain_limit });
+        }
+        let runner = q_filter.for_samples(n_samples)?;
+        Ok(Self { operator, gain, gain_limit, n_samples, n_inputs, n_outputs, q_filter, runner })
+    }
+
+    /// Returns the gain alpha.
+    pub fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// Returns `2 / |P|^2`, the gain from which on the error grows.
+    pub fn gain_limit(&self) -> f64 {
+        self.gain_limit
+    }
+}
+
+impl Law for Adjoint {
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError> {
+        let Self { n_samples, n_inputs, n_outputs, gain, .. } = *self;
+        check("input", input, n_samples, n_inputs)?;
+        check("error", error, n_samples, n_outputs)?;
+        check_place(next, n_samples, n_inputs)?;
+        self.operator.transposed(error, next);
+        for (next, input) in next.iter_mut().zip(input) {
+            *next = input + gain * *next;
+        }
+        self.runner.apply(next, n_inputs)?;
+        check("next", next, n_samples, n_inputs)
+    }
+
+    fn reset(&mut self) {}
+
+    fn describe(&self) -> String {
+        format!(
+            r#"{{"law":"adjoint","gain":{},"q_filter":{},"n_samples":{},"n_inputs":{},"n_outputs":{}}}"#,
+            self.gain,
+            self.q_filter.describe(),
+            self.n_samples,
+            self.n_inputs,
+            self.n_outputs
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::model::{Method, discretize, from_transfer_function, second_order};
+
+    fn axis() -> StateSpace {
+        let model = second_order(157.0, 0.5).unwrap();
+        discretize(&model, 2e-3, Method::ZeroOrderHold).unwrap().delayed(2).unwrap()
+    }
+
+    #[test]
+    fn a_gain_with_delay_sends_each_error_back_to_its_cause() {
+        // y[k] = 2 u[k-1]: |P| = 2, so that the gain is 1/4 and the limit 1/2.
+        let model = from_transfer_function(&[2.0], &[1.0, 0.0], Some(1.0)).unwrap();
+        let mut law = Adjoint::new(&model, 4, None, QFilter::None).unwrap();
+        assert!((law.gain() - 0.25).abs() < 1e-12 && (law.gain_limit() - 0.5).abs() < 1e-12);
+        let mut next = [0.0; 4];
+        law.update(&[10.0; 4], &[9.0, 2.0, 4.0, 6.0], &mut next).unwrap();
+        for (found, expected) in next.iter().zip([11.0, 12.0, 13.0, 10.0]) {
+            assert!((found - expected).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_error_falls_in_every_run_below_the_limit_and_grows_above() {
+        let (model, n_samples) = (axis(), 150);
+        let dense = model.lifted(n_samples).unwrap();
+        let reference = DVector::from_fn(n_samples, |k, _| (k as f64 / 20.0).sin().powi(3));
+        for share in [0.1, 1.0, 1.9] {
+            let limit = Adjoint::new(&model, n_samples, None, QFilter::None).unwrap().gain_limit();
+            let gain = Some(0.5 * share * limit);
+            let mut law = Adjoint::new(&model, n_samples, gain, QFilter::None).unwrap();
+            let mut u = DVector::zeros(n_samples);
+            let mut before = f64::INFINITY;
+            for _ in 0..50 {
+                let e = &reference - &dense * &u;
+                assert!(e.norm() < before);
+                before = e.norm();
+                let mut next = vec![0.0; n_samples];
+                law.update(u.as_slice(), e.as_slice(), &mut next).unwrap();
+                u = DVector::from_vec(next);
+            }
+        }
+        let norm = dense.svd(false, false).singular_values.max();
+        let gain = Some(2.001 / (norm * norm));
+        let error = Adjoint::new(&model, n_samples, gain, QFilter::None).unwrap_err();
+        assert!(matches!(error, LearningError::GainBound { .. }), "{error}");
+    }
+
+    #[test]
+    fn what_has_no_gradient_is_refused() {
+        let refuse = |model: &StateSpace, n, gain| {
+            Adjoint::new(model, n, gain, QFilter::None).unwrap_err().to_string()
+        };
+        assert!(refuse(&axis(), 0, None).contains("n_samples = 0"));
+        assert!(refuse(&axis(), 9, Some(-1.0)).contains("gain = -1"));
+        assert!(refuse(&axis(), 9, Some(f64::NAN)).contains("gain = NaN"));
+        let mute = from_transfer_function(&[0.0], &[1.0, -0.5], Some(1.0)).unwrap();
+        assert!(refuse(&mute, 9, None).contains("|P| = 0"));
+        let explosive = from_transfer_function(&[1.0], &[1.0, -1e3], Some(1.0)).unwrap();
+        assert!(refuse(&explosive, 400, None).contains("|P| = "));
+        assert!(refuse(&second_order(1.0, 1.0).unwrap(), 9, None).contains("continuous"));
+    }
+}

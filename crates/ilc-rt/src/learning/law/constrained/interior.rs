@@ -1,0 +1,247 @@
+//! The interior point: Mehrotra's predictor and corrector, with a Riccati recursion as the linear
+//! solution.
+
+use super::riccati::{Gain, Plant, Pull, Weighing};
+use super::rows::Rows;
+use super::solver::{Bands, Outcome, Places, Solver};
+use crate::learning::sweep::Run;
+
+/// Gap at which the search ends, as a part of the cost ...
+const GAP: f64 = 1e-13;
+/// ... and the one that is good enough where rounding lets it shrink no further.
+const GAP_ENOUGH: f64 = 1e-9;
+/// What of the cost before learning counts as nothing.
+const FLOOR: f64 = 1e-12;
+/// Part of the first violation that may be left when the search ends.
+const RESIDUAL: f64 = 1e-11;
+/// Iterations after which the search is given up.
+const MAX_ITERATIONS: usize = 60;
+/// Part of the way to the border that a step may go, at first and near the end.
+const MARGIN: f64 = 0.995;
+const MARGIN_LATE: f64 = 0.9999;
+/// The products of slack and multiplier start at this part of the cost before learning, in sum ...
+const START: f64 = 0.3;
+/// ... and, coming from an earlier solution, at this part.
+const WARM_START: f64 = 0.1;
+
+/// One group of axes: `N` states, `M` inputs, `P` outputs, `NS` states with the delayed changes.
+#[derive(Debug)]
+pub(super) struct Interior<const N: usize, const M: usize, const P: usize, const NS: usize> {
+    pub(super) plant: Plant<N, M, P>,
+    /// The different weights, and which of them holds at each sample.
+    pub(super) weighings: Vec<Weighing<M, P>>,
+    pub(super) which: Vec<usize>,
+    /// Weight of the input alone, at each of `weighings`.
+    pub(super) holds: Vec<[[f64; M]; M]>,
+    pub(super) places: Places,
+    pub(super) bands: Bands,
+    pub(super) rows: Rows,
+    /// Gains of the problem without bounds.
+    pub(super) plain: Vec<Gain<M, NS>>,
+    pub(super) gains: Vec<Gain<M, NS>>,
+    pub(super) kappa: Vec<[f64; M]>,
+    /// Error at the samples that the input reaches, and the same weighted.
+    pub(super) error: Vec<[f64; P]>,
+    pub(super) weighted: Vec<[f64; P]>,
+    /// `-S u`.
+    pub(super) hold: Vec<[f64; M]>,
+    pub(super) input: Vec<[f64; M]>,
+    /// Where the search is: the change of the input and the output that it causes.
+    pub(super) v: Vec<[f64; M]>,
+    pub(super) output: Vec<[f64; P]>,
+    /// The step from there.
+    pub(super) v_step: Vec<[f64; M]>,
+    pub(super) output_step: Vec<[f64; P]>,
+    /// How the cost pulls there.
+    pub(super) pulls: Vec<Pull<M, P>>,
+    /// Input that the last solution gave, from which the next search may start.
+    pub(super) last: Vec<[f64; M]>,
+    pub(super) has_last: bool,
+    pub(super) cost: f64,
+    pub(super) cost_before: f64,
+    /// The size of the cost that the search has to do with.
+    pub(super) worth: f64,
+}
+
+/// The parts of an [`Interior`] that are given from outside.
+pub(super) struct Parts<const N: usize, const M: usize, const P: usize> {
+    pub(super) plant: Plant<N, M, P>,
+    pub(super) weighings: Vec<Weighing<M, P>>,
+    pub(super) which: Vec<usize>,
+    pub(super) holds: Vec<[[f64; M]; M]>,
+    pub(super) places: Places,
+    pub(super) bands: Bands,
+}
+
+impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {
+    pub(super) fn new(parts: Parts<N, M, P>) -> Self {
+        let Parts { plant, weighings, which, holds, places, bands } = parts;
+        let n_samples = which.len();
+        let count = |is_bounded: bool, width: usize| if is_bounded { n_samples * width } else { 0 };
+        let rows = Rows::new([
+            count(bands.input.is_some() || bands.change.is_some(), M),
+            count(bands.step.is_some(), M),
+            count(bands.bend.is_some(), M),
+            count(bands.output.is_some(), P),
+        ]);
+        let mut interior = Self {
+            plant,
+            weighings,
+            which,
+            holds,
+            places,
+            bands,
+            rows,
+            plain: vec![Gain::NONE; n_samples],
+            gains: vec![Gain::NONE; n_samples],
+            kappa: vec![[0.0; M]; n_samples],
+            error: vec![[0.0; P]; n_samples],
+            weighted: vec![[0.0; P]; n_samples],
+            hold: vec![[0.0; M]; n_samples],
+            input: vec![[0.0; M]; n_samples],
+            v: vec![[0.0; M]; n_samples],
+            output: vec![[0.0; P]; n_samples],
+            v_step: vec![[0.0; M]; n_samples],
+            output_step: vec![[0.0; P]; n_samples],
+            pulls: vec![Pull::NONE; n_samples],
+            last: vec![[0.0; M]; n_samples],
+            has_last: false,
+            cost: 0.0,
+            cost_before: 0.0,
+            worth: 0.0,
+        };
+        interior.factorise(false);
+        std::mem::swap(&mut interior.plain, &mut interior.gains);
+        interior
+    }
+
+    /// Returns the last sample before the final `free` ones whose input nothing determines.
+    pub(super) fn undetermined(&self, free: usize) -> Option<usize> {
+        let end = self.plain.len() - free.min(self.plain.len() - 1);
+        (0..end).rev().find(|k| self.plain[*k].vanished())
+    }
+
+    /// Weighs the change of inputs that reach nothing within the run, so that they stay as they were.
+    pub(super) fn settle_free(&mut self, weight: f64) {
+        for k in 0..self.which.len() {
+            if self.plain[k].vanished() {
+                let (mut held, hold) =
+                    (self.weighings[self.which[k]].clone(), self.holds[self.which[k]]);
+                for i in 0..M {
+                    held.change[i][i] += weight;
+                }
+                self.which[k] = self.weighings.len();
+                self.weighings.push(held);
+                self.holds.push(hold);
+            }
+        }
+        self.factorise(false);
+        std::mem::swap(&mut self.plain, &mut self.gains);
+    }
+
+    /// Runs the iterations from the point where slacks and multipliers stand.
+    fn search(&mut self) -> (bool, usize, f64) {
+        let n_limits = self.rows.count();
+        let mut residual = 1.0;
+        let mut gap = self.rows.gap();
+        let mut found = (false, 0, f64::INFINITY);
+        let mut part = 1.0_f64;
+        self.look();
+        for iteration in 1..=MAX_ITERATIONS {
+            self.rows.weigh(0.0, false);
+            self.factorise(true);
+            self.sweep(true);
+            let length = self.rows.step(0.0, false, 1.0);
+            let shrunk = self.rows.gap_at(length) / gap;
+            let centre = shrunk * shrunk * shrunk * gap / n_limits;
+            self.rows.weigh(centre, true);
+            self.sweep(true);
+            let margin = (1.0 - part).clamp(MARGIN, MARGIN_LATE);
+            let length = self.rows.step(centre, true, margin);
+            if !(length.is_finite() && self.cost.is_finite()) {
+                break;
+            }
+            self.advance(length);
+            self.look();
+            residual *= 1.0 - length;
+            let before = gap;
+            gap = self.rows.gap();
+            part = gap / self.cost.max(FLOOR * self.worth);
+            let is_done = residual <= RESIDUAL && part <= GAP_ENOUGH;
+            found = (is_done, iteration, part);
+            if is_done && (part <= GAP || gap > 0.5 * before) {
+                break;
+            }
+        }
+        found
+    }
+}
+
+impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
+    for Interior<N, M, P, NS>
+{
+    fn solve(&mut self, run: &Run) -> Outcome {
+        self.load(run);
+        self.relax();
+        let mut outcome = Outcome { is_solved: true, iterations: 0, gap: 0.0 };
+        if !self.rows.fit() {
+            // A cost that bounds alone cause counts as well.
+            let stiffness = self.plain[0].stiffness();
+            let overshoot = self.rows.overshoot(|_| 1.0);
+            self.worth = self.cost_before + 0.5 * stiffness * overshoot * overshoot;
+            let centre = self.worth / self.rows.count();
+            let mut found = (false, 0, 0.0);
+            if self.has_last {
+                for (k, v) in self.v.iter_mut().enumerate() {
+                    for (i, v) in v.iter_mut().enumerate() {
+                        *v = self.last[k][i] - self.input[k][i];
+                    }
+                }
+                self.roll();
+                self.rows.start(WARM_START * centre, true);
+                found = self.search();
+            }
+            if !found.0 {
+                let wasted = found.1;
+                self.relax();
+                self.rows.start(START * centre, false);
+                found = self.search();
+                found.1 += wasted;
+            }
+            outcome = Outcome { is_solved: found.0, iterations: found.1, gap: found.2 };
+            self.has_last = found.0;
+        }
+        outcome.is_solved &= self.vet();
+        self.has_last &= outcome.is_solved;
+        if self.has_last {
+            for (k, last) in self.last.iter_mut().enumerate() {
+                for (i, last) in last.iter_mut().enumerate() {
+                    *last = self.input[k][i] + self.v[k][i];
+                }
+            }
+        }
+        outcome
+    }
+
+    fn write(&self, run: &mut Run) {
+        for k in 0..self.v.len() {
+            for (i, channel) in self.places.inputs.iter().enumerate() {
+                let mut next = self.input[k][i] + self.v[k][i];
+                // The sum rounds once more.
+                if let Some(band) = &self.bands.input {
+                    let (low, high) = band.at(k * M + i);
+                    next = next.max(low).min(high);
+                }
+                run.next[k * run.n_inputs + channel] = next;
+            }
+        }
+    }
+
+    fn conflict(&self, run: &Run) -> Option<super::BoundsError> {
+        super::reach::conflict(&self.bands, &self.places.inputs, M, run)
+    }
+
+    fn forget(&mut self) {
+        self.has_last = false;
+    }
+}

@@ -1,0 +1,114 @@
+//! From the signals of a run to the problem of the interior point, and from its solution back to an
+//! input that keeps every promise.
+
+#![expect(clippy::needless_range_loop, reason = "channels are written with their indices")]
+
+use super::interior::Interior;
+use super::rows::{BEND, CHANGE, OUTPUT, STEP};
+use super::solver::Band;
+use crate::learning::sweep::Run;
+
+/// The most that a bound may be exceeded by, as a part of its size.
+const EXCESS: f64 = 1e-9;
+
+impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {
+    /// Takes over the signals of a run: what pulls at the input, and where the limits lie from here.
+    pub(super) fn load(&mut self, run: &Run) {
+        let n_samples = self.which.len();
+        self.cost_before = 0.0;
+        for k in 0..n_samples {
+            for (i, channel) in self.places.inputs.iter().enumerate() {
+                self.input[k][i] = run.input[k * run.n_inputs + channel];
+            }
+            for (i, channel) in self.places.outputs.iter().enumerate() {
+                let sample = k + self.places.shifts[i];
+                let is_inside = sample < n_samples;
+                let error =
+                    if is_inside { run.error[sample * run.n_outputs + channel] } else { 0.0 };
+                self.error[k][i] = error;
+            }
+            let place = self.which[k];
+            let (weighing, hold) = (&self.weighings[place], &self.holds[place]);
+            for i in 0..P {
+                self.weighted[k][i] =
+                    (0..P).map(|j| weighing.output[i][j] * self.error[k][j]).sum();
+                self.cost_before += 0.5 * self.weighted[k][i] * self.error[k][i];
+            }
+            for i in 0..M {
+                self.hold[k][i] = -(0..M).map(|j| hold[i][j] * self.input[k][j]).sum::<f64>();
+                self.cost_before -= 0.5 * self.hold[k][i] * self.input[k][i];
+            }
+        }
+        self.limit();
+    }
+
+    /// Sets the limits of all rows for the input at hand.
+    fn limit(&mut self) {
+        let Self { rows, bands, input, error, .. } = self;
+        let zero = [0.0; M];
+        let at = |k: usize, back: usize| if k < back { &zero } else { &input[k - back] };
+        for k in 0..input.len() {
+            for i in 0..M {
+                let here = k * M + i;
+                let u = input[k][i];
+                let (first, second) = (at(k, 1)[i], at(k, 2)[i]);
+                if let Some(begin) = rows.begin[CHANGE] {
+                    let free = (f64::NEG_INFINITY, f64::INFINITY);
+                    let (low, high) = bands.input.as_ref().map_or(free, |band| band.at(here));
+                    let (least, most) = bands.change.as_ref().map_or(free, |band| band.at(here));
+                    rows.lower.set(begin + here, least.max(low - u));
+                    rows.upper.set(begin + here, most.min(high - u));
+                }
+                for (kind, band, offset) in [
+                    (STEP, &bands.step, u - first),
+                    (BEND, &bands.bend, (u - first) - (first - second)),
+                ] {
+                    if let (Some(begin), Some(band)) = (rows.begin[kind], band) {
+                        let (low, high) = band.at(here);
+                        rows.lower.set(begin + here, low - offset);
+                        rows.upper.set(begin + here, high - offset);
+                    }
+                }
+            }
+            if let (Some(begin), Some(band)) = (rows.begin[OUTPUT], &bands.output) {
+                for i in 0..P {
+                    let (low, high) = band.at(k * P + i);
+                    rows.lower.set(begin + k * P + i, low + error[k][i]);
+                    rows.upper.set(begin + k * P + i, high + error[k][i]);
+                }
+            }
+        }
+    }
+
+    /// Clips what rounding left outside of the bounds of input and change; returns whether all bounds
+    /// hold then.
+    pub(super) fn vet(&mut self) -> bool {
+        let mut largest = 0.0_f64;
+        for (k, v) in self.v.iter_mut().enumerate() {
+            for (i, v) in v.iter_mut().enumerate() {
+                let u = self.input[k][i];
+                if let Some(band) = &self.bands.input {
+                    let (low, high) = band.at(k * M + i);
+                    *v = v.max(low - u).min(high - u);
+                }
+                largest = largest.max((u + *v).abs());
+            }
+        }
+        self.roll();
+        let size = |band: &Option<Band>| {
+            let size = band.as_ref().map_or(0.0, |band| band.size);
+            if size > 0.0 { size } else { largest }
+        };
+        let sizes = [
+            size(&self.bands.input).max(size(&self.bands.change)),
+            size(&self.bands.step),
+            size(&self.bands.bend),
+            size(&self.bands.output),
+        ];
+        let begin = self.rows.begin;
+        let size_of = |start: usize| {
+            (0..4).find(|kind| begin[*kind] == Some(start)).map_or(0.0, |kind| sizes[kind])
+        };
+        self.rows.overshoot(size_of) <= EXCESS
+    }
+}

@@ -1,0 +1,186 @@
+//! Norm-optimal learning within bounds.
+//!
+//! The cost of norm-optimal learning, minimised over the inputs that the machine can take: bounds of
+//! the input, of its change and steps, of the set-point's position, velocity and acceleration and of
+//! the predicted output. `supervisor` and the Python bindings may import it.
+
+mod bounds;
+mod group;
+mod interior;
+mod load;
+#[cfg(test)]
+mod proof;
+mod reach;
+mod riccati;
+mod rows;
+mod solver;
+mod sweeps;
+
+use super::norm_optimal::decouple::parts;
+use super::norm_optimal::{Cost, Plant};
+use crate::learning::error::check;
+use crate::learning::sweep::Run;
+use crate::learning::{Law, LearningError};
+use crate::model::{ModelError, StateSpace};
+
+use bounds::Extent;
+pub use bounds::{Bound, Bounds, BoundsError, Limit};
+use solver::Solver;
+
+/// How the last update ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Status {
+    /// There was none.
+    Untried,
+    /// The next input is optimal within the bounds.
+    Solved,
+    /// The bounds cannot be honoured from this input; it was kept.
+    Infeasible(BoundsError),
+    /// No optimum was found, most likely because the bounds contradict each other; the input was kept.
+    MaxIterations,
+}
+
+/// Norm-optimal learning within bounds, in linear time.
+///
+/// `u_{j+1} = u_j + argmin_v J(v)` over all `v` for which every bound holds.
+///
+/// A primal-dual interior point finds the minimum; its linear systems are solved by a Riccati
+/// recursion, bounds entering as outputs with weights of their own, so that time and memory grow
+/// linearly with the run. Bounds that are not reached cost nothing: the law then is
+/// [`NormOptimal`](super::norm_optimal::NormOptimal). Each search starts from the last solution.
+///
+/// The next input exceeds no bound by more than 1e-9 of its size. If no such input is found, the next
+/// input is the old one and [`Constrained::status`] says so.
+///
+/// # Shapes
+/// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
+/// # Real Time
+/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` time an iteration,
+/// of which there are at most 60, or 120 if the search from the last solution fails.
+/// # Source
+/// - \[haas2016\], section 4: constraints on set points. \[mehrotra1992\]: the interior point.
+///   \[rao1998\]: its linear system as a Riccati recursion.
+#[derive(Debug)]
+pub struct Constrained {
+    cost: Cost,
+    bounds: Bounds,
+    extent: Extent,
+    solvers: Vec<Box<dyn Solver>>,
+    status: Status,
+    iterations: usize,
+    gap: f64,
+}
+
+impl Constrained {
+    /// Makes the law for runs of `n_samples` samples; `cost` is a [`Cost`] or
+    /// [`Weights`](super::norm_optimal::Weights).
+    ///
+    /// # Errors
+    /// - [`LearningError::Weight`] or [`LearningError::Parameter`] for a weight that is none.
+    /// - [`LearningError::Bounds`] or [`LearningError::Length`] for bounds that contradict each other,
+    ///   or do not fit.
+    /// - [`LearningError::Empty`] for no samples, or a model without inputs or outputs.
+    /// - [`LearningError::Undetermined`] if `s`, `r` and `rate` are zero and the model does not
+    ///   determine the input.
+    /// - [`LearningError::Model`] for a continuous model.
+    pub fn new(
+        model: &StateSpace,
+        n_samples: usize,
+        cost: impl Into<Cost>,
+        bounds: Bounds,
+    ) -> Result<Self, LearningError> {
+        let Some(dt_s) = model.dt_s() else {
+            return Err(ModelError::Continuous { action: "constrained learning" }.into());
+        };
+        let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+        for (what, count) in
+            [("n_samples", n_samples), ("n_inputs", n_inputs), ("n_outputs", n_outputs)]
+        {
+            if count == 0 {
+                return Err(LearningError::Empty { what });
+            }
+        }
+        let cost = cost.into();
+        cost.check(n_samples, n_inputs, n_outputs)?;
+        let extent = Extent { n_samples, n_inputs, n_outputs, dt_s };
+        bounds.check(extent)?;
+        let solvers = parts(Plant::Invariant(model), &cost)?
+            .into_iter()
+            .map(|part| group::solver(part, &bounds, extent))
+            .collect::<Result<_, _>>()?;
+        let (status, iterations, gap) = (Status::Untried, 0, 0.0);
+        Ok(Self { cost, bounds, extent, solvers, status, iterations, gap })
+    }
+
+    /// Returns how the last update ended.
+    pub fn status(&self) -> Status {
+        self.status
+    }
+
+    /// Returns the iterations of the last update, those of the group of axes that took most; 0 if no
+    /// bound was reached.
+    pub fn iterations(&self) -> usize {
+        self.iterations
+    }
+
+    /// Returns by how much the cost may exceed the least possible one, as a part of it.
+    pub fn gap(&self) -> f64 {
+        self.gap
+    }
+}
+
+impl Law for Constrained {
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError> {
+        let Extent { n_samples, n_inputs, n_outputs, .. } = self.extent;
+        check("input", input, n_samples, n_inputs)?;
+        check("error", error, n_samples, n_outputs)?;
+        if next.len() != input.len() {
+            let (what, found, n_channels) = ("next", next.len(), n_inputs);
+            return Err(LearningError::Length { what, found, n_samples, n_channels });
+        }
+        (self.iterations, self.gap) = (0, 0.0);
+        let mut run = Run { input, error, next, n_inputs, n_outputs };
+        self.status = Status::Solved;
+        if let Some(conflict) = self.solvers.iter().find_map(|solver| solver.conflict(&run)) {
+            self.status = Status::Infeasible(conflict);
+        } else {
+            for solver in &mut self.solvers {
+                let outcome = solver.solve(&run);
+                self.iterations = self.iterations.max(outcome.iterations);
+                self.gap = self.gap.max(outcome.gap);
+                if !outcome.is_solved {
+                    self.status = Status::MaxIterations;
+                }
+            }
+        }
+        if self.status == Status::Solved {
+            for solver in &self.solvers {
+                solver.write(&mut run);
+            }
+        } else {
+            run.next.copy_from_slice(input);
+            self.reset();
+        }
+        check("next", run.next, n_samples, n_inputs)
+    }
+
+    fn reset(&mut self) {
+        for solver in &mut self.solvers {
+            solver.forget();
+        }
+    }
+
+    fn describe(&self) -> String {
+        let Extent { n_samples, n_inputs, n_outputs, .. } = self.extent;
+        format!(
+            r#"{{"law":"constrained",{},"bounds":{},"n_samples":{n_samples},"n_inputs":{n_inputs},"n_outputs":{n_outputs}}}"#,
+            self.cost.json(),
+            self.bounds.describe(self.extent),
+        )
+    }
+}

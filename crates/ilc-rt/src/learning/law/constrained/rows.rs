@@ -1,0 +1,291 @@
+//! The rows of the bounds: their limits, slacks and multipliers, and what the interior point does to
+//! all of them alike.
+
+/// Kinds of rows: what is bounded at a sample.
+pub(super) const CHANGE: usize = 0;
+/// The difference from the sample before.
+pub(super) const STEP: usize = 1;
+/// The second difference.
+pub(super) const BEND: usize = 2;
+/// The predicted output.
+pub(super) const OUTPUT: usize = 3;
+
+/// How far a slack starts from zero, as a part of the width between two limits.
+const START_WIDTH: f64 = 0.1;
+/// The same, as a part of the largest overshoot of any row of its kind.
+const START_OVERSHOOT: f64 = 0.1;
+
+/// One side of all rows: `slack = limit - T v` for the upper one, `T v - limit` for the lower one.
+#[derive(Debug)]
+pub(super) struct Side {
+    /// +1 for the upper side, -1 for the lower.
+    sign: f64,
+    /// 1 where there is a limit, 0 where there is none.
+    is_on: Vec<f64>,
+    /// The limit; 0 where there is none.
+    pub(super) limit: Vec<f64>,
+    slack: Vec<f64>,
+    multiplier: Vec<f64>,
+    /// `1 / slack`.
+    inverse: Vec<f64>,
+    /// `d slack * d multiplier` of the predictor.
+    second_order: Vec<f64>,
+    slack_step: Vec<f64>,
+    multiplier_step: Vec<f64>,
+}
+
+impl Side {
+    fn new(sign: f64, n_rows: usize) -> Self {
+        let vector = || vec![0.0; n_rows];
+        Self {
+            sign,
+            is_on: vector(),
+            limit: vector(),
+            slack: vec![1.0; n_rows],
+            multiplier: vector(),
+            inverse: vec![1.0; n_rows],
+            second_order: vector(),
+            slack_step: vector(),
+            multiplier_step: vector(),
+        }
+    }
+
+    /// Sets the limit of a row; an infinite one is none.
+    pub(super) fn set(&mut self, row: usize, limit: f64) {
+        let is_on = limit.is_finite();
+        self.is_on[row] = if is_on { 1.0 } else { 0.0 };
+        self.limit[row] = if is_on { limit } else { 0.0 };
+    }
+
+    fn room(&self, row: usize, value: f64) -> f64 {
+        self.sign * (self.limit[row] - value)
+    }
+
+    fn count(&self) -> f64 {
+        self.is_on.iter().sum()
+    }
+
+    /// `sum slack * multiplier`.
+    fn complementarity(&self) -> f64 {
+        self.slack.iter().zip(&self.multiplier).map(|(s, l)| s * l).sum()
+    }
+
+    /// Adds this side's share to the weight and the pull of each row; `centre` is the product of
+    /// slack and multiplier that is aimed at.
+    fn weigh(
+        &self,
+        at: &[f64],
+        sigma: &mut [f64],
+        pull: &mut [f64],
+        centre: f64,
+        is_corrector: bool,
+    ) {
+        let order = if is_corrector { 1.0 } else { 0.0 };
+        let n = sigma.len();
+        let (limit, slack) = (&self.limit[..n], &self.slack[..n]);
+        let (multiplier, inverse) = (&self.multiplier[..n], &self.inverse[..n]);
+        let (is_on, second) = (&self.is_on[..n], &self.second_order[..n]);
+        let (at, pull) = (&at[..n], &mut pull[..n]);
+        for row in 0..n {
+            let ratio = multiplier[row] * inverse[row];
+            let aim = is_on[row] * (centre - order * second[row]);
+            let residual = self.sign * (limit[row] - at[row]) - slack[row];
+            sigma[row] += ratio;
+            pull[row] -= self.sign * (aim * inverse[row] - ratio * residual);
+        }
+    }
+
+    /// Computes the steps of slack and multiplier that belong to the `steps` of the rows; returns the
+    /// largest part by which one of them would shrink.
+    fn step(&mut self, at: &[f64], steps: &[f64], centre: f64, is_corrector: bool) -> f64 {
+        let order = if is_corrector { 1.0 } else { 0.0 };
+        let n = steps.len();
+        let (limit, slack) = (&self.limit[..n], &self.slack[..n]);
+        let (multiplier, inverse) = (&self.multiplier[..n], &self.inverse[..n]);
+        let (is_on, second) = (&self.is_on[..n], &mut self.second_order[..n]);
+        let (slack_step, multiplier_step) =
+            (&mut self.slack_step[..n], &mut self.multiplier_step[..n]);
+        let at = &at[..n];
+        let mut shrink = 0.0_f64;
+        for row in 0..n {
+            let residual = self.sign * (limit[row] - at[row]) - slack[row];
+            let ds = is_on[row] * (residual - self.sign * steps[row]);
+            let aim = is_on[row] * (centre - order * second[row]);
+            let dl = (aim - multiplier[row] * ds) * inverse[row] - multiplier[row];
+            slack_step[row] = ds;
+            multiplier_step[row] = dl;
+            if !is_corrector {
+                second[row] = ds * dl;
+            }
+            // Where there is no limit the second quotient is 0/0, which `max` passes over.
+            shrink = shrink.max(-ds * inverse[row]).max(-dl / multiplier[row]);
+        }
+        shrink
+    }
+
+    /// `sum (slack + a d slack) (multiplier + a d multiplier)`.
+    fn complementarity_at(&self, length: f64) -> f64 {
+        let n = self.slack.len();
+        (0..n)
+            .map(|row| {
+                (self.slack[row] + length * self.slack_step[row])
+                    * (self.multiplier[row] + length * self.multiplier_step[row])
+            })
+            .sum()
+    }
+
+    fn advance(&mut self, length: f64) {
+        for row in 0..self.slack.len() {
+            self.slack[row] += length * self.slack_step[row];
+            self.multiplier[row] += length * self.multiplier_step[row];
+            self.inverse[row] = 1.0 / self.slack[row];
+        }
+    }
+
+    /// Starts slacks and multipliers with the product `centre`: a slack is the room that there is, or
+    /// `least` where that is less; if `keep`, it is what goes with the multiplier of the last search.
+    fn start(&mut self, values: &[f64], least: &[f64], centre: f64, keep: bool) {
+        for (row, value) in values.iter().enumerate() {
+            if self.is_on[row] <= 0.0 {
+                (self.slack[row], self.multiplier[row], self.inverse[row]) = (1.0, 0.0, 1.0);
+                continue;
+            }
+            let least =
+                if keep { (centre / self.multiplier[row]).min(least[row]) } else { least[row] };
+            let slack = self.room(row, *value).max(least);
+            self.slack[row] = slack;
+            self.inverse[row] = 1.0 / slack;
+            self.multiplier[row] = centre / slack;
+        }
+    }
+}
+
+/// All rows of one group of axes.
+#[derive(Debug)]
+pub(super) struct Rows {
+    /// Where each kind begins, if it has rows at all.
+    pub(super) begin: [Option<usize>; 4],
+    ranges: Vec<std::ops::Range<usize>>,
+    pub(super) upper: Side,
+    pub(super) lower: Side,
+    /// Weight of each row as a virtual output.
+    pub(super) sigma: Vec<f64>,
+    /// That weight times the row's target.
+    pub(super) pull: Vec<f64>,
+    /// `T v` at the point where the search is.
+    pub(super) values: Vec<f64>,
+    /// `T dv` of the step that was computed last.
+    pub(super) steps: Vec<f64>,
+    /// The least slack to start with; then the size against which an overshoot is judged.
+    least: Vec<f64>,
+}
+
+impl Rows {
+    /// Makes the rows: `counts[kind]` numbers for each kind that is bounded somewhere.
+    pub(super) fn new(counts: [usize; 4]) -> Self {
+        let mut begin = [None; 4];
+        let mut ranges = Vec::new();
+        let mut n_rows = 0;
+        for (kind, count) in counts.into_iter().enumerate() {
+            if count > 0 {
+                begin[kind] = Some(n_rows);
+                ranges.push(n_rows..n_rows + count);
+                n_rows += count;
+            }
+        }
+        Self {
+            begin,
+            ranges,
+            upper: Side::new(1.0, n_rows),
+            lower: Side::new(-1.0, n_rows),
+            sigma: vec![0.0; n_rows],
+            pull: vec![0.0; n_rows],
+            values: vec![0.0; n_rows],
+            steps: vec![0.0; n_rows],
+            least: vec![0.0; n_rows],
+        }
+    }
+
+    /// Returns the number of limits.
+    pub(super) fn count(&self) -> f64 {
+        self.upper.count() + self.lower.count()
+    }
+
+    /// Returns whether no row overshoots its limits.
+    pub(super) fn fit(&self) -> bool {
+        let fits = |side: &Side| {
+            let room =
+                |(row, value): (usize, &f64)| side.is_on[row] * side.room(row, *value) >= 0.0;
+            self.values.iter().enumerate().all(room)
+        };
+        fits(&self.upper) && fits(&self.lower)
+    }
+
+    /// Returns the largest overshoot of any row, relative to the size of its limits.
+    pub(super) fn overshoot(&self, size_of_kind: impl Fn(usize) -> f64) -> f64 {
+        let mut worst = 0.0_f64;
+        for range in &self.ranges {
+            let size = size_of_kind(range.start).max(f64::MIN_POSITIVE);
+            for row in range.clone() {
+                for side in [&self.upper, &self.lower] {
+                    worst = worst.max(-side.is_on[row] * side.room(row, self.values[row]) / size);
+                }
+            }
+        }
+        worst
+    }
+
+    /// Starts the slacks and multipliers around the computed values.
+    pub(super) fn start(&mut self, centre: f64, is_warm: bool) {
+        for range in &self.ranges {
+            let overshoot = range.clone().fold(0.0_f64, |worst, row| {
+                let room = |side: &Side| -side.is_on[row] * side.room(row, self.values[row]);
+                worst.max(room(&self.upper)).max(room(&self.lower))
+            });
+            for row in range.clone() {
+                let both = self.upper.is_on[row] * self.lower.is_on[row];
+                let width = both * (self.upper.limit[row] - self.lower.limit[row]);
+                let least = (START_WIDTH * width).max(START_OVERSHOOT * overshoot);
+                self.least[row] = least.max(f64::MIN_POSITIVE.sqrt());
+            }
+        }
+        self.upper.start(&self.values, &self.least, centre, is_warm);
+        self.lower.start(&self.values, &self.least, centre, is_warm);
+    }
+
+    /// `sum slack * multiplier`, the gap once the point is feasible.
+    pub(super) fn gap(&self) -> f64 {
+        self.upper.complementarity() + self.lower.complementarity()
+    }
+
+    /// Writes weights and pulls for the next solution.
+    pub(super) fn weigh(&mut self, centre: f64, is_corrector: bool) {
+        self.sigma.fill(0.0);
+        self.pull.fill(0.0);
+        for side in [&self.upper, &self.lower] {
+            side.weigh(&self.values, &mut self.sigma, &mut self.pull, centre, is_corrector);
+        }
+    }
+
+    /// Computes the steps to the solution; returns the part of them that keeps every slack and
+    /// multiplier positive, at most 1 once `margin` is kept.
+    pub(super) fn step(&mut self, centre: f64, is_corrector: bool, margin: f64) -> f64 {
+        let upper = self.upper.step(&self.values, &self.steps, centre, is_corrector);
+        let lower = self.lower.step(&self.values, &self.steps, centre, is_corrector);
+        (margin / upper.max(lower)).min(1.0)
+    }
+
+    /// The gap after a part of the steps.
+    pub(super) fn gap_at(&self, length: f64) -> f64 {
+        self.upper.complementarity_at(length) + self.lower.complementarity_at(length)
+    }
+
+    /// Takes a part of the steps.
+    pub(super) fn advance(&mut self, length: f64) {
+        self.upper.advance(length);
+        self.lower.advance(length);
+        for (value, step) in self.values.iter_mut().zip(&self.steps) {
+            *value += length * step;
+        }
+    }
+}

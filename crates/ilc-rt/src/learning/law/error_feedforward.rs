@@ -1,0 +1,221 @@
+//! Feed-forward learned from the filtered error: the open-loop P-type law of the parallel structure.
+
+use super::q_filter::{QFilter, QRunner};
+use crate::learning::error::{check, check_counts, check_place};
+use crate::learning::{Law, LearningError};
+
+/// The numbers of an [`ErrorFeedforward`] law.
+///
+/// # Units
+/// - `gain`: input units per error unit; `lead` in samples; `limit` in input units
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Feedforward {
+    /// Learning gain, in the paper phi.
+    pub gain: f64,
+    /// How many samples ahead the error is taken: 1 for an axis without delay.
+    pub lead: usize,
+    /// Largest magnitude of the learned feed-forward; infinite for none.
+    pub limit: f64,
+}
+
+/// Open-loop learning from the filtered error, each channel by itself.
+///
+/// `w_j[k] = clamp(w_{j-1}[k] + phi (Q e_{j-1})[k + lead])`, the drive being given `w_j + C e_j`
+///
+/// The filter sees the error alone, so that what was learned stays: it does not fade as it does in a
+/// law that filters its input each time. Beyond the end of the run the filtered error is held. The
+/// limit keeps the feed-forward out of the drive's saturation; [`ErrorFeedforward::n_limited`] says
+/// how often it had to.
+///
+/// # Shapes
+/// - `input` (w), `error`, `next`: `n_samples` x `n_channels`
+/// # Real Time
+/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples n_channels)`.
+/// # Source
+/// - \[filter-based\], Eq. (2), with the lead of Eq. (9) and the filter of Section 4.
+#[derive(Debug)]
+pub struct ErrorFeedforward {
+    rule: Feedforward,
+    n_samples: usize,
+    n_channels: usize,
+    q_filter: QFilter,
+    runner: QRunner,
+    filtered: Vec<f64>,
+    n_limited: usize,
+}
+
+impl ErrorFeedforward {
+    /// Makes the law for runs of `n_samples` samples of `n_channels` axes.
+    ///
+    /// # Errors
+    /// - [`LearningError::Parameter`] for a gain that is not finite, or a limit that is not positive.
+    /// - [`LearningError::Empty`] for no samples or no channels.
+    /// - [`LearningError::Signal`] if the run is too short for the filter.
+    pub fn new(
+        rule: Feedforward,
+        n_samples: usize,
+        n_channels: usize,
+        q_filter: QFilter,
+    ) -> Result<Self, LearningError> {
+        let Feedforward { gain, limit, .. } = rule;
+        if !gain.is_finite() {
+            let allowed = "a gain must be finite";
+            return Err(LearningError::Parameter { what: "gain", value: gain, allowed });
+        }
+        if limit.is_nan() || limit <= 0.0 {
+            let allowed = "a limit must be greater than 0";
+            return Err(LearningError::Parameter { what: "limit", value: limit, allowed });
+        }
+        check_counts(&[("n_samples", n_samples), ("n_channels", n_channels)])?;
+        let runner = q_filter.for_samples(n_samples)?;
+        let filtered = vec![0.0; n_samples * n_channels];
+        Ok(Self { rule, n_samples, n_channels, q_filter, runner, filtered, n_limited: 0 })
+    }
+
+    /// Returns how many values of the last input stand at the limit.
+    pub fn n_limited(&self) -> usize {
+        self.n_limited
+    }
+}
+
+impl Law for ErrorFeedforward {
+    fn update(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        next: &mut [f64],
+    ) -> Result<(), LearningError> {
+        let (n_samples, n_channels) = (self.n_samples, self.n_channels);
+        check("input", input, n_samples, n_channels)?;
+        check("error", error, n_samples, n_channels)?;
+        check_place(next, n_samples, n_channels)?;
+        self.filtered.copy_from_slice(error);
+        self.runner.apply(&mut self.filtered, n_channels)?;
+        let Feedforward { gain, lead, limit } = self.rule;
+        self.n_limited = 0;
+        for k in 0..n_samples {
+            let ahead = k.saturating_add(lead).min(n_samples - 1);
+            for channel in 0..n_channels {
+                let here = k * n_channels + channel;
+                let wanted = input[here] + gain * self.filtered[ahead * n_channels + channel];
+                next[here] = wanted.clamp(-limit, limit);
+                self.n_limited += usize::from(wanted.abs() > limit);
+            }
+        }
+        check("next", next, n_samples, n_channels)
+    }
+
+    fn reset(&mut self) {
+        self.n_limited = 0;
+    }
+
+    fn describe(&self) -> String {
+        let Feedforward { gain, lead, limit } = self.rule;
+        let limit = if limit.is_finite() { limit.to_string() } else { "null".to_owned() };
+        format!(
+            r#"{{"law":"error_feedforward","gain":{gain},"lead":{lead},"limit":{limit},"filter":{},"n_samples":{},"n_channels":{}}}"#,
+            self.q_filter.describe(),
+            self.n_samples,
+            self.n_channels
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::from_transfer_function;
+    use crate::signal::{FirFilter, butterworth};
+
+    const PLAIN: Feedforward = Feedforward { gain: 0.5, lead: 1, limit: f64::INFINITY };
+
+    #[test]
+    fn the_equation_holds_sample_by_sample() {
+        let mut next = [0.0; 4];
+        let error = [1.0, 3.0, 7.0, 4.0];
+        let mut law = ErrorFeedforward::new(PLAIN, 4, 1, QFilter::None).unwrap();
+        law.update(&[10.0; 4], &error, &mut next).unwrap();
+        assert_eq!(next.to_vec(), [11.5, 13.5, 12.0, 12.0]);
+        // The mean of three neighbours, one ahead: 11/3, 14/3, 15/3, 15/3.
+        let mean = FirFilter::new(&[1.0 / 3.0; 3]).unwrap();
+        let mut law = ErrorFeedforward::new(PLAIN, 4, 1, QFilter::Fir(mean)).unwrap();
+        law.update(&[0.0; 4], &error, &mut next).unwrap();
+        for (found, expected) in next.iter().zip([11.0 / 6.0, 14.0 / 6.0, 2.5, 2.5]) {
+            assert!((found - expected).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_limit_bounds_every_channel_and_is_counted() {
+        let rule = Feedforward { gain: 1.0, lead: 0, limit: 2.0 };
+        let mut law = ErrorFeedforward::new(rule, 2, 2, QFilter::None).unwrap();
+        let mut next = [0.0; 4];
+        law.update(&[0.0; 4], &[1.0, -3.0, 2.0, 5.0], &mut next).unwrap();
+        assert_eq!(next.to_vec(), [1.0, -2.0, 2.0, 2.0]);
+        assert_eq!(law.n_limited(), 2);
+        law.reset();
+        assert_eq!(law.n_limited(), 0);
+    }
+
+    /// The axis of the paper with its feedback: `y = P (w + C r)`, `P = G / (1 + C G)`.
+    fn root_mean_squares(q_filter: QFilter, runs: usize) -> Vec<f64> {
+        let (n_samples, kp) = (1500, 2.0);
+        let (num, den) = ([0.00475, 0.00475], [1.0, -1.85, 0.85]);
+        let closed = [den[0], den[1] + kp * num[0], den[2] + kp * num[1]];
+        let plant = from_transfer_function(&num, &closed, Some(2e-3)).unwrap();
+        let reference: Vec<f64> = (0..n_samples)
+            .map(|k| {
+                let t_s = f64::from(k) * 2e-3;
+                2e-3 * (1.0 - (2.0 * t_s).cos() + 0.3 * (7.0 * t_s).sin().powi(3))
+            })
+            .collect();
+        let n_samples = reference.len();
+        let mut law = ErrorFeedforward::new(PLAIN, n_samples, 1, q_filter).unwrap();
+        let (mut w, mut next) = (vec![0.0; n_samples], vec![0.0; n_samples]);
+        let mut seed = 7_u64;
+        (0..runs)
+            .map(|_| {
+                let command: Vec<f64> = w.iter().zip(&reference).map(|(w, r)| w + kp * r).collect();
+                let y = plant.simulate(&command, None).unwrap();
+                let error: Vec<f64> = reference
+                    .iter()
+                    .zip(y)
+                    .map(|(r, y)| {
+                        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                        r - y + 0.3e-6 * 3.46 * ((seed >> 40) as f64 / 16_777_216.0 - 0.5)
+                    })
+                    .collect();
+                law.update(&w, &error, &mut next).unwrap();
+                w.copy_from_slice(&next);
+                (error.iter().map(|e| e * e).sum::<f64>() / n_samples as f64).sqrt()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn without_filter_the_error_falls_and_then_rises_with_it_it_stays_low() {
+        let plain = root_mean_squares(QFilter::None, 120);
+        let least = plain.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(least < 0.2 * plain[0] && plain[119] > 2.0 * least, "{plain:?}");
+        let filter = QFilter::ZeroPhase(butterworth(3, 10.0, 2e-3).unwrap());
+        let filtered = root_mean_squares(filter, 120);
+        assert!(filtered.windows(2).all(|pair| pair[1] < pair[0] + 0.03e-6), "{filtered:?}");
+        assert!(filtered[119] < 0.1 * filtered[0], "{filtered:?}");
+    }
+
+    #[test]
+    fn wrong_numbers_are_refused_one_at_a_time() {
+        let line =
+            |rule, n, m| ErrorFeedforward::new(rule, n, m, QFilter::None).unwrap_err().to_string();
+        assert!(line(Feedforward { gain: f64::NAN, ..PLAIN }, 4, 1).contains("gain = NaN"));
+        assert!(line(Feedforward { limit: 0.0, ..PLAIN }, 4, 1).contains("limit = 0"));
+        assert!(line(Feedforward { limit: f64::NAN, ..PLAIN }, 4, 1).contains("limit = NaN"));
+        assert!(line(PLAIN, 0, 1).contains("n_samples = 0"));
+        assert!(line(PLAIN, 4, 0).contains("n_channels = 0"));
+        let mut law = ErrorFeedforward::new(PLAIN, 4, 1, QFilter::None).unwrap();
+        assert!(law.update(&[0.0; 3], &[0.0; 4], &mut [0.0; 4]).is_err());
+        assert!(law.update(&[0.0; 4], &[0.0; 3], &mut [0.0; 4]).is_err());
+        assert!(law.update(&[0.0; 4], &[0.0; 4], &mut [0.0; 3]).is_err());
+        assert!(law.update(&[f64::NAN; 4], &[0.0; 4], &mut [0.0; 4]).is_err());
+    }
+}

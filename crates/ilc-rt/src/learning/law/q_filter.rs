@@ -1,0 +1,213 @@
+//! The filter through which a law passes what it learned, of whatever kind; every law with a filter
+//! takes this one.
+
+use crate::signal::{
+    FirFilter, GaussianFilter, Section, SignalError, SosFilter, Switched, SwitchedFilter,
+    Symmetric, ZeroPhase,
+};
+
+/// Which filter a law uses.
+#[derive(Debug, Clone, PartialEq)]
+pub enum QFilter {
+    /// None: the law converges only where the model allows it.
+    None,
+    /// Forward and backward: no lag.
+    ZeroPhase(Vec<Section>),
+    /// Forward only, from rest: lags, shown for comparison.
+    Causal(Vec<Section>),
+    /// Gaussian: no lag and no overshoot.
+    Gaussian(GaussianFilter),
+    /// Zero-phase with another cut-off on each segment of the run.
+    Switched(SwitchedFilter),
+    /// Symmetric taps: no lag.
+    Fir(FirFilter),
+}
+
+impl QFilter {
+    /// Sets the filter up for runs of `n_samples` samples.
+    ///
+    /// # Errors
+    /// - [`SignalError::TooShort`] if the run is too short for it, [`SignalError::SegmentBeyondEnd`]
+    ///   if it switches after the run's end.
+    pub fn for_samples(&self, n_samples: usize) -> Result<QRunner, SignalError> {
+        Ok(QRunner(match self {
+            Self::None => Kind::None,
+            Self::ZeroPhase(sections) => {
+                Kind::ZeroPhase(ZeroPhase::new(sections.clone(), n_samples)?)
+            }
+            Self::Causal(sections) => Kind::Causal(SosFilter::new(sections.clone())),
+            Self::Gaussian(filter) => Kind::Symmetric(filter.for_samples(n_samples)?),
+            Self::Switched(filter) => Kind::Switched(filter.for_samples(n_samples)?),
+            Self::Fir(filter) => Kind::Symmetric(filter.for_samples(n_samples)?),
+        }))
+    }
+
+    /// Returns the filter and its parameters as JSON, for the record of the run.
+    pub fn describe(&self) -> String {
+        let sections = |kind: &str, sections: &[Section]| {
+            let rows: Vec<String> = sections
+                .iter()
+                .map(|Section { b: [b0, b1, b2], a: [a1, a2] }| {
+                    format!("[{b0},{b1},{b2},1,{a1},{a2}]")
+                })
+                .collect();
+            format!(r#"{{"kind":"{kind}","sos":[{}]}}"#, rows.join(","))
+        };
+        match self {
+            Self::None => "null".to_owned(),
+            Self::ZeroPhase(given) => sections("zero_phase", given),
+            Self::Causal(given) => sections("causal", given),
+            Self::Gaussian(filter) => format!(
+                r#"{{"kind":"gaussian","bandwidth_hz":{},"dt_s":{}}}"#,
+                filter.bandwidth_hz(),
+                filter.dt_s()
+            ),
+            Self::Switched(filter) => {
+                let segments: Vec<String> = filter
+                    .segments()
+                    .iter()
+                    .map(|segment| format!("[{},{}]", segment.start, segment.cutoff_hz))
+                    .collect();
+                format!(
+                    r#"{{"kind":"switched","order":{},"segments":[{}],"blend":{},"dt_s":{}}}"#,
+                    filter.order(),
+                    segments.join(","),
+                    filter.blend(),
+                    filter.dt_s()
+                )
+            }
+            Self::Fir(filter) => {
+                let taps: Vec<String> = filter.taps().iter().map(f64::to_string).collect();
+                format!(r#"{{"kind":"fir","taps":[{}]}}"#, taps.join(","))
+            }
+        }
+    }
+}
+
+/// A [`QFilter`] with its workspace.
+#[derive(Debug, Clone)]
+pub struct QRunner(Kind);
+
+#[derive(Debug, Clone)]
+enum Kind {
+    None,
+    ZeroPhase(ZeroPhase),
+    Causal(SosFilter),
+    Symmetric(Symmetric),
+    Switched(Switched),
+}
+
+impl QRunner {
+    /// Filters every channel in place.
+    ///
+    /// # Shapes
+    /// - `signal`: time first, `n_samples` x `n_channels`
+    /// # Real Time
+    /// Cold path, but allocates nothing.
+    /// # Errors
+    /// - [`SignalError::Length`] if the signal has another length than the filter was set up for.
+    pub fn apply(&mut self, signal: &mut [f64], n_channels: usize) -> Result<(), SignalError> {
+        (0..n_channels).try_for_each(|channel| match &mut self.0 {
+            Kind::None => Ok(()),
+            Kind::ZeroPhase(filter) => filter.apply(signal, channel, n_channels),
+            Kind::Causal(filter) => {
+                filter.reset();
+                for value in signal.iter_mut().skip(channel).step_by(n_channels) {
+                    *value = filter.step(*value);
+                }
+                Ok(())
+            }
+            Kind::Symmetric(filter) => filter.apply(signal, channel, n_channels),
+            Kind::Switched(filter) => filter.apply(signal, channel, n_channels),
+        })
+    }
+
+    /// Applies the transpose of the filter to every channel in place, for the analysis of laws that
+    /// filter; returns whether there is one for this kind.
+    ///
+    /// # Shapes
+    /// - as [`QRunner::apply`]
+    /// # Errors
+    /// - [`SignalError::Length`] if the signal has another length than the filter was set up for.
+    pub fn apply_transposed(
+        &mut self,
+        signal: &mut [f64],
+        n_channels: usize,
+    ) -> Result<bool, SignalError> {
+        match &mut self.0 {
+            Kind::None => {}
+            Kind::ZeroPhase(filter) => {
+                for channel in 0..n_channels {
+                    filter.apply_transposed(signal, channel, n_channels)?;
+                }
+            }
+            Kind::Causal(filter) => {
+                for channel in 0..n_channels {
+                    filter.reset();
+                    for value in signal.iter_mut().skip(channel).step_by(n_channels).rev() {
+                        *value = filter.step(*value);
+                    }
+                }
+            }
+            Kind::Symmetric(_) | Kind::Switched(_) => return Ok(false),
+        }
+        Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::{Segment, butterworth};
+
+    fn every_kind() -> Vec<QFilter> {
+        let sections = butterworth(3, 40.0, 2e-3).unwrap();
+        let segments =
+            [(0, 10.0), (50, 60.0)].map(|(start, cutoff_hz)| Segment { start, cutoff_hz });
+        vec![
+            QFilter::None,
+            QFilter::ZeroPhase(sections.clone()),
+            QFilter::Causal(sections),
+            QFilter::Gaussian(GaussianFilter::new(30.0, 2e-3).unwrap()),
+            QFilter::Switched(SwitchedFilter::new(2, &segments, 20, 2e-3).unwrap()),
+            QFilter::Fir(FirFilter::new(&[0.25, 0.5, 0.25]).unwrap()),
+        ]
+    }
+
+    #[test]
+    fn every_kind_treats_its_channels_alike_and_alone() {
+        let x: Vec<f64> = (0..120).map(|k| f64::from(k * k % 23) - 11.0).collect();
+        for filter in every_kind() {
+            let mut runner = filter.for_samples(120).unwrap();
+            let mut both: Vec<f64> = x.iter().flat_map(|value| [*value, -2.0 * value]).collect();
+            runner.apply(&mut both, 2).unwrap();
+            let mut alone = x.clone();
+            runner.apply(&mut alone, 1).unwrap();
+            for k in 0..120 {
+                assert!((both[2 * k] - alone[k]).abs() < 1e-13);
+                assert!((both[2 * k + 1] + 2.0 * alone[k]).abs() < 1e-12);
+            }
+            assert_eq!(alone == x, filter == QFilter::None);
+        }
+    }
+
+    #[test]
+    fn every_kind_says_what_it_is_in_json() {
+        let mut kinds: Vec<String> = every_kind()
+            .iter()
+            .map(|filter| {
+                let json: serde_json::Value = serde_json::from_str(&filter.describe()).unwrap();
+                json["kind"].as_str().unwrap_or("none").to_owned()
+            })
+            .collect();
+        kinds.sort();
+        assert_eq!(kinds, ["causal", "fir", "gaussian", "none", "switched", "zero_phase"]);
+    }
+
+    #[test]
+    fn a_run_too_short_for_its_filter_is_refused() {
+        let short: Vec<bool> =
+            every_kind().iter().map(|filter| filter.for_samples(3).is_err()).collect();
+        assert_eq!(short, [false, true, false, true, true, false]);
+    }
+}

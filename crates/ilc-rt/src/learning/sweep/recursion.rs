@@ -1,0 +1,276 @@
+//! One step of the backward recursion, in three forms, each on memory that is kept.
+
+use super::cholesky::{self, Pivots};
+use super::record::Sizes;
+use super::square_root::SquareRoot;
+use super::{Form, Stage, fixed_step};
+
+/// The cost of the samples to come, and the room that one step needs.
+///
+/// All matrices by columns.
+#[derive(Debug, Clone)]
+pub(super) struct Recursion {
+    form: Form,
+    sizes: Sizes,
+    /// `Pi` (n x n); in the square-root forms an upper triangular `U` with `Pi = U'U`.
+    pub(super) cost: Vec<f64>,
+    /// The same one sample later.
+    later: Vec<f64>,
+    /// `Pi B`, `Pi A`, `Q D`, `Q C`.
+    cost_b: Vec<f64>,
+    cost_a: Vec<f64>,
+    weighted_d: Vec<f64>,
+    weighted_c: Vec<f64>,
+    /// Cholesky factor of `H`, lower (m x m).
+    lower: Vec<f64>,
+    /// `K` (m x n).
+    feedback: Vec<f64>,
+    /// `A - B K` (n x n).
+    pub(super) transition: Vec<f64>,
+    /// `C - D K` (p x n), and `Q` times it.
+    left: Vec<f64>,
+    weighted_left: Vec<f64>,
+    /// `S + R` (m x m), and times `K` (m x n).
+    effort: Vec<f64>,
+    weighted_feedback: Vec<f64>,
+    root: SquareRoot,
+}
+
+impl Recursion {
+    pub(super) fn new(form: Form, sizes: Sizes) -> Self {
+        let Sizes { n, m, p, .. } = sizes;
+        let room = |count: usize| vec![0.0; count];
+        Self {
+            form,
+            sizes,
+            cost: room(n * n),
+            later: room(n * n),
+            cost_b: room(n * m),
+            cost_a: room(n * n),
+            weighted_d: room(p * m),
+            weighted_c: room(p * n),
+            lower: room(m * m),
+            feedback: room(m * n),
+            transition: room(n * n),
+            left: room(p * n),
+            weighted_left: room(p * n),
+            effort: room(m * m),
+            weighted_feedback: room(m * n),
+            root: SquareRoot::new(sizes),
+        }
+    }
+
+    /// Starts again from the end of the run, where nothing is left to cost.
+    pub(super) fn restart(&mut self) {
+        self.cost.fill(0.0);
+    }
+
+    /// Goes from sample `k + 1` to sample `k` and writes its gains.
+    ///
+    /// `H = S + R + D'QD + B'Pi B`, `K = H^-1 (D'QC + B'Pi A)`.
+    pub(super) fn step(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
+        std::mem::swap(&mut self.cost, &mut self.later);
+        if self.form == Form::Joseph
+            && let Some(pivots) = fixed_step::step(self.sizes, stage, self.room(), back, fore)
+        {
+            return pivots;
+        }
+        self.any(stage, back, fore)
+    }
+
+    /// What a step of fixed size reads and writes.
+    fn room(&mut self) -> fixed_step::Room<'_> {
+        let Self { later, cost, transition, weighted_c, .. } = self;
+        fixed_step::Room { later, cost, transition, weighted_c }
+    }
+
+    /// [`Recursion::step`] for any sizes and forms.
+    fn any(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
+        let Sizes { n, m, p, targets, held } = self.sizes;
+        let Self { feedback, transition, left, weighted_left, effort, lower, .. } = self;
+        let (a, b) = (&stage.a.as_slice()[..n * n], &stage.b.as_slice()[..n * m]);
+        let (c, d) = (&stage.c.as_slice()[..p * n], &stage.d.as_slice()[..p * m]);
+        let q = &stage.q.as_slice()[..p * p];
+        let (s, r) = (&stage.s.as_slice()[..m * m], &stage.r.as_slice()[..m * m]);
+        for (value, (s, r)) in effort.iter_mut().zip(s.iter().zip(r)) {
+            *value = s + r;
+        }
+        multiply(&mut self.weighted_d[..p * m], q, d, p, p, m);
+        multiply(&mut self.weighted_c[..p * n], q, c, p, p, n);
+
+        let pivots = match self.form {
+            Form::Joseph => {
+                let later = &self.later[..n * n];
+                multiply(&mut self.cost_b[..n * m], later, b, n, n, m);
+                multiply(&mut self.cost_a[..n * n], later, a, n, n, n);
+                lower[..m * m].copy_from_slice(&effort[..m * m]);
+                add_transposed(&mut lower[..m * m], d, &self.weighted_d[..p * m], m, p, m);
+                add_transposed(&mut lower[..m * m], b, &self.cost_b[..n * m], m, n, m);
+                let pivots = cholesky::factorize(&mut lower[..m * m], m, m);
+                cholesky::invert_diagonal(&mut lower[..m * m], m);
+                let feedback = &mut feedback[..m * n];
+                feedback.fill(0.0);
+                add_transposed(feedback, d, &self.weighted_c[..p * n], m, p, n);
+                add_transposed(feedback, b, &self.cost_a[..n * n], m, n, n);
+                for column in feedback.chunks_exact_mut(m) {
+                    cholesky::solve(&lower[..m * m], m, column);
+                }
+                pivots
+            }
+            form => {
+                let cost = (&self.later[..], &mut self.cost[..]);
+                self.root.step(form, stage, effort, cost, (lower, feedback))
+            }
+        };
+
+        let (feedback, transition) = (&feedback[..m * n], &mut transition[..n * n]);
+        let (left, weighted_left) = (&mut left[..p * n], &mut weighted_left[..p * n]);
+        transition.copy_from_slice(a);
+        subtract(transition, b, feedback, n, m, n);
+        left.copy_from_slice(c);
+        subtract(left, d, feedback, p, m, n);
+        multiply(weighted_left, q, left, p, p, n);
+        if self.form == Form::Joseph {
+            // Joseph's form, `(C-DK)'Q(C-DK) + K'(S+R)K + (A-BK)'Pi(A-BK)`: a sum of squares, that
+            // keeps its sign under rounding.
+            let moved = &mut self.cost_a[..n * n];
+            multiply(moved, &self.later[..n * n], transition, n, n, n);
+            let weighted = &mut self.weighted_feedback[..m * n];
+            multiply(weighted, &effort[..m * m], feedback, m, m, n);
+            let cost = &mut self.cost[..n * n];
+            for j in 0..n {
+                for i in 0..=j {
+                    let mut value = 0.0;
+                    for k in 0..n {
+                        value += transition[i * n + k] * moved[j * n + k];
+                    }
+                    for k in 0..p {
+                        value += left[i * p + k] * weighted_left[j * p + k];
+                    }
+                    for k in 0..m {
+                        value += feedback[i * m + k] * weighted[j * m + k];
+                    }
+                    cost[j * n + i] = value;
+                    cost[i * n + j] = value;
+                }
+            }
+        }
+
+        let lower = &lower[..m * m];
+        let rows = n + m;
+        let mut columns = back.chunks_exact_mut(rows);
+        for j in 0..n {
+            let Some(target) = columns.next() else { break };
+            for i in 0..n {
+                target[i] = transition[i * n + j];
+            }
+            for i in 0..m {
+                target[n + i] = b[i * n + j];
+            }
+            cholesky::solve(lower, m, &mut target[n..]);
+        }
+        for j in 0..targets {
+            let Some(target) = columns.next() else { break };
+            for i in 0..n {
+                target[i] = weighted_left[i * p + j];
+            }
+            for i in 0..m {
+                target[n + i] = self.weighted_d[i * p + j];
+            }
+            cholesky::solve(lower, m, &mut target[n..]);
+        }
+        for j in 0..held {
+            let Some(target) = columns.next() else { break };
+            for i in 0..n {
+                let mut value = 0.0;
+                for k in 0..m {
+                    value += feedback[i * m + k] * s[j * m + k];
+                }
+                target[i] = value;
+            }
+            for i in 0..m {
+                target[n + i] = -s[j * m + i];
+            }
+            cholesky::solve(lower, m, &mut target[n..]);
+        }
+        for j in 0..n {
+            let target = &mut fore[j * rows..(j + 1) * rows];
+            target[..n].copy_from_slice(&transition[j * n..(j + 1) * n]);
+            for i in 0..m {
+                target[n + i] = -feedback[j * m + i];
+            }
+        }
+        fore[n * rows..].copy_from_slice(b);
+        pivots
+    }
+
+    /// Returns the largest entry of the cost's change in the last step.
+    pub(super) fn change(&self) -> f64 {
+        let pairs = self.cost.iter().zip(&self.later);
+        pairs.map(|(new, old)| (new - old).abs()).fold(0.0, f64::max)
+    }
+
+    /// Returns the size of the cost, that of the sample itself included.
+    pub(super) fn scale(&self, stage: &Stage) -> f64 {
+        let p = self.sizes.p;
+        let own = (0..self.sizes.n)
+            .map(|j| (0..p).map(|i| stage.c[(i, j)] * self.weighted_c[j * p + i]).sum::<f64>());
+        let own = own.fold(0.0, f64::max);
+        let own = if self.form == Form::Joseph { own } else { own.sqrt() };
+        self.cost.iter().fold(own, |scale, value| scale.max(own + value.abs()))
+    }
+}
+
+/// `out = left right`, (rows, inner) times (inner, cols).
+#[inline]
+fn multiply(out: &mut [f64], left: &[f64], right: &[f64], rows: usize, inner: usize, cols: usize) {
+    for j in 0..cols {
+        let out = &mut out[j * rows..(j + 1) * rows];
+        out.fill(0.0);
+        for k in 0..inner {
+            let factor = right[j * inner + k];
+            let column = &left[k * rows..(k + 1) * rows];
+            for i in 0..rows {
+                out[i] += column[i] * factor;
+            }
+        }
+    }
+}
+
+/// `out -= left right`, (rows, inner) times (inner, cols).
+#[inline]
+fn subtract(out: &mut [f64], left: &[f64], right: &[f64], rows: usize, inner: usize, cols: usize) {
+    for j in 0..cols {
+        let out = &mut out[j * rows..(j + 1) * rows];
+        for k in 0..inner {
+            let factor = right[j * inner + k];
+            let column = &left[k * rows..(k + 1) * rows];
+            for i in 0..rows {
+                out[i] -= column[i] * factor;
+            }
+        }
+    }
+}
+
+/// `out += left' right`, left (inner, rows), right (inner, cols).
+#[inline]
+fn add_transposed(
+    out: &mut [f64],
+    left: &[f64],
+    right: &[f64],
+    rows: usize,
+    inner: usize,
+    cols: usize,
+) {
+    for j in 0..cols {
+        let right = &right[j * inner..(j + 1) * inner];
+        for i in 0..rows {
+            let left = &left[i * inner..(i + 1) * inner];
+            let mut value = out[j * rows + i];
+            for k in 0..inner {
+                value += left[k] * right[k];
+            }
+            out[j * rows + i] = value;
+        }
+    }
+}

@@ -1,0 +1,290 @@
+//! Weights for several agents that keep a formation.
+
+use nalgebra::DMatrix;
+
+use super::{Objective, Weight};
+use crate::learning::LearningError;
+
+/// Which agents there are, and what of their errors is a formation error or the centre's.
+///
+/// An agent is a machine, or a group of axes, with its own reference. All agents' errors stand one
+/// behind the other in each sample: `e = (e_1x, e_1y, e_2x, ...)`. The formation error of two agents
+/// is the difference of their errors, `e_j - e_i = (r_j - r_i) - (y_j - y_i)`: the wanted offset, as
+/// the references have it, less the actual one. So nothing but references says what the formation
+/// is ([`Formation::follow`] makes them from a leader's), and any drift that all agents share costs
+/// nothing in it.
+///
+/// # Shapes
+/// - every signal of the whole: `n_samples` x (`n_agents` * `n_axes`), time first
+/// # Source
+/// - \[barton2010\], Eq. (4.4), (6.4), (6.14), (6.15).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Formation {
+    n_agents: usize,
+    n_axes: usize,
+    /// `F`: formation errors from all errors.
+    shape: DMatrix<f64>,
+    /// `K`: error of the centre from all errors.
+    centre: DMatrix<f64>,
+}
+
+impl Formation {
+    /// Makes a formation of equal agents in which every pair keeps its offset in every axis.
+    ///
+    /// # Errors
+    /// - [`LearningError::Empty`] for no agents or no axes.
+    pub fn new(n_agents: usize, n_axes: usize) -> Result<Self, LearningError> {
+        let axes: Vec<usize> = (0..n_axes).collect();
+        Self::of_pairs(n_agents, n_axes, &Self::all_pairs(n_agents), &axes)
+    }
+
+    /// Makes a formation in which the given pairs of agents keep their offset in the given axes.
+    ///
+    /// For each axis one row for each pair `(i, j)`: -1 at agent `i` and 1 at agent `j`. With three
+    /// agents of two axes and all pairs this is the `F` of the source. The centre is the mean of the
+    /// agents.
+    ///
+    /// # Errors
+    /// - [`LearningError::Empty`] for no agents or no axes.
+    /// - [`LearningError::Weight`] for an agent or axis that is not there, or a pair of one agent.
+    pub fn of_pairs(
+        n_agents: usize,
+        n_axes: usize,
+        pairs: &[(usize, usize)],
+        axes: &[usize],
+    ) -> Result<Self, LearningError> {
+        for (what, count) in [("n_agents", n_agents), ("n_axes", n_axes)] {
+            if count == 0 {
+                return Err(LearningError::Empty { what });
+            }
+        }
+        for (i, j) in pairs {
+            if i == j || *i.max(j) >= n_agents {
+                let reason = format!("({i}, {j}); two different ones of {n_agents} agents from 0");
+                return Err(LearningError::Weight { what: "pairs", sample: 0, reason });
+            }
+        }
+        if let Some(axis) = axes.iter().find(|axis| **axis >= n_axes) {
+            let reason = format!("axis {axis}; the agents have {n_axes} axes from 0");
+            return Err(LearningError::Weight { what: "axes", sample: 0, reason });
+        }
+        let mut shape = DMatrix::zeros(axes.len() * pairs.len(), n_agents * n_axes);
+        for (place, axis) in axes.iter().enumerate() {
+            for (row, (i, j)) in pairs.iter().enumerate() {
+                shape[(place * pairs.len() + row, i * n_axes + axis)] = -1.0;
+                shape[(place * pairs.len() + row, j * n_axes + axis)] = 1.0;
+            }
+        }
+        let share = 1.0 / n_agents as f64;
+        let centre = DMatrix::from_fn(n_axes, n_agents * n_axes, |row, col| {
+            if col % n_axes == row { share } else { 0.0 }
+        });
+        Ok(Self { n_agents, n_axes, shape, centre })
+    }
+
+    /// Returns every pair of agents, neighbours in number first.
+    pub fn all_pairs(n_agents: usize) -> Vec<(usize, usize)> {
+        (1..n_agents).flat_map(|gap| (0..n_agents - gap).map(move |i| (i, i + gap))).collect()
+    }
+
+    /// Takes another definition of the formation errors: any linear map of all errors.
+    ///
+    /// # Errors
+    /// - [`LearningError::Weight`] unless the map has one column for each axis of each agent and
+    ///   finite entries.
+    pub fn with_shape(mut self, shape: DMatrix<f64>) -> Result<Self, LearningError> {
+        check_map("shape", &shape, self.n_channels())?;
+        self.shape = shape;
+        Ok(self)
+    }
+
+    /// Takes another centre than the mean: any linear map of all errors to those of one agent.
+    ///
+    /// # Errors
+    /// - [`LearningError::Weight`] unless the map is `n_axes` x (`n_agents` * `n_axes`) and finite.
+    pub fn with_centre(mut self, centre: DMatrix<f64>) -> Result<Self, LearningError> {
+        check_map("centre", &centre, self.n_channels())?;
+        if centre.nrows() != self.n_axes {
+            let reason = format!("{} rows; {} are needed", centre.nrows(), self.n_axes);
+            return Err(LearningError::Weight { what: "centre", sample: 0, reason });
+        }
+        self.centre = centre;
+        Ok(self)
+    }
+
+    /// Returns the number of agents.
+    pub fn n_agents(&self) -> usize {
+        self.n_agents
+    }
+
+    /// Returns the axes of one agent.
+    pub fn n_axes(&self) -> usize {
+        self.n_axes
+    }
+
+    /// Returns the channels of all agents together.
+    pub fn n_channels(&self) -> usize {
+        self.n_agents * self.n_axes
+    }
+
+    /// Returns `F`, the map from all errors to the formation errors.
+    pub fn shape(&self) -> &DMatrix<f64> {
+        &self.shape
+    }
+
+    /// Returns `K`, the map from all errors to the error of the formation's centre.
+    pub fn centre(&self) -> &DMatrix<f64> {
+        &self.centre
+    }
+
+    /// Returns the formation errors of a run, `n_samples` x rows of `F`, time first.
+    ///
+    /// # Errors
+    /// - [`LearningError::Length`] unless `error` holds whole samples of all agents.
+    pub fn errors(&self, error: &[f64]) -> Result<Vec<f64>, LearningError> {
+        check_signal("error", error, self.n_channels())?;
+        let row_of = |sample: &[f64], row: usize| -> f64 {
+            sample.iter().enumerate().map(|(i, value)| self.shape[(row, i)] * value).sum()
+        };
+        let rows = self.shape.nrows();
+        Ok(error
+            .chunks(self.n_channels())
+            .flat_map(|sample| (0..rows).map(move |row| row_of(sample, row)))
+            .collect())
+    }
+
+    /// Returns the references of all agents from the leader's and each agent's offset to it.
+    ///
+    /// # Shapes
+    /// - `leader`: `n_samples` x `n_axes`; `offsets`: `n_agents` x `n_axes`; the result:
+    ///   `n_samples` x (`n_agents` * `n_axes`)
+    /// # Errors
+    /// - [`LearningError::Length`] if one of them does not fit.
+    pub fn follow(&self, leader: &[f64], offsets: &[f64]) -> Result<Vec<f64>, LearningError> {
+        check_signal("leader", leader, self.n_axes)?;
+        if offsets.len() != self.n_channels() {
+            return Err(LearningError::Length {
+                what: "offsets",
+                found: offsets.len(),
+                n_samples: self.n_agents,
+                n_channels: self.n_axes,
+            });
+        }
+        Ok(leader
+            .chunks(self.n_axes)
+            .flat_map(|sample| {
+                offsets.iter().enumerate().map(|(i, offset)| sample[i % self.n_axes] + offset)
+            })
+            .collect())
+    }
+
+    /// Returns the weight of all agents' errors (or inputs) for an objective.
+    ///
+    /// `Q = sum over rows f of F: w_f f' f + X1 (B1 diag(Q_1, .., Q_p) + B2 K' Q_c K)`, see
+    /// [`Objective`].
+    ///
+    /// # Errors
+    /// - [`LearningError::Weight`] for a term that is out of range or does not fit.
+    /// # Source
+    /// - \[barton2010\], Eq. (6.3), (6.6), (6.8), (6.9).
+    pub fn weight(&self, n_samples: usize, objective: &Objective) -> Result<Weight, LearningError> {
+        objective.check(n_samples, self.n_agents, self.n_axes)?;
+        let at = |k: usize| objective.at(k, self);
+        if objective.is_constant() {
+            return Ok(Weight::Block(at(0)));
+        }
+        Ok(Weight::Blocks((0..n_samples).map(at).collect()))
+    }
+}
+
+/// Refuses a signal that is no whole number of samples.
+fn check_signal(
+    what: &'static str,
+    signal: &[f64],
+    n_channels: usize,
+) -> Result<(), LearningError> {
+    let found = signal.len();
+    if found > 0 && found.is_multiple_of(n_channels) {
+        return Ok(());
+    }
+    let n_samples = (found / n_channels).max(1);
+    Err(LearningError::Length { what, found, n_samples, n_channels })
+}
+
+fn check_map(
+    what: &'static str,
+    map: &DMatrix<f64>,
+    n_channels: usize,
+) -> Result<(), LearningError> {
+    let refused = |reason: String| Err(LearningError::Weight { what, sample: 0, reason });
+    if map.ncols() != n_channels {
+        return refused(format!("{} columns; {n_channels} are needed", map.ncols()));
+    }
+    match map.iter().find(|entry| !entry.is_finite()) {
+        Some(entry) => refused(format!("{entry}; only finite values are allowed")),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_agents_of_two_axes_have_the_printed_shape() {
+        #[rustfmt::skip]
+        let printed = DMatrix::from_row_slice(6, 6, &[
+            -1.0,  0.0,  1.0,  0.0, 0.0, 0.0,
+             0.0,  0.0, -1.0,  0.0, 1.0, 0.0,
+            -1.0,  0.0,  0.0,  0.0, 1.0, 0.0,
+             0.0, -1.0,  0.0,  1.0, 0.0, 0.0,
+             0.0,  0.0,  0.0, -1.0, 0.0, 1.0,
+             0.0, -1.0,  0.0,  0.0, 0.0, 1.0,
+        ]);
+        let formation = Formation::new(3, 2).unwrap();
+        assert_eq!(formation.shape(), &printed);
+        assert_eq!(formation.shape().rank(1e-12), 4);
+        let centre = DMatrix::from_fn(2, 6, |i, j| if i == j % 2 { 1.0 / 3.0 } else { 0.0 });
+        assert_eq!(formation.centre(), &centre);
+    }
+
+    #[test]
+    fn errors_are_wanted_offsets_less_actual_ones() {
+        // Agent 1 is to stay 2 above agent 0; it is 1.5 above and 0.25 beside.
+        let formation = Formation::new(2, 2).unwrap();
+        let reference = formation.follow(&[5.0, 7.0], &[0.0, 0.0, 0.0, 2.0]).unwrap();
+        assert_eq!(reference, [5.0, 7.0, 5.0, 9.0]);
+        let measured = [4.0, 6.0, 4.25, 7.5];
+        let error: Vec<f64> = reference.iter().zip(measured).map(|(r, y)| r - y).collect();
+        assert_eq!(formation.errors(&error).unwrap(), [0.0 - 0.25, 2.0 - 1.5]);
+    }
+
+    #[test]
+    fn one_axis_may_stay_out_of_the_formation() {
+        let formation = Formation::of_pairs(2, 3, &[(0, 1)], &[0, 1]).unwrap();
+        let error = [1.0, 2.0, 3.0, 4.0, 6.0, 9.0];
+        assert_eq!(formation.errors(&error).unwrap(), [3.0, 4.0]);
+    }
+
+    #[test]
+    fn one_wrong_thing_at_a_time_is_refused() {
+        let told = |pairs: &[(usize, usize)], axes: &[usize]| {
+            Formation::of_pairs(2, 2, pairs, axes).unwrap_err().to_string()
+        };
+        assert!(told(&[(1, 1)], &[0]).contains("pairs"));
+        assert!(told(&[(0, 2)], &[0]).contains("(0, 2)"));
+        assert!(told(&[(0, 1)], &[2]).contains("axis 2"));
+        assert!(Formation::new(0, 2).unwrap_err().to_string().contains("n_agents"));
+        assert!(Formation::new(2, 0).unwrap_err().to_string().contains("n_axes"));
+        let good = Formation::new(2, 2).unwrap();
+        let narrow = good.clone().with_shape(DMatrix::zeros(1, 3)).unwrap_err();
+        assert!(narrow.to_string().contains("3 columns"));
+        let flat = good.clone().with_centre(DMatrix::zeros(1, 4)).unwrap_err();
+        assert!(flat.to_string().contains("1 rows"));
+        let nan = good.clone().with_centre(DMatrix::from_element(2, 4, f64::NAN)).unwrap_err();
+        assert!(nan.to_string().contains("NaN"));
+        assert!(good.errors(&[1.0; 6]).unwrap_err().to_string().contains("error holds 6"));
+        assert!(good.follow(&[1.0; 3], &[0.0; 4]).unwrap_err().to_string().contains("leader"));
+        assert!(good.follow(&[1.0; 2], &[0.0; 2]).unwrap_err().to_string().contains("offsets"));
+    }
+}

@@ -1,0 +1,173 @@
+//! The frequency response of a model, and its static gain.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::{ModelError, StateSpace};
+
+/// Magnitude and phase of one channel, as a Bode diagram shows them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bode {
+    /// Absolute value at each frequency.
+    pub magnitude: Vec<f64>,
+    /// Phase at each frequency, without jumps.
+    pub phase_rad: Vec<f64>,
+}
+
+impl StateSpace {
+    /// Returns the response to sinusoids.
+    ///
+    /// `G(w) = C (q I - A)^-1 B + D`, `q = j w` (continuous) or `exp(j w T)` (sampled)
+    ///
+    /// # Shapes
+    /// - one matrix (`n_outputs`, `n_inputs`) for each frequency
+    /// # Units
+    /// - `w_rad_s` in rad/s
+    /// # Errors
+    /// - [`ModelError::NotFinite`] for a frequency that is not a number.
+    /// - [`ModelError::Numerics`] at a frequency that is a pole.
+    pub fn frequency_response(
+        &self,
+        w_rad_s: &[f64],
+    ) -> Result<Vec<DMatrix<Complex<f64>>>, ModelError> {
+        let complex = |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0));
+        let (a, b, c, d) = (complex(&self.a), complex(&self.b), complex(&self.c), complex(&self.d));
+        let mut response = Vec::with_capacity(w_rad_s.len());
+        for (col, &w) in w_rad_s.iter().enumerate() {
+            if !w.is_finite() {
+                return Err(ModelError::NotFinite { what: "w_rad_s", row: 0, col, value: w });
+            }
+            let q = match self.dt_s {
+                None => Complex::new(0.0, w),
+                Some(dt_s) => Complex::new(0.0, w * dt_s).exp(),
+            };
+            let n = self.n_states();
+            if n == 0 {
+                response.push(d.clone());
+                continue;
+            }
+            let mut resolvent = -&a;
+            for i in 0..n {
+                resolvent[(i, i)] += q;
+            }
+            let states = resolvent.lu().solve(&b).ok_or(ModelError::Numerics {
+                what: "the frequency response",
+                reason: "a frequency is a pole of the model",
+            })?;
+            response.push(&c * states + &d);
+        }
+        Ok(response)
+    }
+
+    /// Returns magnitude and phase of the channel from one input to one output.
+    ///
+    /// # Units
+    /// - `w_rad_s` in rad/s, phase in rad, without jumps of a turn from one frequency to the next
+    /// # Errors
+    /// - as [`StateSpace::frequency_response`], and [`ModelError::Parameter`] for a channel that the
+    ///   model does not have.
+    pub fn bode(&self, w_rad_s: &[f64], output: usize, input: usize) -> Result<Bode, ModelError> {
+        for (what, value, count) in
+            [("output", output, self.n_outputs()), ("input", input, self.n_inputs())]
+        {
+            if value >= count {
+                return Err(ModelError::Parameter {
+                    what,
+                    value: value as f64,
+                    allowed: "it must be below the number of channels, counted from 0",
+                });
+            }
+        }
+        let response = self.frequency_response(w_rad_s)?;
+        let mut phase_rad: Vec<f64> = response.iter().map(|g| g[(output, input)].arg()).collect();
+        unwrap_phase(&mut phase_rad);
+        Ok(Bode {
+            magnitude: response.iter().map(|g| g[(output, input)].norm()).collect(),
+            phase_rad,
+        })
+    }
+
+    /// Returns the static gain.
+    ///
+    /// `G(0) = D - C A^-1 B` (continuous), `G(1) = D + C (I - A)^-1 B` (sampled)
+    ///
+    /// # Shapes
+    /// - (`n_outputs`, `n_inputs`)
+    /// # Errors
+    /// - [`ModelError::Numerics`] if the model integrates.
+    pub fn dc_gain(&self) -> Result<DMatrix<f64>, ModelError> {
+        let n = self.n_states();
+        if n == 0 {
+            return Ok(self.d.clone());
+        }
+        let system = match self.dt_s {
+            None => -&self.a,
+            Some(_) => DMatrix::identity(n, n) - &self.a,
+        };
+        let integrates = ModelError::Numerics {
+            what: "the static gain",
+            reason: "the model has a pole at rest: it integrates",
+        };
+        let size = system.amax();
+        let lu = system.full_piv_lu();
+        // The last pivot tells how near the pole at rest is.
+        if lu.u()[(n - 1, n - 1)].abs() <= f64::EPSILON * size {
+            return Err(integrates);
+        }
+        let states = lu.solve(&self.b).ok_or(integrates)?;
+        Ok(&self.d + &self.c * states)
+    }
+}
+
+/// Takes the jumps of a turn out of a phase, in place.
+///
+/// # Units
+/// - `phase_rad` in rad
+pub fn unwrap_phase(phase_rad: &mut [f64]) {
+    let turn = std::f64::consts::TAU;
+    let mut added = 0.0;
+    for k in 1..phase_rad.len() {
+        let step = phase_rad[k] + added - phase_rad[k - 1];
+        added -= turn * (step / turn).round();
+        phase_rad[k] += added;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{from_transfer_function, second_order};
+    use super::*;
+
+    #[test]
+    fn a_lag_falls_to_half_its_power_at_its_corner() {
+        let lag = from_transfer_function(&[4.0], &[1.0, 2.0], None).unwrap();
+        let g = lag.frequency_response(&[0.0, 2.0]).unwrap();
+        assert!((g[0][(0, 0)] - Complex::new(2.0, 0.0)).norm() < 1e-14);
+        assert!((g[1][(0, 0)] - Complex::new(1.0, -1.0)).norm() < 1e-14);
+        assert!((lag.dc_gain().unwrap()[(0, 0)] - 2.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_phase_of_a_delay_goes_on_falling() {
+        let hold = StateSpace::static_gain(DMatrix::from_element(1, 1, 2.0), Some(0.01)).unwrap();
+        let late = hold.delayed(5).unwrap();
+        let w: Vec<f64> = (0..300).map(f64::from).collect();
+        let bode = late.bode(&w, 0, 0).unwrap();
+        for (w, (magnitude, phase)) in w.iter().zip(bode.magnitude.iter().zip(&bode.phase_rad)) {
+            assert!((magnitude - 2.0).abs() < 1e-12 && (phase + 0.05 * w).abs() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn poles_on_the_axis_are_refused_by_name() {
+        let integrator = from_transfer_function(&[1.0], &[1.0, 0.0], None).unwrap();
+        assert!(integrator.dc_gain().unwrap_err().to_string().contains("integrates"));
+        assert!(integrator.frequency_response(&[0.0]).is_err());
+        assert!(integrator.frequency_response(&[f64::NAN]).is_err());
+        let gain = StateSpace::static_gain(DMatrix::from_element(1, 1, 2.0), None).unwrap();
+        assert!((gain.dc_gain().unwrap()[(0, 0)] - 2.0).abs() < 1e-15);
+        assert!((gain.frequency_response(&[1.0]).unwrap()[0][(0, 0)].re - 2.0).abs() < 1e-15);
+        let axis = second_order(10.0, 0.5).unwrap();
+        assert!(axis.bode(&[1.0], 1, 0).is_err() && axis.bode(&[1.0], 0, 1).is_err());
+        assert!((axis.dc_gain().unwrap()[(0, 0)] - 1.0).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,423 @@
+//! Fit of a fraction of any order, for axes with more than one resonance.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DMatrix, DVector, Schur};
+
+use super::FrequencyResponse;
+use super::least_squares::minimize;
+use crate::model::{ModelError, StateSpace, from_transfer_function};
+
+/// Highest order.
+const POLES_MAX: usize = 20;
+/// Rounds of linear fits, each weighted by the last one's denominator.
+const ROUNDS: usize = 40;
+
+/// A fitted fraction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RationalFit {
+    /// The model, stable, without the delay.
+    pub model: StateSpace,
+    /// The delay that was taken out beforehand.
+    pub delay_s: f64,
+    /// Poles that came out unstable and were reflected.
+    pub reflected_poles: usize,
+    /// Weighted RMS of the relative difference of measurement and model.
+    pub residual_rms: f64,
+}
+
+/// Fits a stable fraction to a frequency response.
+///
+/// `min sum_k w_k |ln (H_k exp(j w_k tau) / G(f_k))|^2` over fractions `G = N / D` of the given degrees,
+/// begun by Sanathanan's and Koerner's rounds `min sum_k w_k |(N - H D) / (H D_before)|^2`. The powers
+/// are those of `s / w_ref`, or of `(z - 1) / (T w_ref)` if sampled, so that nothing cancels at high
+/// sample rates. Unstable poles are reflected and the numerator fitted again.
+///
+/// # Shapes
+/// - `measured`: more frequencies than half the number of coefficients, without 0 Hz
+/// # Units
+/// - `delay_s`, `dt_s` in seconds; `dt_s` is `None` for a continuous model
+/// # Errors
+/// - [`ModelError::Parameter`] for degrees out of range, [`ModelError::SampleTime`], and as
+///   [`super::fit_second_order`] for the response.
+/// - [`ModelError::Numerics`] if the linear fit has no solution.
+/// # Source
+/// - \[sanathanan1963\]; \[pintelon2012\], section 9.8.
+pub fn fit_rational(
+    measured: &FrequencyResponse,
+    n_zeros: usize,
+    n_poles: usize,
+    delay_s: f64,
+    dt_s: Option<f64>,
+) -> Result<RationalFit, ModelError> {
+    if n_poles > POLES_MAX {
+        let allowed = "at most 20 poles can be fitted";
+        return Err(ModelError::Parameter { what: "n_poles", value: n_poles as f64, allowed });
+    }
+    if n_zeros > n_poles {
+        let allowed = "a proper model has no more zeros than poles";
+        return Err(ModelError::Parameter { what: "n_zeros", value: n_zeros as f64, allowed });
+    }
+    if !delay_s.is_finite() {
+        let allowed = "it must be finite";
+        return Err(ModelError::Parameter { what: "delay_s", value: delay_s, allowed });
+    }
+    if let Some(dt_s) = dt_s
+        && !(dt_s.is_finite() && dt_s > 0.0)
+    {
+        return Err(ModelError::SampleTime { dt_s });
+    }
+    measured.check(n_zeros + n_poles + 1)?;
+    let problem = Problem::new(measured, n_zeros, n_poles, delay_s, dt_s);
+    let mut fraction = problem.linear_rounds()?;
+    let reflected_poles = problem.stabilize(&mut fraction)?;
+    let refined = problem.refined(&fraction);
+    if problem.cost(&refined) < problem.cost(&fraction)
+        && problem.unstable(&roots(&refined.denominator)?) == 0
+    {
+        fraction = refined;
+    }
+    let all: f64 = problem.root_weight.iter().map(|weight| weight * weight).sum();
+    Ok(RationalFit {
+        model: problem.state_space(&fraction)?,
+        delay_s,
+        reflected_poles,
+        residual_rms: (problem.cost(&fraction) / all).sqrt(),
+    })
+}
+
+/// Coefficients by rising power; the denominator's highest one is 1.
+#[derive(Debug, Clone)]
+struct Fraction {
+    numerator: Vec<f64>,
+    denominator: Vec<f64>,
+}
+
+struct Problem {
+    /// Where the polynomials are evaluated.
+    points: Vec<Complex<f64>>,
+    /// Response without the delay.
+    response: Vec<Complex<f64>>,
+    root_weight: Vec<f64>,
+    n_zeros: usize,
+    n_poles: usize,
+    /// Rate that the variable of the polynomials is measured in.
+    w_ref: f64,
+    dt_s: Option<f64>,
+}
+
+impl Problem {
+    fn new(
+        measured: &FrequencyResponse,
+        n_zeros: usize,
+        n_poles: usize,
+        delay_s: f64,
+        dt_s: Option<f64>,
+    ) -> Self {
+        let f = &measured.frequency_hz;
+        let w_ref = TAU * (f[0] * f[f.len() - 1]).sqrt();
+        let point = |f: &f64| match dt_s {
+            None => Complex::new(0.0, TAU * f / w_ref),
+            Some(dt_s) => (Complex::new(0.0, TAU * f * dt_s).exp() - 1.0) / (dt_s * w_ref),
+        };
+        let advance = |f: &f64| Complex::new(0.0, TAU * f * delay_s).exp();
+        Self {
+            points: f.iter().map(point).collect(),
+            response: measured.response.iter().zip(f).map(|(h, f)| h * advance(f)).collect(),
+            root_weight: measured.weights().iter().map(|weight| weight.sqrt()).collect(),
+            n_zeros,
+            n_poles,
+            w_ref,
+            dt_s,
+        }
+    }
+
+    /// Numerator and denominator at once, the denominator's weight from the round before.
+    fn linear_rounds(&self) -> Result<Fraction, ModelError> {
+        let mut before: Vec<f64> =
+            self.points.iter().map(|p| p.norm().max(1.0).powi(exponent(self.n_poles))).collect();
+        let mut best: Option<(f64, Fraction)> = None;
+        for _ in 0..ROUNDS {
+            let count = self.n_zeros + 1 + self.n_poles;
+            let rows = |k: usize| {
+                let (p, h) = (self.points[k], self.response[k]);
+                let scale = self.root_weight[k] / (h.norm() * before[k]);
+                let mut row: Vec<Complex<f64>> = Vec::with_capacity(count + 1);
+                row.extend((0..=self.n_zeros).map(|i| p.powu(power(i)) * scale));
+                row.extend((0..self.n_poles).map(|i| -h * p.powu(power(i)) * scale));
+                row.push(h * p.powu(power(self.n_poles)) * scale);
+                row
+            };
+            let x = solve((0..self.points.len()).map(rows), count)?;
+            let (numerator, rest) = x.split_at(self.n_zeros + 1);
+            let denominator = [rest, &[1.0]].concat();
+            let fraction = Fraction { numerator: numerator.to_vec(), denominator };
+            let cost = self.cost(&fraction);
+            before = self
+                .points
+                .iter()
+                .map(|p| value(&fraction.denominator, *p).norm().max(f64::MIN_POSITIVE))
+                .collect();
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, fraction));
+            }
+        }
+        best.map(|(_, fraction)| fraction).ok_or(NO_SOLUTION)
+    }
+
+    /// Reflects unstable poles and fits the numerator to what they have become.
+    fn stabilize(&self, fraction: &mut Fraction) -> Result<usize, ModelError> {
+        let mut poles = roots(&fraction.denominator)?;
+        let reflected = self.unstable(&poles);
+        if reflected == 0 {
+            return Ok(0);
+        }
+        for pole in &mut poles {
+            if self.is_unstable(*pole) {
+                *pole = match self.dt_s {
+                    None => -pole.conj(),
+                    Some(dt_s) => {
+                        let step = dt_s * self.w_ref;
+                        ((*pole * step + 1.0).conj().inv() - 1.0) / step
+                    }
+                };
+            }
+        }
+        let mut product = vec![Complex::new(1.0, 0.0)];
+        for pole in &poles {
+            let mut next = vec![Complex::new(0.0, 0.0); product.len() + 1];
+            for (i, c) in product.iter().enumerate() {
+                next[i + 1] += c;
+                next[i] -= c * pole;
+            }
+            product = next;
+        }
+        fraction.denominator = product.iter().map(|c| c.re).collect();
+        let count = self.n_zeros + 1;
+        let rows = |k: usize| {
+            let (p, h) = (self.points[k], self.response[k]);
+            let d = value(&fraction.denominator, p);
+            let scale = Complex::new(self.root_weight[k], 0.0) / (h * d);
+            let mut row: Vec<Complex<f64>> =
+                (0..=self.n_zeros).map(|i| p.powu(power(i)) * scale).collect();
+            row.push(Complex::new(self.root_weight[k], 0.0));
+            row
+        };
+        fraction.numerator = solve((0..self.points.len()).map(rows), count)?;
+        Ok(reflected)
+    }
+
+    fn refined(&self, fraction: &Fraction) -> Fraction {
+        let scale = |c: &f64| if *c == 0.0 { 1.0 } else { *c };
+        let start: Vec<f64> = fraction
+            .numerator
+            .iter()
+            .chain(&fraction.denominator[..self.n_poles])
+            .copied()
+            .collect();
+        let scales: Vec<f64> = start.iter().map(scale).collect();
+        let at = |x: &[f64]| {
+            let mut c: Vec<f64> = x.iter().zip(&scales).map(|(x, scale)| x * scale).collect();
+            let mut denominator = c.split_off(self.n_zeros + 1);
+            denominator.push(1.0);
+            Fraction { numerator: c, denominator }
+        };
+        let x: Vec<f64> = start.iter().zip(&scales).map(|(c, scale)| c / scale).collect();
+        at(&minimize(&x, &|x| self.residuals(&at(x))).parameters)
+    }
+
+    fn residuals(&self, fraction: &Fraction) -> DVector<f64> {
+        let n = self.points.len();
+        let mut residuals = DVector::zeros(2 * n);
+        for k in 0..n {
+            let p = self.points[k];
+            let model = value(&fraction.numerator, p) / value(&fraction.denominator, p);
+            let ratio = self.response[k] / model;
+            residuals[2 * k] = self.root_weight[k] * ratio.norm().ln();
+            residuals[2 * k + 1] = self.root_weight[k] * ratio.arg();
+        }
+        residuals
+    }
+
+    fn cost(&self, fraction: &Fraction) -> f64 {
+        let cost = self.residuals(fraction).norm_squared();
+        if cost.is_finite() { cost } else { f64::INFINITY }
+    }
+
+    fn is_unstable(&self, pole: Complex<f64>) -> bool {
+        match self.dt_s {
+            None => pole.re > 0.0,
+            Some(dt_s) => (pole * (dt_s * self.w_ref) + 1.0).norm() > 1.0,
+        }
+    }
+
+    fn unstable(&self, poles: &[Complex<f64>]) -> usize {
+        poles.iter().filter(|pole| self.is_unstable(**pole)).count()
+    }
+
+    fn state_space(&self, fraction: &Fraction) -> Result<StateSpace, ModelError> {
+        let falling = |c: &[f64]| c.iter().rev().copied().collect::<Vec<f64>>();
+        let plain = from_transfer_function(
+            &falling(&fraction.numerator),
+            &falling(&fraction.denominator),
+            None,
+        )?;
+        let n = plain.n_states();
+        let step = self.dt_s.unwrap_or(1.0) * self.w_ref;
+        let mut a = plain.a * step;
+        if self.dt_s.is_some() {
+            a += DMatrix::identity(n, n);
+        }
+        StateSpace::new(a, plain.b * step, plain.c, plain.d, self.dt_s)
+    }
+}
+
+const NO_SOLUTION: ModelError = ModelError::Numerics {
+    what: "the rational fit",
+    reason: "the linear equations have no solution: try fewer poles",
+};
+
+/// Solves rows `[A | b]` of complex numbers for real unknowns, with columns of equal size.
+fn solve(
+    rows: impl Iterator<Item = Vec<Complex<f64>>>,
+    count: usize,
+) -> Result<Vec<f64>, ModelError> {
+    let mut flat = Vec::new();
+    for row in rows {
+        flat.extend(row.iter().map(|c| c.re));
+        flat.extend(row.iter().map(|c| c.im));
+    }
+    let whole = DMatrix::from_row_slice(flat.len() / (count + 1), count + 1, &flat);
+    let mut a = whole.columns(0, count).into_owned();
+    let sizes: Vec<f64> = a.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
+    for (mut column, size) in a.column_iter_mut().zip(&sizes) {
+        column /= *size;
+    }
+    let b = DVector::from_column_slice(whole.column(count).as_slice());
+    let x = a.svd(true, true).solve(&b, 1e-14).map_err(|_| NO_SOLUTION)?;
+    if x.iter().any(|value| !value.is_finite()) {
+        return Err(NO_SOLUTION);
+    }
+    Ok(x.iter().zip(&sizes).map(|(x, size)| x / size).collect())
+}
+
+/// The roots of a polynomial whose highest coefficient is 1.
+fn roots(rising: &[f64]) -> Result<Vec<Complex<f64>>, ModelError> {
+    let n = rising.len() - 1;
+    if n == 0 {
+        return Ok(Vec::new());
+    }
+    let mut companion = DMatrix::zeros(n, n);
+    for i in 0..n {
+        companion[(0, i)] = -rising[n - 1 - i];
+        if i > 0 {
+            companion[(i, i - 1)] = 1.0;
+        }
+    }
+    let schur = Schur::try_new(companion, f64::EPSILON, 10_000).ok_or(NO_SOLUTION)?;
+    Ok(schur.complex_eigenvalues().iter().copied().collect())
+}
+
+fn value(rising: &[f64], p: Complex<f64>) -> Complex<f64> {
+    rising.iter().rev().fold(Complex::new(0.0, 0.0), |sum, c| sum * p + c)
+}
+
+fn power(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}
+
+fn exponent(i: usize) -> i32 {
+    i32::try_from(i).unwrap_or(i32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Method, discretize};
+
+    fn measured(model: &StateSpace, delay_s: f64) -> FrequencyResponse {
+        let frequency_hz: Vec<f64> = (1..200).map(|k| 0.4 * f64::from(k)).collect();
+        let w: Vec<f64> = frequency_hz.iter().map(|f| TAU * f).collect();
+        let late = |(g, w): (DMatrix<Complex<f64>>, &f64)| {
+            g[(0, 0)] * Complex::new(0.0, -w * delay_s).exp()
+        };
+        FrequencyResponse {
+            response: model.frequency_response(&w).unwrap().into_iter().zip(&w).map(late).collect(),
+            coherence: vec![1.0; frequency_hz.len()],
+            frequency_hz,
+            n_averages: 1.0,
+        }
+    }
+
+    /// Two resonances and an anti-resonance.
+    fn flexible() -> StateSpace {
+        let rigid = from_transfer_function(&[8000.0], &[1.0, 60.0, 8000.0], None).unwrap();
+        let mode =
+            from_transfer_function(&[1.1, 5.0, 60_000.0], &[1.0, 9.0, 60_000.0], None).unwrap();
+        rigid.series(&mode).unwrap()
+    }
+
+    fn largest_difference(model: &StateSpace, expected: &FrequencyResponse, delay_s: f64) -> f64 {
+        let found = measured(model, delay_s);
+        let pairs = found.response.iter().zip(&expected.response);
+        pairs.map(|(f, e)| (f / e - 1.0).norm()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_flexible_axis_is_found_again_continuous_and_sampled() {
+        let data = measured(&flexible(), 4e-3);
+        let found = fit_rational(&data, 2, 4, 4e-3, None).unwrap();
+        assert!(largest_difference(&found.model, &data, 4e-3) < 1e-8);
+        assert_eq!((found.reflected_poles, found.model.n_states()), (0, 4));
+
+        for dt_s in [5e-3, 1e-3, 2e-4] {
+            let held = discretize(&flexible(), dt_s, Method::ZeroOrderHold).unwrap();
+            let data = measured(&held, 0.0);
+            let found = fit_rational(&data, 3, 4, 0.0, Some(dt_s)).unwrap();
+            let worst = largest_difference(&found.model, &data, 0.0);
+            assert!(worst < 1e-6, "dt_s = {dt_s}: {worst}, {}", found.residual_rms);
+        }
+    }
+
+    #[test]
+    fn an_unstable_response_is_fitted_by_a_stable_model() {
+        let unstable = from_transfer_function(&[900.0], &[1.0, -20.0, 900.0], None).unwrap();
+        let data = measured(&unstable, 0.0);
+        let found = fit_rational(&data, 1, 2, 0.0, None).unwrap();
+        assert_eq!(found.reflected_poles, 2);
+        assert!(found.model.poles().unwrap().iter().all(|pole| pole.re < 0.0));
+        assert!(found.residual_rms > 1e-3);
+
+        let dt_s = 1e-3;
+        let held = discretize(&unstable, dt_s, Method::ZeroOrderHold).unwrap();
+        let found = fit_rational(&measured(&held, 0.0), 1, 2, 0.0, Some(dt_s)).unwrap();
+        assert!(found.model.poles().unwrap().iter().all(|pole| pole.norm() < 1.0));
+    }
+
+    #[test]
+    fn noise_leaves_a_residual_of_its_own_size() {
+        let mut data = measured(&flexible(), 0.0);
+        let mut state = 1_u64;
+        let mut random = || {
+            state =
+                state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        for h in &mut data.response {
+            *h *= Complex::new(1.0 + 0.02 * random(), 0.02 * random());
+        }
+        let found = fit_rational(&data, 2, 4, 0.0, None).unwrap();
+        let size = 0.02 * (2.0_f64 / 12.0).sqrt();
+        assert!((found.residual_rms / size - 1.0).abs() < 0.15, "{}", found.residual_rms);
+    }
+
+    #[test]
+    fn degrees_that_cannot_be_are_refused() {
+        let data = measured(&flexible(), 0.0);
+        assert!(fit_rational(&data, 3, 2, 0.0, None).is_err());
+        assert!(fit_rational(&data, 0, 21, 0.0, None).is_err());
+        assert!(fit_rational(&data, 0, 2, f64::NAN, None).is_err());
+        assert!(fit_rational(&data, 0, 2, 0.0, Some(-1.0)).is_err());
+        assert!(fit_rational(&data.band(1.0, 1.3), 0, 2, 0.0, None).is_err());
+    }
+}

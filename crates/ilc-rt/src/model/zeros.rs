@@ -1,0 +1,190 @@
+//! Invariant zeros: where an input and a state cancel in every output.
+
+use nalgebra::{Complex, DMatrix, Schur};
+
+use super::{ModelError, StateSpace};
+
+/// Singular values below this part of the largest entry, times the size, count as zero.
+const RANK: f64 = 1e-13;
+/// Most sweeps of the eigenvalue iteration.
+const SWEEPS_MAX: usize = 10_000;
+
+impl StateSpace {
+    /// Returns the invariant zeros.
+    ///
+    /// `z` where `[A - z I, B; C, D]` loses rank. The pencil is reduced by orthogonal transforms to
+    /// one whose `D` is square and invertible; what is left has the finite zeros as eigenvalues of
+    /// `A - B D^-1 C`. No zero at infinity can turn up as a large finite one.
+    ///
+    /// # Errors
+    /// - [`ModelError::Numerics`] if the model has no rank (some inputs do the same, or some outputs
+    ///   are the same, at every frequency), or the eigenvalue iteration does not end.
+    /// # Source
+    /// - \[emami1982\].
+    pub fn zeros(&self) -> Result<Vec<Complex<f64>>, ModelError> {
+        let tolerance = RANK
+            * [self.a.amax(), self.b.amax(), self.c.amax(), self.d.amax()]
+                .into_iter()
+                .fold(0.0, f64::max)
+            * (self.n_states() + self.n_inputs().max(self.n_outputs())) as f64;
+        let rows = Pencil::of(self).with_full_row_rank(tolerance);
+        let full = rows.transposed().with_full_row_rank(tolerance).transposed();
+        let (p, m) = full.d.shape();
+        if full.a.nrows() == 0 {
+            return Ok(Vec::new());
+        }
+        if p != m {
+            return Err(ModelError::Numerics {
+                what: "the zeros",
+                reason: "the transfer matrix has dependent rows or columns at every frequency",
+            });
+        }
+        let inner = if m == 0 {
+            full.a
+        } else {
+            let inverse = full.d.try_inverse().ok_or(ModelError::Numerics {
+                what: "the zeros",
+                reason: "the reduced pencil is singular",
+            })?;
+            full.a - full.b * inverse * full.c
+        };
+        let schur =
+            Schur::try_new(inner, f64::EPSILON, SWEEPS_MAX).ok_or(ModelError::Numerics {
+                what: "the zeros",
+                reason: "the QR iteration did not converge",
+            })?;
+        Ok(schur.complex_eigenvalues().iter().copied().collect())
+    }
+}
+
+/// The four matrices on their way to a `D` of full rank.
+struct Pencil {
+    a: DMatrix<f64>,
+    b: DMatrix<f64>,
+    c: DMatrix<f64>,
+    d: DMatrix<f64>,
+}
+
+impl Pencil {
+    fn of(model: &StateSpace) -> Self {
+        Self { a: model.a.clone(), b: model.b.clone(), c: model.c.clone(), d: model.d.clone() }
+    }
+
+    fn transposed(self) -> Self {
+        Self {
+            a: self.a.transpose(),
+            b: self.c.transpose(),
+            c: self.b.transpose(),
+            d: self.d.transpose(),
+        }
+    }
+
+    /// Takes states away until `D` has full row rank; the finite zeros stay.
+    fn with_full_row_rank(mut self, tolerance: f64) -> Self {
+        loop {
+            let (n, m, p) = (self.a.nrows(), self.b.ncols(), self.c.nrows());
+            let (rows, rank_d) = row_compression(&self.d, tolerance);
+            if rank_d == p {
+                return self;
+            }
+            let (c, d) = (&rows * &self.c, &rows * &self.d);
+            let dead = c.rows(rank_d, p - rank_d).into_owned();
+            // Columns of V: first what the dead rows do not see, then what they do.
+            let (across, rank_c) = row_compression(&dead.transpose(), tolerance);
+            let kept = n - rank_c;
+            let mut v = DMatrix::zeros(n, n);
+            for col in 0..kept {
+                v.set_column(col, &across.row(rank_c + col).transpose());
+            }
+            for col in 0..rank_c {
+                v.set_column(kept + col, &across.row(col).transpose());
+            }
+            let (a, b) = (v.transpose() * &self.a * &v, v.transpose() * &self.b);
+            let c = c.rows(0, rank_d) * &v;
+            let mut next = Self {
+                a: a.view((0, 0), (kept, kept)).into_owned(),
+                b: b.rows(0, kept).into_owned(),
+                c: DMatrix::zeros(rank_d + rank_c, kept),
+                d: DMatrix::zeros(rank_d + rank_c, m),
+            };
+            next.c.view_mut((0, 0), (rank_d, kept)).copy_from(&c.columns(0, kept));
+            next.d.view_mut((0, 0), (rank_d, m)).copy_from(&d.rows(0, rank_d));
+            next.c
+                .view_mut((rank_d, 0), (rank_c, kept))
+                .copy_from(&a.view((kept, 0), (rank_c, kept)));
+            next.d.view_mut((rank_d, 0), (rank_c, m)).copy_from(&b.rows(kept, rank_c));
+            self = next;
+            if rank_c == 0 {
+                return self;
+            }
+        }
+    }
+}
+
+/// Returns an orthogonal `U` such that `U M` has its nonzero rows first, and their number.
+fn row_compression(matrix: &DMatrix<f64>, tolerance: f64) -> (DMatrix<f64>, usize) {
+    let rows = matrix.nrows();
+    if matrix.is_empty() {
+        return (DMatrix::identity(rows, rows), 0);
+    }
+    // Square, so that all left singular vectors come out.
+    let width = rows.max(matrix.ncols());
+    let mut padded = DMatrix::zeros(rows, width);
+    padded.view_mut((0, 0), matrix.shape()).copy_from(matrix);
+    let svd = padded.svd(true, false);
+    let rank = svd.singular_values.iter().filter(|value| **value > tolerance).count();
+    (svd.u.map_or_else(|| DMatrix::identity(rows, rows), |u| u.transpose()), rank)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Method, discretize, from_transfer_function};
+    use super::*;
+
+    fn sorted(mut zeros: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
+        zeros.sort_by(|a, b| a.re.total_cmp(&b.re).then(a.im.total_cmp(&b.im)));
+        zeros
+    }
+
+    #[test]
+    fn zeros_of_a_fraction_are_the_roots_of_its_numerator() {
+        // (s + 1)(s + 4) over a denominator of degree 5: three zeros are at infinity.
+        let model =
+            from_transfer_function(&[2.0, 10.0, 8.0], &[1.0, 2.0, 7.0, 5.0, 3.0, 1.0], None)
+                .unwrap();
+        let zeros = sorted(model.zeros().unwrap());
+        assert_eq!(zeros.len(), 2);
+        assert!((zeros[0].re + 4.0).abs() < 1e-10 && (zeros[1].re + 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn sampling_a_triple_integrator_puts_zeros_where_they_are_known() {
+        let plant = from_transfer_function(&[1.0], &[1.0, 0.0, 0.0, 0.0], None).unwrap();
+        assert!(plant.zeros().unwrap().is_empty());
+        let held = discretize(&plant, 0.1, Method::ZeroOrderHold).unwrap();
+        // The roots of z^2 + 4 z + 1.
+        let zeros = sorted(held.zeros().unwrap());
+        assert!((zeros[0].re + 2.0 + 3.0_f64.sqrt()).abs() < 1e-6, "{zeros:?}");
+        assert!((zeros[1].re + 2.0 - 3.0_f64.sqrt()).abs() < 1e-6, "{zeros:?}");
+    }
+
+    #[test]
+    fn a_model_that_does_nothing_has_the_modes_that_nothing_shows() {
+        let a = DMatrix::from_row_slice(2, 2, &[0.5, 1.0, 0.0, 0.25]);
+        let (b, c) = (DMatrix::from_row_slice(2, 1, &[0.0, 1.0]), DMatrix::zeros(1, 2));
+        let mute = StateSpace::discrete(a, b, c, DMatrix::zeros(1, 1), 1.0).unwrap();
+        assert!(mute.zeros().unwrap().is_empty());
+        let gain = StateSpace::static_gain(DMatrix::from_element(1, 1, 2.0), None).unwrap();
+        assert!(gain.zeros().unwrap().is_empty());
+    }
+
+    #[test]
+    fn axes_side_by_side_have_the_zeros_of_both() {
+        let first = from_transfer_function(&[1.0, 2.0], &[1.0, 2.0, 9.0], None).unwrap();
+        let second = from_transfer_function(&[1.0, 0.0, 4.0], &[1.0, 2.0, 9.0], None).unwrap();
+        let zeros = sorted(first.append(&second).unwrap().zeros().unwrap());
+        assert_eq!(zeros.len(), 3);
+        assert!((zeros[0] - Complex::new(-2.0, 0.0)).norm() < 1e-12);
+        assert!((zeros[2] - Complex::new(0.0, 2.0)).norm() < 1e-12);
+    }
+}

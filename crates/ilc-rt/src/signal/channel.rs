@@ -1,0 +1,39 @@
+//! One channel of an interleaved signal, checked once for every filter of whole signals.
+
+use super::SignalError;
+
+/// Refuses a signal that has not `expected` samples of `n_channels` channels.
+pub(super) fn check_channel(
+    signal: &[f64],
+    channel: usize,
+    n_channels: usize,
+    expected: usize,
+) -> Result<(), SignalError> {
+    if n_channels == 0 || channel >= n_channels || signal.len() != expected * n_channels {
+        let found = signal.len().checked_div(n_channels).unwrap_or(0);
+        return Err(SignalError::Length { found, expected });
+    }
+    Ok(())
+}
+
+/// Refuses a sample time that is not a positive number, and returns half the sampling rate in hertz.
+pub(super) fn check_sample_time(dt_s: f64) -> Result<f64, SignalError> {
+    if dt_s.is_finite() && dt_s > 0.0 {
+        Ok(0.5 / dt_s)
+    } else {
+        Err(SignalError::SampleTime { dt_s })
+    }
+}
+
+/// Refuses a frequency that is not above zero and below half the sampling rate.
+pub(super) fn check_frequency(
+    what: &'static str,
+    value_hz: f64,
+    limit_hz: f64,
+) -> Result<(), SignalError> {
+    if value_hz > 0.0 && value_hz < limit_hz {
+        Ok(())
+    } else {
+        Err(SignalError::Frequency { what, value_hz, limit_hz })
+    }
+}

@@ -1,0 +1,130 @@
+//! Which way is along a path and which across: tangents and coupling gains from the reference.
+
+/// Steps below this part of the longest one are rest: their direction is rounding.
+const REST: f64 = 1e-9;
+
+/// Returns the unit tangent of the reference at each sample.
+///
+/// The central difference of the samples; where the reference rests, the direction of the nearest
+/// sample in time that moves (the later of two that are as near), and zeros if none does.
+///
+/// # Shapes
+/// - `reference_m`: `n_samples`, time first; one tangent a sample
+/// # Real Time
+/// Cold; `O(n_samples)`.
+/// # Source
+/// - \[barton2010\], Sect. 4.1: the angle `theta(k)` of the tangent.
+pub fn tangents<const N: usize>(reference_m: &[[f64; N]]) -> Vec<[f64; N]> {
+    let last = reference_m.len().saturating_sub(1);
+    let steps: Vec<[f64; N]> = (0..reference_m.len())
+        .map(|k| {
+            let (before, after) =
+                (&reference_m[k.saturating_sub(1)], &reference_m[(k + 1).min(last)]);
+            std::array::from_fn(|axis| after[axis] - before[axis])
+        })
+        .collect();
+    let length = |step: &[f64; N]| step.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let longest = steps.iter().map(length).fold(0.0, f64::max);
+    let moves = |step: &[f64; N]| length(step) > REST * longest;
+    // For each sample, the last one at or before it that moves, and the first one at or after it.
+    let mut before = vec![None; steps.len()];
+    let mut seen = None;
+    for (k, step) in steps.iter().enumerate() {
+        seen = if moves(step) { Some(k) } else { seen };
+        before[k] = seen;
+    }
+    let mut after = None;
+    let mut tangents = vec![[0.0; N]; steps.len()];
+    for k in (0..steps.len()).rev() {
+        after = if moves(&steps[k]) { Some(k) } else { after };
+        let nearest = match (before[k], after) {
+            (Some(before), Some(after)) if k - before < after - k => Some(before),
+            (_, Some(after)) => Some(after),
+            (before, None) => before,
+        };
+        if let Some(from) = nearest {
+            let scale = 1.0 / length(&steps[from]);
+            tangents[k] = steps[from].map(|part| part * scale);
+        }
+    }
+    tangents
+}
+
+/// Returns the linearised coupling gains of two axes at each sample.
+///
+/// `epsilon = c_1 e_1 + c_2 e_2`, `c_1 = -sin theta`, `c_2 = cos theta`; positive where the tool is to the
+/// right of the path.
+///
+/// # Shapes
+/// - `reference_m`: `n_samples`; one pair a sample, zeros if the reference never moves
+/// # Source
+/// - \[barton2010\], Eq. (4.1) to (4.3)
+pub fn coupling_gains(reference_m: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    tangents(reference_m).iter().map(|tangent| [-tangent[1], tangent[0]]).collect()
+}
+
+/// Returns at each sample what is left of an error when its part along the path is taken away.
+///
+/// `epsilon = (I - t t') e`; for two axes this is `c c'` of [`coupling_gains`].
+///
+/// # Shapes
+/// - `reference_m`: `n_samples`; one symmetric `N x N` matrix a sample, by rows
+/// # Source
+/// - \[barton2010\], Eq. (4.2), for any number of axes
+pub fn across<const N: usize>(reference_m: &[[f64; N]]) -> Vec<[[f64; N]; N]> {
+    tangents(reference_m)
+        .iter()
+        .map(|tangent| {
+            std::array::from_fn(|row| {
+                std::array::from_fn(|col| {
+                    f64::from(u8::from(row == col)) - tangent[row] * tangent[col]
+                })
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "directions along an axis are exact")]
+mod tests {
+    use super::*;
+    use crate::trajectory::random::Random;
+
+    #[test]
+    fn a_line_at_45_degrees_is_hand_computed() {
+        let reference: Vec<[f64; 2]> = (0..5).map(|k| [f64::from(k), f64::from(k)]).collect();
+        let half = 0.5_f64.sqrt();
+        for gains in coupling_gains(&reference) {
+            assert!((gains[0] + half).abs() < 1e-15 && (gains[1] - half).abs() < 1e-15);
+        }
+        let across = across(&reference);
+        assert!((across[2][0][0] - 0.5).abs() < 1e-15 && (across[2][0][1] + 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn at_rest_the_nearest_direction_holds() {
+        let mut reference = vec![[0.0, 0.0]; 4];
+        reference.extend([[1.0, 0.0], [2.0, 0.0], [2.0, 0.0], [2.0, 0.0], [2.0, 0.0], [2.0, 1.0]]);
+        let tangents = tangents(&reference);
+        assert_eq!(tangents[0], [1.0, 0.0]);
+        assert_eq!(tangents[6], [1.0, 0.0]);
+        assert_eq!(tangents[8], [0.0, 1.0]);
+        assert_eq!(super::tangents(&[[1.0, 1.0]; 3]), [[0.0, 0.0]; 3]);
+        assert!(super::tangents::<2>(&[]).is_empty());
+    }
+
+    #[test]
+    fn across_is_a_projection_that_the_path_itself_has_no_part_in() {
+        let mut random = Random(3);
+        let reference: Vec<[f64; 3]> =
+            (0..200).map(|_| std::array::from_fn(|_| random.signed())).collect();
+        for (tangent, across) in tangents(&reference).iter().zip(across(&reference)) {
+            for row in across {
+                let along: f64 = row.iter().zip(tangent).map(|(a, b)| a * b).sum();
+                assert!(along.abs() < 1e-14);
+            }
+            let trace: f64 = (0..3).map(|axis| across[axis][axis]).sum();
+            assert!((trace - 2.0).abs() < 1e-14);
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! What is no path and no arc.
+
+use thiserror::Error;
+
+/// Why a path or an arc was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum ContourError {
+    /// There is no sample.
+    #[error("a path of 0 samples; at least 1 is needed")]
+    Empty,
+    /// A coordinate is not a number.
+    #[error("sample {sample}, axis {}: {value}; only finite values are allowed", axis + 1)]
+    NotFinite {
+        /// Which sample.
+        sample: usize,
+        /// Which axis.
+        axis: usize,
+        /// The value given.
+        value: f64,
+    },
+    /// The numbers describe no arc.
+    #[error("arc: {reason}")]
+    Arc {
+        /// The rule, as a sentence.
+        reason: &'static str,
+    },
+}

@@ -1,0 +1,16 @@
+//! The geometry of contours: distance to a path, and which way is across it. Cold.
+//!
+//! Three ways to measure, from the same points: to the path near each point's own time
+//! ([`contour_error_m`]), to a whole sampled path ([`SampledPath`]), and to exact lines and arcs
+//! ([`Shape`]); [`coupling`] gives what learning and cross-coupled control weight with.
+
+pub mod coupling;
+mod error;
+mod sampled;
+mod shape;
+mod windowed;
+
+pub use error::ContourError;
+pub use sampled::{Nearest, SampledPath};
+pub use shape::{Arc, Line, Shape};
+pub use windowed::contour_error_m;

@@ -1,0 +1,61 @@
+//! A piece of a path, straight or round, as the ticks of exact stop and blend walk along it.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::MAX_AXES;
+use super::arc::Arc;
+use super::limits::{AxisLimits, Line, PathLimits};
+
+/// A line or an arc.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Element {
+    Line(Line),
+    Arc(Arc),
+}
+
+impl Element {
+    pub(super) fn start_m(&self) -> [f64; MAX_AXES] {
+        match self {
+            Self::Line(line) => line.from_m,
+            Self::Arc(arc) => arc.from_m,
+        }
+    }
+
+    pub(super) fn end_m(&self) -> [f64; MAX_AXES] {
+        match self {
+            Self::Line(line) => line.to_m,
+            Self::Arc(arc) => arc.to_m,
+        }
+    }
+
+    pub(super) fn length_m(&self) -> f64 {
+        match self {
+            Self::Line(line) => line.length_m,
+            Self::Arc(arc) => arc.length_m,
+        }
+    }
+
+    /// The point at `s_m` from the start; exactly the end at the end.
+    pub(super) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
+        match self {
+            Self::Line(line) => line.point_m(s_m),
+            Self::Arc(arc) => arc.point_m(s_m),
+        }
+    }
+
+    /// The unit tangent at `s_m` from the start, times `scale`.
+    pub(super) fn along(&self, s_m: f64, scale: f64) -> [f64; MAX_AXES] {
+        match self {
+            Self::Line(line) => line.along(scale),
+            Self::Arc(arc) => arc.along(s_m, scale),
+        }
+    }
+
+    /// What the axes' limits and the feed leave for a jerk-limited move.
+    pub(super) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
+        match self {
+            Self::Line(line) => PathLimits::along(&line.direction, limits, feed_m_s),
+            Self::Arc(arc) => arc.limits(limits, feed_m_s),
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! One straight leg of an E/S move along its direction, and what its two ends do to it.
+//!
+//! The programmed motion is `v t + A sin(ω t)`. Each end adds a deviation from the line and a window
+//! on the oscillation; both vanish towards the other end, so that each end has an α of its own.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::equations::weight_after;
+use super::jet::Jet;
+
+/// Where exponentials are taken as gone: `e^{-45}` is below the rounding of 1.
+pub(super) const GONE: f64 = 45.0;
+/// `∛45`: where `e^{-x³}` is gone.
+const GONE_CUBE_ROOT: f64 = 3.556_893_304_490_063;
+/// Clearance of the oscillation from a corner, in units of `1/α`, beyond `A/v`.
+const CLEARANCE: f64 = 4.0;
+
+/// What happens at one end of a leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum End {
+    /// From rest, or to rest as its mirror image: Eq. 2.3, α in s⁻³.
+    Rest,
+    /// Into or out of a neighbour on the same line, whose velocity along this leg is given: Eq. 2.12
+    /// and 2.13, α in s⁻¹.
+    Transition {
+        /// Velocity of the neighbour along the direction of this leg.
+        neighbour_m_s: f64,
+        /// `R`, of the later over the earlier speed.
+        ratio: f64,
+    },
+}
+
+/// A leg with the numbers that its motion is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leg {
+    pub(super) feed_m_s: f64,
+    pub(super) amplitude_m: f64,
+    pub(super) omega_rad_s: f64,
+    pub(super) duration_s: f64,
+    pub(super) ends: [End; 2],
+    /// α of the first and of the last end.
+    pub(super) alpha: [f64; 2],
+}
+
+impl Leg {
+    /// What this end adds to the line, at a time counted from the end into the leg, and the window
+    /// of the oscillation there. Read forward in that time; the last end is reversed by the caller.
+    fn end(&self, which: usize, tau_s: f64) -> (Jet, Jet) {
+        let (tau, alpha, v) = (Jet::line(tau_s, 1.0), self.alpha[which], self.feed_m_s);
+        let deviation = match self.ends[which] {
+            End::Rest => -(tau * v) * (tau.cubed() * alpha).decay(),
+            End::Transition { neighbour_m_s, ratio } => {
+                // Of the neighbour's weight at the distance tau from the corner; its ratio is the
+                // other way round when time is.
+                let ratio = if which == 0 { ratio } else { 1.0 / ratio };
+                let neighbour = Jet::constant(1.0) - weight_after(tau_s, ratio, alpha);
+                tau * (neighbour_m_s - v) * neighbour
+            }
+        };
+        let window = match self.ends[which] {
+            _ if self.amplitude_m == 0.0 => Jet::constant(0.0),
+            End::Rest if which == 0 => (tau.squared() * alpha).rise(),
+            _ => {
+                let clear_s = self.clearance_s(which);
+                if tau_s < clear_s {
+                    Jet::constant(0.0)
+                } else {
+                    let open = Jet::line(tau_s - clear_s, 1.0).cubed();
+                    let rate = match self.ends[which] {
+                        End::Rest => alpha,
+                        End::Transition { .. } => alpha.powi(3),
+                    };
+                    (open * rate).rise()
+                }
+            }
+        };
+        (deviation, window)
+    }
+
+    /// How far from a corner the oscillation stays at 0: beyond it the line is farther from the
+    /// corner than the oscillation reaches, so that it never passes the corner.
+    pub(super) fn clearance_s(&self, which: usize) -> f64 {
+        let alpha = self.alpha[which];
+        self.amplitude_m / self.feed_m_s
+            + match self.ends[which] {
+                End::Rest => alpha.cbrt().recip(),
+                End::Transition { ratio, .. } => (CLEARANCE + ratio.ln().abs()) / alpha,
+            }
+    }
+
+    /// How long an end is felt: the deviation, and the opening of the window.
+    pub(super) fn reach_s(&self, which: usize) -> (f64, f64) {
+        let alpha = self.alpha[which];
+        let oscillates = self.amplitude_m != 0.0;
+        match self.ends[which] {
+            End::Rest => {
+                let deviation_s = (GONE / alpha).cbrt();
+                let window_s = match (oscillates, which) {
+                    (false, _) => 0.0,
+                    (true, 0) => (GONE / alpha).sqrt(),
+                    (true, _) => self.clearance_s(which) + deviation_s,
+                };
+                (deviation_s, window_s)
+            }
+            End::Transition { neighbour_m_s, ratio } => {
+                let still = (neighbour_m_s - self.feed_m_s).abs() <= 0.0;
+                let deviation_s = if still { 0.0 } else { (GONE + ratio.ln().abs()) / alpha };
+                let window_s =
+                    if oscillates { self.clearance_s(which) + GONE_CUBE_ROOT / alpha } else { 0.0 };
+                (deviation_s, window_s)
+            }
+        }
+    }
+
+    /// The motion along the leg at a time from its first end.
+    ///
+    /// The position is counted from the nearer end, which `from_end` names, so that both are exact.
+    pub(super) fn at(&self, t_s: f64) -> (Jet, bool) {
+        let left_s = self.duration_s - t_s;
+        let (first, opening) = self.end(0, t_s);
+        let (last, closing) = self.end(1, left_s);
+        let (last, closing) = (-last.reversed(), closing.reversed());
+        let from_end = left_s < t_s;
+        let line = if from_end {
+            Jet::line(-self.feed_m_s * left_s, self.feed_m_s)
+        } else {
+            Jet::line(self.feed_m_s * t_s, self.feed_m_s)
+        };
+        let mut motion = line + first + last;
+        if self.amplitude_m != 0.0 {
+            let phase = Jet::line(self.omega_rad_s * t_s, self.omega_rad_s);
+            motion = motion + phase.sin() * opening * closing * self.amplitude_m;
+        }
+        (motion, from_end)
+    }
+
+    /// The motion near one end alone, as if the other were far away; from that end, forward in the
+    /// time from it. What limits are checked on while α is searched.
+    pub(super) fn near(&self, which: usize, tau_s: f64) -> Jet {
+        let (deviation, window) = self.end(which, tau_s);
+        let mut motion = Jet::line(self.feed_m_s * tau_s, self.feed_m_s) + deviation;
+        if self.amplitude_m != 0.0 {
+            let phase = if which == 0 {
+                Jet::line(self.omega_rad_s * tau_s, self.omega_rad_s)
+            } else {
+                Jet::line(self.omega_rad_s * (self.duration_s - tau_s), -self.omega_rad_s)
+            };
+            // From the last end the line runs the other way, and the oscillation does not.
+            let sign = if which == 0 { 1.0 } else { -1.0 };
+            motion = motion + phase.sin() * window * (sign * self.amplitude_m);
+        }
+        motion
+    }
+
+    /// The programmed position, without any end.
+    pub(super) fn programmed_m(&self, t_s: f64) -> f64 {
+        self.feed_m_s * t_s + self.amplitude_m * (self.omega_rad_s * t_s).sin()
+    }
+}

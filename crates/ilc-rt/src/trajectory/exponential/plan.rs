@@ -1,0 +1,253 @@
+//! An E/S move of several legs: which end is what, its α, and the motion at any time.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::alpha::{AlphaInterval, Place};
+use super::equations::blending_ratio;
+use super::leg::{End, Leg};
+use crate::trajectory::MAX_AXES;
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::limits::{AxisLimits, Line, PathLimits};
+use crate::trajectory::motion::MotionState;
+use crate::trajectory::path::{PathSegment, checked_lines};
+
+/// Directions closer than this are the same line.
+const SAME_LINE: f64 = 1e-9;
+
+/// A straight leg with an oscillation along it, as modulated tool paths have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModulatedSegment {
+    /// End point, one coordinate an axis.
+    pub to_m: Vec<f64>,
+    /// Speed of the line.
+    pub feed_m_s: f64,
+    /// Amplitude along the line; 0 for none.
+    pub amplitude_m: f64,
+    /// Frequency of the oscillation; not read if the amplitude is 0.
+    pub frequency_hz: f64,
+}
+
+/// The α of one place, and the intervals in which it might be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AlphaChoice {
+    /// Segment at whose start, or in front of whose end, it is.
+    pub segment: usize,
+    /// `start-up`, `transition` or `end`.
+    pub place: &'static str,
+    /// The α used: the largest admissible. In s⁻³ (and s⁻² for the oscillation) for start-up and end,
+    /// in s⁻¹ for a transition.
+    pub alpha: f64,
+    /// All admissible intervals, from the smallest on.
+    pub admissible: Vec<AlphaInterval>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct PlacedLeg {
+    leg: Leg,
+    line: Line,
+    start_s: f64,
+}
+
+/// A planned E/S move from rest to rest.
+#[derive(Clone, Debug)]
+pub struct ExponentialSigmoid {
+    legs: Box<[PlacedLeg]>,
+    choices: Box<[AlphaChoice]>,
+    n_axes: usize,
+    duration_s: f64,
+}
+
+impl ExponentialSigmoid {
+    /// Plans a move in which every leg keeps its programmed time, `length / feed`.
+    ///
+    /// Each start, transition and end gets the largest α at which no axis exceeds a limit; one α
+    /// holds for all axes, so that a leg stays straight. The oscillation is 0 near corners, so that
+    /// it passes none.
+    ///
+    /// # Shapes
+    /// - `limits`: one entry for each coordinate of `start_m`, 1 to 6
+    /// # Real Time
+    /// Cold: allocates, and searches.
+    /// # Errors
+    /// [`TrajectoryError`] for values out of range; [`TrajectoryError::Alpha`] if no α holds the
+    /// limits (a start overshoots its feed by 79 %); [`TrajectoryError::Hurried`] for a leg that is
+    /// over before its ends are.
+    /// # Source
+    /// - [dimarco2016], Section 2.1
+    #[expect(clippy::disallowed_methods, reason = "cold: planned once")]
+    pub fn plan(
+        start_m: &[f64],
+        segments: &[ModulatedSegment],
+        limits: &[AxisLimits],
+    ) -> Result<Self, TrajectoryError> {
+        let straight: Vec<PathSegment> = segments
+            .iter()
+            .map(|segment| PathSegment::line(segment.to_m.clone(), segment.feed_m_s))
+            .collect();
+        let lines = checked_lines(start_m, &straight, limits)?;
+        for (index, segment) in segments.iter().enumerate() {
+            check_oscillation(index, segment)?;
+        }
+        let mut legs = placed(segments, &lines)?;
+        let mut choices = Vec::new();
+        let n_legs = legs.len();
+        for i in 0..=n_legs {
+            let before = i.checked_sub(1).map(|at| (at, 1));
+            let after = (i < n_legs).then_some((i, 0));
+            let joined = after.is_some_and(|(at, _)| legs[at].leg.ends[0] != End::Rest);
+            let groups: [(&str, Vec<(usize, usize)>); 2] = if joined {
+                [("transition", before.into_iter().chain(after).collect()), ("", Vec::new())]
+            } else {
+                [("end", before.into_iter().collect()), ("start-up", after.into_iter().collect())]
+            };
+            for (place, members) in groups {
+                let Some(&(segment, _)) = members.first() else { continue };
+                let along = PathLimits::along(&legs[segment].line.direction, limits, f64::INFINITY);
+                let near: Vec<(Leg, usize)> =
+                    members.iter().map(|&(at, which)| (legs[at].leg, which)).collect();
+                let (alpha, admissible) =
+                    Place { legs: &near, limits: along, segment, name: place }.choose()?;
+                for &(at, which) in &members {
+                    legs[at].leg.alpha[which] = alpha;
+                }
+                choices.push(AlphaChoice { segment, place, alpha, admissible });
+            }
+        }
+        let duration_s = legs.last().map_or(0.0, |last| last.start_s + last.leg.duration_s);
+        Ok(Self {
+            legs: legs.into_boxed_slice(),
+            choices: choices.into_boxed_slice(),
+            n_axes: start_m.len(),
+            duration_s,
+        })
+    }
+
+    /// Every α, and the intervals in which it might be.
+    pub fn choices(&self) -> &[AlphaChoice] {
+        &self.choices
+    }
+
+    /// How long the move lasts: the sum of `length / feed`.
+    pub fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    /// Number of axes.
+    pub fn n_axes(&self) -> usize {
+        self.n_axes
+    }
+
+    /// The state at a time from the start; at rest before it and after the end.
+    ///
+    /// # Real Time
+    /// Hot, allocates nothing; a few exponentials.
+    pub fn at(&self, t_s: f64) -> MotionState {
+        let Some((placed, local_s)) = self.find(t_s) else {
+            return MotionState::at_rest(match (self.legs.first(), self.legs.last()) {
+                (Some(_), Some(last)) if t_s >= self.duration_s => last.line.to_m,
+                (Some(first), _) => first.line.from_m,
+                _ => [0.0; MAX_AXES],
+            });
+        };
+        let (motion, from_end) = placed.leg.at(local_s);
+        let anchor_m = if from_end { placed.line.to_m } else { placed.line.from_m };
+        let [s, v, a, j] = motion.0;
+        let mut state = MotionState {
+            position_m: placed.line.along(s),
+            velocity_m_s: placed.line.along(v),
+            acceleration_m_s2: placed.line.along(a),
+            jerk_m_s3: placed.line.along(j),
+        };
+        for (position_m, anchor_m) in state.position_m.iter_mut().zip(anchor_m) {
+            *position_m += anchor_m;
+        }
+        state
+    }
+
+    /// Where the program is at a time, with no limits: what tracking is measured against.
+    pub fn programmed_m(&self, t_s: f64) -> [f64; MAX_AXES] {
+        let Some((placed, local_s)) = self.find(t_s) else { return self.at(t_s).position_m };
+        let mut position_m = placed.line.along(placed.leg.programmed_m(local_s));
+        for (position_m, from_m) in position_m.iter_mut().zip(placed.line.from_m) {
+            *position_m += from_m;
+        }
+        position_m
+    }
+
+    /// The leg of a time within the move, and the time from its start.
+    fn find(&self, t_s: f64) -> Option<(&PlacedLeg, f64)> {
+        if !(0.0..self.duration_s).contains(&t_s) {
+            return None;
+        }
+        let at = self.legs.partition_point(|placed| placed.start_s <= t_s).checked_sub(1)?;
+        let placed = self.legs.get(at)?;
+        Some((placed, (t_s - placed.start_s).min(placed.leg.duration_s)))
+    }
+}
+
+/// Each leg in time, with what its ends are.
+#[expect(clippy::disallowed_methods, reason = "cold: planned once")]
+fn placed(
+    segments: &[ModulatedSegment],
+    lines: &[Line],
+) -> Result<Vec<PlacedLeg>, TrajectoryError> {
+    let mut legs: Vec<PlacedLeg> = Vec::with_capacity(lines.len());
+    let mut start_s = 0.0;
+    for (index, (line, segment)) in lines.iter().zip(segments).enumerate() {
+        let duration_s = line.length_m / segment.feed_m_s;
+        if !(duration_s.is_finite() && duration_s > 0.0) {
+            return Err(TrajectoryError::Duration { length_m: line.length_m, duration_s });
+        }
+        let mut leg = Leg {
+            feed_m_s: segment.feed_m_s,
+            amplitude_m: segment.amplitude_m,
+            omega_rad_s: std::f64::consts::TAU
+                * if segment.amplitude_m > 0.0 { segment.frequency_hz } else { 1.0 },
+            duration_s,
+            ends: [End::Rest; 2],
+            alpha: [1.0; 2],
+        };
+        if let Some(before) = index.checked_sub(1).and_then(|at| legs.get_mut(at)) {
+            let turn = (0..MAX_AXES).fold([0.0_f64; 2], |[on, back], axis| {
+                let (a, b) = (before.line.direction[axis], line.direction[axis]);
+                [on.max((a - b).abs()), back.max((a + b).abs())]
+            });
+            let sign = match turn {
+                [on, _] if on < SAME_LINE => Some(1.0),
+                [_, back] if back < SAME_LINE => Some(-1.0),
+                _ => None,
+            };
+            if let Some(sign) = sign {
+                let ratio = blending_ratio(before.leg.feed_m_s, sign * leg.feed_m_s);
+                before.leg.ends[1] = End::Transition { neighbour_m_s: sign * leg.feed_m_s, ratio };
+                leg.ends[0] = End::Transition { neighbour_m_s: sign * before.leg.feed_m_s, ratio };
+            }
+        }
+        legs.push(PlacedLeg { leg, line: *line, start_s });
+        start_s += duration_s;
+    }
+    Ok(legs)
+}
+
+fn check_oscillation(index: usize, segment: &ModulatedSegment) -> Result<(), TrajectoryError> {
+    let refuse =
+        |name, value, unit| Err(TrajectoryError::Oscillation { segment: index, name, value, unit });
+    if !(segment.amplitude_m.is_finite() && segment.amplitude_m >= 0.0) {
+        return refuse("amplitude", segment.amplitude_m, "m: must be finite and not below 0");
+    }
+    let is_turning = segment.frequency_hz.is_finite() && segment.frequency_hz > 0.0;
+    if segment.amplitude_m > 0.0 && !is_turning {
+        return refuse("frequency", segment.frequency_hz, "Hz: must be finite and above 0");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
+)]
+mod tests;

@@ -1,0 +1,65 @@
+"""The Bode diagram of an identified axis: measurement, model, coherence, uncertainty."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from ilc_rt.plots import CONTOUR, FIRST, LAST, STYLE, WIDTH_IN
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def bode(
+    frequency_hz: NDArray[np.float64],
+    response: NDArray[np.complex128],
+    coherence: NDArray[np.float64],
+    model: NDArray[np.complex128],
+    bound: NDArray[np.float64],
+    title: str = "",
+) -> Figure:
+    """Draw magnitude, phase, and how far both can be trusted.
+
+    Parameters
+    ----------
+    frequency_hz : ndarray of float64, shape (n_frequencies,)
+        Frequencies in Hz.
+    response, model : ndarray of complex128, shape (n_frequencies,)
+        What was measured, and what the model says.
+    coherence, bound : ndarray of float64, shape (n_frequencies,)
+        Coherence, and the bound of the multiplicative uncertainty.
+    title : str
+        What is drawn.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH_IN, 6.4))
+        magnitude, phase, trust = figure.subplots(3, 1, sharex=True, height_ratios=(2, 2, 1.4))
+        # The model's phase is drawn where the measured one is: turns mean nothing.
+        shown_deg = np.degrees(np.unwrap(np.angle(response)))
+        model_deg = np.degrees(np.unwrap(np.angle(model)))
+        model_deg += 360.0 * np.round(np.median(shown_deg - model_deg) / 360.0)
+        dots = {"color": FIRST, "linestyle": "none", "marker": ".", "markersize": 3.5}
+        line = {"color": LAST}
+        magnitude.plot(frequency_hz, 20.0 * np.log10(np.abs(response)), label="measured", **dots)
+        magnitude.plot(frequency_hz, 20.0 * np.log10(np.abs(model)), label="model", **line)
+        phase.plot(frequency_hz, shown_deg, **dots)
+        phase.plot(frequency_hz, model_deg, **line)
+        trust.plot(frequency_hz, coherence, color=CONTOUR, label="coherence")
+        trust.plot(frequency_hz, bound, color=LAST, linestyle=":", label="uncertainty")
+        magnitude.set_title(title)
+        magnitude.set_ylabel("magnitude in dB")
+        phase.set_ylabel("phase in degrees")
+        trust.set_xlabel("frequency in Hz")
+        trust.set_ylim(0.0, max(1.05, min(2.0, 1.05 * float(np.max(bound)))))
+        trust.set_xscale("log")
+        trust.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        trust.xaxis.set_minor_formatter(NullFormatter())
+        magnitude.legend(loc="lower left")
+        trust.legend(loc="center left")
+        figure.align_ylabels()
+        return figure

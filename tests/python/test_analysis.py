@@ -1,0 +1,256 @@
+"""Analysis and tuning against dense NumPy solutions of the lifted problem."""
+
+import json
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+
+from ilc_rt import (
+    BadInputError,
+    Campaign,
+    Cell,
+    LearningError,
+    NormOptimalIlc,
+    PdIlc,
+    StateSpace,
+    analyze,
+    discretize,
+    second_order,
+    signal,
+    tune,
+)
+from ilc_rt.cli import main
+
+DT_S = 0.002
+N = 120
+GANTRY = "examples/01_gantry.toml"
+
+
+def axis(w0=94.0, damping=0.7):
+    """Return the closed position loop of one axis."""
+    return discretize(second_order(w0, damping), DT_S)
+
+
+def servo():
+    """Return the servo example of the source, closed by python-control."""
+    z = control.tf("z")
+    plant = control.ss(control.feedback((z - 0.5) / ((z - 1) * (z - 0.925)), 0.425))
+    return StateSpace(plant.A, plant.B, plant.C, plant.D, 1.0)
+
+
+def triangle(n=401):
+    """Return the reference of the servo example."""
+    k = np.arange(n)
+    return np.where(k <= 200, k / 200, 2 - k / 200)
+
+
+def lifted(model, n):
+    """Return the dense operator, one simulated impulse a column."""
+    first = model.simulate(np.eye(n)[:, 0])
+    return np.array([[first[i - j] if i >= j else 0.0 for j in range(n)] for i in range(n)])
+
+
+def columns(law, n):
+    """Return L_u and L_e of a law, one update a column."""
+    eye, zero = np.eye(n), np.zeros(n)
+    keep = np.column_stack([law.update(eye[:, i], zero) for i in range(n)])
+    learn = np.column_stack([law.update(zero, eye[:, i]) for i in range(n)])
+    return keep, learn
+
+
+def optimal(model, n, q, s, r):
+    """Return L_u, L_e and P by the equations of the source."""
+    p = lifted(model, n)
+    cost = q * p.T @ p + (s + r) * np.eye(n)
+    keep = np.linalg.solve(cost, q * p.T @ p + r * np.eye(n))
+    return keep, np.linalg.solve(cost, q * p.T), p
+
+
+@pytest.mark.parametrize(("q", "s", "r"), [(1, 1, 1), (0.1, 1, 1), (1, 0.01, 5)])
+def test_the_servo_example_agrees_with_its_equations(q, s, r):
+    model, n, reference = servo(), 401, triangle()
+    found = analyze({"q": q, "s": s, "r": r}, model, reference=reference, noise_std=1e-3, n_runs=5)
+    keep, learn, p = optimal(model, n, q, s, r)
+    t = keep - learn @ p
+    np.testing.assert_allclose(found.monotonic_factor, np.linalg.norm(t[:-1, :-1], 2), rtol=1e-9)
+    np.testing.assert_allclose(
+        found.spectral_radius, np.abs(np.linalg.eigvals(t[:-1, :-1])).max(), rtol=1e-9
+    )
+    stays = reference - p @ np.linalg.solve(q * p.T @ p + s * np.eye(n), q * p.T @ reference)
+    np.testing.assert_allclose(found.converged_error[:, 0], stays, atol=1e-9)
+    np.testing.assert_allclose(found.converged_error_rms, np.sqrt(np.mean(stays**2)), rtol=1e-9)
+    sigma, u = np.zeros((n, n)), np.zeros(n)
+    for expected in found.expected_rms:
+        e = reference - p @ u
+        square = e @ e / n + 1e-6 * (np.trace(p @ sigma @ p.T) / n + 1)
+        np.testing.assert_allclose(expected, np.sqrt(square), rtol=1e-9)
+        sigma = t @ sigma @ t.T + learn @ learn.T
+        u = t @ u + learn @ reference
+    assert found.converges
+    assert found.monotonic
+
+
+def test_a_filtered_law_agrees_with_its_columns():
+    model = axis()
+    law = PdIlc(kp=0.4, kd=1.0, q_filter=signal.butterworth(2, 15.0, DT_S), lead=5)
+    found = analyze(law, model, N)
+    keep, learn = columns(law, N)
+    t = keep - learn @ lifted(model, N)
+    np.testing.assert_allclose(found.monotonic_factor, np.linalg.norm(t, 2), rtol=1e-9)
+    # Far from normal: an eigenvalue moves by much more than the rounding of the matrix.
+    np.testing.assert_allclose(found.spectral_radius, np.abs(np.linalg.eigvals(t)).max(), rtol=1e-6)
+    assert found.method == "dense"
+
+
+def test_long_runs_are_analysed_without_their_matrix():
+    law = PdIlc(kp=0.4, kd=0.0, q_filter=signal.butterworth(2, 15.0, DT_S), lead=6)
+    found = analyze(law, axis(), 5000, noise_std=1e-6)
+    assert found.method == "structured"
+    assert found.converges
+    assert found.expected_rms_limit > 1e-6
+
+
+def test_the_usual_condition_does_not_make_the_error_fall():
+    model = axis()
+    first = model.simulate([1.0, 0.0])[1]
+    found = analyze(PdIlc(kp=0.9 / first, kd=0.0), model, N)
+    assert found.pd_factor == pytest.approx(0.1)
+    assert found.pd_gain_range[1] == pytest.approx(2 / first)
+    assert found.spectral_radius == pytest.approx(0.1)
+    assert found.monotonic_factor > 1
+    assert not found.monotonic
+
+
+class Proportional:
+    """A law written in Python."""
+
+    def update(self, u, e, disturbance=None):
+        """Return the next input, the error taken one sample ahead."""
+        del disturbance
+        ahead = np.vstack([e[1:], e[-1:]])
+        return u + 0.5 * ahead
+
+
+class Clipped:
+    """A law that is not linear."""
+
+    def update(self, u, e, disturbance=None):
+        """Return a bounded input."""
+        del disturbance
+        return np.clip(u + e, -0.1, 0.1)
+
+
+def test_a_law_written_in_python_is_tried():
+    own = analyze(PdIlc(kp=0.5, kd=0.0), axis(), N)
+    found = analyze(Proportional(), axis(), N)
+    assert found.monotonic_factor == pytest.approx(own.monotonic_factor, rel=1e-9)
+    assert found.critical_frequency_hz == pytest.approx(own.critical_frequency_hz)
+    with pytest.raises(LearningError, match="not linear"):
+        analyze(Clipped(), axis(), N)
+
+
+def test_uncertainty_is_a_number_or_a_curve():
+    weights = {"s": 0.5, "r": 2.0}
+    same = analyze(weights, servo(), 200, uncertainty=0.4)
+    curve = analyze(weights, servo(), 200, uncertainty=np.full(9, 0.4))
+    assert same.robust_factor == pytest.approx(curve.robust_factor, rel=1e-12)
+    assert same.robust_factor < 1 < same.uncertainty_allowed
+    above = analyze(weights, servo(), 200, uncertainty=1.01 * same.uncertainty_allowed)
+    assert above.robust_factor > 1
+
+
+def test_the_figures_are_readable():
+    found = analyze(NormOptimalIlc(axis(), N, rate=3.0), axis(), reference=np.ones(N))
+    assert "RMS error before learning" in str(found)
+    assert repr(found).startswith("Analysis(converges=True")
+    assert json.loads(json.dumps(found.to_dict()))["initial_error_rms"] == pytest.approx(1.0)
+    assert found.frequency_hz.shape == found.contraction.shape
+    assert found.converged_input.shape == (N, 1)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "match"),
+    [
+        ({"n_samples": None}, ValueError, "n_samples = None"),
+        ({"reference": np.ones(N - 1)}, ValueError, "reference"),
+        ({"reference": np.full(N, np.nan)}, ValueError, "reference"),
+        ({"reference": np.ones((N, 2))}, ValueError, "reference"),
+        ({"noise_std": -1.0}, LearningError, "noise_std = -1"),
+        ({"uncertainty": -0.1}, LearningError, "uncertainty = -0.1"),
+        ({"uncertainty": np.ones((2, 2))}, ValueError, "uncertainty"),
+        ({"law": 3.0}, TypeError, "law = 3.0"),
+        ({"law": {"qq": 1.0}}, ValueError, "the weights are q, s, r and rate"),
+        ({"law": {"q": -1.0}}, LearningError, "q = -1"),
+        ({"model": second_order(94.0, 0.7)}, ValueError, "continuous"),
+        ({"model": 1}, TypeError, "model"),
+    ],
+)
+def test_wrong_questions_are_refused(options, error, match):
+    arguments = {"law": {"r": 0.1}, "model": axis(), "n_samples": N, **options}
+    with pytest.raises(error, match=match):
+        analyze(**arguments)
+
+
+def test_tuning_says_what_and_why():
+    reference = 0.01 * (1 - np.cos(np.arange(300) / 40))
+    curve = np.linspace(0.2, 3.0, 50)
+    found = tune(axis(), 300, uncertainty=curve, noise_std=1e-5, reference=reference)
+    assert [step["name"] for step in found.steps] == ["s1", "s2", "s3", "smoothing", "s4"]
+    assert all(step["why"] for step in found.steps)
+    assert found.q == 1
+    assert found.s > 0
+    assert found.r > 0
+    assert found.analysis.robust_factor < 1
+    assert found.analysis.converged_error_rms < found.analysis.initial_error_rms
+    noisy = tune(axis(), 300, uncertainty=curve, noise_std=1e-3, reference=reference)
+    assert noisy.r > found.r
+    assert "s1" in str(found)
+    with pytest.raises(LearningError, match="n_runs = 0"):
+        tune(axis(), 300, n_runs=0)
+    with pytest.raises(ValueError, match="reference"):
+        tune(axis(), 300, reference=np.ones(7))
+
+
+def test_the_cell_knows_its_model_and_its_first_error():
+    cell = Cell.load(GANTRY)
+    model, error = cell.model(), cell.first_error()
+    way = cell.reference() - cell.reference()[0]
+    np.testing.assert_allclose(error, way - model.simulate(way), atol=1e-15)
+
+
+def test_ilc_tune_prints_and_writes(tmp_path, capsys):
+    file = tmp_path / "figures.json"
+    arguments = ["tune", GANTRY, "--uncertainty", "0.3", "--noise-m", "1e-6"]
+    assert main([*arguments, "--json", str(file)]) == 0
+    text = capsys.readouterr().out
+    assert "[learning.norm_optimal]" in text
+    assert "s3" in text
+    figures = json.loads(file.read_text(encoding="utf-8"))
+    assert figures["analysis"]["converges"] is True
+    assert figures["q"] == 1
+    assert main(["tune", GANTRY, "--noise-m", "-1"]) == 2
+    assert "noise_std" in capsys.readouterr().err
+
+
+def divergent_cell(tmp_path):
+    """Write the gantry with a proportional law that is far too eager."""
+    text = Path(GANTRY).read_text(encoding="utf-8").replace('law = "norm_optimal"', 'law = "pd"')
+    path = tmp_path / "cell.toml"
+    path.write_text(text + "\n[learning.pd]\nkp = 5.0\ncutoff_hz = 100.0\n", encoding="utf-8")
+    return path
+
+
+def test_a_law_that_will_not_converge_does_not_start(tmp_path, capsys):
+    cell = divergent_cell(tmp_path)
+    with pytest.raises(BadInputError, match=r"\[learning\].*will not converge"):
+        Campaign(cell)
+    assert main(["run", str(cell), "--bus", "loopback:"]) == 2
+    assert "will not converge" in capsys.readouterr().err
+    Campaign(cell, library=tmp_path / "x.db", allow_divergent=True)
+    eager = PdIlc(kp=5.0, kd=0.0)
+    with pytest.raises(BadInputError, match="will not converge"):
+        Campaign(GANTRY, law=eager)
+    Campaign(GANTRY, law=eager, library=tmp_path / "x.db", allow_divergent=True)
+    Campaign(GANTRY, law=Clipped(), library=tmp_path / "x.db")

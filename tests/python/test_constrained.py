@@ -1,0 +1,251 @@
+"""Norm-optimal learning within bounds, against SciPy's solvers and its own promises."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import LinearConstraint, lsq_linear, minimize
+
+from ilc_rt import (
+    ConstrainedIlc,
+    LearningError,
+    NormOptimalIlc,
+    StateSpace,
+    discretize,
+    second_order,
+)
+
+DT_S = 0.002
+
+
+def axis():
+    """Return the closed position loop of one axis."""
+    return discretize(second_order(157.0, 0.5), DT_S)
+
+
+def problem(n_samples):
+    """Return a reference in metres and an error to learn from."""
+    k = np.arange(n_samples)
+    return 0.02 * (1.0 - np.cos(k / 9.0)), 3e-3 * np.sin(k / 9.0)
+
+
+def stacked(model, n_samples, u, e, q, s, r, rate):
+    """Return M, t with cost = |M v - t|^2, of one axis."""
+    eye = np.eye(n_samples)
+    difference = np.diff(eye, axis=0)
+    rows = [
+        np.sqrt(q) * model.lifted(n_samples),
+        np.sqrt(s) * eye,
+        np.sqrt(r) * eye,
+        rate * difference,
+    ]
+    targets = [np.sqrt(q) * e, -np.sqrt(s) * u, 0.0 * u, np.zeros(n_samples - 1)]
+    return np.vstack(rows), np.concatenate(targets)
+
+
+@pytest.mark.parametrize(("q", "s", "r", "rate"), [(1.0, 0.0, 1e-2, 3.0), (2.0, 1e-2, 1e-3, 0.0)])
+def test_a_bounded_input_agrees_with_scipys_least_squares(q, s, r, rate):
+    n_samples = 60
+    _, e = problem(n_samples)
+    u = 1e-3 * np.cos(np.arange(n_samples))
+    free = NormOptimalIlc(axis(), n_samples, q=q, s=s, r=r, rate=rate).update(u, e)
+    limit = 0.6 * np.abs(free).max()
+    law = ConstrainedIlc(axis(), n_samples, q=q, s=s, r=r, rate=rate, u_bounds=(-limit, limit))
+    found = law.update(u, e)
+    assert law.status == "solved"
+    assert law.iterations > 0
+    matrix, target = stacked(axis(), n_samples, u, e, q, s, r, rate)
+    # bvls finds the active set itself: exact, like a direct solution.
+    best = lsq_linear(matrix, target, (-limit - u, limit - u), method="bvls", tol=1e-15)
+    expected = u + best.x
+    assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
+    cost = np.sum((matrix @ (found - u) - target) ** 2)
+    assert cost <= 2.0 * best.cost * (1.0 + 1e-8)
+    assert np.count_nonzero(np.abs(np.abs(found) - limit) < 1e-9 * limit) > 3
+
+
+def test_all_bounds_together_agree_with_scipys_minimize():
+    n_samples = 24
+    r, e = problem(n_samples)
+    u = np.zeros(n_samples)
+    matrix, target = stacked(axis(), n_samples, u, e, 1.0, 0.0, 1e-2, 1.0)
+    free = np.linalg.lstsq(matrix, target)[0]
+    size = np.abs(free).max()
+    first = np.eye(n_samples) - np.eye(n_samples, k=-1)
+    rise = np.concatenate([[0.0], np.diff(r)]) / DT_S
+    bend = first @ rise / DT_S
+    bounds = {
+        "u_bounds": (-0.9 * size, 0.8 * size),
+        "v_bounds": (-0.85 * size, None),
+        "step_bounds": (-0.2 * size, 0.15 * size),
+        "velocity_bounds": (-0.2, 0.9 * np.abs(rise + first @ free / DT_S).max()),
+        "acceleration_bounds": (-np.inf, 0.6 * np.abs(bend + first @ first @ free / DT_S**2).max()),
+        "output_bounds": (-1e-3, r + 0.8e-3),
+    }
+    law = ConstrainedIlc(axis(), n_samples, r=1e-2, rate=1.0, reference=r, **bounds)
+    found = law.update(u, e)
+    assert law.status == "solved", law.message
+    operator = axis().lifted(n_samples)
+    low_y, high_y = -1e-3 - (r - e), 0.8e-3 + e
+
+    def rows(scale):
+        return [
+            LinearConstraint(scale * np.eye(n_samples), -0.85 * size * scale, 0.8 * size * scale),
+            LinearConstraint(scale * first, -0.2 * size * scale, 0.15 * size * scale),
+            LinearConstraint(
+                scale * first,
+                (bounds["velocity_bounds"][0] - rise) * DT_S * scale,
+                (bounds["velocity_bounds"][1] - rise) * DT_S * scale,
+            ),
+            LinearConstraint(
+                scale * first @ first,
+                -np.inf,
+                (bounds["acceleration_bounds"][1] - bend) * DT_S**2 * scale,
+            ),
+            # No input reaches the first sample.
+            LinearConstraint(scale * operator[1:], low_y[1:] * scale, high_y[1:] * scale),
+        ]
+
+    hessian, slope = matrix.T @ matrix, matrix.T @ target
+    worth = slope @ free
+    best = minimize(
+        lambda w: (0.5 * w @ hessian @ w * size**2 - slope @ w * size) / worth,
+        np.zeros(n_samples),
+        jac=lambda w: (hessian @ w * size**2 - slope * size) / worth,
+        constraints=[
+            LinearConstraint(c.A * size / s, c.lb / s, c.ub / s)
+            for c, s in zip(rows(1.0), [size, size, size, size, size], strict=True)
+        ],
+        method="SLSQP",
+        options={"ftol": 1e-15, "maxiter": 1000},
+    )
+    expected = best.x * size
+    ours, theirs = (0.5 * v @ hessian @ v - slope @ v for v in (found, expected))
+    assert ours <= theirs + 1e-9 * worth
+    assert np.abs(found - expected).max() < 1e-4 * size
+    assert np.abs(found - free).max() > 1e-2 * size
+
+
+def test_bounds_that_are_not_reached_change_nothing():
+    n_samples = 200
+    r, e = problem(n_samples)
+    free = NormOptimalIlc(axis(), n_samples, rate=3.0).update(np.zeros(n_samples), e)
+    law = ConstrainedIlc(axis(), n_samples, rate=3.0, u_bounds=(-1.0, 1.0), reference=r)
+    found = law.update(np.zeros(n_samples), e)
+    assert (law.status, law.iterations, law.gap) == ("solved", 0, 0.0)
+    assert np.abs(found - free).max() < 1e-8 * np.abs(free).max()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(2, 120))
+def test_no_bound_is_exceeded_over_several_runs(seed, n_samples):
+    rng = np.random.default_rng(seed)
+    model = axis().append(axis())
+    r = np.cumsum(rng.normal(size=(n_samples, 2)), axis=0) * 1e-3
+    limit = np.array([[rng.uniform(1e-4, 1e-2), np.inf]])
+    step = rng.uniform(1e-4, 1e-2)
+    rise = np.abs(np.diff(r, axis=0, prepend=r[:1])).max() / DT_S + step
+    law = ConstrainedIlc(
+        model,
+        n_samples,
+        rate=rng.uniform(0.1, 3.0),
+        u_bounds=(-limit, limit),
+        step_bounds=(-step, step),
+        velocity_bounds=(-rise, rise),
+        reference=r,
+    )
+    u = np.zeros((n_samples, 2))
+    for _ in range(4):
+        e = r - model.simulate(r + u) + 1e-5 * rng.normal(size=r.shape)
+        u = law.update(u, e)
+        assert law.status == "solved", law.message
+        assert np.all(np.abs(u) <= limit)
+        before = np.vstack([[0.0, 0.0], u[:-1]])
+        assert np.abs(u - before).max() <= step * (1.0 + 1e-9)
+        assert np.abs(np.diff(r + u, axis=0, prepend=r[:1])).max() <= rise * DT_S * (1.0 + 1e-9)
+
+
+def test_what_cannot_be_honoured_keeps_the_input_and_says_so():
+    u = np.zeros(9)
+    u[3] = 0.5
+    law = ConstrainedIlc(axis(), 9, rate=3.0, u_bounds=(-0.1, 0.1), v_bounds=(-0.01, 0.01))
+    assert law.status == "untried"
+    assert np.array_equal(law.update(u, np.ones(9)), u)
+    assert law.status == "infeasible"
+    assert "at sample 3, channel 0" in law.message
+    r, e = problem(30)
+    law = ConstrainedIlc(
+        axis(), 30, rate=3.0, u_bounds=(-0.1, 0.1), output_bounds=(5.0, 6.0), reference=r
+    )
+    assert np.array_equal(law.update(np.zeros(30), e), np.zeros(30))
+    assert law.status == "max_iterations"
+
+
+def test_a_second_search_starts_from_the_first_and_a_reset_forgets_it():
+    _, e = problem(200)
+    law = ConstrainedIlc(axis(), 200, rate=3.0, u_bounds=(-1e-3, 1e-3))
+    first = law.update(np.zeros(200), e)
+    cold = law.iterations
+    again = law.update(np.zeros(200), e)
+    assert law.iterations <= cold
+    assert np.abs(again - first).max() < 1e-9
+    law.reset()
+    assert np.array_equal(law.update(np.zeros(200), e), first)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "error", "words"),
+    [
+        ("u_bounds", 1.0, TypeError, "a pair"),
+        ("u_bounds", (1.0,), ValueError, "1 sides"),
+        ("u_bounds", (np.nan, 1.0), ValueError, r"u_bounds\[0\] holds NaN"),
+        ("v_bounds", (None, np.zeros(8)), ValueError, r"v_bounds\[1\] has shape \(8,\)"),
+        ("step_bounds", (np.zeros((9, 2)), None), ValueError, r"step_bounds\[0\] has shape"),
+        ("step_bounds", ("a", None), (TypeError, ValueError), r"step_bounds\[0\]"),
+        ("reference", np.zeros(8), ValueError, "reference has shape"),
+        ("reference", np.full(9, np.inf), ValueError, "reference holds inf"),
+        ("position_bounds", (0.0, 1.0), LearningError, "position bound needs the reference"),
+        ("velocity_bounds", (0.0, 1.0), LearningError, "velocity bound needs the reference"),
+        (
+            "acceleration_bounds",
+            (0.0, 1.0),
+            LearningError,
+            "acceleration bound needs the reference",
+        ),
+        ("output_bounds", (0.0, 1.0), LearningError, "output bound needs the reference"),
+        ("u_bounds", (1.0, -1.0), LearningError, "lower input bound 1 lies above"),
+        ("v_bounds", (np.inf, np.inf), LearningError, "lower change bound is inf"),
+        ("q", np.ones(8), ValueError, "q has shape"),
+        ("r", -1.0, LearningError, "r = -1"),
+        ("rate", -1.0, LearningError, "rate = -1"),
+    ],
+)
+def test_wrong_arguments_are_refused_one_at_a_time(name, value, error, words):
+    with pytest.raises(error, match=words):
+        ConstrainedIlc(axis(), 9, **({"rate": 3.0} | {name: value}))
+
+
+def test_bounds_that_exclude_each_other_are_refused_with_the_sample():
+    r = np.linspace(0.0, 0.08, 9)
+    with pytest.raises(LearningError, match="input and position bounds leave no value.* sample 6"):
+        ConstrainedIlc(
+            axis(), 9, rate=3.0, u_bounds=(-0.005, 0.005), position_bounds=(0.0, 0.051), reference=r
+        )
+    low = np.full(9, -1.0)
+    low[1] = 0.3
+    with pytest.raises(LearningError, match="at sample 1, channel 0"):
+        ConstrainedIlc(axis(), 9, rate=3.0, u_bounds=(low, 1.0), step_bounds=(-0.1, 0.1))
+
+
+def test_wrong_signals_are_refused_one_at_a_time():
+    law = ConstrainedIlc(axis(), 9, rate=3.0, u_bounds=(-1.0, 1.0))
+    for u, e, name in [
+        (np.zeros(8), np.zeros(9), "u"),
+        (np.zeros(9), np.zeros(8), "e"),
+        (np.full(9, np.nan), np.zeros(9), "u"),
+        (np.zeros(9), np.full(9, np.inf), "e"),
+    ]:
+        with pytest.raises(ValueError, match=f"^{name} h"):
+            law.update(u, e)
+    with pytest.raises(LearningError, match="does not determine the input"):
+        ConstrainedIlc(StateSpace(0.5, [[1.0, 1.0]], 1.0, [[0.0, 0.0]], DT_S), 300)

@@ -1,0 +1,174 @@
+"""Trajectories: limits, derivatives, shapes, refusals."""
+
+import numpy as np
+import pytest
+
+from ilc_rt import Cell, TrajectoryError, trajectory
+
+LIMITS = {"velocity_max_m_s": 0.5, "acceleration_max_m_s2": 10.0, "jerk_max_m_s3": 800.0}
+SQUARE = [[0.0, 0.0], [0.03, 0.0], [0.03, 0.02], [0.0, 0.02]]
+GCODE = "G1 X30 F3000 (first)\nG3 X20 Y10 I-10 J0\nG4 P0.1\nG1 X0 Y0\n"
+
+PLANS = {
+    "complete": lambda dt: trajectory.jerk_limited(SQUARE, feed_m_s=0.05, dt_s=dt, **LIMITS),
+    "on_time": lambda dt: trajectory.jerk_limited(
+        SQUARE, feed_m_s=[0.05, 0.04, 0.1], dt_s=dt, setting="on_time", **LIMITS
+    ),
+    "exponential_sigmoid": lambda dt: trajectory.exponential_sigmoid(
+        [[0.0, 0.0], [0.06, 0.08], [0.0, 0.0]],
+        feed_m_s=[0.05, 0.08],
+        dt_s=dt,
+        amplitude_m=0.001,
+        frequency_hz=5.0,
+        **LIMITS,
+    ),
+    "six_point": lambda dt: trajectory.modulated(
+        [0.0, 0.05], feed_m_s=0.02, amplitude_m=0.001, frequency_hz=5.0, dt_s=dt,
+        interpolation="on_time", **LIMITS,
+    ),
+    "spline": lambda dt: trajectory.spline(SQUARE, feed_m_s=0.05, dt_s=dt, **LIMITS),
+    "butterfly": lambda dt: trajectory.butterfly(dt_s=dt, **LIMITS),
+    "spiral": lambda dt: trajectory.spiral(
+        pitch_m=0.004, turns=2.5, feed_m_s=0.03, dt_s=dt, **LIMITS
+    ),
+    "raster": lambda dt: trajectory.raster(
+        width_m=0.03, pitch_m=0.005, rows=3, feed_m_s=0.05, dt_s=dt, there_and_back=True, **LIMITS
+    ),
+    "gcode": lambda dt: trajectory.gcode(
+        GCODE, start_m=[0.0, 0.0], feed_m_s=0.05, dt_s=dt, **LIMITS
+    ),
+    "gcode blended": lambda dt: trajectory.gcode(
+        GCODE, start_m=[0.0, 0.0], feed_m_s=0.05, dt_s=dt, blend_s=0.04, **LIMITS
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_every_limit_holds_and_derivatives_belong_together(name):
+    dt_s = 0.001
+    path = PLANS[name](dt_s)
+    n = path.n_samples
+    assert path.dt_s == dt_s
+    assert path.t_s.shape == (n,)
+    for array in (path.position_m, path.velocity_m_s, path.acceleration_m_s2, path.programmed_m):
+        assert array.shape == (n, path.n_axes)
+        assert np.isfinite(array).all()
+    assert path.computing_s >= 0.0
+    p, v, a = path.position_m, path.velocity_m_s, path.acceleration_m_s2
+    assert abs(v).max() <= LIMITS["velocity_max_m_s"] * (1 + 1e-9)
+    assert abs(a).max() <= LIMITS["acceleration_max_m_s2"] * (1 + 1e-9)
+    for order, key in enumerate(LIMITS, 1):
+        differences = np.diff(p, order, axis=0) / dt_s**order
+        assert abs(differences).max() <= LIMITS[key] * (1 + 1e-9) + 1e-14 / dt_s**order
+    # Central differences miss by a sixth of the next but one derivative times dt^2.
+    bend = LIMITS["jerk_max_m_s3"] * dt_s**2
+    np.testing.assert_allclose((p[2:] - p[:-2]) / (2 * dt_s), v[1:-1], atol=bend)
+    np.testing.assert_allclose(
+        (v[2:] - v[:-2]) / (2 * dt_s), a[1:-1], atol=LIMITS["jerk_max_m_s3"] * dt_s
+    )
+    for rest in (v[0], v[-1], a[0], a[-1]):
+        np.testing.assert_allclose(rest, 0.0, atol=1e-9)
+
+
+def test_the_settings_lose_frequency_or_amplitude():
+    def path(way):
+        return trajectory.modulated(
+            [0.0, 0.1], feed_m_s=0.02, amplitude_m=0.0015, frequency_hz=12.0, dt_s=0.001,
+            interpolation=way, velocity_max_m_s=0.5, acceleration_max_m_s2=5.0, jerk_max_m_s3=300.0,
+        )  # fmt: skip
+
+    complete, on_time = path("complete"), path("on_time")
+    assert complete.t_s[-1] > 1.3 * 5.0
+    assert on_time.t_s[-1] < 1.05 * 5.0
+
+    def amplitude(path):
+        middle = path.position_m[path.n_samples // 4 : 3 * path.n_samples // 4, 0]
+        off = middle - np.polyval(np.polyfit(range(len(middle)), middle, 1), range(len(middle)))
+        return 4.0 / len(off) * np.abs(np.fft.rfft(off * np.hanning(len(off)))).max()
+
+    assert amplitude(on_time) < 0.8 * amplitude(complete)
+
+
+def test_an_exponential_sigmoid_move_is_on_its_path_and_on_time():
+    path = trajectory.exponential_sigmoid([0.0, 0.5], feed_m_s=0.1, dt_s=0.001, **LIMITS)
+    miss = abs(path.position_m - path.programmed_m)[:, 0]
+    assert miss[1000:4000].max() < 1e-12
+    place = [(segment, name) for segment, name, _, _ in path.alphas]
+    assert place == [(0, "start-up"), (0, "end")]
+    for _, _, alpha, intervals in path.alphas:
+        assert alpha == intervals[-1][1]
+    linear = trajectory.jerk_limited([0.0, 0.5], feed_m_s=0.1, dt_s=0.001, **LIMITS)
+    assert trajectory.tracking_index(path)[0] < trajectory.tracking_index(linear)[0]
+
+
+def test_the_index_is_the_integral_of_its_definition():
+    path = PLANS["exponential_sigmoid"](0.001)
+    tracking, acceleration = trajectory.tracking_index(path, k_e=600.0, k_a=2.0)
+    squares = ((path.programmed_m - path.position_m) ** 2).sum(axis=1)
+    assert tracking == pytest.approx(600.0 * np.trapezoid(squares, dx=0.001), rel=1e-9)
+    squares = (path.acceleration_m_s2**2).sum(axis=1)
+    assert acceleration == pytest.approx(2.0 * np.trapezoid(squares, dx=0.001), rel=1e-9)
+
+
+def test_the_butterfly_is_the_curve_of_its_equation():
+    path = trajectory.butterfly(dt_s=0.002, turns=1.0, **LIMITS)
+    t = np.linspace(0.0, 2.0 * np.pi, 200_001)
+    r = 0.00185 * (np.exp(np.cos(t)) - 2 * np.cos(4 * t) - np.sin(t / 12) ** 5)
+    curve = np.column_stack((r * np.sin(t), r * np.cos(t)))
+    for point in path.position_m[::400]:
+        assert np.hypot(*(curve - point).T).min() < 1e-6
+    np.testing.assert_allclose(path.position_m[0], curve[0], atol=1e-15)
+    np.testing.assert_allclose(path.position_m[-1], curve[-1], atol=1e-9)
+    assert np.hypot(*path.velocity_m_s.T).max() <= 0.004 * (1 + 1e-9)
+
+
+def test_a_spline_passes_its_points():
+    from scipy.interpolate import CubicSpline
+
+    points = np.array(SQUARE)
+    path = trajectory.spline(points, feed_m_s=0.05, dt_s=0.001, **LIMITS)
+    knots = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T) ** 0.5)))
+    curve = CubicSpline(knots, points, bc_type="natural")(np.linspace(0.0, knots[-1], 100_001))
+    for point in path.position_m[::50]:
+        assert np.hypot(*(curve - point).T).min() < 2e-6
+
+
+def test_a_part_program_runs_in_a_cell(gantry):
+    cell = Cell.load(gantry.with_name("04_gcode.toml"))
+    reference = cell.reference()
+    np.testing.assert_allclose(reference[-1], 0.0, atol=1e-12)
+    assert reference.max() > 0.079
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"feed_m_s": 0.0}, "feed 0 m/s"),
+        ({"feed_m_s": float("nan")}, "feed NaN"),
+        ({"dt_s": 0.0}, "sample time 0 s"),
+        ({"dt_s": float("inf")}, "sample time inf s"),
+        ({"velocity_max_m_s": -1.0}, "axis 1: velocity limit -1"),
+        ({"jerk_max_m_s3": [800.0, 0.0]}, "axis 2: jerk limit 0"),
+        ({"acceleration_max_m_s2": [1.0]}, "acceleration_max_m_s2 has 1 entries"),
+        ({"setting": "soon"}, 'setting = "soon"'),
+        ({"points_m": [[0.0, 0.0], [0.0, 0.0]]}, "ends where it starts"),
+        ({"points_m": [[0.0, 0.0], [np.nan, 0.0]]}, "points_m holds NaN"),
+        ({"points_m": np.zeros((2, 7)) + np.arange(2)[:, None]}, "7 axes: allowed 1 to 6"),
+        ({"points_m": [[0.0, 0.0]]}, "0 segments"),
+    ],
+)
+def test_one_wrong_thing_at_a_time(change, match):
+    arguments = {"points_m": SQUARE[:2], "feed_m_s": 0.05, "dt_s": 0.001, **LIMITS, **change}
+    with pytest.raises(ValueError, match=match):
+        trajectory.jerk_limited(arguments.pop("points_m"), **arguments)
+
+
+def test_what_no_alpha_holds_is_refused_with_the_limit():
+    limits = LIMITS | {"velocity_max_m_s": 0.1}
+    with pytest.raises(TrajectoryError, match="no alpha holds every limit.*velocity"):
+        trajectory.exponential_sigmoid([0.0, 0.5], feed_m_s=0.09, dt_s=0.001, **limits)
+
+
+def test_a_part_program_is_refused_with_its_line():
+    with pytest.raises(TrajectoryError, match="line 2: G33: allowed G0 G1"):
+        trajectory.gcode("G1 X1\nG33 X2", start_m=[0.0], feed_m_s=0.05, dt_s=0.001, **LIMITS)
