@@ -667,14 +667,6 @@ class ModelInverseIlc:
     ) -> NDArray[np.float64]: ...
     def reset(self) -> None: ...
 
-class _Law(Protocol):
-    def update(
-        self,
-        u: NDArray[np.float64],
-        e: NDArray[np.float64],
-        disturbance: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]: ...
-
 @final
 class Gate:
     def __new__(
