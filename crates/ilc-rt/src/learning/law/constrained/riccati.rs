@@ -222,7 +222,6 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
 
     /// Replaces the cost of the next state by that of this one, given the gain between.
     #[inline(always)]
-    #[expect(clippy::too_many_lines, reason = "one sum, term by term")]
     fn follow<const NS: usize>(
         &self,
         weighing: &Weighing<M, P>,
