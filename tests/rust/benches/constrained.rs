@@ -15,7 +15,7 @@ const N_SAMPLES: usize = 1300;
 const DT_S: f64 = 0.001;
 const WEIGHTS: Weights = Weights { q: 1.0, s: 0.0, r: 0.0, rate: 3.0 };
 
-#[expect(clippy::unnecessary_wraps, reason = "as the bounds are given")]
+#[expect(clippy::unnecessary_wraps, reason = "bounds are optional wherever it is called")]
 fn within(size: f64) -> Option<Bound> {
     Some(Bound::within(-size, size))
 }

@@ -80,7 +80,7 @@ fn learn(golden: &Value, objective: &Objective, updates: usize) -> Learned {
 fn printed(what: &str, found: &[f64], channel: usize, expected: &Value, decimals: &Value) {
     let expected = numbers(expected);
     let n_channels = found.len() / expected.len();
-    let tolerance = 0.5000001 * 10.0_f64.powf(-decimals.as_f64().unwrap());
+    let tolerance = 0.500_000_1 * 10.0_f64.powf(-decimals.as_f64().unwrap());
     for (k, expected) in expected.into_iter().enumerate() {
         let found = found[k * n_channels + channel];
         assert!((found - expected).abs() <= tolerance, "{what}[{k}]: {found} is not {expected}");

@@ -41,6 +41,7 @@ fn cost(q: f64, s: f64, r: f64, rate: f64) -> Cost {
     Cost { q: Weight::Scalar(q), s: Weight::Scalar(s), r: Weight::Scalar(r), rate }
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "bounds are optional wherever it is called")]
 fn within(size: f64) -> Option<Bound> {
     Some(Bound::within(-size, size))
 }
@@ -85,12 +86,6 @@ impl Case {
         let (j, best) = (lifted.cost(&v), lifted.cost(&other));
         let worst = difference(&next, &expected);
         let slope = lifted.stationarity(&v);
-        println!(
-            "{name}: {} iterations, cost {:e}, input {worst:e}, slope {slope:e}, excess {:e}",
-            law.iterations(),
-            (j - best) / best,
-            lifted.excess(&v)
-        );
         assert!((j - best).abs() < 1e-7 * best, "{name}: cost {j:e} against {best:e}");
         assert!(worst < 1e-6, "{name}: input differs by {worst:e}");
         assert!(lifted.excess(&v) < 1e-9, "{name}: excess {:e}", lifted.excess(&v));
@@ -239,7 +234,7 @@ fn all_bounds_together_agree_with_the_other_solver() {
 
 #[test]
 fn an_input_that_is_fixed_in_places_is_honoured() {
-    let fixed = |k: usize| k < 3 || k > 70 || k == 40;
+    let fixed = |k: usize| !(3..=70).contains(&k) || k == 40;
     let size = |k: usize| if fixed(k) { 0.0 } else { 0.01 };
     let bound = Bound {
         lower: Limit::PerSample((0..80).map(|k| -size(k)).collect()),
@@ -308,7 +303,6 @@ fn starting_from_the_last_solution_is_faster_and_as_good() {
         }
         std::mem::swap(&mut input, &mut next);
     }
-    println!("{counts:?}");
     assert!(counts[2..].iter().all(|(warm, cold)| warm < cold), "{counts:?}");
 }
 

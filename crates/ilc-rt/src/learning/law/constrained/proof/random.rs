@@ -48,11 +48,11 @@ fn random_case() -> impl Strategy<Value = Case> {
                     .map(|i| (0..4).map(|j| rough[i.saturating_sub(j * width)]).sum::<f64>() / 4.0)
                     .collect::<Vec<f64>>()
             };
-            let inner = smooth(seed ^ 11, size, m);
-            let u = smooth(seed ^ 12, size, m);
-            let e = noise(n_samples * p, seed ^ 13);
-            let reference = smooth(seed ^ 14, size, m);
-            let output_reference = noise(n_samples * p, seed ^ 15);
+            let inner = smooth(seed ^ 0xb, size, m);
+            let u = smooth(seed ^ 0xc, size, m);
+            let e = noise(n_samples * p, seed ^ 0xd);
+            let reference = smooth(seed ^ 0xe, size, m);
+            let output_reference = noise(n_samples * p, seed ^ 0xf);
             let around = |on: bool, values: DVector<f64>, room: f64| {
                 let side = |sign: f64| {
                     Limit::Full(values.iter().map(|value| value + sign * room).collect())
