@@ -362,12 +362,8 @@ fn a_law_seen_from_outside_has_the_spectrum_of_its_equation() {
         let mut iteration = Iteration::new(&mut law, &model, n).unwrap();
         let seen = Spectrum::new(&mut iteration, &model).unwrap().unwrap();
         let equation = Spectrum::optimal(&model, w).unwrap();
-        let expected: Vec<(f64, f64)> = equation
-            .bins
-            .iter()
-            .map(|bin| bin.frequency_hz)
-            .zip(equation.contraction())
-            .collect();
+        let expected: Vec<(f64, f64)> =
+            equation.bins.iter().map(|bin| bin.frequency_hz).zip(equation.contraction()).collect();
         for (bin, found) in seen.bins.iter().zip(seen.contraction()) {
             let nearest = expected
                 .iter()
