@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ilc_rt._native import repeatability
 from ilc_rt.campaign import Campaign, Drives, load_cell
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import write_text
@@ -18,7 +19,7 @@ from ilc_rt.result import write_text
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
     from ilc_rt._native import Cell
     from ilc_rt.events import Event
@@ -136,16 +137,15 @@ def compare_runs(errors: ArrayLike, axis_names: tuple[str, ...] = ()) -> Repeata
     if len(names) != values.shape[2]:
         message = f"axis_names has {len(names)} names; {values.shape[2]} are needed"
         raise ValueError(message)
-    varying = np.mean(np.var(values, axis=0, ddof=1), axis=0)
-    common = np.maximum(np.mean(np.mean(values, axis=0) ** 2, axis=0) - varying / n_runs, 0.0)
-    axes = tuple(
-        AxisRepeatability(
-            str(name), float(np.sqrt(same)), float(np.sqrt(other)),
-            float(np.sqrt(same / other)) if other > 0.0 else None,
-        )
-        for name, same, other in zip(names, common, varying, strict=True)
-    )  # fmt: skip
+    axes = tuple(_axis(str(name), values[:, :, column]) for column, name in enumerate(names))
     return RepeatabilityCheck(n_runs, axes)
+
+
+def _axis(name: str, errors: NDArray[np.float64]) -> AxisRepeatability:
+    found = repeatability(np.ascontiguousarray(errors))
+    other = found.spread_rms
+    same = float(np.sqrt(max(found.mean_rms**2 - other**2 / len(errors), 0.0)))
+    return AxisRepeatability(name, same, other, same / other if other > 0.0 else None)
 
 
 def check_repeatability(
