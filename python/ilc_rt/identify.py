@@ -51,7 +51,7 @@ DURATION_S = 8.0
 PERIODS = 5
 # Below this median coherence, and above this relative residual, a model is not to be used.
 COHERENCE_MIN = 0.7
-RESIDUAL_MAX = 0.4
+RESIDUAL_MAX = 0.25
 
 
 @dataclass(frozen=True)
