@@ -1,7 +1,5 @@
 //! Computing time of a move, kind by kind: what a planner costs between two ticks, or before a run.
 
-#![expect(missing_docs, reason = "criterion's macros make public items")]
-
 use criterion::{Criterion, criterion_group, criterion_main};
 use ilc_rt::trajectory::curve::{Butterfly, Run, RunLimits};
 use ilc_rt::trajectory::{

@@ -194,10 +194,10 @@ impl Lifted {
             }
         }
         if active.is_empty() {
-            return slope.norm() / self.f.norm();
+            return slope.norm() / self.f.norm().max(1e-12);
         }
         let normals = DMatrix::from_columns(&active);
         let multiplier = non_negative(&normals, &-&slope);
-        (slope + normals * multiplier).norm() / self.f.norm()
+        (slope + normals * multiplier).norm() / self.f.norm().max(1e-12)
     }
 }
