@@ -476,7 +476,7 @@ def butterfly(
     curvature_acceleration_max_m_s2: float = 0.02,
     scale_m: float = 0.00185,
     turns: float = 1.0,
-    center_m: tuple[float, float] = (0.0, 0.0),
+    center_m: tuple[float, float] = ...,
 ) -> Trajectory: ...
 def spiral(
     *,
@@ -488,7 +488,7 @@ def spiral(
     acceleration_max_m_s2: float | ArrayLike,
     jerk_max_m_s3: float | ArrayLike,
     curvature_acceleration_max_m_s2: float = ...,
-    center_m: tuple[float, float] = (0.0, 0.0),
+    center_m: tuple[float, float] = ...,
 ) -> Trajectory: ...
 def raster(
     *,
@@ -500,7 +500,7 @@ def raster(
     velocity_max_m_s: float | ArrayLike,
     acceleration_max_m_s2: float | ArrayLike,
     jerk_max_m_s3: float | ArrayLike,
-    start_m: tuple[float, float] = (0.0, 0.0),
+    start_m: tuple[float, float] = ...,
     there_and_back: bool = False,
     setting: str = "complete",
 ) -> Trajectory: ...
@@ -935,6 +935,7 @@ class CrossCoupled:
     def step(
         self, error_m: ArrayLike, gains: ArrayLike, curvature_per_m: float = 0.0
     ) -> tuple[NDArray[np.float64], float]: ...
+    def reset(self) -> None: ...
 
 _Side: TypeAlias = ArrayLike | None
 _Bounds: TypeAlias = tuple[_Side, _Side] | None
