@@ -95,7 +95,7 @@ fn what_is_beyond_a_limit_is_refused_with_the_amplitude_that_would_do() {
         let mut heard = 0;
         let refusal =
             supervisor::identify(&cell, experiment, &options, in_process(&cell), &mut |_| {
-                heard += 1
+                heard += 1;
             });
         assert_eq!(heard, 0, "nothing may begin");
         refusal.unwrap_err().to_string()
