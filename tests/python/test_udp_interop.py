@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 ROOT = Path(__file__).resolve().parents[2]
+
+# The echo program may have to be compiled first.
+pytestmark = pytest.mark.timeout(900)
 GROUP = "239.74.163.78"
 STOP_ID = 0x7FF
 PATIENCE_S = 20.0
