@@ -1,0 +1,1 @@
+"""Barton 2010: coordinated iterative learning control."""
