@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Axis, Cell, Interface, LawName, Measure};
+use ilc_rt::config::{Axis, AxisUnit, Cell, Interface, LawName, Measure};
 use ilc_rt::supervisor::{self, Plan};
 use pyo3::prelude::*;
 
@@ -102,6 +102,16 @@ impl PyCell {
         let name = |axis: &Axis| match axis.interface {
             Interface::Csp => "csp",
             Interface::Csv => "csv",
+        };
+        self.cell.axes.iter().map(name).collect()
+    }
+
+    /// What each axis is measured in: `m`, or `rad` for a rotary one.
+    #[getter]
+    fn axis_units(&self) -> Vec<&'static str> {
+        let name = |axis: &Axis| match axis.unit {
+            AxisUnit::M => "m",
+            AxisUnit::Rad => "rad",
         };
         self.cell.axes.iter().map(name).collect()
     }

@@ -1,11 +1,13 @@
 //! Contour error near a point's own time: how far measured points are from where they should have
 //! been, give or take a window. Cold.
 
+use crate::trajectory::MAX_AXES;
+
 /// Distance of each measured point to the path near its own time.
 ///
 /// The path is the polyline through the reference samples from `window` before to `window` after
-/// the sample of the same time; the distance is exact (point to segment), for 1 to 6 axes.
-/// Points that repeat while the path rests count as points.
+/// the sample of the same time; the distance is exact (point to segment), for 1 to
+/// [`MAX_AXES`] axes. Points that repeat while the path rests count as points.
 ///
 /// # Shapes
 /// - `reference_m`, `actual_m`: `n_samples * n_axes`, time first; a trailing part of a sample is not
@@ -29,6 +31,17 @@ pub fn contour_error_m(
         4 => distances_m::<4>(reference_m, actual_m, window),
         5 => distances_m::<5>(reference_m, actual_m, window),
         6 => distances_m::<6>(reference_m, actual_m, window),
+        7..=MAX_AXES => {
+            let pad = |values: &[f64]| -> Vec<f64> {
+                let row = |row: &[f64]| {
+                    let mut wide = [0.0; MAX_AXES];
+                    wide[..n_axes].copy_from_slice(row);
+                    wide
+                };
+                values.chunks_exact(n_axes).flat_map(row).collect()
+            };
+            distances_m::<MAX_AXES>(&pad(reference_m), &pad(actual_m), window)
+        }
         _ => Vec::new(),
     }
 }
