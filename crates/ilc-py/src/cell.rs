@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Axis, AxisUnit, Cell, Interface, LawName, Measure};
+use ilc_rt::config::{Axis, Cell, Interface, LawName, Measure};
 use ilc_rt::supervisor::{self, Plan};
 use pyo3::prelude::*;
 
@@ -109,11 +109,7 @@ impl PyCell {
     /// What each axis is measured in: `m`, or `rad` for a rotary one.
     #[getter]
     fn axis_units(&self) -> Vec<&'static str> {
-        let name = |axis: &Axis| match axis.unit {
-            AxisUnit::M => "m",
-            AxisUnit::Rad => "rad",
-        };
-        self.cell.axes.iter().map(name).collect()
+        self.cell.axes.iter().map(|axis| axis.unit.symbol()).collect()
     }
 
     /// Gain kv of each axis' position loop in 1/s; None where it is in the drive.

@@ -92,6 +92,16 @@ pub enum AxisUnit {
     Rad,
 }
 
+impl AxisUnit {
+    /// The unit as it is written.
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::M => "m",
+            Self::Rad => "rad",
+        }
+    }
+}
+
 /// `[[axis]]`: one drive.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -214,8 +214,8 @@ def claims(figures: Figures) -> list[Claim]:
                 f"identified leg: {what}", found[key], true[key], unit, "section 7.3.3, eq. (7.19)",
                 holds=abs(found[key] / true[key] - 1.0) < 0.03,
                 remark=f"swept sine of {found['amplitude'] * 1e3:.0f} mN m on a simulated leg "
-                "whose linearisation is the printed model; with less the encoder's steps show, with "
-                "more the curve of the leg's weight",
+                "whose linearisation is the printed model; with less the encoder's steps show, "
+                "with more the curve of the leg's weight",
             )
             for what, key, unit in (
                 ("gain", "gain", "rad/(N m)"),

@@ -219,6 +219,27 @@ mod tests {
     }
 
     #[test]
+    fn axes_that_do_not_move_add_nothing() {
+        let reference = contour();
+        let mut random = Random(4);
+        let actual: Vec<f64> = reference.iter().map(|r| r + 3e-4 * random.signed()).collect();
+        let expected = contour_error_m(&reference, &actual, 2, 50);
+        for n_axes in 3..=MAX_AXES {
+            let among = |values: &[f64]| -> Vec<f64> {
+                let row = |pair: &[f64]| {
+                    let mut row = vec![0.25; n_axes];
+                    (row[0], row[n_axes - 1]) = (pair[0], pair[1]);
+                    row
+                };
+                values.chunks_exact(2).flat_map(row).collect()
+            };
+            let found = contour_error_m(&among(&reference), &among(&actual), n_axes, 50);
+            let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(found.len() == expected.len() && apart < 1e-15, "{n_axes} axes: {apart}");
+        }
+    }
+
+    #[test]
     fn skipping_changes_nothing() {
         let reference = contour();
         let mut random = Random(9);
@@ -246,7 +267,7 @@ mod tests {
         assert!(errors[0].is_nan() && errors[1] == 0.0);
         assert!(contour_error_m(&[], &[0.0, 0.0], 2, 9)[0].is_nan());
         assert!(contour_error_m(&line(3), &[0.0], 0, 9).is_empty());
-        assert!(contour_error_m(&line(7), &[0.0; 14], 7, 9).is_empty());
+        assert!(contour_error_m(&line(13), &[0.0; 26], MAX_AXES + 1, 9).is_empty());
     }
 
     #[test]
