@@ -62,11 +62,11 @@ class AtTheTools:
         return following if self.smooth is None else self.smooth.zero_phase(following)
 
 
-def coordinated(path: str, case: Case, machine: Machine) -> AtTheTools:
+def coordinated(path: str, case: Case, machine: Machine, *, is_smoothed: bool = True) -> AtTheTools:
     """Return the law (8.7) of a case: the model is the drives' with a constant Jacobian behind it.
 
     The formation (8.8) is that of x and y; z is tracked by whatever tracks, and by nothing if the
-    formation alone counts.
+    formation alone counts. The input goes through the printed Gaussian filter if it `is_smoothed`.
     """
     jacobian = machine.delta.jacobian(np.full(N_LEGS, HOME_RAD))
     legs = one_mechanism(machine)
@@ -76,7 +76,7 @@ def coordinated(path: str, case: Case, machine: Machine) -> AtTheTools:
         [at_tool] * N_AGENTS, machine.cell.n_samples, tracking=tracking,
         sigma=PER_MM2 * SIGMA_Q, s=SIGMA_S, r=SIGMA_R, axes=[0, 1],
     )  # fmt: skip
-    return AtTheTools(law, machine, BANDWIDTH_HZ[path])
+    return AtTheTools(law, machine, BANDWIDTH_HZ[path] if is_smoothed else None)
 
 
 def through_jacobians(path: str, machine: Machine) -> AtTheTools:
