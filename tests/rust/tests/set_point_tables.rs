@@ -15,9 +15,8 @@ const CYCLE_S: f64 = 0.005;
 
 /// Nine rotary drives, `a1` to `a9`, on a bus.
 fn cell_text(bus: &str, cycle_us: u32, jerk_max: f64) -> String {
-    let mut text = format!(
-        "[cell]\nname = \"nine\"\ncycle_us = {cycle_us}\n[bus]\naddress = \"{bus}\"\n"
-    );
+    let mut text =
+        format!("[cell]\nname = \"nine\"\ncycle_us = {cycle_us}\n[bus]\naddress = \"{bus}\"\n");
     for axis in 1..=N_AXES {
         writeln!(
             text,

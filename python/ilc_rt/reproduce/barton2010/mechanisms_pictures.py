@@ -26,7 +26,6 @@ def _normalised(axes: Axes, cases: dict[str, Any], title: str, signal: Any) -> N
         errors = np.asarray(signal(cases[case]))
         axes.semilogy(errors / errors[0], "o-", markersize=3, label=name)
     axes.set_title(title)
-    axes.set_xlabel("iteration")
     axes.grid(visible=True, alpha=0.3)
 
 
@@ -46,6 +45,8 @@ def _draw_errors(which: str, figures: Figures, figure: Figure) -> None:
         _normalised(axes, cases, title, signal)
     for axes in (panels[0], panels[2]):
         axes.set_ylabel("RMS over first")
+    for axes in panels[2:]:
+        axes.set_xlabel("iteration")
     panels[0].legend(fontsize="small")
 
 
@@ -61,6 +62,25 @@ def _draw_agents(figures: Figures, figure: Figure) -> None:
         axes.set_ylabel("RMS y error in mm")
         axes.grid(visible=True, alpha=0.3)
         axes.legend()
+
+
+def _draw_unfiltered(figures: Figures, figure: Figure) -> None:
+    found = figures["mechanisms"]
+    for axes, path in zip(figure.subplots(1, 2), ("raster", "spiral"), strict=True):
+        for colour, case in (("C0", "individual"), ("C1", "formation")):
+            for cases, style, name in (
+                (found[path], "o-", "with the filter"),
+                (found["unfiltered"][path], "s--", "without"),
+            ):
+                axes.semilogy(
+                    1e6 * np.asarray(cases[case]["formation_rms_m"]), style, color=colour,
+                    markersize=3, label=f"{_NAMES[case]}, {name}",
+                )  # fmt: skip
+        axes.set_title(path)
+        axes.set_xlabel("iteration")
+        axes.set_ylabel("RMS formation error in µm")
+        axes.grid(visible=True, alpha=0.3)
+    figure.axes[0].legend(fontsize="small")
 
 
 def _draw_paths(which: str, figures: Figures, figure: Figure) -> None:
@@ -97,6 +117,11 @@ PICTURES = [
         "mechanisms_agents",
         "The three systems under the trajectory objective (figures 8.11, 8.17).",
         _draw_agents,
+    ),
+    Picture(
+        "mechanisms_unfiltered",
+        "Formation errors with and without the Gaussian filter of section 8.3.1.",
+        _draw_unfiltered,
     ),
     Picture(
         "mechanisms_raster_paths",
