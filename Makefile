@@ -78,6 +78,7 @@ docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
 
 bench: $(VENV)/.bench ## Speed, as ratios; writes docs/benchmarks.md
+	rm -rf $(TARGET)/criterion
 	cargo bench --workspace --bench main_job --bench learning --bench constrained --bench relevance --bench trajectory
 	$(BIN)/python benchmarks/report.py
 
