@@ -119,8 +119,8 @@ def _print(outcome: Outcome, console: Console) -> None:
         cells = (claim.what, printed, ours, ratio(claim), verdict(claim.holds), claim.source)
         table.add_row(*map(escape, cells), style=style)
     console.print(table)
-    for claim in claims:
-        if claim.remark:
-            console.print(f"{claim.what}: {claim.remark}", style="dim", markup=False)
+    for remark in dict.fromkeys(claim.remark for claim in claims if claim.remark):
+        about = "; ".join(claim.what for claim in claims if claim.remark == remark)
+        console.print(f"{about}: {remark}", style="dim", markup=False)
     sizes = " on reduced sizes" if outcome.reduced else ""
     console.print(f"{outcome.paper.name}: computed in {outcome.seconds:.1f} s{sizes}")

@@ -89,11 +89,10 @@ def text(outcome: Outcome) -> str:
         "|---|--:|--:|--:|:-:|---|",
     ]
     claims = outcome.claims
-    notes = [claim for claim in claims if claim.remark]
+    notes = list(dict.fromkeys(claim.remark for claim in claims if claim.remark))
     lines += [_row(claim, notes) for claim in claims]
     lines.append("")
-    for number, claim in enumerate(notes, start=1):
-        lines += [f"{number}. {claim.remark}"]
+    lines += [f"{number}. {note}" for number, note in enumerate(notes, start=1)]
     if notes:
         lines.append("")
     for picture in paper.pictures:
@@ -102,8 +101,8 @@ def text(outcome: Outcome) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _row(claim: Claim, notes: list[Claim]) -> str:
+def _row(claim: Claim, notes: list[str]) -> str:
     ours, printed = pair(claim.ours, claim.printed, claim.unit)
-    note = f" ({notes.index(claim) + 1})" if claim.remark else ""
+    note = f" ({notes.index(claim.remark) + 1})" if claim.remark else ""
     cells = [claim.what + note, printed, ours, ratio(claim), verdict(claim.holds)]
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in [*cells, claim.source]) + " |"
