@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import sys
 from typing import TYPE_CHECKING
 
 import papers_fixture
@@ -10,13 +14,12 @@ import pytest
 
 from ilc_rt.cli import main
 from ilc_rt.commands import reproduce
-from ilc_rt.errors import CampaignError
+from ilc_rt.errors import EXIT_INTERRUPTED, CampaignError
 from ilc_rt.reproduce import outcome, papers, workers
 from ilc_rt.reproduce.paper import Claim, Paper
 from ilc_rt.reproduce.quantity import pair
 
 if TYPE_CHECKING:
-    import subprocess
     from collections.abc import Callable
     from pathlib import Path
 
@@ -185,3 +188,18 @@ def test_quantities_share_a_unit_and_ratios_need_both() -> None:
     assert Claim("", 1.0, None).ratio is None
     assert Claim("", 1.0, 0.0).ratio is None
     assert Claim("", 1.0, 4.0).ratio == 0.25
+
+
+def test_ctrl_c_ends_every_process_with_one_code(tmp_path: Path) -> None:
+    """The terminal interrupts the whole group, and nobody leaves a trace."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "ilc_rt.cli", "reproduce", "all", "--reduced"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert ": " in process.stdout.readline()
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60.0)
+    assert process.returncode == EXIT_INTERRUPTED
+    assert said == ""

@@ -181,7 +181,7 @@ def test_what_does_not_hold_is_known(figures: dict[str, Any]) -> None:
     fails = [claim.what for claim in PAPER.claims(figures) if claim.holds is False]
     assert fails == [
         "the loop of eq. 3 as printed is stable",
-        "gain of the printed filter at 0 Hz",
+        "the printed filter passes what is constant",
         "a filter of 50 Hz converges, lead 1",
         "switched 10/50/10 Hz with a lead of one sample",
     ]

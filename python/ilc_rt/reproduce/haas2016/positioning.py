@@ -178,7 +178,7 @@ def claims(figures: Figures) -> list[Claim]:
         Claim("a causal Q stalls and then grows, 2 ms", float(causal["2ms"].min()), None, "m",
               "section 1", holds=bool(stalls),
               remark="The figure is the smallest error. The paper says Butterworth, not whether "
-              "it was applied without lag; only zero-phase gives a curve like Fig. 3."),
+              "it was applied without lag."),
     ]  # fmt: skip
 
 
