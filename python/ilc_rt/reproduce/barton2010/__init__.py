@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from ilc_rt.reproduce.barton2010 import (
     appendix_i,
+    bursts,
+    dissimilar,
+    formation,
+    raster,
     robustness,
     servo,
+    uncertain,
 )
 from ilc_rt.reproduce.paper import Claim, Figures, Paper, Tell
 
@@ -13,11 +18,26 @@ from ilc_rt.reproduce.paper import Claim, Figures, Paper, Tell
 SECTIONS = (
     servo,
     robustness,
+    raster,
+    uncertain,
+    bursts,
+    formation,
     appendix_i,
+    dissimilar,
 )
 
 ABOUT = """
-todo
+Norm-optimal learning and what its weights do: a servo axis (section 3.4), time-varying weights on
+a stage for micro-robotic deposition (chapter 5), three agents that keep a formation (chapter 6),
+a small worked example with printed tables (appendix I), and a fast axis that helps a slow one
+(appendix J).
+
+Left open by the print, and chosen here: size, speed and limits of the rasters; the x axis of the
+stage (taken like the y axis); high and low weights that are shown in graphs alone; the
+uncertainty of section 5.5, said to be in appendix B and not there; the size of noise bursts, of the
+agents' uncertainty and of the disturbance of agent 1; speed and flow of appendix J. Read
+differently from the print: the controller (5.13), unstable as it stands; table I.3, whose E_h2
+lacks a power of ten. Values that are only drawn in the thesis are not compared.
 """
 
 

@@ -24,7 +24,7 @@ ITERATIONS = 5
 S, R = 1e-4, 1e-6
 
 
-def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: ARG001
+def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     """Return converged inputs u(0..3), errors e(1..4) and formation errors, a row per channel.
 
     `u`, `e`: x1, y1, x2, y2, x3, y3; `formation`: d1, d2, d3, h1, h2, h3. `difference`: largest

@@ -30,7 +30,7 @@ R_VALUES = (0.0, 0.1, 1.0, 10.0)
 SHAPED = np.linspace(0.0, 2.0, 33)
 
 
-def compute(reduced: bool, tell: Tell) -> Figures:
+def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     """Return worst factors of a run under uncertainty, a counterexample to lemma 2, and a tuning.
 
     References

@@ -1,4 +1,4 @@
-"""Runs of a law on a simulated plant, for every section of this package; nothing else imports it."""
+"""Runs of a law on a simulated plant; only the sections of this package import it."""
 
 from __future__ import annotations
 

@@ -6,6 +6,7 @@ The paper's package makes its section `servo` with it.
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,7 +29,7 @@ ITERATIONS, ITERATIONS_R = 20, 500
 SHOWN = (0, 1, 2, 5, 20)
 
 
-def compute(reduced: bool, tell: Tell) -> Figures:
+def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     """Return RMS errors per run and factors of convergence for each weight, and the noise's share.
 
     `q`, `s`, `r`: `value`, `rms` (a list per value, from run 0), `monotonic_factor` (largest
@@ -86,15 +87,15 @@ def _learned(
 
 
 def _signals(axis: Servo) -> Figures:
-    """Return the signals of figure 3.4, q = s = r = 1: error, controller's output, learned input."""
+    """Return the signals of figure 3.4, q = s = r = 1: error, feedback, learned input."""
     law = NormOptimalIlc(axis.plant, axis.n_samples, q=1.0, s=1.0, r=1.0)
     history = list(runs(law, axis.plant.simulate, axis.first_error, SHOWN[-1]))
     return {
         "run": list(SHOWN),
         "reference": axis.reference.tolist(),
-        "error": [history[j][1].tolist() for j in SHOWN],
-        "feedback": [(CONTROLLER_GAIN * history[j][1]).tolist() for j in SHOWN],
-        "learned": [history[j][0].tolist() for j in SHOWN],
+        "error": [np.round(history[j][1], 8).tolist() for j in SHOWN],
+        "feedback": [np.round(CONTROLLER_GAIN * history[j][1], 8).tolist() for j in SHOWN],
+        "learned": [np.round(history[j][0], 8).tolist() for j in SHOWN],
     }
 
 
@@ -168,7 +169,7 @@ def claims(figures: Figures) -> list[Claim]:
 
 
 def _rises(values: list[float]) -> bool:
-    return all(after > before for before, after in zip(values, values[1:], strict=False))
+    return all(after > before for before, after in pairwise(values))
 
 
 __all__ = ["PICTURES", "claims", "compute"]

@@ -73,9 +73,7 @@ def noise_figures(axis: Servo, ahead: Sequence[Analysis], reduced: bool) -> Figu
 
 def _disturbed(axis: Servo, law: NormOptimalIlc, noise: Array) -> list[Array]:
     """Return the errors of runs in which each has its own disturbance of the output."""
-    history = runs(
-        law, axis.plant.simulate, axis.first_error, len(noise) - 1, lambda j: noise[j]
-    )
+    history = runs(law, axis.plant.simulate, axis.first_error, len(noise) - 1, lambda j: noise[j])
     return [e for _, e in history]
 
 
