@@ -69,7 +69,8 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     disturbance = np.concatenate([drawn, np.zeros((ITERATIONS + 1, n_samples, 4))], axis=2)
 
     def true(u: Array) -> Array:
-        return np.multiply(plant.simulate(u), TRUE_GAINS)
+        y: Array = plant.simulate(u) * TRUE_GAINS
+        return y
 
     figures: Figures = {
         "axes": list(AXES),
@@ -201,7 +202,7 @@ def _draw(figures: Figures, figure: Figure) -> None:
     left.set_title("axis x1")
     right.set_title("formation error E_d2")
     lower.set_title("axis x2, agent 1 disturbed")
-    disturbed.set_title("formation alone, agent 1 disturbed")
+    disturbed.set_title("formation alone, disturbed")
     for axes in (left, right, lower, disturbed):
         axes.set_xlabel("run")
         axes.set_ylabel("RMS error in m")

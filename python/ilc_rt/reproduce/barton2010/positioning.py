@@ -91,7 +91,8 @@ class Stage:
 
     def linearised_m(self, error_m: Array) -> Array:
         """Return the linearised contour error, eq. (4.1)."""
-        return np.sum(self.coupling[:, 0] * error_m, axis=1, dtype=np.float64)
+        contour_m: Array = np.sum(self.coupling[:, 0] * error_m, axis=1)
+        return contour_m
 
     def learn(
         self,

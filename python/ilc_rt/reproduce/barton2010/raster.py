@@ -214,17 +214,24 @@ def _draw_path(figures: Figures, figure: Figure) -> None:
     section = figures["raster"]
     reference_m = np.array(section["reference_m"])
     whole, near = figure.subplots(1, 2)
-    for axes in (whole, near):
-        axes.plot(*(1e3 * reference_m.T), color=INK, linewidth=0.8, label="programmed")
-        for name, colour in (("time_invariant", FIRST), ("time_varying", LAST)):
-            tool_m = reference_m - np.array(section[name]["error_m"])
-            axes.plot(*(1e3 * tool_m.T), color=colour, label=name.replace("_", "-"))
-        axes.set_xlabel("x in mm")
-        axes.set_ylabel("y in mm")
-    corner_m = reference_m[section["corner_samples"][0]]
-    near.set_xlim(*(1e3 * corner_m[0] + [-0.08, 0.04]))
-    near.set_ylim(*(1e3 * corner_m[1] + [-0.04, 0.08]))
-    near.set_title("at t1")
+    whole.plot(*(1e3 * reference_m.T), color=INK, linewidth=0.8)
+    for number, sample in enumerate(section["corner_samples"], start=1):
+        whole.annotate(f"t{number}", 1e3 * reference_m[sample])
+    whole.set_xlabel("x in mm")
+    whole.set_ylabel("y in mm")
+    corner = section["corner_samples"][0]
+    shown = slice(corner - round(4 * CORNER_S / DT_S), corner + round(4 * CORNER_S / DT_S))
+    for name, colour in (
+        ("programmed", INK), ("feedback", "#9AA0A8"), ("time_invariant", FIRST),
+        ("time_varying", LAST),
+    ):  # fmt: skip
+        error_m = 0.0 if name == "programmed" else np.array(section[name]["error_m"])
+        tool_m = (reference_m - error_m - reference_m[corner])[shown]
+        near.plot(*(1e6 * tool_m.T), color=colour, linewidth=1.2, label=name.replace("_", "-"))
+    near.set_xlim(-60.0, 60.0)
+    near.set_ylim(-30.0, 120.0)
+    near.set_xlabel("x from corner t1 in µm")
+    near.set_ylabel("y from corner t1 in µm")
     near.legend()
 
 

@@ -193,9 +193,10 @@ def _draw_worst(figures: Figures, figure: Figure) -> None:
     section = figures["robustness"]
     left, right = figure.subplots(1, 2)
     for s, row in zip(section["s"], section["worst_factor"], strict=True):
-        left.plot(section["r"], row, "o-", label=f"s = {s:g}")
+        left.plot(section["r"], row, "o-", markersize=3, label=f"s = {s:g}")
     left.axhline(1.0, color="#30343B", linestyle="--", linewidth=1.0)
     left.set_xscale("symlog", linthresh=0.1)
+    left.set_xlim(left=0.0)
     left.set_xlabel("weight r of the change of input")
     left.set_ylabel("worst factor of a run")
     left.legend()

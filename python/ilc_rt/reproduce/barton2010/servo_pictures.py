@@ -8,6 +8,7 @@ from ilc_rt.plots import WIDTH_IN
 from ilc_rt.reproduce.paper import Figures, Picture
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -17,13 +18,21 @@ def _draw_sweep(figures: Figures, figure: Figure, name: str) -> None:
     for value, errors, factor in zip(
         sweep["value"], sweep["rms"], sweep["monotonic_factor"], strict=True
     ):
-        label = f"{name} = {value:g}, factor {factor:.2g}"
+        label = f"{name} = {value:g}, factor {max(factor, 0.0):.2f}"
         axes.semilogy(range(len(errors)), errors, label=label)
     if name == "r":
-        axes.set_xscale("symlog", linthresh=10)
-    axes.set_xlabel("run (0 is without learning)")
+        _from_the_first_run_on(axes, len(sweep["rms"][0]))
+    else:
+        axes.set_xlabel("run (0 is without learning)")
     axes.set_ylabel("RMS error")
     axes.legend()
+
+
+def _from_the_first_run_on(axes: Axes, n_runs: int) -> None:
+    """Show hundreds of runs on a log scale, which has no run 0."""
+    axes.set_xscale("log")
+    axes.set_xlim(1, n_runs - 1)
+    axes.set_xlabel("run")
 
 
 def _draw_q(figures: Figures, figure: Figure) -> None:
@@ -44,13 +53,14 @@ def _draw_noise(figures: Figures, figure: Figure) -> None:
     for value, errors, limit in zip(
         noise["value"], noise["runs_rms"], noise["expected_rms"], strict=True
     ):
-        (line,) = axes.plot(range(len(errors)), errors, linewidth=0.8, label=f"r = {value:g}")
-        axes.axhline(limit, color=line.get_color(), linestyle="--", linewidth=1.0)
+        (line,) = axes.plot(
+            range(len(errors)), errors, linewidth=0.8, alpha=0.5, label=f"r = {value:g}"
+        )
+        axes.axhline(limit, color=line.get_color(), linestyle="--", zorder=5)
     axes.axhline(noise["noise_std"], color="#5A6068", linestyle=":", label="noise alone")
-    axes.set_xscale("symlog", linthresh=10)
-    axes.set_xlabel("run (0 is without learning)")
+    _from_the_first_run_on(axes, len(noise["runs_rms"][0]))
     axes.set_ylabel("RMS error")
-    axes.set_ylim(0.95 * noise["noise_std"], 1.6 * noise["noise_std"])
+    axes.set_ylim(0.95 * noise["noise_std"], 1.4 * max(noise["expected_rms"]))
     axes.legend()
 
 

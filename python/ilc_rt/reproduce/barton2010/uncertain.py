@@ -130,7 +130,7 @@ def claims(figures: Figures) -> list[Claim]:
         Claim(
             "factor at the worst frequency, low s", figures["factor_low"], source="eq. (3.20)",
             holds=figures["factor_low"] > 1.0,
-            remark="over frequency; in a run of finite length a factor not far above 1 may still do",
+            remark="over frequency; in a run of finite length it need not stay below 1",
         ),
         Claim(
             "factor at the worst frequency, high s", figures["factor_high"], source="eq. (3.20)",
