@@ -37,7 +37,9 @@ stage (taken like the y axis); high and low weights that are shown in graphs alo
 uncertainty of section 5.5, said to be in appendix B and not there; the size of noise bursts, of the
 agents' uncertainty and of the disturbance of agent 1; speed and flow of appendix J. Read
 differently from the print: the controller (5.13), unstable as it stands; table I.3, whose E_h2
-lacks a power of ten. Values that are only drawn in the thesis are not compared.
+lacks a power of ten; the listings, of which H.1 filters a doubled vector (twice the bandwidth),
+case 1 never assigns its weight and case 4 takes I/3 for K. Values that are only drawn are not
+compared.
 """
 
 

@@ -53,7 +53,6 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
         parts += [(begin, HIGH), (end, LOW)]
     noise = gate * np.random.default_rng(5).normal(size=(iterations + 1, N_SAMPLES, 2))
     sigma = weights.schedule(parts, N_SAMPLES, BANDWIDTH_HZ, DT_S)
-    q = weights.coupled(table.coupling, sigma=1.0, gamma=0.0)
     figures: Figures = {
         "low": LOW,
         "high": HIGH,
@@ -62,7 +61,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
         "sigma": np.round(sigma, 6).tolist(),
     }
     for name, r in (("low_r", LOW), ("high_r", HIGH), ("time_varying", sigma)):
-        law = NormOptimalIlc(table.plant, N_SAMPLES, q=q, s=S, r=r)
+        law = NormOptimalIlc.contour(table.plant, table.reference_m, q=0.0, contour=1.0, s=S, r=r)
         figures[name], errors_m = table.learn(law, iterations, disturbance=noise.__getitem__)
         quiet, _ = table.learn(law, iterations)
         figures[name]["undisturbed_rms_m"] = quiet["linearised_rms_m"]

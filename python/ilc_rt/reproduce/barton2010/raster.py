@@ -69,8 +69,10 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     sigma, gamma = schedules(corners)
     laws = {
         "feedback": None,
-        "time_invariant": _law(table, 1.0, 0.0),
-        "time_varying": _law(table, sigma, gamma),
+        "time_invariant": NormOptimalIlc.contour(
+            table.plant, table.reference_m, q=0.0, contour=1.0, s=S, r=R
+        ),
+        "time_varying": time_varying_law(table, sigma, gamma),
         "individual": NormOptimalIlc(table.plant, N_SAMPLES, q=1.0, s=S, r=R),
     }
     figures: Figures = {
@@ -110,8 +112,8 @@ def schedules(corners: list[int]) -> tuple[Array, Array]:
     return sigma, weights.schedule(sections, N_SAMPLES, BANDWIDTH_HZ, DT_S)
 
 
-def _law(table: Stage, sigma: Array | float, gamma: Array | float) -> NormOptimalIlc:
-    """Return the law of (5.8) with the weight of (5.2)."""
+def time_varying_law(table: Stage, sigma: Array, gamma: Array) -> NormOptimalIlc:
+    """Return the law of (5.8) with the weight of (5.2); sigma = 1, gamma = 0: the contour alone."""
     q = weights.coupled(table.coupling, sigma=sigma, gamma=gamma)
     return NormOptimalIlc(table.plant, len(table.reference_m), q=q, s=S, r=R)
 

@@ -63,7 +63,6 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     }
     sigma = weights.schedule([(0, LOW), (UNCERTAIN_FROM, HIGH)], N_SAMPLES, BANDWIDTH_HZ, DT_S)
     figures["sigma"] = np.round(sigma, 8).tolist()
-    q = weights.coupled(table.coupling, sigma=1.0, gamma=0.0)
 
     def true(u: Array) -> Array:
         acting = u.copy()
@@ -71,7 +70,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
         return table.plant.simulate(acting)
 
     for name, s in (("low_s", LOW), ("high_s", HIGH), ("time_varying", sigma)):
-        law = NormOptimalIlc(table.plant, N_SAMPLES, q=q, s=s, r=R)
+        law = NormOptimalIlc.contour(table.plant, table.reference_m, q=0.0, contour=1.0, s=s, r=R)
         figures[name], _ = table.learn(law, 12 if reduced else ITERATIONS, true)
     return figures
 
