@@ -204,6 +204,7 @@ def test_uncertain_dynamics_need_the_high_weight_where_they_are():
 def test_bursts_need_the_high_weight_where_they_are():
     low, high, varying = (found("bursts")[name] for name in ("low_r", "high_r", "time_varying"))
     assert varying["past_noise_m"] < 0.75 * low["past_noise_m"]
+    assert varying["converged_rms_m"] < low["converged_rms_m"]
     assert low["settled_at"] <= varying["settled_at"] < high["settled_at"]
 
 

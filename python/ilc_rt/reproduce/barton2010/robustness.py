@@ -159,8 +159,8 @@ def claims(figures: Figures) -> list[Claim]:
         Claim(
             "r does not matter for robust convergence in the 2-norm: worst factor at r = 1",
             max(with_r), source="lemma 2", holds=max(with_r) < 1.0,
-            remark="does not follow: the step of the proof that replaces U' Z Delta by alpha needs "
-            "Z Delta to commute with U; the input can grow from one run to the next",
+            remark="does not follow: the proof takes Z Delta, which mixes eigenvectors, for the "
+            "number alpha; the input can grow from one run to the next",
         ),
         Claim(
             "lemma 2, counterexample: growth of the input in the first run",
