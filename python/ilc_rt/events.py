@@ -61,6 +61,7 @@ class StartEvent:
     law: str
     bus: str
     mode: str
+    input_units: tuple[str, ...] = ()
     rt: RealTimeReport | None = None
 
 

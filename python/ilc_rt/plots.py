@@ -148,7 +148,7 @@ def learned_input(result: CampaignResult) -> Figure | None:
             axes.plot(time_s, last.input[:, number] * 1e3, color=LAST, linewidth=1.2,
                       label=f"run {last.index}")  # fmt: skip
             axes.set_title(result.axis_names[number])
-            axes.set_ylabel(f"input in {result.input_units(1e-3)}")
+            axes.set_ylabel(f"input in m{result.input_unit(number)}")
         grid[-1].set_xlabel("time in s")
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
         figure.align_ylabels()
@@ -171,14 +171,14 @@ def tracking(result: CampaignResult) -> Figure | None:
             upper.plot(time_s, first.error_m[:, number] * 1e6, color=FIRST, linewidth=1.2,
                        label=f"run {first.index}")  # fmt: skip
             upper.set_title(name)
-            upper.set_ylabel("error in µm")
+            upper.set_ylabel(f"error in µ{result.axis_unit(number)}")
             if panels == 2:
                 upper.plot(time_s, last.error_m[:, number] * 1e6, color=LAST, linewidth=1.2,
                            label=f"run {last.index}")  # fmt: skip
                 lower = grid[number * panels + 1]
                 lower.plot(time_s, last.error_m[:, number] * 1e6, color=LAST, linewidth=1.0)
                 lower.set_title(f"{name}, run {last.index} on a scale of its own")
-                lower.set_ylabel("error in µm")
+                lower.set_ylabel(f"error in µ{result.axis_unit(number)}")
         grid[-1].set_xlabel("time in s")
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
         figure.align_ylabels()

@@ -52,6 +52,7 @@ class CampaignResult:
     n_axes: int = 0
     cycle_s: float = 0.0
     axis_names: tuple[str, ...] = ()
+    input_units: tuple[str, ...] = ()
     created_utc: str = ""
     records: list[IterationRecord] = field(default_factory=list)
     start: StartEvent | None = None
@@ -100,6 +101,7 @@ class CampaignResult:
             n_axes=int(last["n_axes"]),
             cycle_s=float(last["cycle_s"]),
             axis_names=axis_names(last),
+            input_units=tuple(last.get("input_units") or ()),
             created_utc=str(last.get("created_utc", "")),
             records=[IterationRecord.from_row(row, str(library)) for row in own],
             status="completed",
@@ -113,6 +115,7 @@ class CampaignResult:
             self.law, self.measure = event.law, event.measure
             self.n_samples, self.n_axes = event.n_samples, event.n_axes
             self.cycle_s, self.axis_names = event.cycle_s, event.axis_names
+            self.input_units = event.input_units
             if event.first_index > 0 and not self.records:
                 self._recall_earlier_runs(event.first_index)
         elif isinstance(event, IterationEvent):
@@ -135,9 +138,13 @@ class CampaignResult:
         """Address of the bus, or ``""`` if not known."""
         return self.start.bus if self.start else ""
 
-    def input_units(self, scale: float = 1.0) -> str:
-        """Return the unit of the learned input, in metres or thousandths."""
-        return {1.0: "m", 1e-3: "mm", 1e-6: "µm"}[scale]
+    def input_unit(self, axis: int) -> str:
+        """Return the unit of an axis' learned input: m, m/s, rad or rad/s."""
+        return self.input_units[axis] if axis < len(self.input_units) else "m"
+
+    def axis_unit(self, axis: int) -> str:
+        """Return what an axis is measured in: m or rad."""
+        return self.input_unit(axis).removesuffix("/s")
 
     def sentence(self) -> str:
         """Say in one plain sentence what was learned.

@@ -153,7 +153,7 @@ def test_a_part_program_runs_in_a_cell(gantry):
         ({"setting": "soon"}, 'setting = "soon"'),
         ({"points_m": [[0.0, 0.0], [0.0, 0.0]]}, "ends where it starts"),
         ({"points_m": [[0.0, 0.0], [np.nan, 0.0]]}, "points_m holds NaN"),
-        ({"points_m": np.zeros((2, 7)) + np.arange(2)[:, None]}, "7 axes: allowed 1 to 6"),
+        ({"points_m": np.zeros((2, 13)) + np.arange(2)[:, None]}, "13 axes: allowed 1 to 12"),
         ({"points_m": [[0.0, 0.0]]}, "0 segments"),
     ],
 )

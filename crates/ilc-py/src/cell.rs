@@ -106,6 +106,12 @@ impl PyCell {
         self.cell.axes.iter().map(name).collect()
     }
 
+    /// What each axis is measured in: `m`, or `rad` for a rotary one.
+    #[getter]
+    fn axis_units(&self) -> Vec<&'static str> {
+        self.cell.axes.iter().map(|axis| axis.unit.symbol()).collect()
+    }
+
     /// Gain kv of each axis' position loop in 1/s; None where it is in the drive.
     #[getter]
     fn position_gains_per_s(&self) -> Vec<Option<f64>> {

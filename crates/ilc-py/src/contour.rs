@@ -1,7 +1,7 @@
 //! Contour geometry: `contour_error`, `coupling_gains`, `projection_across`, `Line`, `Arc`.
 
 use ilc_rt::trajectory::contour::{Arc, ContourError, Line, SampledPath, Shape, coupling};
-use ilc_rt::trajectory::contour_error_m;
+use ilc_rt::trajectory::{MAX_AXES, contour_error_m};
 use numpy::IntoPyArray;
 use numpy::ndarray::Array3;
 use pyo3::exceptions::PyValueError;
@@ -103,7 +103,7 @@ impl PyArc {
 /// actual_m : ndarray of float64, shape (n_samples, n_axes)
 ///     Measured points in m.
 /// window : int or None
-///     For a sampled path of 1 to 6 axes: how many samples before and after its
+///     For a sampled path of 1 to 12 axes: how many samples before and after its
 ///     own time a point is compared with. None, for 2 and 3 axes: the whole path,
 ///     by a spatial index.
 ///
@@ -146,16 +146,16 @@ fn contour_error<'py>(
     let n_axes = reference.n_channels;
     let actual = read_path("actual_m", actual_m)?.with_channels("actual_m", n_axes)?;
     let errors = match (window, n_axes) {
-        (Some(window), 1..=6) => {
+        (Some(window), 1..=MAX_AXES) => {
             detached(py, || contour_error_m(&reference.values, &actual.values, n_axes, window))
         }
         (None, 2) => to_sampled::<2>(py, &reference, &actual)?,
         (None, 3) => to_sampled::<3>(py, &reference, &actual)?,
         (None, _) => {
-            let allowed = "2 or 3 axes, or 1 to 6 with a window,";
+            let allowed = "2 or 3 axes, or 1 to 12 with a window,";
             return Err(misfit("reference_m", &reference.shape(), allowed));
         }
-        (Some(_), _) => return Err(misfit("reference_m", &reference.shape(), "1 to 6 axes")),
+        (Some(_), _) => return Err(misfit("reference_m", &reference.shape(), "1 to 12 axes")),
     };
     give_signal(py, errors, 1, true)
 }

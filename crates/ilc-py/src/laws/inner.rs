@@ -4,6 +4,7 @@ use std::sync::Mutex;
 
 use ilc_rt::learning::gate::Gate;
 use ilc_rt::learning::ladder::Ladder;
+use ilc_rt::learning::law::through_jacobian::ThroughJacobian;
 use ilc_rt::learning::{Law, LearningError};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -45,10 +46,24 @@ impl InnerLaw {
     }
 
     fn prepare(&mut self, u: &Signal, e: &Signal, disturbance: Option<Py<PyAny>>) {
-        self.u_shape = (u.n_channels, u.is_flat);
-        self.e_shape = (e.n_channels, e.is_flat);
+        self.prepare_shapes((u.n_channels, u.is_flat), (e.n_channels, e.is_flat), disturbance);
+    }
+
+    /// Says in which shapes the object is to see its signals, where the error is not as it came.
+    pub(super) fn prepare_shapes(
+        &mut self,
+        u_shape: (usize, bool),
+        e_shape: (usize, bool),
+        disturbance: Option<Py<PyAny>>,
+    ) {
+        (self.u_shape, self.e_shape) = (u_shape, e_shape);
         self.disturbance = disturbance;
         self.raised = None;
+    }
+
+    /// Takes what the object raised in the last update.
+    pub(super) fn take_raised(&mut self) -> Option<PyErr> {
+        self.raised.take()
     }
 
     /// Returns an input in the shape in which `u` came last.
@@ -125,6 +140,15 @@ impl Around for Ladder<InnerLaw> {
     }
 }
 
+impl Around for ThroughJacobian<InnerLaw> {
+    fn inner(&self) -> &InnerLaw {
+        self.law()
+    }
+    fn inner_mut(&mut self) -> &mut InnerLaw {
+        self.law_mut()
+    }
+}
+
 /// Runs one update of a law round another one.
 pub(super) fn update_around<'py, W: Around>(
     py: Python<'py>,
@@ -139,7 +163,7 @@ pub(super) fn update_around<'py, W: Around>(
     let (result, raised) = look(py, law, |law| {
         law.inner_mut().prepare(&u, &e, disturbance);
         let result = next(law, &u, &e);
-        (result, law.inner_mut().raised.take())
+        (result, law.inner_mut().take_raised())
     });
     match raised {
         Some(raised) => Err(raised),

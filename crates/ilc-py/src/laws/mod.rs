@@ -16,6 +16,7 @@ mod relevance;
 mod relevance_weights;
 mod repeatability;
 mod solver;
+mod through_jacobian;
 pub(crate) mod weight;
 
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
@@ -87,6 +88,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<model_inverse::PyModelInverseIlc>()?;
     module.add_class::<gate::PyGate>()?;
     module.add_class::<ladder::PyLadder>()?;
+    module.add_class::<through_jacobian::PyThroughJacobian>()?;
     module.add_class::<repeatability::PyRepeatability>()?;
     module.add_function(wrap_pyfunction!(repeatability::repeatability, module)?)?;
     module.add_class::<norm_optimal::PyNormOptimalIlc>()?;

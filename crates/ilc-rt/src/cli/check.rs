@@ -1,6 +1,6 @@
 //! `ilc-rt check`: what a cell description would do, without touching a bus.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -45,8 +45,14 @@ fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
         let low = column().copied().fold(f64::INFINITY, f64::min);
         let high = column().copied().fold(f64::NEG_INFINITY, f64::max);
         show::say(&format!(
-            "  axis {} (node {}): {:.3} to {:.3} m of {:.3} to {:.3} m",
-            axis.name, axis.node, low, high, axis.limits.position_min_m, axis.limits.position_max_m
+            "  axis {} (node {}): {:.3} to {:.3} {unit} of {:.3} to {:.3} {unit}",
+            axis.name,
+            axis.node,
+            low,
+            high,
+            axis.limits.position_min_m,
+            axis.limits.position_max_m,
+            unit = axis.unit.symbol()
         ));
     }
     show::say(&format!("  path: {}", path(&cell, &plan)));
@@ -66,6 +72,7 @@ fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
 /// What kind of path it is, how long, and how fast at most.
 fn path(cell: &Cell, plan: &Plan) -> String {
     let program = &cell.program;
+    let file = program.file.as_deref().unwrap_or(Path::new("")).display();
     let kind = match program.kind {
         PathKind::Points => format!("{} segments", program.segments.len()),
         PathKind::Spline => format!("spline through {} points", program.segments.len() + 1),
@@ -73,10 +80,8 @@ fn path(cell: &Cell, plan: &Plan) -> String {
         PathKind::Spiral => "spiral".to_owned(),
         PathKind::Raster => "raster".to_owned(),
         PathKind::Modulated => format!("{} modulated legs", program.segments.len()),
-        PathKind::Gcode => {
-            let file = program.file.as_deref().unwrap_or(std::path::Path::new(""));
-            format!("part program {}", file.display())
-        }
+        PathKind::Gcode => format!("part program {file}"),
+        PathKind::Table => format!("set points of {file}"),
     };
     let rows = || plan.reference_m.chunks_exact(cell.n_axes());
     let steps_m = rows().zip(rows().skip(1)).map(|(from, to)| {

@@ -81,6 +81,27 @@ pub enum Interface {
     Csv,
 }
 
+/// What an axis is measured in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AxisUnit {
+    /// Metres: a linear axis.
+    #[default]
+    M,
+    /// Radians: a rotary axis.
+    Rad,
+}
+
+impl AxisUnit {
+    /// The unit as it is written.
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::M => "m",
+            Self::Rad => "rad",
+        }
+    }
+}
+
 /// `[[axis]]`: one drive.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -91,7 +112,11 @@ pub struct Axis {
     pub node: u8,
     /// Command interface.
     pub interface: Interface,
-    /// Position counts of the drive in one metre.
+    /// What its coordinate is measured in; every quantity of a rotary axis whose name ends in `_m`,
+    /// `_m_s`, … is in rad, rad/s, …
+    #[serde(default)]
+    pub unit: AxisUnit,
+    /// Position counts of the drive in one metre (or radian).
     pub counts_per_m: f64,
     /// `[axis.limits]`
     pub limits: Limits,

@@ -10,7 +10,7 @@ mod program;
 mod validate;
 
 pub use cell::{
-    Axis, AxisModel, AxisSimulation, BusSection, Cell, CellSection, Interface, Limits,
+    Axis, AxisModel, AxisSimulation, AxisUnit, BusSection, Cell, CellSection, Interface, Limits,
     PositionLoop, Safety, Simulation, TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;

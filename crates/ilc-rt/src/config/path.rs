@@ -21,6 +21,8 @@ pub enum PathKind {
     Modulated,
     /// A part program, `file`.
     Gcode,
+    /// Set points, one row a servo cycle, `file`.
+    Table,
 }
 
 /// `[program.butterfly]`: `r = scale (e^{cos t} - 2 cos 4t - sin⁵(t/12))`.

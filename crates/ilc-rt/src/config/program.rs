@@ -17,7 +17,8 @@ pub struct Program {
     /// What kind of path it is.
     #[serde(default)]
     pub kind: PathKind,
-    /// Part program of `kind = "gcode"`; a relative path begins at the cell description.
+    /// Part program of `kind = "gcode"`, set points of `kind = "table"`; a relative path begins at the
+    /// cell description.
     pub file: Option<PathBuf>,
     /// Speed of G0; `feed_m_s` if it is not given.
     pub rapid_m_s: Option<f64>,

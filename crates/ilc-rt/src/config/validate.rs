@@ -4,11 +4,10 @@ use super::cell::{Axis, Cell, Interface};
 use super::error::ConfigError;
 use super::path::PathKind;
 use super::program::{LawName, Measure};
+use crate::trajectory::MAX_AXES;
 
 /// Highest CANopen node number.
 const NODE_MAX: u8 = 127;
-/// Most axes of a cell; the servo loop's arrays have this size.
-const AXES_MAX: usize = 6;
 
 /// Turns a TOML error into one line that names the place.
 pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
@@ -53,10 +52,10 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     v.range("[bus] load_max", cell.bus.load_max, 0.05, 1.0)?;
     v.range("[bus] bitrate_bit_s", f64::from(cell.bus.bitrate_bit_s), 1e4, 8e6)?;
     v.that(
-        (1..=AXES_MAX).contains(&cell.axes.len()),
+        (1..=MAX_AXES).contains(&cell.axes.len()),
         "[[axis]] count",
         &cell.axes.len(),
-        "1 to 6 axes",
+        &format!("1 to {MAX_AXES} axes"),
     )?;
     nodes(cell, &v)?;
     for axis in &cell.axes {
@@ -251,7 +250,12 @@ fn check_kind(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
         if by_segments { "at least one segment" } else { "0, as this kind has none" },
     )?;
     let sections = [
-        ("[program] file", program.file.is_some(), kind == PathKind::Gcode, true),
+        (
+            "[program] file",
+            program.file.is_some(),
+            matches!(kind, PathKind::Gcode | PathKind::Table),
+            true,
+        ),
         ("[program] rapid_m_s", program.rapid_m_s.is_some(), kind == PathKind::Gcode, false),
         ("[program.butterfly]", program.butterfly.is_some(), kind == PathKind::Butterfly, false),
         ("[program.spiral]", program.spiral.is_some(), kind == PathKind::Spiral, true),

@@ -8,7 +8,7 @@ use crate::learning::LearningError;
 use crate::library::LibraryError;
 use crate::model::ModelError;
 use crate::trajectory::TrajectoryError;
-use crate::trajectory::program::GcodeError;
+use crate::trajectory::program::{GcodeError, TableError};
 
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
@@ -67,13 +67,23 @@ pub enum SupervisorError {
         /// Why.
         source: TrajectoryError,
     },
-    /// The part program cannot be read.
-    #[error("{file}: cannot be read: {reason}; allowed: a text file of G-code")]
-    PartProgramFile {
-        /// Part program.
+    /// The file of the program cannot be read.
+    #[error("{file}: cannot be read: {reason}; allowed: a text file of {what}")]
+    ProgramFile {
+        /// Part program or table.
         file: String,
         /// What the system said.
         reason: String,
+        /// What it should hold.
+        what: &'static str,
+    },
+    /// The table of set points is refused.
+    #[error("{file}: {source}")]
+    Table {
+        /// Table.
+        file: String,
+        /// Line, what is there, and what is allowed.
+        source: TableError,
     },
     /// The part program is refused.
     #[error("{file}: {source}")]

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::error::SupervisorError;
 use super::forecast;
-use crate::config::{Axis, Cell, ConfigError, Interface, LawName, Measure};
+use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, LawName, Measure};
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
@@ -218,9 +218,11 @@ fn axis_limits(axis: &Axis) -> AxisLimits {
 }
 
 pub(super) fn input_unit(axis: &Axis) -> &'static str {
-    match axis.interface {
-        Interface::Csp => "m",
-        Interface::Csv => "m/s",
+    match (axis.interface, axis.unit) {
+        (Interface::Csp, AxisUnit::M) => "m",
+        (Interface::Csv, AxisUnit::M) => "m/s",
+        (Interface::Csp, AxisUnit::Rad) => "rad",
+        (Interface::Csv, AxisUnit::Rad) => "rad/s",
     }
 }
 

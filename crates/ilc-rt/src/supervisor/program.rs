@@ -9,12 +9,14 @@ use super::error::SupervisorError;
 use crate::config::{Cell, Corner, PathKind};
 use crate::record::fingerprint;
 use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
-use crate::trajectory::program::read_gcode;
+use crate::trajectory::program::{SetPointTable, TableError, read_gcode, read_table};
 use crate::trajectory::{
     ArcSpec, AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, ModulatedSegment,
-    PathSegment, PathSpec, SampledMotion, TrajectoryError, raster,
+    PathSegment, PathSpec, SampledMotion, TrajectoryError, raster, set_points,
 };
 
+/// How far the first row of a table may be from the start.
+const START_M: f64 = 1e-9;
 /// How far set points may round beyond the range of an axis.
 const ROUNDING_M: f64 = 1e-12;
 
@@ -22,7 +24,7 @@ const ROUNDING_M: f64 = 1e-12;
 ///
 /// # Errors
 /// [`SupervisorError::Program`] for a path beyond the limits, [`SupervisorError::PartProgram`] for
-/// a G-code file that is refused.
+/// a G-code file that is refused, [`SupervisorError::Table`] for a table of set points.
 pub(super) fn interpolator(
     cell: &Cell,
     limits: &[AxisLimits],
@@ -37,6 +39,11 @@ pub(super) fn interpolator(
         PathKind::Gcode => {
             let (segments, dwell_s) = gcode(cell)?;
             straight(cell, limits, segments, dwell_s)
+        }
+        PathKind::Table => {
+            let table = table(cell)?;
+            let motion = set_points(&table.position_m, limits, cell.cycle_s()).map_err(refused)?;
+            play(&motion).map_err(refused)
         }
         PathKind::Raster => {
             let Some(shape) = program.raster else { return Err(refused(TrajectoryError::Empty)) };
@@ -182,16 +189,44 @@ fn points(cell: &Cell) -> Vec<PathSegment> {
 /// The segments of the part program, and the rest before them.
 fn gcode(cell: &Cell) -> Result<(Vec<PathSegment>, f64), SupervisorError> {
     let program = &cell.program;
-    let path = program.file.clone().unwrap_or_default();
-    let path: PathBuf = cell.file.parent().unwrap_or(Path::new("")).join(path);
-    let file = path.display().to_string();
-    let text = std::fs::read_to_string(&path).map_err(|error| {
-        SupervisorError::PartProgramFile { file: file.clone(), reason: error.to_string() }
-    })?;
+    let (file, text) = read_file(cell, "G-code")?;
     let rapid_m_s = program.rapid_m_s.unwrap_or(program.feed_m_s);
     let read = read_gcode(&text, &program.start_m, program.feed_m_s, rapid_m_s)
         .map_err(|source| SupervisorError::PartProgram { file, source })?;
     Ok((read.segments, read.dwell_before_s))
+}
+
+/// The set points of the table; refused unless they begin where the axes rest before a run.
+fn table(cell: &Cell) -> Result<SetPointTable, SupervisorError> {
+    let (file, text) = read_file(cell, "set points")?;
+    let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
+    let refused = |source| SupervisorError::Table { file: file.clone(), source };
+    let table = read_table(&text, &names).map_err(refused)?;
+    for ((name, &found_m), &start_m) in
+        names.iter().zip(&table.position_m).zip(&cell.program.start_m)
+    {
+        if (found_m - start_m).abs() > START_M {
+            return Err(refused(TableError {
+                line: table.lines.first().copied().unwrap_or(1),
+                found: format!("axis {name} begins at {found_m}"),
+                allowed: format!("the first row must be [program] start_m, {start_m}"),
+            }));
+        }
+    }
+    Ok(table)
+}
+
+/// The name and the text of `[program] file`, which is a text file of `what`.
+fn read_file(cell: &Cell, what: &'static str) -> Result<(String, String), SupervisorError> {
+    let path = cell.program.file.clone().unwrap_or_default();
+    let path: PathBuf = cell.file.parent().unwrap_or(Path::new("")).join(path);
+    let file = path.display().to_string();
+    match std::fs::read_to_string(&path) {
+        Ok(text) => Ok((file, text)),
+        Err(error) => {
+            Err(SupervisorError::ProgramFile { file, reason: error.to_string(), what })
+        }
+    }
 }
 
 fn straight(

@@ -161,6 +161,24 @@ pub enum TrajectoryError {
         /// Unit, and what is allowed.
         unit: &'static str,
     },
+    /// A row of set points that is too far from those before it.
+    #[error(
+        "row {}: axis {}: the {quantity} over the cycle is {} {unit}, limit {} {unit}: let the set \
+         points change more slowly, and rest at the first and the last",
+        row + 1, axis + 1, Figure(*reached), Figure(*limit), unit = quantity.unit()
+    )]
+    Row {
+        /// Which row; those after the last one are the rest at the end.
+        row: usize,
+        /// Which axis.
+        axis: usize,
+        /// Which limit.
+        quantity: Quantity,
+        /// What is reached there.
+        reached: f64,
+        /// The limit.
+        limit: f64,
+    },
     /// No α holds the limits.
     #[error(
         "segment {} {place}: no alpha holds every limit: at alpha {} the {quantity} along the path \
@@ -281,6 +299,7 @@ impl TrajectoryError {
             Self::AxisLimit { axis, .. }
             | Self::Position { axis, .. }
             | Self::Unproven { axis, .. }
+            | Self::Row { axis, .. }
             | Self::Exceeds { axis, .. } => Some(axis),
             _ => None,
         }

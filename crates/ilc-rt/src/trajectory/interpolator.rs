@@ -41,7 +41,7 @@ impl Interpolator {
     /// over the cycle compared with the limits.
     ///
     /// # Shapes
-    /// - `limits`: one entry for each coordinate of `spec.start_m`, 1 to 6
+    /// - `limits`: one entry for each coordinate of `spec.start_m`, 1 to [`MAX_AXES`]
     /// # Real Time
     /// Cold: allocates, and walks through a blended run several times.
     /// # Errors
@@ -72,7 +72,7 @@ impl Interpolator {
     /// Rests at a point for some samples, as while an axis is identified.
     ///
     /// # Shapes
-    /// - `at_m`: one coordinate for each axis, 1 to 6
+    /// - `at_m`: one coordinate for each axis, 1 to [`MAX_AXES`]
     /// # Real Time
     /// Cold.
     /// # Errors

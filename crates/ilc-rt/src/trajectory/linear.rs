@@ -60,7 +60,7 @@ impl Linear {
     /// to the target, all arriving together where that is possible.
     ///
     /// # Shapes
-    /// - `limits`: one entry for each coordinate of `start_m`, 1 to 6
+    /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`](super::MAX_AXES)
     /// # Real Time
     /// Cold: allocates.
     /// # Errors

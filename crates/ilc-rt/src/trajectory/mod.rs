@@ -27,6 +27,7 @@ mod proof;
 #[cfg(test)]
 mod random;
 mod raster;
+mod set_points;
 mod setpoint;
 mod stop;
 mod table;
@@ -45,9 +46,10 @@ pub use path::{ArcSpec, CornerRule, PathSegment, PathSpec};
 pub use point_to_point::PointToPoint;
 pub use profile::{JerkLimited, PathState};
 pub use raster::raster;
+pub use set_points::set_points;
 pub use setpoint::Setpoint;
 pub use stop::ControlledStop;
 pub use tracking_index::TrackingIndex;
 
 /// Most axes that move together; every array of the tick has this length.
-pub const MAX_AXES: usize = 6;
+pub const MAX_AXES: usize = 12;

@@ -150,7 +150,7 @@ mod tests {
         let mut there = [1.0; MAX_AXES];
         let mut limits = [LIMITS; MAX_AXES];
         assert!(PointToPoint::new(&here, &there, 0, &limits, 0.1).is_err());
-        assert!(PointToPoint::new(&here, &there, 7, &limits, 0.1).is_err());
+        assert!(PointToPoint::new(&here, &there, MAX_AXES + 1, &limits, 0.1).is_err());
         assert!(PointToPoint::new(&here, &there, 2, &limits, f64::NAN).is_err());
         assert!(PointToPoint::new(&here, &there, 2, &limits, 0.0).is_err());
         limits[1].jerk_max_m_s3 = 0.0;

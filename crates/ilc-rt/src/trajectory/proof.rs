@@ -15,7 +15,7 @@ pub(super) const N_SAMPLES_MAX: usize = 10_000_000;
 /// Longest blend window.
 const WINDOW_MAX_S: f64 = 10.0;
 /// Relative excess that still counts as holding a limit.
-const TOLERANCE: f64 = 1e-9;
+pub(super) const TOLERANCE: f64 = 1e-9;
 /// Steps of each bracketing search for a remedy.
 const SEARCH_STEPS: usize = 12;
 
@@ -75,9 +75,7 @@ impl Proof<'_> {
         for (axis, limit) in self.limits.iter().enumerate() {
             for (order, (quantity, limit)) in limit.named().into_iter().enumerate() {
                 let reached = peaks.of_axis[axis][order];
-                // Differences of rounded positions carry noise of their own, divided by powers of the cycle.
-                let rounding_noise = 8.0 * f64::EPSILON * (2.0 + peaks.farthest_m)
-                    / self.cycle_s.powi(i32::try_from(order).unwrap_or(2) + 1);
+                let rounding_noise = rounding_noise(peaks.farthest_m, order, self.cycle_s);
                 let excess = Excess { axis, quantity, reached, limit };
                 if reached > limit * (1.0 + TOLERANCE) + rounding_noise
                     && worst.is_none_or(|worst| reached / limit > worst.reached / worst.limit)
@@ -162,6 +160,12 @@ impl Proof<'_> {
         }
         Some(holds)
     }
+}
+
+/// What differences of rounded positions carry of their own, for velocity (0) to jerk (2).
+pub(super) fn rounding_noise(farthest_m: f64, order: usize, cycle_s: f64) -> f64 {
+    let power = i32::try_from(order).unwrap_or(2) + 1;
+    8.0 * f64::EPSILON * (2.0 + farthest_m) / cycle_s.powi(power)
 }
 
 /// Largest finite differences of order 1, 2 and 3 over the cycle.

@@ -230,7 +230,8 @@ mod tests {
 
     #[test]
     fn all_axes_rest_and_the_slowest_says_when() {
-        let velocities = [0.5, -0.2, 0.0, 0.0, 0.0, 0.0];
+        let mut velocities = [0.0; MAX_AXES];
+        (velocities[0], velocities[1]) = (0.5, -0.2);
         let mut stop = ControlledStop::new(
             &[1.0; MAX_AXES],
             &velocities,

@@ -5,8 +5,10 @@ from __future__ import annotations
 from ilc_rt.reproduce.barton2010 import (
     appendix_i,
     bursts,
+    delta,
     dissimilar,
     formation,
+    mechanisms,
     raster,
     robustness,
     servo,
@@ -22,6 +24,8 @@ SECTIONS = (
     uncertain,
     bursts,
     formation,
+    delta,
+    mechanisms,
     appendix_i,
     dissimilar,
 )
@@ -29,7 +33,8 @@ SECTIONS = (
 ABOUT = """
 Norm-optimal learning and what its weights do: a servo axis (section 3.4), time-varying weights on
 a stage for micro-robotic deposition (chapter 5), three agents that keep a formation (chapter 6),
-a small worked example with printed tables (appendix I), and a fast axis that helps a slow one
+the kinematics of a delta mechanism (chapter 7), three such mechanisms as nine drives on the bus of
+the real controller (chapter 8), a small worked example with printed tables (appendix I), and a fast axis that helps a slow one
 (appendix J).
 
 Left open by the print, and chosen here: size, speed and limits of the rasters; the x axis of the

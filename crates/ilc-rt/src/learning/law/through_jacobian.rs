@@ -14,17 +14,19 @@ const CONDITION_MAX: f64 = 1e6;
 /// smallest one if there are more joints than coordinates. The law itself has joints as inputs and
 /// outputs.
 ///
+/// One Jacobian does for runs of any length; one a sample for runs of just so many samples. Several
+/// mechanisms side by side have theirs on the diagonal of one matrix.
+///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_joints`; `error`: `n_samples` x `n_coordinates`
 /// # Units
 /// - `error` in metres; what the law sees in radians (or the unit of the joints)
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`].
+/// Cold path. Allocates when it is made, and in the first [`Law::update`] of a run of another length.
 /// # Source
 /// - \[barton2010\], Sect. 8.2: one matrix for the whole working area; here also one a sample.
-pub struct ThroughJacobian {
-    law: Box<dyn Law>,
-    n_samples: usize,
+pub struct ThroughJacobian<L = Box<dyn Law>> {
+    law: L,
     n_joints: usize,
     n_coordinates: usize,
     /// One pseudo-inverse for all samples, or one a sample; by rows.
@@ -32,7 +34,7 @@ pub struct ThroughJacobian {
     joint_error: Vec<f64>,
 }
 
-impl std::fmt::Debug for ThroughJacobian {
+impl<L: Law> std::fmt::Debug for ThroughJacobian<L> {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         out.debug_struct("ThroughJacobian")
             .field("law", &self.law.describe())
@@ -40,30 +42,18 @@ impl std::fmt::Debug for ThroughJacobian {
     }
 }
 
-impl ThroughJacobian {
+impl<L: Law> ThroughJacobian<L> {
     /// Wraps a law of the joints; `jacobians` holds one matrix for all samples, or one a sample.
     ///
     /// # Errors
-    /// - [`LearningError::Length`] for another number of matrices.
+    /// - [`LearningError::Empty`] if there is no matrix.
     /// - [`LearningError::Weight`] for matrices of different or empty shape.
     /// - [`LearningError::Parameter`] for a matrix that cannot be inverted, or is not finite.
-    pub fn new(
-        law: Box<dyn Law>,
-        jacobians: &[DMatrix<f64>],
-        n_samples: usize,
-    ) -> Result<Self, LearningError> {
+    pub fn new(law: L, jacobians: &[DMatrix<f64>]) -> Result<Self, LearningError> {
         let found = jacobians.len();
         let Some(first) = jacobians.first() else {
             return Err(LearningError::Empty { what: "jacobian" });
         };
-        if found != 1 && found != n_samples {
-            return Err(LearningError::Length {
-                what: "jacobian",
-                found,
-                n_samples,
-                n_channels: 1,
-            });
-        }
         let (n_coordinates, n_joints) = first.shape();
         let mut inverses = Vec::with_capacity(found * n_joints * n_coordinates);
         for (sample, jacobian) in jacobians.iter().enumerate() {
@@ -79,8 +69,30 @@ impl ThroughJacobian {
             let inverse = pseudo_inverse(jacobian)?;
             inverses.extend(inverse.transpose().iter());
         }
-        let joint_error = vec![0.0; n_samples * n_joints];
-        Ok(Self { law, n_samples, n_joints, n_coordinates, inverses, joint_error })
+        Ok(Self { law, n_joints, n_coordinates, inverses, joint_error: Vec::new() })
+    }
+
+    /// Returns the law of the joints.
+    pub fn law(&self) -> &L {
+        &self.law
+    }
+
+    /// Returns the law of the joints, to look into it.
+    pub fn law_mut(&mut self) -> &mut L {
+        &mut self.law
+    }
+
+    /// Returns the joints and the coordinates of the tool.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.n_joints, self.n_coordinates)
+    }
+
+    /// Samples of a run: as many as there are matrices, or those of `input` if one does for all.
+    fn n_samples(&self, input: &[f64]) -> usize {
+        match self.inverses.len() / (self.n_joints * self.n_coordinates) {
+            1 => (input.len() / self.n_joints).max(1),
+            matrices => matrices,
+        }
     }
 }
 
@@ -102,7 +114,7 @@ fn pseudo_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, LearningError
     svd.pseudo_inverse(0.0).map_err(|_| refused(condition))
 }
 
-impl Law for ThroughJacobian {
+impl<L: Law> Law for ThroughJacobian<L> {
     fn update(
         &mut self,
         input: &[f64],
@@ -110,10 +122,12 @@ impl Law for ThroughJacobian {
         next: &mut [f64],
     ) -> Result<(), LearningError> {
         let (p, m) = (self.n_coordinates, self.n_joints);
-        check("input", input, self.n_samples, m)?;
-        check("error", error, self.n_samples, p)?;
+        let n_samples = self.n_samples(input);
+        check("input", input, n_samples, m)?;
+        check("error", error, n_samples, p)?;
+        self.joint_error.resize(n_samples * m, 0.0);
         let one_for_all = self.inverses.len() == m * p;
-        for k in 0..self.n_samples {
+        for k in 0..n_samples {
             let at = if one_for_all { 0 } else { k * m * p };
             let at_tool = &error[k * p..(k + 1) * p];
             for joint in 0..m {
@@ -158,14 +172,14 @@ mod tests {
     fn hand_computed_with_one_matrix_and_with_one_a_sample() {
         let jacobian = DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, 4.0]);
         let mut law =
-            ThroughJacobian::new(proportional(1.0, 2, 2), std::slice::from_ref(&jacobian), 2)
+            ThroughJacobian::new(proportional(1.0, 2, 2), std::slice::from_ref(&jacobian))
                 .unwrap();
         let mut next = [0.0; 4];
         law.update(&[1.0; 4], &[2.0, 2.0, 4.0, 8.0], &mut next).unwrap();
         assert!(next.iter().zip([2.0, 1.5, 3.0, 3.0]).all(|(a, b)| (a - b).abs() < 1e-15));
 
         let changing = [jacobian.clone(), jacobian * 2.0];
-        let mut law = ThroughJacobian::new(proportional(1.0, 2, 2), &changing, 2).unwrap();
+        let mut law = ThroughJacobian::new(proportional(1.0, 2, 2), &changing).unwrap();
         law.update(&[1.0; 4], &[2.0, 2.0, 4.0, 8.0], &mut next).unwrap();
         assert!(next.iter().zip([2.0, 1.5, 2.0, 2.0]).all(|(a, b)| (a - b).abs() < 1e-15));
     }
@@ -174,17 +188,20 @@ mod tests {
     fn one_wrong_thing_at_a_time_is_refused() {
         let good = DMatrix::identity(3, 3);
         let make = |jacobians: &[DMatrix<f64>]| {
-            ThroughJacobian::new(proportional(1.0, 5, 3), jacobians, 5).unwrap_err().to_string()
+            ThroughJacobian::new(proportional(1.0, 5, 3), jacobians).unwrap_err().to_string()
         };
         assert!(make(&[]).contains("jacobian"));
-        assert!(make(&[good.clone(), good.clone()]).contains("holds 2"));
         assert!(make(&[DMatrix::zeros(3, 3)]).contains("condition"));
         assert!(make(&[good.clone() * f64::NAN]).contains("finite"));
         let mut mixed = vec![good.clone(); 5];
         mixed[3] = DMatrix::identity(2, 3);
         assert!(make(&mixed).contains("sample 3"));
-        let mut law = ThroughJacobian::new(proportional(1.0, 5, 3), &[good], 5).unwrap();
+        let mut law =
+            ThroughJacobian::new(proportional(1.0, 5, 3), std::slice::from_ref(&good)).unwrap();
         assert!(law.update(&[0.0; 15], &[0.0; 14], &mut [0.0; 15]).is_err());
+        let mut law = ThroughJacobian::new(proportional(1.0, 5, 3), &vec![good; 4]).unwrap();
+        let told = law.update(&[0.0; 15], &[0.0; 15], &mut [0.0; 15]).unwrap_err().to_string();
+        assert!(told.contains("holds 15"), "{told}");
     }
 
     #[test]
@@ -204,7 +221,7 @@ mod tests {
             .map(|joints| DMatrix::from_row_slice(3, 3, &delta.jacobian(*joints).unwrap().concat()))
             .collect();
         let mut law =
-            ThroughJacobian::new(proportional(0.8, n_samples, 3), &jacobians, n_samples).unwrap();
+            ThroughJacobian::new(proportional(0.8, n_samples, 3), &jacobians).unwrap();
         let mut input = vec![0.0; 3 * n_samples];
         let mut worst = Vec::new();
         for _ in 0..12 {

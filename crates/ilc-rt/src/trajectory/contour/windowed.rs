@@ -1,11 +1,13 @@
 //! Contour error near a point's own time: how far measured points are from where they should have
 //! been, give or take a window. Cold.
 
+use crate::trajectory::MAX_AXES;
+
 /// Distance of each measured point to the path near its own time.
 ///
 /// The path is the polyline through the reference samples from `window` before to `window` after
-/// the sample of the same time; the distance is exact (point to segment), for 1 to 6 axes.
-/// Points that repeat while the path rests count as points.
+/// the sample of the same time; the distance is exact (point to segment), for 1 to
+/// [`MAX_AXES`] axes. Points that repeat while the path rests count as points.
 ///
 /// # Shapes
 /// - `reference_m`, `actual_m`: `n_samples * n_axes`, time first; a trailing part of a sample is not
@@ -29,6 +31,17 @@ pub fn contour_error_m(
         4 => distances_m::<4>(reference_m, actual_m, window),
         5 => distances_m::<5>(reference_m, actual_m, window),
         6 => distances_m::<6>(reference_m, actual_m, window),
+        7..=MAX_AXES => {
+            let pad = |values: &[f64]| -> Vec<f64> {
+                let row = |row: &[f64]| {
+                    let mut wide = [0.0; MAX_AXES];
+                    wide[..n_axes].copy_from_slice(row);
+                    wide
+                };
+                values.chunks_exact(n_axes).flat_map(row).collect()
+            };
+            distances_m::<MAX_AXES>(&pad(reference_m), &pad(actual_m), window)
+        }
         _ => Vec::new(),
     }
 }
@@ -206,6 +219,27 @@ mod tests {
     }
 
     #[test]
+    fn axes_that_do_not_move_add_nothing() {
+        let reference = contour();
+        let mut random = Random(4);
+        let actual: Vec<f64> = reference.iter().map(|r| r + 3e-4 * random.signed()).collect();
+        let expected = contour_error_m(&reference, &actual, 2, 50);
+        for n_axes in 3..=MAX_AXES {
+            let among = |values: &[f64]| -> Vec<f64> {
+                let row = |pair: &[f64]| {
+                    let mut row = vec![0.25; n_axes];
+                    (row[0], row[n_axes - 1]) = (pair[0], pair[1]);
+                    row
+                };
+                values.chunks_exact(2).flat_map(row).collect()
+            };
+            let found = contour_error_m(&among(&reference), &among(&actual), n_axes, 50);
+            let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(found.len() == expected.len() && apart < 1e-15, "{n_axes} axes: {apart}");
+        }
+    }
+
+    #[test]
     fn skipping_changes_nothing() {
         let reference = contour();
         let mut random = Random(9);
@@ -233,7 +267,7 @@ mod tests {
         assert!(errors[0].is_nan() && errors[1] == 0.0);
         assert!(contour_error_m(&[], &[0.0, 0.0], 2, 9)[0].is_nan());
         assert!(contour_error_m(&line(3), &[0.0], 0, 9).is_empty());
-        assert!(contour_error_m(&line(7), &[0.0; 14], 7, 9).is_empty());
+        assert!(contour_error_m(&line(13), &[0.0; 26], MAX_AXES + 1, 9).is_empty());
     }
 
     #[test]

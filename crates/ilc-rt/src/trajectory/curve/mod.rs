@@ -23,7 +23,7 @@ pub type Derivatives = [[f64; MAX_AXES]; 4];
 
 /// A curve that is smooth but for jumps of its third derivative at the breaks.
 pub trait Curve {
-    /// Number of axes, 1 to 6.
+    /// Number of axes, 1 to [`MAX_AXES`].
     fn n_axes(&self) -> usize;
 
     /// Parameters of the start, of every jump of the third derivative, and of the end.

@@ -65,7 +65,7 @@ impl ExponentialSigmoid {
     /// it passes none.
     ///
     /// # Shapes
-    /// - `limits`: one entry for each coordinate of `start_m`, 1 to 6
+    /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`]
     /// # Real Time
     /// Cold: allocates, and searches.
     /// # Errors

@@ -265,7 +265,7 @@ fn bad_values_are_refused_one_at_a_time() {
         error
     };
     assert!(broken(&|s| s.start_m.clear()).contains("0 axes"));
-    assert!(broken(&|s| s.start_m = vec![0.0; 7]).contains("7 axes"));
+    assert!(broken(&|s| s.start_m = vec![0.0; MAX_AXES + 1]).contains("13 axes: allowed 1 to 12"));
     assert!(broken(&|s| s.start_m = vec![0.0; 3]).contains("limits of 2 axes"));
     assert!(broken(&|s| s.start_m[1] = f64::NAN).contains("axis 2: position NaN"));
     assert!(broken(&|s| s.segments.clear()).contains("0 segments"));

@@ -1,5 +1,7 @@
-//! Part programs: text that says where the tool goes, turned into segments. Cold.
+//! Programs as text: part programs that say where the tool goes, and tables of set points. Cold.
 
 mod gcode;
+mod table;
 
 pub use gcode::{GcodeError, GcodeProgram, read_gcode};
+pub use table::{SetPointTable, TableError, read_table};
