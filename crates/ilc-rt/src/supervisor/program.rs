@@ -223,9 +223,7 @@ fn read_file(cell: &Cell, what: &'static str) -> Result<(String, String), Superv
     let file = path.display().to_string();
     match std::fs::read_to_string(&path) {
         Ok(text) => Ok((file, text)),
-        Err(error) => {
-            Err(SupervisorError::ProgramFile { file, reason: error.to_string(), what })
-        }
+        Err(error) => Err(SupervisorError::ProgramFile { file, reason: error.to_string(), what }),
     }
 }
 

@@ -48,7 +48,11 @@ pub fn set_points(
     if n_samples > N_SAMPLES_MAX {
         let duration_s = n_samples as f64 * dt_s;
         let n_samples = n_samples as f64;
-        return Err(TrajectoryError::TooLong { duration_s, n_samples, n_samples_max: N_SAMPLES_MAX });
+        return Err(TrajectoryError::TooLong {
+            duration_s,
+            n_samples,
+            n_samples_max: N_SAMPLES_MAX,
+        });
     }
     prove(position_m, limits, dt_s)?;
     let mut motion = SampledMotion {
@@ -62,7 +66,8 @@ pub fn set_points(
     for row in 0..n_samples {
         let inside = row > 0 && row + 1 < n_samples;
         for axis in 0..n_axes {
-            let (before, now, after) = (at(row.saturating_sub(1), axis), at(row, axis), at(row + 1, axis));
+            let (before, now, after) =
+                (at(row.saturating_sub(1), axis), at(row, axis), at(row + 1, axis));
             motion.velocity_m_s.push(if inside { (after - before) / (2.0 * dt_s) } else { 0.0 });
             motion.acceleration_m_s2.push((after - 2.0 * now + before) / (dt_s * dt_s));
         }
@@ -87,8 +92,7 @@ fn prove(position_m: &[f64], limits: &[AxisLimits], dt_s: f64) -> Result<(), Tra
                 [velocity, acceleration, jerk].into_iter().zip(limit.named()).enumerate()
             {
                 let allowed = limit * (1.0 + TOLERANCE) + rounding_noise(farthest_m, order, dt_s);
-                // Written so that a number that is none is refused as well.
-                if !(reached.abs() <= allowed) {
+                if reached.is_nan() || reached.abs() > allowed {
                     return Err(TrajectoryError::Row { row, axis, quantity, reached, limit });
                 }
             }
@@ -126,7 +130,9 @@ mod tests {
         assert_eq!((motion.n_axes, motion.n_samples()), (2, 51));
         // The fastest, in the middle: 0.1 m / 0.5 s * 15/8.
         assert!((motion.velocity_m_s[50] - 0.375).abs() < 1e-3);
-        assert!(motion.velocity_m_s[..2].iter().chain(&motion.velocity_m_s[100..]).all(|v| *v == 0.0));
+        assert!(
+            motion.velocity_m_s[..2].iter().chain(&motion.velocity_m_s[100..]).all(|v| *v == 0.0)
+        );
     }
 
     #[test]

@@ -172,8 +172,7 @@ mod tests {
     fn hand_computed_with_one_matrix_and_with_one_a_sample() {
         let jacobian = DMatrix::from_row_slice(2, 2, &[2.0, 0.0, 0.0, 4.0]);
         let mut law =
-            ThroughJacobian::new(proportional(1.0, 2, 2), std::slice::from_ref(&jacobian))
-                .unwrap();
+            ThroughJacobian::new(proportional(1.0, 2, 2), std::slice::from_ref(&jacobian)).unwrap();
         let mut next = [0.0; 4];
         law.update(&[1.0; 4], &[2.0, 2.0, 4.0, 8.0], &mut next).unwrap();
         assert!(next.iter().zip([2.0, 1.5, 3.0, 3.0]).all(|(a, b)| (a - b).abs() < 1e-15));
@@ -220,8 +219,7 @@ mod tests {
             .iter()
             .map(|joints| DMatrix::from_row_slice(3, 3, &delta.jacobian(*joints).unwrap().concat()))
             .collect();
-        let mut law =
-            ThroughJacobian::new(proportional(0.8, n_samples, 3), &jacobians).unwrap();
+        let mut law = ThroughJacobian::new(proportional(0.8, n_samples, 3), &jacobians).unwrap();
         let mut input = vec![0.0; 3 * n_samples];
         let mut worst = Vec::new();
         for _ in 0..12 {
