@@ -3,22 +3,56 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from ilc_rt import ErrorFeedforwardIlc
-from ilc_rt.reproduce.filter_ilc import PAPER, bench, disturbance, filters, mechanisms
+from ilc_rt.reproduce.filter_ilc import (
+    PAPER,
+    bench,
+    convergence,
+    disturbance,
+    filters,
+    mechanisms,
+)
+
+if TYPE_CHECKING:
+    from ilc_rt.reproduce.paper import Figures
 
 CASES = ["unfiltered", "zero_phase", "switched", "gate", "ladder", "disturbance", "feedforward"]
 
 
 @pytest.fixture(scope="module")
-def figures() -> dict[str, Any]:
-    """Return the paper's figures on reduced sizes."""
-    return PAPER.compute(True, lambda _: None)
+def converging() -> Figures:
+    """Return what the analysis says."""
+    return convergence.compute(True, lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def filtered() -> Figures:
+    """Return learning without filter, with one, and with a switched one."""
+    return filters.compute(True, lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def gated() -> Figures:
+    """Return gate, ladder and repeatability."""
+    return mechanisms.compute(True, lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def disturbed() -> Figures:
+    """Return disturbance, feed-forward and saturation."""
+    return disturbance.compute(True, lambda _: None)
+
+
+@pytest.fixture(scope="module")
+def figures(converging: Figures, filtered: Figures, gated: Figures, disturbed: Figures) -> Figures:
+    """Return all of it."""
+    return converging | filtered | gated | disturbed
 
 
 def test_the_motion_is_the_x_axis_of_the_butterfly() -> None:
@@ -47,8 +81,8 @@ def test_the_loop_is_gain_round_the_corrected_plant() -> None:
     np.testing.assert_allclose(stand.run(learned), e, atol=1e-9 * abs(e).max())
 
 
-def test_the_critical_frequency_is_that_of_eq_9(figures: dict[str, Any]) -> None:
-    told = figures["convergence"]
+def test_the_critical_frequency_is_that_of_eq_9(converging: Figures) -> None:
+    told = converging["convergence"]
     z = np.exp(2j * np.pi * np.array(told["frequency_hz"])[1:-1] * bench.DT_S)
     plant = 0.00475 / z * (1 + 1 / z) / ((1 - 1 / z) * (1 - 0.85 / z))
     for case, lead in ((told, 1), (told["lead_5"], 5)):
@@ -61,25 +95,17 @@ def test_the_critical_frequency_is_that_of_eq_9(figures: dict[str, Any]) -> None
     assert told["lead_5"]["critical_frequency_hz"] > 50.0
 
 
-def test_the_analysis_tells_which_cutoff_is_possible(figures: dict[str, Any]) -> None:
+def test_the_analysis_tells_which_cutoff_is_possible(converging: Figures) -> None:
     """50 Hz with the paper's lead is refused in words, with the critical frequency."""
-    one, five = figures["convergence"]["told"]
+    one, five = converging["convergence"]["told"]
     assert (one["lead"], one["cutoff_hz"], one["converges"]) == (1, 50.0, False)
     assert "each run multiplies the error by 1.06" in one["why"]
     assert "from 11.07" in one["why"]
     assert (five["lead"], five["cutoff_hz"], five["converges"]) == (5, 50.0, True)
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_each_case_has_its_errors_of_forty_runs(figures: dict[str, Any], name: str) -> None:
-    rmse, largest = (np.array(figures[name][key]) for key in ("rmse_m", "max_m"))
-    assert len(rmse) == len(largest) >= 40
-    assert (rmse < largest).all()
-    assert (rmse > 0.5 * bench.NOISE_M).all()
-
-
-def test_without_filter_the_error_falls_and_then_rises(figures: dict[str, Any]) -> None:
-    rmse = np.array(figures["unfiltered"]["rmse_m"])
+def test_without_filter_the_error_falls_and_then_rises(filtered: Figures) -> None:
+    rmse = np.array(filtered["unfiltered"]["rmse_m"])
     turn = int(rmse.argmin())
     assert 10 < turn < 30
     assert (np.diff(rmse[:turn]) < 0.0).all()
@@ -93,16 +119,16 @@ def test_it_rises_without_noise_too() -> None:
     assert course.rmse_m[-1] > 1.5 * min(course.rmse_m)
 
 
-def test_with_10_hz_it_falls_from_run_to_run(figures: dict[str, Any]) -> None:
-    rmse = figures["zero_phase"]["rmse_m"]
+def test_with_10_hz_it_falls_from_run_to_run(filtered: Figures) -> None:
+    rmse = filtered["zero_phase"]["rmse_m"]
     assert filters.falls(rmse)
     assert rmse[-1] < 0.02 * rmse[0]
-    assert rmse[-1] < 0.7 * min(figures["unfiltered"]["rmse_m"])
-    assert not filters.falls(figures["unfiltered"]["rmse_m"])
+    assert rmse[-1] < 0.7 * min(filtered["unfiltered"]["rmse_m"])
+    assert not filters.falls(filtered["unfiltered"]["rmse_m"])
 
 
-def test_the_switched_filter_helps_where_the_motion_is_fast(figures: dict[str, Any]) -> None:
-    wide = figures["switched"]
+def test_the_switched_filter_helps_where_the_motion_is_fast(filtered: Figures) -> None:
+    wide = filtered["switched"]
     assert set(wide["segments"]["cutoffs_hz"]) == {10.0, 50.0}
     assert filters.falls(wide["rmse_m"])
     assert wide["fast_rmse_m"] < 0.6 * wide["low_pass"]["fast_rmse_m"]
@@ -112,17 +138,18 @@ def test_the_switched_filter_helps_where_the_motion_is_fast(figures: dict[str, A
     assert wide["lead_1"]["fast_rmse_m"] > 4.0 * wide["lead_1"]["slow_rmse_m"]
 
 
-def test_a_gate_holds_takes_back_and_resumes(figures: dict[str, Any]) -> None:
-    gate = figures["gate"]
+def test_a_gate_holds_takes_back_and_resumes(gated: Figures) -> None:
+    gate = gated["gate"]
     begun = gate["states"].index("holding") + 1
     held = np.array(gate["rmse_m"][begun:])
     assert len(held) > 20
     assert held.max() < 1.05 * gate["tolerance_m"]
     assert held.max() < 1.02 * held.min()
     back = gate["rollback"]
-    assert back["states"][-1] == "rolled_back"
-    assert back["rmse_m"][-1] < 1.1 * min(back["rmse_m"])
-    assert back["rmse_m"][-1] < 0.5 * figures["unfiltered"]["rmse_m"][-1]
+    taken = back["states"].index("rolled_back")
+    assert back["rmse_m"][taken] > mechanisms.GROWTH * min(back["rmse_m"])
+    assert set(back["states"][taken:]) == {"rolled_back"}
+    assert max(back["rmse_m"][taken + 1 :]) < 1.05 * min(back["rmse_m"])
     resumed, step_run = gate["resume"], gate["resume"]["step_run"]
     assert resumed["states"][step_run - 1] == "holding"
     assert resumed["states"][step_run] == "learning"
@@ -132,52 +159,60 @@ def test_a_gate_holds_takes_back_and_resumes(figures: dict[str, Any]) -> None:
 
 
 def test_the_noise_that_a_ladder_learns_falls_with_the_root_of_its_repeats(
-    figures: dict[str, Any],
+    gated: Figures,
 ) -> None:
-    learned = figures["ladder"]["learned_noise"]
+    learned = gated["ladder"]["learned_noise"]
     expected = learned["noise_rms"][0] / np.sqrt(learned["repeats"])
     np.testing.assert_allclose(learned["noise_rms"], expected, rtol=0.15)
-    assert figures["ladder"]["noise_rms_m"] == pytest.approx(
+    assert gated["ladder"]["noise_rms_m"] == pytest.approx(
         bench.NOISE_M / np.sqrt(mechanisms.REPEATS), rel=0.05
     )
-    rmse = np.array(figures["ladder"]["rmse_m"])
+    rmse = np.array(gated["ladder"]["rmse_m"])
     same = rmse.reshape(-1, mechanisms.REPEATS)
     assert (np.ptp(same, axis=1) < 0.01 * same.mean(axis=1)).all()
     assert (np.diff(same.mean(axis=1)) < 0.0).all()
 
 
-def test_the_runs_repeat_as_well_as_the_paper_asks(figures: dict[str, Any]) -> None:
-    check = figures["repeatability"]
+def test_the_runs_repeat_as_well_as_the_paper_asks(gated: Figures) -> None:
+    check = gated["repeatability"]
     assert check["largest_rms_m"] - check["least_rms_m"] < 0.3e-6
     assert check["learnable"] > 0.999
     assert check["spread_rms_m"] < 3.0 * bench.NOISE_M
 
 
-def test_a_repetitive_disturbance_is_learned_away(figures: dict[str, Any]) -> None:
-    rmse = np.array(figures["disturbance"]["rmse_m"])
+def test_a_repetitive_disturbance_is_learned_away(disturbed: Figures) -> None:
+    rmse = np.array(disturbed["disturbance"]["rmse_m"])
     begins = disturbance.DISTURBANCE_RUN
     assert rmse[begins] > 20.0 * rmse[begins - 1]
     assert rmse[begins + 39] < 0.02 * rmse[begins]
-    assert figures["disturbance"]["max_m"][begins + 39] < 5e-6
-    assert filters.falls(figures["disturbance"]["rmse_m"][begins:])
+    assert disturbed["disturbance"]["max_m"][begins + 39] < 5e-6
+    assert filters.falls(disturbed["disturbance"]["rmse_m"][begins:])
 
 
-def test_feed_forward_helps_and_learning_more(figures: dict[str, Any]) -> None:
-    fed = figures["feedforward"]
+def test_feed_forward_helps_and_learning_more(disturbed: Figures) -> None:
+    fed = disturbed["feedforward"]
     assert fed["max_m"][0] < 0.5 * fed["without_max_m"]
     assert fed["rmse_m"][-1] < 0.5 * fed["rmse_m"][0]
     assert filters.falls(fed["rmse_m"])
 
 
-def test_the_guard_keeps_the_learned_signal_within_the_drive(figures: dict[str, Any]) -> None:
-    saturated = figures["saturation"]
+def test_the_guard_keeps_the_learned_signal_within_the_drive(disturbed: Figures) -> None:
+    saturated = disturbed["saturation"]
     assert max(saturated["input_max"]) <= saturated["limit"]
     assert saturated["unguarded_input_max"][-1] > 1.5 * saturated["limit"]
     assert saturated["limited_samples"][-1] > 0
     assert saturated["limited_samples"][0] == 0
 
 
-def test_what_does_not_hold_is_known(figures: dict[str, Any]) -> None:
+@pytest.mark.parametrize("name", CASES)
+def test_each_case_has_its_errors_of_forty_runs(figures: Figures, name: str) -> None:
+    rmse, largest = (np.array(figures[name][key]) for key in ("rmse_m", "max_m"))
+    assert len(rmse) == len(largest) >= 40
+    assert (rmse < largest).all()
+    assert (rmse > 0.5 * bench.NOISE_M).all()
+
+
+def test_what_does_not_hold_is_known(figures: Figures) -> None:
     fails = [claim.what for claim in PAPER.claims(figures) if claim.holds is False]
     assert fails == [
         "the loop of eq. 3 as printed is stable",
@@ -188,7 +223,7 @@ def test_what_does_not_hold_is_known(figures: dict[str, Any]) -> None:
     assert figures["convergence"]["printed"]["filter_gain"] == pytest.approx(1.23, abs=0.005)
 
 
-def test_every_picture_draws_something(figures: dict[str, Any]) -> None:
+def test_every_picture_draws_something(figures: Figures) -> None:
     """From the figures alone, as they come back from JSON."""
     restored = json.loads(json.dumps(figures, allow_nan=False))
     for picture in PAPER.pictures:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from ilc_rt.reproduce.haas2016 import PAPER, constrained, positioning
+from ilc_rt.reproduce.haas2016 import PAPER, constrained, gantry, positioning
 
 TIMES = list(positioning.SAMPLE_TIMES_S)
 BOUNDS = list(constrained.BOUNDS)
@@ -116,25 +116,30 @@ def test_each_bound_is_held_and_costs_nothing_where_it_is_not_reached(
 
 
 def test_the_tool_needs_a_measurement_at_the_tool(figures: dict[str, Any]) -> None:
-    gantry = figures["gantry"]
+    bench = figures["gantry"]
     for key in ("tracking_inf_m", "contour_inf_m"):
-        none, enc, kgm = (gantry[name][key] for name in ("none", "enc", "kgm"))
+        none, enc, kgm = (bench[name][key] for name in ("none", "enc", "kgm"))
         assert none[0] == enc[0] == kgm[0]
         assert len(none) == len(enc) == len(kgm) >= 11
         assert kgm[9] < enc[9] < none[9]
         assert kgm[9] < 0.2 * none[9]
-    enc = gantry["enc"]["contour_inf_m"]
+    enc = bench["enc"]["contour_inf_m"]
     assert 1 <= int(np.argmin(enc)) < 6
     assert enc[-1] > 1.2 * min(enc)
     # The encoders themselves see it fall.
-    assert (
-        gantry["enc"]["encoder_contour_inf_m"][9] < 0.2 * gantry["enc"]["encoder_contour_inf_m"][0]
-    )
+    assert bench["enc"]["encoder_contour_inf_m"][9] < 0.2 * bench["enc"]["encoder_contour_inf_m"][0]
 
 
 def test_without_learning_every_run_is_alike(figures: dict[str, Any]) -> None:
     none = np.array(figures["gantry"]["none"]["tracking_inf_m"])
     np.testing.assert_allclose(none, none[0], rtol=1e-3)
+
+
+def test_the_gantry_gives_the_same_figures_again(figures: dict[str, Any]) -> None:
+    """Lock-step: no clock, no chance."""
+    again = gantry.compute(True, lambda _: None)
+    assert again["gantry"] == figures["gantry"]
+    assert again["path"] == figures["path"]
 
 
 def test_every_statement_but_one_holds(figures: dict[str, Any]) -> None:
