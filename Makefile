@@ -8,7 +8,7 @@ SOURCES := $(shell find crates sim python -name '*.rs' -o -name '*.py' -o -name 
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-rust test-python check fmt lint docs bench rt vcan clean
+.PHONY: help build demo gallery test test-rust test-python check fmt lint docs bench rt vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -42,6 +42,10 @@ build: $(VENV)/.built ## Build the binaries and the Python package into .venv
 
 demo: build ## Ten runs on simulated drives, the error falling, and a report
 	$(BIN)/ilc demo
+
+gallery: build ## The papers, computed again: docs/gallery, pages and figures
+	mkdir -p docs/gallery
+	$(BIN)/ilc reproduce all --json docs/gallery/figures.json --report docs/gallery
 
 test: test-rust test-python vcan ## Everything that can fail, on every transport
 
@@ -78,6 +82,7 @@ docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
 
 bench: $(VENV)/.bench ## Speed, as ratios; writes docs/benchmarks.md
+	rm -rf $(TARGET)/criterion
 	cargo bench --workspace --bench main_job --bench learning --bench constrained --bench relevance --bench trajectory
 	$(BIN)/python benchmarks/report.py
 

@@ -57,6 +57,7 @@ __all__ = [
     "coupled_weights",
     "coupling_gains",
     "discretize",
+    "doubt",
     "excitation",
     "exponential_sigmoid",
     "fir",
@@ -303,6 +304,7 @@ def fit_rational(
     delay_s: float = 0.0,
     dt_s: float | None = None,
 ) -> RationalFit: ...
+def doubt(measured: FrequencyResponse, residual_rms: float) -> str | None: ...
 def uncertainty(
     measured: FrequencyResponse, model: ArrayLike, deviations: float = 3.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...

@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING
 import typer
 from typer import Typer
 
-from ilc_rt.commands import demo, identify, library, monitor, plot, repeatability, run, tune
+from ilc_rt.commands import (
+    demo,
+    identify,
+    library,
+    monitor,
+    plot,
+    repeatability,
+    reproduce,
+    run,
+    tune,
+)
 from ilc_rt.errors import (
     EXIT_BAD_INPUT,
     EXIT_FAILURE,
@@ -33,6 +43,7 @@ app.command("demo")(demo.demo)
 app.command("run")(run.run)
 app.command("identify")(identify.identify)
 app.command("repeatability")(repeatability.repeatability)
+app.command("reproduce")(reproduce.reproduce)
 app.command("plot")(plot.plot)
 app.command("tune")(tune.tune)
 app.add_typer(library.app, name="library")

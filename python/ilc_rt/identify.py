@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import tempfile
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -31,12 +31,11 @@ from ilc_rt._native import (
 from ilc_rt.campaign import Campaign, Drives, load_cell
 from ilc_rt.errors import BadInputError
 from ilc_rt.experiment import Experiment
-from ilc_rt.result import write_text
+from ilc_rt.identification import Identification
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from ilc_rt.events import Event
@@ -49,186 +48,6 @@ FROM_HZ = 1.0
 TO_HZ = 50.0
 DURATION_S = 8.0
 PERIODS = 5
-# Below this median coherence, and above this relative residual, a model is not to be used.
-COHERENCE_MIN = 0.7
-RESIDUAL_MAX = 0.25
-
-
-@dataclass(frozen=True)
-class Identification:
-    """What an experiment showed.
-
-    Attributes
-    ----------
-    measured : FrequencyResponse
-        Response from input to measured output, in the band of the excitation.
-    model : SecondOrderFit
-        Fitted gain, natural frequency, damping and delay.
-    described : SecondOrderFit or VelocityLoopFit
-        What ``[axis.model]`` can say of it: unit gain and whole samples of
-        delay; the velocity loop alone of a csv axis.
-    uncertainty : tuple of two arrays
-        Frequencies in Hz, and the bound there of what `described` leaves over:
-        ``|H/G - 1|`` and three standard deviations of the measurement.
-    u, y : ndarray of float64, shape (n_samples,)
-        Input and output of the periods that were evaluated.
-    period_samples : int
-        Samples in a period.
-    dt_s : float
-        Sample time in seconds.
-    experiment : Experiment
-        What was done; with the amplitude that was used.
-    interface : {"csp", "csv"} or None
-        How the axis is commanded; None if it is not an axis of a cell.
-    """
-
-    measured: FrequencyResponse
-    model: SecondOrderFit
-    described: SecondOrderFit | VelocityLoopFit
-    uncertainty: tuple[Array, Array]
-    u: Array
-    y: Array
-    period_samples: int
-    dt_s: float
-    experiment: Experiment
-    interface: Literal["csp", "csv"] | None = None
-
-    @property
-    def frequency_hz(self) -> Array:
-        """Frequencies in Hz, shape (n_frequencies,)."""
-        return self.measured.frequency_hz
-
-    @property
-    def response(self) -> NDArray[np.complex128]:
-        """Measured response, shape (n_frequencies,)."""
-        return self.measured.response
-
-    @property
-    def coherence(self) -> Array:
-        """Coherence of input and output, shape (n_frequencies,)."""
-        return self.measured.coherence
-
-    @property
-    def doubt(self) -> str | None:
-        """Why the model should not be used; None if nothing speaks against it."""
-        trust = float(np.median(self.coherence))
-        if trust < COHERENCE_MIN:
-            return (
-                f"the output hardly follows the input (median coherence {trust:.2f}, "
-                f"{COHERENCE_MIN} is needed): the axis sticks or the amplitude is lost in noise"
-            )
-        left = self.described.residual_rms
-        if left > RESIDUAL_MAX:
-            return (
-                f"the model leaves {left * 100:.0f} % unexplained ({RESIDUAL_MAX * 100:.0f} % at "
-                "most): friction, or a resonance that a second-order model does not have"
-            )
-        return None
-
-    def uncertainty_on_grid(self, count: int = 257) -> Array:
-        """Return the bound at equally spaced frequencies from 0 to Nyquist.
-
-        Below the band of the excitation the bound is that at its lower end;
-        above it at least 1, as nothing is known there.
-
-        Parameters
-        ----------
-        count : int
-            How many frequencies, at least 2.
-
-        Returns
-        -------
-        ndarray of float64, shape (count,)
-
-        Raises
-        ------
-        ValueError
-            For fewer than two frequencies.
-        """
-        if count < 2:
-            message = f"count = {count}: at least 2"
-            raise ValueError(message)
-        grid_hz = np.linspace(0.0, 0.5 / self.dt_s, count)
-        frequency_hz, bound = self.uncertainty
-        found = np.interp(grid_hz, frequency_hz, bound)
-        return np.where(grid_hz > frequency_hz[-1], np.maximum(found, 1.0), found)
-
-    def section(self) -> str:
-        """Return the section ``[axis.model]`` that says what was found."""
-        model = self.described
-        lines = ["[axis.model]"]
-        if isinstance(model, VelocityLoopFit):
-            lines.append(f"velocity_bandwidth_hz = {model.bandwidth_hz:.3f}")
-        else:
-            lines.append(f"natural_frequency_hz = {model.natural_frequency_hz:.3f}")
-            lines.append(f"damping = {model.damping:.4f}")
-        lines.append(f"delay_samples = {model.delay_samples}")
-        return "\n".join(lines) + "\n"
-
-    def rows(self) -> list[tuple[str, str, str]]:
-        """Return name, value and standard deviation of every figure, as text."""
-        model = self.model
-        return [
-            ("gain", f"{model.gain:.5f}", f"{model.gain_deviation:.1e}"),
-            (
-                "natural frequency in Hz",
-                f"{model.natural_frequency_hz:.4f}",
-                f"{model.natural_frequency_deviation_hz:.1e}",
-            ),
-            ("damping", f"{model.damping:.5f}", f"{model.damping_deviation:.1e}"),
-            ("delay in ms", f"{model.delay_s * 1e3:.4f}", f"{model.delay_deviation_s * 1e3:.1e}"),
-            ("left over in %", f"{model.residual_rms * 1e2:.2f}", ""),
-        ]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the content of the file of ``--json``."""
-        model, bound = self.model, self.uncertainty
-        return {
-            "axis": self.experiment.axis,
-            "waveform": self.experiment.waveform,
-            "amplitude": self.experiment.amplitude,
-            "dt_s": self.dt_s,
-            "periods": self.experiment.periods,
-            "frequency_hz": self.frequency_hz.tolist(),
-            "response_real": self.response.real.tolist(),
-            "response_imag": self.response.imag.tolist(),
-            "coherence": self.coherence.tolist(),
-            "n_averages": self.measured.n_averages,
-            "model": {
-                "gain": model.gain,
-                "gain_deviation": model.gain_deviation,
-                "natural_frequency_hz": model.natural_frequency_hz,
-                "natural_frequency_deviation_hz": model.natural_frequency_deviation_hz,
-                "damping": model.damping,
-                "damping_deviation": model.damping_deviation,
-                "delay_s": model.delay_s,
-                "delay_deviation_s": model.delay_deviation_s,
-                "residual_rms": model.residual_rms,
-            },
-            "uncertainty": {"frequency_hz": bound[0].tolist(), "bound": bound[1].tolist()},
-            "axis_model": self.section(),
-            "doubt": self.doubt,
-        }
-
-    def write_json(self, path: str | Path) -> None:
-        """Write the figures to a file.
-
-        Raises
-        ------
-        BadInputError
-            If the file cannot be written.
-        """
-        write_text(path, json.dumps(self.to_json(), indent=1) + "\n")
-
-    def figure(self) -> Figure:
-        """Return the Bode diagram of measurement and model."""
-        from ilc_rt.bode import bode
-
-        return bode(
-            self.frequency_hz, self.response, self.coherence,
-            self.described.response(self.frequency_hz), self.uncertainty[1],
-            f"axis {self.experiment.axis}" if self.experiment.axis else "",
-        )  # fmt: skip
 
 
 def swept_sine(

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
+import pytest
+
 from ilc_rt import Library
 
 if TYPE_CHECKING:
@@ -50,3 +52,14 @@ def test_trajectories_are_planned_and_drawn(gantry: Path, tmp_path: Path) -> Non
     assert len(tracking) == 3
     assert tracking[0] < tracking[1]
     assert (tmp_path / "05_trajectories.png").stat().st_size > 10_000
+
+
+def test_an_axis_is_identified_and_drawn(gantry: Path, tmp_path: Path) -> None:
+    """Near the simulated axis, friction and all; the bolder law leaves less."""
+    said = run_example(gantry.with_name("06_identify.py"), tmp_path)
+    frequencies_hz = [float(value) for value in re.findall(r"natural_frequency_hz = (\S+)", said)]
+    assert frequencies_hz == pytest.approx([15.0], rel=0.1)
+    factors = [float(value) for value in re.findall(r"leaves ([\d.]+) of", said)]
+    assert len(factors) == 2
+    assert factors[0] < factors[1] < 1.0
+    assert (tmp_path / "06_identify.png").stat().st_size > 10_000

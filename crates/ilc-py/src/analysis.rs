@@ -30,8 +30,8 @@ use crate::argument::give_signal;
 ///     First frequency at which a run makes the error grow, with the law's
 ///     filter and without; None if there is none.
 /// robust_factor, robust_lifted, uncertainty_allowed : float or None
-///     Worst factor of a run within the uncertainty given, over frequency and
-///     over the whole run; the largest uncertainty that would do.
+///     Worst factor of a run within the uncertainty given, over frequency; an
+///     upper bound of it over the whole run; the largest uncertainty that would do.
 /// initial_error_rms, converged_error_rms : float or None
 ///     RMS error before learning and in the end, for the reference given.
 /// expected_rms_limit : float or None
@@ -149,7 +149,7 @@ impl PyAnalysis {
         self.analysis.robust_factor
     }
 
-    /// The same over the whole run, for uncertainty that changes along it.
+    /// Upper bound of that factor over the whole run.
     #[getter]
     fn robust_lifted(&self) -> Option<f64> {
         self.analysis.robust_lifted

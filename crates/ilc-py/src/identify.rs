@@ -710,6 +710,26 @@ fn uncertainty<'py>(
     Ok((give(py, found.frequency_hz), give(py, found.bound)))
 }
 
+/// Return why a model should not be used; None if nothing speaks against it.
+///
+/// A median coherence below 0.7, or a relative residual above 0.25.
+///
+/// Parameters
+/// ----------
+/// measured : FrequencyResponse
+///     What was measured in the band of the excitation.
+/// residual_rms : float
+///     What the fit of the model left over, relative to the response.
+///
+/// Returns
+/// -------
+/// str or None
+///     One line for people.
+#[pyfunction]
+fn doubt(measured: &Bound<'_, PyFrequencyResponse>, residual_rms: f64) -> Option<String> {
+    identify::doubt(&measured.get().0, residual_rms).map(|doubt| doubt.to_string())
+}
+
 /// Return an excitation from rest to rest.
 ///
 /// Parameters
@@ -813,5 +833,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit_velocity_loop, module)?)?;
     module.add_function(wrap_pyfunction!(fit_rational, module)?)?;
     module.add_function(wrap_pyfunction!(uncertainty, module)?)?;
+    module.add_function(wrap_pyfunction!(doubt, module)?)?;
     module.add_function(wrap_pyfunction!(excitation, module)?)
 }

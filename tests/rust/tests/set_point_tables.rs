@@ -11,7 +11,6 @@ use ilc_tests::Scratch;
 use ilc_tests::campaign::run;
 
 const N_AXES: usize = 9;
-const CYCLE_S: f64 = 0.005;
 
 /// Nine rotary drives, `a1` to `a9`, on a bus.
 fn cell_text(bus: &str, cycle_us: u32, jerk_max: f64) -> String {
@@ -65,7 +64,8 @@ fn nine_axes_learn_their_table_in_lock_step() {
     let folder = Scratch::new();
     let cell = load(&folder, &cell_text("loopback:", 5000, 4000.0), &points());
     let plan = Plan::new(&cell, None, true).unwrap();
-    let dwell = (0.1 / CYCLE_S).round() as usize;
+    // 0.1 s of 5 ms.
+    let dwell = 20;
     assert_eq!(plan.n_samples(), 161 + dwell + 2 * dwell);
     assert!(plan.meta.input_units.iter().all(|unit| unit == "rad"));
     let middle = &plan.reference_m[(dwell + 80) * N_AXES..][..N_AXES];

@@ -87,7 +87,9 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
     };
     match experiment(arguments) {
         Ok((outcome, identified)) => {
+            let doubt = identified.as_ref().and_then(|found| found.doubt);
             let written = match (&file, identified) {
+                // What was measured is written all the same: it shows what is wrong.
                 (Some(file), Some(found)) => file.write(&figures(&arguments.axis, &found)),
                 (Some(file), None) => {
                     file.give_up();
@@ -95,7 +97,13 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
                 }
                 (None, _) => true,
             };
-            exit_status(&outcome, written)
+            if let Some(doubt) = doubt {
+                show::complain(&format_args!(
+                    "no model for axis {}: {doubt}; try a larger amplitude or another band",
+                    arguments.axis
+                ));
+            }
+            exit_status(&outcome, written && doubt.is_none())
         }
         Err(error) => {
             if let Some(file) = file {
@@ -170,7 +178,7 @@ fn describe(experiment: &Experiment, found: &Identified) -> String {
          natural frequency  {:>10.4} +- {:.1e} Hz\n\
          damping            {:>10.5} +- {:.1e}\n\
          delay              {:>10.4} +- {:.1e} ms\n\
-         left over          {:>10.2} % rms\n\n{}",
+         left over          {:>10.2} % rms{}",
         experiment.axis,
         found.measured.frequency_hz.len(),
         experiment.excitation.from_hz,
@@ -186,7 +194,7 @@ fn describe(experiment: &Experiment, found: &Identified) -> String {
         model.delay_s * 1e3,
         fit.delay_deviation_s * 1e3,
         fit.residual_rms * 100.0,
-        found.section()
+        if found.doubt.is_none() { format!("\n\n{}", found.section()) } else { String::new() }
     )
 }
 
@@ -210,6 +218,7 @@ fn figures(axis: &str, found: &Identified) -> serde_json::Value {
             "frequency_hz": found.uncertainty.frequency_hz,
             "bound": found.uncertainty.bound,
         },
-        "axis_model": found.section(),
+        "doubt": found.doubt.map(|doubt| doubt.to_string()),
+        "axis_model": found.doubt.is_none().then(|| found.section()),
     })
 }

@@ -16,7 +16,7 @@ use tracing::Level;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 
-/// Done, but what was asked for beyond it could not be written.
+/// Done, but what was asked for beyond it could not be written, or no model could be found.
 pub const EXIT_FAILURE: u8 = 1;
 /// Bad input: nothing has moved.
 pub const EXIT_BAD_INPUT: u8 = 2;
@@ -25,10 +25,9 @@ pub const EXIT_FAULT: u8 = 3;
 
 #[derive(Parser)]
 #[command(name = "ilc-rt", version, about = "The real-time controller that learns", long_about = None)]
-#[command(
-    after_help = "Exit status: 0 done, 1 done but --json could not be written, 2 bad input (nothing moved), 3 controlled stop after a \
-fault, 129 after SIGHUP, 130 after Ctrl-C, 143 after SIGTERM."
-)]
+#[command(after_help = "Exit status: 0 done, 1 done but --json could not be written or \
+no model found, 2 bad input (nothing moved), 3 controlled stop after a \
+fault, 129 after SIGHUP, 130 after Ctrl-C, 143 after SIGTERM.")]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,

@@ -90,6 +90,7 @@ pub enum StopReason {
 }
 
 /// What the loop reports.
+#[expect(clippy::large_enum_variant, reason = "a box would be allocated in the tick")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message {
     /// A cycle.
@@ -183,6 +184,7 @@ impl Mailbox {
 
 impl LoopSide {
     /// Reports; counts what nobody has room for.
+    #[expect(clippy::large_types_passed_by_value, reason = "it moves into the ring")]
     pub(super) fn tell(&mut self, message: Message) {
         if self.messages.push(message).is_err() {
             self.dropped += 1;

@@ -45,6 +45,7 @@ pub(super) struct Slots {
 }
 
 impl Slots {
+    #[expect(clippy::large_stack_arrays, reason = "made once, before the loop starts")]
     pub(super) fn new(n_nodes: usize) -> Self {
         Self {
             ring: [Slot::default(); DEPTH],

@@ -5,8 +5,8 @@ use super::experiment::Experiment;
 use crate::config::Cell;
 use crate::model::ModelError;
 use crate::model::identify::{
-    Averaging, FrequencyResponse, Known, SecondOrder, SecondOrderFit, Uncertainty, VelocityLoop,
-    fit_second_order, fit_velocity_loop, frequency_response, uncertainty,
+    Averaging, Doubt, FrequencyResponse, Known, SecondOrder, SecondOrderFit, Uncertainty,
+    VelocityLoop, doubt, fit_second_order, fit_velocity_loop, frequency_response, uncertainty,
 };
 use crate::record::IterationRecord;
 
@@ -24,6 +24,8 @@ pub struct Identified {
     pub described: Described,
     /// What the model leaves over.
     pub uncertainty: Uncertainty,
+    /// Why the description should not be used, if anything speaks against it.
+    pub doubt: Option<Doubt>,
 }
 
 /// The model of an axis as a cell describes it.
@@ -69,23 +71,26 @@ impl Identified {
             let (u, y) = (column(&record.input, 1.0), column(&record.error_m, -1.0));
             let measured = frequency_response(&u, &y, dt_s, averaging)?.band(from_hz, to_hz);
             let fit = fit_second_order(&measured, Some(dt_s), Known::default())?;
-            let (described, model) = match axis.position_loop {
+            let (described, residual_rms, model) = match axis.position_loop {
                 None => {
                     let whole_s = fit.model.delay_samples() as f64 * dt_s;
                     let known = Known { gain: Some(1.0), delay_s: Some(whole_s) };
-                    let model = fit_second_order(&measured, Some(dt_s), known)?.model;
-                    (Described::Position(model), model.response(&measured.frequency_hz))
+                    let found = fit_second_order(&measured, Some(dt_s), known)?;
+                    let (model, left) = (found.model, found.residual_rms);
+                    (Described::Position(model), left, model.response(&measured.frequency_hz))
                 }
                 Some(position_loop) => {
                     let kv = position_loop.gain_per_s;
                     let free = fit_velocity_loop(&measured, kv, dt_s, None)?.model;
                     let whole_s = free.delay_samples() as f64 * dt_s;
-                    let model = fit_velocity_loop(&measured, kv, dt_s, Some(whole_s))?.model;
-                    (Described::Velocity(model), model.response(&measured.frequency_hz))
+                    let found = fit_velocity_loop(&measured, kv, dt_s, Some(whole_s))?;
+                    let (model, left) = (found.model, found.residual_rms);
+                    (Described::Velocity(model), left, model.response(&measured.frequency_hz))
                 }
             };
             let uncertainty = uncertainty(&measured, &model, DEVIATIONS)?;
-            Ok(Self { measured, fit, described, uncertainty })
+            let doubt = doubt(&measured, residual_rms);
+            Ok(Self { measured, fit, described, uncertainty, doubt })
         };
         evaluate().map_err(|source| SupervisorError::Model {
             file: cell.file.display().to_string(),

@@ -34,7 +34,7 @@ mod table;
 mod to_rest;
 mod tracking_index;
 
-pub use contour::contour_error_m;
+pub use contour::{contour_error_m, path_tangents};
 pub use error::{Quantity, TrajectoryError};
 pub use exponential::{ExponentialSigmoid, ModulatedSegment};
 pub use interpolator::Interpolator;

@@ -92,8 +92,7 @@ fn prove(position_m: &[f64], limits: &[AxisLimits], dt_s: f64) -> Result<(), Tra
                 [velocity, acceleration, jerk].into_iter().zip(limit.named()).enumerate()
             {
                 let allowed = limit * (1.0 + TOLERANCE) + rounding_noise(farthest_m, order, dt_s);
-                // Written so that a number that is none is refused as well.
-                if !(reached.abs() <= allowed) {
+                if reached.is_nan() || reached.abs() > allowed {
                     return Err(TrajectoryError::Row { row, axis, quantity, reached, limit });
                 }
             }

@@ -1,19 +1,12 @@
-//! Direction of a sampled path, also where it rests.
+//! The tangents of a contour's reference, or why it has none.
 
 use crate::learning::LearningError;
-
-/// A step counts as rest below this part of the longest step ...
-const REST: f64 = 1e-9;
-/// ... or below this part of the largest coordinate: the rounding of the coordinates themselves.
-const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// Two steps count as a reversal if they cancel to less than this part of their lengths.
-const REVERSAL: f64 = 1e-6;
+use crate::learning::error::check;
+use crate::trajectory::path_tangents;
 
 /// Returns the unit tangent of a path at each of its samples.
 ///
-/// `t[k] = (r[k+1] - r[k-1]) / |r[k+1] - r[k-1]|`; at the ends of the run and where the path turns
-/// back on itself the one step that is left or that arrives. Where the path rests the tangent is
-/// undefined: there the one nearest in time holds, of two equally near ones the earlier.
+/// That of [`path_tangents`]; a path that never moves is refused, as nothing lies across it.
 ///
 /// # Shapes
 /// - `reference`: `n_samples` x `n_axes`, time first; the result alike
@@ -31,113 +24,18 @@ pub fn tangents(reference: &[f64], n_axes: usize) -> Result<Vec<f64>, LearningEr
         let (n_samples, n_channels) = ((found / n_axes.max(2)).max(1), n_axes.max(2));
         return Err(LearningError::Length { what: "reference", found, n_samples, n_channels });
     }
-    let n_samples = found / n_axes;
-    crate::learning::error::check("reference", reference, n_samples, n_axes)?;
+    check("reference", reference, found / n_axes, n_axes)?;
 
-    let point = |k: usize| &reference[k * n_axes..(k + 1) * n_axes];
-    let step = |from: usize, to: usize| -> Vec<f64> {
-        point(from).iter().zip(point(to)).map(|(from, to)| to - from).collect()
-    };
-    let longest = (1..n_samples).map(|k| length(&step(k - 1, k))).fold(0.0, f64::max);
-    let largest = reference.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-    let rest = (REST * longest).max(ROUNDING * largest);
-    let direction = |k: usize| -> Option<Vec<f64>> {
-        let (before, after) = (k.saturating_sub(1), (k + 1).min(n_samples - 1));
-        let (arriving, leaving) = (step(before, k), step(k, after));
-        let mut across = step(before, after);
-        if length(&across) <= REVERSAL * (length(&arriving) + length(&leaving)) {
-            across = arriving;
-        }
-        let norm = length(&across);
-        (norm > rest).then(|| across.iter().map(|value| value / norm).collect())
-    };
-    let known: Vec<Option<Vec<f64>>> = (0..n_samples).map(direction).collect();
-    hold_nearest(&known).ok_or_else(|| LearningError::Weight {
+    path_tangents(reference, n_axes).ok_or_else(|| LearningError::Weight {
         what: "reference",
         sample: 0,
         reason: "the path never moves; a contour needs a path of at least two points".to_owned(),
     })
 }
 
-/// Fills each gap with the entry nearest in time.
-fn hold_nearest(known: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
-    let places: Vec<usize> =
-        known.iter().enumerate().filter_map(|(k, entry)| entry.as_ref().map(|_| k)).collect();
-    let mut filled = Vec::new();
-    let mut next = 0;
-    for k in 0..known.len() {
-        while next < places.len() && places[next] < k {
-            next += 1;
-        }
-        let after = places.get(next);
-        let before = next.checked_sub(1).map(|place| &places[place]);
-        let nearest = match (before, after) {
-            (Some(before), Some(after)) if k - before <= after - k => before,
-            (Some(before), None) => before,
-            (_, Some(after)) => after,
-            (None, None) => return None,
-        };
-        filled.extend(known[*nearest].as_ref()?);
-    }
-    Some(filled)
-}
-
-fn length(step: &[f64]) -> f64 {
-    // Scaled, so that the squares of very short and very long steps neither vanish nor overflow.
-    let scale = step.iter().fold(0.0, |scale: f64, value| scale.max(value.abs()));
-    if scale > 0.0 {
-        scale * step.iter().map(|value| (value / scale).powi(2)).sum::<f64>().sqrt()
-    } else {
-        0.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    fn close(found: &[f64], expected: &[f64]) {
-        assert_eq!(found.len(), expected.len());
-        for (f, e) in found.iter().zip(expected) {
-            assert!((f - e).abs() < 1e-14, "{found:?} is not {expected:?}");
-        }
-    }
-
-    #[test]
-    fn a_diagonal_has_one_tangent_also_while_it_rests() {
-        let path = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.1, 1.1, 1.3, 1.3, 1.3, 1.3, 1.3, 1.3];
-        let half = 0.5_f64.sqrt();
-        close(&tangents(&path, 2).unwrap(), &[half; 14]);
-    }
-
-    #[test]
-    fn a_rest_between_two_moves_belongs_to_the_nearer_one() {
-        // Along x, rests at samples 2 to 6, then along y.
-        let x = [0.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0];
-        let y = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0];
-        let path: Vec<f64> = x.iter().zip(&y).flat_map(|(x, y)| [*x, *y]).collect();
-        let found = tangents(&path, 2).unwrap();
-        // Samples 2 and 6 still see a step; 4 lies halfway and takes the earlier.
-        let along_x = [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
-        let expected: Vec<f64> = along_x.iter().flat_map(|x| [*x, 1.0 - x]).collect();
-        close(&found, &expected);
-    }
-
-    #[test]
-    fn a_reversal_keeps_the_line_it_is_on() {
-        let path = [0.0, 0.0, 1.0, 2.0, 2.0, 4.0, 1.0, 2.0 + 1e-9];
-        let found = tangents(&path, 2).unwrap();
-        let (c, s) = (1.0 / 5.0_f64.sqrt(), 2.0 / 5.0_f64.sqrt());
-        close(&found[4..6], &[c, s]);
-    }
-
-    #[test]
-    fn rounding_at_rest_is_no_motion() {
-        let noise = 2.0_f64.powi(-52);
-        let path = [1.0, 0.0, 1.0 + noise, 0.0, 1.0, noise, 1.0, 0.5, 1.0, 1.0];
-        close(&tangents(&path, 2).unwrap()[..4], &[0.0, 1.0, 0.0, 1.0]);
-    }
 
     #[test]
     fn a_path_without_motion_or_sense_is_refused() {
@@ -148,26 +46,5 @@ mod tests {
         assert!(told(&[], 2).contains("reference holds 0"));
         assert!(told(&[1.0, 2.0], 1).contains("reference holds 2"));
         assert!(told(&[1.0, 2.0, f64::NAN, 2.0], 2).contains("NaN"));
-    }
-
-    proptest! {
-        #[test]
-        fn every_tangent_has_unit_length(
-            steps in prop::collection::vec((0..3_u8, -1.0..1.0_f64, -1.0..1.0_f64), 2..40),
-        ) {
-            // A third of the samples rest.
-            let mut path = vec![0.3, -0.2];
-            for (rest, x, y) in steps {
-                let (last_x, last_y) = (path[path.len() - 2], path[path.len() - 1]);
-                let move_on = f64::from(u8::from(rest > 0));
-                path.extend([last_x + move_on * x, last_y + move_on * y]);
-            }
-            if let Ok(found) = tangents(&path, 2) {
-                prop_assert_eq!(found.len(), path.len());
-                for pair in found.chunks(2) {
-                    prop_assert!((pair[0].hypot(pair[1]) - 1.0).abs() < 1e-14);
-                }
-            }
-        }
     }
 }

@@ -5,6 +5,7 @@
 //! and [`uncertainty`] bounds what the model does not explain. Cold, for set-up only; `supervisor`,
 //! `cli` and the Python bindings may import it.
 
+mod doubt;
 mod excitation;
 mod least_squares;
 mod multisine;
@@ -16,6 +17,7 @@ mod swept_sine;
 mod uncertainty;
 mod velocity_loop;
 
+pub use doubt::{Doubt, doubt};
 pub use excitation::{Excitation, ExcitationSignal, Waveform};
 pub use multisine::multisine;
 pub use rational::{RationalFit, fit_rational};

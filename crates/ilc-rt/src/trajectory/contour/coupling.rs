@@ -1,53 +1,15 @@
 //! Which way is along a path and which across: tangents and coupling gains from the reference.
 
-/// Steps below this part of the longest one are rest: their direction is rounding.
-const REST: f64 = 1e-9;
+use super::tangent::path_tangents;
 
-/// Returns the unit tangent of the reference at each sample.
+/// Returns the unit tangent of the reference at each sample; zeros if it never moves.
 ///
-/// The central difference of the samples; where the reference rests, the direction of the nearest
-/// sample in time that moves (the later of two that are as near), and zeros if none does.
-///
-/// # Shapes
-/// - `reference_m`: `n_samples`, time first; one tangent a sample
-/// # Real Time
-/// Cold; `O(n_samples)`.
-/// # Source
-/// - \[barton2010\], Sect. 4.1: the angle `theta(k)` of the tangent.
+/// That of [`path_tangents`], an array a sample.
 pub fn tangents<const N: usize>(reference_m: &[[f64; N]]) -> Vec<[f64; N]> {
-    let last = reference_m.len().saturating_sub(1);
-    let steps: Vec<[f64; N]> = (0..reference_m.len())
-        .map(|k| {
-            let (before, after) =
-                (&reference_m[k.saturating_sub(1)], &reference_m[(k + 1).min(last)]);
-            std::array::from_fn(|axis| after[axis] - before[axis])
-        })
-        .collect();
-    let length = |step: &[f64; N]| step.iter().map(|part| part * part).sum::<f64>().sqrt();
-    let longest = steps.iter().map(length).fold(0.0, f64::max);
-    let moves = |step: &[f64; N]| length(step) > REST * longest;
-    // For each sample, the last one at or before it that moves, and the first one at or after it.
-    let mut before = vec![None; steps.len()];
-    let mut seen = None;
-    for (k, step) in steps.iter().enumerate() {
-        seen = if moves(step) { Some(k) } else { seen };
-        before[k] = seen;
+    match path_tangents(reference_m.as_flattened(), N) {
+        Some(tangents) => tangents.as_chunks().0.to_vec(),
+        None => vec![[0.0; N]; reference_m.len()],
     }
-    let mut after = None;
-    let mut tangents = vec![[0.0; N]; steps.len()];
-    for k in (0..steps.len()).rev() {
-        after = if moves(&steps[k]) { Some(k) } else { after };
-        let nearest = match (before[k], after) {
-            (Some(before), Some(after)) if k - before < after - k => Some(before),
-            (_, Some(after)) => Some(after),
-            (before, None) => before,
-        };
-        if let Some(from) = nearest {
-            let scale = 1.0 / length(&steps[from]);
-            tangents[k] = steps[from].map(|part| part * scale);
-        }
-    }
-    tangents
 }
 
 /// Returns the linearised coupling gains of two axes at each sample.

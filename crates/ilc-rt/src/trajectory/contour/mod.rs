@@ -8,9 +8,11 @@ pub mod coupling;
 mod error;
 mod sampled;
 mod shape;
+mod tangent;
 mod windowed;
 
 pub use error::ContourError;
 pub use sampled::{Nearest, SampledPath};
 pub use shape::{Arc, Line, Shape};
+pub use tangent::path_tangents;
 pub use windowed::contour_error_m;

@@ -10,6 +10,8 @@ use crate::learning::sweep::Run;
 const GAP: f64 = 1e-13;
 /// ... and the one that is good enough where rounding lets it shrink no further.
 const GAP_ENOUGH: f64 = 1e-9;
+/// An iteration that leaves more of the gap than this has met rounding.
+const STALLED: f64 = 0.9;
 /// What of the cost before learning counts as nothing.
 const FLOOR: f64 = 1e-12;
 /// Part of the first violation that may be left when the search ends.
@@ -19,6 +21,14 @@ const MAX_ITERATIONS: usize = 60;
 /// Part of the way to the border that a step may go, at first and near the end.
 const MARGIN: f64 = 0.995;
 const MARGIN_LATE: f64 = 0.9999;
+/// A corrected step that is shorter than this, or widens the gap, is replaced by one towards the
+/// middle: where single products of slack and multiplier lie far below the others, corrections may
+/// lead round in a circle for ever.
+const SHORT: f64 = 0.1;
+/// That step aims at least at this part of the mean product ...
+const CENTRING: f64 = 0.3;
+/// ... and after so many iterations, twice what almost every search takes, it is the only one.
+const CORRECTED_ITERATIONS: usize = 15;
 /// The products of slack and multiplier start at this part of the cost before learning, in sum ...
 const START: f64 = 0.3;
 /// ... and, coming from an earlier solution, at this part.
@@ -157,7 +167,14 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
             self.rows.weigh(centre, true);
             self.sweep(true);
             let margin = (1.0 - part).clamp(MARGIN, MARGIN_LATE);
-            let length = self.rows.step(centre, true, margin);
+            let mut length = self.rows.step(centre, true, margin);
+            let strays = length < SHORT || self.rows.gap_at(length) > gap;
+            if strays || iteration > CORRECTED_ITERATIONS {
+                let centre = CENTRING.max(shrunk * shrunk * shrunk) * gap / n_limits;
+                self.rows.weigh(centre, false);
+                self.sweep(true);
+                length = self.rows.step(centre, false, MARGIN);
+            }
             if !(length.is_finite() && self.cost.is_finite()) {
                 break;
             }
@@ -169,7 +186,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
             part = gap / self.cost.max(FLOOR * self.worth);
             let is_done = residual <= RESIDUAL && part <= GAP_ENOUGH;
             found = (is_done, iteration, part);
-            if is_done && (part <= GAP || gap > 0.5 * before) {
+            if is_done && (part <= GAP || gap > STALLED * before) {
                 break;
             }
         }

@@ -1,7 +1,7 @@
 //! After how many samples an output first answers to an input.
 
 use super::plant::Plant;
-use crate::model::{ModelError, StateSpace};
+use crate::model::{self, ModelError};
 
 /// A Markov parameter counts as zero below this part of the magnitudes that were added up for it.
 const ROUNDING: f64 = 1e-13;
@@ -13,32 +13,9 @@ pub(in crate::learning::law) fn relative_degrees(
     n_samples: usize,
 ) -> Result<Vec<Option<usize>>, ModelError> {
     match plant {
-        Plant::Invariant(model) => invariant(model),
+        Plant::Invariant(model) => model::relative_degrees(model),
         Plant::Varying(_) => Ok(varying(plant, n_samples)),
     }
-}
-
-/// By Cayley and Hamilton `n + 1` Markov parameters decide.
-fn invariant(model: &StateSpace) -> Result<Vec<Option<usize>>, ModelError> {
-    let n = model.n_states();
-    let parameters = model.markov(n + 1)?;
-    let (a, c) = (model.a().abs(), model.c().abs());
-    let mut reached = model.b().abs();
-    let mut found = vec![None; model.n_outputs()];
-    for (k, parameter) in parameters.iter().enumerate() {
-        let magnitude = if k == 0 { model.d().abs() } else { &c * &reached };
-        if k > 0 {
-            reached = &a * reached;
-        }
-        for (row, degree) in found.iter_mut().enumerate() {
-            let answers =
-                |col: usize| parameter[(row, col)].abs() > ROUNDING * magnitude[(row, col)];
-            if degree.is_none() && (0..model.n_inputs()).any(answers) {
-                *degree = Some(k);
-            }
-        }
-    }
-    Ok(found)
 }
 
 /// The smallest lag over all samples; at most as many as there are states, which is small enough to
@@ -78,7 +55,8 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::model::{Method, TimeVarying, discretize, from_transfer_function, second_order};
+    use crate::model::{Method, StateSpace, TimeVarying};
+    use crate::model::{discretize, from_transfer_function, second_order};
 
     fn axis() -> StateSpace {
         discretize(&second_order(157.0, 0.5).unwrap(), 2e-3, Method::ZeroOrderHold).unwrap()

@@ -179,25 +179,27 @@ impl Lifted {
         worst
     }
 
-    /// What of the slope no multiplier of the right sign can balance, relative to the slope itself.
+    /// What of the slope no multiplier of the right sign can balance, relative to its two terms.
     pub(super) fn stationarity(&self, v: &DVector<f64>) -> f64 {
-        let slope = &self.h * v + &self.f;
+        let curved = &self.h * v;
+        let size = curved.norm().max(self.f.norm()).max(1e-12);
+        let slope = curved + &self.f;
         let values = &self.rows * v;
         let mut active = Vec::new();
         for i in 0..self.rows.nrows() {
             let norm = self.rows.row(i).norm();
-            let size = (norm * v.norm()).max(1e-12);
+            let near = 1e-6 * (norm * v.norm()).max(1e-12);
             for (sign, limit) in [(1.0, self.high[i]), (-1.0, self.low[i])] {
-                if limit.is_finite() && (limit - values[i]).abs() < 1e-6 * size {
+                if limit.is_finite() && (limit - values[i]).abs() < near {
                     active.push(self.rows.row(i).transpose() * (sign / norm));
                 }
             }
         }
         if active.is_empty() {
-            return slope.norm() / self.f.norm().max(1e-12);
+            return slope.norm() / size;
         }
         let normals = DMatrix::from_columns(&active);
         let multiplier = non_negative(&normals, &-&slope);
-        (slope + normals * multiplier).norm() / self.f.norm().max(1e-12)
+        (slope + normals * multiplier).norm() / size
     }
 }

@@ -1,0 +1,33 @@
+"""Axes that the papers' pictures share.
+
+The papers' packages import it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.ticker import NullFormatter
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def errors_over_runs(axes: Axes, label: str, *, runs: bool = True) -> None:
+    """Make the vertical axis logarithmic with plain numbers, and name both.
+
+    Parameters
+    ----------
+    axes : Axes
+        With its curves drawn.
+    label : str
+        What the vertical axis shows, with its unit.
+    runs : bool
+        Whether to name the horizontal axis: the lowest of several does.
+    """
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_ylabel(label)
+    if runs:
+        axes.set_xlabel("run (0 is without learning)")
