@@ -116,7 +116,7 @@ def test_the_loop_is_the_controller_step_by_step():
     assert machine.expansion(100.0) == pytest.approx(1.0053)
     kelvin = machine.temperatures_k(3, 2000)
     assert np.abs(kelvin).max() <= 100.0
-    assert 30.0 < kelvin.std() < 45.0
+    assert 50.0 < kelvin.std() < 65.0, "every temperature comes about as often"
     np.testing.assert_array_equal(kelvin[:50], machine.temperatures_k(3, 50))
 
 

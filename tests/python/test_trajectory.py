@@ -170,8 +170,8 @@ def test_no_alpha_is_above_the_one_wanted():
         return {place: alpha for _, place, alpha, _ in path.alphas}
 
     free = alphas(None)
-    assert alphas(25.0) == {"start-up": 25.0, "transition": 25.0, "end": 25.0}
-    assert alphas({"transition": 25.0}) == free | {"transition": 25.0}
+    assert alphas(25.0) == pytest.approx({"start-up": 25.0, "transition": 25.0, "end": 25.0})
+    assert alphas({"transition": 25.0}) == pytest.approx(free | {"transition": 25.0})
     assert alphas(1e12) == free
     with pytest.raises(TrajectoryError, match=r"end: alpha_max 1: must be at least 5\.625"):
         alphas({"end": 1.0})

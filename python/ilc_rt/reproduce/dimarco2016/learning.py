@@ -131,7 +131,8 @@ def claims(figures: Figures) -> list[Claim]:
                 median["dpw"] / median["pd_ilc"],
                 source=source,
                 holds=median["dpw"] < 0.5 * median["pd_ilc"],
-                remark=seeds,
+                remark=f"{seeds}; temperatures that seldom come again make it larger, as all runs "
+                "count and few are near: least where the expansion's small N_d weighs them",
             ),
             Claim(
                 f"{title}: DPW-ILC, last runs over early ones",

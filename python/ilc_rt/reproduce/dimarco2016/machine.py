@@ -29,10 +29,9 @@ ALPHA_R = 3.9e-3
 #: Coefficients of the expansion in 1/K and 1/K² (Eq. 4.17).
 ALPHA_1, ALPHA_2 = 3e-6, 5e-7
 
-# Random temperature: white noise through a first-order low-pass, cut at 100 K. The thesis prints
-# "filtered" and "up to 100 °C in either direction".
-_POLE, _SPREAD_K, _LARGEST_K = 0.9, 40.0, 100.0
-_SETTLING = 100
+# Random temperature: normal steps summed up and reflected at 100 K, so that every temperature comes
+# about as often. The thesis prints "filtered random" and "up to 100 °C in either direction".
+_STEP_K, _LARGEST_K = 40.0, 100.0
 
 
 @dataclass(frozen=True)
@@ -101,8 +100,8 @@ EXPANSION = System("expansion", lambda _: _COLD, expansion, 1e-4)
 
 def temperatures_k(seed: int, n_runs: int) -> NDArray[np.float64]:
     """Return the temperature above T_0 of every run, constant within it."""
-    noise = np.random.default_rng(seed).standard_normal(_SETTLING + n_runs)
-    filtered = np.zeros_like(noise)
-    for run in range(1, len(noise)):
-        filtered[run] = _POLE * filtered[run - 1] + np.sqrt(1.0 - _POLE**2) * noise[run]
-    return np.clip(_SPREAD_K * filtered[_SETTLING:], -_LARGEST_K, _LARGEST_K)
+    random = np.random.default_rng(seed)
+    start = random.uniform(-_LARGEST_K, _LARGEST_K)
+    path = start + np.cumsum(_STEP_K * random.standard_normal(n_runs))
+    turn = 4.0 * _LARGEST_K
+    return np.abs((path - _LARGEST_K) % turn - 2.0 * _LARGEST_K) - _LARGEST_K
