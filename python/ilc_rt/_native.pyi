@@ -80,6 +80,7 @@ __all__ = [
     "run_events",
     "schedule",
     "second_order",
+    "sigmoid_pair",
     "spiral",
     "spline",
     "tracking_index",
@@ -446,6 +447,21 @@ def exponential_sigmoid(
     jerk_max_m_s3: float | ArrayLike,
     amplitude_m: float | ArrayLike | None = None,
     frequency_hz: float | ArrayLike | None = None,
+    alpha_max: float | dict[str, float] | None = None,
+) -> Trajectory: ...
+def sigmoid_pair(
+    *,
+    velocity_m_s: ArrayLike,
+    amplitude_m: ArrayLike,
+    omega_rad_s: ArrayLike,
+    phase_zero_s: ArrayLike,
+    corner_s: float,
+    duration_s: float,
+    start_alpha: float,
+    transition_alpha: float,
+    sine_alpha: float,
+    sine_offset_s: float,
+    dt_s: float,
 ) -> Trajectory: ...
 def modulated(
     points_m: ArrayLike,

@@ -101,6 +101,131 @@ def test_an_exponential_sigmoid_move_is_on_its_path_and_on_time():
     assert trajectory.tracking_index(path)[0] < trajectory.tracking_index(linear)[0]
 
 
+RAMPED = {"feed_m_s": 3.0, "amplitude_m": 0.15, "frequency_hz": 2.0 / (2.0 * np.pi)}
+
+
+def ramped_limits(acceleration):
+    return {
+        "velocity_max_m_s": 30.0,
+        "acceleration_max_m_s2": acceleration,
+        "jerk_max_m_s3": 1000.0 * acceleration,
+    }
+
+
+def printed_start(t, alpha):
+    """Return position and acceleration of DiMarco Eq. (2.3), (2.5), (2.8), (2.10), corrected."""
+    m, (a, w) = RAMPED["feed_m_s"], (RAMPED["amplitude_m"], 2.0)
+    s, c = np.sin(w * t), np.cos(w * t)
+    line, window = np.exp(-alpha * t**3), np.exp(-alpha * t**2)
+    x = m * t * (1.0 - line) + a * s * (1.0 - window)
+    along = line * m * (12.0 * alpha * t**2 - 9.0 * alpha**2 * t**5)
+    swing = 4.0 * alpha**2 * t**2 * s - 2.0 * alpha * s - 4.0 * alpha * w * t * c - w * w * s
+    return x, along - a * window * swing - a * w * w * s
+
+
+@pytest.mark.parametrize("acceleration", [2.0, 5.0, 20.0, 100.0])
+def test_the_largest_alpha_is_that_of_the_printed_equations(acceleration):
+    path = trajectory.exponential_sigmoid(
+        [0.0, 180.0], dt_s=0.002, **RAMPED, **ramped_limits(acceleration)
+    )
+    t = path.t_s[:5001]
+    [(_, place, alpha, intervals), _] = path.alphas
+    assert place == "start-up"
+    x, a = printed_start(t, alpha)
+    np.testing.assert_allclose(path.position_m[:5001, 0], x, rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(path.acceleration_m_s2[:5001, 0], a, rtol=0.0, atol=1e-9)
+    fine = np.linspace(0.0, 10.0, 20_001)
+
+    def peak(alpha):
+        return np.abs(printed_start(fine, alpha)[1]).max()
+
+    assert peak(alpha) == pytest.approx(acceleration, rel=1e-4)
+    assert all(peak(alpha * factor) > acceleration for factor in np.geomspace(1.01, 1e3, 20))
+    scanned = np.geomspace(intervals[0][0], alpha, 60)
+    inside = np.array([any(low <= a <= high for low, high in intervals) for a in scanned])
+    holds = np.array([peak(a) <= acceleration for a in scanned])
+    np.testing.assert_array_equal(inside[1:-1], holds[1:-1])
+
+
+def test_ends_that_reach_into_each_other_are_planned_together():
+    for acceleration in (4.0, 10.0):
+        limits = ramped_limits(acceleration)
+        path = trajectory.exponential_sigmoid([0.0, 30.0], dt_s=0.001, **RAMPED, **limits)
+        assert path.t_s[-1] == pytest.approx(10.0)
+        assert 0.999 < abs(path.acceleration_m_s2).max() / acceleration <= 1.0 + 1e-9
+    with pytest.raises(TrajectoryError, match=r"start-up.*alpha 0.045.*reaches 3.31"):
+        trajectory.exponential_sigmoid([0.0, 30.0], dt_s=0.001, **RAMPED, **ramped_limits(3.0))
+
+
+def test_an_oscillation_beyond_the_limits_is_refused_for_itself():
+    with pytest.raises(TrajectoryError, match=r"acceleration of the programmed .* reaches 0.6 m"):
+        trajectory.exponential_sigmoid([0.0, 300.0], dt_s=0.01, **RAMPED, **ramped_limits(0.59))
+
+
+def test_no_alpha_is_above_the_one_wanted():
+    def alphas(alpha_max):
+        path = trajectory.exponential_sigmoid(
+            [0.0, 0.2, 0.0], feed_m_s=0.1, dt_s=0.001, alpha_max=alpha_max, **LIMITS
+        )
+        return {place: alpha for _, place, alpha, _ in path.alphas}
+
+    free = alphas(None)
+    assert alphas(25.0) == pytest.approx({"start-up": 25.0, "transition": 25.0, "end": 25.0})
+    assert alphas({"transition": 25.0}) == pytest.approx(free | {"transition": 25.0})
+    assert alphas(1e12) == free
+    with pytest.raises(TrajectoryError, match=r"end: alpha_max 1: must be at least 5\.625"):
+        alphas({"end": 1.0})
+    with pytest.raises(TrajectoryError, match="alpha_max NaN"):
+        alphas(float("nan"))
+    with pytest.raises(ValueError, match='"start"; "start-up"'):
+        alphas({"start": 1.0})
+    with pytest.raises(TypeError, match=r"alpha_max = \[1.0\]; a number, or a dict"):
+        alphas([1.0])
+
+
+PAIR = {
+    "velocity_m_s": [10.0, -5.0],
+    "amplitude_m": [2.0, 1.0],
+    "omega_rad_s": [10.0, 20.0],
+    "phase_zero_s": [0.0, 6.01],
+    "corner_s": 6.0,
+    "duration_s": 14.0,
+    "start_alpha": 5.0,
+    "transition_alpha": 2.0,
+    "sine_alpha": 3.0,
+    "sine_offset_s": 1.0,
+    "dt_s": 0.01,
+}
+
+
+def test_a_sigmoid_pair_is_its_equation():
+    path = trajectory.sigmoid_pair(**PAIR)
+    t, c = path.t_s, path.t_s - 6.0
+    first = 10.0 * t + 2.0 * np.sin(10.0 * t) / (1.0 + np.exp(3.0 * (c + 1.0)))
+    second = 60.0 - 5.0 * c + np.sin(20.0 * (c - 0.01)) / (1.0 + np.exp(-3.0 * (c - 1.0)))
+    joined = first * 0.5 / (0.5 + np.exp(2.0 * c)) + second * 2.0 / (2.0 + np.exp(-2.0 * c))
+    expected = joined * (1.0 - np.exp(-5.0 * t**2))
+    np.testing.assert_allclose(path.position_m[:, 0], expected, rtol=0.0, atol=1e-12)
+    slope = (path.position_m[2:] - path.position_m[:-2]) / 0.02
+    np.testing.assert_allclose(slope, path.velocity_m_s[1:-1], atol=0.4)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"velocity_m_s": [1.0]}, "velocity_m_s has 1 entries; 2 are needed"),
+        ({"velocity_m_s": [1.0, 0.0]}, "velocity_m_s = 0: allowed a finite number other than 0"),
+        ({"amplitude_m": [1.0, np.nan]}, "amplitude_m holds NaN"),
+        ({"start_alpha": 0.0}, "start_alpha = 0: allowed a finite number above 0"),
+        ({"sine_offset_s": float("inf")}, "sine_offset_s = inf: allowed a finite number"),
+        ({"dt_s": 0.0}, "sample time 0 s"),
+    ],
+)
+def test_a_pair_that_cannot_be_is_refused(change, match):
+    with pytest.raises(ValueError, match=match):
+        trajectory.sigmoid_pair(**{**PAIR, **change})
+
+
 def test_the_index_is_the_integral_of_its_definition():
     path = PLANS["exponential_sigmoid"](0.001)
     tracking, acceleration = trajectory.tracking_index(path, k_e=600.0, k_a=2.0)

@@ -24,6 +24,7 @@ mod library;
 mod model;
 mod model_argument;
 mod python_law;
+mod sigmoid_pair;
 mod signal;
 mod time_varying;
 mod trajectory;
@@ -44,6 +45,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     contour::register(module)?;
     control::register(module)?;
     trajectory::register(module)?;
+    sigmoid_pair::register(module)?;
     laws::register(module)?;
     weights::register(module)?;
     analysis::register(module)?;

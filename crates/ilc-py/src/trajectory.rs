@@ -1,15 +1,17 @@
 //! Trajectories: `Trajectory` and the functions that plan one.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use ilc_rt::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
+use ilc_rt::trajectory::exponential::AlphaMax;
 use ilc_rt::trajectory::program::read_gcode;
 use ilc_rt::trajectory::{
     AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
     ModulatedSegment, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion, TrackingIndex,
     TrajectoryError, points_program, raster as raster_program,
 };
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::argument::{Signal, give_signal, read_vector};
@@ -18,12 +20,12 @@ use crate::error::OrRaise;
 use crate::exceptions;
 
 /// Place of an alpha, the alpha, and the intervals in which it might be.
-type Alpha = (usize, &'static str, f64, Vec<(f64, f64)>);
+pub(crate) type Alpha = (usize, &'static str, f64, Vec<(f64, f64)>);
 
 /// A planned motion, sampled.
 ///
 /// All arrays are float64 of shape (n_samples, n_axes), time first. The first
-/// and the last sample are at rest.
+/// and the last sample are at rest, but for `sigmoid_pair`.
 ///
 /// Examples
 /// --------
@@ -111,7 +113,7 @@ impl PyTrajectory {
 }
 
 /// Plans without the interpreter, and measures how long it takes.
-fn planned(
+pub(crate) fn planned(
     py: Python<'_>,
     plan: impl FnOnce() -> Result<(SampledMotion, Vec<Alpha>), TrajectoryError> + Send,
 ) -> PyResult<PyTrajectory> {
@@ -163,6 +165,34 @@ fn read_limits(
         .collect())
 }
 
+/// Reads the largest alpha wanted: a number for all places, or numbers by the place's name.
+fn read_alpha_max(object: Option<&Bound<'_, PyAny>>) -> PyResult<AlphaMax> {
+    let mut alpha_max = AlphaMax::default();
+    let Some(object) = object else { return Ok(alpha_max) };
+    if let Ok(value) = object.extract::<f64>() {
+        return Ok(AlphaMax { start_up: value, transition: value, end: value });
+    }
+    let Ok(by_place) = object.extract::<BTreeMap<String, f64>>() else {
+        return Err(PyTypeError::new_err(format!(
+            "alpha_max = {}; a number, or a dict of numbers by place, is needed",
+            object.repr()?
+        )));
+    };
+    for (place, value) in by_place {
+        match place.as_str() {
+            "start-up" => alpha_max.start_up = value,
+            "transition" => alpha_max.transition = value,
+            "end" => alpha_max.end = value,
+            other => {
+                return Err(PyValueError::new_err(format!(
+                    "alpha_max: {other:?}; \"start-up\", \"transition\" or \"end\" is needed"
+                )));
+            }
+        }
+    }
+    Ok(alpha_max)
+}
+
 fn read_setting(setting: &str) -> PyResult<LinearSetting> {
     match setting {
         "complete" => Ok(LinearSetting::CompleteEveryMove),
@@ -198,9 +228,10 @@ fn sample_exponential(
     start_m: &[f64],
     segments: &[ModulatedSegment],
     limits: &[AxisLimits],
+    alpha_max: &AlphaMax,
     dt_s: f64,
 ) -> Result<(SampledMotion, Vec<Alpha>), TrajectoryError> {
-    let plan = ExponentialSigmoid::plan(start_m, segments, limits)?;
+    let plan = ExponentialSigmoid::plan_below(start_m, segments, limits, alpha_max)?;
     let motion = SampledMotion::sample(plan.duration_s(), dt_s, plan.n_axes(), |t_s| {
         (plan.at(t_s), plan.programmed_m(t_s))
     })?;
@@ -342,6 +373,10 @@ fn jerk_limited(
 ///     Amplitude of the oscillation along each leg, in m.
 /// frequency_hz : float or ndarray of float64, shape (n_points - 1,)
 ///     Its frequency, in Hz.
+/// alpha_max : float or dict of float, optional
+///     No alpha above this is used, at every place or by the name of the place:
+///     ``"start-up"``, ``"transition"``, ``"end"``. The largest that the limits
+///     allow is not the one with the smallest `tracking_index`.
 ///
 /// Returns
 /// -------
@@ -355,9 +390,14 @@ fn jerk_limited(
 /// ValueError, TypeError
 ///     If an array has the wrong shape, dtype or a number that is not finite.
 ///
+/// Notes
+/// -----
+/// A start has to be over before its leg is: ``a T^3`` of at least 45, so that
+/// its acceleration reaches about ``11 v / T`` in a leg of T seconds.
+///
 /// References
 /// ----------
-/// [dimarco2016], Section 2.1.
+/// [dimarco2016], Section 2.1, 2.3.3.
 ///
 /// Examples
 /// --------
@@ -368,7 +408,7 @@ fn jerk_limited(
 /// >>> " ".join(place for _, place, _, _ in move.alphas)
 /// 'start-up transition end'
 #[pyfunction]
-#[pyo3(signature = (points_m, *, feed_m_s, dt_s, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3, amplitude_m=None, frequency_hz=None))]
+#[pyo3(signature = (points_m, *, feed_m_s, dt_s, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3, amplitude_m=None, frequency_hz=None, alpha_max=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 fn exponential_sigmoid(
     py: Python<'_>,
@@ -380,6 +420,7 @@ fn exponential_sigmoid(
     jerk_max_m_s3: &Bound<'_, PyAny>,
     amplitude_m: Option<&Bound<'_, PyAny>>,
     frequency_hz: Option<&Bound<'_, PyAny>>,
+    alpha_max: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyTrajectory> {
     let points = read_points("points_m", points_m)?;
     let n_legs = points.len() - 1;
@@ -399,7 +440,8 @@ fn exponential_sigmoid(
             frequency_hz: frequencies[i],
         })
         .collect();
-    planned(py, || sample_exponential(&points[0], &segments, &limits, dt_s))
+    let alpha_max = read_alpha_max(alpha_max)?;
+    planned(py, || sample_exponential(&points[0], &segments, &limits, &alpha_max, dt_s))
 }
 
 /// Plan a modulated tool path: a feed with an oscillation along it.
@@ -478,7 +520,9 @@ fn modulated(
     let limits = read_limits(start.len(), velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
     let segment = ModulatedSegment { to_m: end.clone(), feed_m_s, amplitude_m, frequency_hz };
     if interpolation == "exponential_sigmoid" {
-        return planned(py, || sample_exponential(start, &[segment], &limits, dt_s));
+        return planned(py, || {
+            sample_exponential(start, &[segment], &limits, &AlphaMax::default(), dt_s)
+        });
     }
     let setting = read_setting(interpolation).map_err(|_| {
         PyValueError::new_err(format!(

@@ -173,11 +173,17 @@ impl StateSpace {
             }
         };
         let mut output = Vec::with_capacity(input.len() / m * self.n_outputs());
-        for u in input.chunks_exact(m) {
-            let u = DVector::from_column_slice(u);
-            let y = &self.c * &x + &self.d * &u;
+        // In place: a vector made anew for each product would take longer than the product.
+        let (mut next, mut u) = (DVector::zeros(n), DVector::zeros(m));
+        let mut y = DVector::zeros(self.n_outputs());
+        for sample in input.chunks_exact(m) {
+            u.copy_from_slice(sample);
+            y.gemv(1.0, &self.c, &x, 0.0);
+            y.gemv(1.0, &self.d, &u, 1.0);
             output.extend_from_slice(y.as_slice());
-            x = &self.a * &x + &self.b * &u;
+            next.gemv(1.0, &self.a, &x, 0.0);
+            next.gemv(1.0, &self.b, &u, 1.0);
+            std::mem::swap(&mut x, &mut next);
         }
         Ok(output)
     }

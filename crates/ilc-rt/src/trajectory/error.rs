@@ -199,6 +199,37 @@ pub enum TrajectoryError {
         /// The limit along the path.
         limit: f64,
     },
+    /// The programmed oscillation breaks a limit, whatever its start.
+    #[error(
+        "segment {}: the {quantity} of the programmed oscillation reaches {} {unit} along the path, \
+         limit {} {unit}; lower its amplitude or its frequency",
+        segment + 1, Figure(*reached), Figure(*limit), unit = quantity.unit()
+    )]
+    Programmed {
+        /// Which segment.
+        segment: usize,
+        /// The limit that it breaks.
+        quantity: Quantity,
+        /// What is reached.
+        reached: f64,
+        /// The limit along the path.
+        limit: f64,
+    },
+    /// The largest α wanted is so small that an end is not over within its leg.
+    #[error(
+        "segment {} {place}: alpha_max {value}: must be at least {}, as the {place} is not over \
+         within its segment otherwise", segment + 1, Figure(*least)
+    )]
+    AlphaMax {
+        /// Which segment.
+        segment: usize,
+        /// `start-up`, `transition` or `end`.
+        place: &'static str,
+        /// The value given.
+        value: f64,
+        /// The smallest that is over in time.
+        least: f64,
+    },
     /// A leg is over before its ends can be.
     #[error(
         "segment {}: lasts {} s at its feed, and its oscillation has to be 0 for {} s of that near \

@@ -130,7 +130,11 @@ fn random_exponential_sigmoid_moves() {
                     }
                 }
             }
-            Err(TrajectoryError::Alpha { .. } | TrajectoryError::Hurried { .. }) => refused += 1,
+            Err(
+                TrajectoryError::Alpha { .. }
+                | TrajectoryError::Hurried { .. }
+                | TrajectoryError::Programmed { .. },
+            ) => refused += 1,
             Err(other) => panic!("{other}"),
         }
     }

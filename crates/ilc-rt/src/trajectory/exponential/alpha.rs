@@ -1,29 +1,25 @@
 //! The largest α that honours every limit. Cold.
 //!
 //! The peaks of velocity, acceleration and jerk are not monotone in α: an oscillation and a start can
-//! help or hurt each other. So α is scanned, every crossing bracketed and bisected, dips between two
-//! points of the scan looked into, and all admissible intervals reported.
+//! help or hurt each other. So α is scanned, every crossing bracketed and bisected, dips and humps
+//! between two points of the scan looked into, and all admissible intervals reported. An end is checked together
+//! with the other end of its leg wherever both are felt, on the motion that will be executed.
 
 use super::leg::{End, Leg};
+use super::peaks::peaks;
 use crate::trajectory::error::{Quantity, TrajectoryError};
 use crate::trajectory::limits::PathLimits;
 
 /// Scan points in a decade of α.
 const PER_DECADE: f64 = 12.0;
-/// Samples of an end without oscillation.
-const SAMPLES: usize = 160;
-/// Samples of one period of an oscillation.
-const SAMPLES_A_PERIOD: f64 = 32.0;
-/// Most samples of an end.
-const SAMPLES_MAX: f64 = 20_000.0;
-/// Bisections of a crossing, and golden sections of a peak.
+/// A hump of the scan is looked into above this.
+const NEAR: f64 = 0.9;
+/// Golden sections of a dip or a hump.
+const SECTIONS: usize = 16;
+/// Bisections of a crossing.
 const STEPS: usize = 32;
-/// Peaks looked into of one end and quantity.
-const CANDIDATES: usize = 4;
-/// Distance kept from a crossing, relative: far above the rounding of a peak.
-const MARGIN: f64 = 1e-10;
 /// `(√5 - 1)/2`.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
+pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// An interval of α in which every limit holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +35,10 @@ pub(super) struct Place<'a> {
     /// The legs that end here, each with the end that is here.
     pub(super) legs: &'a [(Leg, usize)],
     pub(super) limits: PathLimits,
+    /// Share of each limit that is kept free: for the rounding of a peak, or for the ends to come.
+    pub(super) margin: f64,
+    /// No α above this is wanted.
+    pub(super) alpha_max: f64,
     /// Number of the first leg, for the refusal.
     pub(super) segment: usize,
     pub(super) name: &'static str,
@@ -49,10 +49,19 @@ impl Place<'_> {
     ///
     /// # Errors
     /// [`TrajectoryError::Alpha`] with the limit that is nearest to hold if no α is admissible,
-    /// [`TrajectoryError::Hurried`] if a leg is too short for any.
+    /// [`TrajectoryError::Hurried`] if a leg is too short for any, [`TrajectoryError::AlphaMax`] if
+    /// the largest wanted is too small for the leg.
     pub(super) fn choose(&self) -> Result<(f64, Vec<AlphaInterval>), TrajectoryError> {
         let smallest = self.smallest()?;
-        let largest = self.largest().max(1.001 * smallest);
+        if self.alpha_max.is_nan() || self.alpha_max < smallest {
+            return Err(TrajectoryError::AlphaMax {
+                segment: self.segment,
+                place: self.name,
+                value: self.alpha_max,
+                least: smallest,
+            });
+        }
+        let largest = self.largest().max(1.001 * smallest).min(self.alpha_max);
         let n_points = ((largest / smallest).log10() * PER_DECADE).ceil().max(4.0);
         let step = (largest / smallest).powf(1.0 / n_points);
         #[expect(
@@ -60,11 +69,12 @@ impl Place<'_> {
             clippy::cast_sign_loss,
             reason = "a few hundred at most: powers of 10 of finite numbers"
         )]
-        let alphas: Vec<f64> =
-            (0..=n_points as usize).map(|i| smallest * step.powf(i as f64)).collect();
+        let alphas: Vec<f64> = (0..=n_points as usize)
+            .map(|i| (smallest * step.powf(i as f64)).min(largest))
+            .collect();
         let ratios: Vec<f64> = alphas.iter().map(|&alpha| self.excess(alpha, false).0).collect();
         let mut found: Vec<(f64, f64)> = alphas.iter().copied().zip(ratios).collect();
-        self.look_into_dips(&mut found);
+        self.look_between(&mut found);
         let intervals = self.intervals(&found);
         match intervals.last() {
             Some(last) => Ok((last.to, intervals)),
@@ -72,25 +82,39 @@ impl Place<'_> {
         }
     }
 
-    /// Adds the lowest point of every dip that the scan sees but that stays above 1 on it.
-    fn look_into_dips(&self, found: &mut Vec<(f64, f64)>) {
-        let dips: Vec<[(f64, f64); 3]> = found
+    /// Adds the lowest point of every dip that stays above 1 on the scan, and the highest of every
+    /// hump that stays below: there may be an interval, or a gap, between two points.
+    fn look_between(&self, found: &mut Vec<(f64, f64)>) {
+        let turns: Vec<(f64, f64, f64)> = found
             .windows(3)
-            .filter(|w| w[1].1 > 1.0 && w[1].1 <= w[0].1 && w[1].1 <= w[2].1)
-            .map(|w| [w[0], w[1], w[2]])
+            .filter_map(|w| {
+                let [before, at, after] = [w[0].1, w[1].1, w[2].1];
+                let is_dip = at > 1.0 && at <= before && at <= after;
+                let is_hump = at <= 1.0 && at > NEAR && at >= before && at >= after;
+                let sign = if is_dip { 1.0 } else { -1.0 };
+                (is_dip || is_hump).then_some((w[0].0, w[2].0, sign))
+            })
             .collect();
-        for [low, _, high] in dips {
-            let (mut from, mut to) = (low.0, high.0);
-            for _ in 0..24 {
-                let (left, right) = (to - GOLDEN * (to - from), from + GOLDEN * (to - from));
-                if self.excess(left, false).0 < self.excess(right, false).0 {
-                    to = right;
+        for (mut from, mut to, sign) in turns {
+            let value = |alpha: f64| sign * self.excess(alpha, false).0;
+            let (mut left, mut right) = (to - GOLDEN * (to - from), from + GOLDEN * (to - from));
+            let (mut at_left, mut at_right) = (value(left), value(right));
+            for _ in 0..SECTIONS {
+                if at_left < at_right {
+                    (to, right, at_right) = (right, left, at_left);
+                    left = to - GOLDEN * (to - from);
+                    at_left = value(left);
                 } else {
-                    from = left;
+                    (from, left, at_left) = (left, right, at_right);
+                    right = from + GOLDEN * (to - from);
+                    at_right = value(right);
                 }
             }
-            let alpha = 0.5 * (from + to);
-            found.push((alpha, self.excess(alpha, false).0));
+            found.push(if at_left < at_right {
+                (left, sign * at_left)
+            } else {
+                (right, sign * at_right)
+            });
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
@@ -127,7 +151,7 @@ impl Place<'_> {
     }
 
     fn holds(&self, alpha: f64) -> bool {
-        self.excess(alpha, true).0 <= 1.0 - MARGIN
+        self.excess(alpha, true).0 <= 1.0 - self.margin
     }
 
     /// The largest ratio of a peak to its limit; `exact` refines each peak.
@@ -140,7 +164,7 @@ impl Place<'_> {
         let mut worst = (0.0, Quantity::Velocity, 0.0, self.limits.velocity_m_s);
         for (leg, which) in self.legs {
             let mut leg = *leg;
-            leg.alpha[*which] = alpha;
+            leg.alpha[*which] = Some(alpha);
             let peaks = peaks(&leg, *which, exact);
             for ((quantity, limit), peak) in limits.into_iter().zip(peaks) {
                 if peak / limit > worst.0 {
@@ -151,15 +175,16 @@ impl Place<'_> {
         worst
     }
 
-    /// The smallest α whose end is over within its share of the leg.
+    /// The smallest α whose deviation is gone at the other end, and whose clearance leaves the other
+    /// end its half of the leg.
     fn smallest(&self) -> Result<f64, TrajectoryError> {
         let mut smallest = 1e-12_f64;
         for (leg, which) in self.legs {
             let fits = |alpha: f64| {
                 let mut leg = *leg;
-                leg.alpha[*which] = alpha;
-                let (deviation_s, window_s) = leg.reach_s(*which);
-                deviation_s <= leg.duration_s && window_s <= 0.5 * leg.duration_s
+                leg.alpha[*which] = Some(alpha);
+                let (deviation_s, _) = leg.reach_s(*which);
+                deviation_s <= leg.duration_s && leg.clearance_s(*which) <= 0.5 * leg.duration_s
             };
             let (mut low, mut high) = (1e-12_f64, 1e18_f64);
             if !fits(high) {
@@ -220,80 +245,4 @@ impl Place<'_> {
             limit,
         }
     }
-}
-
-/// Largest absolute velocity, acceleration and jerk of one end and of a period after it.
-fn peaks(leg: &Leg, which: usize, exact: bool) -> [f64; 3] {
-    let (deviation_s, window_s) = leg.reach_s(which);
-    let felt_s = deviation_s.max(window_s);
-    let (span_s, n_samples) = if leg.amplitude_m == 0.0 {
-        (felt_s, SAMPLES as f64)
-    } else {
-        let period_s = std::f64::consts::TAU / leg.omega_rad_s;
-        let span_s = (felt_s + period_s).min(leg.duration_s);
-        let fine_s = (deviation_s / SAMPLES as f64).min(window_s / SAMPLES as f64);
-        let wanted = (SAMPLES_A_PERIOD * span_s / period_s).max(span_s / fine_s.max(1e-300));
-        (span_s, wanted.min(SAMPLES_MAX))
-    };
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "1 to the most samples"
-    )]
-    let n_samples = n_samples.ceil().max(2.0) as usize;
-    let value = |tau_s: f64| leg.near(which, tau_s).0;
-    // The jerk jumps where the window opens: the samples have a joint there.
-    let joint_s = if leg.amplitude_m == 0.0 || matches!((leg.ends[which], which), (End::Rest, 0)) {
-        0.0
-    } else {
-        leg.clearance_s(which).min(span_s)
-    };
-    let times_s: Vec<f64> = [(0.0, joint_s), (joint_s, span_s)]
-        .into_iter()
-        .filter(|(from, to)| to > from)
-        .flat_map(|(from, to)| {
-            (0..=n_samples).map(move |i| from + (to - from) * i as f64 / n_samples as f64)
-        })
-        .collect();
-    let samples: Vec<[f64; 4]> = times_s.iter().map(|&tau_s| value(tau_s)).collect();
-    std::array::from_fn(|order| {
-        let size = |jet: &[f64; 4]| jet[order + 1].abs();
-        let most = samples.iter().map(size).fold(0.0, f64::max);
-        if !exact {
-            return most;
-        }
-        let mut peak = most;
-        // Each side of the joint has peaks of its own: samples at its edges have no neighbour beyond.
-        let (is_first, is_last) = (
-            |i: usize| i.is_multiple_of(n_samples + 1),
-            |i: usize| (i + 1).is_multiple_of(n_samples + 1),
-        );
-        let mut candidates: Vec<(usize, f64)> = (0..samples.len())
-            .map(|i| (i, size(&samples[i])))
-            .filter(|&(i, here)| {
-                let before = if is_first(i) { 0.0 } else { size(&samples[i - 1]) };
-                let after = if is_last(i) { 0.0 } else { size(&samples[i + 1]) };
-                here >= 0.97 * most && here >= before && here >= after
-            })
-            .collect();
-        candidates.sort_by(|a, b| b.1.total_cmp(&a.1));
-        for (i, _) in candidates.into_iter().take(CANDIDATES) {
-            let from = times_s[if is_first(i) { i } else { i - 1 }];
-            let to = times_s[if is_last(i) { i } else { i + 1 }];
-            peak = peak.max(refined(|tau_s| size(&value(tau_s)), from, to));
-        }
-        peak
-    })
-}
-
-/// The largest value in an interval with one maximum.
-fn refined(value: impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
-    let mut best = 0.0_f64;
-    for _ in 0..24 {
-        let (left, right) = (to - GOLDEN * (to - from), from + GOLDEN * (to - from));
-        let (at_left, at_right) = (value(left), value(right));
-        best = best.max(at_left).max(at_right);
-        if at_left > at_right { to = right } else { from = left }
-    }
-    best
 }

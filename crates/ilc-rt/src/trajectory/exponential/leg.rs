@@ -1,7 +1,8 @@
 //! One straight leg of an E/S move along its direction, and what its two ends do to it.
 //!
 //! The programmed motion is `v t + A sin(ω t)`. Each end adds a deviation from the line and a window
-//! on the oscillation; both vanish towards the other end, so that each end has an α of its own.
+//! on the oscillation. A deviation is gone at the other end, and a window is multiplied by one that
+//! is shut there: so the leg is at rest, or at its corner, exactly, whatever α each end has.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -38,15 +39,18 @@ pub(super) struct Leg {
     pub(super) omega_rad_s: f64,
     pub(super) duration_s: f64,
     pub(super) ends: [End; 2],
-    /// α of the first and of the last end.
-    pub(super) alpha: [f64; 2],
+    /// α of the first and of the last end; an end without one is not there yet.
+    pub(super) alpha: [Option<f64>; 2],
 }
 
 impl Leg {
     /// What this end adds to the line, at a time counted from the end into the leg, and the window
     /// of the oscillation there. Read forward in that time; the last end is reversed by the caller.
     fn end(&self, which: usize, tau_s: f64) -> (Jet, Jet) {
-        let (tau, alpha, v) = (Jet::line(tau_s, 1.0), self.alpha[which], self.feed_m_s);
+        let Some(alpha) = self.alpha[which] else {
+            return (Jet::constant(0.0), Jet::constant(1.0));
+        };
+        let (tau, v) = (Jet::line(tau_s, 1.0), self.feed_m_s);
         let deviation = match self.ends[which] {
             End::Rest => -(tau * v) * (tau.cubed() * alpha).decay(),
             End::Transition { neighbour_m_s, ratio } => {
@@ -78,19 +82,24 @@ impl Leg {
     }
 
     /// How far from a corner the oscillation stays at 0: beyond it the line is farther from the
-    /// corner than the oscillation reaches, so that it never passes the corner.
+    /// corner than the oscillation reaches, so that it never passes the corner. A start has none.
     pub(super) fn clearance_s(&self, which: usize) -> f64 {
-        let alpha = self.alpha[which];
-        self.amplitude_m / self.feed_m_s
-            + match self.ends[which] {
-                End::Rest => alpha.cbrt().recip(),
-                End::Transition { ratio, .. } => (CLEARANCE + ratio.ln().abs()) / alpha,
+        let Some(alpha) = self.alpha[which] else { return 0.0 };
+        if self.amplitude_m == 0.0 {
+            return 0.0;
+        }
+        match self.ends[which] {
+            End::Rest if which == 0 => 0.0,
+            End::Rest => self.amplitude_m / self.feed_m_s + alpha.cbrt().recip(),
+            End::Transition { ratio, .. } => {
+                self.amplitude_m / self.feed_m_s + (CLEARANCE + ratio.ln().abs()) / alpha
             }
+        }
     }
 
     /// How long an end is felt: the deviation, and the opening of the window.
     pub(super) fn reach_s(&self, which: usize) -> (f64, f64) {
-        let alpha = self.alpha[which];
+        let Some(alpha) = self.alpha[which] else { return (0.0, 0.0) };
         let oscillates = self.amplitude_m != 0.0;
         match self.ends[which] {
             End::Rest => {
@@ -132,24 +141,6 @@ impl Leg {
             motion = motion + phase.sin() * opening * closing * self.amplitude_m;
         }
         (motion, from_end)
-    }
-
-    /// The motion near one end alone, as if the other were far away; from that end, forward in the
-    /// time from it. What limits are checked on while α is searched.
-    pub(super) fn near(&self, which: usize, tau_s: f64) -> Jet {
-        let (deviation, window) = self.end(which, tau_s);
-        let mut motion = Jet::line(self.feed_m_s * tau_s, self.feed_m_s) + deviation;
-        if self.amplitude_m != 0.0 {
-            let phase = if which == 0 {
-                Jet::line(self.omega_rad_s * tau_s, self.omega_rad_s)
-            } else {
-                Jet::line(self.omega_rad_s * (self.duration_s - tau_s), -self.omega_rad_s)
-            };
-            // From the last end the line runs the other way, and the oscillation does not.
-            let sign = if which == 0 { 1.0 } else { -1.0 };
-            motion = motion + phase.sin() * window * (sign * self.amplitude_m);
-        }
-        motion
     }
 
     /// The programmed position, without any end.

@@ -1,9 +1,14 @@
-//! The program of the thesis's Appendix A: two legs on one axis, every α given. Nothing is limited.
+//! The program of the thesis's Appendix A: two legs on one axis, every α given. Nothing is limited:
+//! for a motion that is to be exactly what somebody else's was, read by the Python glue.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::equations::{weight_after, weight_before};
 use super::jet::Jet;
+use crate::trajectory::MAX_AXES;
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::limits::is_positive;
+use crate::trajectory::motion::{MotionState, SampledMotion};
 
 /// One leg of the listing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +91,65 @@ impl Listing {
             + path(second, opening) * weight_after(from_corner_s, ratio, self.transition_alpha);
         joined * (t.squared() * self.start_alpha).rise()
     }
+
+    /// Where the two legs are at a time, their oscillations included, with no start and no transition.
+    pub fn programmed_m(&self, t_s: f64) -> f64 {
+        let [first, second] = &self.legs;
+        let leg = if t_s < self.corner_s { first } else { second };
+        let corner_m = first.velocity_m_s * self.corner_s;
+        corner_m
+            + leg.velocity_m_s * (t_s - self.corner_s)
+            + leg.amplitude_m * (leg.omega_rad_s * (t_s - leg.phase_zero_s)).sin()
+    }
+
+    /// Samples the motion from its start on.
+    ///
+    /// # Real Time
+    /// Cold: allocates.
+    /// # Errors
+    /// [`TrajectoryError`] for a velocity of 0, an α or a time that is not above 0, or a number that
+    /// is not finite.
+    pub fn sample(&self, duration_s: f64, dt_s: f64) -> Result<SampledMotion, TrajectoryError> {
+        let refuse = |name, value, allowed| Err(TrajectoryError::Shape { name, value, allowed });
+        for (name, value) in [
+            ("duration_s", duration_s),
+            ("corner_s", self.corner_s),
+            ("start_alpha", self.start_alpha),
+            ("transition_alpha", self.transition_alpha),
+            ("sine_alpha", self.sine_alpha),
+        ] {
+            if !is_positive(value) {
+                return refuse(name, value, "a finite number above 0");
+            }
+        }
+        for leg in &self.legs {
+            let is_still = leg.velocity_m_s.abs() <= 0.0;
+            if is_still || !leg.velocity_m_s.is_finite() {
+                return refuse("velocity_m_s", leg.velocity_m_s, "a finite number other than 0");
+            }
+            for (name, value) in [
+                ("amplitude_m", leg.amplitude_m),
+                ("omega_rad_s", leg.omega_rad_s),
+                ("phase_zero_s", leg.phase_zero_s),
+                ("sine_offset_s", self.sine_offset_s),
+            ] {
+                if !value.is_finite() {
+                    return refuse(name, value, "a finite number");
+                }
+            }
+        }
+        let on_first_axis = |value: f64| {
+            let mut axes = [0.0; MAX_AXES];
+            axes[0] = value;
+            axes
+        };
+        SampledMotion::sample(duration_s, dt_s, 1, |t_s| {
+            let [x, v, a, j] = self.at(t_s).0.map(on_first_axis);
+            let state =
+                MotionState { position_m: x, velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: j };
+            (state, on_first_axis(self.programmed_m(t_s)))
+        })
+    }
 }
 
 #[cfg(test)]
@@ -111,5 +175,35 @@ mod tests {
             n_samples += 1;
         }
         assert_eq!(n_samples, 1401);
+        let motion = listing.sample(14.0, 0.01).unwrap();
+        assert_eq!((motion.n_samples(), motion.n_axes), (1401, 1));
+        // Between start and transition it is on its program, and turns round before the corner.
+        for k in [200, 250, 1150, 1300] {
+            let miss = motion.position_m[k] - motion.programmed_m[k];
+            assert!(miss.abs() < 0.1, "{k}: {miss}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_cannot_be_is_refused() {
+        let printed = Listing::printed();
+        assert!(printed.sample(0.0, 0.01).is_err() && printed.sample(14.0, 0.0).is_err());
+        for bad in [
+            Listing { start_alpha: 0.0, ..printed },
+            Listing { transition_alpha: f64::NAN, ..printed },
+            Listing { sine_alpha: -1.0, ..printed },
+            Listing { corner_s: f64::INFINITY, ..printed },
+            Listing { sine_offset_s: f64::NAN, ..printed },
+            Listing { legs: [ListedLeg { velocity_m_s: 0.0, ..printed.legs[0] }; 2], ..printed },
+            Listing {
+                legs: [ListedLeg { amplitude_m: f64::NAN, ..printed.legs[0] }; 2],
+                ..printed
+            },
+        ] {
+            assert!(
+                matches!(bad.sample(14.0, 0.01), Err(TrajectoryError::Shape { .. })),
+                "{bad:?}"
+            );
+        }
     }
 }

@@ -7,12 +7,15 @@
 //! leave the path there. Planning is cold; [`ExponentialSigmoid::at`] is hot.
 
 mod alpha;
+mod choice;
 pub mod equations;
 mod jet;
 mod leg;
 pub mod listing;
+mod peaks;
 mod plan;
 
 pub use alpha::AlphaInterval;
+pub use choice::{AlphaChoice, AlphaMax};
 pub use jet::Jet;
-pub use plan::{AlphaChoice, ExponentialSigmoid, ModulatedSegment};
+pub use plan::{ExponentialSigmoid, ModulatedSegment};

@@ -2,17 +2,20 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use super::alpha::{AlphaInterval, Place};
+use super::choice::{AlphaChoice, AlphaMax, MARGIN, choose};
 use super::equations::blending_ratio;
 use super::leg::{End, Leg};
 use crate::trajectory::MAX_AXES;
-use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::error::{Quantity, TrajectoryError};
 use crate::trajectory::limits::{AxisLimits, Line, PathLimits};
 use crate::trajectory::motion::MotionState;
 use crate::trajectory::path::{PathSegment, checked_lines};
 
 /// Directions closer than this are the same line.
 const SAME_LINE: f64 = 1e-9;
+/// Shares of each limit that an end keeps free for the ends after it, tried one after the other. None
+/// unless a leg is so short that its ends reach into each other.
+const RESERVES: [f64; 3] = [MARGIN, 1e-3, 0.03];
 
 /// A straight leg with an oscillation along it, as modulated tool paths have.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,24 +30,10 @@ pub struct ModulatedSegment {
     pub frequency_hz: f64,
 }
 
-/// The α of one place, and the intervals in which it might be.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AlphaChoice {
-    /// Segment at whose start, or in front of whose end, it is.
-    pub segment: usize,
-    /// `start-up`, `transition` or `end`.
-    pub place: &'static str,
-    /// The α used: the largest admissible. In s⁻³ (and s⁻² for the oscillation) for start-up and end,
-    /// in s⁻¹ for a transition.
-    pub alpha: f64,
-    /// All admissible intervals, from the smallest on.
-    pub admissible: Vec<AlphaInterval>,
-}
-
 #[derive(Clone, Copy, Debug)]
-struct PlacedLeg {
-    leg: Leg,
-    line: Line,
+pub(super) struct PlacedLeg {
+    pub(super) leg: Leg,
+    pub(super) line: Line,
     start_s: f64,
 }
 
@@ -62,64 +51,78 @@ impl ExponentialSigmoid {
     ///
     /// Each start, transition and end gets the largest α at which no axis exceeds a limit; one α
     /// holds for all axes, so that a leg stays straight. The oscillation is 0 near corners, so that
-    /// it passes none.
+    /// it passes none. A leg may be so short that its ends reach into each other; they are then
+    /// checked together, the earlier one having the larger α.
     ///
     /// # Shapes
     /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`]
     /// # Real Time
     /// Cold: allocates, and searches.
     /// # Errors
-    /// [`TrajectoryError`] for values out of range; [`TrajectoryError::Alpha`] if no α holds the
-    /// limits (a start overshoots its feed by 79 %); [`TrajectoryError::Hurried`] for a leg that is
-    /// over before its ends are.
+    /// [`TrajectoryError`] for values out of range; [`TrajectoryError::Programmed`] for an
+    /// oscillation beyond the limits; [`TrajectoryError::Alpha`] if no α holds them (a start
+    /// overshoots its feed by 79 %, and has to be over within its leg);
+    /// [`TrajectoryError::Hurried`] for a leg that is over before its ends are.
     /// # Source
     /// - [dimarco2016], Section 2.1
-    #[expect(clippy::disallowed_methods, reason = "cold: planned once")]
     pub fn plan(
         start_m: &[f64],
         segments: &[ModulatedSegment],
         limits: &[AxisLimits],
+    ) -> Result<Self, TrajectoryError> {
+        Self::plan_below(start_m, segments, limits, &AlphaMax::default())
+    }
+
+    /// Plans like [`plan`](Self::plan), with no α above what is wanted: a gentler move than the
+    /// limits allow can cost less (Fig. 2.15).
+    ///
+    /// # Shapes
+    /// - as [`plan`](Self::plan)
+    /// # Real Time
+    /// Cold: allocates, and searches.
+    /// # Errors
+    /// As [`plan`](Self::plan); [`TrajectoryError::AlphaMax`] for one so small that an end is not
+    /// over within its leg.
+    /// # Source
+    /// - [dimarco2016], Section 2.3.3
+    pub fn plan_below(
+        start_m: &[f64],
+        segments: &[ModulatedSegment],
+        limits: &[AxisLimits],
+        alpha_max: &AlphaMax,
     ) -> Result<Self, TrajectoryError> {
         let straight: Vec<PathSegment> = segments
             .iter()
             .map(|segment| PathSegment::line(segment.to_m.clone(), segment.feed_m_s))
             .collect();
         let lines = checked_lines(start_m, &straight, limits)?;
-        for (index, segment) in segments.iter().enumerate() {
+        for (index, (segment, line)) in segments.iter().zip(&lines).enumerate() {
             check_oscillation(index, segment)?;
+            let along = PathLimits::along(&line.direction, limits, f64::INFINITY);
+            check_programmed(index, segment, &along)?;
         }
-        let mut legs = placed(segments, &lines)?;
-        let mut choices = Vec::new();
-        let n_legs = legs.len();
-        for i in 0..=n_legs {
-            let before = i.checked_sub(1).map(|at| (at, 1));
-            let after = (i < n_legs).then_some((i, 0));
-            let joined = after.is_some_and(|(at, _)| legs[at].leg.ends[0] != End::Rest);
-            let groups: [(&str, Vec<(usize, usize)>); 2] = if joined {
-                [("transition", before.into_iter().chain(after).collect()), ("", Vec::new())]
-            } else {
-                [("end", before.into_iter().collect()), ("start-up", after.into_iter().collect())]
-            };
-            for (place, members) in groups {
-                let Some(&(segment, _)) = members.first() else { continue };
-                let along = PathLimits::along(&legs[segment].line.direction, limits, f64::INFINITY);
-                let near: Vec<(Leg, usize)> =
-                    members.iter().map(|&(at, which)| (legs[at].leg, which)).collect();
-                let (alpha, admissible) =
-                    Place { legs: &near, limits: along, segment, name: place }.choose()?;
-                for &(at, which) in &members {
-                    legs[at].leg.alpha[which] = alpha;
+        let bare = placed(segments, &lines)?;
+        let mut first_refusal = None;
+        for reserve in RESERVES {
+            let mut legs = bare.clone();
+            match choose(&mut legs, limits, reserve, alpha_max) {
+                Ok(choices) => {
+                    let duration_s =
+                        legs.last().map_or(0.0, |last| last.start_s + last.leg.duration_s);
+                    return Ok(Self {
+                        legs: legs.into_boxed_slice(),
+                        choices: choices.into_boxed_slice(),
+                        n_axes: start_m.len(),
+                        duration_s,
+                    });
                 }
-                choices.push(AlphaChoice { segment, place, alpha, admissible });
+                Err(refusal @ TrajectoryError::Alpha { .. }) => {
+                    first_refusal.get_or_insert(refusal);
+                }
+                Err(other) => return Err(other),
             }
         }
-        let duration_s = legs.last().map_or(0.0, |last| last.start_s + last.leg.duration_s);
-        Ok(Self {
-            legs: legs.into_boxed_slice(),
-            choices: choices.into_boxed_slice(),
-            n_axes: start_m.len(),
-            duration_s,
-        })
+        Err(first_refusal.unwrap_or(TrajectoryError::Empty))
     }
 
     /// Every α, and the intervals in which it might be.
@@ -205,7 +208,7 @@ fn placed(
                 * if segment.amplitude_m > 0.0 { segment.frequency_hz } else { 1.0 },
             duration_s,
             ends: [End::Rest; 2],
-            alpha: [1.0; 2],
+            alpha: [None; 2],
         };
         if let Some(before) = index.checked_sub(1).and_then(|at| legs.get_mut(at)) {
             let turn = (0..MAX_AXES).fold([0.0_f64; 2], |[on, back], axis| {
@@ -238,6 +241,29 @@ fn check_oscillation(index: usize, segment: &ModulatedSegment) -> Result<(), Tra
     let is_turning = segment.frequency_hz.is_finite() && segment.frequency_hz > 0.0;
     if segment.amplitude_m > 0.0 && !is_turning {
         return refuse("frequency", segment.frequency_hz, "Hz: must be finite and above 0");
+    }
+    Ok(())
+}
+
+/// Refuses an oscillation that is beyond the limits where it is fully open.
+fn check_programmed(
+    index: usize,
+    segment: &ModulatedSegment,
+    limits: &PathLimits,
+) -> Result<(), TrajectoryError> {
+    if segment.amplitude_m == 0.0 {
+        return Ok(());
+    }
+    let omega = std::f64::consts::TAU * segment.frequency_hz;
+    let speed_m_s = segment.amplitude_m * omega;
+    for (quantity, reached, limit) in [
+        (Quantity::Velocity, segment.feed_m_s + speed_m_s, limits.velocity_m_s),
+        (Quantity::Acceleration, speed_m_s * omega, limits.acceleration_m_s2),
+        (Quantity::Jerk, speed_m_s * omega * omega, limits.jerk_m_s3),
+    ] {
+        if reached > limit {
+            return Err(TrajectoryError::Programmed { segment: index, quantity, reached, limit });
+        }
     }
     Ok(())
 }

@@ -120,7 +120,7 @@ fn an_oscillation_passes_no_corner_and_stays_within_the_limits() {
 
 #[test]
 fn there_can_be_two_intervals_of_alpha_and_the_larger_is_used() {
-    let mut found_two = 0;
+    let mut found_two = std::collections::BTreeSet::new();
     for i in 0..60 {
         let (f, a) = (0.5 + 0.1 * f64::from(i % 10), 6.0 + 1.5 * f64::from(i / 10));
         let plan = ExponentialSigmoid::plan(
@@ -129,18 +129,17 @@ fn there_can_be_two_intervals_of_alpha_and_the_larger_is_used() {
             &[limits(10.0, a, 1e4)],
         );
         let Ok(plan) = plan else { continue };
-        let choice = &plan.choices()[0];
-        let last = choice.admissible[choice.admissible.len() - 1];
-        assert_eq!(choice.alpha, last.to);
-        for pair in choice.admissible.windows(2) {
-            assert!(pair[0].to < pair[1].from);
-        }
-        if choice.admissible.len() > 1 {
-            found_two += 1;
+        for choice in plan.choices() {
+            assert_eq!(choice.alpha, choice.admissible.last().unwrap().to);
+            for pair in choice.admissible.windows(2) {
+                assert!(pair[0].to < pair[1].from);
+            }
+            if choice.admissible.len() > 1 {
+                found_two.insert(choice.place);
+            }
         }
     }
-    println!("{found_two} of 60 with two intervals");
-    assert!(found_two > 0);
+    assert_eq!(found_two.len(), 2, "at starts and at ends: {found_two:?}");
 }
 
 #[test]
@@ -162,6 +161,12 @@ fn what_cannot_be_is_refused_with_the_limit() {
         "{fast}"
     );
     println!("{fast}");
+    let shaken = plan(0.05, 0.01, 0.1).unwrap_err();
+    assert!(
+        matches!(shaken, TrajectoryError::Programmed { quantity: Quantity::Velocity, .. }),
+        "{shaken}"
+    );
+    println!("{shaken}");
     let hurried = plan(0.005, 0.0015, 0.002).unwrap_err();
     assert!(matches!(hurried, TrajectoryError::Hurried { .. }), "{hurried}");
     println!("{hurried}");
@@ -185,4 +190,62 @@ fn a_peak_right_where_the_oscillation_opens_is_seen() {
     let plan = ExponentialSigmoid::plan(&[0.0, 0.0], &program, &two).unwrap();
     let found = peaks(&plan, 1, 400_000)[2];
     assert!(found <= two[1].jerk_max_m_s3 * (1.0 + 1e-9), "{found}");
+}
+
+/// The ramped sinusoid of Section 2.3: slope 3, amplitude 0.15, "2 Hz" read as 2 rad/s, 10 s.
+fn ramped_sinusoid(acceleration: f64) -> Result<ExponentialSigmoid, TrajectoryError> {
+    let program = [segment(&[30.0], 3.0, 0.15, 2.0 / std::f64::consts::TAU)];
+    let limit = limits(10.0, acceleration, 1e3 * acceleration);
+    ExponentialSigmoid::plan(&[0.0], &program, &[limit])
+}
+
+#[test]
+fn ends_that_reach_into_each_other_are_planned_together() {
+    for acceleration in [4.0, 5.0, 7.0, 10.0, 20.0] {
+        let plan = ramped_sinusoid(acceleration).unwrap();
+        let start = plan.choices()[0].alpha;
+        // The windows of the oscillation overlap: the start's is not open for good before the end's.
+        assert!(acceleration > 10.0 || (45.0 / start).sqrt() > 5.0, "{acceleration}: {start}");
+        let found = peaks(&plan, 0, 400_000)[1];
+        assert!(found <= acceleration * (1.0 + 1e-9), "{acceleration}: {found}");
+        assert!(found >= acceleration * (1.0 - 1e-3), "no more is left than has to be: {found}");
+        let nearly = plan.duration_s() * (1.0 - 1e-15);
+        for (time_s, at) in [(0.0, 0.0), (nearly, 30.0)] {
+            let state = plan.at(time_s);
+            assert!((state.position_m[0] - at).abs() < 1e-13, "{state:?}");
+            assert!(state.velocity_m_s[0].abs() < 1e-12, "{state:?}");
+            assert!(state.acceleration_m_s2[0].abs() < 1e-10, "{state:?}");
+        }
+    }
+}
+
+#[test]
+fn a_start_that_cannot_be_over_within_its_leg_is_refused() {
+    // α T³ has to be 45 for the deviation to be gone at the end: v α^(1/3) 3.1 = 3.3 m/s².
+    let refusal = ramped_sinusoid(3.0).unwrap_err();
+    println!("{refusal}");
+    let TrajectoryError::Alpha { quantity, place, alpha, reached, .. } = refusal else {
+        panic!("{refusal}")
+    };
+    assert_eq!((quantity, place), (Quantity::Acceleration, "start-up"));
+    assert!((alpha - 0.045).abs() < 1e-6 && reached > 3.3, "{refusal}");
+}
+
+#[test]
+fn no_alpha_is_above_the_one_wanted() {
+    let program = [segment(&[0.3], 0.1, 0.0, 0.0), segment(&[0.0], 0.1, 0.0, 0.0)];
+    let plan = |alpha_max: &AlphaMax| {
+        ExponentialSigmoid::plan_below(&[0.0], &program, &[limits(1.0, 5.0, 400.0)], alpha_max)
+    };
+    let free = plan(&AlphaMax::default()).unwrap();
+    let wanted = AlphaMax { start_up: 40.0, transition: 30.0, ..AlphaMax::default() };
+    let found = plan(&wanted).unwrap();
+    let alphas: Vec<f64> = found.choices().iter().map(|choice| choice.alpha).collect();
+    assert_eq!(alphas, [40.0, 30.0, free.choices()[2].alpha]);
+    assert_eq!(found.choices()[0].admissible.last().unwrap().to, 40.0);
+    for bad in [0.1, -1.0, f64::NAN] {
+        let refusal = plan(&AlphaMax { end: bad, ..wanted }).unwrap_err();
+        assert!(matches!(refusal, TrajectoryError::AlphaMax { place: "end", .. }), "{refusal}");
+        println!("{refusal}");
+    }
 }

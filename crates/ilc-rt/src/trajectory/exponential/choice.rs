@@ -1,0 +1,84 @@
+//! Which α each place of an E/S move gets. Cold; read by its plan.
+
+use super::alpha::{AlphaInterval, Place};
+use super::leg::{End, Leg};
+use super::plan::PlacedLeg;
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::limits::{AxisLimits, PathLimits};
+
+/// Distance kept from a limit, relative: far above the rounding of a peak.
+pub(super) const MARGIN: f64 = 1e-10;
+
+/// The α of one place, and the intervals in which it might be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AlphaChoice {
+    /// Segment at whose start, or in front of whose end, it is.
+    pub segment: usize,
+    /// `start-up`, `transition` or `end`.
+    pub place: &'static str,
+    /// The α used: the largest admissible. In s⁻³ (and s⁻² for the oscillation) for start-up and end,
+    /// in s⁻¹ for a transition.
+    pub alpha: f64,
+    /// All admissible intervals, from the smallest on.
+    pub admissible: Vec<AlphaInterval>,
+}
+
+/// The largest α wanted at each kind of place; infinite for as large as the limits allow.
+///
+/// # Units
+/// - as in [`AlphaChoice::alpha`]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AlphaMax {
+    /// At starts from rest.
+    pub start_up: f64,
+    /// Where a line goes on, or turns round.
+    pub transition: f64,
+    /// At ends at rest.
+    pub end: f64,
+}
+
+impl Default for AlphaMax {
+    fn default() -> Self {
+        Self { start_up: f64::INFINITY, transition: f64::INFINITY, end: f64::INFINITY }
+    }
+}
+
+/// Chooses the α of each place, one after the other, and enters it in the legs.
+pub(super) fn choose(
+    legs: &mut [PlacedLeg],
+    limits: &[AxisLimits],
+    reserve: f64,
+    alpha_max: &AlphaMax,
+) -> Result<Vec<AlphaChoice>, TrajectoryError> {
+    let mut choices = Vec::new();
+    let n_legs = legs.len();
+    for i in 0..=n_legs {
+        let before = i.checked_sub(1).map(|at| (at, 1));
+        let after = (i < n_legs).then_some((i, 0));
+        let joined = after.is_some_and(|(at, _)| legs[at].leg.ends[0] != End::Rest);
+        let groups: [(&str, f64, Vec<(usize, usize)>); 2] = if joined {
+            let both = before.into_iter().chain(after).collect();
+            [("transition", alpha_max.transition, both), ("", 0.0, Vec::new())]
+        } else {
+            [
+                ("end", alpha_max.end, before.into_iter().collect()),
+                ("start-up", alpha_max.start_up, after.into_iter().collect()),
+            ]
+        };
+        for (name, alpha_max, members) in groups {
+            let Some(&(segment, _)) = members.first() else { continue };
+            let along = PathLimits::along(&legs[segment].line.direction, limits, f64::INFINITY);
+            let near: Vec<(Leg, usize)> =
+                members.iter().map(|&(at, which)| (legs[at].leg, which)).collect();
+            // An end has none after it on its leg.
+            let margin = if name == "end" { MARGIN } else { reserve };
+            let place = Place { legs: &near, limits: along, margin, alpha_max, segment, name };
+            let (alpha, admissible) = place.choose()?;
+            for &(at, which) in &members {
+                legs[at].leg.alpha[which] = Some(alpha);
+            }
+            choices.push(AlphaChoice { segment, place: name, alpha, admissible });
+        }
+    }
+    Ok(choices)
+}
