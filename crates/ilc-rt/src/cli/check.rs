@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
-use crate::config::{Cell, PathKind};
-use crate::supervisor::{Plan, SupervisorError};
+use crate::config::{Cell, GateMeasure, LawName, PathKind};
+use crate::supervisor::{Plan, Prepared, SupervisorError};
 
 #[derive(Args)]
 #[command(after_help = "Example:
@@ -30,7 +30,7 @@ pub(super) fn check(arguments: &CheckArguments) -> u8 {
 fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
     let cell = Cell::load(&arguments.cell)?;
     let plan = Plan::new(&cell, None, false)?;
-    let law = plan.law(&cell)?;
+    let Prepared { law, verdict, warnings } = plan.law(&cell)?;
     show::say(&format!(
         "cell {}: {} axes on {}, {} us cycle; a classical CAN bus at {} bit/s would be {:.0} % loaded",
         cell.cell.name,
@@ -60,7 +60,52 @@ fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
             |law| format!("is learned: {}", law.describe())
         )
     ));
+    for line in learning(&cell) {
+        show::say(&format!("  {line}"));
+    }
+    if !verdict.is_empty() {
+        show::say(&format!("  forecast from the model: {verdict}"));
+    }
+    for warning in warnings {
+        show::say(&format!("  warning: {warning}"));
+    }
     Ok(())
+}
+
+/// What decides on the next input beside the law.
+fn learning(cell: &Cell) -> Vec<String> {
+    let learning = &cell.learning;
+    if learning.law == LawName::None {
+        return Vec::new();
+    }
+    let mut lines = Vec::new();
+    if let Some(ladder) = &learning.ladder {
+        lines.push(format!(
+            "ladder: each step from the mean of {} runs, gain 1 at first and {} to {} later",
+            ladder.repeats, ladder.lowest, ladder.highest
+        ));
+    }
+    lines.push(match &learning.gate {
+        Some(gate) => format!(
+            "gate: the input is kept while the {} error is within {} m (learning resumes at {} m); after \
+             {} {} in a row above {} times the best error the best input is restored",
+            match gate.measure {
+                GateMeasure::Rms => "RMS",
+                GateMeasure::Max => "largest",
+            },
+            gate.tolerance_m,
+            gate.tolerance_m * gate.resume,
+            gate.patience,
+            if learning.ladder.is_some() { "steps" } else { "runs" },
+            gate.growth
+        ),
+        None => format!(
+            "an RMS error above {} times the best one restores the best input; after the second time \
+             nothing is learned any more",
+            learning.rollback()
+        ),
+    });
+    lines
 }
 
 /// What kind of path it is, how long, and how fast at most.

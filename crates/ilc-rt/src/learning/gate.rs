@@ -1,6 +1,6 @@
 //! The switching mechanism: when any law is to learn, to rest, or to go back to what was best.
 
-use super::{Law, LearningError};
+use super::{Law, LearningError, StandIn};
 
 /// What a run is judged by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -162,6 +162,7 @@ impl<L: Law> Gate<L> {
         } else if self.state == GateState::Learning && too_long {
             self.state = GateState::RolledBack;
             self.runs_grown = 0;
+            self.law.taken_back();
         }
         if self.best_figure.is_none_or(|best| figure < best) {
             self.best_figure = Some(figure);
@@ -200,6 +201,14 @@ impl<L: Law> Law for Gate<L> {
 
     fn expect(&mut self, disturbance: &[f64]) {
         self.law.expect(disturbance);
+    }
+
+    fn stand_in(&mut self) -> StandIn<'_> {
+        StandIn::Inside(&mut self.law)
+    }
+
+    fn taken_back(&mut self) {
+        self.law.taken_back();
     }
 
     fn reset(&mut self) {

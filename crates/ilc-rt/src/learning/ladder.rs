@@ -1,6 +1,6 @@
 //! The ladder mechanism: several runs with the same input before each step of learning.
 
-use super::{Law, LearningError};
+use super::{Law, LearningError, StandIn};
 
 /// How a [`Ladder`] averages and adapts.
 ///
@@ -42,6 +42,9 @@ impl LadderRule {
 /// - `slow f_{j-1} < f_j <= f_{j-1}`: it decays too slowly, so `g` is raised;
 /// - otherwise, or if `f_j` is less than twice the noise `s_j / sqrt(n)` of the mean, so that its
 ///   ratio says nothing: `g` stays.
+///
+/// Where whoever runs the law takes an input back ([`Law::taken_back`]) the error grew too, though the
+/// law never learns from that run: `g` is halved, and the mean begins anew.
 ///
 /// # Shapes
 /// - those of the law inside
@@ -216,6 +219,16 @@ impl<L: Law> Law for Ladder<L> {
 
     fn expect(&mut self, disturbance: &[f64]) {
         self.law.expect(disturbance);
+    }
+
+    fn stand_in(&mut self) -> StandIn<'_> {
+        StandIn::Inside(&mut self.law)
+    }
+
+    fn taken_back(&mut self) {
+        self.gain = (0.5 * self.gain).max(self.rule.lowest);
+        self.runs = 0;
+        self.law.taken_back();
     }
 
     fn reset(&mut self) {

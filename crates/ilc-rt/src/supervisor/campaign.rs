@@ -15,7 +15,7 @@ use super::plan::Plan;
 use super::progress::{Decision, Progress, Resumed};
 use super::telemetry::Telemetry;
 use super::{nodes, reason};
-use crate::config::{Cell, LawName, Measure};
+use crate::config::{Cell, Measure};
 use crate::fieldbus::Bus;
 use crate::learning::Law;
 use crate::library::Library;
@@ -78,11 +78,22 @@ pub fn run(
     let mut plan = Plan::new(cell, options.measure, options.lockstep)?;
     let (name, law) = match law {
         Some(law) => ("user", Some(law)),
-        None => (law_name(cell), plan.law(cell)?),
+        None => {
+            let prepared = plan.law(cell)?;
+            for warning in &prepared.warnings {
+                tracing::warn!("{warning}");
+            }
+            (cell.learning.law.as_str(), prepared.law)
+        }
     };
+    // Without a law there is nothing to take back; with the cell's own law its gate decides, if it has
+    // one: it knows what is good enough, and when the machine is not what it was.
+    let is_gated = name != "user" && cell.learning.gate.is_some();
+    let growth_allowed =
+        if law.is_none() || is_gated { f64::INFINITY } else { cell.learning.rollback() };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
     plan.name_law(cell, name, &parameters);
-    carry_out(cell, options, bus, Work { plan, law, input: None }, observe)
+    carry_out(cell, options, bus, Work { plan, law, input: None, growth_allowed }, observe)
 }
 
 /// Excites one axis while all hold still, `options.iterations` times, and keeps what was measured; the
@@ -98,7 +109,13 @@ pub fn identify(
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, SupervisorError> {
     let planned = experiment.plan(cell, options.measure, options.lockstep)?;
-    let work = Work { plan: planned.plan, law: None, input: Some(planned.input) };
+    let work = Work {
+        plan: planned.plan,
+        law: None,
+        input: Some(planned.input),
+        // Nothing is learned, so that there is nothing to take back.
+        growth_allowed: f64::INFINITY,
+    };
     carry_out(cell, options, bus, work, observe)
 }
 
@@ -108,6 +125,8 @@ struct Work {
     law: Option<Box<dyn Law>>,
     /// Input of the first run, if it is not to be zero.
     input: Option<Vec<f64>>,
+    /// Growth of the error at which the best input is restored.
+    growth_allowed: f64,
 }
 
 #[expect(clippy::too_many_lines, reason = "the course of a campaign, step by step")]
@@ -118,16 +137,14 @@ fn carry_out(
     work: Work,
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, SupervisorError> {
-    let Work { mut plan, mut law, input } = work;
+    let Work { mut plan, mut law, input, growth_allowed } = work;
     if options.resume && !options.library.exists() {
         // Opening it would leave an empty file where a name was mistyped.
         let path = options.library.display();
         return Err(SupervisorError::Resume(format!("there is no library {path} to go on with")));
     }
     let library = Library::open(&options.library)?;
-    // Without a law there is nothing to take back when a run is worse than another.
-    let rollback_ratio = if law.is_some() { cell.learning.rollback_ratio } else { f64::INFINITY };
-    let mut progress = Progress::new(rollback_ratio);
+    let mut progress = Progress::new(growth_allowed);
     let resumed = if options.resume {
         progress.resume(&library, &mut plan.meta, law.as_deref_mut(), &options.disturbance)?
     } else {
@@ -226,14 +243,6 @@ fn carry_out(
     Ok(campaign.end(pacer, cell, options))
 }
 
-fn law_name(cell: &Cell) -> &'static str {
-    match cell.learning.law {
-        LawName::NormOptimal => "norm_optimal",
-        LawName::Pd => "pd",
-        LawName::None => "none",
-    }
-}
-
 /// A campaign whose loop runs.
 struct Running<'a> {
     collector: Collector,
@@ -318,6 +327,9 @@ impl Running<'_> {
                 self.progress.asked();
                 learner.begin(&record.input, &record.error_m, &self.present);
             } else {
+                if matches!(decision, Decision::RollBack(_)) {
+                    learner.take_back();
+                }
                 learner.pass(&self.present);
             }
         }
