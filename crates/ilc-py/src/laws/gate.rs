@@ -68,6 +68,13 @@ pub(super) struct PyGate {
     gate: Mutex<Gate<InnerLaw>>,
 }
 
+impl PyGate {
+    /// Returns the law inside.
+    pub(super) fn inside<'py>(&self, py: Python<'py>) -> &Bound<'py, PyAny> {
+        self.law.bind(py)
+    }
+}
+
 #[pymethods]
 impl PyGate {
     #[new]
@@ -152,6 +159,14 @@ impl PyGate {
         disturbance: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         update_around(py, &self.gate, u, e, disturbance)
+    }
+
+    /// Tell the law that the input it made last is taken back.
+    ///
+    /// For whoever runs the law and restores an earlier input because the error
+    /// grew; handed on to the law inside.
+    fn taken_back(&self, py: Python<'_>) {
+        look(py, &self.gate, Law::taken_back);
     }
 
     /// Forget every run; the law inside too.

@@ -211,6 +211,25 @@ impl<L: Law> Law for Gate<L> {
         self.law.taken_back();
     }
 
+    fn goes_back(&self) -> bool {
+        true
+    }
+
+    fn remark(&self) -> Option<String> {
+        match self.state {
+            GateState::Learning => self.law.remark(),
+            GateState::Holding => Some(format!(
+                "the error is within the tolerance of {}: the input is kept until it exceeds {}",
+                self.rule.tolerance,
+                self.rule.resume * self.rule.tolerance
+            )),
+            GateState::RolledBack => Some(format!(
+                "the error grew beyond {} times the best one: the best input is kept",
+                self.rule.growth
+            )),
+        }
+    }
+
     fn reset(&mut self) {
         self.law.reset();
         self.state = GateState::Learning;
@@ -243,6 +262,7 @@ mod tests {
     struct Counter {
         expected: Vec<f64>,
         resets: usize,
+        n_taken_back: usize,
     }
 
     impl Law for Counter {
@@ -255,6 +275,9 @@ mod tests {
         }
         fn expect(&mut self, disturbance: &[f64]) {
             self.expected = disturbance.to_vec();
+        }
+        fn taken_back(&mut self) {
+            self.n_taken_back += 1;
         }
         fn reset(&mut self) {
             self.resets += 1;
@@ -284,6 +307,19 @@ mod tests {
     }
 
     use GateState::{Holding, Learning, RolledBack};
+
+    #[test]
+    fn the_law_inside_hears_that_its_input_is_taken_back_and_people_hear_why() {
+        let mut gate = gate(0.0);
+        assert!(gate.goes_back() && gate.remark().is_none());
+        play(&mut gate, &[5.0, 2.0, 3.1, 2.9, 3.1]);
+        assert_eq!((gate.law().n_taken_back, gate.remark()), (0, None));
+        play(&mut gate, &[3.2]);
+        assert_eq!(gate.law().n_taken_back, 1);
+        assert!(gate.remark().unwrap().contains("best input is kept"));
+        gate.taken_back();
+        assert_eq!(gate.law().n_taken_back, 2);
+    }
 
     #[test]
     fn inside_the_tolerance_the_input_is_kept_and_learning_resumes_with_hysteresis() {

@@ -87,6 +87,17 @@ pub trait Law: Send {
     /// come has an earlier input. Most laws look at one run only and have no use for it.
     fn taken_back(&mut self) {}
 
+    /// Returns whether the law goes back to an earlier input by itself where the error grows, so that
+    /// nobody else should.
+    fn goes_back(&self) -> bool {
+        false
+    }
+
+    /// Returns what a person should know of the last update, as a sentence; most have nothing to say.
+    fn remark(&self) -> Option<String> {
+        None
+    }
+
     /// Forgets everything that earlier runs taught the law itself.
     fn reset(&mut self);
 
@@ -131,6 +142,14 @@ impl<L: Law + ?Sized> Law for Box<L> {
 
     fn taken_back(&mut self) {
         (**self).taken_back();
+    }
+
+    fn goes_back(&self) -> bool {
+        (**self).goes_back()
+    }
+
+    fn remark(&self) -> Option<String> {
+        (**self).remark()
     }
 
     fn reset(&mut self) {

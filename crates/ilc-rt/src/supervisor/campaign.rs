@@ -86,11 +86,12 @@ pub fn run(
             (cell.learning.law.as_str(), prepared.law)
         }
     };
-    // Without a law there is nothing to take back; with the cell's own law its gate decides, if it has
-    // one: it knows what is good enough, and when the machine is not what it was.
-    let is_gated = name != "user" && cell.learning.gate.is_some();
-    let growth_allowed =
-        if law.is_none() || is_gated { f64::INFINITY } else { cell.learning.rollback() };
+    // Without a law there is nothing to take back. A gate decides by itself: it knows what is good
+    // enough, and when the machine is not what it was.
+    let growth_allowed = match &law {
+        Some(law) if !law.goes_back() => cell.learning.rollback(),
+        _ => f64::INFINITY,
+    };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
     plan.name_law(cell, name, &parameters);
     carry_out(cell, options, bus, Work { plan, law, input: None, growth_allowed }, observe)
@@ -228,6 +229,7 @@ fn carry_out(
         iterations: options.iterations,
         mail,
         stopping: None,
+        remark: None,
         failure: None,
         phase_iteration: first,
         progress_every: if options.lockstep { u32::MAX } else { progress_every },
@@ -258,6 +260,8 @@ struct Running<'a> {
     iterations: u32,
     mail: Mailbox,
     stopping: Option<StopReason>,
+    /// What the law last had to say.
+    remark: Option<String>,
     /// Why no more runs can be kept, if so: the axes are stopped, as nothing may be lost.
     failure: Option<String>,
     phase_iteration: u32,
@@ -296,6 +300,11 @@ impl Running<'_> {
             }
         }
         while let Some(lesson) = self.learner.as_mut().and_then(Learner::take) {
+            // Once for each change: what stays as it is need not be said after every run.
+            if lesson.remark != self.remark {
+                tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
+                self.remark = lesson.remark;
+            }
             match lesson.input {
                 Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
                 Err(error) => self.fail(format!("the law refused the last run: {error}")),

@@ -14,6 +14,8 @@ pub(super) struct Lesson {
     pub(super) input: Result<Vec<f64>, LearningError>,
     /// How long it took.
     pub(super) update_ms: f64,
+    /// What a person should know of it.
+    pub(super) remark: Option<String>,
 }
 
 /// What a law is to do.
@@ -132,5 +134,6 @@ pub(super) fn learn(law: &mut dyn Law, input: &[f64], error: &[f64]) -> Lesson {
     let began = Instant::now();
     let mut next = vec![0.0; input.len()];
     let result = law.update(input, error, &mut next);
-    Lesson { input: result.map(|()| next), update_ms: began.elapsed().as_secs_f64() * 1e3 }
+    let update_ms = began.elapsed().as_secs_f64() * 1e3;
+    Lesson { input: result.map(|()| next), update_ms, remark: law.remark() }
 }

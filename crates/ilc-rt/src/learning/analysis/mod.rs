@@ -20,6 +20,8 @@ mod uncertainty;
 mod verdict;
 
 #[cfg(test)]
+mod every_law;
+#[cfg(test)]
 mod oracle;
 
 pub use condition::PdCondition;

@@ -182,6 +182,20 @@ impl Law for Constrained {
         self.unbounded().map_or(StandIn::Itself, |law| StandIn::Unbounded(Box::new(law)))
     }
 
+    fn remark(&self) -> Option<String> {
+        match self.status {
+            Status::Untried | Status::Solved => None,
+            Status::Infeasible(conflict) => {
+                Some(format!("the bounds cannot be honoured, so that the input is kept: {conflict}"))
+            }
+            Status::MaxIterations => Some(
+                "no input within the bounds was found, so that the input is kept: they most likely \
+                 contradict each other"
+                    .to_owned(),
+            ),
+        }
+    }
+
     fn reset(&mut self) {
         for solver in &mut self.solvers {
             solver.forget();
