@@ -131,3 +131,30 @@ fn path(cell: &Cell, plan: &Plan) -> String {
         steps_m.fold((0.0, 0.0_f64), |(sum, most), step| (sum + step, most.max(step)));
     format!("{kind}, {length_m:.4} m long, {:.4} m/s at most", fastest_m / cell.cycle_s())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GANTRY: &str =
+        include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/01_gantry.toml"));
+
+    fn told(tail: &str) -> String {
+        let cell = Cell::parse(&format!("{GANTRY}\n{tail}"), "cell.toml").unwrap();
+        learning(&cell).join("\n")
+    }
+
+    #[test]
+    fn what_decides_beside_the_law_is_told() {
+        let plain = told("");
+        assert!(plain.contains("above 1.5 times the best one restores"), "{plain}");
+        let gate = "[learning.gate]\ntolerance_m = 2e-5\nresume = 2.0\ngrowth = 3.0\n";
+        let gated = told(gate);
+        for part in ["RMS error is within 0.00002 m", "resumes at 0.00004 m", "2 runs", "3 times"] {
+            assert!(gated.contains(part), "{gated}");
+        }
+        let both = told(&format!("{gate}[learning.ladder]\nrepeats = 5\n"));
+        assert!(both.contains("mean of 5 runs") && both.contains("2 steps"), "{both}");
+        assert!(!both.contains("restores the best input; after the second time"), "{both}");
+    }
+}

@@ -123,6 +123,6 @@ pub struct ErrorFeedforwardSection {
 
 impl Default for ErrorFeedforwardSection {
     fn default() -> Self {
-        Self { gain_per_s: 10.0, lead_samples: 1, order: 4, cutoff_hz: 5.0 }
+        Self { gain_per_s: 10.0, lead_samples: 1, order: 2, cutoff_hz: 5.0 }
     }
 }

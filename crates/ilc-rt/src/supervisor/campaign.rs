@@ -1,8 +1,6 @@
 //! One campaign from the first frame to the last: bring-up, runs, learning, library, end.
 
-use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicI32;
 
 use super::announce::Announcer;
 use super::collect::Collector;
@@ -10,12 +8,13 @@ use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
 use super::learner::{Learner, expect};
+use super::options::{Options, Outcome};
 use super::pace::Pacer;
 use super::plan::Plan;
 use super::progress::{Decision, Progress, Resumed};
 use super::telemetry::Telemetry;
 use super::{nodes, reason};
-use crate::config::{Cell, Measure};
+use crate::config::Cell;
 use crate::fieldbus::Bus;
 use crate::learning::Law;
 use crate::library::Library;
@@ -26,42 +25,6 @@ use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
 const MAILBOX: usize = 8192;
 /// Time between two reports of progress.
 const PROGRESS_S: f64 = 0.1;
-
-/// What the caller chooses beyond the cell description.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Runs in the whole campaign; the first one is without learning.
-    pub iterations: u32,
-    /// Measurement to learn from, if not the cell's.
-    pub measure: Option<Measure>,
-    /// Paced by the nodes' answers instead of the clock.
-    pub lockstep: bool,
-    /// Go on with the newest campaign of the same cell, program and law.
-    pub resume: bool,
-    /// Where every run is kept.
-    pub library: PathBuf,
-    /// What is measured of each run's surroundings: kept with the run, and told to the law.
-    pub disturbance: Disturbance,
-    /// Whether to publish on Zenoh.
-    pub telemetry: bool,
-    /// Set to a signal's number to bring the axes to rest.
-    pub stop: Arc<AtomicI32>,
-}
-
-/// How a campaign ended.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
-    /// How.
-    pub status: EndStatus,
-    /// One sentence.
-    pub reason: String,
-    /// Signal that asked to stop, or 0.
-    pub signal: i32,
-    /// Name of the campaign in the library.
-    pub campaign: String,
-    /// Number and figures of every run of the campaign, resumed ones included.
-    pub runs: Vec<(u32, Figures)>,
-}
 
 /// Runs a campaign on a bus (`cell.bus.address`, open), with the cell's law or another one; `observe` hears every event.
 ///
