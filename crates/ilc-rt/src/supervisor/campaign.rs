@@ -39,15 +39,14 @@ pub fn run(
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, SupervisorError> {
     let mut plan = Plan::new(cell, options.measure, options.lockstep)?;
-    let (name, law) = match law {
-        Some(law) => ("user", Some(law)),
-        None => {
-            let prepared = plan.law(cell)?;
-            for warning in &prepared.warnings {
-                tracing::warn!("{warning}");
-            }
-            (cell.learning.law.as_str(), prepared.law)
+    let (name, law) = if let Some(law) = law {
+        ("user", Some(law))
+    } else {
+        let prepared = plan.law(cell)?;
+        for warning in &prepared.warnings {
+            tracing::warn!("{warning}");
         }
+        (cell.learning.law.as_str(), prepared.law)
     };
     // Without a law there is nothing to take back. A gate decides by itself: it knows what is good
     // enough, and when the machine is not what it was.

@@ -118,7 +118,7 @@ fn model_laws_are_judged_on_their_own_model_and_on_another() {
     let laws: [Box<dyn Law>; 3] = [
         Box::new(Adjoint::new(&model, n, None, QFilter::None).unwrap()),
         Box::new(Adjoint::new(&model, n, None, low_pass(20.0)).unwrap()),
-        Box::new(ModelInverse::new(&model, n, 0.5, low_pass(10.0)).unwrap()),
+        Box::new(ModelInverse::new(&model, n, 0.5, low_pass(4.0)).unwrap()),
     ];
     for mut law in laws {
         let found = divergence(law.as_mut(), &model, n).unwrap().unwrap();
