@@ -94,7 +94,7 @@ class Campaign:
     UserWarning
         If the law's low-pass begins above the frequency from which on the law
         makes the error grow, or the error of the cell's own law will rise
-        before it falls.
+        before it falls; not with `allow_divergent`.
 
     Notes
     -----
@@ -138,7 +138,7 @@ class Campaign:
             raise BadInputError(message)
         if law is not None and not allow_divergent:
             _refuse_divergent(law, self.cell)
-        if law is None and learning:
+        if law is None and learning and not allow_divergent:
             for line in self.cell.warnings:
                 warnings.warn(f"{self.cell.path}: {line}", stacklevel=2)
         self.measure = measure
