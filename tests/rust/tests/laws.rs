@@ -49,8 +49,7 @@ fn rows(library: &Path) -> Vec<Row> {
 fn run(cell: &Cell, iterations: u32) -> (Outcome, Vec<Row>) {
     let scratch = Scratch::new();
     let options = options(scratch.file("library.db"), iterations);
-    let outcome =
-        supervisor::run(cell, &options, in_process(cell), None, &mut |_| {}).unwrap();
+    let outcome = supervisor::run(cell, &options, in_process(cell), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
     let rows = rows(&options.library);
     (outcome, rows)
@@ -106,8 +105,7 @@ fn every_law_that_a_cell_can_name_learns_on_the_gantry() {
 const CO_ILC: &str = "law = \"norm_optimal\"\n[learning.norm_optimal]\nrate = 6.0";
 /// A law that converges by the model, and makes the error of the real axes grow after two runs: it
 /// learns at the frequency of the mode that the model leaves out.
-const GROWING: &str =
-    "law = \"pd\"\n[learning.pd]\nkp = 1.5\nlead_samples = 8\ncutoff_hz = 25.0";
+const GROWING: &str = "law = \"pd\"\n[learning.pd]\nkp = 1.5\nlead_samples = 8\ncutoff_hz = 25.0";
 
 #[test]
 fn the_constrained_law_keeps_the_bounds_that_the_plain_one_would_exceed() {
@@ -156,12 +154,13 @@ fn the_constrained_law_keeps_the_bounds_that_the_plain_one_would_exceed() {
 #[test]
 fn a_gate_keeps_the_input_from_the_run_on_that_is_good_enough() {
     let free = rms_m(&run(&short(SERIES, CO_ILC), 6).1);
-    let tolerance_m = 1.1 * free[3];
+    let tolerance_m = 1.02 * free[3];
     assert!(tolerance_m < free[2], "{}", microns(&free));
     let gate = format!("{CO_ILC}\n[learning.gate]\ntolerance_m = {tolerance_m}");
     let (outcome, rows) = run(&short(SERIES, &gate), 7);
     println!("free {}; gated {}", microns(&free), microns(&rms_m(&rows)));
     assert!(outcome.runs.iter().all(|(_, run)| !run.rolled_back));
+    // The first run whose RMS error in the record is within the tolerance, and no other one.
     for index in 1..=3 {
         assert_ne!(rows[index].record.input, rows[index - 1].record.input, "run {index} learns");
     }
@@ -278,7 +277,10 @@ fn ladder_and_gate_go_on_in_the_middle_of_what_they_did() {
     for index in 0..=5 {
         assert_eq!(kept[index].record.input, whole[index].record.input, "run {index}");
     }
-    assert_ne!(kept[6].record.input, kept[5].record.input, "the step comes when it would have come");
+    assert_ne!(
+        kept[6].record.input, kept[5].record.input,
+        "the step comes when it would have come"
+    );
 
     // Broken while it rests.
     let tolerance_m = 1.1 * rms_m(&run(&short(SERIES, CO_ILC), 3).1)[2];
@@ -310,7 +312,10 @@ fn another_gate_ladder_or_weight_along_the_run_is_another_campaign() {
     for (one, other) in [
         (phase(2.0), phase(3.0)),
         (around("contour = { weight = 2.0 }"), around("contour = { weight = 3.0 }")),
-        (around("[learning.gate]\ntolerance_m = 1e-6"), around("[learning.gate]\ntolerance_m = 2e-6")),
+        (
+            around("[learning.gate]\ntolerance_m = 1e-6"),
+            around("[learning.gate]\ntolerance_m = 2e-6"),
+        ),
         (around("[learning.ladder]\nrepeats = 2"), around("[learning.ladder]\nrepeats = 3")),
         (around(""), around("[learning.ladder]\nrepeats = 1")),
     ] {

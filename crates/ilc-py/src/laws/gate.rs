@@ -176,10 +176,7 @@ impl PyGate {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let GateRule { measure, tolerance, resume, growth, patience } = self.rule;
-        let measure = match measure {
-            Measure::Rms => "rms",
-            Measure::Max => "max",
-        };
+        let measure = measure.as_str();
         Ok(format!(
             "Gate({}, tolerance={tolerance}, measure='{measure}', resume={resume}, growth={growth}, patience={patience})",
             shown(py, &self.gate)?

@@ -87,14 +87,14 @@ fn learning(cell: &Cell) -> Vec<String> {
     }
     lines.push(match &learning.gate {
         Some(gate) => format!(
-            "gate: the input is kept while the {} error is within {} m (learning resumes at {} m); after \
+            "gate: the input is kept while the {} error is within {:.3} um (learning resumes at {:.3} um); after \
              {} {} in a row above {} times the best error the best input is restored",
             match gate.measure {
                 GateMeasure::Rms => "RMS",
                 GateMeasure::Max => "largest",
             },
-            gate.tolerance_m,
-            gate.tolerance_m * gate.resume,
+            gate.tolerance_m * 1e6,
+            gate.tolerance_m * gate.resume * 1e6,
             gate.patience,
             if learning.ladder.is_some() { "steps" } else { "runs" },
             gate.growth
@@ -150,7 +150,7 @@ mod tests {
         assert!(plain.contains("above 1.5 times the best one restores"), "{plain}");
         let gate = "[learning.gate]\ntolerance_m = 2e-5\nresume = 2.0\ngrowth = 3.0\n";
         let gated = told(gate);
-        for part in ["RMS error is within 0.00002 m", "resumes at 0.00004 m", "2 runs", "3 times"] {
+        for part in ["RMS error is within 20.000 um", "resumes at 40.000 um", "2 runs", "3 times"] {
             assert!(gated.contains(part), "{gated}");
         }
         let both = told(&format!("{gate}[learning.ladder]\nrepeats = 5\n"));

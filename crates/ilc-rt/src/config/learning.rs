@@ -159,9 +159,9 @@ impl Default for LadderSection {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GateMeasure {
-    /// Root of the mean square over all samples and axes.
+    /// Root of the mean over the samples of the squared length of the error: `tracking_rms_m`.
     Rms,
-    /// Largest magnitude of any sample of any axis.
+    /// Largest magnitude of any sample of any axis: `tracking_inf_m`.
     Max,
 }
 

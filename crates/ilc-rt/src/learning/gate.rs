@@ -7,6 +7,12 @@ use super::{Law, LearningError, StandIn};
 pub enum Measure {
     /// Root of the mean square over all samples and channels.
     Rms,
+    /// Root of the mean over the samples of the squared length of the error, all channels taken
+    /// together: the figure by which a controller reports its runs.
+    RmsLength {
+        /// Channels of the error.
+        n_channels: usize,
+    },
     /// Largest magnitude of any sample of any channel.
     Max,
 }
@@ -19,7 +25,17 @@ impl Measure {
                 let sum: f64 = error.iter().map(|e| e * e).sum();
                 (sum / error.len().max(1) as f64).sqrt()
             }
+            Self::RmsLength { n_channels } => Self::Rms.of(error) * (n_channels as f64).sqrt(),
             Self::Max => error.iter().fold(0.0, |largest: f64, e| largest.max(e.abs())),
+        }
+    }
+
+    /// Returns its name in records.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Rms => "rms",
+            Self::RmsLength { .. } => "rms_length",
+            Self::Max => "max",
         }
     }
 }
@@ -219,7 +235,7 @@ impl<L: Law> Law for Gate<L> {
         match self.state {
             GateState::Learning => self.law.remark(),
             GateState::Holding => Some(format!(
-                "the error is within the tolerance of {}: the input is kept until it exceeds {}",
+                "the error is within the tolerance of {:.4e}: the input is kept until it exceeds {:.4e}",
                 self.rule.tolerance,
                 self.rule.resume * self.rule.tolerance
             )),
@@ -239,10 +255,7 @@ impl<L: Law> Law for Gate<L> {
 
     fn describe(&self) -> String {
         let GateRule { measure, tolerance, resume, growth, patience } = self.rule;
-        let measure = match measure {
-            Measure::Rms => "rms",
-            Measure::Max => "max",
-        };
+        let measure = measure.as_str();
         let ratio = |value: f64| if value.is_finite() { value.to_string() } else { "null".into() };
         format!(
             r#"{{"law":"gate","measure":"{measure}","tolerance":{tolerance},"resume":{},"growth":{},"patience":{patience},"inner":{}}}"#,
@@ -359,6 +372,8 @@ mod tests {
     fn the_measures_are_those_of_their_names() {
         assert!((Measure::Rms.of(&[3.0, -4.0]) - 12.5_f64.sqrt()).abs() < 1e-15);
         assert_eq!(Measure::Max.of(&[3.0, -4.0]).to_bits(), 4_f64.to_bits());
+        // One sample of two axes: the length is 5.
+        assert!((Measure::RmsLength { n_channels: 2 }.of(&[3.0, -4.0]) - 5.0).abs() < 1e-15);
         let rule = GateRule { tolerance: 3.9, measure: Measure::Max, ..GateRule::default() };
         let mut gate = Gate::new(Counter::default(), rule).unwrap();
         gate.update(&[0.0; 2], &[3.0, -4.0], &mut [0.0; 2]).unwrap();

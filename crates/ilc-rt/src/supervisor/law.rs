@@ -116,12 +116,7 @@ fn error_feedforward(cell: &Cell, n_samples: usize) -> Made {
 
 /// What the cell allows of each axis becomes bounds of the input; those of a set point only where the
 /// input is added to one.
-fn constrained(
-    cell: &Cell,
-    believed: &StateSpace,
-    reference_m: &[f64],
-    n_samples: usize,
-) -> Made {
+fn constrained(cell: &Cell, believed: &StateSpace, reference_m: &[f64], n_samples: usize) -> Made {
     let (learning, section) = (&cell.learning, &cell.learning.constrained);
     let sides = |lower: &dyn Fn(usize) -> f64, upper: &dyn Fn(usize) -> f64| Bound {
         lower: Limit::PerChannel((0..cell.n_axes()).map(lower).collect()),
@@ -179,7 +174,7 @@ fn surrounded(law: Box<dyn Law>, cell: &Cell) -> Made {
     if let Some(gate) = cell.learning.gate {
         let rule = GateRule {
             measure: match gate.measure {
-                GateMeasure::Rms => Measure::Rms,
+                GateMeasure::Rms => Measure::RmsLength { n_channels: cell.n_axes() },
                 GateMeasure::Max => Measure::Max,
             },
             tolerance: gate.tolerance_m,

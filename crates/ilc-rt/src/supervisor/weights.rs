@@ -12,10 +12,7 @@ use crate::learning::weights::{Contour, ContourTerms, Gain, Schedule, Weight};
 ///
 /// `Q_k = q_k I + c_k (I - t_k t_k') + along t_k t_k'`, `t_k` the direction of the path; `q`, `s`, `r`
 /// and `c` go over from phase to phase through a Gaussian filter.
-pub(super) fn norm_optimal_cost(
-    cell: &Cell,
-    reference_m: &[f64],
-) -> Result<Cost, SupervisorError> {
+pub(super) fn norm_optimal_cost(cell: &Cell, reference_m: &[f64]) -> Result<Cost, SupervisorError> {
     let section = &cell.learning.norm_optimal;
     let n_samples = reference_m.len() / cell.n_axes();
     let run = Run { cell, section, n_samples };
@@ -89,7 +86,8 @@ impl Run<'_> {
         let mut segments = vec![(0, base)];
         for phase in &self.section.phases {
             let Some(value) = pick(phase) else { continue };
-            for (start, value) in [(self.sample(phase.from_s), value), (self.sample(phase.to_s), base)]
+            for (start, value) in
+                [(self.sample(phase.from_s), value), (self.sample(phase.to_s), base)]
             {
                 match segments.last_mut() {
                     Some(last) if last.0 == start => last.1 = value,
@@ -142,7 +140,11 @@ mod tests {
         let phase = "[[learning.norm_optimal.phase]]\nfrom_s = 0.4\nto_s = 0.6\nq = 5.0\nr = 2.0\n";
         let cost = cost(phase).unwrap();
         let q = |k: usize| cost.q.entry(k, 0, 0);
-        assert!((q(50) - 1.0).abs() < 1e-9 && (q(250) - 5.0).abs() < 1e-9 && (q(450) - 1.0).abs() < 1e-9);
+        assert!(
+            (q(50) - 1.0).abs() < 1e-9
+                && (q(250) - 5.0).abs() < 1e-9
+                && (q(450) - 1.0).abs() < 1e-9
+        );
         // Half-way at the boundary, and nowhere a step.
         assert!((0.5 * (q(199) + q(200)) - 3.0).abs() < 1e-9, "{}", q(200));
         assert!((1..500).all(|k| (q(k) - q(k - 1)).abs() < 0.3));

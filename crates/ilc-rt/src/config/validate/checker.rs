@@ -8,7 +8,12 @@ pub(super) struct Checker {
 }
 
 impl Checker {
-    pub(super) fn refuse(&self, key: &str, value: &dyn std::fmt::Display, allowed: &str) -> ConfigError {
+    pub(super) fn refuse(
+        &self,
+        key: &str,
+        value: &dyn std::fmt::Display,
+        allowed: &str,
+    ) -> ConfigError {
         ConfigError::Value {
             file: self.file.clone(),
             key: key.to_owned(),
@@ -28,7 +33,13 @@ impl Checker {
     }
 
     /// Refuses what is not a finite number from `low` to `high`.
-    pub(super) fn range(&self, key: &str, value: f64, low: f64, high: f64) -> Result<(), ConfigError> {
+    pub(super) fn range(
+        &self,
+        key: &str,
+        value: f64,
+        low: f64,
+        high: f64,
+    ) -> Result<(), ConfigError> {
         self.that(
             value.is_finite() && (low..=high).contains(&value),
             key,

@@ -60,9 +60,7 @@ fn transposes_are_those_of_the_update() {
 
 /// A law that would diverge, and one that will not.
 fn pair(n: usize) -> [Pd; 2] {
-    [2.5, 0.5].map(|kp| {
-        Pd::new(PdGains { kp, kd: 0.0, lead: 9 }, n, 1, low_pass(8.0)).unwrap()
-    })
+    [2.5, 0.5].map(|kp| Pd::new(PdGains { kp, kd: 0.0, lead: 9 }, n, 1, low_pass(8.0)).unwrap())
 }
 
 #[test]
@@ -132,7 +130,8 @@ fn model_laws_are_judged_on_their_own_model_and_on_another() {
 fn weights_that_vary_do_not_cost_the_certainty_of_the_own_model() {
     let (model, n) = (one_axis(15.0), 80);
     let q: Vec<f64> = (0..n).map(|k| if k < 40 { 1.0 } else { 0.0 }).collect();
-    let cost = Cost { q: Weight::PerSample(q), ..Weights { rate: 3.0, ..Weights::default() }.into() };
+    let cost =
+        Cost { q: Weight::PerSample(q), ..Weights { rate: 3.0, ..Weights::default() }.into() };
     let mut law = NormOptimal::new(&model, n, cost).unwrap();
     let verdict = divergence(&mut law, &model, n).unwrap().unwrap();
     assert!(verdict.converges && verdict.why.contains("cost of its own model"), "{}", verdict.why);

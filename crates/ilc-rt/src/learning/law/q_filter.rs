@@ -112,9 +112,8 @@ impl QFilter {
 /// Finds where a response on the unit circle last falls below `1 / sqrt 2`, from above.
 fn highest_passed_hz(dt_s: f64, response: impl Fn(Complex<f64>) -> Complex<f64>) -> Option<f64> {
     const STEPS: usize = 4096;
-    let passes = |omega_rad: f64| {
-        response(Complex::from_polar(1.0, omega_rad)).norm() >= FRAC_1_SQRT_2
-    };
+    let passes =
+        |omega_rad: f64| response(Complex::from_polar(1.0, omega_rad)).norm() >= FRAC_1_SQRT_2;
     let omega_rad = |place: usize| PI * place as f64 / STEPS as f64;
     let place = (0..=STEPS).rev().find(|place| passes(omega_rad(*place)))?;
     let (mut low, mut high) = (omega_rad(place), omega_rad(place + 1).min(PI));
@@ -254,7 +253,9 @@ mod tests {
         let expected = [None, Some(40.0), Some(40.0), Some(30.0), Some(60.0), Some(taps_hz)];
         for (found, expected) in told.iter().zip(expected) {
             match (found, expected) {
-                (Some(found), Some(expected)) => assert!((found - expected).abs() < 1e-6, "{told:?}"),
+                (Some(found), Some(expected)) => {
+                    assert!((found - expected).abs() < 1e-6, "{told:?}");
+                }
                 (found, expected) => assert_eq!(*found, expected),
             }
         }

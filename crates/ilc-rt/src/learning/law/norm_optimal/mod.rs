@@ -216,10 +216,9 @@ impl Law for NormOptimal {
     }
 
     fn structure(&self) -> Structure<'_> {
-        self.invariant.as_ref().map_or(Structure::Unknown, |model| Structure::Optimal {
-            model,
-            weights: self.scalars,
-        })
+        self.invariant
+            .as_ref()
+            .map_or(Structure::Unknown, |model| Structure::Optimal { model, weights: self.scalars })
     }
 
     fn reset(&mut self) {}
