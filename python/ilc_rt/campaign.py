@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import warnings
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -79,6 +80,7 @@ class Campaign:
     allow_divergent : bool
         Whether to start a law of which the analysis says that it will not
         converge. A law written in Python is not analysed: it always starts.
+        Of a `Gate` or a `Ladder` the law inside is analysed.
 
     Raises
     ------
@@ -86,6 +88,19 @@ class Campaign:
         If the cell, the bus or a program cannot be used.
     BadInputError
         If the law will not converge with the cell's model.
+
+    Warns
+    -----
+    UserWarning
+        If the law's low-pass begins above the frequency from which on the law
+        makes the error grow, or the error of the cell's own law will rise
+        before it falls; not with `allow_divergent`.
+
+    Notes
+    -----
+    The controller restores the best input when the error grows, unless the law
+    is a `Gate`, which does so by itself. It tells any other law that has a
+    method ``taken_back()``.
 
     Examples
     --------
@@ -123,6 +138,9 @@ class Campaign:
             raise BadInputError(message)
         if law is not None and not allow_divergent:
             _refuse_divergent(law, self.cell)
+        if law is None and learning and not allow_divergent:
+            for line in self.cell.warnings:
+                warnings.warn(f"{self.cell.path}: {line}", stacklevel=2)
         self.measure = measure
         self.transport = transport_of(self.bus)
         self.lockstep = self.transport == "loopback" if lockstep is None else lockstep

@@ -1,10 +1,12 @@
 //! `analyze` and `refuse_divergent`: what a law will do, before its first run.
 
+use std::ffi::CString;
+
 use ilc_rt::learning::Law;
 use ilc_rt::learning::analysis::{self, Question, Uncertainty};
 use ilc_rt::learning::law::norm_optimal::Weights;
 use ilc_rt::model::StateSpace;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -54,7 +56,9 @@ use crate::python_law::PythonLaw;
 /// Notes
 /// -----
 /// A law written in Python is tried for linearity, and reset before each of its
-/// updates; it should keep nothing from run to run. Up to 640 inputs whole
+/// updates; it should keep nothing from run to run. Of a `Gate` or a `Ladder` the
+/// law inside is analysed, with gain 1, of a law with bounds the same law without
+/// them: a bound that is reached can only hold the input there. Up to 640 inputs whole
 /// matrices are formed, beyond that products with signals.
 ///
 /// References
@@ -109,7 +113,8 @@ fn analyze(
 /// Refuse a law that will not converge with a model.
 ///
 /// The quick part of `analyze`: less than a second up to 60 000 samples. A law
-/// written in Python is let through.
+/// written in Python is let through; of a `Gate` or a `Ladder` the law inside is
+/// looked at, of a law with bounds the same law without them.
 ///
 /// Parameters
 /// ----------
@@ -124,6 +129,12 @@ fn analyze(
 /// ------
 /// LearningError
 ///     With the figures.
+///
+/// Warns
+/// -----
+/// UserWarning
+///     If the low-pass of the law begins above the frequency from which on the
+///     law makes the error grow; both are named.
 ///
 /// Examples
 /// --------
@@ -142,7 +153,20 @@ fn refuse_divergent(
 ) -> PyResult<()> {
     let model = read_model("model", model)?;
     let Some(mut law) = laws::own_law(law, n_samples, model.n_inputs())? else { return Ok(()) };
-    detached(py, || analysis::refuse_divergent(law.as_mut(), &model, n_samples)).or_raise()
+    let found = detached(py, || {
+        analysis::refuse_divergent(law.as_mut(), &model, n_samples)?;
+        analysis::overreach(law.as_mut(), &model, n_samples)
+    });
+    match found.or_raise()? {
+        Some(found) => warn(py, &found.to_string()),
+        None => Ok(()),
+    }
+}
+
+/// Warns as `warnings.warn` does.
+fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
+    let message = CString::new(message)?;
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &message, 1)
 }
 
 /// Reads a number or a list of gains.

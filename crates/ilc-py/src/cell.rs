@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Axis, Cell, Interface, LawName, Measure};
+use ilc_rt::config::{Axis, Cell, Interface, Measure};
 use ilc_rt::supervisor::{self, Plan};
 use pyo3::prelude::*;
 
@@ -26,6 +26,7 @@ pub(crate) struct PyCell {
     pub(crate) cell: Cell,
     reference_m: Vec<f64>,
     n_samples: usize,
+    warnings: Vec<String>,
 }
 
 #[pymethods]
@@ -56,8 +57,8 @@ impl PyCell {
         cell.learning.allow_divergent |= allow_divergent;
         let plan = Plan::new(&cell, None, false).or_raise()?;
         // Refuses a model or weights that cannot learn, before any drive is touched.
-        plan.law(&cell).or_raise()?;
-        Ok(Self { n_samples: plan.n_samples(), reference_m: plan.reference_m, cell })
+        let warnings = plan.law(&cell).or_raise()?.warnings;
+        Ok(Self { n_samples: plan.n_samples(), reference_m: plan.reference_m, cell, warnings })
     }
 
     /// Name of the cell.
@@ -134,14 +135,16 @@ impl PyCell {
         }
     }
 
-    /// Law: `norm_optimal`, `pd` or `none`.
+    /// Name of the law, as in `[learning] law`.
     #[getter]
     fn law(&self) -> &'static str {
-        match self.cell.learning.law {
-            LawName::NormOptimal => "norm_optimal",
-            LawName::Pd => "pd",
-            LawName::None => "none",
-        }
+        self.cell.learning.law.as_str()
+    }
+
+    /// What the analysis has to say against the law, though it may start.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
     }
 
     /// Return the set points of a run, as the loop will give them.

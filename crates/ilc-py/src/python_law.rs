@@ -4,9 +4,11 @@ use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use crate::argument::{Signal, give_signal};
+use crate::laws;
 
 /// Any object with `update(u, e, disturbance=None)`; told of a run from which nothing is learned, or
-/// of the first one, by its method `expect(disturbance)` if it has one.
+/// of the first one, by its method `expect(disturbance)` if it has one, and that its last input is
+/// taken back by `taken_back()`.
 pub(crate) struct PythonLaw {
     law: Py<PyAny>,
     name: String,
@@ -81,6 +83,15 @@ impl Law for PythonLaw {
                 self.law.bind(py).call_method1("expect", (passed,)).map(drop)
             });
         }
+    }
+
+    fn taken_back(&mut self) {
+        // A law that has no `taken_back` does not care.
+        let _ = Python::attach(|py| self.law.bind(py).call_method0("taken_back").map(drop));
+    }
+
+    fn goes_back(&self) -> bool {
+        Python::attach(|py| laws::goes_back(self.law.bind(py)))
     }
 
     fn reset(&mut self) {

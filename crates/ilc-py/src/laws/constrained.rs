@@ -1,18 +1,16 @@
 //! `ConstrainedIlc`.
 
-use std::sync::Mutex;
-
-use ilc_rt::learning::Law;
 use ilc_rt::learning::law::constrained::{Bound as Limits, Bounds, Constrained, Limit, Status};
 use ilc_rt::learning::law::norm_optimal::Cost;
 use ilc_rt::learning::weights::Weight;
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
+use super::fixed_size::FixedSize;
 use super::weight::read_weight;
-use super::{held, next};
-use crate::argument::{Signal, give_signal, misfit, read_numbers};
+use crate::argument::{Signal, misfit, read_numbers};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::read_model;
@@ -102,10 +100,14 @@ use crate::model_argument::read_model;
 #[pyclass(name = "ConstrainedIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyConstrainedIlc {
-    n_samples: usize,
-    n_inputs: usize,
-    n_outputs: usize,
-    law: Mutex<Constrained>,
+    law: FixedSize<Constrained>,
+}
+
+impl PyConstrainedIlc {
+    /// Makes the law without its bounds, as which analysis sees it.
+    pub(super) fn unbounded(&self) -> Result<Box<dyn Law>, LearningError> {
+        Ok(Box::new(self.law.look(Constrained::unbounded)?))
+    }
 }
 
 #[pymethods]
@@ -180,19 +182,19 @@ impl PyConstrainedIlc {
             reference: given_reference.filter(|_| is_setpoint),
         };
         let law = detached(py, || Constrained::new(&model, n_samples, cost, bounds)).or_raise()?;
-        Ok(Self { n_samples, n_inputs, n_outputs, law: Mutex::new(law) })
+        Ok(Self { law: FixedSize::new(law, &model, n_samples) })
     }
 
     /// Samples of a run.
     #[getter]
-    fn n_samples(&self) -> usize {
-        self.n_samples
+    pub(super) fn n_samples(&self) -> usize {
+        self.law.n_samples()
     }
 
     /// How the last update ended: untried, solved, infeasible or max_iterations.
     #[getter]
     fn status(&self) -> &'static str {
-        match held(&self.law).status() {
+        match self.law.look(Constrained::status) {
             Status::Untried => "untried",
             Status::Solved => "solved",
             Status::Infeasible(_) => "infeasible",
@@ -203,7 +205,7 @@ impl PyConstrainedIlc {
     /// The status as a sentence, with names and samples of bounds that cannot be honoured.
     #[getter]
     fn message(&self) -> String {
-        match held(&self.law).status() {
+        match self.law.look(Constrained::status) {
             Status::Untried => "there was no update yet".to_owned(),
             Status::Solved => "the input is optimal within the bounds".to_owned(),
             Status::Infeasible(error) => error.to_string(),
@@ -216,13 +218,13 @@ impl PyConstrainedIlc {
     /// Iterations of the last update; 0 if no bound was reached.
     #[getter]
     fn iterations(&self) -> usize {
-        held(&self.law).iterations()
+        self.law.look(Constrained::iterations)
     }
 
     /// By how much the cost may exceed the least one, as a part of it.
     #[getter]
     fn gap(&self) -> f64 {
-        held(&self.law).gap()
+        self.law.look(Constrained::gap)
     }
 
     /// Return the input of the next run.
@@ -254,29 +256,16 @@ impl PyConstrainedIlc {
         disturbance: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let _ = disturbance;
-        let u = self.read("u", u, self.n_inputs)?;
-        let e = self.read("e", e, self.n_outputs)?;
-        let result = detached(py, || next(&mut *held(&self.law), &u, &e)).or_raise()?;
-        give_signal(py, result, u.n_channels, u.is_flat)
+        self.law.update(py, u, e)
     }
 
     /// Forget the last solution: the next search starts afresh.
     fn reset(&self) {
-        held(&self.law).reset();
+        self.law.reset();
     }
 
     fn __repr__(&self) -> String {
-        format!("ConstrainedIlc({})", held(&self.law).describe())
-    }
-}
-
-impl PyConstrainedIlc {
-    fn read(&self, name: &str, signal: &Bound<'_, PyAny>, n_channels: usize) -> PyResult<Signal> {
-        let signal = Signal::read(name, signal)?;
-        if (signal.n_samples, signal.n_channels) == (self.n_samples, n_channels) {
-            return Ok(signal);
-        }
-        Err(misfit(name, &signal.shape(), &format!("({}, {n_channels})", self.n_samples)))
+        format!("ConstrainedIlc({})", self.law.look(Constrained::describe))
     }
 }
 

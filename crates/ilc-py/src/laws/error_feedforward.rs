@@ -2,6 +2,7 @@
 
 use ilc_rt::learning::law::error_feedforward::{ErrorFeedforward, Feedforward};
 use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use super::any_size::AnySize;
@@ -52,6 +53,18 @@ pub(super) struct PyErrorFeedforwardIlc {
     rule: Feedforward,
     filter: QFilter,
     law: AnySize<ErrorFeedforward>,
+}
+
+impl PyErrorFeedforwardIlc {
+    /// Makes the law anew, for runs of the given size.
+    pub(super) fn own(
+        &self,
+        n_samples: usize,
+        n_channels: usize,
+    ) -> Result<Box<dyn Law>, LearningError> {
+        let filter = self.filter.clone();
+        Ok(Box::new(ErrorFeedforward::new(self.rule, n_samples, n_channels, filter)?))
+    }
 }
 
 #[pymethods]

@@ -68,6 +68,13 @@ pub(super) struct PyGate {
     gate: Mutex<Gate<InnerLaw>>,
 }
 
+impl PyGate {
+    /// Returns the law inside.
+    pub(super) fn inside<'py>(&self, py: Python<'py>) -> &Bound<'py, PyAny> {
+        self.law.bind(py)
+    }
+}
+
 #[pymethods]
 impl PyGate {
     #[new]
@@ -154,6 +161,14 @@ impl PyGate {
         update_around(py, &self.gate, u, e, disturbance)
     }
 
+    /// Tell the law that the input it made last is taken back.
+    ///
+    /// For whoever runs the law and restores an earlier input because the error
+    /// grew; handed on to the law inside.
+    fn taken_back(&self, py: Python<'_>) {
+        look(py, &self.gate, Law::taken_back);
+    }
+
     /// Forget every run; the law inside too.
     fn reset(&self, py: Python<'_>) {
         look(py, &self.gate, Law::reset);
@@ -161,10 +176,7 @@ impl PyGate {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let GateRule { measure, tolerance, resume, growth, patience } = self.rule;
-        let measure = match measure {
-            Measure::Rms => "rms",
-            Measure::Max => "max",
-        };
+        let measure = measure.as_str();
         Ok(format!(
             "Gate({}, tolerance={tolerance}, measure='{measure}', resume={resume}, growth={growth}, patience={patience})",
             shown(py, &self.gate)?

@@ -105,6 +105,11 @@ impl Law for InnerLaw {
         }
     }
 
+    fn taken_back(&mut self) {
+        // A law that has no `taken_back` does not care.
+        let _ = Python::attach(|py| self.law.bind(py).call_method0("taken_back").map(drop));
+    }
+
     fn reset(&mut self) {
         // A law may keep nothing and have no `reset`; one that fails is as good as none.
         let _ = Python::attach(|py| self.law.bind(py).call_method0("reset").map(drop));

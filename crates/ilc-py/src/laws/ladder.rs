@@ -67,6 +67,13 @@ pub(super) struct PyLadder {
     ladder: Mutex<Ladder<InnerLaw>>,
 }
 
+impl PyLadder {
+    /// Returns the law inside.
+    pub(super) fn inside<'py>(&self, py: Python<'py>) -> &Bound<'py, PyAny> {
+        self.law.bind(py)
+    }
+}
+
 #[pymethods]
 impl PyLadder {
     #[new]
@@ -139,6 +146,14 @@ impl PyLadder {
         disturbance: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         update_around(py, &self.ladder, u, e, disturbance)
+    }
+
+    /// Tell the law that the input it made last is taken back.
+    ///
+    /// For whoever runs the law and restores an earlier input because the error
+    /// grew: the gain is halved and the mean begins anew.
+    fn taken_back(&self, py: Python<'_>) {
+        look(py, &self.ladder, Law::taken_back);
     }
 
     /// Forget every run and the gain; the law inside too.

@@ -4,6 +4,7 @@ mod adjoint;
 mod any_size;
 mod constrained;
 mod error_feedforward;
+mod fixed_size;
 mod flexible;
 mod gate;
 mod inner;
@@ -50,8 +51,9 @@ fn fixed_size(
     Err(misfit(name, &signal.shape(), &format!("({n_samples}, {n_channels})")))
 }
 
-/// Makes a law of its own out of one that comes with the controller, for runs of the given size;
-/// `None` for any other object.
+/// Makes a law of its own for analysis out of one that comes with the controller, for runs of the given
+/// size: of a gate or a ladder the law inside, of a law with bounds the one without them. `None` for any
+/// other object.
 pub(crate) fn own_law(
     object: &Bound<'_, PyAny>,
     n_samples: usize,
@@ -60,16 +62,56 @@ pub(crate) fn own_law(
     if let Ok(law) = object.cast::<pd::PyPdIlc>() {
         return law.get().own(n_samples, n_channels).or_raise().map(Some);
     }
-    match object.cast::<norm_optimal::PyNormOptimalIlc>() {
-        Ok(law) => law.get().own().or_raise().map(Some),
-        Err(_) => Ok(None),
+    if let Ok(law) = object.cast::<error_feedforward::PyErrorFeedforwardIlc>() {
+        return law.get().own(n_samples, n_channels).or_raise().map(Some);
     }
+    if let Ok(law) = object.cast::<adjoint::PyAdjointIlc>() {
+        return Ok(Some(law.get().own()));
+    }
+    if let Ok(law) = object.cast::<model_inverse::PyModelInverseIlc>() {
+        return Ok(Some(law.get().own()));
+    }
+    if let Ok(law) = object.cast::<constrained::PyConstrainedIlc>() {
+        return law.get().unbounded().or_raise().map(Some);
+    }
+    if let Ok(law) = object.cast::<norm_optimal::PyNormOptimalIlc>() {
+        return law.get().own().or_raise().map(Some);
+    }
+    match inside(object) {
+        Some(law) => own_law(&law, n_samples, n_channels),
+        None => Ok(None),
+    }
+}
+
+/// Returns the law inside a gate or a ladder.
+fn inside<'py>(object: &Bound<'py, PyAny>) -> Option<Bound<'py, PyAny>> {
+    let py = object.py();
+    if let Ok(law) = object.cast::<gate::PyGate>() {
+        return Some(law.get().inside(py).clone());
+    }
+    object.cast::<ladder::PyLadder>().ok().map(|law| law.get().inside(py).clone())
+}
+
+/// Returns whether a law goes back to its best input by itself: a gate does, also inside a ladder.
+pub(crate) fn goes_back(object: &Bound<'_, PyAny>) -> bool {
+    object.is_instance_of::<gate::PyGate>() || inside(object).is_some_and(|law| goes_back(&law))
 }
 
 /// Returns the number of samples that a law was made for, if it says so.
 pub(crate) fn samples_of(object: &Bound<'_, PyAny>) -> Option<usize> {
-    let law = object.cast::<norm_optimal::PyNormOptimalIlc>().ok()?;
-    Some(law.get().n_samples())
+    if let Ok(law) = object.cast::<adjoint::PyAdjointIlc>() {
+        return Some(law.get().n_samples());
+    }
+    if let Ok(law) = object.cast::<model_inverse::PyModelInverseIlc>() {
+        return Some(law.get().n_samples());
+    }
+    if let Ok(law) = object.cast::<constrained::PyConstrainedIlc>() {
+        return Some(law.get().n_samples());
+    }
+    if let Ok(law) = object.cast::<norm_optimal::PyNormOptimalIlc>() {
+        return Some(law.get().n_samples());
+    }
+    inside(object).and_then(|law| samples_of(&law))
 }
 
 /// Makes the optimal law of the given weights.

@@ -1,14 +1,11 @@
 //! `ModelInverseIlc`.
 
-use std::sync::Mutex;
-
 use ilc_rt::learning::Law;
 use ilc_rt::learning::law::model_inverse::ModelInverse;
 use ilc_rt::learning::law::q_filter::QFilter;
 use pyo3::prelude::*;
 
-use super::{fixed_size, held, next};
-use crate::argument::give_signal;
+use super::fixed_size::FixedSize;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::read_model;
@@ -63,10 +60,18 @@ use crate::signal::{kind, read_filter};
 pub(super) struct PyModelInverseIlc {
     gain: f64,
     q_filter: QFilter,
-    n_samples: usize,
-    n_inputs: usize,
-    n_outputs: usize,
-    law: Mutex<ModelInverse>,
+    law: FixedSize<ModelInverse>,
+}
+
+impl PyModelInverseIlc {
+    /// Makes the law anew.
+    pub(super) fn own(&self) -> Box<dyn Law> {
+        Box::new(self.law.look(ModelInverse::clone))
+    }
+
+    pub(super) fn n_samples(&self) -> usize {
+        self.law.n_samples()
+    }
 }
 
 #[pymethods]
@@ -84,8 +89,7 @@ impl PyModelInverseIlc {
         let q_filter = read_filter("q_filter", q_filter)?;
         let law = detached(py, || ModelInverse::new(&model, n_samples, gain, q_filter.clone()))
             .or_raise()?;
-        let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
-        Ok(Self { gain, q_filter, n_samples, n_inputs, n_outputs, law: Mutex::new(law) })
+        Ok(Self { gain, q_filter, law: FixedSize::new(law, &model, n_samples) })
     }
 
     /// Gain of the step.
@@ -123,21 +127,18 @@ impl PyModelInverseIlc {
         disturbance: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let _ = disturbance;
-        let u = fixed_size("u", u, self.n_samples, self.n_inputs)?;
-        let e = fixed_size("e", e, self.n_samples, self.n_outputs)?;
-        let result = detached(py, || next(&mut *held(&self.law), &u, &e)).or_raise()?;
-        give_signal(py, result, u.n_channels, u.is_flat)
+        self.law.update(py, u, e)
     }
 
     /// Forget what earlier runs taught: nothing, for this law.
     fn reset(&self) {
-        held(&self.law).reset();
+        self.law.reset();
     }
 
     fn __repr__(&self) -> String {
         format!(
             "ModelInverseIlc(n_samples={}, gain={}, q_filter={})",
-            self.n_samples,
+            self.law.n_samples(),
             self.gain,
             kind(&self.q_filter)
         )

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
-use crate::config::{Cell, PathKind};
-use crate::supervisor::{Plan, SupervisorError};
+use crate::config::{Cell, GateMeasure, LawName, PathKind};
+use crate::supervisor::{Plan, Prepared, SupervisorError};
 
 #[derive(Args)]
 #[command(after_help = "Example:
@@ -30,7 +30,7 @@ pub(super) fn check(arguments: &CheckArguments) -> u8 {
 fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
     let cell = Cell::load(&arguments.cell)?;
     let plan = Plan::new(&cell, None, false)?;
-    let law = plan.law(&cell)?;
+    let Prepared { law, verdict, warnings } = plan.law(&cell)?;
     show::say(&format!(
         "cell {}: {} axes on {}, {} us cycle; a classical CAN bus at {} bit/s would be {:.0} % loaded",
         cell.cell.name,
@@ -66,7 +66,52 @@ fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
             |law| format!("is learned: {}", law.describe())
         )
     ));
+    for line in learning(&cell) {
+        show::say(&format!("  {line}"));
+    }
+    if !verdict.is_empty() {
+        show::say(&format!("  forecast from the model: {verdict}"));
+    }
+    for warning in warnings {
+        show::say(&format!("  warning: {warning}"));
+    }
     Ok(())
+}
+
+/// What decides on the next input beside the law.
+fn learning(cell: &Cell) -> Vec<String> {
+    let learning = &cell.learning;
+    if learning.law == LawName::None {
+        return Vec::new();
+    }
+    let mut lines = Vec::new();
+    if let Some(ladder) = &learning.ladder {
+        lines.push(format!(
+            "ladder: each step from the mean of {} runs, gain 1 at first and {} to {} later",
+            ladder.repeats, ladder.lowest, ladder.highest
+        ));
+    }
+    lines.push(match &learning.gate {
+        Some(gate) => format!(
+            "gate: the input is kept while the {} error is within {:.3} um (learning resumes at {:.3} um); after \
+             {} {} in a row above {} times the best error the best input is restored",
+            match gate.measure {
+                GateMeasure::Rms => "RMS",
+                GateMeasure::Max => "largest",
+            },
+            gate.tolerance_m * 1e6,
+            gate.tolerance_m * gate.resume * 1e6,
+            gate.patience,
+            if learning.ladder.is_some() { "steps" } else { "runs" },
+            gate.growth
+        ),
+        None => format!(
+            "an RMS error above {} times the best one restores the best input; after the second time \
+             nothing is learned any more",
+            learning.rollback()
+        ),
+    });
+    lines
 }
 
 /// What kind of path it is, how long, and how fast at most.
@@ -90,4 +135,31 @@ fn path(cell: &Cell, plan: &Plan) -> String {
     let (length_m, fastest_m) =
         steps_m.fold((0.0, 0.0_f64), |(sum, most), step| (sum + step, most.max(step)));
     format!("{kind}, {length_m:.4} m long, {:.4} m/s at most", fastest_m / cell.cycle_s())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GANTRY: &str =
+        include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/01_gantry.toml"));
+
+    fn told(tail: &str) -> String {
+        let cell = Cell::parse(&format!("{GANTRY}\n{tail}"), "cell.toml").unwrap();
+        learning(&cell).join("\n")
+    }
+
+    #[test]
+    fn what_decides_beside_the_law_is_told() {
+        let plain = told("");
+        assert!(plain.contains("above 1.5 times the best one restores"), "{plain}");
+        let gate = "[learning.gate]\ntolerance_m = 2e-5\nresume = 2.0\ngrowth = 3.0\n";
+        let gated = told(gate);
+        for part in ["RMS error is within 20.000 um", "resumes at 40.000 um", "2 runs", "3 times"] {
+            assert!(gated.contains(part), "{gated}");
+        }
+        let both = told(&format!("{gate}[learning.ladder]\nrepeats = 5\n"));
+        assert!(both.contains("mean of 5 runs") && both.contains("2 steps"), "{both}");
+        assert!(!both.contains("restores the best input; after the second time"), "{both}");
+    }
 }

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::error::ConfigError;
-use super::program::{Learning, Program};
+use super::learning::Learning;
+use super::program::Program;
+use super::simulation::{AxisSimulation, Simulation};
 
 /// A whole cell description, validated.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -218,76 +220,6 @@ pub struct Telemetry {
 impl Default for Telemetry {
     fn default() -> Self {
         Self { enabled: true, listen: Vec::new(), connect: Vec::new(), scouting: true }
-    }
-}
-
-/// `[simulation]`: the plant as a whole.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Simulation {
-    /// Error of the right angle between the first two axes: `x_tcp += orthogonality_rad * y`.
-    pub orthogonality_rad: f64,
-    /// Step of the drives' own control loops and of the integration.
-    pub step_us: u32,
-    /// Standard deviation of white noise on the encoders; 0 for none.
-    pub encoder_noise_m: f64,
-    /// Seed of the noise.
-    pub seed: u64,
-}
-
-impl Default for Simulation {
-    fn default() -> Self {
-        Self { orthogonality_rad: 0.0, step_us: 125, encoder_noise_m: 0.0, seed: 1 }
-    }
-}
-
-/// `[axis.simulation]`: a mass in a cascade (P position, PI velocity), friction, and one mode that
-/// only the tool centre point sees.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct AxisSimulation {
-    /// Moving mass, the mode's included.
-    pub mass_kg: f64,
-    /// Natural frequency for which the cascade is tuned.
-    pub natural_frequency_hz: f64,
-    /// Damping ratio for which the cascade is tuned.
-    pub damping: f64,
-    /// Integral time of the velocity controller.
-    pub integral_time_s: f64,
-    /// Largest force of the motor.
-    pub force_max_n: f64,
-    /// Coulomb friction.
-    pub coulomb_n: f64,
-    /// Static friction.
-    pub static_n: f64,
-    /// Stribeck velocity.
-    pub stribeck_m_s: f64,
-    /// Part of the mass that swings as the mode; 0 for none.
-    pub mode_mass_kg: f64,
-    /// Natural frequency of the mode.
-    pub mode_frequency_hz: f64,
-    /// Damping ratio of the mode.
-    pub mode_damping: f64,
-    /// Position at power-on.
-    pub position_start_m: f64,
-}
-
-impl Default for AxisSimulation {
-    fn default() -> Self {
-        Self {
-            mass_kg: 20.0,
-            natural_frequency_hz: 15.0,
-            damping: 1.0,
-            integral_time_s: 0.1,
-            force_max_n: 2000.0,
-            coulomb_n: 0.0,
-            static_n: 0.0,
-            stribeck_m_s: 0.002,
-            mode_mass_kg: 0.0,
-            mode_frequency_hz: 20.0,
-            mode_damping: 0.1,
-            position_start_m: 0.0,
-        }
     }
 }
 

@@ -5,17 +5,25 @@
 
 mod cell;
 mod error;
+mod law;
+mod learning;
+mod norm_optimal;
 mod path;
 mod program;
+mod simulation;
 mod validate;
 
 pub use cell::{
-    Axis, AxisModel, AxisSimulation, AxisUnit, BusSection, Cell, CellSection, Interface, Limits,
-    PositionLoop, Safety, Simulation, TcpEncoder, Telemetry,
+    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Interface, Limits, PositionLoop,
+    Safety, TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
-pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
-pub use program::{
-    Corner, LawName, Learning, Measure, NormOptimalSection, PdSection, Program, Segment,
+pub use law::{
+    AdjointSection, ConstrainedSection, ErrorFeedforwardSection, ModelInverseSection, PdSection,
 };
+pub use learning::{GateMeasure, GateSection, LadderSection, LawName, Learning, Measure};
+pub use norm_optimal::{ContourSection, NormOptimalSection, PhaseSection};
+pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
+pub use program::{Corner, Program, Segment};
+pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;

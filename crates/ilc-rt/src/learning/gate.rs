@@ -1,12 +1,18 @@
 //! The switching mechanism: when any law is to learn, to rest, or to go back to what was best.
 
-use super::{Law, LearningError};
+use super::{Law, LearningError, StandIn};
 
 /// What a run is judged by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
     /// Root of the mean square over all samples and channels.
     Rms,
+    /// Root of the mean over the samples of the squared length of the error, all channels taken
+    /// together: the figure by which a controller reports its runs.
+    RmsLength {
+        /// Channels of the error.
+        n_channels: usize,
+    },
     /// Largest magnitude of any sample of any channel.
     Max,
 }
@@ -19,7 +25,17 @@ impl Measure {
                 let sum: f64 = error.iter().map(|e| e * e).sum();
                 (sum / error.len().max(1) as f64).sqrt()
             }
+            Self::RmsLength { n_channels } => Self::Rms.of(error) * (n_channels as f64).sqrt(),
             Self::Max => error.iter().fold(0.0, |largest: f64, e| largest.max(e.abs())),
+        }
+    }
+
+    /// Returns its name in records.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Rms => "rms",
+            Self::RmsLength { .. } => "rms_length",
+            Self::Max => "max",
         }
     }
 }
@@ -162,6 +178,7 @@ impl<L: Law> Gate<L> {
         } else if self.state == GateState::Learning && too_long {
             self.state = GateState::RolledBack;
             self.runs_grown = 0;
+            self.law.taken_back();
         }
         if self.best_figure.is_none_or(|best| figure < best) {
             self.best_figure = Some(figure);
@@ -202,6 +219,33 @@ impl<L: Law> Law for Gate<L> {
         self.law.expect(disturbance);
     }
 
+    fn stand_in(&mut self) -> StandIn<'_> {
+        StandIn::Inside(&mut self.law)
+    }
+
+    fn taken_back(&mut self) {
+        self.law.taken_back();
+    }
+
+    fn goes_back(&self) -> bool {
+        true
+    }
+
+    fn remark(&self) -> Option<String> {
+        match self.state {
+            GateState::Learning => self.law.remark(),
+            GateState::Holding => Some(format!(
+                "the error is within the tolerance of {:.4e}: the input is kept until it exceeds {:.4e}",
+                self.rule.tolerance,
+                self.rule.resume * self.rule.tolerance
+            )),
+            GateState::RolledBack => Some(format!(
+                "the error grew beyond {} times the best one: the best input is kept",
+                self.rule.growth
+            )),
+        }
+    }
+
     fn reset(&mut self) {
         self.law.reset();
         self.state = GateState::Learning;
@@ -211,10 +255,7 @@ impl<L: Law> Law for Gate<L> {
 
     fn describe(&self) -> String {
         let GateRule { measure, tolerance, resume, growth, patience } = self.rule;
-        let measure = match measure {
-            Measure::Rms => "rms",
-            Measure::Max => "max",
-        };
+        let measure = measure.as_str();
         let ratio = |value: f64| if value.is_finite() { value.to_string() } else { "null".into() };
         format!(
             r#"{{"law":"gate","measure":"{measure}","tolerance":{tolerance},"resume":{},"growth":{},"patience":{patience},"inner":{}}}"#,
@@ -234,6 +275,7 @@ mod tests {
     struct Counter {
         expected: Vec<f64>,
         resets: usize,
+        n_taken_back: usize,
     }
 
     impl Law for Counter {
@@ -246,6 +288,9 @@ mod tests {
         }
         fn expect(&mut self, disturbance: &[f64]) {
             self.expected = disturbance.to_vec();
+        }
+        fn taken_back(&mut self) {
+            self.n_taken_back += 1;
         }
         fn reset(&mut self) {
             self.resets += 1;
@@ -275,6 +320,19 @@ mod tests {
     }
 
     use GateState::{Holding, Learning, RolledBack};
+
+    #[test]
+    fn the_law_inside_hears_that_its_input_is_taken_back_and_people_hear_why() {
+        let mut gate = gate(0.0);
+        assert!(gate.goes_back() && gate.remark().is_none());
+        play(&mut gate, &[5.0, 2.0, 3.1, 2.9, 3.1]);
+        assert_eq!((gate.law().n_taken_back, gate.remark()), (0, None));
+        play(&mut gate, &[3.2]);
+        assert_eq!(gate.law().n_taken_back, 1);
+        assert!(gate.remark().unwrap().contains("best input is kept"));
+        gate.taken_back();
+        assert_eq!(gate.law().n_taken_back, 2);
+    }
 
     #[test]
     fn inside_the_tolerance_the_input_is_kept_and_learning_resumes_with_hysteresis() {
@@ -314,6 +372,8 @@ mod tests {
     fn the_measures_are_those_of_their_names() {
         assert!((Measure::Rms.of(&[3.0, -4.0]) - 12.5_f64.sqrt()).abs() < 1e-15);
         assert_eq!(Measure::Max.of(&[3.0, -4.0]).to_bits(), 4_f64.to_bits());
+        // One sample of two axes: the length is 5.
+        assert!((Measure::RmsLength { n_channels: 2 }.of(&[3.0, -4.0]) - 5.0).abs() < 1e-15);
         let rule = GateRule { tolerance: 3.9, measure: Measure::Max, ..GateRule::default() };
         let mut gate = Gate::new(Counter::default(), rule).unwrap();
         gate.update(&[0.0; 2], &[3.0, -4.0], &mut [0.0; 2]).unwrap();

@@ -1,6 +1,6 @@
 //! The ladder mechanism: several runs with the same input before each step of learning.
 
-use super::{Law, LearningError};
+use super::{Law, LearningError, StandIn};
 
 /// How a [`Ladder`] averages and adapts.
 ///
@@ -42,6 +42,9 @@ impl LadderRule {
 /// - `slow f_{j-1} < f_j <= f_{j-1}`: it decays too slowly, so `g` is raised;
 /// - otherwise, or if `f_j` is less than twice the noise `s_j / sqrt(n)` of the mean, so that its
 ///   ratio says nothing: `g` stays.
+///
+/// Where whoever runs the law takes an input back ([`Law::taken_back`]) the error grew too, though the
+/// law never learns from that run: `g` is halved, and the mean begins anew.
 ///
 /// # Shapes
 /// - those of the law inside
@@ -218,6 +221,24 @@ impl<L: Law> Law for Ladder<L> {
         self.law.expect(disturbance);
     }
 
+    fn stand_in(&mut self) -> StandIn<'_> {
+        StandIn::Inside(&mut self.law)
+    }
+
+    fn taken_back(&mut self) {
+        self.gain = (0.5 * self.gain).max(self.rule.lowest);
+        self.runs = 0;
+        self.law.taken_back();
+    }
+
+    fn goes_back(&self) -> bool {
+        self.law.goes_back()
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.law.remark()
+    }
+
     fn reset(&mut self) {
         self.law.reset();
         (self.gain, self.runs, self.figure, self.noise) = (1.0, 0, None, 0.0);
@@ -295,6 +316,23 @@ mod tests {
             gain_after(f64::from(size));
         }
         assert!((gain_after(30.0) - 0.0625).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_input_that_is_taken_back_halves_the_gain_and_begins_a_new_mean() {
+        let mut law = ladder(LadderRule::new(2), 1);
+        let mut next = [0.0];
+        law.update(&[1.0], &[8.0], &mut next).unwrap();
+        law.taken_back();
+        assert_eq!((law.runs(), law.gain().to_bits()), (0, 0.5_f64.to_bits()));
+        // The same input again: what was seen of it before does not count.
+        law.update(&[1.0], &[2.0], &mut next).unwrap();
+        law.update(&[1.0], &[4.0], &mut next).unwrap();
+        assert!((next[0] - 2.5).abs() < 1e-15);
+        for _ in 0..9 {
+            law.taken_back();
+        }
+        assert!((law.gain() - 0.0625).abs() < 1e-15);
     }
 
     #[test]

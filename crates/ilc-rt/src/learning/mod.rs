@@ -20,7 +20,7 @@ pub mod weights;
 
 pub use error::LearningError;
 pub use repeatability::{Repeatability, repeatability};
-pub use structure::Structure;
+pub use structure::{LowPass, StandIn, Structure};
 
 /// A rule that turns the error of one run into the input of the next.
 ///
@@ -72,6 +72,32 @@ pub trait Law: Send {
         Structure::Unknown
     }
 
+    /// Returns the law that [`analysis`] looks at where this one is not linear itself.
+    fn stand_in(&mut self) -> StandIn<'_> {
+        StandIn::Itself
+    }
+
+    /// Returns the law's low-pass for a sample time, if it has one that can be told from the rest.
+    fn low_pass(&self, dt_s: f64) -> Option<LowPass> {
+        let _ = dt_s;
+        None
+    }
+
+    /// Tells the law that the input it made last is taken back, as the error grew with it: the run to
+    /// come has an earlier input. Most laws look at one run only and have no use for it.
+    fn taken_back(&mut self) {}
+
+    /// Returns whether the law goes back to an earlier input by itself where the error grows, so that
+    /// nobody else should.
+    fn goes_back(&self) -> bool {
+        false
+    }
+
+    /// Returns what a person should know of the last update, as a sentence; most have nothing to say.
+    fn remark(&self) -> Option<String> {
+        None
+    }
+
     /// Forgets everything that earlier runs taught the law itself.
     fn reset(&mut self);
 
@@ -104,6 +130,26 @@ impl<L: Law + ?Sized> Law for Box<L> {
 
     fn structure(&self) -> Structure<'_> {
         (**self).structure()
+    }
+
+    fn stand_in(&mut self) -> StandIn<'_> {
+        (**self).stand_in()
+    }
+
+    fn low_pass(&self, dt_s: f64) -> Option<LowPass> {
+        (**self).low_pass(dt_s)
+    }
+
+    fn taken_back(&mut self) {
+        (**self).taken_back();
+    }
+
+    fn goes_back(&self) -> bool {
+        (**self).goes_back()
+    }
+
+    fn remark(&self) -> Option<String> {
+        (**self).remark()
     }
 
     fn reset(&mut self) {

@@ -14,7 +14,7 @@ const LANCZOS_STEPS: usize = 100;
 ///
 /// # Real Time
 /// Cold path. Allocates when it is made, never in [`Operator::forward`] or [`Operator::transposed`].
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Operator {
     a: DMatrix<f64>,
     b: DMatrix<f64>,

@@ -1,5 +1,6 @@
-//! What a law says of itself to whoever analyses it.
+//! What a law says of itself to whoever analyses it: `analysis` reads it, the laws write it.
 
+use crate::learning::Law;
 use crate::learning::law::norm_optimal::Weights;
 use crate::learning::law::pd::PdGains;
 use crate::model::StateSpace;
@@ -16,7 +17,27 @@ pub enum Structure<'a> {
     Optimal {
         /// What the law believes of the axes.
         model: &'a StateSpace,
-        /// The weights of the cost.
-        weights: Weights,
+        /// The weights of the cost; `None` if they change along the run or tie channels together.
+        weights: Option<Weights>,
     },
+}
+
+/// Which law analysis looks at in place of one that is not linear itself.
+#[expect(missing_debug_implementations, reason = "laws need not have one")]
+pub enum StandIn<'a> {
+    /// The law itself.
+    Itself,
+    /// The law inside one that only says when to learn, or from which runs.
+    Inside(&'a mut (dyn Law + 'a)),
+    /// The law as it is as long as none of its bounds is reached.
+    Unbounded(Box<dyn Law>),
+}
+
+/// The low-pass of a law, and the law without it.
+#[expect(missing_debug_implementations, reason = "laws need not have one")]
+pub struct LowPass {
+    /// Highest frequency that one pass of the filter lets through with `1 / sqrt 2` or more.
+    pub cutoff_hz: f64,
+    /// The same law without filter and without bounds.
+    pub unfiltered: Box<dyn Law>,
 }

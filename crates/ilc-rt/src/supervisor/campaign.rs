@@ -1,8 +1,6 @@
 //! One campaign from the first frame to the last: bring-up, runs, learning, library, end.
 
-use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicI32;
 
 use super::announce::Announcer;
 use super::collect::Collector;
@@ -10,12 +8,13 @@ use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
 use super::learner::{Learner, expect};
+use super::options::{Options, Outcome};
 use super::pace::Pacer;
 use super::plan::Plan;
 use super::progress::{Decision, Progress, Resumed};
 use super::telemetry::Telemetry;
 use super::{nodes, reason};
-use crate::config::{Cell, LawName, Measure};
+use crate::config::Cell;
 use crate::fieldbus::Bus;
 use crate::learning::Law;
 use crate::library::Library;
@@ -26,42 +25,6 @@ use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
 const MAILBOX: usize = 8192;
 /// Time between two reports of progress.
 const PROGRESS_S: f64 = 0.1;
-
-/// What the caller chooses beyond the cell description.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Runs in the whole campaign; the first one is without learning.
-    pub iterations: u32,
-    /// Measurement to learn from, if not the cell's.
-    pub measure: Option<Measure>,
-    /// Paced by the nodes' answers instead of the clock.
-    pub lockstep: bool,
-    /// Go on with the newest campaign of the same cell, program and law.
-    pub resume: bool,
-    /// Where every run is kept.
-    pub library: PathBuf,
-    /// What is measured of each run's surroundings: kept with the run, and told to the law.
-    pub disturbance: Disturbance,
-    /// Whether to publish on Zenoh.
-    pub telemetry: bool,
-    /// Set to a signal's number to bring the axes to rest.
-    pub stop: Arc<AtomicI32>,
-}
-
-/// How a campaign ended.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
-    /// How.
-    pub status: EndStatus,
-    /// One sentence.
-    pub reason: String,
-    /// Signal that asked to stop, or 0.
-    pub signal: i32,
-    /// Name of the campaign in the library.
-    pub campaign: String,
-    /// Number and figures of every run of the campaign, resumed ones included.
-    pub runs: Vec<(u32, Figures)>,
-}
 
 /// Runs a campaign on a bus (`cell.bus.address`, open), with the cell's law or another one; `observe` hears every event.
 ///
@@ -76,13 +39,24 @@ pub fn run(
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, SupervisorError> {
     let mut plan = Plan::new(cell, options.measure, options.lockstep)?;
-    let (name, law) = match law {
-        Some(law) => ("user", Some(law)),
-        None => (law_name(cell), plan.law(cell)?),
+    let (name, law) = if let Some(law) = law {
+        ("user", Some(law))
+    } else {
+        let prepared = plan.law(cell)?;
+        for warning in &prepared.warnings {
+            tracing::warn!("{warning}");
+        }
+        (cell.learning.law.as_str(), prepared.law)
+    };
+    // Without a law there is nothing to take back. A gate decides by itself: it knows what is good
+    // enough, and when the machine is not what it was.
+    let growth_allowed = match &law {
+        Some(law) if !law.goes_back() => cell.learning.rollback(),
+        _ => f64::INFINITY,
     };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
     plan.name_law(cell, name, &parameters);
-    carry_out(cell, options, bus, Work { plan, law, input: None }, observe)
+    carry_out(cell, options, bus, Work { plan, law, input: None, growth_allowed }, observe)
 }
 
 /// Excites one axis while all hold still, `options.iterations` times, and keeps what was measured; the
@@ -98,7 +72,13 @@ pub fn identify(
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, SupervisorError> {
     let planned = experiment.plan(cell, options.measure, options.lockstep)?;
-    let work = Work { plan: planned.plan, law: None, input: Some(planned.input) };
+    let work = Work {
+        plan: planned.plan,
+        law: None,
+        input: Some(planned.input),
+        // Nothing is learned, so that there is nothing to take back.
+        growth_allowed: f64::INFINITY,
+    };
     carry_out(cell, options, bus, work, observe)
 }
 
@@ -108,6 +88,8 @@ struct Work {
     law: Option<Box<dyn Law>>,
     /// Input of the first run, if it is not to be zero.
     input: Option<Vec<f64>>,
+    /// Growth of the error at which the best input is restored.
+    growth_allowed: f64,
 }
 
 #[expect(clippy::too_many_lines, reason = "the course of a campaign, step by step")]
@@ -118,16 +100,14 @@ fn carry_out(
     work: Work,
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, SupervisorError> {
-    let Work { mut plan, mut law, input } = work;
+    let Work { mut plan, mut law, input, growth_allowed } = work;
     if options.resume && !options.library.exists() {
         // Opening it would leave an empty file where a name was mistyped.
         let path = options.library.display();
         return Err(SupervisorError::Resume(format!("there is no library {path} to go on with")));
     }
     let library = Library::open(&options.library)?;
-    // Without a law there is nothing to take back when a run is worse than another.
-    let rollback_ratio = if law.is_some() { cell.learning.rollback_ratio } else { f64::INFINITY };
-    let mut progress = Progress::new(rollback_ratio);
+    let mut progress = Progress::new(growth_allowed);
     let resumed = if options.resume {
         progress.resume(&library, &mut plan.meta, law.as_deref_mut(), &options.disturbance)?
     } else {
@@ -211,6 +191,7 @@ fn carry_out(
         iterations: options.iterations,
         mail,
         stopping: None,
+        remark: None,
         failure: None,
         phase_iteration: first,
         progress_every: if options.lockstep { u32::MAX } else { progress_every },
@@ -224,14 +205,6 @@ fn carry_out(
         }
     }
     Ok(campaign.end(pacer, cell, options))
-}
-
-fn law_name(cell: &Cell) -> &'static str {
-    match cell.learning.law {
-        LawName::NormOptimal => "norm_optimal",
-        LawName::Pd => "pd",
-        LawName::None => "none",
-    }
 }
 
 /// A campaign whose loop runs.
@@ -249,6 +222,8 @@ struct Running<'a> {
     iterations: u32,
     mail: Mailbox,
     stopping: Option<StopReason>,
+    /// What the law last had to say.
+    remark: Option<String>,
     /// Why no more runs can be kept, if so: the axes are stopped, as nothing may be lost.
     failure: Option<String>,
     phase_iteration: u32,
@@ -287,6 +262,11 @@ impl Running<'_> {
             }
         }
         while let Some(lesson) = self.learner.as_mut().and_then(Learner::take) {
+            // Once for each change: what stays as it is need not be said after every run.
+            if lesson.remark != self.remark {
+                tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
+                self.remark = lesson.remark;
+            }
             match lesson.input {
                 Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
                 Err(error) => self.fail(format!("the law refused the last run: {error}")),
@@ -318,6 +298,9 @@ impl Running<'_> {
                 self.progress.asked();
                 learner.begin(&record.input, &record.error_m, &self.present);
             } else {
+                if matches!(decision, Decision::RollBack(_)) {
+                    learner.take_back();
+                }
                 learner.pass(&self.present);
             }
         }

@@ -4,7 +4,7 @@
 use super::error::SupervisorError;
 use super::plan::model;
 use crate::config::{Cell, Interface};
-use crate::learning::analysis::divergence;
+use crate::learning::analysis::{divergence, overreach};
 use crate::learning::{Law, LearningError};
 use crate::model::StateSpace;
 
@@ -48,29 +48,35 @@ pub fn first_error(cell: &Cell, reference_m: &[f64]) -> Result<Vec<f64>, Supervi
     Ok(response.iter().enumerate().map(|(i, y)| way(i / n_axes, i % n_axes) - y).collect())
 }
 
-/// Refuses a law that will not converge with the cell's model, unless the cell allows it; says so of
-/// one whose error will rise before it falls.
-pub(super) fn refuse(
+/// Refuses a law that will not converge with the cell's model, unless the cell allows it; returns the
+/// verdict as a sentence, and warnings: of one whose error will rise before it falls, and of a low-pass
+/// that lets through what the law cannot learn.
+pub(super) fn judge(
     law: &mut dyn Law,
     cell: &Cell,
     n_samples: usize,
-) -> Result<(), SupervisorError> {
+) -> Result<(String, Vec<String>), SupervisorError> {
     let model = learning_model(cell)?;
     let refused = |source| SupervisorError::Learning { file: file(cell), source };
     let verdict = divergence(law, &model, n_samples).map_err(refused)?;
+    let mut warnings = Vec::new();
+    if let Some(verdict) = &verdict {
+        if !verdict.converges && !cell.learning.allow_divergent {
+            let why = verdict.why.clone();
+            return Err(refused(LearningError::Divergent { why }));
+        }
+        if !verdict.converges || verdict.rises {
+            warnings.push(format!(
+                "[learning]: the error will not fall in every run: {}, growth up to {:.3}",
+                verdict.why, verdict.transient_growth
+            ));
+        }
+    }
+    if let Some(found) = overreach(law, &model, n_samples).map_err(refused)? {
+        warnings.push(format!("[learning]: {found}"));
+    }
     law.reset();
-    let Some(verdict) = verdict else { return Ok(()) };
-    if !verdict.converges && !cell.learning.allow_divergent {
-        return Err(refused(LearningError::Divergent { why: verdict.why }));
-    }
-    if !verdict.converges || verdict.rises {
-        tracing::warn!(
-            "[learning]: the error will not fall in every run: {}, growth up to {:.3}",
-            verdict.why,
-            verdict.transient_growth
-        );
-    }
-    Ok(())
+    Ok((verdict.map_or_else(String::new, |verdict| verdict.why), warnings))
 }
 
 fn file(cell: &Cell) -> String {

@@ -14,14 +14,18 @@ pub(super) struct Lesson {
     pub(super) input: Result<Vec<f64>, LearningError>,
     /// How long it took.
     pub(super) update_ms: f64,
+    /// What a person should know of it.
+    pub(super) remark: Option<String>,
 }
 
-/// A run to learn from.
-pub(super) struct Job {
-    /// Input and error; none if nothing is to be learned from it.
-    signals: Option<(Vec<f64>, Vec<f64>)>,
-    /// Disturbance of the run to come.
-    coming: Vec<f64>,
+/// What a law is to do.
+pub(super) enum Job {
+    /// Learn from the input and the error of a run, for one with this disturbance.
+    Learn { input: Vec<f64>, error: Vec<f64>, coming: Vec<f64> },
+    /// Nothing is to be learned from the last run, but the one to come has this disturbance.
+    Pass { coming: Vec<f64> },
+    /// Its last input is taken back.
+    TakeBack,
 }
 
 /// A law, and where it computes.
@@ -44,10 +48,15 @@ impl Learner {
             .name("ilc-learn".to_owned())
             .spawn(move || {
                 for job in todo {
-                    expect(law.as_mut(), &job.coming);
-                    let Some((input, error)) = job.signals else { continue };
-                    if done.send(learn(law.as_mut(), &input, &error)).is_err() {
-                        return;
+                    match job {
+                        Job::TakeBack => law.taken_back(),
+                        Job::Pass { coming } => expect(law.as_mut(), &coming),
+                        Job::Learn { input, error, coming } => {
+                            expect(law.as_mut(), &coming);
+                            if done.send(learn(law.as_mut(), &input, &error)).is_err() {
+                                return;
+                            }
+                        }
                     }
                 }
             })
@@ -63,9 +72,9 @@ impl Learner {
                 *done = Some(learn(law.as_mut(), input, error));
             }
             Self::Thread { jobs: Some(jobs), .. } => {
-                let signals = Some((input.to_vec(), error.to_vec()));
+                let (input, error, coming) = (input.to_vec(), error.to_vec(), coming.to_vec());
                 // A thread that is gone never answers; the old input is then repeated and counted.
-                let _ = jobs.send(Job { signals, coming: coming.to_vec() });
+                let _ = jobs.send(Job::Learn { input, error, coming });
             }
             Self::Thread { .. } => {}
         }
@@ -76,7 +85,18 @@ impl Learner {
         match self {
             Self::InLine { law, .. } => expect(law.as_mut(), coming),
             Self::Thread { jobs: Some(jobs), .. } => {
-                let _ = jobs.send(Job { signals: None, coming: coming.to_vec() });
+                let _ = jobs.send(Job::Pass { coming: coming.to_vec() });
+            }
+            Self::Thread { .. } => {}
+        }
+    }
+
+    /// Tells the law that its last input is taken back, as the error grew with it.
+    pub(super) fn take_back(&mut self) {
+        match self {
+            Self::InLine { law, .. } => law.taken_back(),
+            Self::Thread { jobs: Some(jobs), .. } => {
+                let _ = jobs.send(Job::TakeBack);
             }
             Self::Thread { .. } => {}
         }
@@ -114,5 +134,6 @@ pub(super) fn learn(law: &mut dyn Law, input: &[f64], error: &[f64]) -> Lesson {
     let began = Instant::now();
     let mut next = vec![0.0; input.len()];
     let result = law.update(input, error, &mut next);
-    Lesson { input: result.map(|()| next), update_ms: began.elapsed().as_secs_f64() * 1e3 }
+    let update_ms = began.elapsed().as_secs_f64() * 1e3;
+    Lesson { input: result.map(|()| next), update_ms, remark: law.remark() }
 }

@@ -3,23 +3,18 @@
 use std::time::Duration;
 
 use super::error::SupervisorError;
-use super::forecast;
-use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, LawName, Measure};
+use super::law::{self, Prepared};
+use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, Measure};
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
 use crate::fieldbus::load;
-use crate::learning::Law;
-use crate::learning::law::norm_optimal::{NormOptimal, Weights};
-use crate::learning::law::pd::{Pd, PdGains};
-use crate::learning::law::q_filter::QFilter;
 use crate::model::{
     Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
 };
 use crate::record::{Meta, fingerprint};
 use crate::rt::Nanos;
 use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
-use crate::signal::butterworth;
 use crate::trajectory::{AxisLimits, Interpolator};
 
 /// How long drives may take to be switched on.
@@ -107,46 +102,16 @@ impl Plan {
         self.interpolator.n_samples()
     }
 
-    /// Makes the law that the cell names; `None` if it shall not learn.
+    /// Makes the law that the cell names, with its ladder and its gate.
     ///
     /// A law that will not converge with the cell's own model is refused, unless the cell says
-    /// `allow_divergent`.
+    /// `allow_divergent`. What else the analysis has to say is in [`Prepared::warnings`].
     ///
     /// # Errors
     /// [`SupervisorError::Model`] or [`SupervisorError::Learning`] if model or weights are unusable, or
     /// the law will not converge.
-    pub fn law(&self, cell: &Cell) -> Result<Option<Box<dyn Law>>, SupervisorError> {
-        let mut law = self.named_law(cell)?;
-        if let Some(law) = &mut law {
-            forecast::refuse(law.as_mut(), cell, self.n_samples())?;
-        }
-        Ok(law)
-    }
-
-    fn named_law(&self, cell: &Cell) -> Result<Option<Box<dyn Law>>, SupervisorError> {
-        let file = || cell.file.display().to_string();
-        let n_samples = self.n_samples();
-        let refused = |source| SupervisorError::Learning { file: file(), source };
-        match cell.learning.law {
-            LawName::None => Ok(None),
-            LawName::NormOptimal => {
-                let model = model(cell)
-                    .map_err(|source| SupervisorError::Model { file: file(), source })?;
-                let w = cell.learning.norm_optimal;
-                let weights = Weights { q: w.q, s: w.s, r: w.r, rate: w.rate };
-                let law = NormOptimal::new(&model, n_samples, weights).map_err(refused)?;
-                Ok(Some(Box::new(law)))
-            }
-            LawName::Pd => {
-                let pd = cell.learning.pd;
-                let gains = PdGains { kp: pd.kp, kd: pd.kd, lead: pd.lead_samples };
-                let filter = butterworth(pd.order, pd.cutoff_hz, cell.cycle_s())
-                    .map_err(|source| refused(source.into()))?;
-                let law = Pd::new(gains, n_samples, cell.n_axes(), QFilter::ZeroPhase(filter))
-                    .map_err(refused)?;
-                Ok(Some(Box::new(law)))
-            }
-        }
+    pub fn law(&self, cell: &Cell) -> Result<Prepared, SupervisorError> {
+        law::prepare(cell, &self.reference_m)
     }
 
     /// Completes the provenance with the law that will be used.
@@ -170,6 +135,8 @@ impl Plan {
                 parameters,
                 cell.learning.input_max_m,
                 cell.learning.input_max_m_s,
+                // Of weights that vary along the run the parameters do not tell every number.
+                (name == cell.learning.law.as_str()).then(|| cell.learning.law_text()),
             )
         );
         self.meta.fingerprint = fingerprint(&whole);

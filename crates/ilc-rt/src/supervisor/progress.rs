@@ -157,6 +157,9 @@ impl Progress {
                 }
             }
             let decision = self.decide(&mut record);
+            if let (Decision::RollBack(_), Some(law)) = (&decision, law.as_deref_mut()) {
+                law.taken_back();
+            }
             last = Some((decision, record));
         }
         let coming = last.as_ref().map_or(0, |(_, record)| record.index + 1);

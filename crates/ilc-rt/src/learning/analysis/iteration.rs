@@ -55,7 +55,9 @@ impl<'a> Iteration<'a> {
         let plant = Plant::new(model)?;
         let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
         let hessian = match law.structure() {
-            Structure::Optimal { model, weights } => Hessian::new(model, n_samples, weights)?,
+            Structure::Optimal { model, weights: Some(weights) } => {
+                Hessian::new(model, n_samples, weights)?
+            }
             _ => None,
         };
         let (n_u, n_e) = (n_samples * n_inputs, n_samples * n_outputs);

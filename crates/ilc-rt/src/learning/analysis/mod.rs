@@ -12,6 +12,7 @@ mod frequency;
 mod hessian;
 mod iteration;
 mod krylov;
+mod overreach;
 mod plant;
 mod question;
 mod refuse;
@@ -19,12 +20,15 @@ mod uncertainty;
 mod verdict;
 
 #[cfg(test)]
+mod every_law;
+#[cfg(test)]
 mod oracle;
 
 pub use condition::PdCondition;
 pub use figures::{Analysis, Method};
 pub(in crate::learning) use frequency::Spectrum;
 pub use krylov::Estimate;
+pub use overreach::{Overreach, overreach};
 pub use question::{DENSE_MAX, Question, analyze};
 pub use refuse::{Verdict, divergence, refuse_divergent};
 pub use uncertainty::Uncertainty;

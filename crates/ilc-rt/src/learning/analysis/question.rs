@@ -11,7 +11,7 @@ use super::uncertainty::Uncertainty;
 use super::verdict;
 use crate::learning::error::check;
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
-use crate::learning::{Law, LearningError, Structure};
+use crate::learning::{Law, LearningError, StandIn, Structure};
 use crate::model::StateSpace;
 
 /// Up to this many inputs (samples times channels) whole matrices are formed.
@@ -43,7 +43,8 @@ impl Default for Question {
 /// `u_{j+1} = T u_j + L_e (r - d_j)`, `T = L_u - L_e P`.
 ///
 /// The law is used through [`Law::update`] and is reset before each use. A law of which nothing is
-/// known is tried for linearity first.
+/// known is tried for linearity first. Of a gate or a ladder the law inside is analysed, with gain 1,
+/// of a law with bounds the same law without them: a bound that is reached only holds the input there.
 ///
 /// # Shapes
 /// - `question.reference`: `n_samples` x `n_outputs`, time first
@@ -64,6 +65,15 @@ pub fn analyze(
     question: &Question,
 ) -> Result<Analysis, LearningError> {
     refuse_question(question, model, n_samples)?;
+    match law.stand_in() {
+        StandIn::Itself => {}
+        StandIn::Inside(inside) => return analyze(inside, model, n_samples, question),
+        StandIn::Unbounded(mut other) => {
+            let mut analysis = analyze(other.as_mut(), model, n_samples, question)?;
+            analysis.why = verdict::with_bounds(&analysis.why);
+            return Ok(analysis);
+        }
+    }
     let pd_condition = match law.structure() {
         Structure::Pd(gains) => Some(PdCondition::new(gains, model)?),
         _ => None,
@@ -89,7 +99,7 @@ pub fn analyze(
     let certain = optimal.is_some_and(|(own, _)| own);
     let converges = certain || verdict::converges(radius, growth);
     let spectrum = match optimal {
-        Some((true, weights)) => Some(Spectrum::optimal(model, weights)?),
+        Some((true, Some(weights))) => Some(Spectrum::optimal(model, weights)?),
         _ => Spectrum::new(&mut iteration, model)?,
     };
     let mut analysis = Analysis {
@@ -133,7 +143,7 @@ pub fn analyze(
         analysis.robust_lifted = Some(factor.value + uncertainty.largest() * share);
     }
     if let Some(reference) = &question.reference {
-        let weights = optimal.filter(|(own, _)| *own).map(|(_, weights)| weights);
+        let weights = optimal.filter(|(own, _)| *own).and_then(|(_, weights)| weights);
         converged(&mut analysis, &mut iteration, dense.as_ref(), model, weights, reference)?;
     }
     expected(&mut analysis, &mut iteration, dense.as_ref(), spectrum.as_ref(), question)?;

@@ -16,6 +16,11 @@ pub(super) fn converges(radius: Estimate, growth: f64) -> bool {
     radius.value < 1.0 + ROUNDING && growth < GROWTH_MAX
 }
 
+/// The verdict on a law with bounds, from that on the law without them.
+pub(super) fn with_bounds(why: &str) -> String {
+    format!("without its bounds, which can only hold the input where they are reached: {why}")
+}
+
 /// Fills in the verdict.
 pub(super) fn tell(analysis: &mut Analysis, certain: bool) {
     let radius = analysis.spectral_radius.value;

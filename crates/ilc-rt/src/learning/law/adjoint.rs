@@ -3,7 +3,7 @@
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_counts, check_place};
 use crate::learning::operator::Operator;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, LowPass};
 use crate::model::{ModelError, StateSpace};
 
 /// Gradient learning: one step down the squared error.
@@ -24,7 +24,7 @@ use crate::model::{ModelError, StateSpace};
 /// # Source
 /// - \[barton2010\], Ch. 3: the lifted operator; the law is the gradient of Eq. (3.13) with Q = I,
 ///   S = R = 0.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Adjoint {
     operator: Operator,
     gain: f64,
@@ -109,6 +109,34 @@ impl Law for Adjoint {
         }
         self.runner.apply(next, n_inputs)?;
         check("next", next, n_samples, n_inputs)
+    }
+
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let Self { n_samples, n_inputs, n_outputs, gain, .. } = *self;
+        check("dual", dual, n_samples, n_inputs)?;
+        check("to_input", to_input, n_samples, n_inputs)?;
+        check("to_error", to_error, n_samples, n_outputs)?;
+        to_input.copy_from_slice(dual);
+        if !self.runner.apply_transposed(to_input, n_inputs)? {
+            return Ok(false);
+        }
+        self.operator.forward(to_input, to_error);
+        for value in to_error {
+            *value *= gain;
+        }
+        Ok(true)
+    }
+
+    fn low_pass(&self, dt_s: f64) -> Option<LowPass> {
+        let cutoff_hz = self.q_filter.cutoff_hz(dt_s)?;
+        let runner = QFilter::None.for_samples(self.n_samples).ok()?;
+        let plain = Self { q_filter: QFilter::None, runner, ..self.clone() };
+        Some(LowPass { cutoff_hz, unfiltered: Box::new(plain) })
     }
 
     fn reset(&mut self) {}

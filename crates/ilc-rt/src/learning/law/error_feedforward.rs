@@ -2,7 +2,7 @@
 
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_counts, check_place};
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, LowPass, StandIn};
 
 /// The numbers of an [`ErrorFeedforward`] law.
 ///
@@ -76,6 +76,13 @@ impl ErrorFeedforward {
     pub fn n_limited(&self) -> usize {
         self.n_limited
     }
+
+    /// Makes the law without its limit, with another filter.
+    fn unlimited(&self, q_filter: QFilter) -> Option<Box<dyn Law>> {
+        let rule = Feedforward { limit: f64::INFINITY, ..self.rule };
+        let law = Self::new(rule, self.n_samples, self.n_channels, q_filter).ok()?;
+        Some(Box::new(law))
+    }
 }
 
 impl Law for ErrorFeedforward {
@@ -103,6 +110,40 @@ impl Law for ErrorFeedforward {
             }
         }
         check("next", next, n_samples, n_channels)
+    }
+
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let (n_samples, n_channels) = (self.n_samples, self.n_channels);
+        for (what, signal) in [("dual", dual), ("to_input", &*to_input), ("to_error", &*to_error)] {
+            check(what, signal, n_samples, n_channels)?;
+        }
+        to_input.copy_from_slice(dual);
+        to_error.fill(0.0);
+        let Feedforward { gain, lead, .. } = self.rule;
+        for k in 0..n_samples {
+            let ahead = k.saturating_add(lead).min(n_samples - 1);
+            for channel in 0..n_channels {
+                to_error[ahead * n_channels + channel] += gain * dual[k * n_channels + channel];
+            }
+        }
+        Ok(self.runner.apply_transposed(to_error, n_channels)?)
+    }
+
+    fn stand_in(&mut self) -> StandIn<'_> {
+        if self.rule.limit.is_infinite() {
+            return StandIn::Itself;
+        }
+        self.unlimited(self.q_filter.clone()).map_or(StandIn::Itself, StandIn::Unbounded)
+    }
+
+    fn low_pass(&self, dt_s: f64) -> Option<LowPass> {
+        let cutoff_hz = self.q_filter.cutoff_hz(dt_s)?;
+        Some(LowPass { cutoff_hz, unfiltered: self.unlimited(QFilter::None)? })
     }
 
     fn reset(&mut self) {

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_counts, check_place};
 use crate::learning::operator::Operator;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, LowPass};
 use crate::model::{ModelError, StateSpace, relative_degrees};
 
 /// A zero nearer to the unit circle than this counts as on it: the inverse would ring for the whole
@@ -31,7 +31,7 @@ const SINGULAR: f64 = 1e-12;
 /// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)`.
 /// # Source
 /// - \[barton2010\], Eq. (3.13) to (3.15), whose limit for S = R = 0 it is.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct ModelInverse {
     inverse: Operator,
     shifts: Vec<usize>,
@@ -140,6 +140,39 @@ impl Law for ModelInverse {
         }
         self.runner.apply(next, n_channels)?;
         check("next", next, n_samples, n_channels)
+    }
+
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let (n_samples, n_channels) = (self.n_samples, self.shifts.len());
+        for (what, signal) in [("dual", dual), ("to_input", &*to_input), ("to_error", &*to_error)] {
+            check(what, signal, n_samples, n_channels)?;
+        }
+        to_input.copy_from_slice(dual);
+        to_error.fill(0.0);
+        if !self.runner.apply_transposed(to_input, n_channels)? {
+            return Ok(false);
+        }
+        self.inverse.transposed(to_input, &mut self.ahead);
+        for (channel, shift) in self.shifts.iter().enumerate() {
+            for k in 0..n_samples {
+                let answer = (k + shift).min(n_samples - 1);
+                to_error[answer * n_channels + channel] +=
+                    self.gain * self.ahead[k * n_channels + channel];
+            }
+        }
+        Ok(true)
+    }
+
+    fn low_pass(&self, dt_s: f64) -> Option<LowPass> {
+        let cutoff_hz = self.q_filter.cutoff_hz(dt_s)?;
+        let runner = QFilter::None.for_samples(self.n_samples).ok()?;
+        let plain = Self { q_filter: QFilter::None, runner, ..self.clone() };
+        Some(LowPass { cutoff_hz, unfiltered: Box::new(plain) })
     }
 
     fn reset(&mut self) {}

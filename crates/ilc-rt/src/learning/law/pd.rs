@@ -2,7 +2,7 @@
 
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_counts, check_place};
-use crate::learning::{Law, LearningError, Structure};
+use crate::learning::{Law, LearningError, LowPass, Structure};
 
 /// The numbers of a [`Pd`] law.
 ///
@@ -120,6 +120,12 @@ impl Law for Pd {
 
     fn structure(&self) -> Structure<'_> {
         Structure::Pd(self.gains)
+    }
+
+    fn low_pass(&self, dt_s: f64) -> Option<LowPass> {
+        let cutoff_hz = self.q_filter.cutoff_hz(dt_s)?;
+        let plain = Self::new(self.gains, self.n_samples, self.n_channels, QFilter::None);
+        Some(LowPass { cutoff_hz, unfiltered: Box::new(plain.ok()?) })
     }
 
     fn reset(&mut self) {}

@@ -1,6 +1,10 @@
 //! The filter through which a law passes what it learned, of whatever kind; every law with a filter
 //! takes this one.
 
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
+
+use nalgebra::Complex;
+
 use crate::signal::{
     FirFilter, GaussianFilter, Section, SignalError, SosFilter, Switched, SwitchedFilter,
     Symmetric, ZeroPhase,
@@ -40,6 +44,27 @@ impl QFilter {
             Self::Switched(filter) => Kind::Switched(filter.for_samples(n_samples)?),
             Self::Fir(filter) => Kind::Symmetric(filter.for_samples(n_samples)?),
         }))
+    }
+
+    /// Returns the highest frequency that one pass lets through with `1 / sqrt 2` or more, for signals
+    /// sampled every `dt_s`: the cut-off of a low-pass, the highest one of a switched filter.
+    ///
+    /// `None` without a filter, or for one that lets nothing through as well as that.
+    pub fn cutoff_hz(&self, dt_s: f64) -> Option<f64> {
+        match self {
+            Self::None => None,
+            Self::ZeroPhase(sections) | Self::Causal(sections) => highest_passed_hz(dt_s, |z| {
+                let gain = |Section { b, a }: &Section| {
+                    (b[0] + (b[1] + b[2] / z) / z) / (1.0 + (a[0] + a[1] / z) / z)
+                };
+                sections.iter().map(gain).product()
+            }),
+            Self::Gaussian(filter) => Some(filter.bandwidth_hz() * filter.dt_s() / dt_s),
+            Self::Switched(filter) => Some(filter.highest_hz() * filter.dt_s() / dt_s),
+            Self::Fir(filter) => highest_passed_hz(dt_s, |z| {
+                filter.taps().iter().rev().fold(Complex::new(0.0, 0.0), |sum, tap| sum / z + *tap)
+            }),
+        }
     }
 
     /// Returns the filter and its parameters as JSON, for the record of the run.
@@ -82,6 +107,21 @@ impl QFilter {
             }
         }
     }
+}
+
+/// Finds where a response on the unit circle last falls below `1 / sqrt 2`, from above.
+fn highest_passed_hz(dt_s: f64, response: impl Fn(Complex<f64>) -> Complex<f64>) -> Option<f64> {
+    const STEPS: usize = 4096;
+    let passes =
+        |omega_rad: f64| response(Complex::from_polar(1.0, omega_rad)).norm() >= FRAC_1_SQRT_2;
+    let omega_rad = |place: usize| PI * place as f64 / STEPS as f64;
+    let place = (0..=STEPS).rev().find(|place| passes(omega_rad(*place)))?;
+    let (mut low, mut high) = (omega_rad(place), omega_rad(place + 1).min(PI));
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if passes(middle) { low = middle } else { high = middle }
+    }
+    Some(low / (TAU * dt_s))
 }
 
 /// A [`QFilter`] with its workspace.
@@ -202,6 +242,27 @@ mod tests {
             .collect();
         kinds.sort();
         assert_eq!(kinds, ["causal", "fir", "gaussian", "none", "switched", "zero_phase"]);
+    }
+
+    #[test]
+    fn every_low_pass_tells_its_cut_off() {
+        let told: Vec<Option<f64>> =
+            every_kind().iter().map(|filter| filter.cutoff_hz(2e-3)).collect();
+        // cos^2 (w / 2) = 1 / sqrt 2 for the taps.
+        let taps_hz = 2.0 * (0.5_f64.sqrt().sqrt()).acos() / (TAU * 2e-3);
+        let expected = [None, Some(40.0), Some(40.0), Some(30.0), Some(60.0), Some(taps_hz)];
+        for (found, expected) in told.iter().zip(expected) {
+            match (found, expected) {
+                (Some(found), Some(expected)) => {
+                    assert!((found - expected).abs() < 1e-6, "{told:?}");
+                }
+                (found, expected) => assert_eq!(*found, expected),
+            }
+        }
+        let nothing = QFilter::Fir(FirFilter::new(&[0.1]).unwrap());
+        assert_eq!(nothing.cutoff_hz(2e-3), None);
+        let all = QFilter::Fir(FirFilter::new(&[1.0]).unwrap());
+        assert!((all.cutoff_hz(2e-3).unwrap() - 250.0).abs() < 1e-6);
     }
 
     #[test]

@@ -17,10 +17,10 @@ mod solver;
 mod sweeps;
 
 use super::norm_optimal::decouple::parts;
-use super::norm_optimal::{Cost, Plant};
+use super::norm_optimal::{Cost, NormOptimal, Plant};
 use crate::learning::error::check;
 use crate::learning::sweep::Run;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, StandIn};
 use crate::model::{ModelError, StateSpace};
 
 use bounds::Extent;
@@ -62,6 +62,7 @@ pub enum Status {
 ///   \[rao1998\]: its linear system as a Riccati recursion.
 #[derive(Debug)]
 pub struct Constrained {
+    model: StateSpace,
     cost: Cost,
     bounds: Bounds,
     extent: Extent,
@@ -109,12 +110,20 @@ impl Constrained {
             .map(|part| group::solver(part, &bounds, extent))
             .collect::<Result<_, _>>()?;
         let (status, iterations, gap) = (Status::Untried, 0, 0.0);
-        Ok(Self { cost, bounds, extent, solvers, status, iterations, gap })
+        Ok(Self { model: model.clone(), cost, bounds, extent, solvers, status, iterations, gap })
     }
 
     /// Returns how the last update ended.
     pub fn status(&self) -> Status {
         self.status
+    }
+
+    /// Returns the law without its bounds.
+    ///
+    /// # Errors
+    /// - as [`NormOptimal::new`].
+    pub fn unbounded(&self) -> Result<NormOptimal, LearningError> {
+        NormOptimal::new(&self.model, self.extent.n_samples, self.cost.clone())
     }
 
     /// Returns the iterations of the last update, those of the group of axes that took most; 0 if no
@@ -167,6 +176,24 @@ impl Law for Constrained {
             self.reset();
         }
         check("next", run.next, n_samples, n_inputs)
+    }
+
+    fn stand_in(&mut self) -> StandIn<'_> {
+        self.unbounded().map_or(StandIn::Itself, |law| StandIn::Unbounded(Box::new(law)))
+    }
+
+    fn remark(&self) -> Option<String> {
+        match self.status {
+            Status::Untried | Status::Solved => None,
+            Status::Infeasible(conflict) => {
+                Some(format!("the bounds cannot be honoured, so that the input is kept: {conflict}"))
+            }
+            Status::MaxIterations => Some(
+                "no input within the bounds was found, so that the input is kept: they most likely \
+                 contradict each other"
+                    .to_owned(),
+            ),
+        }
     }
 
     fn reset(&mut self) {

@@ -44,8 +44,9 @@ pub struct NormOptimal {
     n_inputs: usize,
     n_outputs: usize,
     weights: String,
-    /// Model and weights, where one model and four numbers say it all.
-    plain: Option<(StateSpace, Weights)>,
+    /// Model, where one says it all, and the weights, where four numbers do.
+    invariant: Option<StateSpace>,
+    scalars: Option<Weights>,
     conditioning: f64,
     parts: Vec<Box<dyn Sweep>>,
 }
@@ -102,7 +103,8 @@ impl NormOptimal {
             n_inputs,
             n_outputs,
             weights: cost.json(),
-            plain: plant.invariant().cloned().zip(cost.scalars()),
+            invariant: plant.invariant().cloned(),
+            scalars: cost.scalars(),
             conditioning: 1.0,
             parts: Vec::new(),
         };
@@ -149,7 +151,8 @@ impl NormOptimal {
             n_inputs,
             n_outputs,
             weights: format!(r#""weights":{told:?}"#),
-            plain: None,
+            invariant: None,
+            scalars: None,
             conditioning: 1.0,
             parts: Vec::new(),
         };
@@ -213,10 +216,9 @@ impl Law for NormOptimal {
     }
 
     fn structure(&self) -> Structure<'_> {
-        self.plain.as_ref().map_or(Structure::Unknown, |(model, weights)| Structure::Optimal {
-            model,
-            weights: *weights,
-        })
+        self.invariant
+            .as_ref()
+            .map_or(Structure::Unknown, |model| Structure::Optimal { model, weights: self.scalars })
     }
 
     fn reset(&mut self) {}

@@ -1,0 +1,143 @@
+//! What is allowed in `[[axis]]`.
+
+use super::checker::Checker;
+use crate::config::{Axis, Cell, ConfigError, Interface};
+
+/// Highest CANopen node number.
+const NODE_MAX: u8 = 127;
+
+/// Nodes: each once.
+pub(super) fn nodes(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
+    let mut taken: Vec<(u8, String)> = Vec::new();
+    let axes = cell.axes.iter().map(|axis| (axis.node, format!("[[axis]] {} node", axis.name)));
+    let tcp = cell.tcp_encoder.iter().map(|tcp| (tcp.node, "[tcp_encoder] node".to_owned()));
+    for (node, key) in axes.chain(tcp) {
+        v.that((1..=NODE_MAX).contains(&node), &key, &node, "1 to 127")?;
+        if let Some((_, other)) = taken.iter().find(|(seen, _)| *seen == node) {
+            return Err(v.refuse(
+                &key,
+                &node,
+                &format!("a number of its own; {other} has it already"),
+            ));
+        }
+        taken.push((node, key));
+    }
+    Ok(())
+}
+
+/// Ranges of an axis, and what its interface needs.
+pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
+    let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
+    v.that(!axis.name.is_empty(), "[[axis]] name", &axis.name, "a name, as \"x\"")?;
+    v.range(&at("counts_per_m"), axis.counts_per_m, 1.0, 1e10)?;
+    let l = &axis.limits;
+    v.range(&at("limits.position_min_m"), l.position_min_m, -1e3, 1e3)?;
+    v.range(&at("limits.position_max_m"), l.position_max_m, -1e3, 1e3)?;
+    v.that(
+        l.position_min_m < l.position_max_m,
+        &at("limits.position_max_m"),
+        &l.position_max_m,
+        "above limits.position_min_m",
+    )?;
+    let counts = axis.counts_per_m * l.position_min_m.abs().max(l.position_max_m.abs());
+    v.that(
+        counts <= f64::from(i32::MAX),
+        &at("counts_per_m"),
+        &axis.counts_per_m,
+        "counts_per_m times the farthest position must fit 32 bits",
+    )?;
+    v.range(&at("limits.velocity_max_m_s"), l.velocity_max_m_s, 1e-6, 1e2)?;
+    v.that(
+        axis.counts_per_m * l.velocity_max_m_s <= f64::from(i32::MAX),
+        &at("limits.velocity_max_m_s"),
+        &l.velocity_max_m_s,
+        "counts_per_m times velocity_max_m_s must fit 32 bits",
+    )?;
+    v.range(&at("limits.acceleration_max_m_s2"), l.acceleration_max_m_s2, 1e-4, 1e4)?;
+    v.range(&at("limits.jerk_max_m_s3"), l.jerk_max_m_s3, 1e-3, 1e7)?;
+    v.range(&at("limits.following_error_max_m"), l.following_error_max_m, 1e-7, 1.0)?;
+    v.range(&at("model.delay_samples"), f64::from(axis.model.delay_samples), 0.0, 20.0)?;
+    let (wanted, unwanted) = match axis.interface {
+        Interface::Csp => (
+            vec![
+                ("natural_frequency_hz", axis.model.natural_frequency_hz, 0.1, 1e3),
+                ("damping", axis.model.damping, 0.05, 5.0),
+            ],
+            vec![("velocity_bandwidth_hz", axis.model.velocity_bandwidth_hz)],
+        ),
+        Interface::Csv => (
+            vec![("velocity_bandwidth_hz", axis.model.velocity_bandwidth_hz, 0.1, 1e4)],
+            vec![
+                ("natural_frequency_hz", axis.model.natural_frequency_hz),
+                ("damping", axis.model.damping),
+            ],
+        ),
+    };
+    for (key, value, low, high) in wanted {
+        let key = at(&format!("model.{key}"));
+        match value {
+            Some(value) => v.range(&key, value, low, high)?,
+            None => {
+                return Err(v.refuse(
+                    &key,
+                    &"missing",
+                    &format!("{low} to {high} for this interface"),
+                ));
+            }
+        }
+    }
+    for (key, value) in unwanted {
+        if let Some(value) = value {
+            return Err(v.refuse(
+                &at(&format!("model.{key}")),
+                &value,
+                "not used by this interface; remove it",
+            ));
+        }
+    }
+    match (axis.interface, &axis.position_loop) {
+        (Interface::Csv, None) => Err(v.refuse(
+            &at("position_loop"),
+            &"missing",
+            "interface \"csv\" needs [axis.position_loop] gain_per_s",
+        )),
+        (Interface::Csp, Some(_)) => Err(v.refuse(
+            &at("position_loop"),
+            &"given",
+            "interface \"csp\" has its position loop in the drive; remove it",
+        )),
+        (Interface::Csv, Some(position_loop)) => {
+            v.range(&at("position_loop.gain_per_s"), position_loop.gain_per_s, 0.01, 1e3)?;
+            v.range(
+                &at("position_loop.velocity_feedforward"),
+                position_loop.velocity_feedforward,
+                0.0,
+                1.0,
+            )
+        }
+        (Interface::Csp, None) => Ok(()),
+    }?;
+    check_simulation(axis, v)
+}
+
+fn check_simulation(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
+    let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
+    let (s, l) = (&axis.simulation, &axis.limits);
+    v.range(&at("simulation.mass_kg"), s.mass_kg, 1e-3, 1e5)?;
+    v.range(&at("simulation.natural_frequency_hz"), s.natural_frequency_hz, 0.1, 1e3)?;
+    v.range(&at("simulation.damping"), s.damping, 0.05, 5.0)?;
+    v.range(&at("simulation.integral_time_s"), s.integral_time_s, 1e-3, 1e3)?;
+    v.range(&at("simulation.force_max_n"), s.force_max_n, 1e-3, 1e7)?;
+    v.range(&at("simulation.coulomb_n"), s.coulomb_n, 0.0, s.force_max_n)?;
+    v.range(&at("simulation.static_n"), s.static_n, s.coulomb_n, s.force_max_n)?;
+    v.range(&at("simulation.stribeck_m_s"), s.stribeck_m_s, 1e-6, 1.0)?;
+    v.range(&at("simulation.mode_mass_kg"), s.mode_mass_kg, 0.0, 0.9 * s.mass_kg)?;
+    v.range(&at("simulation.mode_frequency_hz"), s.mode_frequency_hz, 0.1, 1e3)?;
+    v.range(&at("simulation.mode_damping"), s.mode_damping, 0.0, 2.0)?;
+    v.range(
+        &at("simulation.position_start_m"),
+        s.position_start_m,
+        l.position_min_m,
+        l.position_max_m,
+    )
+}

@@ -1,0 +1,46 @@
+//! What the caller of a campaign chooses, and what it is told at the end; the binary and the Python
+//! bindings fill the one and read the other.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicI32;
+
+use super::disturbance::Disturbance;
+use crate::config::Measure;
+use crate::record::{EndStatus, Figures};
+
+/// What the caller chooses beyond the cell description.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Runs in the whole campaign; the first one is without learning.
+    pub iterations: u32,
+    /// Measurement to learn from, if not the cell's.
+    pub measure: Option<Measure>,
+    /// Paced by the nodes' answers instead of the clock.
+    pub lockstep: bool,
+    /// Go on with the newest campaign of the same cell, program and law.
+    pub resume: bool,
+    /// Where every run is kept.
+    pub library: PathBuf,
+    /// What is measured of each run's surroundings: kept with the run, and told to the law.
+    pub disturbance: Disturbance,
+    /// Whether to publish on Zenoh.
+    pub telemetry: bool,
+    /// Set to a signal's number to bring the axes to rest.
+    pub stop: Arc<AtomicI32>,
+}
+
+/// How a campaign ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// How.
+    pub status: EndStatus,
+    /// One sentence.
+    pub reason: String,
+    /// Signal that asked to stop, or 0.
+    pub signal: i32,
+    /// Name of the campaign in the library.
+    pub campaign: String,
+    /// Number and figures of every run of the campaign, resumed ones included.
+    pub runs: Vec<(u32, Figures)>,
+}
