@@ -4,6 +4,7 @@ mod adjoint;
 mod any_size;
 mod constrained;
 mod error_feedforward;
+mod exchange;
 mod flexible;
 mod gate;
 mod inner;
