@@ -3,6 +3,11 @@
 //! The sweeps of this folder import it. A product and a sum are always rounded one by one, never
 //! fused, so every processor finds the same bits.
 
+#![expect(
+    clippy::inline_always,
+    reason = "single instructions, and what takes over the instructions of its caller"
+)]
+
 /// Numbers in a row.
 pub(super) const LANES: usize = 8;
 
@@ -79,7 +84,6 @@ impl Instructions {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Portable;
 
-#[expect(clippy::inline_always, reason = "these are single instructions")]
 impl Wide for Portable {
     type Row = [f64; LANES];
 
@@ -130,7 +134,6 @@ mod avx {
     impl<T: Work> NullaryFnOnce for Call<T> {
         type Output = T::Output;
 
-        #[expect(clippy::inline_always, reason = "takes over the instructions of its caller")]
         #[inline(always)]
         fn call(self) -> Self::Output {
             self.1.with(self.0)
@@ -141,7 +144,6 @@ mod avx {
     const LOW: i32 = 0x20;
     const HIGH: i32 = 0x31;
 
-    #[expect(clippy::inline_always, reason = "these are single instructions")]
     impl Wide for V3 {
         type Row = [__m256d; 2];
 
