@@ -9,6 +9,46 @@ use pyo3::prelude::*;
 /// The matrix type of `ilc-rt`.
 pub(crate) type Matrix = nalgebra::DMatrix<f64>;
 
+/// Samples and channels of a signal, and whether it has a channel axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Layout {
+    pub(crate) n_samples: usize,
+    pub(crate) n_channels: usize,
+    pub(crate) is_flat: bool,
+}
+
+impl Layout {
+    /// Reads `(n_samples,)` or `(n_samples, n_channels)`.
+    pub(crate) fn of(name: &str, shape: &[usize]) -> PyResult<Self> {
+        let (n_samples, n_channels, is_flat) = match *shape {
+            [n_samples] => (n_samples, 1, true),
+            [n_samples, n_channels] => (n_samples, n_channels, false),
+            _ => return Err(misfit(name, shape, "(n_samples,) or (n_samples, n_channels)")),
+        };
+        if n_samples * n_channels == 0 {
+            return Err(misfit(name, shape, "at least one sample of one channel"));
+        }
+        Ok(Self { n_samples, n_channels, is_flat })
+    }
+
+    /// Refuses any other number of samples, then of channels.
+    pub(crate) fn require(self, name: &str, n_samples: usize, n_channels: usize) -> PyResult<()> {
+        if self.n_samples != n_samples {
+            let rule = format!("({n_samples},) or ({n_samples}, n_channels)");
+            return Err(misfit(name, &self.shape(), &rule));
+        }
+        if self.n_channels != n_channels {
+            return Err(misfit(name, &self.shape(), &format!("(n_samples, {n_channels})")));
+        }
+        Ok(())
+    }
+
+    /// Returns the shape as it came from Python.
+    fn shape(self) -> Vec<usize> {
+        if self.is_flat { vec![self.n_samples] } else { vec![self.n_samples, self.n_channels] }
+    }
+}
+
 /// A signal, time first, that remembers whether it had a channel axis.
 #[derive(Debug)]
 pub(crate) struct Signal {
@@ -22,14 +62,7 @@ impl Signal {
     /// Reads `(n_samples,)` or `(n_samples, n_channels)`.
     pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (values, shape) = read_array(name, object)?;
-        let (n_samples, n_channels, is_flat) = match shape[..] {
-            [n_samples] => (n_samples, 1, true),
-            [n_samples, n_channels] => (n_samples, n_channels, false),
-            _ => return Err(misfit(name, &shape, "(n_samples,) or (n_samples, n_channels)")),
-        };
-        if values.is_empty() {
-            return Err(misfit(name, &shape, "at least one sample of one channel"));
-        }
+        let Layout { n_samples, n_channels, is_flat } = Layout::of(name, &shape)?;
         Ok(Self { values, n_samples, n_channels, is_flat })
     }
 
@@ -149,19 +182,31 @@ pub(crate) fn read_array(
     object: &Bound<'_, PyAny>,
 ) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let (values, shape) = read_numbers(name, object)?;
+    refuse_infinite(name, &values, &shape)?;
+    Ok((values, shape))
+}
+
+/// Refuses numbers in row-major order of which one is infinite or not a number.
+pub(crate) fn refuse_infinite(name: &str, values: &[f64], shape: &[usize]) -> PyResult<()> {
     // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
-    let poison: f64 = values.iter().map(|value| value * 0.0).sum();
-    if poison.is_finite() {
-        return Ok((values, shape));
+    // In several sums at a time, because each would wait for its last addition.
+    let chunks = values.chunks_exact(16);
+    let rest = chunks.remainder();
+    let mut poison = [0.0; 16];
+    for chunk in chunks {
+        for (sum, value) in poison.iter_mut().zip(chunk) {
+            *sum += value * 0.0;
+        }
     }
-    match values.iter().position(|value| !value.is_finite()) {
-        None => Ok((values, shape)),
-        Some(index) => Err(PyValueError::new_err(format!(
-            "{name} holds {} at {}; only finite numbers are allowed",
-            values[index],
-            place(index, &shape)
-        ))),
+    if poison.iter().chain(rest).all(|value| value.is_finite()) {
+        return Ok(());
     }
+    let index = values.iter().position(|value| !value.is_finite()).unwrap_or(0);
+    Err(PyValueError::new_err(format!(
+        "{name} holds {} at {}; only finite numbers are allowed",
+        values[index],
+        place(index, shape)
+    )))
 }
 
 /// Reads any array of float64 or integers in row-major order, infinite numbers and NaN included.
@@ -169,6 +214,31 @@ pub(crate) fn read_numbers(
     name: &str,
     object: &Bound<'_, PyAny>,
 ) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let array = converted(name, object, false)?;
+    let shape = array.shape().to_vec();
+    let array = array.readonly();
+    // One plain copy where the numbers lie in order, as they nearly always do.
+    let values = match array.as_slice() {
+        Ok(values) => values.to_vec(),
+        Err(_) => array.as_array().iter().copied().collect(),
+    };
+    Ok((values, shape))
+}
+
+/// Copies any array of float64 or integers into one of float64 in row-major order that is known to
+/// nobody else.
+pub(crate) fn private<'py>(
+    name: &str,
+    object: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    converted(name, object, true)
+}
+
+fn converted<'py>(
+    name: &str,
+    object: &Bound<'py, PyAny>,
+    is_copied: bool,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let numpy = object.py().import("numpy")?;
     let array = numpy.call_method1("asarray", (object,)).map_err(|error| {
         PyValueError::new_err(format!("{name} is no array of numbers: {error}"))
@@ -180,16 +250,8 @@ pub(crate) fn read_numbers(
     if !(matches!(kind.as_str(), "i" | "u") || kind == "f" && size == 8) {
         return Err(PyTypeError::new_err(format!("{name} has dtype {dtype}; float64 is needed")));
     }
-    let array = array.call_method1("astype", ("float64", "C", "unsafe", false, false))?;
-    let array = array.cast::<PyArrayDyn<f64>>()?;
-    let shape = array.shape().to_vec();
-    let array = array.readonly();
-    // One plain copy where the numbers lie in order, as they nearly always do.
-    let values = match array.as_slice() {
-        Ok(values) => values.to_vec(),
-        Err(_) => array.as_array().iter().copied().collect(),
-    };
-    Ok((values, shape))
+    let array = array.call_method1("astype", ("float64", "C", "unsafe", false, is_copied))?;
+    Ok(array.cast_into::<PyArrayDyn<f64>>()?)
 }
 
 /// Returns the position of a flat index as Python would write it.

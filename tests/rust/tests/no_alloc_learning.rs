@@ -13,6 +13,7 @@ use ilc_rt::learning::law::model_inverse::ModelInverse;
 use ilc_rt::learning::law::norm_optimal::{Cost, NormOptimal, Paired, Weights};
 use ilc_rt::learning::law::pd::{Pd, PdGains};
 use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::learning::law::relevance::{Relevance, RelevanceWeights, RunShape};
 use ilc_rt::learning::sweep::{Form, Gains};
 use ilc_rt::learning::weights::{Dynamic, Weight};
 use ilc_rt::model::{Method, StateSpace, TimeVarying, discretize, second_order};
@@ -151,6 +152,33 @@ fn what_goes_round_a_law_allocates_in_its_first_update_only() {
             let count = allocations() - before;
             assert!(count == 0 || run == 0, "{count} in run {run} of {}", law.describe());
             input.copy_from_slice(&next);
+        }
+    }
+}
+
+#[test]
+fn recall_allocates_nothing_within_its_capacity() {
+    let shape =
+        RunShape { n_samples: N_SAMPLES, n_inputs: 2, n_outputs: 2, n_disturbances: 2, dt_s: 4e-3 };
+    for top in [None, Some(5)] {
+        let gains = PdGains { kp: 1.0, kd: 0.0, lead: 1 };
+        let core = Box::new(Pd::new(gains, N_SAMPLES, 2, QFilter::None).unwrap());
+        let weights = RelevanceWeights::default();
+        let mut law = Relevance::new(core, shape, weights, top).unwrap().with_capacity(40);
+        let (mut input, mut next) = (vec![0.0; 2 * N_SAMPLES], vec![0.0; 2 * N_SAMPLES]);
+        for again in [false, true] {
+            for run in 0..40 {
+                let phase = f64::from(run);
+                let error: Vec<f64> =
+                    (0..2 * N_SAMPLES).map(|k| (phase + k as f64).cos()).collect();
+                let before = allocations();
+                law.expect(&[phase.sin(), 0.1 * phase]);
+                law.update(&input, &error, &mut next).unwrap();
+                assert_eq!(allocations() - before, 0, "run {run} with {top:?}, {again}");
+                input.copy_from_slice(&next);
+            }
+            assert!(law.len() >= 39 && input.iter().all(|value| value.is_finite()));
+            law.reset();
         }
     }
 }

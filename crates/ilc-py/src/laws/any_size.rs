@@ -5,10 +5,9 @@ use std::sync::Mutex;
 use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
-use super::{held, next};
-use crate::argument::{Signal, give_signal};
-use crate::detached::detached;
-use crate::error::OrRaise;
+use super::exchange::{Given, exchange};
+use super::held;
+use crate::argument::Layout;
 
 /// The law for the size of run seen last: samples, channels, law.
 #[derive(Debug)]
@@ -27,24 +26,21 @@ impl<L: Law> AnySize<L> {
         e: &Bound<'py, PyAny>,
         make: impl FnOnce(usize, usize) -> Result<L, LearningError> + Send,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let u = Signal::read("u", u)?;
-        let e = Signal::read("e", e)?
-            .with_samples("e", u.n_samples)?
-            .with_channels("e", u.n_channels)?;
-        let (n_samples, n_channels) = (u.n_samples, u.n_channels);
-        let result = detached(py, || {
+        let u = Given::read("u", u)?;
+        let e = Given::read("e", e)?.like("e", &u)?;
+        let Layout { n_samples, n_channels, .. } = u.layout();
+        exchange(py, &u, &e, |u, e, next| {
             let mut kept = held(&self.0);
-            match &mut *kept {
-                Some((n, m, law)) if (*n, *m) == (n_samples, n_channels) => next(law, &u, &e),
-                _ => {
-                    let mut law = make(n_samples, n_channels)?;
-                    let result = next(&mut law, &u, &e);
-                    *kept = Some((n_samples, n_channels, law));
-                    result
-                }
+            if let Some((n, m, law)) = &mut *kept
+                && (*n, *m) == (n_samples, n_channels)
+            {
+                return law.update(u, e, next);
             }
-        });
-        give_signal(py, result.or_raise()?, n_channels, u.is_flat)
+            let mut law = make(n_samples, n_channels)?;
+            let result = law.update(u, e, next);
+            *kept = Some((n_samples, n_channels, law));
+            result
+        })
     }
 
     /// Returns what `look` sees in the law, or `None` before the first update.

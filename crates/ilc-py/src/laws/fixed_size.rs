@@ -6,10 +6,8 @@ use ilc_rt::learning::Law;
 use ilc_rt::model::StateSpace;
 use pyo3::prelude::*;
 
-use super::{fixed_size, held, next};
-use crate::argument::give_signal;
-use crate::detached::detached;
-use crate::error::OrRaise;
+use super::exchange::{Given, exchange};
+use super::held;
 
 /// The law, and the size of run that it was made for.
 #[derive(Debug)]
@@ -38,10 +36,9 @@ impl<L: Law> FixedSize<L> {
         u: &Bound<'py, PyAny>,
         e: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let u = fixed_size("u", u, self.n_samples, self.n_inputs)?;
-        let e = fixed_size("e", e, self.n_samples, self.n_outputs)?;
-        let result = detached(py, || next(&mut *held(&self.law), &u, &e)).or_raise()?;
-        give_signal(py, result, u.n_channels, u.is_flat)
+        let u = Given::read("u", u)?.of_size("u", self.n_samples, self.n_inputs)?;
+        let e = Given::read("e", e)?.of_size("e", self.n_samples, self.n_outputs)?;
+        exchange(py, &u, &e, |u, e, next| held(&self.law).update(u, e, next))
     }
 
     /// Returns what `look` sees in the law.

@@ -4,6 +4,7 @@ mod adjoint;
 mod any_size;
 mod constrained;
 mod error_feedforward;
+mod exchange;
 mod fixed_size;
 mod flexible;
 mod gate;
@@ -26,7 +27,7 @@ use ilc_rt::learning::{Law, LearningError};
 use ilc_rt::model::StateSpace;
 use pyo3::prelude::*;
 
-use crate::argument::{Signal, misfit};
+use crate::argument::Signal;
 use crate::error::OrRaise;
 use crate::held::held;
 
@@ -35,20 +36,6 @@ fn next(law: &mut dyn Law, u: &Signal, e: &Signal) -> Result<Vec<f64>, LearningE
     let mut next = vec![0.0; u.values.len()];
     law.update(&u.values, &e.values, &mut next)?;
     Ok(next)
-}
-
-/// Reads a signal of a law that was made for one size of run.
-fn fixed_size(
-    name: &str,
-    signal: &Bound<'_, PyAny>,
-    n_samples: usize,
-    n_channels: usize,
-) -> PyResult<Signal> {
-    let signal = Signal::read(name, signal)?;
-    if (signal.n_samples, signal.n_channels) == (n_samples, n_channels) {
-        return Ok(signal);
-    }
-    Err(misfit(name, &signal.shape(), &format!("({n_samples}, {n_channels})")))
 }
 
 /// Makes a law of its own for analysis out of one that comes with the controller, for runs of the given

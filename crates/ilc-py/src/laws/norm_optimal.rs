@@ -7,10 +7,11 @@ use ilc_rt::learning::weights::Weight;
 use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
+use super::exchange::{Given, exchange};
+use super::held;
 use super::solver::{Effort, Filter, Solver, side_by_side};
 use super::weight::give_weight;
-use super::{fixed_size, held, next};
-use crate::argument::{give_signal, misfit};
+use crate::argument::misfit;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::{AnyModel, read_any_model};
@@ -389,10 +390,9 @@ impl PyNormOptimalIlc {
         disturbance: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let _ = disturbance;
-        let u = fixed_size("u", u, self.n_samples, self.n_inputs)?;
-        let e = fixed_size("e", e, self.n_samples, self.n_outputs)?;
-        let result = detached(py, || next(held(&self.law).law(), &u, &e)).or_raise()?;
-        give_signal(py, result, u.n_channels, u.is_flat)
+        let u = Given::read("u", u)?.of_size("u", self.n_samples, self.n_inputs)?;
+        let e = Given::read("e", e)?.of_size("e", self.n_samples, self.n_outputs)?;
+        exchange(py, &u, &e, |u, e, next| held(&self.law).law().update(u, e, next))
     }
 
     /// Forget what earlier runs taught: nothing, for this law.

@@ -181,20 +181,8 @@ pub(crate) fn check(
     n_samples: usize,
     n_channels: usize,
 ) -> Result<(), LearningError> {
-    if signal.len() != n_samples * n_channels {
-        return Err(LearningError::Length { what, found: signal.len(), n_samples, n_channels });
-    }
-    // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
-    // In several sums at a time, because each would wait for its last addition.
-    let chunks = signal.chunks_exact(16);
-    let rest = chunks.remainder();
-    let mut poison = [0.0; 16];
-    for chunk in chunks {
-        for (sum, value) in poison.iter_mut().zip(chunk) {
-            *sum += value * 0.0;
-        }
-    }
-    if poison.iter().chain(rest).all(|value| value.is_finite()) {
+    check_length(what, signal, n_samples, n_channels)?;
+    if is_finite(signal) {
         return Ok(());
     }
     let index = signal.iter().position(|value| !value.is_finite()).unwrap_or(0);
@@ -206,16 +194,41 @@ pub(crate) fn check(
     })
 }
 
+/// Returns whether every value is finite.
+pub(crate) fn is_finite(signal: &[f64]) -> bool {
+    // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
+    // In several sums at a time, because each would wait for its last addition.
+    let chunks = signal.chunks_exact(16);
+    let rest = chunks.remainder();
+    let mut poison = [0.0; 16];
+    for chunk in chunks {
+        for (sum, value) in poison.iter_mut().zip(chunk) {
+            *sum += value * 0.0;
+        }
+    }
+    poison.iter().chain(rest).all(|value| value.is_finite())
+}
+
 /// Checks the length of the place for a result.
 pub(crate) fn check_place(
     next: &[f64],
     n_samples: usize,
     n_channels: usize,
 ) -> Result<(), LearningError> {
-    if next.len() == n_samples * n_channels {
+    check_length("next", next, n_samples, n_channels)
+}
+
+/// Checks the length of a signal.
+pub(crate) fn check_length(
+    what: &'static str,
+    signal: &[f64],
+    n_samples: usize,
+    n_channels: usize,
+) -> Result<(), LearningError> {
+    if signal.len() == n_samples * n_channels {
         return Ok(());
     }
-    Err(LearningError::Length { what: "next", found: next.len(), n_samples, n_channels })
+    Err(LearningError::Length { what, found: signal.len(), n_samples, n_channels })
 }
 
 /// Refuses counts that are zero.

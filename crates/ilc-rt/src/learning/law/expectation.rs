@@ -11,6 +11,8 @@ use crate::learning::LearningError;
 pub(super) struct Expectation {
     finished: Option<Vec<f64>>,
     coming: Option<Vec<f64>>,
+    /// Room for the two that are not there yet.
+    spare: Vec<Vec<f64>>,
     is_new: bool,
     n_disturbances: usize,
     refused: Option<LearningError>,
@@ -18,17 +20,24 @@ pub(super) struct Expectation {
 
 impl Expectation {
     pub(super) fn new(n_disturbances: usize) -> Self {
-        let mut expectation =
-            Self { finished: None, coming: None, is_new: false, n_disturbances, refused: None };
+        let mut expectation = Self {
+            finished: None,
+            coming: None,
+            spare: (0..2).map(|_| Vec::with_capacity(n_disturbances)).collect(),
+            is_new: false,
+            n_disturbances,
+            refused: None,
+        };
         expectation.forget();
         expectation
     }
 
     /// Forgets every announcement. Without disturbances there is nothing to be told.
     pub(super) fn forget(&mut self) {
-        let nothing = (self.n_disturbances == 0).then(Vec::new);
-        self.finished.clone_from(&nothing);
-        self.coming = nothing;
+        self.spare.extend(self.finished.take().into_iter().chain(self.coming.take()));
+        if self.n_disturbances == 0 {
+            (self.finished, self.coming) = (self.spare.pop(), self.spare.pop());
+        }
         self.is_new = false;
         self.refused = None;
     }
@@ -39,7 +48,7 @@ impl Expectation {
             self.refused = Some(refused);
             return;
         }
-        let mut place = self.finished.take().unwrap_or_default();
+        let mut place = self.finished.take().or_else(|| self.spare.pop()).unwrap_or_default();
         place.clear();
         place.extend_from_slice(disturbance);
         self.finished = self.coming.replace(place);

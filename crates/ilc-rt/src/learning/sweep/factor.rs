@@ -148,12 +148,17 @@ impl Gains {
         for i in 0..n {
             self.passed[i * n + i] = 1.0;
         }
+        let has_constant_plant = stages.has_constant_plant();
         let mut k = n_samples;
         while k > 0 {
             k -= 1;
-            // The stages of the constant range are read once.
+            // The stages of the constant range are read once, and so is a plant that does not vary.
             if !constant.contains(&k) || k + 1 == constant.end {
-                stages.stage_into(k, &mut self.stage);
+                if has_constant_plant && k + 1 < n_samples {
+                    stages.weights_into(k, &mut self.stage);
+                } else {
+                    stages.stage_into(k, &mut self.stage);
+                }
             }
             let pivots = self.step();
             if pivots.vanished && k < free_from {

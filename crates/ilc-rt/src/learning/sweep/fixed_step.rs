@@ -1,14 +1,15 @@
 //! One step of the backward recursion in Joseph's form for sizes that the compiler knows.
 
 #![expect(
+    clippy::inline_always,
     clippy::needless_range_loop,
-    clippy::needless_pass_by_value,
-    reason = "the indices are those of the equations; room is lent and given back"
+    reason = "the indices are those of the equations; compiled anew for each processor"
 )]
 
 use super::Stage;
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
+use super::wide::{Instructions, Wide, Work};
 
 /// What a step reads and writes besides the gains; by columns.
 pub(super) struct Room<'a> {
@@ -23,17 +24,19 @@ pub(super) struct Room<'a> {
 }
 
 /// Steps if there is code for the sizes, otherwise touches nothing.
-pub(super) fn step(
+pub(super) fn step<'a>(
+    how: Instructions,
     sizes: Sizes,
-    stage: &Stage,
-    room: Room,
-    back: &mut [f64],
-    fore: &mut [f64],
+    stage: &'a Stage,
+    room: Room<'a>,
+    back: &'a mut [f64],
+    fore: &'a mut [f64],
 ) -> Option<Pivots> {
+    let step = Step { sizes, stage, room, back, fore };
     macro_rules! choose {
         ($(($n:literal, $m:literal, $p:literal))*) => {
             match (sizes.n, sizes.m, sizes.p) {
-                $(($n, $m, $p) => Some(sized::<$n, $m, $p>(sizes, stage, room, back, fore)),)*
+                $(($n, $m, $p) => Some(how.run(OfSize::<$n, $m, $p>(step))),)*
                 _ => None,
             }
         };
@@ -46,13 +49,30 @@ pub(super) fn step(
 /// A matrix by columns.
 type Columns<const R: usize, const C: usize> = [[f64; R]; C];
 
-fn sized<const N: usize, const M: usize, const P: usize>(
-    Sizes { targets, held, .. }: Sizes,
-    stage: &Stage,
-    room: Room,
-    back: &mut [f64],
-    fore: &mut [f64],
-) -> Pivots {
+/// All of a step.
+struct Step<'a> {
+    sizes: Sizes,
+    stage: &'a Stage,
+    room: Room<'a>,
+    back: &'a mut [f64],
+    fore: &'a mut [f64],
+}
+
+/// A step with `N` states, `M` inputs and `P` outputs.
+struct OfSize<'a, const N: usize, const M: usize, const P: usize>(Step<'a>);
+
+impl<const N: usize, const M: usize, const P: usize> Work for OfSize<'_, N, M, P> {
+    type Output = Pivots;
+
+    #[inline(always)]
+    fn with(self, _: impl Wide) -> Pivots {
+        sized(self)
+    }
+}
+
+#[inline(always)]
+fn sized<const N: usize, const M: usize, const P: usize>(work: OfSize<'_, N, M, P>) -> Pivots {
+    let Step { sizes: Sizes { targets, held, .. }, stage, room, back, fore } = work.0;
     let a: Columns<N, N> = read(stage.a.as_slice());
     let b: Columns<N, M> = read(stage.b.as_slice());
     let c: Columns<P, N> = read(stage.c.as_slice());
@@ -130,7 +150,7 @@ fn sized<const N: usize, const M: usize, const P: usize>(
     pivots
 }
 
-#[inline]
+#[inline(always)]
 fn read<const R: usize, const C: usize>(values: &[f64]) -> Columns<R, C> {
     let mut matrix = [[0.0; R]; C];
     for (column, values) in matrix.iter_mut().zip(values.chunks_exact(R)) {
@@ -139,12 +159,12 @@ fn read<const R: usize, const C: usize>(values: &[f64]) -> Columns<R, C> {
     matrix
 }
 
-#[inline]
+#[inline(always)]
 fn transposed<const R: usize, const C: usize>(matrix: &Columns<R, C>) -> Columns<C, R> {
     std::array::from_fn(|col| std::array::from_fn(|row| matrix[row][col]))
 }
 
-#[inline]
+#[inline(always)]
 fn product<const R: usize, const K: usize, const C: usize>(
     left: &Columns<R, K>,
     right: &Columns<K, C>,
@@ -155,7 +175,7 @@ fn product<const R: usize, const K: usize, const C: usize>(
 }
 
 /// `sum += left right`.
-#[inline]
+#[inline(always)]
 fn add_product<const R: usize, const K: usize, const C: usize>(
     sum: &mut Columns<R, C>,
     left: &Columns<R, K>,

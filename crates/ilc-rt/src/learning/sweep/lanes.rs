@@ -4,26 +4,25 @@
 //! lies far enough away along the run has no influence that could be seen in a double, so the run may
 //! be cut anywhere if each stretch begins with a warm-up over its neighbour's samples. [`LANES`]
 //! stretches side by side keep the processor busy, and the run is taken a block at a time so that
-//! what the backward sweep leaves for the forward one stays in the cache.
+//! what the backward sweep leaves for the forward one stays in the cache. Where it is cut depends on
+//! the gains and the length of the run alone, never on the processor.
 
-#![expect(clippy::needless_range_loop, reason = "the indices are those of the equations")]
+#![expect(
+    clippy::inline_always,
+    clippy::needless_range_loop,
+    reason = "compiled anew for the instructions of each processor, which closures are not"
+)]
 
 use super::Run;
 use super::single::Fixed;
+use super::wide::{LANES, Lanes, Wide};
 
-/// Stretches side by side.
-const LANES: usize = 8;
-/// Samples that are fetched at a time.
-const TILE: usize = 8;
+/// Samples that are fetched at a time: a line of the cache for each lane.
+const TILE: usize = LANES;
 /// What is left of a state after the warm-up.
-const FORGOTTEN: f64 = 1e-20;
-/// A stretch is at least this many times as long as its warm-up.
-const WORTHWHILE: usize = 4;
+const FORGOTTEN: f64 = 1e-18;
 /// Samples of a stretch: with its `LANES` neighbours it fits the second cache.
 const STRETCH: usize = 2048;
-
-type Lanes = [f64; LANES];
-type Tile = [Lanes; TILE];
 
 /// Where the channel's samples lie.
 #[derive(Debug, Clone, Copy)]
@@ -39,23 +38,20 @@ pub(super) struct Cut {
     /// Both in tiles.
     warm_up: usize,
     stretch: usize,
-    /// `kappa` of one block: sample by sample, lane by lane.
-    kappa: Vec<Tile>,
+    /// `kappa` of one block, sample by sample, lane by lane, behind one row that is not used.
+    kappa: Vec<Lanes>,
 }
 
 impl Cut {
     /// Returns how to cut `n_samples` samples, or `None` if that is not worthwhile.
     pub(super) fn new<const N: usize>(gains: &Fixed<N>, n_samples: usize) -> Option<Self> {
-        let longest = n_samples / (LANES * WORTHWHILE);
-        let warm_up = gains.memory(longest)?.max(1).div_ceil(TILE);
+        // Eight stretches at a time are worth a warm-up as long as each.
+        let warm_up = gains.memory(n_samples / LANES)?.max(1).div_ceil(TILE);
         // As few blocks as possible, all of about the same size.
-        let n_blocks = n_samples.div_ceil(LANES * STRETCH.max(WORTHWHILE * warm_up * TILE));
+        let n_blocks = n_samples.div_ceil(LANES * STRETCH.max(4 * warm_up * TILE));
         let stretch = n_samples / (LANES * TILE * n_blocks);
-        (stretch >= warm_up).then(|| Self {
-            warm_up,
-            stretch,
-            kappa: vec![[[0.0; LANES]; TILE]; stretch],
-        })
+        let kappa = vec![Lanes::default(); 1 + stretch * TILE];
+        (stretch >= warm_up).then_some(Self { warm_up, stretch, kappa })
     }
 
     /// Samples of one block.
@@ -67,9 +63,10 @@ impl Cut {
     ///
     /// `last` is the costate after the last block; `meanwhile` is told the costate at the start of
     /// this one and returns the state there.
-    #[inline]
+    #[inline(always)]
     pub(super) fn solve<const HELD: bool, const N: usize>(
         &mut self,
+        wide: impl Wide,
         gains: &Fixed<N>,
         (place, first): (Place, usize),
         run: &mut Run,
@@ -77,64 +74,103 @@ impl Cut {
         meanwhile: impl FnOnce(&mut Run, [f64; N]) -> [f64; N],
     ) -> [f64; N] {
         let Self { warm_up, stretch, kappa } = self;
-        let start = |lane: usize| first + lane * *stretch * TILE;
+        let length = *stretch * TILE;
+        let starts: [usize; LANES] = std::array::from_fn(|lane| first + lane * length);
         // Where the stretch that a lane warms up over begins; the very last one has none.
-        let beyond =
-            |lane: usize| start(if lane + 1 == LANES && last.is_some() { lane } else { lane + 1 });
+        let mut beyond = starts.map(|start| start + length);
+        if last.is_some() {
+            beyond[LANES - 1] = starts[LANES - 1];
+        }
         let errors = Channel { offset: place.output, stride: run.n_outputs };
         let inputs = Channel { offset: place.input, stride: run.n_inputs };
+        let zero = wide.row(&[0.0; LANES]);
+        let fetch = Fetch::<HELD> { errors, inputs, shift: place.shift };
 
-        let mut costate = [[0.0; LANES]; N];
-        let gather = |run: &Run, tile: usize, from: &dyn Fn(usize) -> usize| {
-            let at: [usize; LANES] = std::array::from_fn(|lane| from(lane) + tile * TILE);
-            let (mut error, mut input) = (NONE, NONE);
-            errors.load(run.error, at.map(|at| at + place.shift), &mut error);
-            if HELD {
-                inputs.load(run.input, at, &mut input);
-            }
-            (error, input)
-        };
+        let mut costate = [zero; N];
         for tile in (0..*warm_up).rev() {
-            let (error, input) = gather(run, tile, &beyond);
-            for (error, input) in error.iter().zip(&input).rev() {
-                backward::<HELD, N>(gains, &mut costate, input, error);
+            let (error, input) = fetch.tile(wide, run, &beyond, tile);
+            for i in (0..TILE).rev() {
+                backward::<HELD, N, _>(wide, gains, &mut costate, input[i], error[i]);
             }
         }
         if let Some(exact) = last {
-            for (lanes, value) in costate.iter_mut().zip(exact) {
-                lanes[LANES - 1] = value;
+            replace(wide, &mut costate, LANES - 1, exact);
+        }
+        for (tile, kappa) in kappa[1..].chunks_exact_mut(TILE).enumerate().rev() {
+            let (error, input) = fetch.tile(wide, run, &starts, tile);
+            for i in (0..TILE).rev() {
+                let row = backward::<HELD, N, _>(wide, gains, &mut costate, input[i], error[i]);
+                kappa[i] = Lanes(wide.values(row));
             }
         }
-        for (tile, kappa) in kappa.iter_mut().enumerate().rev() {
-            let (error, input) = gather(run, tile, &start);
-            for (kappa, (error, input)) in kappa.iter_mut().zip(error.iter().zip(&input)).rev() {
-                *kappa = backward::<HELD, N>(gains, &mut costate, input, error);
-            }
-        }
-        let exact = meanwhile(run, std::array::from_fn(|i| costate[i][0]));
+        let exact = meanwhile(run, lane(wide, &costate, 0));
 
-        let mut state = [[0.0; LANES]; N];
-        for kappa in kappa[*stretch - *warm_up..].iter().flatten() {
-            // Each lane warms up over the end of the lane before.
-            let before = std::array::from_fn(|lane| if lane > 0 { kappa[lane - 1] } else { 0.0 });
-            forward(gains, &mut state, &before);
+        // Each lane warms up over the end of the lane before, one place earlier in memory; what the
+        // first one finds there does not count.
+        let mut state = [zero; N];
+        for pair in kappa[length - *warm_up * TILE..].windows(2) {
+            let [before, now] = pair else { break };
+            let mut kappa = [0.0; LANES];
+            kappa[0] = before.0[LANES - 1];
+            kappa[1..].copy_from_slice(&now.0[..LANES - 1]);
+            forward(wide, gains, &mut state, wide.row(&kappa));
         }
-        for (lanes, value) in state.iter_mut().zip(exact) {
-            lanes[0] = value;
-        }
-        for (tile, kappa) in kappa.iter().enumerate() {
-            let at: [usize; LANES] = std::array::from_fn(|lane| start(lane) + tile * TILE);
-            let mut change = NONE;
-            for (change, kappa) in change.iter_mut().zip(kappa) {
-                *change = forward(gains, &mut state, kappa);
+        replace(wide, &mut state, 0, exact);
+        for (tile, kappa) in kappa[1..].chunks_exact(TILE).enumerate() {
+            let mut change = [zero; TILE];
+            for i in 0..TILE {
+                change[i] = forward(wide, gains, &mut state, wide.row(&kappa[i].0));
             }
-            inputs.store(run, at, &change);
+            inputs.store(wide, run, &starts, tile, change);
         }
-        std::array::from_fn(|i| state[i][LANES - 1])
+        lane(wide, &state, LANES - 1)
     }
 }
 
-const NONE: Tile = [[0.0; LANES]; TILE];
+/// Returns the numbers of one lane.
+#[inline(always)]
+fn lane<W: Wide, const N: usize>(wide: W, rows: &[W::Row; N], lane: usize) -> [f64; N] {
+    let mut found = [0.0; N];
+    for i in 0..N {
+        found[i] = wide.values(rows[i])[lane];
+    }
+    found
+}
+
+/// Replaces the numbers of one lane.
+#[inline(always)]
+fn replace<W: Wide, const N: usize>(wide: W, rows: &mut [W::Row; N], lane: usize, exact: [f64; N]) {
+    for i in 0..N {
+        let mut values = wide.values(rows[i]);
+        values[lane] = exact[i];
+        rows[i] = wide.row(&values);
+    }
+}
+
+/// What the backward sweep reads.
+#[derive(Clone, Copy)]
+struct Fetch<const HELD: bool> {
+    errors: Channel,
+    inputs: Channel,
+    shift: usize,
+}
+
+impl<const HELD: bool> Fetch<HELD> {
+    /// Fetches a tile of error and input, sample by sample.
+    #[inline(always)]
+    fn tile<W: Wide>(
+        self,
+        wide: W,
+        run: &Run,
+        starts: &[usize; LANES],
+        tile: usize,
+    ) -> ([W::Row; TILE], [W::Row; TILE]) {
+        let error = self.errors.load(wide, run.error, starts, tile * TILE + self.shift);
+        let input =
+            if HELD { self.inputs.load(wide, run.input, starts, tile * TILE) } else { error };
+        (error, input)
+    }
+}
 
 /// One channel of a time-first signal.
 #[derive(Clone, Copy)]
@@ -144,103 +180,113 @@ struct Channel {
 }
 
 impl Channel {
-    /// Fetches a tile for each lane, from the samples `at`.
-    #[inline]
-    fn load(self, signal: &[f64], at: [usize; LANES], tile: &mut Tile) {
-        for lane in 0..LANES {
-            let from = &signal[at[lane] * self.stride + self.offset..];
-            if self.stride == 1
-                && let Some(chunk) = from.first_chunk::<TILE>()
-            {
-                for i in 0..TILE {
-                    tile[i][lane] = chunk[i];
-                }
-            } else {
-                for (row, value) in tile.iter_mut().zip(from.iter().step_by(self.stride)) {
-                    row[lane] = *value;
+    /// Fetches a tile for each lane, `ahead` of where it starts; returns it sample by sample.
+    #[inline(always)]
+    fn load<W: Wide>(
+        self,
+        wide: W,
+        signal: &[f64],
+        starts: &[usize; LANES],
+        ahead: usize,
+    ) -> [W::Row; TILE] {
+        let mut rows = [wide.row(&[0.0; TILE]); LANES];
+        if self.stride == 1 {
+            for lane in 0..LANES {
+                let begin = starts[lane] + ahead + self.offset;
+                if let Some(values) = signal[begin..].first_chunk() {
+                    rows[lane] = wide.row(values);
                 }
             }
+            return wide.transpose(rows);
         }
+        for lane in 0..LANES {
+            let from = &signal[(starts[lane] + ahead) * self.stride + self.offset..];
+            let mut values = [0.0; TILE];
+            for (to, value) in values.iter_mut().zip(from.iter().step_by(self.stride)) {
+                *to = *value;
+            }
+            rows[lane] = wide.row(&values);
+        }
+        wide.transpose(rows)
     }
 
-    /// Writes the input plus its change.
-    #[inline]
-    fn store(self, run: &mut Run, at: [usize; LANES], change: &Tile) {
+    /// Writes the input plus its change, given sample by sample.
+    #[inline(always)]
+    fn store<W: Wide>(
+        self,
+        wide: W,
+        run: &mut Run,
+        starts: &[usize; LANES],
+        tile: usize,
+        change: [W::Row; TILE],
+    ) {
+        let change = wide.transpose(change);
+        if self.stride == 1 {
+            for lane in 0..LANES {
+                let begin = starts[lane] + tile * TILE + self.offset;
+                let place = (run.input[begin..].first_chunk(), run.next[begin..].first_chunk_mut());
+                if let (Some(input), Some(next)) = place {
+                    *next = wide.values(wide.add(wide.row(input), change[lane]));
+                }
+            }
+            return;
+        }
         for lane in 0..LANES {
-            let begin = at[lane] * self.stride + self.offset;
-            let (input, next) = (&run.input[begin..], &mut run.next[begin..]);
-            if self.stride == 1
-                && let (Some(input), Some(next)) =
-                    (input.first_chunk::<TILE>(), next.first_chunk_mut::<TILE>())
-            {
-                for i in 0..TILE {
-                    next[i] = input[i] + change[i][lane];
-                }
-            } else {
-                let pairs =
-                    next.iter_mut().step_by(self.stride).zip(input.iter().step_by(self.stride));
-                for ((next, input), row) in pairs.zip(change) {
-                    *next = input + row[lane];
-                }
+            let begin = (starts[lane] + tile * TILE) * self.stride + self.offset;
+            let inputs = run.input[begin..].iter().step_by(self.stride);
+            let nexts = run.next[begin..].iter_mut().step_by(self.stride);
+            for ((next, input), change) in nexts.zip(inputs).zip(wide.values(change[lane])) {
+                *next = input + change;
             }
         }
     }
 }
 
-#[inline]
-fn backward<const HELD: bool, const N: usize>(
+#[inline(always)]
+fn backward<const HELD: bool, const N: usize, W: Wide>(
+    wide: W,
     gains: &Fixed<N>,
-    costate: &mut [Lanes; N],
-    input: &Lanes,
-    error: &Lanes,
-) -> Lanes {
-    let mut kappa = [0.0; LANES];
-    let mut earlier = [[0.0; LANES]; N];
-    for lane in 0..LANES {
-        kappa[lane] = gains.error * error[lane];
-        if HELD {
-            kappa[lane] -= gains.input * input[lane];
-        }
-    }
+    costate: &mut [W::Row; N],
+    input: W::Row,
+    error: W::Row,
+) -> W::Row {
+    let mut kappa = wide.scale(gains.error, error);
+    let mut earlier = *costate;
     for i in 0..N {
-        for lane in 0..LANES {
-            earlier[i][lane] = gains.from_error[i] * error[lane];
-            if HELD {
-                earlier[i][lane] += gains.from_input[i] * input[lane];
-            }
+        earlier[i] = wide.scale(gains.from_error[i], error);
+    }
+    if HELD {
+        kappa = wide.subtract(kappa, wide.scale(gains.input, input));
+        for (earlier, gain) in earlier.iter_mut().zip(gains.from_input) {
+            *earlier = wide.add(*earlier, wide.scale(gain, input));
         }
     }
-    for j in 0..N {
-        for lane in 0..LANES {
-            kappa[lane] += gains.costate[j] * costate[j][lane];
-        }
-        for i in 0..N {
-            for lane in 0..LANES {
-                earlier[i][lane] += gains.transition[i][j] * costate[j][lane];
-            }
+    for (j, value) in costate.iter().enumerate() {
+        kappa = wide.add(kappa, wide.scale(gains.costate[j], *value));
+        for (earlier, gains) in earlier.iter_mut().zip(&gains.transition) {
+            *earlier = wide.add(*earlier, wide.scale(gains[j], *value));
         }
     }
     *costate = earlier;
     kappa
 }
 
-#[inline]
-fn forward<const N: usize>(gains: &Fixed<N>, state: &mut [Lanes; N], kappa: &Lanes) -> Lanes {
-    let mut change = *kappa;
-    let mut later = [[0.0; LANES]; N];
+#[inline(always)]
+fn forward<const N: usize, W: Wide>(
+    wide: W,
+    gains: &Fixed<N>,
+    state: &mut [W::Row; N],
+    kappa: W::Row,
+) -> W::Row {
+    let mut change = kappa;
+    let mut later = *state;
     for i in 0..N {
-        for lane in 0..LANES {
-            later[i][lane] = gains.b[i] * kappa[lane];
-        }
+        later[i] = wide.scale(gains.b[i], kappa);
     }
-    for j in 0..N {
-        for lane in 0..LANES {
-            change[lane] -= gains.feedback[j] * state[j][lane];
-        }
-        for i in 0..N {
-            for lane in 0..LANES {
-                later[i][lane] += gains.transition[j][i] * state[j][lane];
-            }
+    for ((value, column), feedback) in state.iter().zip(&gains.transition).zip(gains.feedback) {
+        change = wide.subtract(change, wide.scale(feedback, *value));
+        for (later, gain) in later.iter_mut().zip(column) {
+            *later = wide.add(*later, wide.scale(*gain, *value));
         }
     }
     *state = later;
@@ -252,9 +298,12 @@ impl<const N: usize> Fixed<N> {
     fn memory(&self, longest: usize) -> Option<usize> {
         let mut power: [[f64; N]; N] =
             std::array::from_fn(|col| std::array::from_fn(|row| f64::from(u8::from(row == col))));
+        // Relative to the largest so far, as the units of the states may differ.
+        let mut largest = 0.0_f64;
         for k in 0..=longest {
             let size = power.iter().flatten().fold(0.0_f64, |size, value| size.max(value.abs()));
-            if size < FORGOTTEN {
+            largest = largest.max(size);
+            if size < FORGOTTEN * largest {
                 return Some(k);
             }
             power = std::array::from_fn(|col| {

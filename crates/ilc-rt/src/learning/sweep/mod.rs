@@ -26,11 +26,14 @@ mod recursion;
 mod single;
 mod square_root;
 mod stage;
+mod wide;
 
 pub use factor::{FactorError, Form, Gains};
 pub use general::General;
 pub use rate::Rate;
 pub use stage::{Stage, Stages};
+
+use wide::Instructions;
 
 /// Where the signals of a solver lie among those of the whole machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -69,7 +72,7 @@ pub trait Sweep: Send + std::fmt::Debug {
 
 /// Returns the quickest solver for the given channels.
 pub fn solver(gains: Gains, channels: Channels) -> Box<dyn Sweep> {
-    match single::single(&gains, &channels) {
+    match single::single(&gains, &channels, Instructions::best()) {
         Some(solver) => solver,
         None => Box::new(General::new(gains, channels)),
     }

@@ -1,8 +1,11 @@
 //! The two sweeps for one input and one output, with everything in registers.
 
+#![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
+
 use super::factor::Gains;
 use super::lanes::{Cut, Place};
 use super::record::Record;
+use super::wide::{Instructions, Wide, Work};
 use super::{Channels, Run, Sweep};
 
 /// The most states, that of a rate penalty included, for which [`single`] has a solver.
@@ -13,7 +16,11 @@ const MAX_STATES: usize = 6;
 ///
 /// `None` unless the gains are for one input, one output and 1 to 6 states: the caller
 /// then takes [`super::General`].
-pub(super) fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep>> {
+pub(super) fn single(
+    gains: &Gains,
+    channels: &Channels,
+    how: Instructions,
+) -> Option<Box<dyn Sweep>> {
     let ([input], [output], [shift]) =
         (&channels.inputs[..], &channels.outputs[..], &channels.shifts[..])
     else {
@@ -21,12 +28,12 @@ pub(super) fn single(gains: &Gains, channels: &Channels) -> Option<Box<dyn Sweep
     };
     let at = Place { input: *input, output: *output, shift: *shift };
     Some(match gains.n_states() {
-        1 => Box::new(Single::<1>::new(gains, at)),
-        2 => Box::new(Single::<2>::new(gains, at)),
-        3 => Box::new(Single::<3>::new(gains, at)),
-        4 => Box::new(Single::<4>::new(gains, at)),
-        5 => Box::new(Single::<5>::new(gains, at)),
-        6 => Box::new(Single::<6>::new(gains, at)),
+        1 => Box::new(Single::<1>::new(gains, at, how)),
+        2 => Box::new(Single::<2>::new(gains, at, how)),
+        3 => Box::new(Single::<3>::new(gains, at, how)),
+        4 => Box::new(Single::<4>::new(gains, at, how)),
+        5 => Box::new(Single::<5>::new(gains, at, how)),
+        6 => Box::new(Single::<6>::new(gains, at, how)),
         _ => return None,
     })
 }
@@ -63,22 +70,22 @@ impl<const N: usize> Fixed<N> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn backward<const HELD: bool>(&self, costate: &mut [f64; N], input: f64, error: f64) -> f64 {
         let hold = |gain: f64| if HELD { gain * input } else { 0.0 };
-        let kappa = self.error * error - hold(self.input) + dot(&self.costate, costate);
+        let kappa = dot(self.error * error - hold(self.input), &self.costate, costate);
         let earlier = std::array::from_fn(|i| {
             // The part that does not wait for the previous sample first: it shortens the chain.
             let fresh = self.from_error[i] * error + hold(self.from_input[i]);
-            fresh + dot(&self.transition[i], costate)
+            dot(fresh, &self.transition[i], costate)
         });
         *costate = earlier;
         kappa
     }
 
-    #[inline]
+    #[inline(always)]
     fn forward(&self, state: &mut [f64; N], kappa: f64) -> f64 {
-        let change = kappa - dot(&self.feedback, state);
+        let change = kappa - dot(0.0, &self.feedback, state);
         let mut next: [f64; N] = std::array::from_fn(|i| self.b[i] * kappa);
         for (column, value) in self.transition.iter().zip(*state) {
             for (entry, gain) in next.iter_mut().zip(column) {
@@ -90,9 +97,8 @@ impl<const N: usize> Fixed<N> {
     }
 }
 
-#[inline]
-fn dot<const N: usize>(left: &[f64; N], right: &[f64; N]) -> f64 {
-    let mut sum = 0.0;
+#[inline(always)]
+fn dot<const N: usize>(mut sum: f64, left: &[f64; N], right: &[f64; N]) -> f64 {
     for i in 0..N {
         sum += left[i] * right[i];
     }
@@ -111,13 +117,14 @@ struct Single<const N: usize> {
     n_before: usize,
     n_samples: usize,
     is_held: bool,
+    instructions: Instructions,
     place: Place,
     /// `kappa` before and after.
     kappa: Vec<f64>,
 }
 
 impl<const N: usize> Single<N> {
-    fn new(gains: &Gains, place: Place) -> Self {
+    fn new(gains: &Gains, place: Place, instructions: Instructions) -> Self {
         let (n_samples, is_held) = (gains.n_samples(), gains.sizes().held > 0);
         let (mut before, mut after, mut cut) = (Vec::new(), Vec::new(), None);
         for index in (0..gains.n_stored()).rev() {
@@ -137,11 +144,12 @@ impl<const N: usize> Single<N> {
         let n_before = before.len();
         let n_after: usize = after.iter().map(|(count, _)| count).sum();
         let kappa = vec![0.0; n_before + n_after];
-        Self { before, cut, after, n_before, n_samples, is_held, place, kappa }
+        Self { before, cut, after, n_before, n_samples, is_held, instructions, place, kappa }
     }
 
     /// Solves with (`HELD`) or without a weight of the input.
-    fn sweep<const HELD: bool>(&mut self, run: &mut Run) {
+    #[inline(always)]
+    fn sweep<const HELD: bool>(&mut self, wide: impl Wide, run: &mut Run) {
         let Self { before, cut, after, n_before, n_samples, place, kappa, .. } = self;
         let (kappa_before, kappa_after) = kappa.split_at_mut(*n_before);
         let first_after = *n_samples - kappa_after.len();
@@ -152,7 +160,7 @@ impl<const N: usize> Single<N> {
                 let first = *n_before + block * cut.block();
                 let exact = (block + 1 == *n_blocks).then_some(costate);
                 let at = (*place, first);
-                state = cut.solve::<HELD, N>(gains, at, run, exact, |run, costate| {
+                state = cut.solve::<HELD, N>(wide, gains, at, run, exact, |run, costate| {
                     if block > 0 {
                         return state;
                     }
@@ -165,13 +173,31 @@ impl<const N: usize> Single<N> {
     }
 }
 
+/// A solver with the run that it is to solve.
+struct Solve<'a, 'r, const N: usize>(&'a mut Single<N>, &'a mut Run<'r>);
+
+impl<const N: usize> Work for Solve<'_, '_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with(self, wide: impl Wide) {
+        let Self(single, run) = self;
+        if single.is_held {
+            single.sweep::<true>(wide, run);
+        } else {
+            single.sweep::<false>(wide, run);
+        }
+    }
+}
+
 impl<const N: usize> Sweep for Single<N> {
     fn solve(&mut self, run: &mut Run) {
-        if self.is_held { self.sweep::<true>(run) } else { self.sweep::<false>(run) }
+        self.instructions.run(Solve(self, run));
     }
 }
 
 /// Goes back over the samples from `first` on and returns the costate at their start.
+#[inline(always)]
 fn backward<const HELD: bool, const N: usize>(
     sets: &Sets<N>,
     place: Place,
@@ -198,6 +224,7 @@ fn backward<const HELD: bool, const N: usize>(
 }
 
 /// Goes over the samples from `first` on and returns the state at their end.
+#[inline(always)]
 fn forward<const N: usize>(
     sets: &Sets<N>,
     place: Place,
@@ -263,42 +290,46 @@ mod tests {
     }
 
     #[test]
-    fn stretches_agree_with_the_plain_sweep() {
+    fn stretches_agree_with_the_plain_sweep_on_every_processor() {
+        // From runs too short for a single stretch to several blocks with samples left over.
+        let short = (64..700).step_by(53).chain([3, 1301]);
+        let lengths: Vec<usize> = short.chain([5000, 40_000, 100_003]).collect();
         for n in 1..=MAX_STATES {
-            for (s, n_samples) in [(0.0, 3), (0.0, 700), (0.3, 5000), (0.0, 40_000), (0.2, 100_003)]
-            {
+            for (&n_samples, s) in lengths.iter().zip([0.0, 0.2].into_iter().cycle()) {
                 let gains = Gains::new(&axis(n, s, n_samples), 0).unwrap();
-                let channels = Channels { inputs: vec![1], outputs: vec![0], shifts: vec![1] };
-                let wave = |seed: usize| -> Vec<f64> {
-                    (0..2 * n_samples).map(|k| ((k * k + seed) as f64).sin()).collect()
-                };
-                let (input, error) = (wave(1), wave(2));
-                let solve = |sweep: &mut dyn Sweep| {
-                    let mut next = vec![0.0; input.len()];
-                    let (input, error) = (&input, &error);
-                    let next_run = &mut next[..];
-                    sweep.solve(&mut Run {
-                        input,
-                        error,
-                        next: next_run,
-                        n_inputs: 2,
-                        n_outputs: 2,
-                    });
-                    next
-                };
-                let mut quick = single(&gains, &channels).unwrap();
-                let is_cut = format!("{quick:?}").contains("warm_up");
-                assert!(is_cut || n_samples < 5000, "{n} states, {n_samples} samples");
-                let quick = solve(quick.as_mut());
-                let plain = solve(&mut General::new(gains, channels));
-                let scale = plain.iter().fold(1.0_f64, |scale, value| scale.max(value.abs()));
-                for (k, (quick, plain)) in quick.iter().zip(&plain).enumerate() {
-                    assert!(
-                        (quick - plain).abs() <= 1e-14 * scale,
-                        "{n} states, {n_samples} samples, at {k}: {quick} and {plain}"
-                    );
+                for width in [1, 2] {
+                    agree(&gains, n_samples, width);
                 }
             }
+        }
+    }
+
+    /// Solves the same problem in every way, with the axis' signals among those of `width` axes.
+    fn agree(gains: &Gains, n_samples: usize, width: usize) {
+        let channels = Channels { inputs: vec![width - 1], outputs: vec![0], shifts: vec![1] };
+        let wave = |seed: usize| -> Vec<f64> {
+            (0..width * n_samples).map(|k| ((k * k + seed) as f64).sin()).collect()
+        };
+        let (input, error) = (wave(1), wave(2));
+        let solve = |sweep: &mut dyn Sweep| {
+            let mut next = vec![0.0; input.len()];
+            let (input, error) = (&input[..], &error[..]);
+            let (n_inputs, n_outputs) = (width, width);
+            sweep.solve(&mut Run { input, error, next: &mut next, n_inputs, n_outputs });
+            next
+        };
+        let told = format!("{} states, {n_samples} samples of {width}", gains.n_states());
+        let mut quick = single(gains, &channels, Instructions::best()).unwrap();
+        let is_cut = format!("{quick:?}").contains("warm_up");
+        assert!(is_cut || n_samples < 5000, "{told}");
+        let quick = solve(quick.as_mut());
+        let mut portable = single(gains, &channels, Instructions::Portable).unwrap();
+        assert!(quick == solve(portable.as_mut()), "{told}");
+        let plain = solve(&mut General::new(gains.clone(), channels));
+        let scale = plain.iter().fold(1.0_f64, |scale, value| scale.max(value.abs()));
+        for (k, (quick, plain)) in quick.iter().zip(&plain).enumerate() {
+            let told = format!("{told}, at {k}: {quick} and {plain}");
+            assert!((quick - plain).abs() <= 1e-14 * scale, "{told}");
         }
     }
 }

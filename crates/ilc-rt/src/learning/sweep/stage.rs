@@ -64,6 +64,14 @@ pub trait Stages {
         *stage = self.stage(k);
     }
 
+    /// Overwrites the weights in `stage`, which holds the matrices of another sample, with those of
+    /// sample `k`; asked for only if the plant is [constant](Stages::has_constant_plant).
+    ///
+    /// By default it overwrites everything.
+    fn weights_into(&self, k: usize, stage: &mut Stage) {
+        self.stage_into(k, stage);
+    }
+
     /// A range of samples at which all stages are equal; empty if there is none.
     fn constant(&self) -> Range<usize>;
 
@@ -94,6 +102,10 @@ impl<S: Stages + ?Sized> Stages for &S {
 
     fn stage_into(&self, k: usize, stage: &mut Stage) {
         (**self).stage_into(k, stage);
+    }
+
+    fn weights_into(&self, k: usize, stage: &mut Stage) {
+        (**self).weights_into(k, stage);
     }
 
     fn constant(&self) -> Range<usize> {

@@ -12,7 +12,7 @@ pub use cost::{Cost, Weights};
 pub use pairing::Paired;
 pub use plant::Plant;
 
-use crate::learning::error::check;
+use crate::learning::error::{check, check_length, check_place, is_finite};
 use crate::learning::sweep::{self, Channels, FactorError, Form, Gains, Rate, Run, Stages, Sweep};
 use crate::learning::{Law, LearningError, Structure};
 use crate::model::StateSpace;
@@ -49,6 +49,8 @@ pub struct NormOptimal {
     scalars: Option<Weights>,
     conditioning: f64,
     parts: Vec<Box<dyn Sweep>>,
+    /// Samples at the start of the run whose error no part looks at, at least in some output.
+    n_unread: usize,
 }
 
 impl NormOptimal {
@@ -107,18 +109,24 @@ impl NormOptimal {
             scalars: cost.scalars(),
             conditioning: 1.0,
             parts: Vec::new(),
+            n_unread: 0,
         };
+        let mut n_read = 0;
         for Part { plant, cost, inputs, outputs } in parts(plant, &cost)? {
             let (told, rate) = (cost.told(), cost.rate);
             let paired = Paired::new(plant.borrow(), n_samples, cost)?;
             let channels = Channels { inputs, outputs, shifts: paired.shifts().to_vec() };
             let free_samples = paired.free_samples();
+            n_read += channels.outputs.len();
             if rate > 0.0 {
                 let rated = Rate { inner: paired, weight: rate * rate };
                 law.add(&rated, channels, free_samples, form, &told)?;
             } else {
                 law.add(&paired, channels, free_samples, form, &told)?;
             }
+        }
+        if n_read < n_outputs {
+            law.n_unread = n_samples;
         }
         Ok(law)
     }
@@ -155,6 +163,7 @@ impl NormOptimal {
             scalars: None,
             conditioning: 1.0,
             parts: Vec::new(),
+            n_unread: 0,
         };
         law.add(stages, channels, free_samples, Form::default(), told)?;
         Ok(law)
@@ -177,6 +186,8 @@ impl NormOptimal {
             FactorError::Unbounded => LearningError::Unbounded { weights: weights() },
         })?;
         self.conditioning = self.conditioning.min(gains.conditioning());
+        let shift = channels.shifts.iter().copied().max().unwrap_or(0);
+        self.n_unread = self.n_unread.max(shift.min(self.n_samples));
         self.parts.push(sweep::solver(gains, channels));
         Ok(())
     }
@@ -202,17 +213,22 @@ impl Law for NormOptimal {
         next: &mut [f64],
     ) -> Result<(), LearningError> {
         let Self { n_samples, n_inputs, n_outputs, .. } = *self;
-        check("input", input, n_samples, n_inputs)?;
-        check("error", error, n_samples, n_outputs)?;
-        if next.len() != input.len() {
-            let (what, found, n_channels) = ("next", next.len(), n_inputs);
-            return Err(LearningError::Length { what, found, n_samples, n_channels });
-        }
-        let mut run = Run { input, error, next, n_inputs, n_outputs };
+        check_length("input", input, n_samples, n_inputs)?;
+        check_length("error", error, n_samples, n_outputs)?;
+        check_place(next, n_samples, n_inputs)?;
+        let mut run = Run { input, error, next: &mut *next, n_inputs, n_outputs };
         for part in &mut self.parts {
             part.solve(&mut run);
         }
-        check("next", run.next, n_samples, n_inputs)
+        // Whatever is not finite in the input, or in an error that a part looks at, makes a sample of
+        // `next` infinite or not a number: nothing but sums and products lies in between. So one pass
+        // says all, and only a run with something wrong is searched for where it is.
+        if is_finite(next) && is_finite(&error[..self.n_unread * n_outputs]) {
+            return Ok(());
+        }
+        check("input", input, n_samples, n_inputs)?;
+        check("error", error, n_samples, n_outputs)?;
+        check("next", next, n_samples, n_inputs)
     }
 
     fn structure(&self) -> Structure<'_> {

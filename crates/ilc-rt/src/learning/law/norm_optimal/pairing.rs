@@ -127,6 +127,10 @@ impl Stages for Paired {
         self.weigh(k, &mut stage.q, &mut stage.s, &mut stage.r);
     }
 
+    fn weights_into(&self, k: usize, stage: &mut Stage) {
+        self.weigh(k, &mut stage.q, &mut stage.s, &mut stage.r);
+    }
+
     fn constant(&self) -> Range<usize> {
         if self.rows.len() == 1 && self.cost.is_constant() {
             let latest = self.shifts.iter().copied().max().unwrap_or(0);
@@ -263,6 +267,8 @@ mod tests {
         for k in 0..10 {
             paired.stage_into(k, &mut stage);
             assert_eq!(stage, paired.stage(k));
+            paired.weights_into(9 - k, &mut stage);
+            assert_eq!(stage, paired.stage(9 - k));
         }
     }
 }

@@ -6,8 +6,10 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 use super::weights::RelevanceWeights;
 
-/// Most coordinates of a run: its error and seven disturbances.
-const COORDINATES_MAX: usize = 8;
+/// Most numbers that describe a disturbance.
+pub(super) const DISTURBANCES_MAX: usize = 7;
+/// Most coordinates of a run: its error and its disturbance.
+const COORDINATES_MAX: usize = 1 + DISTURBANCES_MAX;
 /// Runs that are searched one by one before a tree pays.
 const FEW: usize = 512;
 /// Width of the border in which the tree's rounding must not decide.

@@ -13,7 +13,7 @@ use super::inputs::Inputs;
 use crate::learning::error::check;
 use crate::learning::{Law, LearningError};
 
-use index::{Index, index};
+use index::{DISTURBANCES_MAX, Index, index};
 use weights::normalise;
 
 pub use weights::RelevanceWeights;
@@ -52,9 +52,10 @@ pub struct RunShape {
 ///   `n_disturbances`
 /// # Real Time
 /// Cold path. `O(n_samples top + log n_runs)`, or `O(n_samples n_runs)` without `top`. An update
-/// allocates for what is kept (a block of about a megabyte at a time, nothing up to the number given
-/// to [`Relevance::with_capacity`]), for the index (made anew after about `4 sqrt(n_runs)` runs), and
-/// lists of `top` numbers. What is kept is never moved by growth.
+/// allocates nothing up to the number of runs given to [`Relevance::with_capacity`], as long as they
+/// are searched one by one (512 runs, or any number without `top`). Beyond, it allocates for what is
+/// kept (a block of about a megabyte at a time, never moved by growth) and for the tree over the runs
+/// (made anew after about `4 sqrt(n_runs)` of them, and a list of `top` numbers a search).
 /// # Source
 /// - \[dimarco2016\], Eq. (4.2) to (4.14), Appendix C. The listing computes the sum over all runs
 ///   anew after each; `top` and [`Relevance::trim`] are its future work (Sec. 5.1).
@@ -120,7 +121,7 @@ impl Relevance {
             disturbances: Vec::new(),
             index,
             proposal: vec![0.0; length],
-            found: Vec::with_capacity(top.map_or(0, |top| top.min(1024))),
+            found: Vec::new(),
             sums: Vec::new(),
         })
     }
@@ -132,6 +133,9 @@ impl Relevance {
         self.disturbances.reserve(n_runs * self.shape.n_disturbances);
         self.index.reserve(n_runs);
         self.sums.reserve(n_runs);
+        if self.top.is_some() {
+            self.found.reserve(n_runs);
+        }
         self
     }
 
@@ -289,25 +293,32 @@ impl Law for Relevance {
         error: &[f64],
         next: &mut [f64],
     ) -> Result<(), LearningError> {
-        let RunShape { n_samples, n_inputs, .. } = self.shape;
+        let RunShape { n_samples, n_inputs, n_disturbances, .. } = self.shape;
         if next.len() != n_samples * n_inputs {
             let (what, found, n_channels) = ("next", next.len(), n_inputs);
             return Err(LearningError::Length { what, found, n_samples, n_channels });
         }
         self.propose(input, error)?;
         let (finished, coming) = self.told.settle()?;
-        let finished = finished.map(<[f64]>::to_vec);
-        let coming = coming.to_vec();
+        // On the stack, so that an update allocates nothing for them.
+        let copy = |disturbance: &[f64]| {
+            let mut place = [0.0; DISTURBANCES_MAX];
+            place[..n_disturbances].copy_from_slice(disturbance);
+            place
+        };
+        let (finished, coming) = (finished.map(copy), copy(coming));
+        let coming = &coming[..n_disturbances];
         if let Some(finished) = finished {
-            self.is_replayed = self.is_replayed && self.knows(&finished);
+            let finished = &finished[..n_disturbances];
+            self.is_replayed = self.is_replayed && self.knows(finished);
             if !self.is_replayed {
-                self.keep(error, &finished);
+                self.keep(error, finished);
             }
         }
         if self.is_empty() {
             next.copy_from_slice(&self.proposal);
         } else {
-            self.weigh(&coming, next);
+            self.weigh(coming, next);
         }
         check("next", next, n_samples, n_inputs)
     }

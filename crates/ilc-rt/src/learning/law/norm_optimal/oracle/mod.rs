@@ -241,3 +241,41 @@ proptest! {
         prop_assert!(worst < 1e-10, "{worst:e}");
     }
 }
+
+#[test]
+fn whatever_is_not_finite_is_refused_wherever_it_is() {
+    let (one, late) = (axis(157.0, 0.5, 1e-3), axis(157.0, 0.5, 1e-3).delayed(3).unwrap());
+    let apart = one.append(&late).unwrap();
+    let mixed = DMatrix::from_row_slice(2, 2, &[1.0, 0.5, 0.0, 1.0]);
+    let coupled = apart.series(&StateSpace::static_gain(mixed, Some(1e-3)).unwrap()).unwrap();
+    // The second output answers to nothing: no part of the law looks at its error.
+    let deaf = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
+    let deaf = one.series(&StateSpace::static_gain(deaf, Some(1e-3)).unwrap()).unwrap();
+    for (model, n_samples) in
+        [(&one, 60), (&one, 2000), (&apart, 2000), (&coupled, 60), (&deaf, 60)]
+    {
+        for w in [weights(1.0, 0.0, 1e-2, 0.0), weights(1.0, 1e-3, 1e-2, 0.0)] {
+            let mut law = NormOptimal::new(model, n_samples, w).unwrap();
+            let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+            let mut next = vec![0.0; n_samples * n_inputs];
+            let samples = (0..6).chain([n_samples / 2, n_samples - 2, n_samples - 1]);
+            for (sample, value) in samples.zip([f64::NAN, f64::INFINITY, -f64::INFINITY].repeat(3))
+            {
+                for (what, n_channels) in [("input", n_inputs), ("error", n_outputs)] {
+                    for channel in 0..n_channels {
+                        let (mut u, mut e) =
+                            (noise(n_samples * n_inputs, 1), noise(n_samples * n_outputs, 2));
+                        let signal = if what == "input" { &mut u } else { &mut e };
+                        signal[sample * n_channels + channel] = value;
+                        let refused = law.update(&u, &e, &mut next).unwrap_err();
+                        let told = format!("{refused:?}");
+                        let expected = LearningError::NotFinite { what, sample, channel, value };
+                        assert_eq!(told, format!("{expected:?}"));
+                    }
+                }
+            }
+            let (u, e) = (noise(n_samples * n_inputs, 1), noise(n_samples * n_outputs, 2));
+            law.update(&u, &e, &mut next).unwrap();
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Eight numbers at a time, with the widest instructions that the processor at hand has.
+//!
+//! The sweeps of this folder import it. A product and a sum are always rounded one by one, never
+//! fused, so every processor finds the same bits.
+
+#![expect(
+    clippy::inline_always,
+    reason = "single instructions, and what takes over the instructions of its caller"
+)]
+
+/// Numbers in a row.
+pub(super) const LANES: usize = 8;
+
+/// Eight numbers as they lie in memory.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub(super) struct Lanes(pub(super) [f64; LANES]);
+
+/// The instructions for rows of eight numbers.
+pub(super) trait Wide: Copy {
+    /// Eight numbers in registers.
+    type Row: Copy;
+
+    /// Returns the row of these numbers.
+    fn row(self, values: &[f64; LANES]) -> Self::Row;
+
+    /// Returns the numbers of a row.
+    fn values(self, row: Self::Row) -> [f64; LANES];
+
+    /// Returns `left + right`.
+    fn add(self, left: Self::Row, right: Self::Row) -> Self::Row;
+
+    /// Returns `left - right`.
+    fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row;
+
+    /// Returns `factor row`.
+    fn scale(self, factor: f64, row: Self::Row) -> Self::Row;
+
+    /// Returns the columns of eight rows.
+    fn transpose(self, rows: [Self::Row; LANES]) -> [Self::Row; LANES];
+}
+
+/// Something to do with rows of numbers.
+pub(super) trait Work {
+    /// What comes out of it.
+    type Output;
+
+    /// Does it. Marked `#[inline(always)]`, as everything that it calls, so that it is compiled for
+    /// the instructions at hand.
+    fn with(self, wide: impl Wide) -> Self::Output;
+}
+
+/// The instructions that a processor has.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Instructions {
+    /// Those of every processor that the program runs on.
+    Portable,
+    /// AVX2 as well.
+    #[cfg(target_arch = "x86_64")]
+    Avx(pulp::x86::V3),
+}
+
+impl Instructions {
+    /// Returns the best of the processor at hand.
+    pub(super) fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            return Self::Avx(simd);
+        }
+        Self::Portable
+    }
+
+    /// Does the work with these instructions.
+    pub(super) fn run<T: Work>(self, work: T) -> T::Output {
+        match self {
+            Self::Portable => work.with(Portable),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx(simd) => simd.vectorize(avx::Call(simd, work)),
+        }
+    }
+}
+
+/// What every processor has.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Portable;
+
+impl Wide for Portable {
+    type Row = [f64; LANES];
+
+    #[inline(always)]
+    fn row(self, values: &[f64; LANES]) -> Self::Row {
+        *values
+    }
+
+    #[inline(always)]
+    fn values(self, row: Self::Row) -> [f64; LANES] {
+        row
+    }
+
+    #[inline(always)]
+    fn add(self, left: Self::Row, right: Self::Row) -> Self::Row {
+        std::array::from_fn(|lane| left[lane] + right[lane])
+    }
+
+    #[inline(always)]
+    fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row {
+        std::array::from_fn(|lane| left[lane] - right[lane])
+    }
+
+    #[inline(always)]
+    fn scale(self, factor: f64, row: Self::Row) -> Self::Row {
+        row.map(|value| factor * value)
+    }
+
+    #[inline(always)]
+    fn transpose(self, rows: [Self::Row; LANES]) -> [Self::Row; LANES] {
+        std::array::from_fn(|col| std::array::from_fn(|row| rows[row][col]))
+    }
+}
+
+/// AVX, as two vectors of four numbers.
+#[cfg(target_arch = "x86_64")]
+mod avx {
+    use std::arch::x86_64::__m256d;
+
+    use pulp::x86::V3;
+    use pulp::{NullaryFnOnce, cast};
+
+    use super::{LANES, Wide, Work};
+
+    /// Work with the proof that the processor has the instructions for it.
+    pub(super) struct Call<T>(pub(super) V3, pub(super) T);
+
+    impl<T: Work> NullaryFnOnce for Call<T> {
+        type Output = T::Output;
+
+        #[inline(always)]
+        fn call(self) -> Self::Output {
+            self.1.with(self.0)
+        }
+    }
+
+    /// The low halves of one row after the other, then the high ones.
+    const LOW: i32 = 0x20;
+    const HIGH: i32 = 0x31;
+
+    impl Wide for V3 {
+        type Row = [__m256d; 2];
+
+        #[inline(always)]
+        fn row(self, values: &[f64; LANES]) -> Self::Row {
+            cast(*values)
+        }
+
+        #[inline(always)]
+        fn values(self, row: Self::Row) -> [f64; LANES] {
+            cast(row)
+        }
+
+        #[inline(always)]
+        fn add(self, left: Self::Row, right: Self::Row) -> Self::Row {
+            let simd = self.avx;
+            [simd._mm256_add_pd(left[0], right[0]), simd._mm256_add_pd(left[1], right[1])]
+        }
+
+        #[inline(always)]
+        fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row {
+            let simd = self.avx;
+            [simd._mm256_sub_pd(left[0], right[0]), simd._mm256_sub_pd(left[1], right[1])]
+        }
+
+        #[inline(always)]
+        fn scale(self, factor: f64, row: Self::Row) -> Self::Row {
+            let simd = self.avx;
+            let factor = simd._mm256_set1_pd(factor);
+            [simd._mm256_mul_pd(factor, row[0]), simd._mm256_mul_pd(factor, row[1])]
+        }
+
+        #[inline(always)]
+        fn transpose(self, rows: [Self::Row; LANES]) -> [Self::Row; LANES] {
+            // Four by four; the two quarters off the diagonal change places.
+            let mut columns = rows;
+            for row in [0, 4] {
+                for half in 0..2 {
+                    let [a, b, c, d] = [
+                        rows[row][half],
+                        rows[row + 1][half],
+                        rows[row + 2][half],
+                        rows[row + 3][half],
+                    ];
+                    let four = quarter(self, [a, b, c, d]);
+                    for i in 0..4 {
+                        columns[half * 4 + i][row / 4] = four[i];
+                    }
+                }
+            }
+            columns
+        }
+    }
+
+    /// Returns the columns of four rows of four.
+    #[inline(always)]
+    fn quarter(simd: V3, [a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
+        let simd = simd.avx;
+        let (ab_even, ab_odd) = (simd._mm256_unpacklo_pd(a, b), simd._mm256_unpackhi_pd(a, b));
+        let (cd_even, cd_odd) = (simd._mm256_unpacklo_pd(c, d), simd._mm256_unpackhi_pd(c, d));
+        [
+            simd._mm256_permute2f128_pd::<LOW>(ab_even, cd_even),
+            simd._mm256_permute2f128_pd::<LOW>(ab_odd, cd_odd),
+            simd._mm256_permute2f128_pd::<HIGH>(ab_even, cd_even),
+            simd._mm256_permute2f128_pd::<HIGH>(ab_odd, cd_odd),
+        ]
+    }
+}
