@@ -31,9 +31,9 @@ The thesis leaves open, and this takes: "2 Hz" as 2 rad/s, a run of 10 s and a j
 times that of acceleration for J; a Q filter of 25 taps, without which PD-ILC diverges; the ILC
 signal added to the reference of the PD loop (Fig. 4.1 is missing) and stored as it is; the law of
 the text (one sample of lead, kp = kd = 1.284), not of the listing; EPSILON = 1 as listed;
-temperatures as random steps of 40 K, summed up and reflected at 100 K either way; 1 K as the
-resolution of Flexible ILC's table. Lengths of chapter 4 are inches, as printed: the weights of the
-relevance depend on them.
+temperatures as white noise through a first-order low-pass (pole 0.3), mapped so that all within
+100 K are as likely; 1 K as the resolution of Flexible ILC's table. Lengths of chapter 4 are inches,
+as printed: the weights of the relevance depend on them.
 """
 
 

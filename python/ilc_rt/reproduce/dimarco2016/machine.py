@@ -6,6 +6,7 @@ reference does. Read by the other modules of this package only.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -29,9 +30,9 @@ ALPHA_R = 3.9e-3
 #: Coefficients of the expansion in 1/K and 1/K² (Eq. 4.17).
 ALPHA_1, ALPHA_2 = 3e-6, 5e-7
 
-# Random temperature: normal steps summed up and reflected at 100 K, so that every temperature comes
-# about as often. The thesis prints "filtered random" and "up to 100 °C in either direction".
-_STEP_K, _LARGEST_K = 40.0, 100.0
+# Random temperature: white noise through a first-order low-pass, mapped so that every temperature
+# within 100 K is as likely. Printed is "filtered random" and "up to 100 °C in either direction".
+_POLE, _LARGEST_K, _SETTLING = 0.3, 100.0, 100
 
 
 @dataclass(frozen=True)
@@ -100,8 +101,8 @@ EXPANSION = System("expansion", lambda _: _COLD, expansion, 1e-4)
 
 def temperatures_k(seed: int, n_runs: int) -> NDArray[np.float64]:
     """Return the temperature above T_0 of every run, constant within it."""
-    random = np.random.default_rng(seed)
-    start = random.uniform(-_LARGEST_K, _LARGEST_K)
-    path = start + np.cumsum(_STEP_K * random.standard_normal(n_runs))
-    turn = 4.0 * _LARGEST_K
-    return np.abs((path - _LARGEST_K) % turn - 2.0 * _LARGEST_K) - _LARGEST_K
+    noise = np.random.default_rng(seed).standard_normal(_SETTLING + n_runs)
+    filtered = np.zeros_like(noise)
+    for run in range(1, len(noise)):
+        filtered[run] = _POLE * filtered[run - 1] + math.sqrt(1.0 - _POLE**2) * noise[run]
+    return np.array([_LARGEST_K * math.erf(x / math.sqrt(2.0)) for x in filtered[_SETTLING:]])

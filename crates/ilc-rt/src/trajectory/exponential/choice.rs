@@ -56,17 +56,20 @@ pub(super) fn choose(
         let before = i.checked_sub(1).map(|at| (at, 1));
         let after = (i < n_legs).then_some((i, 0));
         let joined = after.is_some_and(|(at, _)| legs[at].leg.ends[0] != End::Rest);
-        let groups: [(&str, f64, Vec<(usize, usize)>); 2] = if joined {
-            let both = before.into_iter().chain(after).collect();
-            [("transition", alpha_max.transition, both), ("", 0.0, Vec::new())]
+        let members: Vec<(usize, usize)> = before.into_iter().chain(after).collect();
+        // Legs that are not joined end and start apart from each other.
+        let groups: Vec<Vec<(usize, usize)>> = if joined {
+            vec![members]
         } else {
-            [
-                ("end", alpha_max.end, before.into_iter().collect()),
-                ("start-up", alpha_max.start_up, after.into_iter().collect()),
-            ]
+            members.into_iter().map(|member| vec![member]).collect()
         };
-        for (name, alpha_max, members) in groups {
-            let Some(&(segment, _)) = members.first() else { continue };
+        for members in groups {
+            let Some(&(segment, which)) = members.first() else { continue };
+            let (name, alpha_max) = match which {
+                _ if joined => ("transition", alpha_max.transition),
+                0 => ("start-up", alpha_max.start_up),
+                _ => ("end", alpha_max.end),
+            };
             let along = PathLimits::along(&legs[segment].line.direction, limits, f64::INFINITY);
             let near: Vec<(Leg, usize)> =
                 members.iter().map(|&(at, which)| (legs[at].leg, which)).collect();
