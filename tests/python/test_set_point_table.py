@@ -88,8 +88,8 @@ def test_a_table_is_refused_with_its_line_or_row(tmp_path):
     assert "line 164: 2 columns: 9 columns are needed" in line
     line = refusal(tmp_path, cell_text(jerk=10.0), good)
     assert "cell.toml: [program] (axis 8 is a8): row 5: axis 8: the jerk over the cycle" in line
-    line = refusal(tmp_path, cell_text(), table_text(set_points()[:80]))
-    assert "row " in line
+    line = refusal(tmp_path, cell_text(), table_text(set_points()[:40]))
+    assert "row 41: axis " in line
     assert "rest at the first and the last" in line
     line = refusal(tmp_path, cell_text().replace("points.csv", "gone.csv"), good)
     assert "gone.csv: cannot be read" in line
