@@ -1,29 +1,19 @@
 //! The two sweeps for sizes that the compiler knows: everything but the gains stays in registers.
 
-#![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
-
 use super::factor::Gains;
 use super::record::Sizes;
-use super::wide::{Instructions, Wide, Work};
 use super::{Channels, Run};
 
 /// Solves if there is code for the sizes, otherwise touches nothing and returns `false`.
-pub(super) fn solve(
-    how: Instructions,
-    gains: &Gains,
-    channels: &Channels,
-    kappa: &mut [f64],
-    run: &mut Run,
-) -> bool {
+pub(super) fn solve(gains: &Gains, channels: &Channels, kappa: &mut [f64], run: &mut Run) -> bool {
     let Sizes { n, m, targets, .. } = gains.sizes();
-    let all = All { gains, channels, kappa, run };
     macro_rules! choose {
         ($($n:literal)*) => {
             match (n, m, targets) {
                 $(
-                    ($n, 1, 1) => how.run(OfSize::<$n, 1, 1>(all)),
-                    ($n, 2, 2) => how.run(OfSize::<$n, 2, 2>(all)),
-                    ($n, 3, 3) => how.run(OfSize::<$n, 3, 3>(all)),
+                    ($n, 1, 1) => sweep::<$n, 1, 1>(gains, channels, kappa, run),
+                    ($n, 2, 2) => sweep::<$n, 2, 2>(gains, channels, kappa, run),
+                    ($n, 3, 3) => sweep::<$n, 3, 3>(gains, channels, kappa, run),
                 )*
                 _ => return false,
             }
@@ -33,29 +23,12 @@ pub(super) fn solve(
     true
 }
 
-/// What a sweep reads and writes.
-struct All<'a, 'r> {
-    gains: &'a Gains,
-    channels: &'a Channels,
-    kappa: &'a mut [f64],
-    run: &'a mut Run<'r>,
-}
-
-/// A sweep with `N` states, `M` inputs and `P` outputs that have a target.
-struct OfSize<'a, 'r, const N: usize, const M: usize, const P: usize>(All<'a, 'r>);
-
-impl<const N: usize, const M: usize, const P: usize> Work for OfSize<'_, '_, N, M, P> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with(self, _: impl Wide) {
-        sweep(self);
-    }
-}
-
-#[inline(always)]
-fn sweep<const N: usize, const M: usize, const P: usize>(work: OfSize<'_, '_, N, M, P>) {
-    let All { gains, channels, kappa, run } = work.0;
+fn sweep<const N: usize, const M: usize, const P: usize>(
+    gains: &Gains,
+    channels: &Channels,
+    kappa: &mut [f64],
+    run: &mut Run,
+) {
     let rows = N + M;
     let is_held = gains.sizes().held > 0;
     let last = gains.n_samples().saturating_sub(1);
@@ -121,7 +94,7 @@ fn sweep<const N: usize, const M: usize, const P: usize>(work: OfSize<'_, '_, N,
 }
 
 /// Adds a column times a factor, its first rows to one sum and the others to another.
-#[inline(always)]
+#[inline]
 fn add<const N: usize, const M: usize>(
     first: &mut [f64; N],
     others: &mut [f64; M],

@@ -1,15 +1,14 @@
 //! One step of the backward recursion in Joseph's form for sizes that the compiler knows.
 
 #![expect(
-    clippy::inline_always,
     clippy::needless_range_loop,
-    reason = "the indices are those of the equations; compiled anew for each processor"
+    clippy::needless_pass_by_value,
+    reason = "the indices are those of the equations; room is lent and given back"
 )]
 
 use super::Stage;
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
-use super::wide::{Instructions, Wide, Work};
 
 /// What a step reads and writes besides the gains; by columns.
 pub(super) struct Room<'a> {
@@ -24,19 +23,17 @@ pub(super) struct Room<'a> {
 }
 
 /// Steps if there is code for the sizes, otherwise touches nothing.
-pub(super) fn step<'a>(
-    how: Instructions,
+pub(super) fn step(
     sizes: Sizes,
-    stage: &'a Stage,
-    room: Room<'a>,
-    back: &'a mut [f64],
-    fore: &'a mut [f64],
+    stage: &Stage,
+    room: Room,
+    back: &mut [f64],
+    fore: &mut [f64],
 ) -> Option<Pivots> {
-    let step = Step { sizes, stage, room, back, fore };
     macro_rules! choose {
         ($(($n:literal, $m:literal, $p:literal))*) => {
             match (sizes.n, sizes.m, sizes.p) {
-                $(($n, $m, $p) => Some(how.run(OfSize::<$n, $m, $p>(step))),)*
+                $(($n, $m, $p) => Some(sized::<$n, $m, $p>(sizes, stage, room, back, fore)),)*
                 _ => None,
             }
         };
@@ -49,30 +46,13 @@ pub(super) fn step<'a>(
 /// A matrix by columns.
 type Columns<const R: usize, const C: usize> = [[f64; R]; C];
 
-/// All of a step.
-struct Step<'a> {
-    sizes: Sizes,
-    stage: &'a Stage,
-    room: Room<'a>,
-    back: &'a mut [f64],
-    fore: &'a mut [f64],
-}
-
-/// A step with `N` states, `M` inputs and `P` outputs.
-struct OfSize<'a, const N: usize, const M: usize, const P: usize>(Step<'a>);
-
-impl<const N: usize, const M: usize, const P: usize> Work for OfSize<'_, N, M, P> {
-    type Output = Pivots;
-
-    #[inline(always)]
-    fn with(self, _: impl Wide) -> Pivots {
-        sized(self)
-    }
-}
-
-#[inline(always)]
-fn sized<const N: usize, const M: usize, const P: usize>(work: OfSize<'_, N, M, P>) -> Pivots {
-    let Step { sizes: Sizes { targets, held, .. }, stage, room, back, fore } = work.0;
+fn sized<const N: usize, const M: usize, const P: usize>(
+    Sizes { targets, held, .. }: Sizes,
+    stage: &Stage,
+    room: Room,
+    back: &mut [f64],
+    fore: &mut [f64],
+) -> Pivots {
     let a: Columns<N, N> = read(stage.a.as_slice());
     let b: Columns<N, M> = read(stage.b.as_slice());
     let c: Columns<P, N> = read(stage.c.as_slice());
@@ -150,7 +130,7 @@ fn sized<const N: usize, const M: usize, const P: usize>(work: OfSize<'_, N, M, 
     pivots
 }
 
-#[inline(always)]
+#[inline]
 fn read<const R: usize, const C: usize>(values: &[f64]) -> Columns<R, C> {
     let mut matrix = [[0.0; R]; C];
     for (column, values) in matrix.iter_mut().zip(values.chunks_exact(R)) {
@@ -159,12 +139,12 @@ fn read<const R: usize, const C: usize>(values: &[f64]) -> Columns<R, C> {
     matrix
 }
 
-#[inline(always)]
+#[inline]
 fn transposed<const R: usize, const C: usize>(matrix: &Columns<R, C>) -> Columns<C, R> {
     std::array::from_fn(|col| std::array::from_fn(|row| matrix[row][col]))
 }
 
-#[inline(always)]
+#[inline]
 fn product<const R: usize, const K: usize, const C: usize>(
     left: &Columns<R, K>,
     right: &Columns<K, C>,
@@ -175,7 +155,7 @@ fn product<const R: usize, const K: usize, const C: usize>(
 }
 
 /// `sum += left right`.
-#[inline(always)]
+#[inline]
 fn add_product<const R: usize, const K: usize, const C: usize>(
     sum: &mut Columns<R, C>,
     left: &Columns<R, K>,

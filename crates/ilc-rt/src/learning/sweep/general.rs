@@ -2,7 +2,6 @@
 
 use super::factor::Gains;
 use super::record::Sizes;
-use super::wide::Instructions;
 use super::{Channels, Run, Sweep, fixed};
 
 /// The solver for coupled axes, and for gains that vary along the run.
@@ -17,7 +16,6 @@ pub struct General {
     /// One `kappa` per sample and input.
     kappa: Vec<f64>,
     work: Vec<f64>,
-    instructions: Instructions,
 }
 
 impl General {
@@ -26,7 +24,7 @@ impl General {
         let Sizes { n, m, targets, .. } = gains.sizes();
         let (kappa, work) =
             (vec![0.0; gains.n_samples() * m], vec![0.0; 2 * (n + m) + targets + m]);
-        Self { gains, channels, kappa, work, instructions: Instructions::best() }
+        Self { gains, channels, kappa, work }
     }
 
     /// Makes the solver for signals that are its own: every input, and a target for every output
@@ -52,7 +50,7 @@ impl General {
 
     /// [`Sweep::solve`] for any sizes.
     fn any(&mut self, run: &mut Run) {
-        let Self { gains, channels, kappa, work, .. } = self;
+        let Self { gains, channels, kappa, work } = self;
         let Sizes { n, m, targets: p, held, .. } = gains.sizes();
         let rows = n + m;
         let last = gains.n_samples().saturating_sub(1);
@@ -122,8 +120,7 @@ fn add(sum: &mut [f64], columns: &mut std::slice::ChunksExact<f64>, factors: &[f
 
 impl Sweep for General {
     fn solve(&mut self, run: &mut Run) {
-        let Self { gains, channels, kappa, instructions, .. } = self;
-        if !fixed::solve(*instructions, gains, channels, kappa, run) {
+        if !fixed::solve(&self.gains, &self.channels, &mut self.kappa, run) {
             self.any(run);
         }
     }

@@ -3,7 +3,6 @@
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
 use super::square_root::SquareRoot;
-use super::wide::Instructions;
 use super::{Form, Stage, fixed_step};
 
 /// The cost of the samples to come, and the room that one step needs.
@@ -12,7 +11,6 @@ use super::{Form, Stage, fixed_step};
 #[derive(Debug, Clone)]
 pub(super) struct Recursion {
     form: Form,
-    instructions: Instructions,
     sizes: Sizes,
     /// `Pi` (n x n); in the square-root forms an upper triangular `U` with `Pi = U'U`.
     pub(super) cost: Vec<f64>,
@@ -44,7 +42,6 @@ impl Recursion {
         let room = |count: usize| vec![0.0; count];
         Self {
             form,
-            instructions: Instructions::best(),
             sizes,
             cost: room(n * n),
             later: room(n * n),
@@ -74,8 +71,7 @@ impl Recursion {
     pub(super) fn step(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
         std::mem::swap(&mut self.cost, &mut self.later);
         if self.form == Form::Joseph
-            && let Some(pivots) =
-                fixed_step::step(self.instructions, self.sizes, stage, self.room(), back, fore)
+            && let Some(pivots) = fixed_step::step(self.sizes, stage, self.room(), back, fore)
         {
             return pivots;
         }

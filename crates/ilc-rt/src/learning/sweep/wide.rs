@@ -1,7 +1,7 @@
 //! Eight numbers at a time, with the widest instructions that the processor at hand has.
 //!
-//! The sweeps of this folder import it. A product and a sum are always rounded one by one, never
-//! fused, so every processor finds the same bits.
+//! Written for the constant-gain sweep ([`super::lanes`], [`super::single`]). A product and a sum are
+//! always rounded one by one, never fused, so every processor finds the same bits.
 
 #![expect(
     clippy::inline_always,
