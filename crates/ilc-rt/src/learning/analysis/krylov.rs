@@ -3,7 +3,8 @@
 //! Lanczos for symmetric maps, Arnoldi for the others, GMRES for fixed points; nothing of the square
 //! of the run's length is ever stored. Used by this folder only.
 
-use nalgebra::{DMatrix, DVector, Schur, SymmetricEigen};
+use faer::Mat;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::iteration::{noise, norm};
 use crate::learning::LearningError;
@@ -197,14 +198,14 @@ pub(super) fn fixed_point(
 
 /// Returns the largest absolute eigenvalue of a small matrix.
 pub(super) fn radius(matrix: &DMatrix<f64>) -> Result<f64, LearningError> {
-    const MAX_SWEEPS: usize = 10_000;
-    let schur = Schur::try_new(matrix.clone(), f64::EPSILON, MAX_SWEEPS).ok_or(
+    let (rows, cols) = matrix.shape();
+    let values = Mat::from_fn(rows, cols, |i, j| matrix[(i, j)]).eigenvalues().map_err(|_| {
         LearningError::Numerics {
             what: "spectral radius",
-            reason: "the QR iteration did not converge",
-        },
-    )?;
-    Ok(schur.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max))
+            reason: "the eigenvalue iteration did not end",
+        }
+    })?;
+    Ok(values.iter().map(|value| value.re.hypot(value.im)).fold(0.0, f64::max))
 }
 
 /// Removes the basis from `next`, twice for the rounding of the first time; returns its parts.
