@@ -35,12 +35,13 @@ temperatures as white noise through a first-order low-pass (pole 0.3), mapped so
 100 K are as likely; 1 K as the resolution of Flexible ILC's table. Lengths of chapter 4 are inches,
 as printed: the weights of the relevance depend on them.
 
-The thesis says of the temperatures only that they are random, filtered, and within 100 K either way.
-The outcome for the expansion depends on which are taken. Gaussian ones with a standard deviation of
-40 K and a pole of 0.9, tried first, left DPW-ILC at 0.72 of the error of PD-ILC (0.12 for the motor),
-and temperatures that are all as likely and wander slowly left it at about 0.25, without further
-improvement: how far DPW-ILC lies below PD-ILC, and whether it goes on improving there, is not robust.
-For the motor both held in every trial, and trimming to the 30 most relevant hurt in none.
+The thesis says of the temperatures only that they are random, filtered, and within 100 K either
+way. The outcome for the expansion depends on which are taken. Gaussian ones with a standard
+deviation of 40 K and a pole of 0.9, tried first, left DPW-ILC at 0.72 of the error of PD-ILC (0.12
+for the motor), and temperatures that are all as likely and wander slowly left it at about 0.25,
+without further improvement: how far DPW-ILC lies below PD-ILC, and whether it goes on improving
+there, is not robust. For the motor both held in every trial, and trimming to the 30 most relevant
+hurt in none.
 """
 
 
