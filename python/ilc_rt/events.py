@@ -227,6 +227,7 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Event:
     try:
         if cls is StartEvent:
             values["axis_names"] = tuple(values["axis_names"])
+            values["input_units"] = tuple(values.get("input_units", ()))
             report = values.get("rt")
             values["rt"] = _real_time_report(report) if report else None
         elif cls is LatencyEvent:

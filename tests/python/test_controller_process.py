@@ -190,7 +190,7 @@ def test_check_tells_what_would_be_done(bench: Bench) -> None:
     check = bench.start("ilc-rt", "check", bench.cell())
     assert check.end() == 0
     assert "axis x (node 1): 0.000 to 0.080 m of -0.020 to 0.100 m" in "\n".join(check.said)
-    assert "1515 samples, 3.030 s" in check.said[-1]
+    assert "1515 samples, 3.030 s" in "\n".join(check.said)
 
 
 def test_latency_is_measured(bench: Bench) -> None:
