@@ -16,19 +16,20 @@ const STALLED: f64 = 0.9;
 const FLOOR: f64 = 1e-12;
 /// Part of the first violation that may be left when the search ends.
 const RESIDUAL: f64 = 1e-11;
-/// Iterations after which the search is given up.
+/// Iterations after which a search is given up, and a careful one.
 const MAX_ITERATIONS: usize = 60;
+const MAX_CAREFUL_ITERATIONS: usize = 120;
 /// Part of the way to the border that a step may go, at first and near the end.
 const MARGIN: f64 = 0.995;
 const MARGIN_LATE: f64 = 0.9999;
-/// A corrected step that is shorter than this, or widens the gap, is replaced by one towards the
-/// middle: where single products of slack and multiplier lie far below the others, corrections may
-/// lead round in a circle for ever.
+/// In a careful search a corrected step that is shorter than this, or widens the gap, is replaced by
+/// one towards the middle: where single products of slack and multiplier lie far below the others,
+/// corrections may lead round in a circle for ever.
 const SHORT: f64 = 0.1;
 /// That step aims at least at this part of the mean product ...
 const CENTRING: f64 = 0.3;
-/// ... and after so many iterations, twice what almost every search takes, it is the only one.
-const CORRECTED_ITERATIONS: usize = 15;
+/// ... and once so many iterations in a row have not brought the gap to a new low, it is the only one.
+const LOST: usize = 8;
 /// The products of slack and multiplier start at this part of the cost before learning, in sum ...
 const START: f64 = 0.3;
 /// ... and, coming from an earlier solution, at this part.
@@ -150,14 +151,19 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
     }
 
     /// Runs the iterations from the point where slacks and multipliers stand.
-    fn search(&mut self) -> (bool, usize, f64) {
+    ///
+    /// A careful search takes more of them, and ends where corrections alone do not: about once in
+    /// ten thousand random problems.
+    fn search(&mut self, is_careful: bool) -> (bool, usize, f64) {
         let n_limits = self.rows.count();
         let mut residual = 1.0;
         let mut gap = self.rows.gap();
         let mut found = (false, 0, f64::INFINITY);
         let mut part = 1.0_f64;
+        let (mut low, mut since, mut is_lost) = (gap, 0, false);
         self.look();
-        for iteration in 1..=MAX_ITERATIONS {
+        let most = if is_careful { MAX_CAREFUL_ITERATIONS } else { MAX_ITERATIONS };
+        for iteration in 1..=most {
             self.rows.weigh(0.0, false);
             self.factorise(true);
             self.sweep(true);
@@ -169,7 +175,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
             let margin = (1.0 - part).clamp(MARGIN, MARGIN_LATE);
             let mut length = self.rows.step(centre, true, margin);
             let strays = length < SHORT || self.rows.gap_at(length) > gap;
-            if strays || iteration > CORRECTED_ITERATIONS {
+            if is_careful && (strays || is_lost) {
                 let centre = CENTRING.max(shrunk * shrunk * shrunk) * gap / n_limits;
                 self.rows.weigh(centre, false);
                 self.sweep(true);
@@ -183,6 +189,9 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
             residual *= 1.0 - length;
             let before = gap;
             gap = self.rows.gap();
+            since = if gap < STALLED * low { 0 } else { since + 1 };
+            low = low.min(gap);
+            is_lost |= since >= LOST;
             part = gap / self.cost.max(FLOOR * self.worth);
             let is_done = residual <= RESIDUAL && part <= GAP_ENOUGH;
             found = (is_done, iteration, part);
@@ -216,14 +225,16 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
                 }
                 self.roll();
                 self.rows.start(WARM_START * centre, true);
-                found = self.search();
+                found = self.search(false);
             }
-            if !found.0 {
-                let wasted = found.1;
-                self.relax();
-                self.rows.start(START * centre, false);
-                found = self.search();
-                found.1 += wasted;
+            for is_careful in [false, true] {
+                if !found.0 {
+                    let wasted = found.1;
+                    self.relax();
+                    self.rows.start(START * centre, false);
+                    found = self.search(is_careful);
+                    found.1 += wasted;
+                }
             }
             outcome = Outcome { is_solved: found.0, iterations: found.1, gap: found.2 };
             self.has_last = found.0;

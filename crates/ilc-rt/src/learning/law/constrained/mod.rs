@@ -56,7 +56,8 @@ pub enum Status {
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
 /// # Real Time
 /// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` time an iteration,
-/// of which there are at most 60, or 120 if the search from the last solution fails.
+/// of which there are at most 60 in a search; one from the last solution that fails is begun anew, and
+/// then once more with care, in at most 240 iterations altogether.
 /// # Source
 /// - \[haas2016\], section 4: constraints on set points. \[mehrotra1992\]: the interior point.
 ///   \[rao1998\]: its linear system as a Riccati recursion.
