@@ -149,6 +149,7 @@ def claims(figures: Figures) -> list[Claim]:
 def draw(figures: Figures, figure: Figure) -> None:
     """Draw the corner, and the ratios over the jerk limit."""
     found = figures["interpolation"]["corner"]
+    figure.set_size_inches(figure.get_figwidth(), 4.6)
     near, over = figure.subplots(1, 2)
     motion = found["motion"]
     near.plot(motion["t_s"], motion["programmed_m"], color="0.7", label="programmed")
@@ -159,7 +160,6 @@ def draw(figures: Figures, figure: Figure) -> None:
     ):
         near.plot(motion["t_s"], motion[way], linewidth=1.0, label=label)
     near.set(xlabel="time (s)", ylabel="position (m)", title="Corner at 1 s")
-    near.legend(fontsize="small")
     jerks = [row["jerk_per_s"] for row in found["rows"]]
     for span in SPANS_S:
         for part in ("tracking", "total"):
@@ -168,7 +168,8 @@ def draw(figures: Figures, figure: Figure) -> None:
             over.loglog(jerks, ratios, marker=".", label=label)
     over.axhline(30.0, color="0.7", linestyle=":", label="printed")
     over.set(xlabel="jerk over acceleration limit (1/s)", ylabel="linear over E/S")
-    over.legend(fontsize="small")
+    for axes in (near, over):
+        axes.legend(fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.2))
 
 
 PICTURES = (

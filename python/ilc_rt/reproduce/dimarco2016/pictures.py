@@ -25,15 +25,16 @@ def draw_rms(figures: Figures, figure: Figure, name: str) -> None:
     for law, label in LABELS.items():
         over_runs.semilogy(found["rms_seed0"][law], linewidth=0.8, label=label)
     over_runs.set(xlabel="run", ylabel="RMS error (in)", title=f"{TITLES[name]}, one sequence")
-    over_runs.legend(fontsize="small", loc="upper right")
+    figure.legend(*over_runs.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     over_seeds.boxplot([found["last100_rms"][law] for law in LABELS], whis=(0.0, 100.0))
     over_seeds.set_xticks(range(1, len(LABELS) + 1), LABELS.values(), rotation=60, ha="right")
-    over_seeds.set_title(f"last {found['n_last']} runs, all sequences", fontsize="small")
+    over_seeds.set_title(f"last {found['n_last']}, all", fontsize="small")
 
 
 def draw_signals(figures: Figures, figure: Figure, name: str) -> None:
     """Draw errors and ILC signals of some runs of DPW-ILC."""
     found = figures[name]["signals_seed0"]
+    figure.set_size_inches(figure.get_figwidth(), 4.6)
     tracking, errors, inputs = figure.subplots(3, 1, sharex=True)
     reference = np.array(found["reference"])
     tracking.plot(found["t_s"], reference, color="0.7", label="reference")
@@ -46,8 +47,8 @@ def draw_signals(figures: Figures, figure: Figure, name: str) -> None:
     tracking.set(ylabel="position (in)", title=f"{TITLES[name]}, DPW-ILC")
     errors.set(ylabel="error (in)")
     inputs.set(ylabel="ILC signal (in)", xlabel="time (s)")
-    for axes in (tracking, errors, inputs):
-        axes.legend(fontsize="x-small", loc="upper right")
+    tracking.legend(fontsize="x-small", loc="upper right")
+    figure.legend(*errors.get_legend_handles_labels(), loc="outside lower center", ncols=5)
 
 
 def draw_relevance(figures: Figures, figure: Figure, name: str) -> None:
