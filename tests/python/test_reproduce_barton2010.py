@@ -266,3 +266,14 @@ def test_a_fast_axis_relieves_a_slow_one():
     assert coupled["y_error_rms_mm"][-1] > nominal["y_error_rms_mm"][-1]
     # The 14 % of the testbed are not in the printed data.
     assert coupled["plain_rms"][-1] > nominal["plain_rms"][-1]
+
+
+@pytest.mark.parametrize("name", ["raster", "uncertain", "bursts"])
+def test_each_way_of_weighing_in_time_is_there_beside_feedback(name):
+    """The same names in all three sections, one figure a run, feedback without a trend."""
+    ways = [
+        found(name)[way]["contour_rms_m"] for way in ("feedback", "time_invariant", "time_varying")
+    ]
+    assert len({len(way) for way in ways}) == 1
+    assert ways[0][-1] == pytest.approx(ways[0][0], rel=0.2)
+    assert ways[2][-1] < ways[0][-1]

@@ -74,6 +74,9 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
         converged_m = figures[name]["linearised_rms_m"][-converged:]
         figures[name]["converged_rms_m"] = float(np.mean(converged_m))
         figures[name]["spread_of_rms_m"] = float(np.std(converged_m))
+    figures["feedback"], _ = table.learn(None, iterations, disturbance=noise.__getitem__)
+    # Of the two weights that do not vary, the one that learns as fast as the varying one.
+    figures["time_invariant"] = figures["low_r"]
     return figures
 
 

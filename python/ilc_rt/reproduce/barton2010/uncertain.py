@@ -72,6 +72,9 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     for name, s in (("low_s", LOW), ("high_s", HIGH), ("time_varying", sigma)):
         law = NormOptimalIlc.contour(table.plant, table.reference_m, q=0.0, contour=1.0, s=s, r=R)
         figures[name], _ = table.learn(law, 12 if reduced else ITERATIONS, true)
+    figures["feedback"], _ = table.learn(None, 12 if reduced else ITERATIONS, true)
+    # Of the two weights that do not vary, the one with which learning is stable.
+    figures["time_invariant"] = figures["high_s"]
     return figures
 
 
