@@ -174,8 +174,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
             self.sweep(true);
             let margin = (1.0 - part).clamp(MARGIN, MARGIN_LATE);
             let mut length = self.rows.step(centre, true, margin);
-            let strays = length < SHORT || self.rows.gap_at(length) > gap;
-            if is_careful && (strays || is_lost) {
+            if is_careful && (is_lost || length < SHORT || self.rows.gap_at(length) > gap) {
                 let centre = CENTRING.max(shrunk * shrunk * shrunk) * gap / n_limits;
                 self.rows.weigh(centre, false);
                 self.sweep(true);
