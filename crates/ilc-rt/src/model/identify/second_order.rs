@@ -390,7 +390,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
+        #![proptest_config(ilc_cases::cases(40))]
         #[test]
         fn any_second_order_model_is_found_again(
             gain in prop_oneof![-3.0..-0.3, 0.3..3.0],
