@@ -104,9 +104,12 @@ class Campaign:
 
     Examples
     --------
-    >>> campaign = Campaign("examples/01_gantry.toml", bus="loopback:")  # doctest: +SKIP
-    >>> for record in campaign.run(10):                                  # doctest: +SKIP
+    >>> campaign = Campaign("examples/01_gantry.toml", bus="loopback:")
+    >>> for record in campaign.run(3):
     ...     print(record.index, record.contour_inf_m)
+    0 0.00...
+    1 0.000...
+    2 0.000...
     """
 
     def __init__(
