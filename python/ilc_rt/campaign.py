@@ -106,10 +106,10 @@ class Campaign:
     --------
     >>> campaign = Campaign("examples/01_gantry.toml", bus="loopback:")
     >>> for record in campaign.run(3):
-    ...     print(record.index, record.contour_inf_m)
-    0 0.00...
-    1 0.000...
-    2 0.000...
+    ...     print(f"run {record.index}: {1e6 * record.contour_inf_m:.0f} µm")
+    run 0: 5... µm
+    run 1: ... µm
+    run 2: ... µm
     """
 
     def __init__(

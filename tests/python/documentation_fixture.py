@@ -12,9 +12,13 @@ import re
 import subprocess
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from processes_fixture import program
+from typer.main import get_command
+
+from ilc_rt.cli import app
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
@@ -112,15 +116,6 @@ def commands_of_blocks() -> list[Command]:
     return found
 
 
-def help_of(argv: list[str]) -> str:
-    """Return what a program says of itself, on one wide terminal."""
-    done = subprocess.run(
-        [*argv, "--help"], capture_output=True, text=True, check=True, timeout=60,
-        env={"PATH": "/usr/bin:/bin", "COLUMNS": "300", "NO_COLOR": "1", "TERM": "dumb"},
-    )  # fmt: skip
-    return done.stdout
-
-
 def launcher(name: str) -> list[str]:
     """Return how one of the three programs is started."""
     if name == "ilc":
@@ -128,33 +123,43 @@ def launcher(name: str) -> list[str]:
     return [str(program(name))]
 
 
+@cache
+def help_of(name: str, *verb: str) -> str:
+    """Return what a program says of itself or of a verb; of `ilc` what its terminal view is made of."""
+    if name != "ilc":
+        argv = [*launcher(name), *verb, "--help"]
+        return subprocess.run(argv, capture_output=True, text=True, check=True, timeout=60).stdout
+    command = get_command(app)
+    for word in verb:
+        command = getattr(command, "commands")[word]  # noqa: B009
+    options = [word for parameter in command.params for word in parameter.opts]
+    options += [word for parameter in command.params for word in parameter.secondary_opts]
+    return "\n".join([command.help or "", *options])
+
+
 def verbs_of(name: str) -> list[list[str]]:
     """Return every verb of a program, verbs of verbs too."""
-    found: list[list[str]] = []
-    open_ones: list[list[str]] = [[]]
-    while open_ones:
-        verb = open_ones.pop(0)
-        found.append(verb)
-        said = help_of([*launcher(name), *verb])
-        # Rich draws a panel, Clap a list.
-        panel = re.search(r"─ Commands ─.*?\n(.*?)╰", said, re.DOTALL)
-        plain = re.search(r"^Commands:\n(.*?)\n\n", said, re.DOTALL | re.MULTILINE)
-        listed = panel or plain
-        if listed:
-            names = re.findall(r"^[│ ]+([a-z][a-z-]*) ", listed.group(1), re.MULTILINE)
-            open_ones += [[*verb, one] for one in names if one != "help"]
-    return found
+    if name == "ilc":
+        found: list[list[str]] = []
+        open_ones = [([], get_command(app))]
+        while open_ones:
+            verb, command = open_ones.pop(0)
+            found.append(verb)
+            inner = getattr(command, "commands", {})
+            open_ones += [([*verb, word], one) for word, one in inner.items()]
+        return found
+    listed = re.search(r"^Commands:\n(.*?)\n\n", help_of(name), re.DOTALL | re.MULTILINE)
+    assert listed is not None
+    words = re.findall(r"^  ([a-z][a-z-]*) ", listed.group(1), re.MULTILINE)
+    return [[], *([word] for word in words if word != "help")]
 
 
 def commands_of_help() -> list[Command]:
     """Return every example that a program's help gives."""
     found = []
     for name in ("ilc", "ilc-rt", "ilc-sim"):
+        example = re.compile(rf"^\s*(?:Examples?:)?\s*({name} .*?)\s*$", re.MULTILINE)
         for verb in verbs_of(name):
-            said = help_of([*launcher(name), *verb])
             where = " ".join([name, *verb, "--help"])
-            for line in re.findall(r"^\s*(?:Examples?:)?\s*((?:ilc|ilc-rt|ilc-sim) .*?)\s*$", said, re.MULTILINE):
-                if not line.startswith(f"{name} "):
-                    continue
-                found.append(Command(where, line))
+            found += [Command(where, line) for line in example.findall(help_of(name, *verb))]
     return found

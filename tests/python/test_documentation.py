@@ -29,6 +29,7 @@ from documentation_fixture import (
     help_of,
     launcher,
     outside_of_blocks,
+    verbs_of,
 )
 from processes_fixture import Process, free_port, program
 
@@ -202,9 +203,7 @@ def test_verbs_and_options_in_running_text_exist(document: Path) -> None:
         for code in re.findall(r"`((?:ilc|ilc-rt|ilc-sim) [^`]+)`", line):
             name, *rest = code.split()
             verb = [word for word in rest if re.fullmatch(r"[a-z][a-z-]*", word)][:2]
-            said = help_of([*launcher(name), *verb[:1]])
-            if len(verb) == 2 and re.search(rf"^[│ ]+{verb[1]} ", said, re.MULTILINE):
-                said = help_of([*launcher(name), *verb])
+            said = help_of(name, *verb[: 2 if verb in verbs_of(name) else 1])
             for option in (word.split("=")[0] for word in rest if word.startswith("--")):
                 assert re.search(rf"{option}\b", said), f"{document}:{number}: {code}"
         for target in re.findall(r"`make ([a-z-]+)`", line):
