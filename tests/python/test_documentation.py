@@ -46,6 +46,8 @@ NETWORK_CELL = "examples/01_gantry.toml"
 SHORTER = (
     (r"^ilc (run|demo)(?!.* --iterations)(.*)$", r"ilc \1\2 --iterations 2"),
     (r"--iterations \d+", "--iterations 2"),
+    # The library has three runs by then.
+    (r"--iterations 2(.*) --resume|--resume(.*) --iterations 2", r"--resume\1\2 --iterations 5"),
     (r"^ilc (run|demo|identify|repeatability)(?!.* --bus)(.*)$", r"ilc \1\2 --bus loopback:"),
     (r"^ilc repeatability(.*) --runs \d+", r"ilc repeatability\1 --runs 2"),
     (r"^ilc reproduce(?!.* --from)(.*)$", r"ilc reproduce\1 --reduced"),
@@ -106,7 +108,7 @@ def with_drives(text: str, folder: Path) -> None:
     if not found:
         text = f"{text} --bus {address}"
     if " run " in text and "--iterations" not in text:
-        text = f"{text} --iterations 2"
+        text = f"{text} --iterations {5 if '--resume' in text else 2}"
     cell = ROOT / NETWORK_CELL
     drives = Process([program("ilc-sim"), "run", cell, "--bus", address, "--lockstep"], folder)
     try:
@@ -144,7 +146,9 @@ def watched(text: str, folder: Path) -> None:
     watcher = Process(argv, folder)
     try:
         # Runs are made until the watcher, which needs a moment to connect, has seen its two.
-        campaign = Process([*launcher("ilc"), "run", cell, "--iterations", "2000"], folder)
+        bus = f"udp:239.74.163.2:{free_port()}"
+        argv = [*launcher("ilc"), "run", str(cell), "--bus", bus, "--lockstep", "--iterations", "500"]
+        campaign = Process(argv, folder)
         try:
             assert watcher.end() == 0, watcher.errors
         finally:
