@@ -2,6 +2,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use super::gate::Gate;
 use super::input::LearnedInput;
 use super::mailbox::{LoopSide, Message, Sample, StopReason, Table};
 use super::node::Drive;
@@ -40,8 +41,10 @@ pub struct Cycle {
     pub(super) input: LearnedInput,
     pub(super) phase: Phase,
     pub(super) reference: Setpoint,
-    /// The last three position commands of each axis, newest first: where a stop has to begin.
-    pub(super) commanded_m: [[f64; MAX_AXES]; 3],
+    /// The last three commands of each axis, newest first, m or m/s as it takes them: where a stop has
+    /// to begin.
+    pub(super) commanded: [[f64; MAX_AXES]; 3],
+    pub(super) gates: [Gate; MAX_AXES],
     pub(super) run: u32,
     pub(super) overrun_streak: u32,
     pub(super) run_overruns: u32,
@@ -104,7 +107,8 @@ impl Cycle {
                 velocity_m_s: [0.0; MAX_AXES],
                 done: false,
             },
-            commanded_m: [[0.0; MAX_AXES]; 3],
+            commanded: [[0.0; MAX_AXES]; 3],
+            gates: [Gate::default(); MAX_AXES],
             run: spec.runs.start,
             overrun_streak: 0,
             run_overruns: 0,

@@ -75,6 +75,20 @@ pub enum StopReason {
         /// Distance found.
         error_m: f64,
     },
+    /// An axis stands outside its limits before its drive is switched on.
+    OutsideLimits {
+        /// Axis.
+        axis: usize,
+        /// Where it stands.
+        position_m: f64,
+    },
+    /// A position jumped farther than the axis can move.
+    Jump {
+        /// Axis.
+        axis: usize,
+        /// By how much, from one answer to the next.
+        step_m: f64,
+    },
     /// A number in the command was not finite.
     NotFinite {
         /// Axis.
@@ -87,6 +101,26 @@ pub enum StopReason {
     },
     /// The bus failed.
     Bus(BusError),
+}
+
+impl StopReason {
+    /// The axis whose measurement has failed, or may have, if it is for that.
+    pub(super) fn distrusted(self) -> Option<usize> {
+        match self {
+            Self::SilentAxis { axis, .. }
+            | Self::FollowingError { axis, .. }
+            | Self::Jump { axis, .. } => Some(axis),
+            Self::Asked(_)
+            | Self::DriveFault { .. }
+            | Self::NotEnabled { .. }
+            | Self::SilentTool { .. }
+            | Self::NodeLeft { .. }
+            | Self::OutsideLimits { .. }
+            | Self::NotFinite { .. }
+            | Self::Overrun { .. }
+            | Self::Bus(_) => None,
+        }
+    }
 }
 
 /// What the loop reports.

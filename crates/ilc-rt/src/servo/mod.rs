@@ -6,6 +6,7 @@
 mod advance;
 mod command;
 mod cycle;
+mod gate;
 mod input;
 mod mailbox;
 mod node;
@@ -14,6 +15,7 @@ mod realtime;
 mod receive;
 mod slots;
 mod spec;
+mod stopping;
 
 pub use cycle::{Cycle, TickStatus};
 pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, mailbox};

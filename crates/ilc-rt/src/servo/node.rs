@@ -19,6 +19,10 @@ pub(super) struct Drive {
     pub(super) emergency: u16,
     /// Whether it is lost and shall only be told to stop.
     pub(super) lost: bool,
+    /// Whether what it measures is not to be trusted any more.
+    pub(super) distrusted: bool,
+    /// Distance of the last two positions, if it is farther than the axis can move.
+    pub(super) jump_m: Option<f64>,
     /// Last controlword sent.
     pub(super) controlword: Controlword,
     /// Last target sent.
@@ -34,6 +38,8 @@ impl Default for Drive {
             following_error_m: 0.0,
             emergency: 0,
             lost: false,
+            distrusted: false,
+            jump_m: None,
             controlword: Controlword::DISABLE_VOLTAGE,
             target_counts: 0,
         }

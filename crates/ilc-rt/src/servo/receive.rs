@@ -14,6 +14,13 @@ use crate::fieldbus::{Bus, Frame};
 
 /// Most frames taken in one tick, so that a babbling bus cannot hold the loop.
 const FRAMES_MAX: usize = 256;
+/// Ways at full speed that an axis may be ahead of its last position.
+const JUMP_WAYS: f64 = 2.0;
+/// Share of the following error allowed that it may be ahead beyond that, for noise.
+const JUMP_SHARE: f64 = 0.1;
+/// Share of the following error allowed by which an axis may stand outside its limits at the start: one
+/// that has been at its limit rests as far from it as noise and friction say.
+const OUTSIDE_SHARE: f64 = 0.02;
 /// Cycles without an answer after which a position is too old to blame the drive for its distance.
 const STALE_CYCLES: u64 = 5;
 
@@ -40,7 +47,17 @@ impl Cycle {
             let spec = &self.spec.axes[axis];
             let drive = &mut self.drives[axis];
             if let Some(status) = Status::decode(frame, spec.node) {
-                drive.status(status, spec.scale.to_si(status.position_counts));
+                let encoder_m = spec.scale.to_si(status.position_counts);
+                #[expect(clippy::cast_precision_loss, reason = "a count of cycles")]
+                let cycles = self.slots.silence(axis).max(1) as f64;
+                let way_m = spec.limits.velocity_max_m_s * self.spec.cycle.as_secs_f64() * cycles;
+                let step_m = encoder_m - drive.encoder_m;
+                if drive.heard
+                    && step_m.abs() > JUMP_WAYS * way_m + JUMP_SHARE * spec.following_error_max_m
+                {
+                    drive.jump_m = drive.jump_m.or(Some(step_m));
+                }
+                drive.status(status, encoder_m);
                 return Ok(());
             }
             // A drive sends this one last, so it completes the answer to a SYNC.
@@ -96,7 +113,11 @@ impl Cycle {
         if self.overrun_streak > self.spec.overrun_cycles_max {
             return Some(StopReason::Overrun { cycles: self.overrun_streak });
         }
-        silence.or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)))
+        let fault = silence.or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)));
+        for drive in &mut self.drives {
+            drive.jump_m = None;
+        }
+        fault
     }
 
     fn find_silence(&mut self) -> Option<StopReason> {
@@ -126,6 +147,14 @@ impl Cycle {
         let drive = &self.drives[axis];
         let spec = &self.spec.axes[axis];
         if let Phase::Enabling { ticks } = self.phase {
+            let slack_m = OUTSIDE_SHARE * spec.following_error_max_m;
+            let position_m = drive.encoder_m;
+            if drive.heard
+                && (position_m < spec.position_min_m - slack_m
+                    || position_m > spec.position_max_m + slack_m)
+            {
+                return Some(StopReason::OutsideLimits { axis, position_m });
+            }
             // A fault from before is reset on the way; what is not enabled in time is refused.
             return (ticks > self.spec.enable_ticks && !drive.enabled())
                 .then_some(StopReason::NotEnabled { axis, statusword: drive.statusword });
@@ -140,8 +169,11 @@ impl Cycle {
         if !drive.enabled() || drive.state() == Some(State::QuickStopActive) {
             return Some(StopReason::NotEnabled { axis, statusword: drive.statusword });
         }
+        if let Some(step_m) = drive.jump_m {
+            return Some(StopReason::Jump { axis, step_m });
+        }
         let wanted_m = match spec.mode {
-            Mode::Csp => self.commanded_m[0][axis],
+            Mode::Csp => self.commanded[0][axis],
             Mode::Csv => self.reference.position_m[axis],
         };
         let error_m = wanted_m - drive.encoder_m;

@@ -1,6 +1,6 @@
 //! Why the axes were stopped, in one sentence that names axis, node and numbers.
 
-use crate::config::Cell;
+use crate::config::{AxisUnit, Cell};
 use crate::fieldbus::canopen::emcy;
 use crate::fieldbus::cia402::Statusword;
 use crate::record::EndStatus;
@@ -35,10 +35,10 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             other => format!("stopped by signal {other}"),
         },
         StopReason::DriveFault { axis: index, code, following_error_m } => format!(
-            "drive of {} faulted: 0x{code:04X} {}; its following error was {:.3} mm",
+            "drive of {} faulted: 0x{code:04X} {}; its following error was {}",
             axis(index),
             emcy::meaning(code),
-            following_error_m * 1e3
+            distance(cell, index, following_error_m)
         ),
         StopReason::NotEnabled { axis: index, statusword } => {
             let state = Statusword(statusword)
@@ -61,10 +61,34 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             format!("node {node} restarted or left operation by itself")
         }
         StopReason::FollowingError { axis: index, error_m } => format!(
-            "{}: following error {:.3} mm, limits.following_error_max_m allows {:.3} mm",
+            "{}: following error {}, limits.following_error_max_m allows {}",
             axis(index),
-            error_m.abs() * 1e3,
-            cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m * 1e3)
+            distance(cell, index, error_m.abs()),
+            distance(
+                cell,
+                index,
+                cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m)
+            )
+        ),
+        StopReason::OutsideLimits { axis: index, position_m } => cell.axes.get(index).map_or_else(
+            || format!("axis {index} is at {position_m}, outside its limits"),
+            |axis| {
+                let unit = axis.unit.symbol();
+                let (low, high) = (axis.limits.position_min_m, axis.limits.position_max_m);
+                // As the counts have it, without the digits that are only rounding.
+                let resolution = 10_f64.powf(axis.counts_per_m.log10().ceil());
+                let position = (position_m * resolution).round() / resolution;
+                format!(
+                    "axis {} is at {position} {unit}, outside {low} to {high} {unit}: \
+                     bring it back by other means; nothing has moved",
+                    axis.name
+                )
+            },
+        ),
+        StopReason::Jump { axis: index, step_m } => format!(
+            "{}: its position jumped by {} from one answer to the next, farther than it can move",
+            axis(index),
+            distance(cell, index, step_m)
         ),
         StopReason::NotFinite { axis: index } => {
             format!("{}: the command was not a finite number", axis(index))
@@ -78,6 +102,12 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
     }
 }
 
+/// A distance of an axis in thousandths of its unit.
+fn distance(cell: &Cell, axis: usize, distance: f64) -> String {
+    let unit = cell.axes.get(axis).map_or(AxisUnit::M, |axis| axis.unit);
+    format!("{:.3} m{}", distance * 1e3, unit.symbol())
+}
+
 /// Whether a reason is somebody's wish or a fault.
 pub(super) fn status(reason: StopReason) -> EndStatus {
     match reason {
@@ -88,6 +118,8 @@ pub(super) fn status(reason: StopReason) -> EndStatus {
         | StopReason::SilentTool { .. }
         | StopReason::NodeLeft { .. }
         | StopReason::FollowingError { .. }
+        | StopReason::OutsideLimits { .. }
+        | StopReason::Jump { .. }
         | StopReason::NotFinite { .. }
         | StopReason::Overrun { .. }
         | StopReason::Bus(_) => EndStatus::Fault,
