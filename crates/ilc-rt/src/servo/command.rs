@@ -15,15 +15,22 @@ impl Cycle {
     /// the drive misses: it goes on for a cycle by itself, and its silence is noticed if that lasts.
     pub(super) fn command(&mut self) {
         let mut newest = self.commanded[0];
+        let mut fault = None;
         for axis in 0..self.n_axes() {
-            let target = self.target(axis);
-            match self.spec.axes[axis].scale.to_counts(target) {
-                Some(counts) => {
-                    newest[axis] = target;
-                    self.drives[axis].target_counts = counts;
-                }
-                // The last command once more; the stop begins from it in the next tick.
-                None => self.begin_stop(StopReason::NotFinite { axis }),
+            let scale = self.spec.axes[axis].scale;
+            let mut target = self.target(axis);
+            if !target.is_finite() {
+                fault = fault.or(Some(StopReason::NotFinite { axis }));
+                // On as before for this cycle; the stop begins from there.
+                let [last, before, _] = self.commanded;
+                target = match self.spec.axes[axis].mode {
+                    Mode::Csp => 2.0 * last[axis] - before[axis],
+                    Mode::Csv => last[axis],
+                };
+            }
+            newest[axis] = target;
+            if let Some(counts) = scale.to_counts(target) {
+                self.drives[axis].target_counts = counts;
             }
             let controlword = self.controlword(axis);
             self.drives[axis].controlword = controlword;
@@ -32,7 +39,10 @@ impl Cycle {
         }
         self.commanded = [newest, self.commanded[0], self.commanded[1]];
         if let Err(error) = self.bus.send(&sync::frame()) {
-            self.begin_stop(StopReason::Bus(error));
+            fault = fault.or(Some(StopReason::Bus(error)));
+        }
+        if let Some(reason) = fault {
+            self.begin_stop(reason);
         }
     }
 

@@ -36,6 +36,8 @@ pub struct Cycle {
     pub(super) mail: LoopSide,
     pub(super) drives: [Drive; MAX_AXES],
     pub(super) tool_m: [f64; MAX_AXES],
+    /// Length of the tool's last PDO that could not be read, if there was one.
+    pub(super) tool_unreadable: Option<u8>,
     pub(super) slots: Slots,
     pub(super) interpolator: Interpolator,
     pub(super) input: LearnedInput,
@@ -98,7 +100,8 @@ impl Cycle {
             mail,
             drives: [Drive::default(); MAX_AXES],
             tool_m: [0.0; MAX_AXES],
-            slots: Slots::new(n_axes + usize::from(spec.tool.is_some())),
+            tool_unreadable: None,
+            slots: Slots::new(n_axes, spec.tool.is_some()),
             interpolator,
             input: LearnedInput::new(most, step_max, fade_ticks),
             phase: Phase::Enabling { ticks: 0 },
@@ -141,6 +144,7 @@ impl Cycle {
             self.begin_stop(reason);
         }
         let at = self.advance();
+        self.watch_age();
         let after = self.phase.name();
         if before != after {
             self.mail.tell(Message::Phase(after, self.run));

@@ -16,6 +16,11 @@ use crate::trajectory::{ControlledStop, MAX_AXES};
 impl Cycle {
     /// Begins a controlled stop of all axes, unless one is under way or nothing moves any more.
     pub(super) fn begin_stop(&mut self, reason: StopReason) {
+        if let Some(reason) = self.better_reason(reason) {
+            self.stopping = Some(reason);
+            self.mail.tell(Message::Stopping(reason));
+            return;
+        }
         if self.stopping.is_some() || matches!(self.phase, Phase::Disabling { .. } | Phase::Stopped)
         {
             return;
