@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import tomlkit
 
 from ilc_rt._native import (
     NormOptimalIlc,
@@ -20,6 +22,8 @@ from ilc_rt._native import (
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ilc_rt._native import Cell
 
     Array = NDArray[np.float64]
 
@@ -118,6 +122,42 @@ class BelievedAxis:
         w = 2.0 * np.pi * frequency_hz
         top = [2.0 * MODE_DAMPING * w, w * w]
         return discretize(from_transfer_function(top, [1.0, *top]), self.dt_s, "tustin")
+
+
+def believed_axes(
+    cell: Cell, samples_max: int | None = None
+) -> tuple[list[BelievedAxis], dict[str, Any]]:
+    """Return the axes of a cell, and its whole description as it was written.
+
+    Parameters
+    ----------
+    cell : Cell
+        The cell; what it has read needs no more checks.
+    samples_max : int or None
+        How much of the program the axes get.
+    """
+    written = tomlkit.parse(Path(cell.path).read_text(encoding="utf-8-sig")).unwrap()
+    way = cell.reference()[:samples_max] - cell.reference()[0]
+    axes = []
+    for index, axis in enumerate(written["axis"]):
+        model, loop = axis.get("model", {}), axis.get("position_loop", {})
+        interface = cell.interfaces[index]
+        bandwidth_hz = gain = 0.0
+        if interface == "csp":
+            natural_hz, damping = model["natural_frequency_hz"], model["damping"]
+        else:
+            bandwidth_hz, gain = model["velocity_bandwidth_hz"], loop["gain_per_s"]
+            natural_hz = float(np.sqrt(gain * bandwidth_hz / (2.0 * np.pi)))
+            damping = 0.5 * bandwidth_hz / natural_hz
+        axes.append(
+            BelievedAxis(
+                cell.axis_names[index], cell.axis_units[index], interface, cell.cycle_s,
+                np.ascontiguousarray(way[:, index]), float(natural_hz), float(damping),
+                int(model.get("delay_samples", 0)), float(bandwidth_hz), float(gain),
+                float(loop.get("velocity_feedforward", 0.0)),
+            )
+        )  # fmt: skip
+    return axes, written
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import tomlkit
 
 from ilc_rt._native import Cell
 from ilc_rt.errors import BadInputError
-from ilc_rt.trials import KNOWN_SHARE, BelievedAxis, Bench, Trial, Weights
+from ilc_rt.trials import KNOWN_SHARE, BelievedAxis, Bench, Trial, Weights, believed_axes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -174,7 +173,7 @@ def propose_weights(
     described = _load(cell)
     law = described.law
     section = "learning.constrained" if law == "constrained" else "learning.norm_optimal"
-    axes, written = _believed_axes(described)
+    axes, written = believed_axes(described, SAMPLES_MAX)
     low, known = _known(uncertainty, known_hz, described.cycle_s)
     if not (np.isfinite(noise_m) and noise_m >= 0.0):
         message = f"noise_m = {noise_m}; 0 or a positive number is needed"
@@ -209,32 +208,6 @@ def _load(cell: str | Path) -> Cell:
         return Cell.load(cell, allow_divergent=True)
     except ValueError as error:
         raise BadInputError(" ".join(str(error).split())) from error
-
-
-def _believed_axes(cell: Cell) -> tuple[list[BelievedAxis], dict[str, Any]]:
-    """Return the axes and the whole description; what `Cell` has read needs no more checks."""
-    written = tomlkit.parse(Path(cell.path).read_text(encoding="utf-8-sig")).unwrap()
-    way = cell.reference()[:SAMPLES_MAX] - cell.reference()[0]
-    axes = []
-    for index, axis in enumerate(written["axis"]):
-        model, loop = axis.get("model", {}), axis.get("position_loop", {})
-        interface = cell.interfaces[index]
-        bandwidth_hz = gain = 0.0
-        if interface == "csp":
-            natural_hz, damping = model["natural_frequency_hz"], model["damping"]
-        else:
-            bandwidth_hz, gain = model["velocity_bandwidth_hz"], loop["gain_per_s"]
-            natural_hz = float(np.sqrt(gain * bandwidth_hz / (2.0 * np.pi)))
-            damping = 0.5 * bandwidth_hz / natural_hz
-        axes.append(
-            BelievedAxis(
-                cell.axis_names[index], cell.axis_units[index], interface, cell.cycle_s,
-                np.ascontiguousarray(way[:, index]), float(natural_hz), float(damping),
-                int(model.get("delay_samples", 0)), float(bandwidth_hz), float(gain),
-                float(loop.get("velocity_feedforward", 0.0)),
-            )
-        )  # fmt: skip
-    return axes, written
 
 
 def _known(

@@ -13,8 +13,8 @@ from ilc_rt import Campaign, Cell
 from ilc_rt.cell_file import changed_text, write_values
 from ilc_rt.cli import main
 from ilc_rt.errors import BadInputError
-from ilc_rt.trials import BelievedAxis, Weights
-from ilc_rt.tuning import _believed_axes, propose_weights
+from ilc_rt.trials import BelievedAxis, Bench, Weights, believed_axes
+from ilc_rt.tuning import propose_weights
 
 README = {"uncertainty": 0.3, "noise_m": 1e-6}
 SHIPPED = ["examples/01_gantry.toml", "examples/02_parallel.toml", "examples/04_gcode.toml"]
@@ -66,7 +66,7 @@ def test_ten_other_cells_learn_with_what_is_proposed(tmp_path):
 @pytest.mark.parametrize("cell", SHIPPED)
 def test_the_axes_of_the_trials_are_those_of_the_controller(cell):
     described = Cell.load(cell)
-    axes, _ = _believed_axes(described)
+    axes, _ = believed_axes(described)
     model = described.model()
     way = described.reference() - described.reference()[0]
     for index, axis in enumerate(axes):
@@ -266,9 +266,7 @@ def test_what_the_controller_would_refuse_is_not_written(tmp_path):
     assert broken.read_text(encoding="utf-8") == "[learning\n"
 
 
-def test_a_trial_stops_when_its_error_grows(monkeypatch):
-    from ilc_rt.trials import Bench
-
+def test_a_trial_stops_when_its_error_grows():
     axis = BelievedAxis("x", "m", "csp", 0.002, np.linspace(0.0, 0.1, 400), 15.0, 0.6, 3)
     bench = Bench(axis, 0.3, 19.5, 0.0, 10)
     assert bench.try_weights(Weights(1.0, 0.0, 0.0, 0.5), 1.2) is None
