@@ -85,16 +85,17 @@ impl Progress {
     /// Decides what follows a run, and marks it if the best input is restored because of it.
     ///
     /// Growth is measured in the RMS error over the best run so far. After two restorations the law
-    /// has shown that it does not converge here, and learning stays off. A run that the computer
-    /// disturbed (overruns, missing samples) is no evidence: unless it is the best all the same, its
-    /// input is repeated. Nor is a larger error under another disturbance than the best run's evidence
-    /// against the law: it goes on learning.
+    /// has shown that it does not converge here, and learning stays off. A run that computer or bus
+    /// disturbed (overruns, missing samples) is no evidence, for the law or against it, be it the first
+    /// or seemingly the best: its input is repeated. Nor is a larger error under another disturbance than
+    /// the best run's evidence against the law: it goes on learning.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
         let rms = record.figures.tracking_rms_m;
         let off = self.rollbacks >= ROLLBACKS_MAX;
-        let disturbed = record.figures.overruns > 0 || record.figures.missing_samples > 0;
+        if is_disturbed(&record.figures) {
+            return Decision::Hold;
+        }
         match &self.best {
-            Some(best) if disturbed && rms >= best.rms => Decision::Hold,
             Some(best)
                 if rms > best.rms * self.rollback_ratio
                     && !off
@@ -182,6 +183,11 @@ impl Progress {
     }
 }
 
+/// Whether something other than the axes had a part in the error of a run.
+pub(super) fn is_disturbed(figures: &Figures) -> bool {
+    figures.overruns > 0 || figures.missing_samples > 0
+}
+
 #[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
 fn refused(error: LearningError) -> SupervisorError {
     SupervisorError::Resume(format!("the law refused a run: {error}"))
@@ -237,15 +243,21 @@ mod tests {
 
     #[test]
     fn a_disturbed_run_is_neither_learned_from_nor_held_against_the_law() {
+        let disturbed = |rms, overruns, missing_samples| {
+            let mut record = record(rms);
+            (record.figures.overruns, record.figures.missing_samples) = (overruns, missing_samples);
+            record
+        };
         let mut progress = Progress::new(1.5);
+        // The first one neither, nor one that seems to be the best.
+        assert_eq!(progress.decide(&mut disturbed(0.1, 0, 1)), Decision::Hold);
         assert_eq!(progress.decide(&mut record(1.0)), Decision::Learn);
-        let mut disturbed = record(9.0);
-        disturbed.figures.overruns = 3;
-        assert_eq!(progress.decide(&mut disturbed), Decision::Hold);
-        assert!(!disturbed.figures.rolled_back);
-        let mut better = record(0.5);
-        better.figures.missing_samples = 1;
-        assert_eq!(progress.decide(&mut better), Decision::Learn);
+        let mut worse = disturbed(9.0, 3, 0);
+        assert_eq!(progress.decide(&mut worse), Decision::Hold);
+        assert!(!worse.figures.rolled_back);
+        assert_eq!(progress.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
+        assert_eq!(progress.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
+        assert_eq!(progress.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
     }
 
     #[test]
