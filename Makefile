@@ -61,6 +61,9 @@ test-python: $(VENV)/.test ## Python tests
 	cargo build --release --workspace --example bus_echo
 	$(BIN)/python -m pytest -q
 
+fuzz: $(VENV)/.test ## New problems for FUZZ_S seconds (60): property tests, readers, the border to Python
+	FUZZ_S="$(FUZZ_S)" FUZZ_SEED="$(FUZZ_SEED)" $(BIN)/python tests/fuzz/run.py
+
 vcan: build ## The bus contract and the main job on a real vcan0
 	tests/vcan/job
 
