@@ -1,7 +1,8 @@
 """`make fuzz`: new problems for every property test, and mutated inputs for every reader.
 
-Takes about FUZZ_S seconds (60 if not set) once everything is built, from the seed FUZZ_SEED (a new one
-if not set). Prints the seed, and after a failure what makes it a case that `make test` tries first.
+Takes about FUZZ_S seconds (60 if not set) once everything is built, from the seed FUZZ_SEED (a
+new one if not set). Prints the seed, and after a failure what makes it a case that `make test`
+tries first.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 CARGO = ["cargo", "test", "--release", "--workspace"]
-#: Shares of the time for the readers and for the border to Python; the property tests have the rest.
+#: Shares of the time for readers and for the border to Python; property tests have the rest.
 READERS_SHARE, BORDER_SHARE = 0.4, 0.2
 KEEP = """
 What was found becomes a test that is tried first:
-  Rust, property test    the line that was written to the file *.regressions beside it: commit it
-  Rust, reader           the file found-* in tests/fuzz/corpus: name it after what it shows, commit it
+  Rust, property test    the line that is now in the file *.regressions beside it: commit it
+  Rust, reader           the file found-* in tests/fuzz/corpus: name it after what it shows
   Python, property test  the arguments that were printed, as @example(...) above the test
   Python border          the call that was printed, among those of tests/python/test_border.py
 The same problems again: make fuzz FUZZ_SEED={seed}
@@ -34,7 +35,9 @@ def property_tests() -> list[str]:
     for folder in ("crates", "sim", "tests"):
         for source in sorted((ROOT / folder).rglob("*.rs")):
             text = source.read_text(encoding="utf-8")
-            for block in re.finditer(r"^( *)proptest! \{\n(.*?)^\1\}", text, re.DOTALL | re.MULTILINE):
+            for block in re.finditer(
+                r"^( *)proptest! \{\n(.*?)^\1\}", text, re.DOTALL | re.MULTILINE
+            ):
                 names += re.findall(r"#\[test\]\s+fn (\w+)", block.group(2))
     return sorted(set(names))
 
@@ -87,13 +90,19 @@ class Hunt:
         seed = self.seed
         rounds = 0
         while time.monotonic() < until and not self.failed:
-            self.run("property tests in Rust", [*CARGO, "--lib", "--tests", "--quiet", "--", *names], seed)
+            self.run(
+                "property tests in Rust",
+                [*CARGO, "--lib", "--tests", "--quiet", "--", *names],
+                seed,
+            )
             self.run("property tests in Python",
                      [sys.executable, "-m", "pytest", "-q", "-m", "hypothesis",
                       f"--hypothesis-seed={seed}"], seed)  # fmt: skip
             seed += 1
             rounds += 1
-        print(f"{len(names)} property tests in Rust and those in Python, {rounds} rounds", flush=True)
+        print(
+            f"{len(names)} property tests in Rust and those in Python, {rounds} rounds", flush=True
+        )
 
 
 def main() -> int:

@@ -125,7 +125,7 @@ def launcher(name: str) -> list[str]:
 
 @cache
 def help_of(name: str, *verb: str) -> str:
-    """Return what a program says of itself or of a verb; of `ilc` what its terminal view is made of."""
+    """Return what a program says of itself or of a verb; of `ilc`, what that is made of."""
     if name != "ilc":
         argv = [*launcher(name), *verb, "--help"]
         return subprocess.run(argv, capture_output=True, text=True, check=True, timeout=60).stdout

@@ -42,7 +42,7 @@ def documented(name: str) -> Iterator[tuple[str, str]]:
 
 
 def examples() -> dict[str, str]:
-    """Return each docstring with an example once, though its object be exported by several modules."""
+    """Return each docstring with an example, once for an object of several modules."""
     by_text: dict[str, str] = {}
     for name in modules():
         for where, text in documented(name):
@@ -64,7 +64,9 @@ def test_an_example_in_a_docstring_runs(
     module = importlib.import_module(
         next(name for name in sorted(modules(), key=len, reverse=True) if where.startswith(name))
     )
-    test = doctest.DocTestParser().get_doctest(EXAMPLES[where], dict(vars(module)), where, None, None)
+    test = doctest.DocTestParser().get_doctest(
+        EXAMPLES[where], dict(vars(module)), where, None, None
+    )
     said: list[str] = []
     flags = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
     found = doctest.DocTestRunner(optionflags=flags).run(test, out=said.append)

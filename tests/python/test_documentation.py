@@ -39,7 +39,9 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.timeout(300)
 
 COMMANDS = list({one.text: one for one in [*commands_of_blocks(), *commands_of_help()]}.values())
-PYTHON = [block for document in DOCUMENTS for block in blocks(document) if block.language == "python"]
+PYTHON = [
+    block for document in DOCUMENTS for block in blocks(document) if block.language == "python"
+]
 NETWORK_CELL = "examples/01_gantry.toml"
 
 #: Each option and what it becomes: as long as it must be to do what it does.
@@ -92,7 +94,11 @@ def environment() -> dict[str, str]:
 def run(text: str, folder: Path) -> str:
     """Run a line as a shell does, and return what it said; it must succeed."""
     for name in ("ilc", "python"):
-        text = re.sub(rf"^{name} ", f"{shlex.join(launcher(name) if name == 'ilc' else [sys.executable])} ", text)
+        text = re.sub(
+            rf"^{name} ",
+            f"{shlex.join(launcher(name) if name == 'ilc' else [sys.executable])} ",
+            text,
+        )
     done = subprocess.run(
         ["bash", "-c", text], cwd=folder, env=environment(), capture_output=True, text=True,
         timeout=280, check=False,
@@ -102,7 +108,7 @@ def run(text: str, folder: Path) -> str:
 
 
 def with_drives(text: str, folder: Path) -> None:
-    """Run a line of `ilc-rt` that finds drives on its bus: simulated ones, on a bus of this host."""
+    """Run a line of `ilc-rt` that finds drives on its bus: simulated ones, on this host."""
     address = f"udp:239.74.163.2:{free_port()}"
     text, found = re.subn(r"--bus \S+", f"--bus {address}", text)
     if not found:
@@ -139,7 +145,15 @@ def watched(text: str, folder: Path) -> None:
     else:
         if "--connect" in rest:
             del rest[rest.index("--connect") : rest.index("--connect") + 2]
-        argv = [*launcher("ilc"), *rest, "--connect", endpoint, "--no-scouting", "--iterations", "2"]
+        argv = [
+            *launcher("ilc"),
+            *rest,
+            "--connect",
+            endpoint,
+            "--no-scouting",
+            "--iterations",
+            "2",
+        ]
     cell = folder / "watched.toml"
     listen = f'[telemetry]\nlisten = ["{endpoint}"]\nscouting = false\n'
     cell.write_text(f"{(folder / 'gantry.toml').read_text(encoding='utf-8')}\n{listen}", "utf-8")
@@ -147,7 +161,16 @@ def watched(text: str, folder: Path) -> None:
     try:
         # Runs are made until the watcher, which needs a moment to connect, has seen its two.
         bus = f"udp:239.74.163.2:{free_port()}"
-        argv = [*launcher("ilc"), "run", str(cell), "--bus", bus, "--lockstep", "--iterations", "500"]
+        argv = [
+            *launcher("ilc"),
+            "run",
+            str(cell),
+            "--bus",
+            bus,
+            "--lockstep",
+            "--iterations",
+            "500",
+        ]
         campaign = Process(argv, folder)
         try:
             assert watcher.end() == 0, watcher.errors
@@ -187,14 +210,16 @@ def test_the_python_of_a_document_runs(
         if block.language == "python" and not block.excuse:
             # Blank lines before the block keep the document's line numbers in a traceback.
             source = "\n" * (block.line - 1) + block.text
-            exec(compile(source, str(document), "exec"), known)  # noqa: S102
+            exec(compile(source, str(document), "exec"), known)
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_every_block_says_what_it_is(document: Path) -> None:
     """A fence names a language, and no command hides in an indented block."""
     for block in blocks(document):
-        assert block.language in LANGUAGES, f"{document}:{block.line - 1}: ``` and one of {LANGUAGES}"
+        assert block.language in LANGUAGES, (
+            f"{document}:{block.line - 1}: ``` and one of {LANGUAGES}"
+        )
     for number, line in outside_of_blocks(document):
         hidden = re.match(rf"(?: {{4,}}|\t)({'|'.join(PROGRAMS)}) ", line)
         assert hidden is None, f"{document}:{number}: a command belongs in a ```sh block"

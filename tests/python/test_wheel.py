@@ -58,7 +58,7 @@ def test_the_wheel_is_small_and_stripped(wheel: Path) -> None:
 
 
 def test_the_tag_names_the_c_library_that_is_needed(wheel: Path) -> None:
-    """The floor of every compiled file is at or below that of the wheel's name and of the README."""
+    """No compiled file needs a newer one than the wheel's name and the README say."""
     tags = re.findall(r"manylinux_2_(\d+)_", wheel.name)
     assert tags, wheel.name
     promised = min(int(minor) for minor in tags)
@@ -69,7 +69,7 @@ def test_the_tag_names_the_c_library_that_is_needed(wheel: Path) -> None:
 
 
 def test_an_empty_environment_needs_nothing_but_the_wheel(wheel: Path, tmp_path: Path) -> None:
-    """`ilc demo` in a new environment, the two processes over UDP, without toolchain or checkout."""
+    """`ilc demo` in a new environment, over UDP, without toolchain or checkout."""
     home = tmp_path / "environment"
     venv.create(home, with_pip=False, symlinks=True)
     subprocess.run(
