@@ -8,7 +8,7 @@ SOURCES := $(shell find crates sim python -name '*.rs' -o -name '*.py' -o -name 
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo gallery test test-rust test-python fuzz check fmt lint docs bench rt vcan clean
+.PHONY: help build demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -63,6 +63,9 @@ test-python: $(VENV)/.test ## Python tests
 
 fuzz: $(VENV)/.test ## New problems for FUZZ_S seconds (60): property tests, readers, the border to Python
 	FUZZ_S="$(FUZZ_S)" FUZZ_SEED="$(FUZZ_SEED)" $(BIN)/python tests/fuzz/run.py
+
+soak: $(VENV)/.test ## The trials of kills, full disks, babble and strangers, SOAK times (20) as many
+	ILC_SOAK="$(or $(SOAK),20)" $(BIN)/python -m pytest -q tests/python/test_trials.py
 
 vcan: build ## The bus contract and the main job on a real vcan0
 	tests/vcan/job
