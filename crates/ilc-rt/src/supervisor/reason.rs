@@ -1,6 +1,6 @@
 //! Why the axes were stopped, in one sentence that names axis, node and numbers.
 
-use crate::config::Cell;
+use crate::config::{AxisUnit, Cell};
 use crate::fieldbus::canopen::emcy;
 use crate::fieldbus::cia402::Statusword;
 use crate::record::EndStatus;
@@ -13,6 +13,10 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             || format!("axis {index}"),
             |axis| format!("axis {} (node {})", axis.name, axis.node),
         )
+    };
+    let thousandth = |index: usize| match cell.axes.get(index).map(|axis| axis.unit) {
+        Some(AxisUnit::Rad) => "mrad",
+        Some(AxisUnit::M) | None => "mm",
     };
     // In lock-step the loop waits for every answer, so that the count of cycles says nothing.
     let unanswered = |cycles: u32| {
@@ -35,10 +39,11 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             other => format!("stopped by signal {other}"),
         },
         StopReason::DriveFault { axis: index, code, following_error_m } => format!(
-            "drive of {} faulted: 0x{code:04X} {}; its following error was {:.3} mm",
+            "drive of {} faulted: 0x{code:04X} {}; its following error was {:.3} {}",
             axis(index),
             emcy::meaning(code),
-            following_error_m * 1e3
+            following_error_m * 1e3,
+            thousandth(index)
         ),
         StopReason::NotEnabled { axis: index, statusword } => {
             let state = Statusword(statusword)
@@ -61,10 +66,11 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             format!("node {node} restarted or left operation by itself")
         }
         StopReason::FollowingError { axis: index, error_m } => format!(
-            "{}: following error {:.3} mm, limits.following_error_max_m allows {:.3} mm",
+            "{}: following error {:.3} {unit}, limits.following_error_max_m allows {:.3} {unit}",
             axis(index),
             error_m.abs() * 1e3,
-            cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m * 1e3)
+            cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m * 1e3),
+            unit = thousandth(index)
         ),
         StopReason::NotFinite { axis: index } => {
             format!("{}: the command was not a finite number", axis(index))
