@@ -6,7 +6,9 @@ mod check;
 mod figures;
 mod identify;
 mod latency;
+mod quantity;
 mod run;
+mod runs;
 mod show;
 
 use std::process::ExitCode;
