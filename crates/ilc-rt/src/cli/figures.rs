@@ -51,7 +51,7 @@ impl FiguresFile {
     pub(super) fn write(&self, figures: &serde_json::Value) -> bool {
         let text = printable_json(&format!("{figures:#}\n"));
         if self.path.as_os_str() == STANDARD_OUTPUT {
-            return show::figures(&text);
+            return show::print(&text);
         }
         match std::fs::write(&self.path, text) {
             Ok(()) => true,

@@ -30,8 +30,8 @@ pub(super) fn leave_standard_output() {
     ASIDE.store(true, Ordering::Relaxed);
 }
 
-/// Prints figures on standard output, and tells whether somebody can read them.
-pub(super) fn figures(text: &str) -> bool {
+/// Prints a text on standard output as it is, and tells whether somebody can read it.
+pub(super) fn print(text: &str) -> bool {
     let mut out = std::io::stdout();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).is_ok()
 }
