@@ -58,7 +58,7 @@ pub(super) struct IdentifyArguments {
     /// Where the experiment is kept.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     library: PathBuf,
-    /// Write response, coherence, model and uncertainty to a file.
+    /// Write response, coherence, model and uncertainty to a file; - for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Print one JSON object a line, and leave the evaluation to whoever reads them.
@@ -80,7 +80,7 @@ enum WaveformName {
 pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
     let file = match &arguments.json {
         None => None,
-        Some(path) => match FiguresFile::reserve(path) {
+        Some(path) => match FiguresFile::reserve(path, arguments.events) {
             None => return EXIT_BAD_INPUT,
             reserved => reserved,
         },
