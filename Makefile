@@ -59,7 +59,7 @@ endif
 
 test-python: $(VENV)/.test ## Python tests
 	cargo build --release --workspace --example bus_echo
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q --numprocesses auto --dist loadfile
 
 fuzz: $(VENV)/.test ## New problems for FUZZ_S seconds (60): property tests, readers, the border to Python
 	FUZZ_S="$(FUZZ_S)" FUZZ_SEED="$(FUZZ_SEED)" $(BIN)/python tests/fuzz/run.py
