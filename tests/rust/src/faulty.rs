@@ -158,9 +158,8 @@ impl FaultyBus {
     /// Frames whose time has come.
     fn due(&mut self) -> Vec<Frame> {
         let now = self.n_syncs;
-        let (due, late) = self.late.drain(..).partition(|(when, _)| *when <= now);
+        let (due, late): (Vec<_>, Vec<_>) = self.late.drain(..).partition(|(when, _)| *when <= now);
         self.late = late;
-        let due: Vec<(u32, Frame)> = due;
         due.into_iter().map(|(_, frame)| frame).collect()
     }
 }

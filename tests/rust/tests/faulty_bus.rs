@@ -11,7 +11,7 @@ use std::time::Duration;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::sync;
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
-use ilc_rt::record::EndStatus;
+use ilc_rt::record::{EndStatus, Figures};
 use ilc_rt::supervisor::{self, Outcome, SupervisorError};
 use ilc_tests::campaign::options;
 use ilc_tests::faulty::{Faults, FaultyBus, Way};
@@ -116,13 +116,20 @@ fn undisturbed(cell: &Cell) -> Outcome {
     campaign(cell, true, Faults::default(), Way::ToController, 0..0, 0).unwrap()
 }
 
+/// What the runs were, but for the time that learning took.
+fn figures(outcome: &Outcome) -> Vec<(u32, Figures)> {
+    let still =
+        |(run, figures): &(u32, Figures)| (*run, Figures { update_ms: 0.0, ..figures.clone() });
+    outcome.runs.iter().map(still).collect()
+}
+
 #[test]
 fn without_faults_it_is_the_bus_behind_it() {
     let cell = short(CELLS[0]);
     let plain = ilc_tests::campaign::run(&cell, RUNS, None).outcome;
     let through = undisturbed(&cell);
     assert_eq!(through.status, EndStatus::Completed, "{}", through.reason);
-    assert_eq!(through.runs, plain.runs);
+    assert_eq!(figures(&through), figures(&plain));
 }
 
 #[test]
@@ -132,7 +139,8 @@ fn a_misfortune_can_be_had_again() {
         let ends: Vec<_> = (0..2)
             .map(|_| campaign(&cell, true, faults, Way::ToController, 400..9_000, 7).unwrap())
             .collect();
-        assert_eq!((&ends[0].reason, &ends[0].runs), (&ends[1].reason, &ends[1].runs), "{name}");
+        assert_eq!(ends[0].reason, ends[1].reason, "{name}");
+        assert_eq!(figures(&ends[0]), figures(&ends[1]), "{name}");
     }
 }
 
@@ -144,7 +152,7 @@ fn lock_step_completes_or_stops_with_a_sentence() {
         let clean_m = clean.runs[0].1.tracking_inf_m;
         for (name, faults) in kinds(0.002).into_iter().chain(kinds(0.05)) {
             for way in [Way::ToController, Way::ToNodes] {
-                for seed in 1..4 {
+                for seed in 1..3 {
                     let what = format!("{name} {way:?} seed {seed}");
                     let end = campaign(&cell, true, faults, way, 100..u32::MAX, seed).unwrap();
                     if end.status == EndStatus::Completed {
@@ -187,21 +195,30 @@ fn by_the_clock_it_completes_or_stops_with_a_sentence() {
         &text[learning..]
     );
     let cell = Cell::parse(&text, CELLS[0]).unwrap();
-    let clean_m = undisturbed(&cell).runs[0].1.tracking_inf_m;
+    let clean = undisturbed(&cell).runs[0].1.clone();
+    let (clean_m, contour_m) = (clean.tracking_inf_m, clean.contour_inf_m);
     std::thread::scope(|scope| {
         for (name, faults) in kinds(0.005) {
             let cell = &cell;
             scope.spawn(move || {
                 let end =
                     campaign(cell, false, faults, Way::ToController, 100..u32::MAX, 3).unwrap();
-                if end.status == EndStatus::Completed {
-                    // What arrived was the truth, if not all of it or not in time.
-                    for (run, figures) in &end.runs {
-                        let error_m = figures.tracking_inf_m;
-                        assert!(
-                            name == "corruption" || error_m <= 2.0 * clean_m,
-                            "{name}, run {run}: {error_m} of {clean_m} m"
-                        );
+                // A position that is another one is followed like any; all else is the truth, if not
+                // all of it or not in time.
+                if end.status != EndStatus::Completed || name == "corruption" {
+                    return;
+                }
+                for (run, figures) in &end.runs {
+                    let error_m = figures.tracking_inf_m;
+                    assert!(
+                        error_m <= 2.0 * clean_m,
+                        "{name}, run {run}: {error_m} of {clean_m} m"
+                    );
+                    // Had a disturbed run been learned from, the next one would be far beside.
+                    if let (Some(is_m), Some(was_m)) = (figures.contour_inf_m, contour_m)
+                        && figures.missing_samples == 0
+                    {
+                        assert!(is_m <= 1.3 * was_m, "{name}, run {run}: {is_m} of {was_m} m");
                     }
                 }
             });

@@ -20,8 +20,22 @@ const LENGTH_MAX: usize = 1 << 16;
 
 /// Numbers at which readers break.
 const NUMBERS: [&str; 16] = [
-    "0", "-0", "-1", "1e-320", "1e308", "1e309", "-1e308", "nan", "inf", "4294967297", "20.",
-    "0.0000001", "99999999999999999999", "1_000", "0x10", "127",
+    "0",
+    "-0",
+    "-1",
+    "1e-320",
+    "1e308",
+    "1e309",
+    "-1e308",
+    "nan",
+    "inf",
+    "4294967297",
+    "20.",
+    "0.0000001",
+    "99999999999999999999",
+    "1_000",
+    "0x10",
+    "127",
 ];
 
 fn corpus(target: &str) -> PathBuf {
@@ -44,7 +58,8 @@ fn keep(target: &str, input: &[u8], what: &str) -> String {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
     });
     let path = corpus(target).join(format!("found-{hash:016x}"));
-    let written = std::fs::create_dir_all(corpus(target)).and_then(|()| std::fs::write(&path, input));
+    let written =
+        std::fs::create_dir_all(corpus(target)).and_then(|()| std::fs::write(&path, input));
     let place = match written {
         Ok(()) => format!(
             "kept as {}: give the file a name that says what it shows, and make test tries it first",

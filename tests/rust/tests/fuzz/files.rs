@@ -53,7 +53,8 @@ fn plan(kind: &str, name: &str, input: &[u8]) {
         let at: Vec<f64> = plan.reference_m.iter().skip(axis).step_by(n).copied().collect();
         assert!(at.iter().all(|p| p.is_finite()), "axis {axis}");
         assert!(
-            at.iter().all(|p| (limits.position_min_m - 1e-9..=limits.position_max_m + 1e-9).contains(p)),
+            at.iter()
+                .all(|p| (limits.position_min_m - 1e-9..=limits.position_max_m + 1e-9).contains(p)),
             "axis {axis} leaves its limits"
         );
         for step in at.windows(2) {
