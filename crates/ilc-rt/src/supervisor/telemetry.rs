@@ -26,7 +26,7 @@ const HEARD_MAX: Duration = Duration::from_secs(3);
 
 /// How long the token outlives the last message: Zenoh sends declarations before data that waits, and
 /// whoever watches leaves when the token goes.
-const LINGER: Duration = Duration::from_millis(100);
+const LINGER: Duration = Duration::from_millis(250);
 
 /// Something to publish.
 struct Message {
