@@ -6,6 +6,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import typer
 
 from ilc_rt.commands.options import (
@@ -22,6 +23,8 @@ from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import Event, StartEvent
 
 PICTURE = "identify-{axis}.png"
+COHERENCE_MIN = 0.7
+"""Median coherence below which the output does not follow the input."""
 
 PictureFolder = Annotated[
     Path | None, typer.Option("--report", metavar="DIR", help="Folder for the picture.")
@@ -132,7 +135,9 @@ def _tell(found: object) -> None:
         f"{count} frequencies, amplitude {found.experiment.amplitude:.4g}, "
         f"coherence at least {worst:.4f}"
     )
-    for name, value, deviation in found.rows():
+    # Figures of an output that does not follow its input say nothing.
+    followed = float(np.median(found.coherence)) >= COHERENCE_MIN
+    for name, value, deviation in found.rows() if followed else []:
         typer.echo(f"  {name:<24} {value:>10}{f'  +- {deviation}' if deviation else ''}")
     if found.doubt is None:
         typer.echo(f"\n{found.section()}")
