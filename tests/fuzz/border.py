@@ -4,10 +4,10 @@ Run it by itself for as long as wanted, with any seed::
 
     python tests/fuzz/border.py --seconds 60 --seed 7
 
-Each call is made in a process of its own kind: with bounded memory, and watched. What is drawn are the
-arguments: mostly right ones, of which one or two are replaced by something else. A call may succeed or
-raise `ValueError` (which every error of the package is), `TypeError`, `MemoryError` or `OSError`; what it
-returns holds no number that is not finite. Exits 1 with the calls that broke a rule.
+Calls are made in another process, with bounded memory, and watched. What is drawn are the
+arguments: mostly right ones, of which one or two are replaced by something else. A call may succeed
+or raise `ValueError` (which every error of the package is), `TypeError`, `MemoryError` or `OSError`;
+what it returns holds no number that is not finite. Exits 1 with the calls that broke a rule.
 """
 
 from __future__ import annotations
@@ -67,6 +67,7 @@ def odd_values(rng: random.Random) -> list[object]:
 def right_values() -> dict[str, object]:
     """Return an argument for each name that occurs, as a reasonable caller gives it."""
     from classes_fixture import ERROR, N, U, axis, both, line, low_pass, response
+
     from ilc_rt import PdIlc, RelevanceWeights, identify, trajectory
     from ilc_rt.control import Pid
 
@@ -195,7 +196,7 @@ def verdict(call: object, arguments: dict[str, object]) -> str | None:
         if "panicked" in line or "integral type conversion" in line:
             return f"{type(error).__name__}: {line}"
         return None
-    except BaseException as error:  # noqa: BLE001 (a panic is none of Exception's)
+    except BaseException as error:
         return f"{type(error).__name__}: {error}"
     at = not_finite(result)
     return None if at is None else f"a number that is not finite at result{at}"
@@ -263,7 +264,11 @@ def follow(command: list[str], folder: str, number: int) -> tuple[int, list[str]
                 number = said["done"] + 1
                 if said["wrong"]:
                     broken.append(f"{said['wrong']}: {said['is']}")
-    return number + 1, [*broken, f"the interpreter ended with {worker.returncode}: {current}"], False
+    return (
+        number + 1,
+        [*broken, f"the interpreter ended with {worker.returncode}: {current}"],
+        False,
+    )
 
 
 def main() -> int:

@@ -85,19 +85,23 @@ def limits():
 EXAMPLES = {
     StateSpace: (lambda: axis().delayed(2), lambda m: m.simulate(U)),
     TimeVarying: (
-        lambda: TimeVarying(*(np.repeat(x[None], N, 0) for x in
-                              (axis().a, axis().b, axis().c, axis().d)), 0.002),
+        lambda: TimeVarying(
+            *(np.repeat(x[None], N, 0) for x in (axis().a, axis().b, axis().c, axis().d)), 0.002
+        ),
         lambda m: m.simulate(U),
     ),
     PdIlc: (lambda: PdIlc(0.4, 0.1, low_pass(), lead=2), updated),
     ErrorFeedforwardIlc: (
-        lambda: ErrorFeedforwardIlc(0.4, signal.gaussian(20.0, 0.002), 3, 0.5), updated,
+        lambda: ErrorFeedforwardIlc(0.4, signal.gaussian(20.0, 0.002), 3, 0.5),
+        updated,
     ),
     NormOptimalIlc: (
-        lambda: NormOptimalIlc(axis(), N, q=np.linspace(0.5, 2.0, N), r=0.1, rate=0.3), updated,
+        lambda: NormOptimalIlc(axis(), N, q=np.linspace(0.5, 2.0, N), r=0.1, rate=0.3),
+        updated,
     ),
     ConstrainedIlc: (
-        lambda: ConstrainedIlc(axis(), N, r=0.1, u_bounds=(-0.4, 0.4)), updated,
+        lambda: ConstrainedIlc(axis(), N, r=0.1, u_bounds=(-0.4, 0.4)),
+        updated,
     ),
     AdjointIlc: (lambda: AdjointIlc(axis(), N, q_filter=low_pass()), updated),
     ModelInverseIlc: (lambda: ModelInverseIlc(axis(), N, 0.5, low_pass()), updated),
@@ -109,19 +113,23 @@ EXAMPLES = {
     Ladder: (lambda: Ladder(PdIlc(0.4, 0.0), 2), updated),
     RelevanceWeights: (lambda: RelevanceWeights(e=3.0, d=[0.1, 0.2]), None),
     RelevanceIlc: (
-        lambda: RelevanceIlc(None, PdIlc(0.4, 0.0), RelevanceWeights(), dt_s=0.002), None,
+        lambda: RelevanceIlc(None, PdIlc(0.4, 0.0), RelevanceWeights(), dt_s=0.002),
+        None,
     ),
     FlexibleIlc: (lambda: FlexibleIlc(None, PdIlc(0.4, 0.0), 0.1), None),
     signal.ButterworthFilter: (
-        lambda: signal.ButterworthFilter(3, 40.0, 0.002, causal=True), lambda f: f.filter(U),
+        lambda: signal.ButterworthFilter(3, 40.0, 0.002, causal=True),
+        lambda f: f.filter(U),
     ),
     signal.FirFilter: (lambda: signal.FirFilter([0.25, 0.5, 0.25], 3), None),
     signal.GaussianFilter: (lambda: signal.GaussianFilter(20.0, 0.002), None),
     signal.SwitchedFilter: (
-        lambda: signal.SwitchedFilter([10.0, 50.0], [0, 30], 0.002, order=3, blend=8), None,
+        lambda: signal.SwitchedFilter([10.0, 50.0], [0, 30], 0.002, order=3, blend=8),
+        None,
     ),
     kinematics.Delta: (
-        lambda: kinematics.Delta(0.04, 0.06, 0.15), lambda d: d.forward([0.1, 0.2, 0.3]),
+        lambda: kinematics.Delta(0.04, 0.06, 0.15),
+        lambda d: d.forward([0.1, 0.2, 0.3]),
     ),
     kinematics.Gantry: (lambda: kinematics.Gantry(0.002), lambda g: g.forward([0.1, 0.2])),
     Pid: (
@@ -145,12 +153,14 @@ EXAMPLES = {
         lambda piece: trajectory.contour_error([piece], [[0.0, 1.5]]),
     ),
     trajectory.Trajectory: (
-        lambda: trajectory.jerk_limited([[0.0, 0.0], [0.1, 0.05]], feed_m_s=0.1, dt_s=0.002,
-                                        **limits()),
+        lambda: trajectory.jerk_limited(
+            [[0.0, 0.0], [0.1, 0.05]], feed_m_s=0.1, dt_s=0.002, **limits()
+        ),
         None,
     ),
     identify.FrequencyResponse: (
-        lambda: identify.FrequencyResponse(*response(), np.linspace(0.8, 1.0, 80), 4.0), None,
+        lambda: identify.FrequencyResponse(*response(), np.linspace(0.8, 1.0, 80), 4.0),
+        None,
     ),
     identify.SecondOrderFit: (
         lambda: identify.fit_second_order(*response(), dt_s=0.002),
@@ -165,14 +175,16 @@ EXAMPLES = {
         lambda fit: fit.response([1.0, 5.0]),
     ),
     identify.Experiment: (
-        lambda: identify.Experiment("x", "multisine", 1.0, 50.0, 8.0, 3, 1e-3), None,
+        lambda: identify.Experiment("x", "multisine", 1.0, 50.0, 8.0, 3, 1e-3),
+        None,
     ),
     identify.Identification: (
         lambda: identify.multisine(axis().simulate, dt_s=0.002, amplitude=1e-3),
         lambda found: found.section(),
     ),
     ilc_rt.Analysis: (
-        lambda: analyze(NormOptimalIlc(axis(), N, r=0.1), axis(), reference=ERROR), None,
+        lambda: analyze(NormOptimalIlc(axis(), N, r=0.1), axis(), reference=ERROR),
+        None,
     ),
     ilc_rt.Tuning: (lambda: tune(axis(), N, uncertainty=0.3, noise_std=1e-6), None),
     ilc_rt.Repeatability: (lambda: repeatability(RNG.normal(size=(3, N))), None),

@@ -60,7 +60,7 @@ def test_sizes_are_bounded_before_memory_is_asked_for(call, words):
 
 @pytest.mark.parametrize("given", [2.0, np.float64(2.0), True, np.bool_(True), "2", None, [2], 1j])
 def test_what_counts_nothing_is_a_type_error_with_a_name(given):
-    with pytest.raises(TypeError, match="lead = .*a whole number from 0"):
+    with pytest.raises(TypeError, match=r"lead = .*a whole number from 0"):
         PdIlc(0.5, 0.0, lead=given)
 
 
@@ -101,18 +101,21 @@ def test_states_that_nothing_moves_are_no_integrators():
 def test_no_cutoff_makes_a_filter_of_numbers_that_are_none(order):
     x = np.ones(400)
     for share in [1e-300, 1e-12, 1e-9, 1e-7, 9e-6, 2e-5, 1e-3, 0.3, 0.4999, 0.4999999999]:
-        try:
-            y = signal.butterworth(order, share / 1e-3, 1e-3).zero_phase(x)
-        except SignalError as error:
-            assert "cutoff_hz = " in str(error)
+        cutoff_hz = share / 1e-3
+        if share < (1e-10 if order == 1 else 1e-5):
+            with pytest.raises(SignalError, match=r"cutoff_hz = .* needs at least"):
+                signal.butterworth(order, cutoff_hz, 1e-3)
             continue
+        y = signal.butterworth(order, cutoff_hz, 1e-3).zero_phase(x)
         np.testing.assert_allclose(y, x, rtol=0, atol=2e-3)
 
 
 def test_a_silent_axis_is_doubted_and_not_a_failure():
     found = identify.multisine(lambda u: 0 * u, dt_s=0.002, amplitude=1e-3)
-    assert found.doubt is not None and "does not answer" in found.doubt
-    assert found.model.gain == 0.0 and found.model.residual_rms == 1.0
+    assert found.doubt is not None
+    assert "does not answer" in found.doubt
+    assert found.model.gain == 0.0
+    assert found.model.residual_rms == 1.0
     assert np.isfinite(found.uncertainty[1]).all()
 
 
@@ -123,10 +126,13 @@ def test_a_resonance_below_the_band_is_found(f0, damping, low, high):
     h = np.asarray(model.frequency_response(2 * np.pi * f)).reshape(-1)
     found = identify.fit_second_order(f, h, dt_s=0.002)
     assert found.natural_frequency_hz == pytest.approx(f0, rel=1e-4)
-    assert found.gain == pytest.approx(1.0, rel=1e-3) and found.residual_rms < 1e-7
+    assert found.gain == pytest.approx(1.0, rel=1e-3)
+    assert found.residual_rms < 1e-7
 
 
-@pytest.mark.parametrize("degrees", [(2, 3), (2, 4), (3, 4), (3, 5), (4, 4), (5, 6), (6, 6), (8, 8)])
+@pytest.mark.parametrize(
+    "degrees", [(2, 3), (2, 4), (3, 4), (3, 5), (4, 4), (5, 6), (6, 6), (8, 8)]
+)
 def test_a_fraction_of_more_poles_than_there_are_fits_too(degrees):
     model = from_transfer_function([1.0, 6.0, 3600.0], np.polymul([1.0, 9.0, 8100.0], [1.0, 40.0]))
     w = np.geomspace(1.0, 80.0, 200) * 2 * np.pi

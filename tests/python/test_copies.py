@@ -10,9 +10,9 @@ import pickle
 
 import numpy as np
 import pytest
+from classes_fixture import EXAMPLES, MODULES, N, axis, both, line, updated
 
 import ilc_rt
-from classes_fixture import EXAMPLES, MODULES, N, axis, both, line, updated
 from ilc_rt import Campaign, Gate, Library, NormOptimalIlc, PdIlc
 
 # What is not a value: a connection to a file, a description of an interface, a running controller.
@@ -42,7 +42,7 @@ def public_classes():
 def ways(thing):
     """Return copies made in every way there is."""
     for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
-        yield pickle.loads(pickle.dumps(thing, protocol))  # noqa: S301
+        yield pickle.loads(pickle.dumps(thing, protocol))
     yield copy.copy(thing)
     yield copy.deepcopy(thing)
 
@@ -78,10 +78,12 @@ def test_copies_are_what_they_are_copies_of(kind):
     assert type(thing) is kind
     copies = list(ways(thing))
     for other in copies:
-        assert type(other) is kind and other is not thing
+        assert type(other) is kind
+        assert other is not thing
         assert_same(attributes(thing), attributes(other))
         assert repr(other) == repr(thing)
-        assert kind.__name__ in repr(thing) and "\n" not in repr(thing)
+        assert kind.__name__ in repr(thing)
+        assert "\n" not in repr(thing)
     if does is not None:
         # Of an original that has been used since: a copy begins where it began.
         expected = does(make())
@@ -93,8 +95,9 @@ def test_copies_are_what_they_are_copies_of(kind):
     "law",
     [
         lambda: NormOptimalIlc.contour(both(), line(), contour=30.0, r=0.01, axes=[0, 1]),
-        lambda: NormOptimalIlc.formation([axis(), axis()], N, tracking=0.4, r=0.01,
-                                         leaders=[0], pairs=[(0, 1)]),
+        lambda: NormOptimalIlc.formation(
+            [axis(), axis()], N, tracking=0.4, r=0.01, leaders=[0], pairs=[(0, 1)]
+        ),
         lambda: NormOptimalIlc.dynamic(both(), N, both(), r=0.1),
     ],
     ids=["contour", "formation", "dynamic"],
@@ -113,7 +116,8 @@ def test_laws_made_by_a_builder_are_copied_by_it(law):
 def test_errors_keep_their_words_and_their_fields(kind):
     raised = kind("node 2 is silent")
     for other in ways(raised):
-        assert type(other) is kind and str(other) == "node 2 is silent"
+        assert type(other) is kind
+        assert str(other) == "node 2 is silent"
         assert vars(other) == vars(raised)
 
 
@@ -135,4 +139,4 @@ def test_what_a_law_has_learned_stays_with_it():
 
 def test_a_library_is_opened_again(tmp_path):
     library = Library(tmp_path / "runs.db")
-    assert copy.copy(library).list() == pickle.loads(pickle.dumps(library)).list() == []  # noqa: S301
+    assert copy.copy(library).list() == pickle.loads(pickle.dumps(library)).list() == []
