@@ -6,6 +6,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import typer
 
 from ilc_rt.commands.options import (
@@ -25,6 +26,8 @@ from ilc_rt.text import file_name, printable
 
 PICTURE = "identify-{axis}.png"
 PERIODS_MAX = 10_000
+COHERENCE_MIN = 0.7
+"""Median coherence below which the output does not follow the input."""
 
 PictureFolder = Annotated[
     Path | None,
@@ -139,7 +142,9 @@ def _tell(found: object) -> None:
         f"{count} frequencies, amplitude {found.experiment.amplitude:.4g}, "
         f"coherence at least {worst:.4f}"
     )
-    for name, value, deviation in found.rows():
+    # Figures of an output that does not follow its input say nothing.
+    followed = float(np.median(found.coherence)) >= COHERENCE_MIN
+    for name, value, deviation in found.rows() if followed else []:
         typer.echo(f"  {name:<24} {value:>10}{f'  +- {deviation}' if deviation else ''}")
     if found.doubt is None:
         typer.echo(f"\n{found.section()}")

@@ -62,7 +62,6 @@ def tune(
 
     Example: ilc tune examples/01_gantry.toml --uncertainty 0.3 --noise-m 1e-6
     """
-    from ilc_rt.cell_file import write_values
     from ilc_rt.tuning import TUNED_LAWS, UNCERTAINTY, propose_weights
 
     found = propose_weights(
@@ -81,7 +80,7 @@ def tune(
     if found.law not in TUNED_LAWS:
         message = f"{cell}: left as it was: {found.notes[0]}"
         raise BadInputError(message)
-    changed = write_values(cell, found.section, found.values())
+    changed = found.write(cell)
     typer.echo(f"written: {cell}" if changed else f"{cell} has these weights already")
 
 
