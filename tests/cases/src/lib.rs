@@ -11,7 +11,7 @@ use proptest::test_runner::{Config, FileFailurePersistence, RngSeed};
 pub const SEED_VARIABLE: &str = "ILC_FUZZ_SEED";
 
 /// The seed of every property test.
-const SEED: u64 = 2026_11_28;
+const SEED: u64 = 20_261_128;
 
 /// How many cases a test draws that does not say it.
 pub const CASES: u32 = 256;

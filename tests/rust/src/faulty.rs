@@ -12,7 +12,7 @@ use crate::rig::node;
 /// SYNCs after which a campaign of a test is over, whatever happens: beyond it, it hangs.
 const SYNCS_MAX: u32 = 60_000;
 
-/// Numbers from a seed (the generator SplitMix64).
+/// Numbers from a seed (the generator `SplitMix64`).
 #[derive(Clone, Debug)]
 pub struct Draws(u64);
 

@@ -14,7 +14,7 @@ use ilc_tests::faulty::Draws;
 /// Seconds that a target has under `make fuzz`.
 const SECONDS_VARIABLE: &str = "ILC_FUZZ_S";
 /// An input that takes longer is a hang.
-const HANG: Duration = Duration::from_secs(60);
+const HANG: Duration = Duration::from_secs(45);
 /// Longest input.
 const LENGTH_MAX: usize = 1 << 16;
 
@@ -71,11 +71,14 @@ fn keep(target: &str, input: &[u8], what: &str) -> String {
 }
 
 /// Says which input hangs, from a thread of its own, and ends the test.
-struct Watchdog(Arc<Mutex<Option<(Instant, Vec<u8>)>>>);
+struct Watchdog(Arc<Mutex<Option<Trial>>>);
+
+/// When it began, and the input.
+type Trial = (Instant, Vec<u8>);
 
 impl Watchdog {
     fn new(target: &'static str) -> Self {
-        let now = Arc::new(Mutex::new(None::<(Instant, Vec<u8>)>));
+        let now = Arc::new(Mutex::new(None::<Trial>));
         let watched = Arc::clone(&now);
         std::thread::spawn(move || {
             // Ends with the test's last owner.
