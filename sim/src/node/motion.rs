@@ -240,10 +240,14 @@ impl Motion {
     ) -> Demand {
         let wanted_m = self.demand_m().unwrap_or(self.limited_m);
         let inside_m = if matches!(self.phase, Phase::Hold { .. }) {
-            // An axis that stands outside the limits stays there until it is told to come back.
             wanted_m
         } else {
-            wanted_m.max(limits.position_min_m).min(limits.position_max_m)
+            // An axis that stands outside the limits stays there until it is told to come back.
+            let (low_m, high_m) = (
+                limits.position_min_m.min(self.limited_m),
+                limits.position_max_m.max(self.limited_m),
+            );
+            wanted_m.max(low_m).min(high_m)
         };
         let reach_m = limits.velocity_max_m_s * dt_s;
         let asked_m = (inside_m - self.limited_m).clamp(-reach_m, reach_m);
