@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Mode, State, bring_up, bring_up_encoder};
+use ilc_rt::fieldbus::cia402::{Command, State, bring_up, bring_up_encoder};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};
-use ilc_rt::supervisor::Plan;
+use ilc_rt::supervisor::{Plan, drive_setup};
 use ilc_sim::Machine;
 
 use crate::campaign::machine;
@@ -226,21 +226,7 @@ impl Rig {
     fn paced(cell: &Cell, runs: u32, lockstep: bool) -> Self {
         let mut tap = Tap::new(cell);
         for axis in &cell.axes {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1e6")]
-            let following_error_max_counts =
-                (axis.limits.following_error_max_m * axis.counts_per_m).round() as u32;
-            let setup = DriveSetup {
-                node: node(axis.node),
-                mode: match axis.interface {
-                    ilc_rt::config::Interface::Csp => Mode::Csp,
-                    ilc_rt::config::Interface::Csv => Mode::Csv,
-                },
-                cycle_us: cell.cell.cycle_us,
-                following_error_max_counts,
-                heartbeat_ms: 0,
-                rpdo_deadline_ms: 0,
-                answer_timeout: Duration::from_secs(1),
-            };
+            let setup = drive_setup(cell, axis, true).expect("a validated cell");
             bring_up(&mut tap, &setup).expect("the drive comes up");
         }
         if let Some(tool) = &cell.tcp_encoder {

@@ -1,5 +1,6 @@
 //! One campaign from the first frame to the last: bring-up, runs, learning, library, end.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::announce::Announcer;
@@ -7,18 +8,18 @@ use super::collect::Collector;
 use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
-use super::learner::{Learner, expect};
+use super::learner::{Learner, Lesson, expect};
 use super::options::{Options, Outcome};
 use super::pace::Pacer;
 use super::plan::Plan;
-use super::progress::{Decision, Progress, Resumed, is_disturbed};
+use super::progress::{Decision, Progress, Resumed};
 use super::telemetry::Telemetry;
 use super::{nodes, reason};
 use crate::config::Cell;
 use crate::fieldbus::Bus;
 use crate::learning::Law;
 use crate::library::Library;
-use crate::record::{EndStatus, Event, Figures, IterationRecord, Meta, StateName};
+use crate::record::{AxisKinds, EndStatus, Event, Figures, IterationRecord, Meta, StateName};
 use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
@@ -178,7 +179,7 @@ fn carry_out(
     let mut campaign = Running {
         collector: Collector::new(
             plan.n_samples(),
-            cell.n_axes(),
+            AxisKinds::new(&plan.meta.input_units, cell.n_axes()),
             plan.measure,
             cell.tcp_encoder.is_some(),
             cell.cycle_s(),
@@ -195,6 +196,7 @@ fn carry_out(
         iterations: options.iterations,
         mail,
         stopping: None,
+        unjudged: VecDeque::new(),
         remark: None,
         failure: None,
         phase_iteration: first,
@@ -228,6 +230,8 @@ struct Running<'a> {
     iterations: u32,
     mail: Mailbox,
     stopping: Option<StopReason>,
+    /// Runs that the law is asked about and has not answered yet, the oldest first: key and place.
+    unjudged: VecDeque<(i64, usize)>,
     /// What the law last had to say.
     remark: Option<String>,
     /// Why no more runs can be kept, if so: the axes are stopped, as nothing may be lost.
@@ -271,15 +275,44 @@ impl Running<'_> {
             }
         }
         while let Some(lesson) = self.learner.as_mut().and_then(Learner::take) {
-            // Once for each change: what stays as it is need not be said after every run.
-            if lesson.remark != self.remark {
-                tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
-                self.remark = lesson.remark;
-            }
-            match lesson.input {
-                Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
-                Err(error) => self.fail(format!("the law refused the last run: {error}")),
-            }
+            self.judged(&lesson);
+            self.learned(lesson);
+        }
+    }
+
+    /// Hands the loop what was learned.
+    fn learned(&mut self, lesson: Lesson) {
+        // Once for each change: what stays as it is need not be said after every run.
+        if lesson.remark != self.remark {
+            tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
+            self.remark = lesson.remark;
+        }
+        match lesson.input {
+            Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
+            Err(error) => self.fail(format!("the law refused the last run: {error}")),
+        }
+    }
+
+    /// Adds what the law decided to a run that was kept while it computed.
+    fn judged(&mut self, lesson: &Lesson) {
+        let Some((id, place)) = self.unjudged.pop_front() else { return };
+        let Some((index, figures)) = self.runs.get_mut(place) else { return };
+        let before = figures.clone();
+        lesson.note(figures);
+        if *figures == before {
+            return;
+        }
+        let event = Event::Judged {
+            id,
+            index: *index,
+            rolled_back: figures.rolled_back,
+            learning_off: figures.learning_off,
+            remark: figures.remark.clone(),
+        };
+        let written = self.library.judge(id, figures);
+        self.announcer.tell(&event);
+        if let Err(error) = written {
+            self.fail(error.to_string());
         }
     }
 
@@ -302,32 +335,41 @@ impl Running<'_> {
         }
         self.progress.note(&mut record);
         let decision = self.progress.decide(&mut record);
-        if is_disturbed(&record.figures) {
-            tracing::warn!(
-                "run {} was disturbed ({} cycles late, {} samples missing): its input is repeated",
-                record.index,
-                record.figures.overruns,
-                record.figures.missing_samples
-            );
-        }
+        let mut asked = false;
+        let mut lesson = None;
         if let Some(learner) = &mut self.learner {
             if decision == Decision::Learn {
                 self.progress.asked();
                 learner.begin(&record.input, &record.error_m, &self.present);
+                asked = true;
+                if learner.is_in_line() {
+                    lesson = learner.take();
+                }
             } else {
                 if matches!(decision, Decision::RollBack(_)) {
                     learner.take_back();
                 }
                 learner.pass(&self.present);
             }
+        } else {
+            record.figures.remark = None;
+        }
+        if let Some(lesson) = lesson {
+            lesson.note(&mut record.figures);
+            self.learned(lesson);
+            asked = false;
         }
         if let Decision::RollBack(input) = decision {
             self.progress.send(&mut self.mail, input, 0.0);
         }
-        self.keep(&record);
+        if let Some(id) = self.keep(&record)
+            && asked
+        {
+            self.unjudged.push_back((id, self.runs.len() - 1));
+        }
     }
 
-    fn keep(&mut self, record: &IterationRecord) {
+    fn keep(&mut self, record: &IterationRecord) -> Option<i64> {
         match self.library.append(&self.meta, record) {
             Ok(id) => {
                 self.announcer.tell(&Event::Iteration {
@@ -337,8 +379,12 @@ impl Running<'_> {
                     figures: record.figures.clone(),
                 });
                 self.runs.push((record.index, record.figures.clone()));
+                Some(id)
             }
-            Err(error) => self.fail(error.to_string()),
+            Err(error) => {
+                self.fail(error.to_string());
+                None
+            }
         }
     }
 
@@ -352,6 +398,11 @@ impl Running<'_> {
     fn end(mut self, pacer: Pacer, cell: &Cell, options: &Options) -> Outcome {
         let remains = pacer.end();
         self.read_mail();
+        while !self.unjudged.is_empty()
+            && let Some(lesson) = self.learner.as_mut().and_then(Learner::take_last)
+        {
+            self.judged(&lesson);
+        }
         let (status, reason) = match (&self.failure, self.stopping, &remains) {
             (Some(why), _, _) => (EndStatus::Fault, why.clone()),
             (None, Some(reason), _) => {
