@@ -173,7 +173,7 @@ fn a_pdo_of_another_length_is_named() {
         (0x181, 6, "no status of node 1: its TPDO1 has 6 bytes, 8 are needed"),
         (0x182, 0, "no status of node 2: its TPDO1 has 0 bytes, 8 are needed"),
         (0x281, 4, "no following error of node 1: its TPDO2 has 4 bytes, 8 are needed"),
-        (0x18A, 4, "no status of node 10: its TPDO1 has 4 bytes, 8 are needed"),
+        (0x18A, 4, "no position of node 10: its TPDO1 has 4 bytes, 8 are needed"),
     ] {
         let shorten = move |_, frame: Frame, out: &mut VecDeque<Frame>| {
             out.push_back(if frame.id() == id {
