@@ -27,13 +27,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
     };
     let ms = |cycles: u32| f64::from(cycles) * cell.cycle_s() * 1e3;
     match reason {
-        StopReason::Asked(signal) => match signal {
-            libc::SIGINT => "stopped by Ctrl-C".to_owned(),
-            libc::SIGTERM => "stopped by SIGTERM".to_owned(),
-            libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
-            libc::SIGHUP => "stopped as its terminal is gone (SIGHUP)".to_owned(),
-            other => format!("stopped by signal {other}"),
-        },
+        StopReason::Asked(signal) => asked(signal),
         StopReason::DriveFault { axis: index, code, following_error_m } => format!(
             "drive of {} faulted: {}; its following error was {}",
             axis(index),
@@ -62,18 +56,21 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             unanswered(cycles),
             3 - pdo
         ),
-        StopReason::WrongLength { node, pdo, n_bytes } => format!(
-            "no {} of node {node}: its TPDO{pdo} has {n_bytes} bytes, 8 are needed",
-            if pdo == 1 { "status" } else { "following error" }
-        ),
+        StopReason::WrongLength { node, pdo, n_bytes } => {
+            let is_tool = cell.tcp_encoder.is_some_and(|tool| tool.node == node);
+            let what = match pdo {
+                _ if is_tool => "position",
+                1 => "status",
+                _ => "following error",
+            };
+            format!("no {what} of node {node}: its TPDO{pdo} has {n_bytes} bytes, 8 are needed")
+        }
         StopReason::SilentTool { cycles } => format!(
             "tool measurement (node {}) is silent: {}",
             cell.tcp_encoder.map_or(0, |tool| tool.node),
             unanswered(cycles)
         ),
-        StopReason::NodeLeft { node } => {
-            format!("node {node} restarted")
-        }
+        StopReason::NodeLeft { node } => format!("node {node} restarted"),
         StopReason::NodeStopped { node, state: NmtState::Stopped } => {
             format!("node {node} was stopped by NMT")
         }
@@ -94,21 +91,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
                 cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m)
             )
         ),
-        StopReason::OutsideLimits { axis: index, position_m } => cell.axes.get(index).map_or_else(
-            || format!("axis {index} is at {position_m}, outside its limits"),
-            |axis| {
-                let unit = axis.unit.symbol();
-                let (low, high) = (axis.limits.position_min_m, axis.limits.position_max_m);
-                // As the counts have it, without the digits that are only rounding.
-                let resolution = 10_f64.powf(axis.counts_per_m.log10().ceil());
-                let position = (position_m * resolution).round() / resolution;
-                format!(
-                    "axis {} is at {position} {unit}, outside {low} to {high} {unit}: \
-                     bring it back by other means; nothing has moved",
-                    axis.name
-                )
-            },
-        ),
+        StopReason::OutsideLimits { axis, position_m } => outside(cell, axis, position_m),
         StopReason::Jump { axis: index, step_m } => format!(
             "{}: its position jumped by {} from one answer to the next, farther than it can move",
             axis(index),
@@ -124,6 +107,34 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
         ),
         StopReason::Bus(error) => format!("{error}"),
     }
+}
+
+/// Who asked for the stop.
+fn asked(signal: i32) -> String {
+    match signal {
+        libc::SIGINT => "stopped by Ctrl-C".to_owned(),
+        libc::SIGTERM => "stopped by SIGTERM".to_owned(),
+        libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
+        libc::SIGHUP => "stopped as its terminal is gone (SIGHUP)".to_owned(),
+        other => format!("stopped by signal {other}"),
+    }
+}
+
+/// Where an axis stands that may not be switched on there.
+fn outside(cell: &Cell, axis: usize, position_m: f64) -> String {
+    let Some(axis) = cell.axes.get(axis) else {
+        return format!("axis {axis} is at {position_m}, outside its limits");
+    };
+    let unit = axis.unit.symbol();
+    let (low, high) = (axis.limits.position_min_m, axis.limits.position_max_m);
+    // As the counts have it, without the digits that are only rounding.
+    let resolution = 10_f64.powf(axis.counts_per_m.log10().ceil());
+    let position = (position_m * resolution).round() / resolution;
+    format!(
+        "axis {} is at {position} {unit}, outside {low} to {high} {unit}: bring it back by other \
+         means; nothing has moved",
+        axis.name
+    )
 }
 
 /// What another master was seen to send.
