@@ -186,18 +186,7 @@ fn plan_piece<C: Curve>(
         }
         speed.push(allowed);
     }
-    // From rest in a turn the run is slow by itself: the tightest bend, which is there, slows down
-    // nothing else.
-    let launch: Vec<f64> = (0..n_places)
-        .map(|i| {
-            let from = if piece.turns[0] { i as f64 * step_m } else { f64::INFINITY };
-            let to =
-                if piece.turns[1] { (n_places - 1 - i) as f64 * step_m } else { f64::INFINITY };
-            let gone_m = from.min(to);
-            (0.5 * jerk.cbrt() * (6.0 * gone_m).powf(2.0 / 3.0))
-                .min((2.0 * acceleration * gone_m).sqrt())
-        })
-        .collect();
+    let launch = launch_speeds(piece.turns, n_places, step_m, acceleration, jerk);
     for (speed, launch) in speed.iter_mut().zip(&launch) {
         if *launch < *speed {
             *speed = limits.feed_m_s;
@@ -264,6 +253,26 @@ fn plan_piece<C: Curve>(
         limit: worst.limit,
         rounds: ROUNDS,
     }))
+}
+
+/// The speed that a run reaches at each place from rest in a turn, or to rest: it is slow there by
+/// itself, and the tightest bend, which is there, slows down nothing else.
+fn launch_speeds(
+    turns: [bool; 2],
+    n_places: usize,
+    step_m: f64,
+    acceleration: f64,
+    jerk: f64,
+) -> Vec<f64> {
+    (0..n_places)
+        .map(|i| {
+            let from = if turns[0] { i as f64 * step_m } else { f64::INFINITY };
+            let to = if turns[1] { (n_places - 1 - i) as f64 * step_m } else { f64::INFINITY };
+            let gone_m = from.min(to);
+            let by_jerk = 0.5 * jerk.cbrt() * (6.0 * gone_m).powf(2.0 / 3.0);
+            by_jerk.min((2.0 * acceleration * gone_m).sqrt())
+        })
+        .collect()
 }
 
 /// The radius of a bend that no axis goes round faster than at a small share of the feed.
