@@ -81,6 +81,8 @@ class ProcessController:
             argv += ["--bus", bus]
         if lockstep:
             argv.append("--lockstep")
+        elif simulated:
+            argv.append("--simulated-drives")
         try:
             self._controller = Program(argv)
         except BaseException:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from typing_extensions import Self
 
-READY_DEADLINE_S = 15.0
+READY_DEADLINE_S = 60.0
 END_DEADLINE_S = 5.0
 
 

@@ -129,6 +129,11 @@ class CampaignResult:
             self.reason = event.reason or self.reason
 
     @property
+    def unkept(self) -> bool:
+        """Whether the campaign was stopped as a run could not be kept."""
+        return self.status == "fault" and (self.reason or "").startswith("library ")
+
+    @property
     def mode(self) -> str:
         """``"realtime"``, ``"lockstep"``, or ``""`` if not known."""
         return self.start.mode if self.start else ""

@@ -42,6 +42,15 @@ impl FromStr for Mute {
     }
 }
 
+/// What the machine shall do beyond what its cell says.
+#[derive(Clone, Debug)]
+pub(crate) struct Habits {
+    /// Silence after which SYNC counts as lost and time goes on by itself.
+    pub(crate) sync_lost_after: Duration,
+    /// Nodes that are to lose their power.
+    pub(crate) mutes: Vec<Mute>,
+}
+
 /// Why the machine cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunError {
@@ -78,7 +87,7 @@ pub(crate) fn run(
     bus: Box<dyn Bus>,
     address: &str,
     clock: ClockMode,
-    mutes: &[Mute],
+    habits: &Habits,
 ) -> Result<(), RunError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
@@ -86,11 +95,12 @@ pub(crate) fn run(
     }
     let failed = |source| RunError::Bus { address: address.to_owned(), source };
     let mut outlet = Outlet { bus, n_sent: 0, n_dropped: 0, broken: None };
-    let mut mutes = mutes.to_vec();
+    let mut mutes = habits.mutes.clone();
     let start = Instant::now();
     let mut drive_clock = DriveClock::new(
         Duration::from_micros(cell.cell.cycle_us.into()),
         Duration::from_micros(machine.step_us().into()),
+        habits.sync_lost_after,
     );
     if clock == ClockMode::RealTime {
         // What is refused only makes the drives less punctual; the controller tells of its own rights.

@@ -19,7 +19,7 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
-from ilc_rt.errors import CampaignError
+from ilc_rt.errors import EXIT_FAULT, CampaignError
 from ilc_rt.progress import CampaignView
 
 ReportFile = Annotated[
@@ -71,17 +71,21 @@ def run(
 
 
 def carry_out(
-    campaign: Campaign, iterations: int, json_file: Path | None, report: Path | None
+    campaign: Campaign,
+    iterations: int,
+    json_file: Path | None,
+    report: Path | None,
+    *,
+    restarts: int = 0,
 ) -> None:
     """Run a campaign in the terminal, then write what was asked for.
 
     Files are written also after a fault or a stop on request, of the runs
-    that were completed.
+    that were completed. A fault of the machine is followed by going on where
+    the campaign was, `restarts` times at most.
     """
     try:
-        with CampaignView() as view:
-            for event in campaign.events(iterations):
-                view.show(event, campaign.result)
+        _show(campaign, iterations, restarts)
     except (CampaignError, KeyboardInterrupt, SystemExit) as stopped:
         if campaign.result.records:
             typer.echo(campaign.result.sentence())
@@ -91,6 +95,25 @@ def carry_out(
         raise
     typer.echo(campaign.result.sentence())
     _write(campaign, json_file, report)
+
+
+def _show(campaign: Campaign, iterations: int, restarts: int) -> None:
+    while True:
+        try:
+            with CampaignView() as view:
+                for event in campaign.events(iterations):
+                    view.show(event, campaign.result)
+        except CampaignError as stopped:
+            # A run that cannot be kept would not be kept the next time either.
+            if stopped.exit_code != EXIT_FAULT or restarts == 0 or campaign.result.unkept:
+                raise
+            restarts -= 1
+            n_runs = len(campaign.result.records)
+            campaign.resume = n_runs > 0
+            onward = f"going on after run {n_runs - 1}" if n_runs else "beginning again"
+            typer.echo(f"ilc: {stopped.reason}; {onward}", err=True)
+        else:
+            return
 
 
 def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> None:

@@ -55,6 +55,9 @@ pub(super) struct IdentifyArguments {
     /// Pace the loop by the drives' answers instead of the clock.
     #[arg(long)]
     lockstep: bool,
+    /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
+    #[arg(long)]
+    simulated_drives: bool,
     /// Where the experiment is kept.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     library: PathBuf,
@@ -142,6 +145,7 @@ fn experiment(
         iterations: 1,
         measure: arguments.measure.map(Measure::from),
         lockstep: arguments.lockstep,
+        simulated: arguments.simulated_drives,
         resume: false,
         library: arguments.library.clone(),
         disturbance: Disturbance::default(),

@@ -35,6 +35,9 @@ pub(super) struct RunArguments {
     /// Pace the loop by the drives' answers instead of the clock: exact repetition, no wall clock.
     #[arg(long)]
     lockstep: bool,
+    /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
+    #[arg(long)]
+    simulated_drives: bool,
     /// Repeat the program without learning, whatever the cell says.
     #[arg(long)]
     no_learning: bool,
@@ -104,6 +107,7 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
         iterations: arguments.iterations,
         measure: arguments.measure.map(Measure::from),
         lockstep: arguments.lockstep,
+        simulated: arguments.simulated_drives,
         resume: arguments.resume,
         library: arguments.library.clone(),
         disturbance: Disturbance::default(),

@@ -80,6 +80,13 @@ pub enum StopReason {
         /// Axis.
         axis: usize,
     },
+    /// A drive missed its commands because this computer stalled.
+    Stalled {
+        /// Axis.
+        axis: usize,
+        /// Consecutive cycles missed.
+        cycles: u32,
+    },
     /// The loop could not keep its cycle.
     Overrun {
         /// Consecutive cycles missed.

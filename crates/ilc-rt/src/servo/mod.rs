@@ -14,6 +14,7 @@ mod realtime;
 mod receive;
 mod slots;
 mod spec;
+mod stall;
 
 pub use cycle::{Cycle, TickStatus};
 pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, mailbox};

@@ -8,7 +8,7 @@ use super::cycle::Cycle;
 use super::mailbox::StopReason;
 use super::phase::Phase;
 use super::spec::Pace;
-use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtState};
+use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtState, emcy};
 use crate::fieldbus::cia402::{EncoderSample, Extra, Mode, State, Status};
 use crate::fieldbus::{Bus, Frame};
 
@@ -93,8 +93,8 @@ impl Cycle {
         if asked != 0 {
             return Some(StopReason::Asked(asked));
         }
-        if self.overrun_streak > self.spec.overrun_cycles_max {
-            return Some(StopReason::Overrun { cycles: self.overrun_streak });
+        if self.stall.streak() > self.spec.overrun_cycles_max {
+            return Some(StopReason::Overrun { cycles: self.stall.streak() });
         }
         silence.or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)))
     }
@@ -129,6 +129,12 @@ impl Cycle {
             // A fault from before is reset on the way; what is not enabled in time is refused.
             return (ticks > self.spec.enable_ticks && !drive.enabled())
                 .then_some(StopReason::NotEnabled { axis, statusword: drive.statusword });
+        }
+        if drive.faulted()
+            && drive.emergency == emcy::CODE_RPDO_TIMEOUT
+            && let Some(cycles) = self.stall.blamed()
+        {
+            return Some(StopReason::Stalled { axis, cycles });
         }
         if drive.faulted() {
             return Some(StopReason::DriveFault {

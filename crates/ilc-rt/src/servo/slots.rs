@@ -94,6 +94,11 @@ impl Slots {
         self.lags.get(node).map_or(0, |lag| lag.silent)
     }
 
+    /// Whether a node that is not given up has answered none of the last `n_cycles` SYNCs.
+    pub(super) fn waits(&self, n_cycles: u64) -> bool {
+        (0..self.n_nodes).any(|node| !self.given_up[node] && self.silence(node) >= n_cycles)
+    }
+
     /// No longer waits for `node`, which is silent: the stop that follows needs many ticks.
     pub(super) fn give_up(&mut self, node: usize) {
         if let Some(given_up) = self.given_up.get_mut(node) {

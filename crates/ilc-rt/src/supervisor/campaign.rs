@@ -8,7 +8,7 @@ use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
 use super::learner::{Learner, expect};
-use super::options::{Options, Outcome};
+use super::options::{Options, Outcome, SIMULATED_PATIENCE_S};
 use super::pace::Pacer;
 use super::plan::Plan;
 use super::progress::{Decision, Progress, Resumed};
@@ -137,9 +137,15 @@ fn carry_out(
     };
     let mut announcer = Announcer::new(observe, telemetry, cell.cycle_s(), cell.n_axes());
     announcer.tell(&Event::State { state: StateName::BringingUp, iteration: first });
-    nodes::start(cell, bus.as_mut(), options.lockstep)?;
+    nodes::start(cell, bus.as_mut(), options)?;
 
     plan.servo.runs = first..options.iterations;
+    if options.forgives_stalls() {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
+        let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;
+        plan.servo.hold_cycles_max = patience;
+        plan.servo.overrun_cycles_max = plan.servo.overrun_cycles_max.max(patience);
+    }
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&options.stop));
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next) {
         progress.send(&mut mail, input, update_ms);
@@ -338,7 +344,7 @@ impl Running<'_> {
         let (status, reason) = match (&self.failure, self.stopping, &remains) {
             (Some(why), _, _) => (EndStatus::Fault, why.clone()),
             (None, Some(reason), _) => {
-                (reason::status(reason), reason::sentence(reason, cell, options.lockstep))
+                (reason::status(reason), reason::sentence(reason, cell, options))
             }
             (None, None, None) => (
                 EndStatus::Fault,
