@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from ilc_rt.experiment import Experiment
 
+ITERATIONS_MAX = 2**32 - 1
 DEFAULT_LIBRARY = "ilc-library.db"
 TRANSPORTS = ("can", "udp", "zenoh", "loopback")
 Drives = Literal["auto", "simulated", "external"]
@@ -184,8 +185,8 @@ class Campaign:
         Leaving the loop early stops the axes in a controlled way before this
         iterator is closed. Parameters and errors are those of `run`.
         """
-        if iterations < 1:
-            message = f"iterations = {iterations}: at least 1"
+        if not 1 <= iterations <= ITERATIONS_MAX:
+            message = f"iterations = {iterations}: allowed 1 to {ITERATIONS_MAX}"
             raise BadInputError(message)
         measure = _measure(self.disturbance, iterations)
         self.result = CampaignResult(self.library)

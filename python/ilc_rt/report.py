@@ -20,7 +20,7 @@ import matplotlib as mpl
 
 from ilc_rt import plots
 from ilc_rt.errors import BadInputError
-from ilc_rt.result import CampaignResult, micrometres, reduction, write_text
+from ilc_rt.result import CampaignResult, micrometres, reduction, report_file, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ilc_rt.record import IterationRecord
-
-REPORT_NAME = "ilc-report.html"
-
 
 def write_report(result: CampaignResult, path: str | Path) -> Path:
     """Write the report of a campaign.
@@ -52,9 +49,7 @@ def write_report(result: CampaignResult, path: str | Path) -> Path:
     BadInputError
         If there is no run to report, or the file cannot be written.
     """
-    target = Path(path)
-    if target.is_dir() or not target.suffix:
-        target = target / REPORT_NAME
+    target = report_file(path)
     if not result.records:
         message = f"{target}: not written: no run was completed"
         raise BadInputError(message)

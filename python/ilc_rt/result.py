@@ -19,6 +19,7 @@ from ilc_rt.events import (
 )
 from ilc_rt.record import IterationRecord
 
+REPORT_NAME = "ilc-report.html"
 # The best run is worth a word if it is this much better than the last.
 BEST_SHARE = 0.9
 
@@ -241,8 +242,12 @@ def library_rows(library: str | Path, cell: str | None = None) -> list[dict[str,
     BadInputError
         If the file is missing or is not a library.
     """
-    if not Path(library).is_file():
+    path = Path(library)
+    if not path.exists():
         message = f"{library}: no such library"
+        raise BadInputError(message)
+    if path.is_file() and path.stat().st_size == 0:
+        message = f"{library}: an empty file, and no library yet"
         raise BadInputError(message)
     try:
         return list(Library(str(library)).list(cell))
@@ -276,6 +281,49 @@ def reduction(before: float, after: float) -> float:
     75.0
     """
     return 100.0 * (1.0 - after / before) if before > 0 else 0.0
+
+
+def report_file(path: str | Path) -> Path:
+    """Return the file of a report: the path itself, or one in it if it is a folder.
+
+    Examples
+    --------
+    >>> report_file("runs/today.html").as_posix(), report_file("runs").as_posix()
+    ('runs/today.html', 'runs/ilc-report.html')
+    """
+    target = Path(path)
+    return target / REPORT_NAME if target.is_dir() or not target.suffix else target
+
+
+def require_writable(path: str | Path, option: str) -> None:
+    """Refuse a file that cannot be written, before anything has been done for it.
+
+    What is missing of the way to it is made and taken away again.
+
+    Raises
+    ------
+    BadInputError
+        With option, file and reason.
+    """
+    target = Path(path)
+    try:
+        if target.exists() and not target.is_file() and not target.is_dir():
+            return  # a device or a pipe: to open it now would be to use it
+        is_new = not target.exists()
+        missing = [folder for folder in target.parents if not folder.exists()]
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with target.open("ab"):
+                pass
+            if is_new:
+                target.unlink()
+        finally:
+            for folder in missing:
+                if folder.is_dir():
+                    folder.rmdir()
+    except OSError as error:
+        message = f"{option} {path}: cannot be written: {error.strerror}"
+        raise BadInputError(message) from error
 
 
 def write_text(path: str | Path, text: str) -> None:

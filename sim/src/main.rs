@@ -12,6 +12,7 @@ use ilc_rt::fieldbus::canopen::NodeId;
 use ilc_sim::{ClockMode, Machine, eds};
 
 mod drive_clock;
+mod neighbours;
 mod run;
 
 use run::{Habits, Mute};
@@ -51,6 +52,10 @@ enum Verb {
         /// by itself; until then a controller that stalls stalls the plant.
         #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
         sync_lost_after: Duration,
+        /// End when standard input closes, as it does when the program that started this one ends: the
+        /// axes come to rest first.
+        #[arg(long)]
+        with_parent: bool,
     },
     /// Prints the electronic data sheet (EDS) of a node.
     Eds {
@@ -89,8 +94,8 @@ fn main() -> ExitCode {
 
 fn carry_out(verb: Verb) -> Result<(), Failure> {
     match verb {
-        Verb::Run { cell, bus, lockstep, mute, sync_lost_after } => {
-            run(&cell, bus, lockstep, &Habits { sync_lost_after, mutes: mute })
+        Verb::Run { cell, bus, lockstep, mute, sync_lost_after, with_parent } => {
+            run(&cell, bus, lockstep, &Habits { sync_lost_after, mutes: mute, with_parent })
         }
         Verb::Eds { cell, node } => print_eds(&cell, node),
     }
@@ -110,8 +115,17 @@ fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Res
     for mute in &habits.mutes {
         require_node(&machine, mute.node, "--mute")?;
     }
-    let bus = ilc_rt::fieldbus::transport::open(&address)
+    let mut bus = ilc_rt::fieldbus::transport::open(&address)
         .map_err(|error| Failure::Input(error.to_string()))?;
+    let nodes: Vec<NodeId> = machine.nodes().collect();
+    let present = neighbours::first_present(bus.as_mut(), &nodes)
+        .map_err(|error| Failure::Broken(format!("{address}: {error}")))?;
+    if let Some(node) = present {
+        return Err(Failure::Input(format!(
+            "{address}: there is a node {node} on this bus already, of other drives: another \
+             `ilc-sim` or `ilc run` uses this address; end it, or give another one with --bus"
+        )));
+    }
     run::run(&cell, machine, bus, &address, clock, habits)
         .map_err(|error| Failure::Broken(error.to_string()))
 }

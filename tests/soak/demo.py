@@ -171,6 +171,8 @@ def main() -> int:
     parser.add_argument("--times", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
+    # A request to end must end what was started as well.
+    signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
     draw = random.Random(arguments.seed)
     tally: Counter[str] = Counter()
     with tempfile.TemporaryDirectory(dir=Path.cwd()) as name, contextlib.ExitStack() as stack:

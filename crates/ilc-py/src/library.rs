@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use ilc_rt::library::{Library, Row, Task};
+use ilc_rt::library::{Library, LibraryError, Row, Task};
 use ilc_rt::record::{Figures, IterationRecord, Meta, fingerprint, infinity_norm, rms};
+use ilc_rt::trajectory::{MAX_AXES, contour_error_m};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -13,17 +14,29 @@ use crate::argument::{Signal, give_signal, misfit, read_disturbance};
 use crate::detached::detached;
 use crate::error::OrRaise;
 
+/// Longest name of a cell, a campaign or a law.
+const NAME_MAX: usize = 200;
+/// Farthest that a point is looked for along the path, before or after its own time, as for runs made here.
+const CONTOUR_WINDOW_S: f64 = 0.25;
+
 /// Every run of every campaign, in one SQLite file.
 ///
 /// Parameters
 /// ----------
 /// path : str or os.PathLike
-///     The file; it is made if it is not there.
+///     The file; it is made if it is not there. ``:memory:`` is a library in
+///     memory. The name is never taken for an address.
 ///
 /// Raises
 /// ------
 /// OSError
-///     If the file cannot be opened or is no library.
+///     If the file cannot be opened or is no library; it is left as it is.
+///
+/// Notes
+/// -----
+/// What reads opens the file for reading only, and for no longer than that: a
+/// library that cannot be written is read all the same, and nothing is left
+/// beside it.
 ///
 /// Examples
 /// --------
@@ -33,7 +46,16 @@ use crate::error::OrRaise;
 #[pyclass(name = "Library", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyLibrary {
-    library: Mutex<Library>,
+    held: Held,
+}
+
+/// Where the runs are.
+#[derive(Debug)]
+enum Held {
+    /// In memory, for as long as this object lives.
+    Memory(Box<Mutex<Library>>),
+    /// In a file, which is opened for each thing that is done.
+    File(PathBuf),
 }
 
 #[pymethods]
@@ -41,7 +63,19 @@ impl PyLibrary {
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(path: PathBuf) -> PyResult<Self> {
-        Ok(Self { library: Mutex::new(Library::open(&path).or_raise()?) })
+        if path.as_os_str() == ":memory:" {
+            let library = Library::in_memory().or_raise()?;
+            return Ok(Self { held: Held::Memory(Box::new(Mutex::new(library))) });
+        }
+        match Library::read(&path) {
+            Ok(_) => {}
+            // A new file is made at once, so that a name that cannot be used is refused here.
+            Err(LibraryError::Missing { .. } | LibraryError::Empty { .. }) => {
+                Library::open(&path).or_raise()?;
+            }
+            refused @ Err(_) => drop(refused.or_raise()?),
+        }
+        Ok(Self { held: Held::File(path) })
     }
 
     /// Return the runs kept, oldest first, without their arrays.
@@ -62,7 +96,7 @@ impl PyLibrary {
     ///     If the file cannot be read.
     #[pyo3(signature = (cell=None))]
     fn list<'py>(&self, py: Python<'py>, cell: Option<&str>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let rows = detached(py, || self.lock().list(None)).or_raise()?;
+        let rows = detached(py, || self.read(|library| library.list(None))).or_raise()?;
         rows.iter()
             .filter(|row| cell.is_none_or(|name| row.meta.cell == name))
             .map(|row| describe(py, row))
@@ -90,7 +124,7 @@ impl PyLibrary {
     /// OSError
     ///     If there is no such run, or its arrays do not match their digest.
     fn load<'py>(&self, py: Python<'py>, id: i64) -> PyResult<Bound<'py, PyDict>> {
-        let row = detached(py, || self.lock().load(id)).or_raise()?;
+        let row = detached(py, || self.read(|library| library.load(id))).or_raise()?;
         let run = describe(py, &row)?;
         let n_axes = row.meta.n_axes;
         let record = row.record;
@@ -143,7 +177,8 @@ impl PyLibrary {
     ) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let disturbance = read_disturbance("disturbance", disturbance)?;
         let task = Task { cell };
-        let found = detached(py, || self.lock().recall(&disturbance, top, &task)).or_raise()?;
+        let found = detached(py, || self.read(|library| library.recall(&disturbance, top, &task)))
+            .or_raise()?;
         found
             .iter()
             .map(|near| {
@@ -167,7 +202,9 @@ impl PyLibrary {
     /// disturbance : float, array_like of float64 or None
     ///     The disturbance it was made under, shape (n_disturbances,).
     /// reference_m : ndarray of float64 or None
-    ///     Its set points in m, same shape as `u`; None: zero.
+    ///     Its set points in m, same shape as `u`; None: zero, so that its path is
+    ///     one point. The contour error is the distance to the path near the same
+    ///     time.
     /// cell, campaign, law : str
     ///     Names; its number follows the last one of the campaign.
     ///
@@ -180,7 +217,7 @@ impl PyLibrary {
     /// ------
     /// ValueError, TypeError
     ///     If an array has the wrong shape, dtype or a number that is not finite,
-    ///     or cycle_s is not above 0.
+    ///     cycle_s is not above 0, or a name is empty or has control characters.
     /// OSError
     ///     If the file cannot be written.
     ///
@@ -230,6 +267,30 @@ impl PyLibrary {
             None => Vec::new(),
         };
         let n_axes = u.n_channels;
+        if u.n_samples == 0 || !(1..=MAX_AXES).contains(&n_axes) {
+            let line = format!(
+                "u has shape {}: at least one sample and 1 to {MAX_AXES} axes are allowed",
+                u.shape()
+            );
+            return Err(PyValueError::new_err(line));
+        }
+        for (key, name) in [("cell", cell), ("campaign", campaign), ("law", law)] {
+            if name.is_empty() || name.len() > NAME_MAX || name.chars().any(char::is_control) {
+                let line = format!(
+                    "{key} = {}: 1 to {NAME_MAX} bytes without control characters are allowed",
+                    name.chars().take(40).collect::<String>().escape_debug()
+                );
+                return Err(PyValueError::new_err(line));
+            }
+        }
+        let encoder_m: Vec<f64> = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
+        let window = (CONTOUR_WINDOW_S / cycle_s).min(u.n_samples as f64);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped above"
+        )]
+        let contour_m = contour_error_m(&reference_m, &encoder_m, n_axes, window as usize);
         let meta = Meta {
             cell: cell.to_owned(),
             campaign: campaign.to_owned(),
@@ -246,26 +307,28 @@ impl PyLibrary {
         let figures = Figures {
             tracking_inf_m: infinity_norm(&error_m),
             tracking_rms_m: rms(&error_m, n_axes),
+            encoder_tracking_inf_m: infinity_norm(&error_m),
+            contour_inf_m: infinity_norm(&contour_m),
+            contour_rms_m: rms(&contour_m, 1),
             ..Figures::default()
         };
-        let encoder_m = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
-        let contour_m = vec![0.0; u.n_samples];
         let input = u.values;
         detached(py, || {
-            let library = self.lock();
-            let index = library.next_index(campaign)?;
-            let record = IterationRecord {
-                index,
-                reference_m,
-                input,
-                encoder_m,
-                tool_m: Vec::new(),
-                error_m,
-                contour_m,
-                disturbance,
-                figures,
-            };
-            library.append(&meta, &record)
+            self.write(|library| {
+                let index = library.next_index(campaign)?;
+                let record = IterationRecord {
+                    index,
+                    reference_m,
+                    input,
+                    encoder_m,
+                    tool_m: Vec::new(),
+                    error_m,
+                    contour_m,
+                    disturbance,
+                    figures,
+                };
+                library.append(&meta, &record)
+            })
         })
         .or_raise()
     }
@@ -288,17 +351,18 @@ impl PyLibrary {
     /// ------
     /// OSError
     ///     If the file cannot be written, or the runs have different numbers of
-    ///     disturbances; nothing is deleted then.
+    ///     disturbances (nothing is deleted then), or the file could not be made
+    ///     smaller.
     ///
     /// Notes
     /// -----
     /// The relevance of DPW-ILC with RMS error and disturbance in units of their
     /// spread over these runs, summed over the disturbances of all of them; without
-    /// disturbances the smallest errors stay. The space in the file is used again.
+    /// disturbances the smallest errors stay. The file becomes smaller.
     #[pyo3(signature = (keep, cell=None))]
     fn trim(&self, py: Python<'_>, keep: usize, cell: Option<String>) -> PyResult<usize> {
         let task = Task { cell };
-        detached(py, || self.lock().trim(keep, &task)).or_raise()
+        detached(py, || self.write(|library| library.trim(keep, &task))).or_raise()
     }
 
     /// Write one run to a file: ``.npz``, ``.csv`` or ``.json`` by its ending.
@@ -323,8 +387,26 @@ impl PyLibrary {
 }
 
 impl PyLibrary {
-    pub(crate) fn lock(&self) -> std::sync::MutexGuard<'_, Library> {
-        self.library.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Reads from the library.
+    pub(crate) fn read<T>(
+        &self,
+        work: impl FnOnce(&Library) -> Result<T, LibraryError>,
+    ) -> Result<T, LibraryError> {
+        match &self.held {
+            Held::Memory(library) => work(&library.lock().unwrap_or_else(PoisonError::into_inner)),
+            Held::File(path) => work(&Library::read(path)?),
+        }
+    }
+
+    /// Writes to the library.
+    fn write<T>(
+        &self,
+        work: impl FnOnce(&Library) -> Result<T, LibraryError>,
+    ) -> Result<T, LibraryError> {
+        match &self.held {
+            Held::Memory(library) => work(&library.lock().unwrap_or_else(PoisonError::into_inner)),
+            Held::File(path) => work(&Library::open(path)?),
+        }
     }
 }
 

@@ -19,8 +19,9 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
-from ilc_rt.errors import EXIT_FAULT, CampaignError
+from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
 from ilc_rt.progress import CampaignView
+from ilc_rt.result import report_file, require_writable
 
 ReportFile = Annotated[
     Path | None,
@@ -84,6 +85,13 @@ def carry_out(
     that were completed. A fault of the machine is followed by going on where
     the campaign was, `restarts` times at most.
     """
+    if json_file is not None:
+        if not json_file.absolute().parent.is_dir():
+            message = f"--json {json_file}: no such folder: {json_file.absolute().parent}"
+            raise BadInputError(message)
+        require_writable(json_file, "--json")
+    if report is not None:
+        require_writable(report_file(report), "--report")
     try:
         _show(campaign, iterations, restarts)
     except (CampaignError, KeyboardInterrupt, SystemExit) as stopped:

@@ -58,6 +58,10 @@ pub(super) struct IdentifyArguments {
     /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
     #[arg(long)]
     simulated_drives: bool,
+    /// Stop the axes and end when standard input closes, as it does when the program that started this
+    /// one ends.
+    #[arg(long)]
+    with_parent: bool,
     /// Where the experiment is kept.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     library: PathBuf,
@@ -150,7 +154,7 @@ fn experiment(
         library: arguments.library.clone(),
         disturbance: Disturbance::default(),
         telemetry: !arguments.no_telemetry,
-        stop: stop_on_signals(),
+        stop: stop_on_signals(arguments.with_parent),
     };
     let mut kept = None;
     let mut observe = |event: &Event| {
@@ -167,7 +171,7 @@ fn experiment(
     let (Some(id), EndStatus::Completed, false) = (kept, outcome.status, arguments.events) else {
         return Ok((outcome, None));
     };
-    let record = Library::open(&arguments.library)?.load(id)?.record;
+    let record = Library::read(&arguments.library)?.load(id)?.record;
     let identified = Identified::new(&cell, &experiment, &record)?;
     show::say(&describe(&experiment, &identified));
     Ok((outcome, Some(identified)))

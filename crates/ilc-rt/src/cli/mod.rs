@@ -6,8 +6,11 @@ mod check;
 mod figures;
 mod identify;
 mod latency;
+mod parent;
 mod run;
 mod show;
+
+pub use parent::when_parent_ends;
 
 use std::process::ExitCode;
 

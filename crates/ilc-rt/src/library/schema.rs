@@ -1,14 +1,21 @@
 //! The tables, and how they come to be.
 
+use rusqlite::Connection;
+
+/// Mark of this program's files, in SQLite's `application_id`: "ILCL".
+pub(super) const MARK: i64 = 0x494C_434C;
+/// The version from which on there is an index of disturbances.
+pub(super) const INDEXED: i64 = 2;
+
 /// Version of the schema, in SQLite's `user_version`.
 pub(super) const VERSION: i64 = 2;
-/// The oldest version that [`CREATE`] brings up to date: it names only what is missing.
+/// The oldest version that [`create`] brings up to date: it names only what is missing.
 ///
 /// Version 1 had the column for the disturbance, and nothing in it.
 pub(super) const OLDEST: i64 = 1;
 
 /// Arrays are little-endian float64, time first; lists of names and disturbances are JSON; times are UTC in ISO 8601.
-pub(super) const CREATE: &str = "
+const CREATE: &str = "
 CREATE TABLE IF NOT EXISTS iteration (
     id              INTEGER PRIMARY KEY,
     created_utc     TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
@@ -50,3 +57,17 @@ CREATE INDEX IF NOT EXISTS iteration_by_fingerprint ON iteration (fingerprint, i
 CREATE INDEX IF NOT EXISTS iteration_by_disturbance ON iteration (cell, disturbance)
     WHERE disturbance IS NOT NULL;
 ";
+
+/// Sets what must be said before the first page of a file is written: the pages of runs that are deleted
+/// can be given back to the system.
+pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
+    connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")
+}
+
+/// Makes the tables in an empty file, or brings an older library up to date: all of it or nothing, so that
+/// a process that is killed leaves a file that is still empty, or a library.
+pub(super) fn create(connection: &Connection) -> rusqlite::Result<()> {
+    connection.execute_batch(&format!(
+        "BEGIN IMMEDIATE;{CREATE}PRAGMA application_id = {MARK};PRAGMA user_version = {VERSION};COMMIT"
+    ))
+}

@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use super::announce::Announcer;
+use super::claim::{Claim, claim};
 use super::collect::Collector;
 use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
+use super::keeper::{Keeper, Kept};
 use super::learner::{Learner, expect};
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S};
 use super::pace::Pacer;
@@ -18,7 +20,7 @@ use crate::config::Cell;
 use crate::fieldbus::Bus;
 use crate::learning::Law;
 use crate::library::Library;
-use crate::record::{EndStatus, Event, Figures, IterationRecord, Meta, StateName};
+use crate::record::{EndStatus, Event, Figures, IterationRecord, StateName};
 use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
@@ -108,10 +110,16 @@ fn carry_out(
     }
     let library = Library::open(&options.library)?;
     let mut progress = Progress::new(growth_allowed);
+    let mut held = Claim::none();
     let resumed = if options.resume {
+        // Claimed before it is read: what another program adds to it meanwhile would be made twice.
+        if let Some(campaign) = library.newest_campaign(&plan.meta.fingerprint)? {
+            held = claim(&options.library, &campaign)?;
+        }
         progress.resume(&library, &mut plan.meta, law.as_deref_mut(), &options.disturbance)?
     } else {
         plan.meta.campaign = library.new_campaign()?;
+        held = claim(&options.library, &plan.meta.campaign)?;
         let coming = options.disturbance.of(0).map_err(SupervisorError::Disturbance)?;
         if let Some(law) = law.as_deref_mut() {
             expect(law, &coming);
@@ -146,6 +154,12 @@ fn carry_out(
         plan.servo.hold_cycles_max = patience;
         plan.servo.overrun_cycles_max = plan.servo.overrun_cycles_max.max(patience);
     }
+    let meta = Arc::new(plan.meta.clone());
+    let keeper = if options.lockstep {
+        Keeper::in_line(library, meta)
+    } else {
+        Keeper::on_thread(library, meta)?
+    };
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&options.stop));
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next) {
         progress.send(&mut mail, input, update_ms);
@@ -187,8 +201,10 @@ fn carry_out(
             cell.cycle_s(),
         ),
         announcer,
-        library,
-        meta: plan.meta,
+        keeper,
+        campaign: plan.meta.campaign,
+        unkept: Vec::new(),
+        _claim: held,
         progress,
         learner,
         runs: resumed.runs,
@@ -217,8 +233,12 @@ fn carry_out(
 struct Running<'a> {
     collector: Collector,
     announcer: Announcer<'a>,
-    library: Library,
-    meta: Meta,
+    keeper: Keeper,
+    /// Name of the campaign.
+    campaign: String,
+    /// Runs that could not be kept, oldest first.
+    unkept: Vec<IterationRecord>,
+    _claim: Claim,
     progress: Progress,
     learner: Option<Learner>,
     runs: Vec<(u32, Figures)>,
@@ -267,6 +287,9 @@ impl Running<'_> {
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
         }
+        while let Some(kept) = self.keeper.take() {
+            self.heed(kept);
+        }
         while let Some(lesson) = self.learner.as_mut().and_then(Learner::take) {
             // Once for each change: what stays as it is need not be said after every run.
             if lesson.remark != self.remark {
@@ -291,7 +314,7 @@ impl Running<'_> {
             match self.disturbance.of(record.index + 1) {
                 Ok(coming) => self.present = coming,
                 Err(why) => {
-                    self.keep(&record);
+                    self.keep(record);
                     self.fail(why);
                     return;
                 }
@@ -313,21 +336,63 @@ impl Running<'_> {
         if let Decision::RollBack(input) = decision {
             self.progress.send(&mut self.mail, input, 0.0);
         }
-        self.keep(&record);
+        self.keep(record);
     }
 
-    fn keep(&mut self, record: &IterationRecord) {
-        match self.library.append(&self.meta, record) {
-            Ok(id) => {
-                self.announcer.tell(&Event::Iteration {
-                    id,
-                    index: record.index,
-                    digest: record.digest(),
-                    figures: record.figures.clone(),
-                });
-                self.runs.push((record.index, record.figures.clone()));
+    fn keep(&mut self, record: IterationRecord) {
+        self.keeper.begin(record);
+        while let Some(kept) = self.keeper.take() {
+            self.heed(kept);
+        }
+    }
+
+    /// Tells of a run that is kept; the first one that is not stops the axes.
+    fn heed(&mut self, kept: Kept) {
+        let Kept { record, result } = kept;
+        match result {
+            Some(Ok(id)) => self.tell_kept(id, &record),
+            Some(Err(error)) => {
+                self.fail(error.to_string());
+                self.unkept.push(record);
             }
-            Err(error) => self.fail(error.to_string()),
+            None => self.unkept.push(record),
+        }
+    }
+
+    fn tell_kept(&mut self, id: i64, record: &IterationRecord) {
+        self.announcer.tell(&Event::Iteration {
+            id,
+            index: record.index,
+            digest: record.digest(),
+            figures: record.figures.clone(),
+        });
+        self.runs.push((record.index, record.figures.clone()));
+    }
+
+    /// Waits for the runs that are being kept, and tries once more to keep those that could not be.
+    fn finish_keeping(&mut self) {
+        for kept in self.keeper.finish() {
+            self.heed(kept);
+        }
+        if self.unkept.is_empty() {
+            return;
+        }
+        let first = self.unkept[0].index;
+        let mut is_saved = true;
+        for record in std::mem::take(&mut self.unkept) {
+            let Some(id) = self.keeper.retry(&record) else {
+                is_saved = false;
+                break;
+            };
+            self.tell_kept(id, &record);
+        }
+        let lost = if is_saved { "could not be kept at once" } else { "could not be kept" };
+        let kept = match self.runs.len() {
+            1 => "1 run is kept".to_owned(),
+            n => format!("{n} runs are kept"),
+        };
+        if let Some(why) = &mut self.failure {
+            why.push_str(&format!("; run {first} {lost}, {kept}"));
         }
     }
 
@@ -341,6 +406,7 @@ impl Running<'_> {
     fn end(mut self, pacer: Pacer, cell: &Cell, options: &Options) -> Outcome {
         let remains = pacer.end();
         self.read_mail();
+        self.finish_keeping();
         let (status, reason) = match (&self.failure, self.stopping, &remains) {
             (Some(why), _, _) => (EndStatus::Fault, why.clone()),
             (None, Some(reason), _) => {
@@ -357,8 +423,8 @@ impl Running<'_> {
         if status == EndStatus::Fault {
             self.announcer.tell(&Event::Fault { reason: reason.clone() });
         }
-        if let Some(mut remains) = remains {
-            if let Err(error) = nodes::release(remains.bus.as_mut()) {
+        if let Some(remains) = remains {
+            if let Err(error) = remains.released {
                 tracing::warn!("nodes could not be taken out of operation: {error}");
             }
             if let Some(timing) = remains.timing {
@@ -376,7 +442,7 @@ impl Running<'_> {
             Some(StopReason::Asked(signal)) if self.failure.is_none() => signal,
             _ => 0,
         };
-        Outcome { status, reason, signal, campaign: self.meta.campaign, runs: self.runs }
+        Outcome { status, reason, signal, campaign: self.campaign, runs: self.runs }
     }
 }
 
