@@ -13,7 +13,6 @@ import platform
 import re
 from datetime import datetime, timezone
 from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -24,6 +23,7 @@ from ilc_rt.result import CampaignResult, micrometres, reduction, report_file, w
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from matplotlib.figure import Figure
 

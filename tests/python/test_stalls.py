@@ -35,7 +35,7 @@ def stall(processes: list[Process], seconds: float) -> None:
 
 @pytest.mark.parametrize("who", ["drives", "controller", "both"])
 def test_a_stall_pauses_the_motion_and_ends_nothing(bench: Bench, who: str) -> None:
-    """20 to 300 ms at drawn moments: every run is made, no sample is lost, the stalls are counted."""
+    """20 to 300 ms at drawn moments: every run is made, and no sample is lost."""
     draw = random.Random(f"stalls of {who}")
     cell = bench.cell(short=True)
     drives = bench.drives(cell)
@@ -54,7 +54,7 @@ def test_a_stall_pauses_the_motion_and_ends_nothing(bench: Bench, who: str) -> N
 
 
 def test_a_stalled_run_is_the_run_that_was_not_stalled(bench: Bench) -> None:
-    """The plant pauses with the controller, so that the path is the same, and the stall is counted."""
+    """The plant pauses with the controller: the path is the same, and the stall is counted."""
     cell = bench.cell(short=True)
     bench.drives(cell)
     controller = bench.controller(cell, "--simulated-drives", "--no-learning", runs=3)

@@ -186,7 +186,8 @@ def main() -> int:
             tally[came] += 1
             last = (folder / "said").read_text().splitlines()
             sentence = next((line for line in last if " within " in line), "")
-            print(f"{number + 1:3}  {time.monotonic() - began:5.1f} s  {came}  {sentence}", flush=True)
+            took_s = time.monotonic() - began
+            print(f"{number + 1:3}  {took_s:5.1f} s  {came}  {sentence}", flush=True)
     print()
     for came, count in tally.most_common():
         print(f"{count:3} of {arguments.times}  {came}")

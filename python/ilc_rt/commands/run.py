@@ -106,22 +106,21 @@ def carry_out(
 
 
 def _show(campaign: Campaign, iterations: int, restarts: int) -> None:
-    while True:
-        try:
-            with CampaignView() as view:
-                for event in campaign.events(iterations):
-                    view.show(event, campaign.result)
-        except CampaignError as stopped:
-            # A run that cannot be kept would not be kept the next time either.
-            if stopped.exit_code != EXIT_FAULT or restarts == 0 or campaign.result.unkept:
-                raise
-            restarts -= 1
-            n_runs = len(campaign.result.records)
-            campaign.resume = n_runs > 0
-            onward = f"going on after run {n_runs - 1}" if n_runs else "beginning again"
-            typer.echo(f"ilc: {stopped.reason}; {onward}", err=True)
-        else:
-            return
+    try:
+        with CampaignView() as view:
+            for event in campaign.events(iterations):
+                view.show(event, campaign.result)
+    except CampaignError as stopped:
+        # A run that cannot be kept would not be kept the next time either.
+        if stopped.exit_code != EXIT_FAULT or restarts == 0 or campaign.result.unkept:
+            raise
+        n_runs = len(campaign.result.records)
+        campaign.resume = n_runs > 0
+        onward = f"going on after run {n_runs - 1}" if n_runs else "beginning again"
+        typer.echo(f"ilc: {stopped.reason}; {onward}", err=True)
+    else:
+        return
+    _show(campaign, iterations, restarts - 1)
 
 
 def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> None:
