@@ -44,9 +44,15 @@ def identify(
         float | None, typer.Option(help="Peak for a csp axis; half of what the limits allow.")
     ] = None,
     amplitude_m_s: Annotated[float | None, typer.Option(help="Peak for a csv axis.")] = None,
-    from_hz: Annotated[float, typer.Option(help="Lowest frequency.")] = 1.0,
-    to_hz: Annotated[float, typer.Option(help="Highest frequency.")] = 50.0,
-    duration_s: Annotated[float, typer.Option(help="Length of one period.")] = 8.0,
+    from_hz: Annotated[
+        float | None, typer.Option(help="Lowest frequency; 1 Hz, or less for a slow axis.")
+    ] = None,
+    to_hz: Annotated[
+        float | None, typer.Option(help="Highest frequency; tried out if not given.")
+    ] = None,
+    duration_s: Annotated[
+        float | None, typer.Option(help="Length of one period; 8 s, or more for a slow axis.")
+    ] = None,
     periods: Annotated[int, typer.Option(help="Periods to evaluate, at least 2.")] = 5,
     at_m: Annotated[
         float | None, typer.Option(help="Where to excite it; the program's start if not given.")
@@ -83,7 +89,7 @@ def identify(
         "axis": name, "amplitude": amplitude, "from_hz": from_hz, "to_hz": to_hz,
         "duration_s": duration_s, "periods": periods, "at_m": at_m,
         "measure": measure.value if measure else None, "bus": bus, "lockstep": lockstep,
-        "drives": drives.value, "library": library, "observe": tell,
+        "drives": drives.value, "library": library, "observe": tell, "tell": typer.echo,
     }  # fmt: skip
     try:
         if method is Method.multisine:

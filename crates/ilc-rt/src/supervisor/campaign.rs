@@ -109,7 +109,7 @@ fn carry_out(
         return Err(SupervisorError::Resume(format!("there is no library {path} to go on with")));
     }
     let library = Library::open(&options.library)?;
-    let mut progress = Progress::new(growth_allowed);
+    let mut progress = Progress::new(growth_allowed).forgiving(options.forgives_stalls());
     let mut held = Claim::none();
     let resumed = if options.resume {
         // Claimed before it is read: what another program adds to it meanwhile would be made twice.
@@ -147,7 +147,10 @@ fn carry_out(
     announcer.tell(&Event::State { state: StateName::BringingUp, iteration: first });
     nodes::start(cell, bus.as_mut(), options)?;
 
-    plan.servo.runs = first..options.iterations;
+    // Drives that were off do not begin where the last run left them. One run with the coming input
+    // brings them there; it is not kept, as it says nothing of the law.
+    let warm_up = u32::from(!resumed.runs.is_empty());
+    plan.servo.runs = first - warm_up..options.iterations;
     if options.forgives_stalls() {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
         let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;
@@ -210,6 +213,7 @@ fn carry_out(
         runs: resumed.runs,
         disturbance: options.disturbance.clone(),
         present: resumed.coming,
+        first,
         iterations: options.iterations,
         mail,
         stopping: None,
@@ -245,6 +249,8 @@ struct Running<'a> {
     disturbance: Disturbance,
     /// Disturbance of the run that is on, or about to be.
     present: Vec<f64>,
+    /// The first run that counts.
+    first: u32,
     iterations: u32,
     mail: Mailbox,
     stopping: Option<StopReason>,
@@ -266,6 +272,7 @@ impl Running<'_> {
                     self.announcer.sample(&sample);
                     if let Some((run, k)) = sample.at {
                         self.collector.take(run, k, &sample);
+                        let run = run.max(self.first);
                         if k % self.progress_every == self.progress_every - 1 {
                             let (iteration, sample) = (run, k as usize + 1);
                             let n_samples = self.n_samples;
@@ -274,6 +281,7 @@ impl Running<'_> {
                     }
                 }
                 Message::Phase(phase, iteration) => {
+                    let iteration = iteration.max(self.first);
                     self.phase_iteration = iteration;
                     if let Some(state) = state_name(phase) {
                         self.announcer.tell(&Event::State { state, iteration });
@@ -283,6 +291,7 @@ impl Running<'_> {
                     self.collector.begin(run);
                     self.progress.started(table);
                 }
+                Message::RunEnded { run, .. } if run < self.first => {}
                 Message::RunEnded { overruns, .. } => self.run_ended(overruns),
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
@@ -322,6 +331,14 @@ impl Running<'_> {
         }
         self.progress.note(&mut record);
         let decision = self.progress.decide(&mut record);
+        if self.progress.is_disturbed(&record.figures) {
+            tracing::warn!(
+                "run {} was disturbed ({} cycles late, {} samples missing): its input is repeated",
+                record.index,
+                record.figures.overruns,
+                record.figures.missing_samples
+            );
+        }
         if let Some(learner) = &mut self.learner {
             if decision == Decision::Learn {
                 self.progress.asked();

@@ -42,6 +42,8 @@ pub(super) struct Progress {
     /// Time of the lesson in each table handed to the loop; table n at n - 1.
     update_ms: Vec<f64>,
     table_in_use: u32,
+    /// Whether overruns are no disturbance, as the plant stood still as well.
+    forgives_overruns: bool,
 }
 
 impl Progress {
@@ -54,7 +56,19 @@ impl Progress {
             late_updates: 0,
             update_ms: Vec::new(),
             table_in_use: 0,
+            forgives_overruns: false,
         }
+    }
+
+    /// The same, where a computer that stalls stalls the plant too: its time passes by SYNC, so that the
+    /// samples of a run with overruns are those of one without.
+    pub(super) fn forgiving(self, forgives_overruns: bool) -> Self {
+        Self { forgives_overruns, ..self }
+    }
+
+    /// Whether a run was disturbed by computer or bus, so that it is no evidence.
+    pub(super) fn is_disturbed(&self, figures: &Figures) -> bool {
+        figures.missing_samples > 0 || figures.overruns > 0 && !self.forgives_overruns
     }
 
     /// A run began with a table.
@@ -85,16 +99,17 @@ impl Progress {
     /// Decides what follows a run, and marks it if the best input is restored because of it.
     ///
     /// Growth is measured in the RMS error over the best run so far. After two restorations the law
-    /// has shown that it does not converge here, and learning stays off. A run that the computer
-    /// disturbed (overruns, missing samples) is no evidence: unless it is the best all the same, its
-    /// input is repeated. Nor is a larger error under another disturbance than the best run's evidence
-    /// against the law: it goes on learning.
+    /// has shown that it does not converge here, and learning stays off. A run that computer or bus
+    /// disturbed (overruns, missing samples) is no evidence, for the law or against it, be it the first
+    /// or seemingly the best: its input is repeated. Nor is a larger error under another disturbance than
+    /// the best run's evidence against the law: it goes on learning.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
         let rms = record.figures.tracking_rms_m;
         let off = self.rollbacks >= ROLLBACKS_MAX;
-        let disturbed = record.figures.overruns > 0 || record.figures.missing_samples > 0;
+        if self.is_disturbed(&record.figures) {
+            return Decision::Hold;
+        }
         match &self.best {
-            Some(best) if disturbed && rms >= best.rms => Decision::Hold,
             Some(best)
                 if rms > best.rms * self.rollback_ratio
                     && !off
@@ -237,15 +252,31 @@ mod tests {
 
     #[test]
     fn a_disturbed_run_is_neither_learned_from_nor_held_against_the_law() {
+        let disturbed = |rms, overruns, missing_samples| {
+            let mut record = record(rms);
+            (record.figures.overruns, record.figures.missing_samples) = (overruns, missing_samples);
+            record
+        };
         let mut progress = Progress::new(1.5);
+        // The first one neither, nor one that seems to be the best.
+        assert_eq!(progress.decide(&mut disturbed(0.1, 0, 1)), Decision::Hold);
         assert_eq!(progress.decide(&mut record(1.0)), Decision::Learn);
-        let mut disturbed = record(9.0);
-        disturbed.figures.overruns = 3;
-        assert_eq!(progress.decide(&mut disturbed), Decision::Hold);
-        assert!(!disturbed.figures.rolled_back);
-        let mut better = record(0.5);
-        better.figures.missing_samples = 1;
-        assert_eq!(progress.decide(&mut better), Decision::Learn);
+        let mut worse = disturbed(9.0, 3, 0);
+        assert_eq!(progress.decide(&mut worse), Decision::Hold);
+        assert!(!worse.figures.rolled_back);
+        assert_eq!(progress.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
+        assert_eq!(progress.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
+        assert_eq!(progress.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
+    }
+
+    #[test]
+    fn a_stall_that_stalls_the_plant_as_well_disturbs_nothing() {
+        let mut progress = Progress::new(1.5).forgiving(true);
+        let mut stalled = record(1.0);
+        stalled.figures.overruns = 50;
+        assert_eq!(progress.decide(&mut stalled), Decision::Learn);
+        stalled.figures.missing_samples = 1;
+        assert_eq!(progress.decide(&mut stalled), Decision::Hold);
     }
 
     #[test]
