@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
     from ilc_rt.experiment import Experiment
 
-ITERATIONS_MAX = 2**32 - 1
 DEFAULT_LIBRARY = "ilc-library.db"
+# Runs are counted in 32 bits.
+ITERATIONS_MAX = 2**32 - 1
 TRANSPORTS = ("can", "udp", "zenoh", "loopback")
 Drives = Literal["auto", "simulated", "external"]
 
@@ -186,7 +187,8 @@ class Campaign:
         iterator is closed. Parameters and errors are those of `run`.
         """
         if not 1 <= iterations <= ITERATIONS_MAX:
-            message = f"iterations = {iterations}: allowed 1 to {ITERATIONS_MAX}"
+            allowed = "at least 1" if iterations < 1 else f"at most {ITERATIONS_MAX}"
+            message = f"iterations = {iterations}: {allowed}"
             raise BadInputError(message)
         measure = _measure(self.disturbance, iterations)
         self.result = CampaignResult(self.library)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 BOM = "\ufeff"
 
 
-def write_values(path: str | Path, section: str, values: Mapping[str, float]) -> bool:
-    """Put numbers into a table of a cell description, in one step.
+def write_values(path: str | Path, tables: Mapping[str, Mapping[str, float]]) -> bool:
+    """Put numbers into tables of a cell description, in one step.
 
     Comments, order and spelling of everything else stay. The file is replaced
     only by one that the controller accepts.
@@ -30,10 +30,9 @@ def write_values(path: str | Path, section: str, values: Mapping[str, float]) ->
     ----------
     path : path
         The cell description.
-    section : str
-        The table, as ``learning.norm_optimal``; made if it is not there.
-    values : mapping
-        The numbers by key.
+    tables : mapping
+        The numbers by key, by table, as ``learning.norm_optimal``; a table that
+        is not there is made.
 
     Returns
     -------
@@ -56,7 +55,10 @@ def write_values(path: str | Path, section: str, values: Mapping[str, float]) ->
         message = f"{path}: not UTF-8 at byte {error.start}"
         raise BadInputError(message) from error
     mark, text = (BOM, text[1:]) if text.startswith(BOM) else ("", text)
-    changed = mark + changed_text(text, section, values, str(path))
+    changed = text
+    for section, values in tables.items():
+        changed = changed_text(changed, section, values, str(path))
+    changed = mark + changed
     if changed == mark + text:
         return False
     _replace(place, changed, str(path))

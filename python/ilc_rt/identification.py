@@ -182,7 +182,7 @@ class Identification:
                 "residual_rms": model.residual_rms,
             },
             "uncertainty": {"frequency_hz": bound[0].tolist(), "bound": bound[1].tolist()},
-            "axis_model": self.section(),
+            "axis_model": None if self.doubt else self.section(),
             "doubt": self.doubt,
         }
 

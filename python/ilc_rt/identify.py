@@ -260,9 +260,12 @@ def _search_band(
     def excite(high_hz: float) -> Identification:
         result = _excite_axis(cell, experiment(low_hz, high_hz, length_s), **options)
         found.append(result)
-        why = result.doubt or f"the model leaves {100.0 * result.described.residual_rms:.0f} %"
-        tell(f"{result.experiment.from_hz:.3g} to {high_hz:.3g} Hz, amplitude "
-             f"{result.experiment.amplitude:.3g}: {why}")  # fmt: skip
+        left = f"the model leaves {100.0 * result.described.residual_rms:.0f} %"
+        why = left if result.doubt is None else result.doubt.split(":")[0]
+        tell(
+            f"{result.experiment.from_hz:.3g} to {high_hz:.3g} Hz, amplitude "
+            f"{result.experiment.amplitude:.3g}: {why}"
+        )
         return result
 
     for share in BAND_SHARES:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ilc_rt._native import Cell
+from ilc_rt.cell_file import write_values
 from ilc_rt.errors import BadInputError
 from ilc_rt.trials import KNOWN_SHARE, BelievedAxis, Bench, Trial, Weights, believed_axes
 
@@ -28,6 +29,8 @@ GROWTH_MAX = 1.2
 STEPS_PER_OCTAVE = 2
 WORTH_WHILE = 0.98
 """Share of the expected error below which a weight of the change earns its place."""
+ACROSS_TO_ALONG = 1.5
+"""How much more an error across the path may weigh than one along it."""
 BISECTIONS = 2
 """Halvings, in octaves, of the step between the best rate and the first that grows."""
 SAMPLES_MAX = 20_000
@@ -67,6 +70,9 @@ class Proposal:
         What the trials assumed; `known_hz` axis by axis.
     units : dict
         What each axis is measured in.
+    along : float or None
+        What the weight along the path should be, if the cell weighs contours and
+        has too little of it.
     """
 
     cell: str
@@ -81,16 +87,32 @@ class Proposal:
     noise: float
     n_runs: int
     units: dict[str, str]
+    along: float | None = None
 
     def toml(self) -> str:
         """Return the lines for the cell description."""
         lines = [f"{key} = {value}" for key, value in self.values().items()]
+        if self.along is not None:
+            lines += ["", f"[{self.section}.contour]", f"along = {self.along}"]
         return f"[{self.section}]\n" + "\n".join(lines) + "\n"
 
     def values(self) -> dict[str, float]:
         """Return the weights by key."""
         w = self.weights
         return {"q": w.q, "s": w.s, "r": w.r, "rate": w.rate}
+
+    def write(self, path: str | Path) -> bool:
+        """Put the weights into a cell description; return whether it changed.
+
+        Raises
+        ------
+        BadInputError
+            If the file cannot be read or written.
+        """
+        tables: dict[str, dict[str, float]] = {self.section: self.values()}
+        if self.along is not None:
+            tables[f"{self.section}.contour"] = {"along": self.along}
+        return write_values(path, tables)
 
     def of(self, axis: str) -> list[Trial]:
         """Return the trials of an axis."""
@@ -102,6 +124,7 @@ class Proposal:
             "cell": self.cell,
             "law": self.law,
             **self.values(),
+            "along": self.along,
             "reasons": [asdict(reason) for reason in self.reasons],
             "notes": list(self.notes),
             "uncertainty": self.uncertainty,
@@ -188,6 +211,9 @@ def propose_weights(
         raise BadInputError(message)
     benches = [Bench(axis, low, known_of[axis.name], noise_m, n_runs) for axis in moving]
     table = written.get("learning", {}).get(section.removeprefix("learning."), {})
+    along = _along(table) if law == "norm_optimal" else None
+    if along is not None:
+        table = {**table, "contour": {**table["contour"], "along": along}}
     varies = bool(table.get("contour") or table.get("phase")) and law not in {"constrained"}
     q = float(table.get("q", 1.0)) if varies else 1.0
     levels = _error_weights(table) if varies else [q]
@@ -195,7 +221,7 @@ def propose_weights(
     weights, trials = search.weights()
     return Proposal(
         cell=described.name, law=law, section=section, weights=weights,
-        reasons=_reasons(search, weights, trials, low, known_of, noise_m),
+        reasons=_reasons(search, weights, trials, low, known_of, noise_m, along), along=along,
         trials=tuple(trials), notes=_notes(law, moving, written, trials),
         uncertainty=low, known_hz=known_of, noise=noise_m, n_runs=n_runs,
         units={axis.name: axis.unit for axis in axes},
@@ -258,6 +284,18 @@ def _error_weights(table: dict[str, Any]) -> list[float]:
             found.append(q + float(phase.get("contour", contour.get("weight", 1.0))))
     positive = [value for value in found if value > 0.0]
     return sorted({min(positive), max(positive)}) if positive else [1.0]
+
+
+def _along(table: dict[str, Any]) -> float | None:
+    """Return the weight along the path that a contour weight needs; None if it has it."""
+    contour = table.get("contour")
+    if contour is None:
+        return None
+    q, along = float(table.get("q", 1.0)), float(contour.get("along", 0.0))
+    across = q + float(contour.get("weight", 1.0))
+    if across <= 2.0 * (q + along):
+        return None
+    return _rounded(across / ACROSS_TO_ALONG - q)
 
 
 class _Search:
@@ -363,6 +401,7 @@ def _reasons(
     uncertainty: float,
     known_hz: dict[str, float],
     noise: float,
+    along: float | None,
 ) -> tuple[Reason, ...]:
     count, runs = len(trials), search.n_runs
     steep = 100.0 * (search.growth_max - 1.0)
@@ -392,12 +431,19 @@ def _reasons(
             f"the largest of {len(search.rates)} rates; with every one of them some trial grows by "
             f"more than {steep:.0f} %: the model is not good enough, `ilc identify` measures it"
         )
-    return (
+    reasons = [
         Reason("q", weights.q, q),
         Reason("s", weights.s, "a weight of the input would leave a part of every error"),
         Reason("r", weights.r, r),
         Reason("rate", weights.rate, rate),
-    )
+    ]
+    if along is not None:
+        why = (
+            "error along the path becomes error across it in every corner, so it must be learned "
+            f"nearly as quickly: it weighs {ACROSS_TO_ALONG:g} times less"
+        )
+        reasons.append(Reason("contour.along", along, why))
+    return tuple(reasons)
 
 
 def _notes(

@@ -12,7 +12,7 @@ use ilc_rt::fieldbus::canopen::NodeId;
 use ilc_sim::{ClockMode, Machine, eds};
 
 mod drive_clock;
-mod neighbours;
+mod presence;
 mod run;
 
 use run::{Habits, Mute};
@@ -115,19 +115,12 @@ fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Res
     for mute in &habits.mutes {
         require_node(&machine, mute.node, "--mute")?;
     }
-    let mut bus = ilc_rt::fieldbus::transport::open(&address)
+    let bus = ilc_rt::fieldbus::transport::open(&address)
         .map_err(|error| Failure::Input(error.to_string()))?;
-    let nodes: Vec<NodeId> = machine.nodes().collect();
-    let present = neighbours::first_present(bus.as_mut(), &nodes)
-        .map_err(|error| Failure::Broken(format!("{address}: {error}")))?;
-    if let Some(node) = present {
-        return Err(Failure::Input(format!(
-            "{address}: there is a node {node} on this bus already, of other drives: another \
-             `ilc-sim` or `ilc run` uses this address; end it, or give another one with --bus"
-        )));
-    }
-    run::run(&cell, machine, bus, &address, clock, habits)
-        .map_err(|error| Failure::Broken(error.to_string()))
+    run::run(&cell, machine, bus, &address, clock, habits).map_err(|error| match error {
+        run::RunError::Taken { .. } => Failure::Input(error.to_string()),
+        error => Failure::Broken(error.to_string()),
+    })
 }
 
 /// Reads a span between a millisecond and a minute.

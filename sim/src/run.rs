@@ -15,6 +15,7 @@ use ilc_rt::rt::{RtRequest, thread};
 use ilc_sim::{ClockMode, Machine};
 
 use crate::drive_clock::DriveClock;
+use crate::presence;
 
 /// Longest wait for a frame before the plant is brought up to date.
 const BATCH: Duration = Duration::from_millis(1);
@@ -88,6 +89,12 @@ pub(crate) enum RunError {
     /// The thread that watches standard input cannot be started.
     #[error("no thread to watch standard input: {0}")]
     Thread(std::io::Error),
+    /// The nodes are there already.
+    #[error(
+        "{address}: node {node} is on this bus already; another ilc-sim, or a real drive, has this \
+         number: stop it, or give --bus another address"
+    )]
+    Taken { address: String, node: NodeId },
     /// Signals cannot be caught.
     #[error("signals cannot be caught: {0}")]
     Signal(std::io::Error),
@@ -125,6 +132,11 @@ pub(crate) fn run(
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(RunError::Signal)?;
     }
     let failed = |source| RunError::Bus { address: address.to_owned(), source };
+    let mut bus = bus;
+    let nodes: Vec<NodeId> = machine.nodes().collect();
+    if let Some(node) = presence::find(bus.as_mut(), &nodes).map_err(failed)? {
+        return Err(RunError::Taken { address: address.to_owned(), node });
+    }
     let mut outlet = Outlet { bus, n_sent: 0, n_dropped: 0, broken: None };
     let mut mutes = habits.mutes.clone();
     let start = Instant::now();

@@ -1,4 +1,4 @@
-"""Files that are no library, that cannot be written, or that go away: nothing is changed or lost."""
+"""Files that are no library, cannot be written, or go away: nothing is changed or lost."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import stat
 import subprocess
 import sys
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +23,7 @@ from ilc_rt import Library
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from ilc_rt import CampaignResult
 
@@ -148,11 +148,11 @@ def test_a_name_is_never_an_address(
     """The file has the name that was given, letter by letter, and is read by it."""
     monkeypatch.chdir(tmp_path)
     Library(name).append(np.zeros(3), np.ones(3), 0.01)
-    assert name in os.listdir(tmp_path)
+    assert (tmp_path / name).is_file()
     assert len(Library(name).list()) == 1
     with pytest.raises(OSError, match="sqlite:///c.db"):
         Library("sqlite:///c.db")
-    assert sorted(os.listdir(tmp_path)) == [name]
+    assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
 def test_readers_leave_nothing_beside_the_file(
@@ -171,7 +171,7 @@ def test_readers_leave_nothing_beside_the_file(
 def test_an_archive_that_cannot_be_written_is_read(
     ilc: Ilc, finished: CampaignResult, gantry: Path, tmp_path: Path
 ) -> None:
-    """A read-only file system: listed and exported; a campaign into it is refused before it moves."""
+    """A read-only file system: listed and exported; a campaign into it is refused."""
     (tmp_path / "a").mkdir()
     shutil.copy(finished.library, tmp_path / "a" / "l.db")
     with mounted(str(tmp_path / "a"), tmp_path / "ro", "none", MS_BIND):
@@ -204,8 +204,8 @@ def test_files_are_tried_before_anything_moves(ilc: Ilc, gantry: Path, tmp_path:
         for option in ("--json", "--report"):
             assert ilc(*run, option, "ro/f.html").returncode == 2
     assert not (tmp_path / "ilc-library.db").exists()
-    assert ilc(*run, "--report", "new/deep/r.html", "--json", "f.json").returncode == 0
-    assert (tmp_path / "new" / "deep" / "r.html").exists()
+    assert ilc(*run, "--report", "new", "--json", "f.json").returncode == 0
+    assert (tmp_path / "new" / "ilc-report.html").exists()
 
 
 def lock(path: Path) -> sqlite3.Connection:
@@ -216,7 +216,7 @@ def lock(path: Path) -> sqlite3.Connection:
 
 
 def test_a_locked_library_stops_the_campaign_soon(bench: Bench) -> None:
-    """In real time: the run that cannot be kept stops the axes, and the sentence counts the others."""
+    """In real time: the run that cannot be kept stops the axes, and the others are counted."""
     cell = bench.cell(short=True)
     bench.drives(cell)
     controller = bench.controller(cell, "--simulated-drives", runs=20)
@@ -288,8 +288,9 @@ def test_a_full_disk_stops_the_campaign_and_loses_nothing(bench: Bench) -> None:
         controller = bench.controller(cell, "--lockstep", runs=200)
         assert controller.end() == 3
         told = [e["index"] for e in controller.events if e["event"] == "iteration"]
-        assert f"; run {len(told)} could not be kept, {len(told)} runs are kept" in (
-            controller.errors[-1]
+        assert (
+            f"; run {len(told)} could not be kept, {len(told)} runs are kept"
+            in (controller.errors[-1])
         )
         assert [index for _, index, _ in bench.kept()] == told == list(range(len(told)))
         assert LIBC.mount(b"tmpfs", str(small).encode(), b"tmpfs", MS_REMOUNT, b"size=16m") == 0

@@ -108,8 +108,8 @@ def test_drives_that_are_there_already_are_recognised(bench: Bench) -> None:
     second = bench.start("ilc-sim", "run", cell, "--bus", bench.bus)
     assert second.end() == 2
     (line,) = second.errors
-    assert line.startswith(f"ilc-sim: {bench.bus}: there is a node ")
-    assert "another `ilc-sim` or `ilc run` uses this address" in line
+    assert line.startswith(f"ilc-sim: {bench.bus}: node ")
+    assert "is on this bus already" in line
     assert controller.end() == 0, controller.errors
     # Idle drives, whose heartbeat has not been switched on, are found by asking.
     first.signal(signal.SIGINT)

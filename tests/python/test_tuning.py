@@ -41,7 +41,7 @@ def assert_learns(path, tmp_path, left):
 def test_a_shipped_cell_learns_with_what_is_proposed(cell, options, tmp_path):
     path = copied(tmp_path, cell)
     found = propose_weights(path, **options)
-    assert write_values(path, found.section, found.values())
+    assert found.write(path)
     assert_learns(path, tmp_path, 0.15)
 
 
@@ -56,7 +56,7 @@ def test_ten_other_cells_learn_with_what_is_proposed(tmp_path):
         path = tmp_path / f"cell{seed}.toml"
         path.write_text(other_cell(seed), encoding="utf-8")
         found = propose_weights(path, **README)
-        write_values(path, found.section, found.values())
+        found.write(path)
         contour, _ = learn(path, tmp_path / f"{seed}.db")
         left.append(contour[-1] / contour[0])
     assert max(left) < 1.0, left
@@ -178,7 +178,7 @@ def test_the_constrained_law_gets_the_weights_in_its_own_table(tmp_path):
     path = gantry_with(tmp_path, ('law = "norm_optimal"', 'law = "constrained"'))
     found = propose_weights(path)
     assert found.section == "learning.constrained"
-    write_values(path, found.section, found.values())
+    found.write(path)
     table = tomlkit.parse(path.read_text(encoding="utf-8"))["learning"]["constrained"]
     assert table["rate"] == found.weights.rate
     Cell.load(path)
@@ -215,7 +215,7 @@ def test_writing_changes_nothing_but_the_numbers(tmp_path):
     path = copied(tmp_path, GANTRY)
     path.chmod(0o640)
     before = path.read_text(encoding="utf-8").splitlines()
-    write_values(path, "learning.norm_optimal", {"q": 1.0, "rate": 7.5})
+    write_values(path, {"learning.norm_optimal": {"q": 1.0, "rate": 7.5}})
     after = path.read_text(encoding="utf-8").splitlines()
     changed = [pair for pair in zip(before, after, strict=True) if pair[0] != pair[1]]
     assert len(changed) == 1
@@ -249,7 +249,7 @@ def test_a_mark_at_the_beginning_and_a_link_are_kept(tmp_path):
     path, link = copied(tmp_path, GANTRY), tmp_path / "link.toml"
     path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
     link.symlink_to(path)
-    assert write_values(link, "learning.norm_optimal", {"rate": 7.5})
+    assert write_values(link, {"learning.norm_optimal": {"rate": 7.5}})
     assert link.is_symlink()
     assert path.read_bytes().startswith(b"\xef\xbb\xbf")
 
@@ -257,13 +257,42 @@ def test_a_mark_at_the_beginning_and_a_link_are_kept(tmp_path):
 def test_what_the_controller_would_refuse_is_not_written(tmp_path):
     path = copied(tmp_path, GANTRY)
     with pytest.raises(BadInputError, match=r"left as it was.*rate"):
-        write_values(path, "learning.norm_optimal", {"rate": -1.0})
+        write_values(path, {"learning.norm_optimal": {"rate": -1.0}})
     assert path.read_bytes() == GANTRY.read_bytes()
     assert len(list(tmp_path.glob(".*"))) == 0
     broken = tmp_path / "broken.toml"
     broken.write_text("[learning\n", encoding="utf-8")
     assert main(["tune", str(broken), "--write"]) == 2
     assert broken.read_text(encoding="utf-8") == "[learning\n"
+
+
+@pytest.mark.parametrize(
+    "contour",
+    ["contour = { weight = 10.0 }\n", "[learning.norm_optimal.contour]\nweight = 100.0\n"],
+    ids=["inline", "table"],
+)
+def test_a_cell_with_contour_weights_learns_with_what_is_proposed(contour, tmp_path):
+    path = copied(tmp_path, GANTRY)
+    path.write_text(path.read_text(encoding="utf-8") + contour, encoding="utf-8")
+    found = propose_weights(path)
+    assert found.along is not None
+    assert found.write(path)
+    assert propose_weights(path).along is None, "it has what it needs"
+    assert_learns(path, tmp_path, 0.2)
+
+
+def test_contour_weights_as_the_manual_says_learn_nearly_as_well(tmp_path):
+    # docs/cell.md: rate times the root of q + weight, along so that across weighs 1.5 times more.
+    weight = 10.0
+    along, rate = (1.0 + weight) / 1.5 - 1.0, 6.0 * (1.0 + weight) ** 0.5
+    path = copied(tmp_path, GANTRY)
+    plain, _ = learn(path, tmp_path / "plain.db")
+    text = path.read_text(encoding="utf-8").replace("rate = 6.0", f"rate = {rate}")
+    text += f"contour = {{ weight = {weight}, along = {along} }}\n"
+    path.write_text(text, encoding="utf-8")
+    weighed, _ = learn(path, tmp_path / "weighed.db")
+    assert weighed[7] < 0.1 * weighed[0]
+    assert weighed[-1] < 1.5 * plain[-1]
 
 
 def test_a_trial_stops_when_its_error_grows():

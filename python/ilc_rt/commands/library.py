@@ -7,13 +7,12 @@ import io
 import json
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
 from rich import box
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 from typer import Typer
 
@@ -24,28 +23,40 @@ from ilc_rt.commands.options import (
 )
 from ilc_rt.errors import BadInputError
 from ilc_rt.export import export_run
-from ilc_rt.result import library_rows, micrometres, write_text
+from ilc_rt.quantity import unit_for
+from ilc_rt.result import STANDARD_OUTPUT, json_text, library_rows, write_text
+from ilc_rt.text import printable
 
-STDOUT = Path("-")
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 # The last ones are shown if there is room for them; the campaign's name says when it began.
-WIDE_ONLY = ("learned from", "created (UTC)")
-COLUMNS = ("id", "campaign", "run", "cell", "law", "tracking µm", "contour µm", *WIDE_ONLY)
-RIGHT = ("id", "run", "tracking µm", "contour µm")
+COLUMNS = (
+    "id", "campaign", "run", "cell", "law", "max tracking", "max contour",
+    "learned from", "note", "created (UTC)",
+)  # fmt: skip
+N_NARROW = 7
+RIGHT = ("id", "run", "max tracking", "max contour")
 SHORTENED = (COLUMNS.index("cell"), COLUMNS.index("law"))
 SHORTEST = 6
-WIDE = 120
+WIDE = 140
 
 app = Typer(
     no_args_is_help=True,
     help="List, show, export and trim the runs in a library.",
 )
 
+# Characters of a program or of a law's parameters that are shown; `export` gives all of them.
+LENGTH_SHOWN = 2000
+
 RunId = Annotated[int, typer.Argument(metavar="ID", help="Number of the run in the library.")]
 CellName = Annotated[str | None, typer.Option("--cell", metavar="NAME", help="Only this cell's.")]
 CampaignOption = Annotated[
     str | None, typer.Option("--campaign", metavar="ID", help="Only this campaign's.")
 ]
-Keep = Annotated[int, typer.Argument(min=0, metavar="KEEP", help="How many runs stay.")]
+Keep = Annotated[
+    int, typer.Argument(min=0, max=2**63 - 1, metavar="KEEP", help="How many runs stay.")
+]
 JsonRows = Annotated[
     Path | None,
     typer.Option("--json", metavar="FILE", help="Write the runs as JSON; - is standard output."),
@@ -75,12 +86,12 @@ def list_runs(
     if campaign is not None:
         rows = [row for row in rows if str(row["campaign"]).startswith(campaign)]
     if json_file is not None:
-        _write(json_file, json.dumps(rows, indent=2) + "\n")
+        write_text(json_file, json_text(rows))
     if csv_file is not None:
-        _write(csv_file, _csv(rows))
-    if STDOUT in {json_file, csv_file}:
+        write_text(csv_file, _csv(rows))
+    if STANDARD_OUTPUT in {json_file, csv_file}:
         return
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False, emoji=False)
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = WIDE
     console.print(_table(rows, console.width))
@@ -91,13 +102,14 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
     """Return the runs as a table; what `show` and `export` need is there at any width."""
     texts = [
         (
-            str(row["id"]), str(row["campaign"]), str(row["index"]), str(row["cell"]),
-            str(row["law"]), micrometres(row["tracking_inf_m"]),
-            micrometres(row["contour_inf_m"]), str(row["measure"]), str(row["created_utc"]),
+            str(row["id"]), printable(row["campaign"]), str(row["index"]), printable(row["cell"]),
+            printable(row["law"]), error_text(row, "tracking_inf_m"),
+            error_text(row, "contour_inf_m"), printable(row["measure"]), note(row),
+            printable(row["created_utc"]),
         )
         for row in rows
     ]  # fmt: skip
-    count = len(COLUMNS) if width >= WIDE else len(COLUMNS) - len(WIDE_ONLY)
+    count = len(COLUMNS) if width >= WIDE else N_NARROW
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 0))
     names = COLUMNS[:count]
     wanted = [
@@ -117,7 +129,7 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
             overflow="ellipsis",
         )  # fmt: skip
     for text in texts:
-        table.add_row(*(escape(part) for part in text[:count]))
+        table.add_row(*text[:count])
     return table
 
 
@@ -134,28 +146,25 @@ def _csv(rows: list[dict[str, Any]]) -> str:
     return text.getvalue()
 
 
-def _write(file: Path, text: str) -> None:
-    if file == STDOUT:
-        typer.echo(text, nl=False)
-    else:
-        write_text(file, text)
-
-
 @app.command("show")
 def show(library: LibraryArgument, run_id: RunId) -> None:
     """Show everything that is kept of one run.
 
     Example: ilc library show ilc-library.db 12
     """
-    for key, value in _load(library, run_id).items():
+    row = _load(library, run_id)
+    for key, value in row.items():
         if key == "disturbance" and value is not None:
             typer.echo(f"{key:22} {', '.join(f'{number:g}' for number in value)}")
+        elif isinstance(value, float) and key.endswith(("_inf_m", "_rms_m")):
+            typer.echo(f"{key:22} {value:.6g}, {error_text(row, key)}")
         elif isinstance(value, np.ndarray):
             size = " x ".join(str(length) for length in value.shape)
-            largest = float(np.abs(value).max()) if value.size else 0.0
+            largest = float(np.abs(value).max(initial=0.0))
             typer.echo(f"{key:22} {size} samples, largest {largest:.6g}")
         else:
-            typer.echo(f"{key:22} {'-' if value is None else value}")
+            shown = "-" if value is None else printable(value, LENGTH_SHOWN)
+            typer.echo(f"{key:22} {shown}")
 
 
 @app.command("export")
@@ -180,6 +189,19 @@ def trim(library: LibraryArgument, keep: Keep, cell: CellName = None) -> None:
     except OSError as error:
         raise BadInputError(str(error)) from error
     typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")
+
+
+def error_text(row: Mapping[str, Any], figure: str) -> str:
+    """Return a figure of a run in the unit of its axes: angles where all axes are rotary."""
+    units = {str(unit).removesuffix("/s") for unit in row["input_units"]}
+    base = "rad" if units == {"rad"} else "m"
+    return unit_for(base, row[figure]).text(row[figure])
+
+
+def note(row: Mapping[str, Any]) -> str:
+    """Return what became of a run in a few words."""
+    said = ("rolled back", row["rolled_back"]), ("learning off", row["learning_off"])
+    return ", ".join(words for words, holds in said if holds)
 
 
 def _load(library: Path, run_id: int) -> dict[str, Any]:

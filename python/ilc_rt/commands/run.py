@@ -19,14 +19,18 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
-from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
+from ilc_rt.commands.targets import make_folder, report_target
+from ilc_rt.errors import EXIT_FAULT, CampaignError
 from ilc_rt.progress import CampaignView
-from ilc_rt.result import report_file, require_writable
+from ilc_rt.text import printable
 
 ReportFile = Annotated[
     Path | None,
     typer.Option(
-        "--report", metavar="PATH", help="Write an HTML report: a .html file or a folder."
+        "--report",
+        metavar="PATH",
+        callback=report_target,
+        help="Write an HTML report: a .html file, or a folder in one that exists.",
     ),
 ]
 Resume = Annotated[
@@ -85,13 +89,6 @@ def carry_out(
     that were completed. A fault of the machine is followed by going on where
     the campaign was, `restarts` times at most.
     """
-    if json_file is not None:
-        if not json_file.absolute().parent.is_dir():
-            message = f"--json {json_file}: no such folder: {json_file.absolute().parent}"
-            raise BadInputError(message)
-        require_writable(json_file, "--json")
-    if report is not None:
-        require_writable(report_file(report), "--report")
     try:
         _show(campaign, iterations, restarts)
     except (CampaignError, KeyboardInterrupt, SystemExit) as stopped:
@@ -117,7 +114,7 @@ def _show(campaign: Campaign, iterations: int, restarts: int) -> None:
         n_runs = len(campaign.result.records)
         campaign.resume = n_runs > 0
         onward = f"going on after run {n_runs - 1}" if n_runs else "beginning again"
-        typer.echo(f"ilc: {stopped.reason}; {onward}", err=True)
+        typer.echo(f"ilc: {printable(stopped.reason)}; {onward}", err=True)
     else:
         return
     _show(campaign, iterations, restarts - 1)
@@ -125,12 +122,14 @@ def _show(campaign: Campaign, iterations: int, restarts: int) -> None:
 
 def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> None:
     result = campaign.result
-    typer.echo(f"library: {campaign.library} (campaign {result.campaign})")
+    typer.echo(f"library: {printable(campaign.library)} (campaign {printable(result.campaign)})")
     if json_file is not None:
         result.write_json(json_file)
-        typer.echo(f"figures: {json_file}")
+        typer.echo(f"figures: {printable(json_file)}")
     if report is not None:
         # Here and not above: matplotlib takes its time, and bad input should not wait for it.
         from ilc_rt.report import write_report
 
-        typer.echo(f"report:  {write_report(result, report)}")
+        if not report.suffix:
+            make_folder(report)
+        typer.echo(f"report:  {printable(write_report(result, report))}")

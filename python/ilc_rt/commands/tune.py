@@ -38,7 +38,11 @@ NoiseStd = Annotated[
     float | None,
     typer.Option("--noise-m", help="Standard deviation of the measurement's noise in metres."),
 ]
-Runs = Annotated[int, typer.Option("--runs", min=1, help="Runs in which learning should be done.")]
+# More say nothing that these do not.
+RUNS_MAX = 1_000_000
+Runs = Annotated[
+    int, typer.Option("--runs", min=1, max=RUNS_MAX, help="Runs in which learning should be done.")
+]
 Write = Annotated[bool, typer.Option("--write", help="Put the weights into the cell description.")]
 
 
@@ -58,7 +62,6 @@ def tune(
 
     Example: ilc tune examples/01_gantry.toml --uncertainty 0.3 --noise-m 1e-6
     """
-    from ilc_rt.cell_file import write_values
     from ilc_rt.tuning import TUNED_LAWS, UNCERTAINTY, propose_weights
 
     found = propose_weights(
@@ -77,7 +80,7 @@ def tune(
     if found.law not in TUNED_LAWS:
         message = f"{cell}: left as it was: {found.notes[0]}"
         raise BadInputError(message)
-    changed = write_values(cell, found.section, found.values())
+    changed = found.write(cell)
     typer.echo(f"written: {cell}" if changed else f"{cell} has these weights already")
 
 

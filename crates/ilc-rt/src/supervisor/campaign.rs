@@ -1,5 +1,6 @@
 //! One campaign from the first frame to the last: bring-up, runs, learning, library, end.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::announce::Announcer;
@@ -8,8 +9,8 @@ use super::collect::Collector;
 use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
-use super::keeper::{Keeper, Kept};
-use super::learner::{Learner, expect};
+use super::keeper::{Keeper, Kept, Told};
+use super::learner::{Learner, Lesson, expect};
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S};
 use super::pace::Pacer;
 use super::plan::Plan;
@@ -20,7 +21,7 @@ use crate::config::Cell;
 use crate::fieldbus::Bus;
 use crate::learning::Law;
 use crate::library::Library;
-use crate::record::{EndStatus, Event, Figures, IterationRecord, StateName};
+use crate::record::{AxisKinds, EndStatus, Event, Figures, IterationRecord, StateName};
 use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
@@ -198,7 +199,7 @@ fn carry_out(
     let mut campaign = Running {
         collector: Collector::new(
             plan.n_samples(),
-            cell.n_axes(),
+            AxisKinds::new(&plan.meta.input_units, cell.n_axes()),
             plan.measure,
             cell.tcp_encoder.is_some(),
             cell.cycle_s(),
@@ -217,6 +218,9 @@ fn carry_out(
         iterations: options.iterations,
         mail,
         stopping: None,
+        unjudged: VecDeque::new(),
+        lessons: VecDeque::new(),
+        awaited: 0,
         remark: None,
         failure: None,
         phase_iteration: first,
@@ -254,6 +258,12 @@ struct Running<'a> {
     iterations: u32,
     mail: Mailbox,
     stopping: Option<StopReason>,
+    /// Runs that the law is asked about and has not answered yet, the oldest first: key and place.
+    unjudged: VecDeque<(i64, usize)>,
+    /// What the law made of runs that are not kept yet, the oldest first.
+    lessons: VecDeque<Lesson>,
+    /// Runs that the law on its thread was asked about and has not answered yet.
+    awaited: u32,
     /// What the law last had to say.
     remark: Option<String>,
     /// Why no more runs can be kept, if so: the axes are stopped, as nothing may be lost.
@@ -296,20 +306,56 @@ impl Running<'_> {
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
         }
-        while let Some(kept) = self.keeper.take() {
-            self.heed(kept);
-        }
+        self.heed_all();
         while let Some(lesson) = self.learner.as_mut().and_then(Learner::take) {
-            // Once for each change: what stays as it is need not be said after every run.
-            if lesson.remark != self.remark {
-                tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
-                self.remark = lesson.remark;
-            }
-            match lesson.input {
-                Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
-                Err(error) => self.fail(format!("the law refused the last run: {error}")),
-            }
+            self.awaited = self.awaited.saturating_sub(1);
+            let lesson = self.learned(lesson);
+            self.lessons.push_back(lesson);
+            self.judge_kept();
         }
+    }
+
+    /// Adds what the law decided to those runs that are kept by now.
+    fn judge_kept(&mut self) {
+        while !self.unjudged.is_empty()
+            && let Some(lesson) = self.lessons.pop_front()
+        {
+            self.judged(&lesson);
+        }
+    }
+
+    /// Hands the loop what was learned.
+    fn learned(&mut self, mut lesson: Lesson) -> Lesson {
+        // Once for each change: what stays as it is need not be said after every run.
+        if lesson.remark != self.remark {
+            tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
+            self.remark.clone_from(&lesson.remark);
+        }
+        match std::mem::replace(&mut lesson.input, Ok(Vec::new())) {
+            Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
+            Err(error) => self.fail(format!("the law refused the last run: {error}")),
+        }
+        lesson
+    }
+
+    /// Adds what the law decided to a run that was kept while it computed.
+    fn judged(&mut self, lesson: &Lesson) {
+        let Some((id, place)) = self.unjudged.pop_front() else { return };
+        let Some((index, figures)) = self.runs.get_mut(place) else { return };
+        let before = figures.clone();
+        lesson.note(figures);
+        if *figures == before {
+            return;
+        }
+        let event = Event::Judged {
+            id,
+            index: *index,
+            rolled_back: figures.rolled_back,
+            learning_off: figures.learning_off,
+            remark: figures.remark.clone(),
+        };
+        self.keeper.judge(id, figures.clone());
+        self.announcer.tell(&event);
     }
 
     fn run_ended(&mut self, overruns: u32) {
@@ -323,7 +369,7 @@ impl Running<'_> {
             match self.disturbance.of(record.index + 1) {
                 Ok(coming) => self.present = coming,
                 Err(why) => {
-                    self.keep(record);
+                    self.keep(record, false);
                     self.fail(why);
                     return;
                 }
@@ -331,43 +377,63 @@ impl Running<'_> {
         }
         self.progress.note(&mut record);
         let decision = self.progress.decide(&mut record);
-        if self.progress.is_disturbed(&record.figures) {
-            tracing::warn!(
-                "run {} was disturbed ({} cycles late, {} samples missing): its input is repeated",
-                record.index,
-                record.figures.overruns,
-                record.figures.missing_samples
-            );
-        }
+        let mut asked = false;
+        let mut lesson = None;
         if let Some(learner) = &mut self.learner {
             if decision == Decision::Learn {
                 self.progress.asked();
                 learner.begin(&record.input, &record.error_m, &self.present);
+                asked = true;
+                if learner.is_in_line() {
+                    lesson = learner.take();
+                }
             } else {
                 if matches!(decision, Decision::RollBack(_)) {
                     learner.take_back();
                 }
                 learner.pass(&self.present);
             }
+        } else {
+            record.figures.remark = None;
+        }
+        if let Some(lesson) = lesson {
+            lesson.note(&mut record.figures);
+            self.learned(lesson);
+            asked = false;
         }
         if let Decision::RollBack(input) = decision {
             self.progress.send(&mut self.mail, input, 0.0);
         }
-        self.keep(record);
+        self.awaited += u32::from(asked);
+        self.keep(record, asked);
     }
 
-    fn keep(&mut self, record: IterationRecord) {
-        self.keeper.begin(record);
-        while let Some(kept) = self.keeper.take() {
-            self.heed(kept);
+    fn keep(&mut self, record: IterationRecord, asked: bool) {
+        self.keeper.begin(record, asked);
+        self.heed_all();
+    }
+
+    /// Heeds whatever has become of runs that were to be kept.
+    fn heed_all(&mut self) {
+        while let Some(told) = self.keeper.take() {
+            self.heed(told);
         }
     }
 
     /// Tells of a run that is kept; the first one that is not stops the axes.
-    fn heed(&mut self, kept: Kept) {
-        let Kept { record, result } = kept;
+    fn heed(&mut self, told: Told) {
+        let Kept { record, asked, result } = match told {
+            Told::Kept(kept) => kept,
+            Told::Unjudged(error) => return self.fail(error.to_string()),
+        };
         match result {
-            Some(Ok(id)) => self.tell_kept(id, &record),
+            Some(Ok(id)) => {
+                self.tell_kept(id, &record);
+                if asked {
+                    self.unjudged.push_back((id, self.runs.len() - 1));
+                    self.judge_kept();
+                }
+            }
             Some(Err(error)) => {
                 self.fail(error.to_string());
                 self.unkept.push(record);
@@ -388,9 +454,10 @@ impl Running<'_> {
 
     /// Waits for the runs that are being kept, and tries once more to keep those that could not be.
     fn finish_keeping(&mut self) {
-        for kept in self.keeper.finish() {
-            self.heed(kept);
+        for told in self.keeper.finish() {
+            self.heed(told);
         }
+        self.heed_all();
         if self.unkept.is_empty() {
             return;
         }
@@ -423,6 +490,12 @@ impl Running<'_> {
     fn end(mut self, pacer: Pacer, cell: &Cell, options: &Options) -> Outcome {
         let remains = pacer.end();
         self.read_mail();
+        while self.awaited > 0
+            && let Some(lesson) = self.learner.as_mut().and_then(Learner::take_last)
+        {
+            self.awaited -= 1;
+            self.lessons.push_back(lesson);
+        }
         self.finish_keeping();
         let (status, reason) = match (&self.failure, self.stopping, &remains) {
             (Some(why), _, _) => (EndStatus::Fault, why.clone()),

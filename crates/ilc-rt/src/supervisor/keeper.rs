@@ -4,83 +4,110 @@
 //! the next input handed over. A run that cannot be kept ends the campaign; those that come after it wait,
 //! so that the library never has a gap.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use super::error::SupervisorError;
 use crate::library::{Library, LibraryError};
-use crate::record::{IterationRecord, Meta};
+use crate::record::{Figures, IterationRecord, Meta};
 
 /// What came of keeping a run.
 #[derive(Debug)]
 pub(super) struct Kept {
     /// The run.
     pub(super) record: IterationRecord,
+    /// Whether the law was asked about it, and what it decides is to be added.
+    pub(super) asked: bool,
     /// Its key, or why it is not kept; `None` if one before it could not be kept.
     pub(super) result: Option<Result<i64, LibraryError>>,
+}
+
+/// What came of a thing that was to be written.
+#[derive(Debug)]
+pub(super) enum Told {
+    /// Of a run.
+    Kept(Kept),
+    /// What the law decided could not be added to a run.
+    Unjudged(LibraryError),
+}
+
+/// What is to be written.
+pub(super) enum Job {
+    /// A run, and whether the law was asked about it.
+    Keep(Box<IterationRecord>, bool),
+    /// What the law decided on a run that is kept.
+    Judge(i64, Figures),
 }
 
 /// The library, and where it is written to.
 pub(super) enum Keeper {
     /// In the caller's thread: the result is there at once.
-    InLine { shelf: Shelf, done: Option<Kept> },
+    InLine { shelf: Shelf, done: VecDeque<Told> },
     /// On a thread of its own.
-    Thread {
-        records: Option<Sender<IterationRecord>>,
-        kept: Receiver<Kept>,
-        thread: Option<JoinHandle<Shelf>>,
-    },
+    Thread { jobs: Option<Sender<Job>>, told: Receiver<Told>, thread: Option<JoinHandle<Shelf>> },
 }
 
 impl Keeper {
     pub(super) fn in_line(library: Library, meta: Arc<Meta>) -> Self {
-        Self::InLine { shelf: Shelf { library, meta, is_stuck: false }, done: None }
+        Self::InLine { shelf: Shelf { library, meta, is_stuck: false }, done: VecDeque::new() }
     }
 
     pub(super) fn on_thread(library: Library, meta: Arc<Meta>) -> Result<Self, SupervisorError> {
-        let (records, todo) = channel();
-        let (told, kept) = channel();
+        let (jobs, todo) = channel();
+        let (done, told) = channel();
         let mut shelf = Shelf { library, meta, is_stuck: false };
         let thread = std::thread::Builder::new()
             .name("ilc-library".to_owned())
             .spawn(move || {
-                for record in todo {
-                    // Nobody listens after a panic of the campaign; the run is in the library all the same.
-                    let _ = told.send(shelf.keep(record));
+                for job in todo {
+                    if let Some(came) = shelf.carry_out(job) {
+                        // Nobody listens after a panic of the campaign; the run is kept all the same.
+                        let _ = done.send(came);
+                    }
                 }
                 shelf
             })
             .map_err(|source| SupervisorError::Thread { what: "library", source })?;
-        Ok(Self::Thread { records: Some(records), kept, thread: Some(thread) })
+        Ok(Self::Thread { jobs: Some(jobs), told, thread: Some(thread) })
     }
 
     /// Begins to keep a run.
-    pub(super) fn begin(&mut self, record: IterationRecord) {
+    pub(super) fn begin(&mut self, record: IterationRecord, asked: bool) {
+        self.give(Job::Keep(Box::new(record), asked));
+    }
+
+    /// Begins to add what the law decided to a run that is kept.
+    pub(super) fn judge(&mut self, id: i64, figures: Figures) {
+        self.give(Job::Judge(id, figures));
+    }
+
+    fn give(&mut self, job: Job) {
         match self {
-            Self::InLine { shelf, done } => *done = Some(shelf.keep(record)),
-            Self::Thread { records: Some(records), .. } => {
-                let _ = records.send(record);
+            Self::InLine { shelf, done } => done.extend(shelf.carry_out(job)),
+            Self::Thread { jobs: Some(jobs), .. } => {
+                let _ = jobs.send(job);
             }
             Self::Thread { .. } => {}
         }
     }
 
     /// What came of the oldest run that was not told of yet, once it is there.
-    pub(super) fn take(&mut self) -> Option<Kept> {
+    pub(super) fn take(&mut self) -> Option<Told> {
         match self {
-            Self::InLine { done, .. } => done.take(),
-            Self::Thread { kept, .. } => kept.try_recv().ok(),
+            Self::InLine { done, .. } => done.pop_front(),
+            Self::Thread { told, .. } => told.try_recv().ok(),
         }
     }
 
     /// Waits until all runs have been told of, by [`take`](Self::take); then keeps happen in line.
-    pub(super) fn finish(&mut self) -> Vec<Kept> {
-        let Self::Thread { records, kept, thread } = self else { return Vec::new() };
-        drop(records.take());
-        let rest: Vec<Kept> = kept.iter().collect();
+    pub(super) fn finish(&mut self) -> Vec<Told> {
+        let Self::Thread { jobs, told, thread } = self else { return Vec::new() };
+        drop(jobs.take());
+        let rest: Vec<Told> = told.iter().collect();
         if let Some(shelf) = thread.take().and_then(|thread| thread.join().ok()) {
-            *self = Self::InLine { shelf, done: None };
+            *self = Self::InLine { shelf, done: VecDeque::new() };
         }
         rest
     }
@@ -102,15 +129,23 @@ pub(super) struct Shelf {
 }
 
 impl Shelf {
-    fn keep(&mut self, record: IterationRecord) -> Kept {
+    fn carry_out(&mut self, job: Job) -> Option<Told> {
+        match job {
+            Job::Keep(record, asked) => Some(Told::Kept(self.keep(*record, asked))),
+            Job::Judge(..) if self.is_stuck => None,
+            Job::Judge(id, figures) => self.library.judge(id, &figures).err().map(Told::Unjudged),
+        }
+    }
+
+    fn keep(&mut self, record: IterationRecord, asked: bool) -> Kept {
         if self.is_stuck {
-            return Kept { record, result: None };
+            return Kept { record, asked, result: None };
         }
         let result = self.library.append(&self.meta, &record);
         if result.is_err() {
             self.is_stuck = true;
             self.library.hurry();
         }
-        Kept { record, result: Some(result) }
+        Kept { record, asked, result: Some(result) }
     }
 }

@@ -5,6 +5,7 @@
 //! it reads the loop's mailbox and never shares anything else with it.
 
 mod announce;
+mod band;
 mod campaign;
 mod claim;
 mod collect;
@@ -26,6 +27,7 @@ mod reason;
 mod telemetry;
 mod weights;
 
+pub use band::{Band, BandSearch};
 pub use campaign::{identify, run};
 pub use disturbance::Disturbance;
 pub use error::SupervisorError;

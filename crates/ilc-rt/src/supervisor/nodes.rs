@@ -6,7 +6,7 @@ use super::error::SupervisorError;
 use super::options::{Options, SIMULATED_PATIENCE_S};
 use super::plan;
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
-use crate::fieldbus::canopen::NmtCommand;
+use crate::fieldbus::canopen::{NmtCommand, listen};
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
 use crate::fieldbus::cia402::{BringUpError, DriveSetup, bring_up, bring_up_encoder};
 use crate::fieldbus::{Bus, BusError};
@@ -24,6 +24,7 @@ pub(super) fn start(
     let file = cell.file.display().to_string();
     let stall_s = if options.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
     let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
+    refuse_company(cell, bus)?;
     let refused = |key: String| {
         let file = file.clone();
         move |source: BringUpError| SupervisorError::BringUp {
@@ -46,6 +47,22 @@ pub(super) fn start(
         address: cell.bus.address.clone(),
         source,
     })
+}
+
+/// Listens before anything is sent: a bus that somebody else commands is left alone.
+fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), SupervisorError> {
+    let numbers = cell.axes.iter().map(|axis| axis.node);
+    let numbers = numbers.chain(cell.tcp_encoder.iter().map(|tool| tool.node));
+    let nodes = numbers.map(|number| plan::node(cell, number)).collect::<Result<Vec<_>, _>>()?;
+    let file = || cell.file.display().to_string();
+    let address = || cell.bus.address.clone();
+    match listen::other_master(bus, &nodes, listen::LISTEN) {
+        Ok(None) => Ok(()),
+        Ok(Some(heard)) => {
+            Err(SupervisorError::Occupied { file: file(), address: address(), heard })
+        }
+        Err(source) => Err(SupervisorError::Start { file: file(), address: address(), source }),
+    }
 }
 
 /// Returns what the drive of an axis is set up to.

@@ -10,6 +10,8 @@ use crate::servo::Mailbox;
 
 /// Times that the best input is restored before learning is switched off for good.
 const ROLLBACKS_MAX: u32 = 2;
+/// Why learning is off then.
+const GROWN: &str = "the error grew twice";
 
 /// What to do after a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,9 +106,16 @@ impl Progress {
     /// or seemingly the best: its input is repeated. Nor is a larger error under another disturbance than
     /// the best run's evidence against the law: it goes on learning.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
-        let rms = record.figures.tracking_rms_m;
+        let rms = record.figures.judged_by();
         let off = self.rollbacks >= ROLLBACKS_MAX;
+        if off {
+            record.figures.learning_off = true;
+            record.figures.remark = Some(format!("learning is off: {GROWN}"));
+        }
         if self.is_disturbed(&record.figures) {
+            if !off {
+                record.figures.remark = Some(disturbance_remark(&record.figures));
+            }
             return Decision::Hold;
         }
         match &self.best {
@@ -117,6 +126,9 @@ impl Progress {
             {
                 self.rollbacks += 1;
                 record.figures.rolled_back = true;
+                record.figures.learning_off = self.rollbacks >= ROLLBACKS_MAX;
+                record.figures.remark =
+                    Some(growth_remark(rms / best.rms, record.figures.learning_off));
                 Decision::RollBack(best.input.clone())
             }
             Some(best) if rms >= best.rms => {
@@ -197,6 +209,24 @@ impl Progress {
     }
 }
 
+fn disturbance_remark(figures: &Figures) -> String {
+    format!(
+        "nothing is learned from it, its input is repeated: {} overruns, {} samples missing",
+        figures.overruns, figures.missing_samples
+    )
+}
+
+/// What is told when the best input is restored; `growth` is the error over the best one.
+fn growth_remark(growth: f64, off: bool) -> String {
+    let how_far = if growth < 1e3 {
+        format!("to {growth:.2} times the best one")
+    } else {
+        "far beyond the best one".to_owned()
+    };
+    let then = if off { format!("; learning is off from here on: {GROWN}") } else { String::new() };
+    format!("the RMS error grew {how_far}: the best input is restored{then}")
+}
+
 #[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
 fn refused(error: LearningError) -> SupervisorError {
     SupervisorError::Resume(format!("the law refused a run: {error}"))
@@ -233,10 +263,22 @@ mod tests {
         assert_eq!(progress.decide(&mut record(0.5)), Decision::Learn, "within the ratio");
         let mut grown = record(0.7);
         assert_eq!(progress.decide(&mut grown), Decision::RollBack(vec![0.4]));
-        assert!(grown.figures.rolled_back);
+        assert!(grown.figures.rolled_back && !grown.figures.learning_off);
+        let said = grown.figures.remark.unwrap();
+        assert_eq!(
+            said,
+            "the RMS error grew to 1.75 times the best one: the best input is restored"
+        );
         assert_eq!(progress.decide(&mut record(0.4)), Decision::Learn);
-        assert_eq!(progress.decide(&mut record(f64::INFINITY)), Decision::RollBack(vec![0.4]));
-        assert_eq!(progress.decide(&mut record(0.4)), Decision::Hold);
+        let mut burst = record(f64::INFINITY);
+        assert_eq!(progress.decide(&mut burst), Decision::RollBack(vec![0.4]));
+        assert!(burst.figures.learning_off);
+        let said = burst.figures.remark.unwrap();
+        assert!(said.contains("far beyond") && said.contains("off from here on"), "{said}");
+        let mut after = record(0.4);
+        assert_eq!(progress.decide(&mut after), Decision::Hold);
+        assert!(after.figures.learning_off && !after.figures.rolled_back);
+        assert_eq!(after.figures.remark.unwrap(), "learning is off: the error grew twice");
         assert_eq!(progress.decide(&mut record(9.0)), Decision::Hold);
     }
 
@@ -264,6 +306,8 @@ mod tests {
         let mut worse = disturbed(9.0, 3, 0);
         assert_eq!(progress.decide(&mut worse), Decision::Hold);
         assert!(!worse.figures.rolled_back);
+        let said = worse.figures.remark.unwrap();
+        assert!(said.ends_with("its input is repeated: 3 overruns, 0 samples missing"), "{said}");
         assert_eq!(progress.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
         assert_eq!(progress.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
         assert_eq!(progress.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));

@@ -78,8 +78,9 @@ pub(super) fn reactions(setup: &DriveSetup) -> Vec<Setting> {
 pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
     use Kind::{I32, U8, U16, U32};
     let at_least = |index, kind, value| Setting::new(index, 0, kind, Need::AtLeast(value));
-    let times =
-        |multiple| (i64::from(setup.acceleration_max_counts_s2) * multiple).min(u32::MAX.into());
+    let times = |multiple: i64| {
+        (i64::from(setup.acceleration_max_counts_s2) * multiple).min(i64::from(u32::MAX))
+    };
     let room = Need::Ample(times(ACCELERATION_AMPLE), times(ACCELERATION_LEAST));
     let velocity = i64::from(setup.velocity_max_counts_s);
     let (min, max) = (i64::from(setup.position_min_counts), i64::from(setup.position_max_counts));
