@@ -124,7 +124,7 @@ fn connect(path: &Path, at_rest: bool) -> Result<Connection, LibraryError> {
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let fail = |source: rusqlite::Error| match source.sqlite_error_code() {
         Some(ErrorCode::NotADatabase) => {
-            LibraryError::Foreign { path: name.clone(), found: "no SQLite database".to_owned() }
+            LibraryError::Foreign { path: name.clone(), found: "not a database".to_owned() }
         }
         Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => told(&name, source),
         Some(ErrorCode::CannotOpen | ErrorCode::ReadOnly) if !at_rest => LibraryError::ReadOnly {
@@ -209,4 +209,116 @@ fn immutable(path: &Path) -> String {
     }
     address.push_str("?immutable=1");
     address
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Library;
+    use super::super::store::tests::{meta, record};
+    use super::*;
+
+    /// A folder of its own, gone when dropped.
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("ilc-{name}-{}", std::process::id()));
+            std::fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+
+        fn names(&self) -> Vec<String> {
+            let entries = std::fs::read_dir(&self.0).unwrap();
+            let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name();
+            let mut names: Vec<String> =
+                entries.map(|entry| name(entry).to_string_lossy().into_owned()).collect();
+            names.sort();
+            names
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    #[test]
+    fn a_foreign_database_is_neither_opened_nor_changed() {
+        let folder = Folder::new("foreign");
+        for (number, sql) in [
+            "CREATE TABLE customers (id)",
+            "CREATE TABLE customers (id); PRAGMA user_version = 2",
+            "CREATE TABLE iteration (id); PRAGMA user_version = 3",
+            "CREATE TABLE iteration (id); PRAGMA application_id = 7",
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let path = folder.0.join(format!("{number}.db"));
+            let connection = Connection::open(&path).unwrap();
+            connection.execute_batch(sql).unwrap();
+            drop(connection);
+            let before = std::fs::read(&path).unwrap();
+            for refused in [Library::open(&path), Library::read(&path)] {
+                assert!(matches!(refused, Err(LibraryError::Foreign { .. })), "{sql}: {refused:?}");
+            }
+            assert_eq!(std::fs::read(&path).unwrap(), before);
+        }
+        assert_eq!(folder.names(), ["0.db", "1.db", "2.db", "3.db"], "nothing is beside them");
+    }
+
+    #[test]
+    fn readers_see_what_a_writer_has_kept_and_leave_nothing_behind() {
+        let folder = Folder::new("readers");
+        let path = folder.0.join("a #1?.db");
+        assert!(matches!(Library::read(&path), Err(LibraryError::Missing { .. })));
+        let library = Library::open(&path).unwrap();
+        library.append(&meta("a"), &record(0)).unwrap();
+        assert_eq!(Library::read(&path).unwrap().list(None).unwrap().len(), 1, "in the log");
+        drop(library);
+        assert_eq!(Library::read(&path).unwrap().list(None).unwrap().len(), 1);
+        assert!(Library::read(&path).unwrap().append(&meta("a"), &record(1)).is_err());
+        assert_eq!(folder.names(), ["a #1?.db"]);
+    }
+
+    #[test]
+    fn what_a_killed_process_had_begun_to_make_is_made_whole() {
+        let folder = Folder::new("begun");
+        let path = folder.0.join("begun.db");
+        let connection = Connection::open(&path).unwrap();
+        connection.pragma_update(None, "journal_mode", "WAL").unwrap();
+        drop(connection);
+        assert!(matches!(Library::read(&path), Err(LibraryError::Empty { .. })));
+        Library::open(&path).unwrap().append(&meta("a"), &record(0)).unwrap();
+        assert_eq!(Library::read(&path).unwrap().list(None).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn a_run_is_not_kept_in_a_file_that_is_gone() {
+        let folder = Folder::new("gone");
+        let path = folder.0.join("gone.db");
+        let library = Library::open(&path).unwrap();
+        library.append(&meta("a"), &record(0)).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let refused = library.append(&meta("a"), &record(1));
+        assert!(matches!(refused, Err(LibraryError::Gone { .. })));
+    }
+
+    #[test]
+    fn another_writer_is_named_and_a_run_kept_twice_too() {
+        let folder = Folder::new("busy");
+        let path = folder.0.join("busy.db");
+        let library = Library::open(&path).unwrap();
+        library.append(&meta("a"), &record(0)).unwrap();
+        let twice = library.append(&meta("a"), &record(0));
+        assert!(matches!(twice, Err(LibraryError::Taken { index: 0, .. })));
+        let other = Connection::open(&path).unwrap();
+        other.execute_batch("BEGIN IMMEDIATE").unwrap();
+        library.hurry();
+        let refused = library.append(&meta("a"), &record(1));
+        assert!(matches!(refused, Err(LibraryError::Locked { .. })), "{refused:?}");
+        drop(other);
+        library.append(&meta("a"), &record(1)).unwrap();
+    }
 }
