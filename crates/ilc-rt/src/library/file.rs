@@ -164,16 +164,17 @@ pub(super) fn found(connection: &Connection, path: &Path) -> Result<Found, Libra
     if mark == 0 && version == 0 && n_objects == 0 {
         return Ok(Found::Empty);
     }
-    if mark == schema::MARK && version > schema::VERSION {
+    // Libraries of before had no mark; their table tells them from somebody else's database.
+    let may_be_ours = mark == schema::MARK
+        || mark == 0 && (n_objects == 0 || has_columns(connection).map_err(fail)?);
+    if may_be_ours && version > schema::VERSION {
         return Err(LibraryError::Version {
             path: name,
             found: version,
             expected: schema::VERSION,
         });
     }
-    // Libraries of before had no mark; their table tells them from somebody else's database.
-    let is_marked = mark == schema::MARK || mark == 0;
-    let is_ours = is_marked
+    let is_ours = may_be_ours
         && (schema::OLDEST..=schema::VERSION).contains(&version)
         && has_columns(connection).map_err(fail)?;
     if is_ours {
