@@ -8,7 +8,7 @@ SOURCES := $(shell find crates sim python -name '*.rs' -o -name '*.py' -o -name 
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo gallery test test-rust test-python check fmt lint docs bench rt vcan clean
+.PHONY: help build demo gallery test test-rust test-python check fmt lint docs bench rt soak vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -59,6 +59,11 @@ endif
 
 test-python: $(VENV)/.test ## Python tests
 	$(BIN)/python -m pytest -q
+
+soak: build ## The demo on a computer that stalls, is busy or is killed: minutes, with a tally
+	$(BIN)/python tests/soak/demo.py stalls --times 10
+	$(BIN)/python tests/soak/demo.py load --times 40
+	$(BIN)/python tests/soak/demo.py kills --times 20
 
 vcan: build ## The bus contract and the main job on a real vcan0
 	tests/vcan/job
