@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use ilc_rt::library::{Library, Row, Task};
-use ilc_rt::record::{Figures, IterationRecord, Meta, fingerprint, infinity_norm, rms};
+use ilc_rt::record::{AxisKinds, Figures, IterationRecord, Meta, distances_m, fingerprint};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -54,7 +54,9 @@ impl PyLibrary {
     /// Returns
     /// -------
     /// list of dict
-    ///     Provenance and figures of each run; lengths in metres.
+    ///     Provenance and figures of each run; lengths in metres, angles in radians. A
+    ///     figure over several axes is over the linear ones, or over all of a cell
+    ///     whose axes are all rotary; contour errors are None where the path has none.
     ///
     /// Raises
     /// ------
@@ -82,8 +84,8 @@ impl PyLibrary {
     ///     What `list` gives, and ``law_parameters`` and ``program`` (JSON),
     ///     ``reference_m``, ``input``, ``encoder_m``, ``tool_m`` (or None),
     ///     ``error_m`` of shape (n_samples, n_axes), ``contour_m`` of shape
-    ///     (n_samples,), ``disturbance`` of shape (n_disturbances,) (None: none is
-    ///     measured).
+    ///     (n_samples,) (None: the path has no contour), ``disturbance`` of shape
+    ///     (n_disturbances,) (None: none is measured).
     ///
     /// Raises
     /// ------
@@ -103,7 +105,10 @@ impl PyLibrary {
         let tool_m = if record.tool_m.is_empty() { None } else { Some(signal(record.tool_m)?) };
         run.set_item("tool_m", tool_m)?;
         run.set_item("error_m", signal(record.error_m)?)?;
-        run.set_item("contour_m", give_signal(py, record.contour_m, 1, true)?)?;
+        let contour_m = record.contour_m;
+        let has_contour = record.figures.contour_inf_m.is_some() && !contour_m.is_empty();
+        let contour_m = has_contour.then(|| give_signal(py, contour_m, 1, true)).transpose()?;
+        run.set_item("contour_m", contour_m)?;
         let disturbance = record.disturbance;
         let disturbance = (!disturbance.is_empty()).then(|| give_signal(py, disturbance, 1, true));
         run.set_item("disturbance", disturbance.transpose()?)?;
@@ -243,13 +248,13 @@ impl PyLibrary {
             axis_names: (1..=n_axes).map(|axis| format!("axis {axis}")).collect(),
             input_units: vec!["m".to_owned(); n_axes],
         };
-        let figures = Figures {
-            tracking_inf_m: infinity_norm(&error_m),
-            tracking_rms_m: rms(&error_m, n_axes),
-            ..Figures::default()
-        };
-        let encoder_m = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
-        let contour_m = vec![0.0; u.n_samples];
+        let encoder_m: Vec<f64> = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
+        let kinds = AxisKinds::new(&meta.input_units, n_axes);
+        let contour_m = distances_m(&reference_m, &encoder_m, &kinds, cycle_s);
+        let mut figures = Figures::default();
+        figures.set_tracking(&error_m, &kinds);
+        figures.set_places(&reference_m, &encoder_m, &[], &kinds);
+        figures.set_contour(&contour_m);
         let input = u.values;
         detached(py, || {
             let library = self.lock();
@@ -356,6 +361,10 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     run.set_item("late_updates", figures.late_updates)?;
     run.set_item("update_ms", figures.update_ms)?;
     run.set_item("rolled_back", figures.rolled_back)?;
+    run.set_item("learning_off", figures.learning_off)?;
+    run.set_item("remark", &figures.remark)?;
+    run.set_item("axes_tracking_inf_m", &figures.axes_tracking_inf_m)?;
+    run.set_item("axes_tracking_rms_m", &figures.axes_tracking_rms_m)?;
     run.set_item("digest", &row.digest)?;
     Ok(run)
 }

@@ -19,15 +19,19 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
+from ilc_rt.commands.targets import make_folder, report_target
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import Event, StartEvent
+from ilc_rt.text import file_name, printable
 
 PICTURE = "identify-{axis}.png"
 COHERENCE_MIN = 0.7
 """Median coherence below which the output does not follow the input."""
+PERIODS_MAX = 10_000
 
 PictureFolder = Annotated[
-    Path | None, typer.Option("--report", metavar="DIR", help="Folder for the picture.")
+    Path | None,
+    typer.Option("--report", metavar="DIR", callback=report_target, help="Folder for the picture."),
 ]
 
 
@@ -56,7 +60,9 @@ def identify(
     duration_s: Annotated[
         float | None, typer.Option(help="Length of one period; 8 s, or more for a slow axis.")
     ] = None,
-    periods: Annotated[int, typer.Option(help="Periods to evaluate, at least 2.")] = 5,
+    periods: Annotated[
+        int, typer.Option(max=PERIODS_MAX, help="Periods to evaluate, at least 2.")
+    ] = 5,
     at_m: Annotated[
         float | None, typer.Option(help="Where to excite it; the program's start if not given.")
     ] = None,
@@ -108,7 +114,8 @@ def identify(
         found.write_json(json_file)
         typer.echo(f"figures: {json_file}")
     if report is not None:
-        typer.echo(f"picture: {_draw(found, report, PICTURE.format(axis=name))}")
+        picture = _draw(found, report, PICTURE.format(axis=file_name(name)))
+        typer.echo(f"picture: {printable(picture)}")
 
     if found.doubt is not None:
         # What was measured is written all the same: it shows what is wrong.
@@ -156,8 +163,8 @@ def _draw(found: object, folder: Path, name: str) -> Path:
     picture = io.BytesIO()
     with mpl.rc_context(plots.STYLE):
         found.figure().savefig(picture, format="png")
+    make_folder(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(picture.getvalue())
     except OSError as error:
         message = f"{folder}: cannot be written: {error.strerror}"

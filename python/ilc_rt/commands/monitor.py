@@ -10,11 +10,13 @@ from typing import Annotated
 import typer
 
 from ilc_rt.campaign import load_cell
+from ilc_rt.comparison import Comparison
 from ilc_rt.errors import EXIT_FAULT
 from ilc_rt.events import (
     EndEvent,
     FaultEvent,
     IterationEvent,
+    JudgedEvent,
     LatencyEvent,
     ProgressEvent,
     StartEvent,
@@ -23,7 +25,8 @@ from ilc_rt.events import (
 from ilc_rt.monitor import Message, Monitor
 from ilc_rt.progress import WORDS, describe
 from ilc_rt.record import IterationRecord
-from ilc_rt.table import HEAD, plain_line, run_cells
+from ilc_rt.table import headings, plain_line, run_cells
+from ilc_rt.text import printable
 
 CellName = Annotated[
     str, typer.Argument(metavar="[CELL]", help="Name of a cell, or its TOML file; * for all.")
@@ -80,6 +83,7 @@ class _View:
         self._events = events
         self._present: set[str] = set()
         self._first: dict[str, IterationRecord] = {}
+        self._units: dict[str, tuple[str, ...]] = {}
 
     def show(self, message: Message) -> None:
         event = message.event
@@ -98,7 +102,12 @@ class _View:
                 f"{message.cell}: loop woke late by {late.p99:.3g} µs (99 %), "
                 f"{late.max:.3g} µs at most"
             )
+        elif isinstance(event, JudgedEvent):
+            if event.remark:
+                typer.echo(f"{message.cell}: run {event.index}: {printable(event.remark)}")
         elif isinstance(event, StartEvent):
+            units = (unit.removesuffix("/s") for unit in event.input_units)
+            self._units[message.cell] = tuple(units)
             typer.echo(describe(event))
         elif isinstance(event, StateEvent):
             run = "" if event.iteration is None else f" (run {event.iteration})"
@@ -120,5 +129,11 @@ class _View:
     def _show_run(self, cell: str, record: IterationRecord) -> None:
         if cell not in self._first or record.index == 0:
             self._first[cell] = record
-            typer.echo(" " * len(cell) + "  " + plain_line([name for name, _ in HEAD]))
-        typer.echo(f"{cell}  {plain_line(run_cells(record, self._first[cell]))}")
+        first = self._first[cell]
+        comparison = Comparison((first, record), self._units.get(cell, ()))
+        names = headings(comparison)
+        if record is first:
+            typer.echo(" " * len(cell) + "  " + plain_line(names, names))
+        typer.echo(f"{cell}  {plain_line(run_cells(comparison, record), names)}")
+        if record.remark:
+            typer.echo(f"{' ' * len(cell)}       {printable(record.remark)}")

@@ -12,10 +12,9 @@ from rich.table import Table
 
 from ilc_rt.commands.options import CellFile, JsonFile  # noqa: TC001 - typer reads them
 from ilc_rt.errors import BadInputError
+from ilc_rt.result import write_text
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from ilc_rt.tuning import Proposal
 
 Uncertainty = Annotated[
@@ -38,7 +37,11 @@ NoiseStd = Annotated[
     float | None,
     typer.Option("--noise-m", help="Standard deviation of the measurement's noise in metres."),
 ]
-Runs = Annotated[int, typer.Option("--runs", min=1, help="Runs in which learning should be done.")]
+# More say nothing that these do not.
+RUNS_MAX = 1_000_000
+Runs = Annotated[
+    int, typer.Option("--runs", min=1, max=RUNS_MAX, help="Runs in which learning should be done.")
+]
 Write = Annotated[bool, typer.Option("--write", help="Put the weights into the cell description.")]
 
 
@@ -69,7 +72,7 @@ def tune(
     )
     _show(found)
     if json_file is not None:
-        _write(json_file, found)
+        write_text(json_file, json.dumps(found.to_json(), indent=2) + "\n")
         typer.echo(f"figures: {json_file}")
     if not write:
         return
@@ -105,11 +108,3 @@ def _show(found: Proposal) -> None:
         console.print(f"note: {note}", markup=False)
     console.print("for the cell:\n")
     console.print(found.toml(), markup=False, end="")
-
-
-def _write(path: Path, found: Proposal) -> None:
-    try:
-        path.write_text(json.dumps(found.to_json(), indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        message = f"{path}: {error.strerror}"
-        raise BadInputError(message) from error

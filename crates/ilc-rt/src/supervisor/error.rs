@@ -95,13 +95,15 @@ pub enum SupervisorError {
     },
     /// The path leaves the range of an axis.
     #[error(
-        "{file}: [program]: axis {axis} goes to {reached_m} m: it reaches {low_m} to {high_m} m"
+        "{file}: [program]: axis {axis} goes to {reached_m} {unit}: it reaches {low_m} to {high_m} {unit}"
     )]
     Range {
         /// Cell description.
         file: String,
         /// Name of the axis.
         axis: String,
+        /// What it is measured in.
+        unit: &'static str,
         /// The farthest position beyond the range.
         reached_m: f64,
         /// Smallest allowed.

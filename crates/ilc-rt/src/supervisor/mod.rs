@@ -33,5 +33,6 @@ pub use experiment::Experiment;
 pub use forecast::{first_error, learning_model};
 pub use identified::{Described, Identified};
 pub use law::Prepared;
+pub use nodes::drive_setup;
 pub use options::{Options, Outcome};
 pub use plan::Plan;
