@@ -25,9 +25,9 @@ from ilc_rt.events import Event, StartEvent
 from ilc_rt.text import file_name, printable
 
 PICTURE = "identify-{axis}.png"
+PERIODS_MAX = 10_000
 COHERENCE_MIN = 0.7
 """Median coherence below which the output does not follow the input."""
-PERIODS_MAX = 10_000
 
 PictureFolder = Annotated[
     Path | None,

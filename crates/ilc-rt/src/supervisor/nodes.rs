@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::error::SupervisorError;
 use super::plan;
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
-use crate::fieldbus::canopen::NmtCommand;
+use crate::fieldbus::canopen::{NmtCommand, listen};
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
 use crate::fieldbus::cia402::{BringUpError, DriveSetup, bring_up, bring_up_encoder};
 use crate::fieldbus::{Bus, BusError};
@@ -17,6 +17,7 @@ const HEARTBEAT_MS: u16 = 100;
 pub(super) fn start(cell: &Cell, bus: &mut dyn Bus, lockstep: bool) -> Result<(), SupervisorError> {
     let file = cell.file.display().to_string();
     let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s);
+    refuse_company(cell, bus)?;
     let refused = |key: String| {
         let file = file.clone();
         move |source: BringUpError| SupervisorError::BringUp {
@@ -39,6 +40,22 @@ pub(super) fn start(cell: &Cell, bus: &mut dyn Bus, lockstep: bool) -> Result<()
         address: cell.bus.address.clone(),
         source,
     })
+}
+
+/// Listens before anything is sent: a bus that somebody else commands is left alone.
+fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), SupervisorError> {
+    let numbers = cell.axes.iter().map(|axis| axis.node);
+    let numbers = numbers.chain(cell.tcp_encoder.iter().map(|tool| tool.node));
+    let nodes = numbers.map(|number| plan::node(cell, number)).collect::<Result<Vec<_>, _>>()?;
+    let file = || cell.file.display().to_string();
+    let address = || cell.bus.address.clone();
+    match listen::other_master(bus, &nodes, listen::LISTEN) {
+        Ok(None) => Ok(()),
+        Ok(Some(heard)) => {
+            Err(SupervisorError::Occupied { file: file(), address: address(), heard })
+        }
+        Err(source) => Err(SupervisorError::Start { file: file(), address: address(), source }),
+    }
 }
 
 /// Returns what the drive of an axis is set up to.

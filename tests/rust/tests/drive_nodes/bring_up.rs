@@ -281,7 +281,9 @@ fn a_segment_that_comes_twice_is_taken_once() {
     }
 
     let mut bus = Twice(Bench::new(ClockMode::LockStep).bus, None);
-    bring_up(&mut bus, &setup(Mode::Csv)).unwrap();
+    // To the bring-up, a node all of whose answers come twice is two nodes.
+    let line = bring_up(&mut bus, &setup(Mode::Csv)).unwrap_err().to_string();
+    assert!(line.starts_with("two nodes answer as node 1: "), "{line}");
     let client = SdoClient::new(node(1), ANSWER);
     let text = b"thirty-two characters, all of it";
     client.download(&mut bus, 0x2000, 0, text).unwrap();

@@ -273,7 +273,7 @@ fn a_drive_left_under_power_is_brought_to_rest_before_anything_is_set() {
 fn option_codes_have_their_ramps() {
     // 0.2 m/s: at 10 m/s2 over after 20 ms, at 2 m/s2 after 100 ms.
     for (option, n_cycles, ends_in) in [
-        (0, 0, State::SwitchOnDisabled),
+        (0, 0_usize, State::SwitchOnDisabled),
         (1, 100, State::SwitchOnDisabled),
         (2, 20, State::SwitchOnDisabled),
         (5, 100, State::QuickStopActive),
@@ -289,7 +289,7 @@ fn option_codes_have_their_ramps() {
             (0..150).map(|_| bench.cycle(Controlword::QUICK_STOP, -200_000)).collect();
         let moving = answers.windows(2).filter(|two| two[0].position() != two[1].position());
         let n_moving = moving.count();
-        let allowed = n_cycles..=n_cycles + 3;
+        let allowed = n_cycles.saturating_sub(2)..=n_cycles + 2;
         assert!(allowed.contains(&n_moving), "605A = {option}: {n_moving} cycles");
         assert_eq!(answers[149].state(), ends_in, "605A = {option}");
     }

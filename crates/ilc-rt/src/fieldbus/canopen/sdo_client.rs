@@ -134,6 +134,41 @@ impl SdoClient {
         Ok(bytes.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte)))
     }
 
+    /// Reads sub-index 0 of an object once and counts the answers until `wait` after the first; 0 if
+    /// none came in time, or the bus failed, as the next question will tell.
+    pub(crate) fn count_answers(
+        &self,
+        bus: &mut dyn Bus,
+        index: u16,
+        timeout: Duration,
+        wait: Duration,
+    ) -> usize {
+        let address = ObjectAddress::new(index, 0);
+        if self.drain(bus, address).is_err()
+            || self.send(bus, address, SdoRequest::UploadInitiate(address)).is_err()
+        {
+            return 0;
+        }
+        let mut deadline = Instant::now() + timeout;
+        let mut n_answers = 0;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let Ok(Some(frame)) = bus.recv(left) else { return n_answers };
+            let answer = (frame.id() == cob_id::of(cob_id::SDO_RESPONSE, self.node))
+                .then(|| SdoResponse::decode(frame.payload()))
+                .flatten();
+            if answer.is_some_and(|answer| named(&answer) == Some(address)) {
+                n_answers += 1;
+                if n_answers == 1 {
+                    deadline = Instant::now() + wait;
+                }
+            }
+            if left.is_zero() {
+                return n_answers;
+            }
+        }
+    }
+
     /// Writes an object: expedited up to four bytes, segmented beyond; little endian.
     ///
     /// # Errors

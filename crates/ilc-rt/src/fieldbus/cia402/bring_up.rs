@@ -18,6 +18,11 @@ const REST: Duration = Duration::from_millis(500);
 /// How often a question is asked again whose answer takes time.
 const ASK_EVERY: Duration = Duration::from_millis(1);
 
+/// How often a question must be answered twice until two nodes are the reason.
+const TWIN_QUESTIONS: u32 = 4;
+/// How long after an answer a second one is waited for.
+const TWIN_WAIT: Duration = Duration::from_millis(20);
+
 /// What a drive is set up to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveSetup {
@@ -86,6 +91,7 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     reset(bus, node, setup.answer_timeout)?;
     let mut remote = Remote { bus, client: SdoClient::new(node, setup.answer_timeout), node };
     let device_type = remote.check_profile(objects::PROFILE_DRIVE)?;
+    remote.refuse_twins(setup.answer_timeout)?;
     let identity = remote.identity()?;
     let supported_modes = remote.read("supported modes", objects::SUPPORTED_MODES, 0)?;
     if supported_modes & setup.mode.supported_bit() == 0 {
@@ -127,6 +133,7 @@ pub fn bring_up_encoder(
     reset(bus, node, timeout)?;
     let mut remote = Remote { bus, client: SdoClient::new(node, timeout), node };
     let device_type = remote.check_profile(objects::PROFILE_ENCODER)?;
+    remote.refuse_twins(timeout)?;
     let identity = remote.identity()?;
     process_data::close_all(&mut remote)?;
     remote.ensure_all(&settings::communication(node, 0, 0))?;
@@ -173,6 +180,17 @@ impl Remote<'_> {
         } else {
             Err(BringUpError::Profile { node: self.node, expected, found, device_type })
         }
+    }
+
+    /// Asks a question a few times and refuses a node that answers it twice each time: it is two. Once
+    /// would not do, as a bus may well carry a frame twice.
+    fn refuse_twins(&mut self, timeout: Duration) -> Result<(), BringUpError> {
+        for _ in 0..TWIN_QUESTIONS {
+            if self.client.count_answers(self.bus, objects::DEVICE_TYPE, timeout, TWIN_WAIT) < 2 {
+                return Ok(());
+            }
+        }
+        Err(BringUpError::TwoNodes { node: self.node })
     }
 
     /// Reads the identity; all but the vendor are optional in CiA 301.

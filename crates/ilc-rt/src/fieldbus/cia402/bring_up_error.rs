@@ -19,6 +19,15 @@ pub enum BringUpError {
         /// How long was waited.
         timeout: Duration,
     },
+    /// Two nodes have the same number.
+    #[error(
+        "two nodes answer as node {node}: each question is answered twice; give one of them another \
+         number, or stop the second simulator"
+    )]
+    TwoNodes {
+        /// The number.
+        node: NodeId,
+    },
     /// The node is of another kind.
     #[error(
         "node {node}: device type: expected profile {expected}, found {found} (0x1000 = 0x{device_type:08X})"
