@@ -11,10 +11,11 @@ use super::run::{MeasureName, exit_status, open, say_event, stop_on_signals};
 use super::{EXIT_BAD_INPUT, show};
 use crate::config::{Cell, Measure};
 use crate::library::Library;
-use crate::model::identify::{Excitation, Waveform};
+use crate::model::identify::{Doubt, Excitation, Waveform};
 use crate::record::{EndStatus, Event};
 use crate::supervisor::{
-    self, Band, BandSearch, Disturbance, Experiment, Identified, Options, Outcome, SupervisorError,
+    self, Band, BandSearch, Described, Disturbance, Experiment, Identified, Options, Outcome,
+    SupervisorError,
 };
 
 /// Where an axis is excited if only the highest frequency is asked for.
@@ -244,31 +245,43 @@ fn excite(
     Ok((outcome, Some((experiment, identified))))
 }
 
+/// The figures of `[axis.model]`; of an output that does not follow its input there are none.
 fn describe(experiment: &Experiment, found: &Identified) -> String {
-    let (fit, model) = (&found.fit, &found.fit.model);
     let worst = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
-    format!(
-        "axis {}: {} frequencies from {} to {} Hz, amplitude {:.3e}, coherence at least {:.4}\n\
-         gain               {:>10.5} +- {:.1e}\n\
-         natural frequency  {:>10.4} +- {:.1e} Hz\n\
-         damping            {:>10.5} +- {:.1e}\n\
-         delay              {:>10.4} +- {:.1e} ms\n\
-         left over          {:>10.2} % rms{}",
+    let head = format!(
+        "axis {}: {} frequencies from {} to {} Hz, amplitude {:.3e}, coherence at least {:.4}",
         experiment.axis,
         found.measured.frequency_hz.len(),
         experiment.excitation.from_hz,
         experiment.excitation.to_hz,
         experiment.excitation.amplitude,
         worst(&found.measured.coherence),
-        model.gain,
-        fit.gain_deviation,
-        model.natural_frequency_hz,
-        fit.natural_frequency_deviation_hz,
-        model.damping,
-        fit.damping_deviation,
-        model.delay_s * 1e3,
-        fit.delay_deviation_s * 1e3,
-        fit.residual_rms * 100.0,
+    );
+    if matches!(found.doubt, Some(Doubt::Incoherent { .. })) {
+        return head;
+    }
+    let (figures, delay_s) = match found.described {
+        Described::Position(model) => (
+            format!(
+                "natural frequency  {:>10.4} Hz\ndamping            {:>10.5}",
+                model.natural_frequency_hz, model.damping
+            ),
+            model.delay_s,
+        ),
+        Described::Velocity(model) => {
+            (format!("velocity bandwidth {:>10.4} Hz", model.bandwidth_hz), model.delay_s)
+        }
+    };
+    format!(
+        "{head}\n\
+         gain               {:>10.5} +- {:.1e}\n\
+         {figures}\n\
+         delay              {:>10.4} ms\n\
+         left over          {:>10.2} % rms{}",
+        found.fit.model.gain,
+        found.fit.gain_deviation,
+        delay_s * 1e3,
+        found.residual_rms * 100.0,
         if found.doubt.is_none() { format!("\n\n{}", found.section()) } else { String::new() }
     )
 }
