@@ -527,7 +527,7 @@ def raster(
     setting: str = "complete",
 ) -> Trajectory: ...
 def gcode(
-    text: str,
+    text: str | bytes,
     *,
     start_m: ArrayLike,
     feed_m_s: float,
@@ -537,6 +537,7 @@ def gcode(
     jerk_max_m_s3: float | ArrayLike,
     rapid_m_s: float | None = None,
     blend_s: float | None = None,
+    block_delete: bool = False,
 ) -> Trajectory: ...
 def tracking_index(
     trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0

@@ -261,7 +261,7 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Event:
                 values[name] = tuple(values.get(name) or ())
         elif cls is LatencyEvent:
             values = {key: parse_histogram(value) for key, value in values.items()}
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
         message = f'event "{data["event"]}" is malformed ({error}): {data!r}'
         raise EventError(message) from error
     event: Event = cls(**values)

@@ -12,6 +12,8 @@ use pyo3::types::PyDict;
 use crate::argument::{Signal, give_signal, misfit, read_disturbance};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
+use crate::whole;
 
 /// Every run of every campaign, in one SQLite file.
 ///
@@ -33,6 +35,7 @@ use crate::error::OrRaise;
 #[pyclass(name = "Library", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyLibrary {
+    made: Made,
     library: Mutex<Library>,
 }
 
@@ -41,7 +44,13 @@ impl PyLibrary {
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(path: PathBuf) -> PyResult<Self> {
-        Ok(Self { library: Mutex::new(Library::open(&path).or_raise()?) })
+        let made = made!(path);
+        Ok(Self { made, library: Mutex::new(Library::open(&path).or_raise()?) })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Return the runs kept, oldest first, without their arrays.
@@ -91,7 +100,11 @@ impl PyLibrary {
     /// ------
     /// OSError
     ///     If there is no such run, or its arrays do not match their digest.
-    fn load<'py>(&self, py: Python<'py>, id: i64) -> PyResult<Bound<'py, PyDict>> {
+    fn load<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole::id)] id: i64,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let row = detached(py, || self.lock().load(id)).or_raise()?;
         let run = describe(py, &row)?;
         let n_axes = row.meta.n_axes;
@@ -143,7 +156,7 @@ impl PyLibrary {
         &self,
         py: Python<'py>,
         disturbance: &Bound<'py, PyAny>,
-        top: usize,
+        #[pyo3(from_py_with = whole::top)] top: usize,
         cell: Option<String>,
     ) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let disturbance = read_disturbance("disturbance", disturbance)?;
@@ -301,7 +314,12 @@ impl PyLibrary {
     /// spread over these runs, summed over the disturbances of all of them; without
     /// disturbances the smallest errors stay. The space in the file is used again.
     #[pyo3(signature = (keep, cell=None))]
-    fn trim(&self, py: Python<'_>, keep: usize, cell: Option<String>) -> PyResult<usize> {
+    fn trim(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::keep)] keep: usize,
+        cell: Option<String>,
+    ) -> PyResult<usize> {
         let task = Task { cell };
         detached(py, || self.lock().trim(keep, &task)).or_raise()
     }
@@ -321,7 +339,12 @@ impl PyLibrary {
     ///     If the ending is unknown or the file cannot be written.
     /// OSError
     ///     If there is no such run, or its arrays do not match their digest.
-    fn export(&self, py: Python<'_>, id: i64, path: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn export(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::id)] id: i64,
+        path: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
         let run = self.load(py, id)?;
         py.import("ilc_rt.export")?.call_method1("export_run", (run, path)).map(drop)
     }

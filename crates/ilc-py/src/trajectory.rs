@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use ilc_rt::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
 use ilc_rt::trajectory::exponential::AlphaMax;
-use ilc_rt::trajectory::program::read_gcode;
+use ilc_rt::trajectory::program::{GcodeSetting, read_gcode};
 use ilc_rt::trajectory::{
     AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
     ModulatedSegment, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion, TrackingIndex,
@@ -18,9 +18,10 @@ use crate::argument::{Signal, give_signal, read_vector};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::exceptions;
+use crate::whole;
 
 /// Place of an alpha, the alpha, and the intervals in which it might be.
-pub(crate) type Alpha = (usize, &'static str, f64, Vec<(f64, f64)>);
+pub(crate) type Alpha = (usize, String, f64, Vec<(f64, f64)>);
 
 /// A planned motion, sampled.
 ///
@@ -35,7 +36,7 @@ pub(crate) type Alpha = (usize, &'static str, f64, Vec<(f64, f64)>);
 /// ...     velocity_max_m_s=0.5, acceleration_max_m_s2=2.0, jerk_max_m_s3=50.0)
 /// >>> float(move.position_m[-1, 0])
 /// 0.1
-#[pyclass(name = "Trajectory", module = "ilc_rt", frozen)]
+#[pyclass(name = "Trajectory", module = "ilc_rt.trajectory", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyTrajectory {
     motion: SampledMotion,
@@ -47,6 +48,20 @@ pub(crate) struct PyTrajectory {
 
 #[pymethods]
 impl PyTrajectory {
+    /// Pickled and copied as its samples.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let samples = (
+            this.position_m(py)?,
+            this.velocity_m_s(py)?,
+            this.acceleration_m_s2(py)?,
+            this.programmed_m(py)?,
+        );
+        let parts = (this.motion.dt_s, samples, this.alphas(), this.computing_s);
+        let maker = py.import("ilc_rt._native")?.getattr("_trajectory")?;
+        Ok((maker, parts.into_pyobject(py)?.into_any()))
+    }
+
     /// Sample time in seconds.
     #[getter]
     fn dt_s(&self) -> f64 {
@@ -240,7 +255,7 @@ fn sample_exponential(
         .iter()
         .map(|choice| {
             let intervals = choice.admissible.iter().map(|i| (i.from, i.to)).collect();
-            (choice.segment, choice.place, choice.alpha, intervals)
+            (choice.segment, choice.place.to_owned(), choice.alpha, intervals)
         })
         .collect();
     Ok((motion, alphas))
@@ -797,7 +812,7 @@ fn raster(
     py: Python<'_>,
     width_m: f64,
     pitch_m: f64,
-    rows: usize,
+    #[pyo3(from_py_with = whole::rows)] rows: usize,
     feed_m_s: f64,
     dt_s: f64,
     velocity_max_m_s: &Bound<'_, PyAny>,
@@ -818,12 +833,14 @@ fn raster(
 
 /// Plan a part program in G-code.
 ///
-/// G0 to G4, G17, G20, G21, G90, G91, M2, M30; arcs by I and J, or R; comments.
+/// G0 to G4, G17, G20, G21, G80, G90, G91, M2, M30; arcs by I and J, or R;
+/// comments; words that ask for what is so anyway. The words mean what they
+/// mean to LinuxCNC, or are refused.
 ///
 /// Parameters
 /// ----------
-/// text : str
-///     The program.
+/// text : str or bytes
+///     The program; bytes may have any encoding that continues ASCII.
 /// start_m : ndarray of float64, shape (n_axes,)
 ///     Where it begins, in m.
 /// feed_m_s : float
@@ -841,6 +858,8 @@ fn raster(
 /// blend_s : float, optional
 ///     Window that rounds the corners, in s; without it every move is at rest
 ///     at its end.
+/// block_delete : bool
+///     Whether blocks that begin with / are left out.
 ///
 /// Returns
 /// -------
@@ -863,11 +882,11 @@ fn raster(
 /// >>> path.position_m[-1].tolist()
 /// [0.0, 0.01]
 #[pyfunction]
-#[pyo3(signature = (text, *, start_m, feed_m_s, dt_s, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3, rapid_m_s=None, blend_s=None))]
+#[pyo3(signature = (text, *, start_m, feed_m_s, dt_s, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3, rapid_m_s=None, blend_s=None, block_delete=false))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 fn gcode(
     py: Python<'_>,
-    text: &str,
+    text: &Bound<'_, PyAny>,
     start_m: &Bound<'_, PyAny>,
     feed_m_s: f64,
     dt_s: f64,
@@ -876,10 +895,23 @@ fn gcode(
     jerk_max_m_s3: &Bound<'_, PyAny>,
     rapid_m_s: Option<f64>,
     blend_s: Option<f64>,
+    block_delete: bool,
 ) -> PyResult<PyTrajectory> {
+    let bytes = match text.extract::<&[u8]>() {
+        Ok(bytes) => bytes,
+        Err(_) => text.extract::<&str>()?.as_bytes(),
+    };
     let start = read_vector("start_m", start_m)?;
     let limits = read_limits(start.len(), velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
-    let program = read_gcode(text, &start, feed_m_s, rapid_m_s.unwrap_or(feed_m_s))
+    let setting = GcodeSetting {
+        start_m: &start,
+        feed_m_s,
+        rapid_m_s: rapid_m_s.unwrap_or(feed_m_s),
+        rotary: &[],
+        exact_corners: blend_s.is_none(),
+        block_delete,
+    };
+    let program = read_gcode(bytes, &setting)
         .map_err(|error| exceptions::TrajectoryError::new_err(error.to_string()))?;
     let spec = PathSpec {
         start_m: start,
@@ -947,8 +979,30 @@ fn tracking_index(
     Ok((index.tracking, index.acceleration))
 }
 
+/// Makes a trajectory again from its samples, for copies.
+#[pyfunction]
+fn _trajectory(
+    dt_s: f64,
+    samples: [Bound<'_, PyAny>; 4],
+    alphas: Vec<Alpha>,
+    computing_s: f64,
+) -> PyResult<PyTrajectory> {
+    let [position, velocity, acceleration, programmed] = samples;
+    let position = Signal::read("position_m", &position)?;
+    let motion = SampledMotion {
+        dt_s,
+        n_axes: position.n_channels,
+        velocity_m_s: Signal::read("velocity_m_s", &velocity)?.values,
+        acceleration_m_s2: Signal::read("acceleration_m_s2", &acceleration)?.values,
+        programmed_m: Signal::read("programmed_m", &programmed)?.values,
+        position_m: position.values,
+    };
+    Ok(PyTrajectory { motion, alphas, computing_s })
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyTrajectory>()?;
+    module.add_function(wrap_pyfunction!(_trajectory, module)?)?;
     module.add_function(wrap_pyfunction!(jerk_limited, module)?)?;
     module.add_function(wrap_pyfunction!(exponential_sigmoid, module)?)?;
     module.add_function(wrap_pyfunction!(modulated, module)?)?;

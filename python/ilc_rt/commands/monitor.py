@@ -28,6 +28,8 @@ from ilc_rt.record import IterationRecord
 from ilc_rt.table import headings, plain_line, run_cells
 from ilc_rt.text import printable
 
+WARNINGS_MAX = 100
+
 CellName = Annotated[
     str, typer.Argument(metavar="[CELL]", help="Name of a cell, or its TOML file; * for all.")
 ]
@@ -82,13 +84,16 @@ class _View:
         self.faults = 0
         self._events = events
         self._present: set[str] = set()
+        self._warned: set[tuple[str, str]] = set()
         self._first: dict[str, IterationRecord] = {}
         self._units: dict[str, tuple[str, ...]] = {}
 
     def show(self, message: Message) -> None:
         event = message.event
         self.runs += isinstance(event, IterationEvent)
-        self.faults += message.topic == "fault"
+        self.faults += isinstance(event, FaultEvent)
+        if message.warning is not None:
+            self._warn(message)
         if self._events:
             kept = {"cell": message.cell, "topic": message.topic, **message.payload}
             typer.echo(json.dumps(kept))
@@ -125,6 +130,13 @@ class _View:
         if message.topic == "state":
             self._present.add(message.cell)
         sys.stdout.flush()
+
+    def _warn(self, message: Message) -> None:
+        """Say what is wrong with a message, once for each cell and topic."""
+        whose = (message.cell, message.topic)
+        if whose not in self._warned and len(self._warned) < WARNINGS_MAX:
+            self._warned.add(whose)
+            typer.echo(f"{message.cell}: {message.topic}: {message.warning}", err=True)
 
     def _show_run(self, cell: str, record: IterationRecord) -> None:
         if cell not in self._first or record.index == 0:

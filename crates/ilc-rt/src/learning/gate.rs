@@ -5,11 +5,9 @@ use super::{Law, LearningError, StandIn, Standing};
 /// What a run is judged by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
-    /// Root of the mean square over all samples and channels.
-    Rms,
     /// Root of the mean over the samples of the squared length of the error, all channels taken
     /// together: the figure by which a controller reports its runs.
-    RmsLength {
+    Rms {
         /// Channels of the error.
         n_channels: usize,
     },
@@ -21,11 +19,10 @@ impl Measure {
     /// Returns the figure of a run's error.
     pub fn of(self, error: &[f64]) -> f64 {
         match self {
-            Self::Rms => {
+            Self::Rms { n_channels } => {
                 let sum: f64 = error.iter().map(|e| e * e).sum();
-                (sum / error.len().max(1) as f64).sqrt()
+                (sum * n_channels as f64 / error.len().max(1) as f64).sqrt()
             }
-            Self::RmsLength { n_channels } => Self::Rms.of(error) * (n_channels as f64).sqrt(),
             Self::Max => error.iter().fold(0.0, |largest: f64, e| largest.max(e.abs())),
         }
     }
@@ -33,8 +30,7 @@ impl Measure {
     /// Returns its name in records.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Rms => "rms",
-            Self::RmsLength { .. } => "rms_length",
+            Self::Rms { .. } => "rms",
             Self::Max => "max",
         }
     }
@@ -60,7 +56,13 @@ pub struct GateRule {
 
 impl Default for GateRule {
     fn default() -> Self {
-        Self { measure: Measure::Rms, tolerance: 0.0, resume: 1.5, growth: 1.5, patience: 2 }
+        Self {
+            measure: Measure::Rms { n_channels: 1 },
+            tolerance: 0.0,
+            resume: 1.5,
+            growth: 1.5,
+            patience: 2,
+        }
     }
 }
 
@@ -153,6 +155,14 @@ impl<L: Law> Gate<L> {
     /// Returns the input of that run; empty before the first one.
     pub fn best_input(&self) -> &[f64] {
         &self.best_input
+    }
+
+    /// Says how many channels the error has, for a [`Measure::Rms`]; for whoever learns it with the first
+    /// run only.
+    pub fn set_channels(&mut self, channels: usize) {
+        if let Measure::Rms { n_channels } = &mut self.rule.measure {
+            *n_channels = channels.max(1);
+        }
     }
 
     /// Returns the law inside.
@@ -388,10 +398,10 @@ mod tests {
 
     #[test]
     fn the_measures_are_those_of_their_names() {
-        assert!((Measure::Rms.of(&[3.0, -4.0]) - 12.5_f64.sqrt()).abs() < 1e-15);
+        assert!((Measure::Rms { n_channels: 1 }.of(&[3.0, -4.0]) - 12.5_f64.sqrt()).abs() < 1e-15);
         assert_eq!(Measure::Max.of(&[3.0, -4.0]).to_bits(), 4_f64.to_bits());
         // One sample of two axes: the length is 5.
-        assert!((Measure::RmsLength { n_channels: 2 }.of(&[3.0, -4.0]) - 5.0).abs() < 1e-15);
+        assert!((Measure::Rms { n_channels: 2 }.of(&[3.0, -4.0]) - 5.0).abs() < 1e-15);
         let rule = GateRule { tolerance: 3.9, measure: Measure::Max, ..GateRule::default() };
         let mut gate = Gate::new(Counter::default(), rule).unwrap();
         gate.update(&[0.0; 2], &[3.0, -4.0], &mut [0.0; 2]).unwrap();

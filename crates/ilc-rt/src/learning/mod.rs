@@ -9,6 +9,7 @@
 pub mod analysis;
 mod error;
 pub mod gate;
+mod krylov;
 pub mod ladder;
 pub mod law;
 mod operator;

@@ -140,7 +140,10 @@ fn carry_out(
     announcer.tell(&Event::State { state: StateName::BringingUp, iteration: first });
     nodes::start(cell, bus.as_mut(), options.lockstep)?;
 
-    plan.servo.runs = first..options.iterations;
+    // Drives that were off do not begin where the last run left them. One run with the coming input
+    // brings them there; it is not kept, as it says nothing of the law.
+    let warm_up = u32::from(!resumed.runs.is_empty());
+    plan.servo.runs = first - warm_up..options.iterations;
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&options.stop));
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next) {
         progress.send(&mut mail, input, update_ms);
@@ -189,6 +192,7 @@ fn carry_out(
         runs: resumed.runs,
         disturbance: options.disturbance.clone(),
         present: resumed.coming,
+        first,
         iterations: options.iterations,
         mail,
         stopping: None,
@@ -221,6 +225,8 @@ struct Running<'a> {
     disturbance: Disturbance,
     /// Disturbance of the run that is on, or about to be.
     present: Vec<f64>,
+    /// The first run that counts.
+    first: u32,
     iterations: u32,
     mail: Mailbox,
     stopping: Option<StopReason>,
@@ -244,6 +250,7 @@ impl Running<'_> {
                     self.announcer.sample(&sample);
                     if let Some((run, k)) = sample.at {
                         self.collector.take(run, k, &sample);
+                        let run = run.max(self.first);
                         if k % self.progress_every == self.progress_every - 1 {
                             let (iteration, sample) = (run, k as usize + 1);
                             let n_samples = self.n_samples;
@@ -252,6 +259,7 @@ impl Running<'_> {
                     }
                 }
                 Message::Phase(phase, iteration) => {
+                    let iteration = iteration.max(self.first);
                     self.phase_iteration = iteration;
                     if let Some(state) = state_name(phase) {
                         self.announcer.tell(&Event::State { state, iteration });
@@ -261,6 +269,7 @@ impl Running<'_> {
                     self.collector.begin(run);
                     self.progress.started(table);
                 }
+                Message::RunEnded { run, .. } if run < self.first => {}
                 Message::RunEnded { overruns, .. } => self.run_ended(overruns),
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }

@@ -47,6 +47,19 @@ pub enum SupervisorError {
         /// Why.
         source: Box<BringUpError>,
     },
+    /// Somebody else commands the bus.
+    #[error(
+        "{file}: [bus] address = {address}: another master is at work on this bus ({heard} heard); \
+         nothing was sent; stop it, or choose another address"
+    )]
+    Occupied {
+        /// Cell description.
+        file: String,
+        /// Bus address.
+        address: String,
+        /// What was heard of it.
+        heard: crate::fieldbus::canopen::listen::Command,
+    },
     /// The bus failed while the nodes were started.
     #[error("{file}: [bus] address = {address}: {source}")]
     Start {

@@ -1,15 +1,15 @@
 //! From `[program]` to the interpolator: which planner each kind of path goes to.
 
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-
 use serde_json::json;
+use std::fmt::Write as _;
 
 use super::error::SupervisorError;
-use crate::config::{Cell, Corner, PathKind};
+use crate::config::{
+    AxisUnit, Cell, Corner, GCODE_BYTES_MAX, PathKind, TABLE_BYTES_MAX, read_beside,
+};
 use crate::record::fingerprint;
 use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
-use crate::trajectory::program::{SetPointTable, TableError, read_gcode, read_table};
+use crate::trajectory::program::{GcodeSetting, SetPointTable, TableError, read_gcode, read_table};
 use crate::trajectory::{
     ArcSpec, AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, ModulatedSegment,
     PathSegment, PathSpec, SampledMotion, TrajectoryError, raster, set_points,
@@ -190,16 +190,24 @@ fn points(cell: &Cell) -> Vec<PathSegment> {
 /// The segments of the part program, and the rest before them.
 fn gcode(cell: &Cell) -> Result<(Vec<PathSegment>, f64), SupervisorError> {
     let program = &cell.program;
-    let (file, text) = read_file(cell, "G-code")?;
-    let rapid_m_s = program.rapid_m_s.unwrap_or(program.feed_m_s);
-    let read = read_gcode(&text, &program.start_m, program.feed_m_s, rapid_m_s)
+    let (file, text) = read_file(cell, "G-code", GCODE_BYTES_MAX)?;
+    let rotary: Vec<bool> = cell.axes.iter().map(|axis| axis.unit == AxisUnit::Rad).collect();
+    let setting = GcodeSetting {
+        start_m: &program.start_m,
+        feed_m_s: program.feed_m_s,
+        rapid_m_s: program.rapid_m_s.unwrap_or(program.feed_m_s),
+        rotary: &rotary,
+        exact_corners: program.corner == Corner::ExactStop,
+        block_delete: program.block_delete,
+    };
+    let read = read_gcode(&text, &setting)
         .map_err(|source| SupervisorError::PartProgram { file, source })?;
     Ok((read.segments, read.dwell_before_s))
 }
 
 /// The set points of the table; refused unless they begin where the axes rest before a run.
 fn table(cell: &Cell) -> Result<SetPointTable, SupervisorError> {
-    let (file, text) = read_file(cell, "set points")?;
+    let (file, text) = read_file(cell, "set points", TABLE_BYTES_MAX)?;
     let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
     let refused = |source| SupervisorError::Table { file: file.clone(), source };
     let table = read_table(&text, &names).map_err(refused)?;
@@ -218,13 +226,16 @@ fn table(cell: &Cell) -> Result<SetPointTable, SupervisorError> {
 }
 
 /// The name and the text of `[program] file`, which is a text file of `what`.
-fn read_file(cell: &Cell, what: &'static str) -> Result<(String, String), SupervisorError> {
-    let path = cell.program.file.clone().unwrap_or_default();
-    let path: PathBuf = cell.file.parent().unwrap_or(Path::new("")).join(path);
-    let file = path.display().to_string();
-    match std::fs::read_to_string(&path) {
+fn read_file(
+    cell: &Cell,
+    what: &'static str,
+    bytes_max: u64,
+) -> Result<(String, Vec<u8>), SupervisorError> {
+    let name = cell.program.file.clone().unwrap_or_default();
+    let file = cell.file.with_file_name(&name).display().to_string();
+    match read_beside(&cell.file, &name, bytes_max) {
         Ok(text) => Ok((file, text)),
-        Err(error) => Err(SupervisorError::ProgramFile { file, reason: error.to_string(), what }),
+        Err(reason) => Err(SupervisorError::ProgramFile { file, reason, what }),
     }
 }
 

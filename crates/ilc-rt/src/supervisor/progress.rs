@@ -87,25 +87,24 @@ impl Progress {
     /// Decides what follows a run, and marks it if the best input is restored because of it.
     ///
     /// Growth is measured in the RMS error over the best run so far. After two restorations the law
-    /// has shown that it does not converge here, and learning stays off. A run that the computer
-    /// disturbed (overruns, missing samples) is no evidence: unless it is the best all the same, its
-    /// input is repeated. Nor is a larger error under another disturbance than the best run's evidence
-    /// against the law: it goes on learning.
+    /// has shown that it does not converge here, and learning stays off. A run that computer or bus
+    /// disturbed (overruns, missing samples) is no evidence, for the law or against it, be it the first
+    /// or seemingly the best: its input is repeated. Nor is a larger error under another disturbance than
+    /// the best run's evidence against the law: it goes on learning.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
         let rms = record.figures.judged_by();
         let off = self.rollbacks >= ROLLBACKS_MAX;
-        let disturbed = record.figures.overruns > 0 || record.figures.missing_samples > 0;
         if off {
             record.figures.learning_off = true;
             record.figures.remark = Some(format!("learning is off: {GROWN}"));
         }
-        match &self.best {
-            Some(best) if disturbed && rms >= best.rms => {
-                if !off {
-                    record.figures.remark = Some(disturbance_remark(&record.figures));
-                }
-                Decision::Hold
+        if is_disturbed(&record.figures) {
+            if !off {
+                record.figures.remark = Some(disturbance_remark(&record.figures));
             }
+            return Decision::Hold;
+        }
+        match &self.best {
             Some(best)
                 if rms > best.rms * self.rollback_ratio
                     && !off
@@ -196,9 +195,14 @@ impl Progress {
     }
 }
 
+/// Whether something other than the axes had a part in the error of a run.
+fn is_disturbed(figures: &Figures) -> bool {
+    figures.overruns > 0 || figures.missing_samples > 0
+}
+
 fn disturbance_remark(figures: &Figures) -> String {
     format!(
-        "nothing is learned from it: {} overruns, {} samples missing",
+        "nothing is learned from it, its input is repeated: {} overruns, {} samples missing",
         figures.overruns, figures.missing_samples
     )
 }
@@ -281,17 +285,23 @@ mod tests {
 
     #[test]
     fn a_disturbed_run_is_neither_learned_from_nor_held_against_the_law() {
+        let disturbed = |rms, overruns, missing_samples| {
+            let mut record = record(rms);
+            (record.figures.overruns, record.figures.missing_samples) = (overruns, missing_samples);
+            record
+        };
         let mut progress = Progress::new(1.5);
+        // The first one neither, nor one that seems to be the best.
+        assert_eq!(progress.decide(&mut disturbed(0.1, 0, 1)), Decision::Hold);
         assert_eq!(progress.decide(&mut record(1.0)), Decision::Learn);
-        let mut disturbed = record(9.0);
-        disturbed.figures.overruns = 3;
-        assert_eq!(progress.decide(&mut disturbed), Decision::Hold);
-        assert!(!disturbed.figures.rolled_back);
-        let said = disturbed.figures.remark.unwrap();
-        assert_eq!(said, "nothing is learned from it: 3 overruns, 0 samples missing");
-        let mut better = record(0.5);
-        better.figures.missing_samples = 1;
-        assert_eq!(progress.decide(&mut better), Decision::Learn);
+        let mut worse = disturbed(9.0, 3, 0);
+        assert_eq!(progress.decide(&mut worse), Decision::Hold);
+        assert!(!worse.figures.rolled_back);
+        let said = worse.figures.remark.unwrap();
+        assert!(said.ends_with("its input is repeated: 3 overruns, 0 samples missing"), "{said}");
+        assert_eq!(progress.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
+        assert_eq!(progress.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
+        assert_eq!(progress.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
     }
 
     #[test]

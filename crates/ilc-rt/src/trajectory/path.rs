@@ -7,7 +7,7 @@ use super::error::TrajectoryError;
 use super::limits::{AxisLimits, Line, is_positive};
 
 /// Farthest position of a plan; the blend's fixed-point numbers hold it with room to spare.
-const POSITION_MAX_M: f64 = 4096.0;
+pub(super) const POSITION_MAX_M: f64 = 4096.0;
 /// Servo cycles that a plan accepts.
 pub(super) const CYCLE_S: (f64, f64) = (1e-5, 1.0);
 /// Longest rest before or after the motion.
