@@ -9,6 +9,7 @@ use clap::{Parser, Subcommand};
 use ilc_rt::cli::refusal_line;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::NodeId;
+use ilc_rt::record::printable_lines;
 use ilc_sim::{ClockMode, Machine, eds};
 
 mod drive_clock;
@@ -88,7 +89,7 @@ fn main() -> ExitCode {
         Err(Failure::Broken(line)) => (line, 1),
     };
     // Nobody is left to tell if standard error is gone.
-    let _ = writeln!(std::io::stderr(), "ilc-sim: {line}");
+    let _ = writeln!(std::io::stderr(), "ilc-sim: {}", printable_lines(&line));
     ExitCode::from(status)
 }
 

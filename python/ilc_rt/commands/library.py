@@ -174,7 +174,7 @@ def export(library: LibraryArgument, run_id: RunId, file: ExportFile) -> None:
     Example: ilc library export ilc-library.db 12 run12.csv
     """
     export_run(_load(library, run_id), file)
-    typer.echo(f"run {run_id} written to {file}")
+    typer.echo(f"run {run_id} written to {printable(file)}")
 
 
 @app.command("trim")
