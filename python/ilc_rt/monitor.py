@@ -91,8 +91,8 @@ class Monitor:
 
     Examples
     --------
-    >>> with Monitor("gantry") as monitor:           # doctest: +SKIP
-    ...     for message in monitor.messages(60.0):
+    >>> with Monitor("press-7") as monitor:
+    ...     for message in monitor.messages(timeout_s=1.0):
     ...         print(message.topic, message.payload)
     """
 

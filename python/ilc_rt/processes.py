@@ -15,6 +15,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import time
 from pathlib import Path
@@ -35,8 +36,10 @@ END_DEADLINE_S = 5.0
 def find_program(name: str) -> Path:
     """Find one of the two programs.
 
-    Looked for beside the running Python interpreter (a virtual environment's
-    ``bin``), then along ``PATH``.
+    Looked for where the wheel that brought this package put it, which
+    depends on how that was installed: beside the running interpreter (a
+    virtual environment's ``bin``), in the folder of this installation's or
+    this user's scripts, under ``pip install --target``; then along ``PATH``.
 
     Parameters
     ----------
@@ -46,19 +49,23 @@ def find_program(name: str) -> Path:
     Raises
     ------
     CampaignError
-        If it is in neither place.
+        If it is in none of these places.
     """
-    beside = Path(sys.executable).parent / name
-    if beside.is_file() and os.access(beside, os.X_OK):
-        return beside
-    found = shutil.which(name)
-    if found is None:
-        message = (
-            f"the program {name} is neither beside {sys.executable} nor on the PATH: "
-            "run `make build`"
-        )
-        raise CampaignError(message)
-    return Path(found)
+    folders = [
+        str(Path(sys.executable).parent),
+        sysconfig.get_path("scripts"),
+        sysconfig.get_path("scripts", sysconfig.get_preferred_scheme("user")),
+        str(Path(__file__).resolve().parents[1] / "bin"),
+    ]
+    for path in (os.pathsep.join(folders), None):
+        found = shutil.which(name, path=path)
+        if found is not None:
+            return Path(found)
+    message = (
+        f"the program {name} is neither beside {sys.executable} nor on the PATH: "
+        "install the wheel of ilc-rt, or run `make build` in a checkout"
+    )
+    raise CampaignError(message)
 
 
 class Program:
