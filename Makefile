@@ -64,8 +64,11 @@ test-python: $(VENV)/.test ## Python tests
 fuzz: $(VENV)/.test ## New problems for FUZZ_S seconds (60): property tests, readers, the border to Python
 	FUZZ_S="$(FUZZ_S)" FUZZ_SEED="$(FUZZ_SEED)" $(BIN)/python tests/fuzz/run.py
 
-soak: $(VENV)/.test ## The trials of kills, full disks, babble and strangers, SOAK times (20) as many
+soak: $(VENV)/.test ## Kills, full disks, strangers and a stalling computer, SOAK times (20) as many: long, with a tally
 	ILC_SOAK="$(or $(SOAK),20)" $(BIN)/python -m pytest -q tests/python/test_trials.py
+	$(BIN)/python tests/soak/demo.py stalls --times 10
+	$(BIN)/python tests/soak/demo.py load --times 40
+	$(BIN)/python tests/soak/demo.py kills --times 20
 
 vcan: build ## The bus contract and the main job on a real vcan0
 	tests/vcan/job

@@ -256,6 +256,7 @@ class Campaign:
             "learning": self.learning,
             "experiment": self.experiment,
             "disturbance": measure,
+            "simulated": self.simulated,
         }
         apart = self.simulated and self.transport != "loopback"
         drives = None

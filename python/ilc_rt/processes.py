@@ -1,7 +1,9 @@
 """Find, start, read and end the programs `ilc-rt` and `ilc-sim`.
 
 Both run in a session of their own: Ctrl-C in a terminal must reach the
-controller alone, which stops the axes while the drives still answer.
+controller alone, which stops the axes while the drives still answer. They end
+with the process that started them, also if it is killed: their standard input
+closes then.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
 
     from typing_extensions import Self
 
-READY_DEADLINE_S = 15.0
+READY_DEADLINE_S = 60.0
 END_DEADLINE_S = 5.0
 
 
@@ -89,7 +91,8 @@ class Program:
         try:
             self._process = subprocess.Popen(
                 [str(argument) for argument in argv],
-                stdin=subprocess.DEVNULL,
+                # Open for as long as this process lives: programs that are told so end with it.
+                stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
                 start_new_session=True,
@@ -190,8 +193,9 @@ class Program:
             if self._wait(END_DEADLINE_S) is None:
                 self.signal(signal.SIGKILL)
                 self._process.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
         self._errors.close()
 
     def _wait(self, deadline_s: float) -> int | None:
@@ -218,7 +222,7 @@ def start_simulated_drives(cell_file: str | Path, bus: str | None, *, lockstep: 
     CampaignError
         If it does not get ready.
     """
-    argv: list[str | Path] = [find_program("ilc-sim"), "run", cell_file]
+    argv: list[str | Path] = [find_program("ilc-sim"), "run", cell_file, "--with-parent"]
     if bus is not None:
         argv += ["--bus", bus]
     if lockstep:

@@ -230,7 +230,7 @@ def test_arguments_reach_the_controller(
     list(campaign.run(5))
     said = (tmp_path / "argv").read_text()
     assert said == str(
-        ["run", str(gantry), "--events", "--iterations", "5", "--library", "l.db",
+        ["run", str(gantry), "--events", "--with-parent", "--iterations", "5", "--library", "l.db",
          "--measure", "encoder", "--resume", "--bus", "udp:239.1.1.1", "--lockstep"]
     )  # fmt: skip
 
