@@ -193,7 +193,7 @@ def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
         config.insert_json5("connect/endpoints", json.dumps(list(connect)))
         config.insert_json5("scouting/multicast/enabled", json.dumps(scouting))
         config.insert_json5("listen/endpoints", "[]")
-        # By itself Zenoh leaves the host's own interface out, where controllers are that keep to it.
+        # By itself Zenoh leaves out the host's own interface, where controllers keep to it.
         interfaces = ",".join(name for _, name in socket.if_nameindex())
         config.insert_json5("scouting/multicast/interface", json.dumps(interfaces))
     except zenoh.ZError as error:

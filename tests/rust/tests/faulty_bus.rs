@@ -86,6 +86,7 @@ fn campaign(
     let scratch = Scratch::new();
     let mut options = options(scratch.file("library.db"), RUNS);
     options.lockstep = lockstep;
+    options.simulated = !lockstep;
     let ended = supervisor::run(cell, &options, Box::new(bus), None, &mut |_| {});
     let said = match &ended {
         Ok(outcome) => outcome.reason.clone(),
