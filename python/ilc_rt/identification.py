@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ilc_rt._native import FrequencyResponse, SecondOrderFit, VelocityLoopFit, doubt
-from ilc_rt.result import write_text
+from ilc_rt.result import json_text, write_text
+from ilc_rt.text import label
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -142,18 +142,38 @@ class Identification:
         return "\n".join(lines) + "\n"
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Return name, value and standard deviation of every figure, as text."""
-        model = self.model
+        """Return name, value and standard deviation of every figure, as text.
+
+        Of an axis of a cell the figures are those of ``[axis.model]``.
+        """
+        free, described = self.model, self.described
+        gain = ("gain", f"{free.gain:.5f}", f"{free.gain_deviation:.1e}")
+        left = ("left over in %", f"{described.residual_rms * 1e2:.2f}", "")
+        if isinstance(described, VelocityLoopFit):
+            bandwidth = f"{described.bandwidth_hz:.4f}"
+            return [
+                gain,
+                ("velocity bandwidth in Hz", bandwidth, f"{described.bandwidth_deviation_hz:.1e}"),
+                ("delay in ms", f"{described.delay_s * 1e3:.4f}", ""),
+                left,
+            ]
+        if self.interface is None:
+            described, left = free, ("left over in %", f"{free.residual_rms * 1e2:.2f}", "")
+        delay_deviation = described.delay_deviation_s * 1e3
         return [
-            ("gain", f"{model.gain:.5f}", f"{model.gain_deviation:.1e}"),
+            gain,
             (
                 "natural frequency in Hz",
-                f"{model.natural_frequency_hz:.4f}",
-                f"{model.natural_frequency_deviation_hz:.1e}",
+                f"{described.natural_frequency_hz:.4f}",
+                f"{described.natural_frequency_deviation_hz:.1e}",
             ),
-            ("damping", f"{model.damping:.5f}", f"{model.damping_deviation:.1e}"),
-            ("delay in ms", f"{model.delay_s * 1e3:.4f}", f"{model.delay_deviation_s * 1e3:.1e}"),
-            ("left over in %", f"{model.residual_rms * 1e2:.2f}", ""),
+            ("damping", f"{described.damping:.5f}", f"{described.damping_deviation:.1e}"),
+            (
+                "delay in ms",
+                f"{described.delay_s * 1e3:.4f}",
+                f"{delay_deviation:.1e}" if delay_deviation else "",
+            ),
+            left,
         ]
 
     def to_json(self) -> dict[str, Any]:
@@ -194,7 +214,7 @@ class Identification:
         BadInputError
             If the file cannot be written.
         """
-        write_text(path, json.dumps(self.to_json(), indent=1) + "\n")
+        write_text(path, json_text(self.to_json()))
 
     def figure(self) -> Figure:
         """Return the Bode diagram of measurement and model."""
@@ -203,5 +223,5 @@ class Identification:
         return bode(
             self.frequency_hz, self.response, self.coherence,
             self.described.response(self.frequency_hz), self.uncertainty[1],
-            f"axis {self.experiment.axis}" if self.experiment.axis else "",
+            f"axis {label(self.experiment.axis)}" if self.experiment.axis else "",
         )  # fmt: skip

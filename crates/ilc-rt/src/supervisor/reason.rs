@@ -1,5 +1,6 @@
 //! Why the axes were stopped, in one sentence that names axis, node and numbers.
 
+use super::options::{Options, SIMULATED_PATIENCE_S};
 use crate::config::{AxisUnit, Cell};
 use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
@@ -7,7 +8,7 @@ use crate::record::EndStatus;
 use crate::servo::{StopReason, Stranger};
 
 /// The sentence for a reason to stop.
-pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> String {
+pub(super) fn sentence(reason: StopReason, cell: &Cell, options: &Options) -> String {
     let axis = |index: usize| {
         cell.axes.get(index).map_or_else(
             || format!("axis {index}"),
@@ -16,7 +17,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
     };
     // In lock-step the loop waits for every answer, so that the count of cycles says nothing.
     let unanswered = |cycles: u32| {
-        if lockstep {
+        if options.lockstep {
             format!("no answer in {} s", cell.safety.answer_timeout_s)
         } else {
             format!(
@@ -101,9 +102,20 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             format!("{}: the command was not a finite number", axis(index))
         }
         StopReason::Overrun { cycles } => format!(
-            "the loop missed {cycles} cycles in a row ({:.0} ms); safety.overrun_cycles_max allows {}",
+            "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late; {}",
             ms(cycles),
-            cell.safety.overrun_cycles_max
+            if options.simulated {
+                format!("with simulated drives {SIMULATED_PATIENCE_S} s are forgiven")
+            } else {
+                format!("safety.overrun_cycles_max allows {}", cell.safety.overrun_cycles_max)
+            }
+        ),
+        StopReason::Stalled { axis: index, cycles } => format!(
+            "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late, and the drive of \
+             {} stopped by itself, as no command came in time (0x{:04X})",
+            ms(cycles),
+            axis(index),
+            emcy::CODE_RPDO_TIMEOUT
         ),
         StopReason::Bus(error) => format!("{error}"),
     }
@@ -180,6 +192,7 @@ pub(super) fn status(reason: StopReason) -> EndStatus {
         | StopReason::OutsideLimits { .. }
         | StopReason::Jump { .. }
         | StopReason::NotFinite { .. }
+        | StopReason::Stalled { .. }
         | StopReason::Overrun { .. }
         | StopReason::Bus(_) => EndStatus::Fault,
     }
