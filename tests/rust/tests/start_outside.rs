@@ -39,6 +39,7 @@ fn an_axis_outside_its_limits_is_refused_and_nothing_moves() {
                     assert!(plant_m.iter().all(|m| m.to_bits() == plant_m[0].to_bits()));
                     // Neither was enabled, nor was a place asked for that the axis is not at.
                     let spec = &cell.axes[number];
+                    #[expect(clippy::cast_possible_truncation, reason = "a place in counts")]
                     let at = (plant_m[0] * spec.counts_per_m).round() as i32;
                     for row in line.rows() {
                         assert_eq!(row.controlword[number] & 0x0F, 0, "{name}");

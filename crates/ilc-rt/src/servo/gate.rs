@@ -115,7 +115,8 @@ impl Gate {
     clippy::disallowed_methods,
     clippy::disallowed_types,
     clippy::disallowed_macros,
-    reason = "tests are cold"
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
 )]
 mod tests {
     use std::f64::consts::TAU;

@@ -276,7 +276,8 @@ fn index(sync: u64) -> usize {
     clippy::disallowed_methods,
     clippy::disallowed_types,
     clippy::disallowed_macros,
-    reason = "tests are cold"
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
 )]
 mod tests {
     use std::collections::BTreeSet;
