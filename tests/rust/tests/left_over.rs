@@ -1,6 +1,8 @@
 //! What an earlier master left in a drive: each wrong value is put right at bring-up, or the drive is
 //! refused with one line that names the object; the axes never move by it.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::ObjectAddress;

@@ -30,7 +30,7 @@ pub enum SdoError {
     /// The node did not answer this question.
     #[error(
         "node {node}: object {address}: no answer within {timeout:?}, tried {TRIES} times{}",
-        beside(.other)
+        beside(*other)
     )]
     Timeout {
         /// The node that was asked.
@@ -93,7 +93,7 @@ impl std::fmt::Display for Stray {
     }
 }
 
-fn beside(other: &Option<Stray>) -> String {
+fn beside(other: Option<Stray>) -> String {
     other.map_or_else(String::new, |stray| format!("; what came instead: {stray}"))
 }
 

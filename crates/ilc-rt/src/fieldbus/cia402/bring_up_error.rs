@@ -79,7 +79,7 @@ pub enum BringUpError {
         cycle_us: u32,
     },
     /// An object has a value with which the drive must not run, and cannot be given another one.
-    #[error("node {node}: object {object} ({name}): found {found}, needed {needed}{}", because(.refusal))]
+    #[error("node {node}: object {object} ({name}): found {found}, needed {needed}{}", because(*refusal))]
     Value {
         /// The node.
         node: NodeId,
@@ -139,7 +139,7 @@ pub enum BringUpError {
     },
 }
 
-fn because(refusal: &Option<AbortCode>) -> String {
+fn because(refusal: Option<AbortCode>) -> String {
     refusal.map_or_else(String::new, |code| format!("; the node refuses it with {code}"))
 }
 

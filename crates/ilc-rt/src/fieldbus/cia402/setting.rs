@@ -173,8 +173,15 @@ pub(super) fn name(address: ObjectAddress) -> &'static str {
 pub(super) fn shown(address: ObjectAddress, kind: Kind, value: i64) -> String {
     let is_code = matches!(
         (address.index, address.sub),
-        (objects::COB_ID_SYNC | objects::COB_ID_EMCY | objects::CONSUMER_HEARTBEAT, _)
-            | (objects::POLARITY | objects::POSITION_UNIT | objects::VELOCITY_UNIT, _)
+        (
+            objects::COB_ID_SYNC
+            | objects::COB_ID_EMCY
+            | objects::CONSUMER_HEARTBEAT
+            | objects::POLARITY
+            | objects::POSITION_UNIT
+            | objects::VELOCITY_UNIT,
+            _
+        )
             | (0x1400..=0x15FF | 0x1800..=0x19FF, 1)
             | (0x1600..=0x17FF | 0x1A00..=0x1BFF, 1..)
     );
