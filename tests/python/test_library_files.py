@@ -367,7 +367,7 @@ def test_a_trim_that_is_killed_loses_no_run_that_stays(tmp_path: Path) -> None:
         assert len(library.list()) == 6
 
 
-@pytest.mark.parametrize("n_axes", [1, 2, 13])
+@pytest.mark.parametrize("n_axes", [1, 2])
 def test_a_run_from_elsewhere_has_all_its_figures(n_axes: int, tmp_path: Path) -> None:
     """The figures are those of the arrays."""
     draw = np.random.default_rng(n_axes)
@@ -377,6 +377,9 @@ def test_a_run_from_elsewhere_has_all_its_figures(n_axes: int, tmp_path: Path) -
     library.append(np.zeros((40, n_axes)), e, 0.002, reference_m=reference_m)
     (row,) = library.list()
     assert row["tracking_inf_m"] == row["encoder_tracking_inf_m"] == np.abs(e).max()
+    if n_axes == 1:
+        assert row["contour_inf_m"] is None, "one axis has no contour"
+        return
     contour_m = library.load(1)["contour_m"]
     assert row["contour_inf_m"] == np.abs(contour_m).max() > 0
     assert row["contour_rms_m"] == pytest.approx(np.sqrt(np.mean(contour_m**2)))
