@@ -82,9 +82,10 @@ docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
 
 bench: $(VENV)/.bench ## Speed, as ratios; writes docs/benchmarks.md
-	rm -rf $(TARGET)/criterion
-	cargo bench --workspace --bench main_job --bench learning --bench constrained --bench relevance --bench trajectory
-	$(BIN)/python benchmarks/report.py
+	rm -rf $(abspath $(TARGET))/criterion
+	CRITERION_HOME=$(abspath $(TARGET))/criterion \
+	  cargo bench --workspace --bench main_job --bench learning --bench constrained --bench relevance --bench trajectory
+	CRITERION_HOME=$(abspath $(TARGET))/criterion $(BIN)/python benchmarks/report.py
 
 rt: build ## What is promised of the tick: no allocation, exact repetition; and this machine's punctuality
 	cargo nextest run --release --workspace -E 'binary(no_alloc) | binary(no_alloc_learning) | binary(lockstep)'

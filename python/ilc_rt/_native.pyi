@@ -49,6 +49,7 @@ __all__ = [
     "TrajectoryError",
     "Tuning",
     "VelocityLoopFit",
+    "__version__",
     "analyze",
     "butterfly",
     "butterworth",
@@ -88,6 +89,8 @@ __all__ = [
     "uncertainty",
     "zero_phase",
 ]
+
+__version__: str
 
 # Docstrings are those of the compiled classes: help(ilc_rt.StateSpace).
 

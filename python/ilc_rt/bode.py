@@ -45,8 +45,8 @@ def bode(
         model_deg += 360.0 * np.round(np.median(shown_deg - model_deg) / 360.0)
         dots = {"color": FIRST, "linestyle": "none", "marker": ".", "markersize": 3.5}
         line = {"color": LAST}
-        magnitude.plot(frequency_hz, 20.0 * np.log10(np.abs(response)), label="measured", **dots)
-        magnitude.plot(frequency_hz, 20.0 * np.log10(np.abs(model)), label="model", **line)
+        magnitude.plot(frequency_hz, _decibels(response), label="measured", **dots)
+        magnitude.plot(frequency_hz, _decibels(model), label="model", **line)
         phase.plot(frequency_hz, shown_deg, **dots)
         phase.plot(frequency_hz, model_deg, **line)
         trust.plot(frequency_hz, coherence, color=CONTOUR, label="coherence")
@@ -63,3 +63,10 @@ def bode(
         trust.legend(loc="center left")
         figure.align_ylabels()
         return figure
+
+
+def _decibels(response: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return the magnitude in dB; NaN, which is not drawn, where there is none."""
+    size = np.abs(response)
+    found = 20.0 * np.log10(np.where(size > 0.0, size, 1.0))
+    return np.where(size > 0.0, found, np.nan)

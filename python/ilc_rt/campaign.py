@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from ilc_rt.experiment import Experiment
 
 DEFAULT_LIBRARY = "ilc-library.db"
+# Runs are counted in 32 bits.
+ITERATIONS_MAX = 2**32 - 1
 TRANSPORTS = ("can", "udp", "zenoh", "loopback")
 Drives = Literal["auto", "simulated", "external"]
 
@@ -184,8 +186,9 @@ class Campaign:
         Leaving the loop early stops the axes in a controlled way before this
         iterator is closed. Parameters and errors are those of `run`.
         """
-        if iterations < 1:
-            message = f"iterations = {iterations}: at least 1"
+        if not 1 <= iterations <= ITERATIONS_MAX:
+            allowed = "at least 1" if iterations < 1 else f"at most {ITERATIONS_MAX}"
+            message = f"iterations = {iterations}: {allowed}"
             raise BadInputError(message)
         measure = _measure(self.disturbance, iterations)
         self.result = CampaignResult(self.library)

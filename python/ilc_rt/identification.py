@@ -25,6 +25,22 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
+def beyond_cell(fit: SecondOrderFit | VelocityLoopFit) -> str | None:
+    """Return what of a fit a cell description does not take; None if it takes all of it."""
+    if isinstance(fit, VelocityLoopFit):
+        figures = [("velocity bandwidth in Hz", fit.bandwidth_hz, 0.1, 10_000.0)]
+    else:
+        figures = [
+            ("natural frequency in Hz", fit.natural_frequency_hz, 0.1, 1000.0),
+            ("damping", fit.damping, 0.05, 5.0),
+        ]
+    figures.append(("delay in cycles", float(fit.delay_samples), 0.0, 20.0))
+    for what, value, low, high in figures:
+        if not low <= value <= high:
+            return f"the fit has {what} {value:.4g}, a cell takes {low:g} to {high:g}"
+    return None
+
+
 @dataclass(frozen=True)
 class Identification:
     """What an experiment showed.
@@ -82,7 +98,8 @@ class Identification:
     @property
     def doubt(self) -> str | None:
         """Why the model should not be used; None if nothing speaks against it."""
-        return doubt(self.measured, self.described.residual_rms)
+        found = doubt(self.measured, self.described.residual_rms)
+        return found if found or self.interface is None else beyond_cell(self.described)
 
     def uncertainty_on_grid(self, count: int = 257) -> Array:
         """Return the bound at equally spaced frequencies from 0 to Nyquist.
@@ -165,7 +182,7 @@ class Identification:
                 "residual_rms": model.residual_rms,
             },
             "uncertainty": {"frequency_hz": bound[0].tolist(), "bound": bound[1].tolist()},
-            "axis_model": self.section(),
+            "axis_model": None if self.doubt else self.section(),
             "doubt": self.doubt,
         }
 

@@ -11,6 +11,7 @@ use ilc_rt::fieldbus::canopen::NodeId;
 use ilc_sim::{ClockMode, Machine, eds};
 
 mod drive_clock;
+mod presence;
 mod run;
 
 use run::Mute;
@@ -105,8 +106,10 @@ fn run(path: &Path, bus: Option<String>, lockstep: bool, mute: &[Mute]) -> Resul
     }
     let bus = ilc_rt::fieldbus::transport::open(&address)
         .map_err(|error| Failure::Input(error.to_string()))?;
-    run::run(&cell, machine, bus, &address, clock, mute)
-        .map_err(|error| Failure::Broken(error.to_string()))
+    run::run(&cell, machine, bus, &address, clock, mute).map_err(|error| match error {
+        run::RunError::Taken { .. } => Failure::Input(error.to_string()),
+        error => Failure::Broken(error.to_string()),
+    })
 }
 
 fn print_eds(path: &Path, node: u8) -> Result<(), Failure> {

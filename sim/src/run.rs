@@ -14,6 +14,7 @@ use ilc_rt::rt::{RtRequest, thread};
 use ilc_sim::{ClockMode, Machine};
 
 use crate::drive_clock::DriveClock;
+use crate::presence;
 
 /// Longest wait for a frame before the plant is brought up to date.
 const BATCH: Duration = Duration::from_millis(1);
@@ -48,6 +49,12 @@ pub(crate) enum RunError {
     /// The bus failed.
     #[error("{address}: {source}")]
     Bus { address: String, source: BusError },
+    /// The nodes are there already.
+    #[error(
+        "{address}: node {node} is on this bus already; another ilc-sim, or a real drive, has this \
+         number: stop it, or give --bus another address"
+    )]
+    Taken { address: String, node: NodeId },
     /// Signals cannot be caught.
     #[error("signals cannot be caught: {0}")]
     Signal(std::io::Error),
@@ -85,6 +92,11 @@ pub(crate) fn run(
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(RunError::Signal)?;
     }
     let failed = |source| RunError::Bus { address: address.to_owned(), source };
+    let mut bus = bus;
+    let nodes: Vec<NodeId> = machine.nodes().collect();
+    if let Some(node) = presence::find(bus.as_mut(), &nodes).map_err(failed)? {
+        return Err(RunError::Taken { address: address.to_owned(), node });
+    }
     let mut outlet = Outlet { bus, n_sent: 0, n_dropped: 0, broken: None };
     let mut mutes = mutes.to_vec();
     let start = Instant::now();

@@ -221,7 +221,7 @@ LAWS = {
         (np.zeros(50), np.ones((50, 2)), ValueError, r"e has shape \(50, 2\)"),
         (np.full(50, np.nan), np.zeros(50), ValueError, r"u holds NaN at \[0\]"),
         (np.zeros(50), np.full(50, np.inf), ValueError, r"e holds inf at \[0\]"),
-        (np.zeros(50, dtype=np.float32), np.zeros(50), TypeError, "u has dtype float32"),
+        (np.zeros(50, dtype=np.longdouble), np.zeros(50), TypeError, "u has dtype float128"),
         (np.zeros(50), np.zeros(50, dtype=complex), TypeError, "e has dtype complex128"),
     ],
 )
@@ -281,6 +281,17 @@ def test_gate_judges_by_its_measure():
         law.update(np.zeros(2), e)
         assert law.state == "learning"
         assert law.best_error == pytest.approx(size)
+
+
+def test_rms_of_several_channels_is_that_of_the_length_as_in_a_cell():
+    e = np.array([[3.0, -4.0], [0.0, 2.0]])
+    law = Gate(Recorder())
+    law.update(np.zeros((2, 2)), e)
+    assert law.best_error == pytest.approx(np.sqrt((25.0 + 4.0) / 2))
+    # The same numbers as one channel are another figure.
+    law = Gate(Recorder())
+    law.update(np.zeros(4), e.ravel())
+    assert law.best_error == pytest.approx(np.sqrt(29.0 / 4))
 
 
 def test_gate_stops_a_law_before_it_diverges():

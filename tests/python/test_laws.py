@@ -182,12 +182,12 @@ def test_models_of_other_packages_are_accepted():
         (lambda x: x[:0], ValueError),
         (lambda x: np.where(np.arange(x.size) == 7, np.nan, x), ValueError),
         (lambda x: np.where(np.arange(x.size) == 7, -np.inf, x), ValueError),
-        (lambda x: x.astype(np.float32), TypeError),
+        (lambda x: x.astype(np.longdouble), TypeError),
         (lambda x: x.astype(np.complex128), TypeError),
         (lambda x: x.astype(object), TypeError),
         (lambda x: None, TypeError),
     ],
-    ids=["short", "wide", "axes", "empty", "nan", "inf", "float32", "complex", "object", "none"],
+    ids=["short", "wide", "axes", "empty", "nan", "inf", "longdouble", "complex", "object", "none"],
 )
 @pytest.mark.parametrize("kind", ["pd", "norm_optimal"])
 def test_each_bad_array_is_refused_by_name(kind, name, spoil, error):

@@ -114,12 +114,12 @@ GOOD = {"a": np.eye(2), "b": np.ones((2, 1)), "c": np.ones((1, 2)), "d": np.zero
         (lambda m: np.full_like(m, np.nan), ValueError),
         (lambda m: np.full_like(m, -np.inf), ValueError),
         (lambda m: m.astype(np.complex128), TypeError),
-        (lambda m: m.astype(np.float32), TypeError),
+        (lambda m: m.astype(np.longdouble), TypeError),
         (lambda m: m.astype(str), TypeError),
         (lambda m: m.astype(bool), TypeError),
         (lambda m: None, TypeError),
     ],
-    ids=["size", "axes", "nan", "inf", "complex", "float32", "text", "bool", "none"],
+    ids=["size", "axes", "nan", "inf", "complex", "longdouble", "text", "bool", "none"],
 )
 def test_each_bad_matrix_is_refused_by_name(name, spoil, error):
     bad = GOOD | {name: spoil(GOOD[name])}

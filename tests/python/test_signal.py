@@ -74,7 +74,7 @@ def test_a_filter_that_cannot_be_is_refused(arguments, match):
         (np.zeros((4, 4, 4)), ValueError, r"x has shape \(4, 4, 4\)"),
         (np.zeros(0), ValueError, r"x has shape \(0,\)"),
         (np.array([0.0, np.nan]), ValueError, r"x holds NaN at \[1\]"),
-        (np.zeros(50, dtype=np.float32), TypeError, "x has dtype float32"),
+        (np.zeros(50, dtype=np.longdouble), TypeError, "x has dtype float128"),
         (np.zeros(50, dtype=complex), TypeError, "x has dtype complex128"),
         ("text", TypeError, "x has dtype"),
     ],

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::give_signal;
+use crate::made::Made;
 
 /// What a law will do with a model.
 ///
@@ -39,14 +40,15 @@ use crate::argument::give_signal;
 #[pyclass(name = "Analysis", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyAnalysis {
+    made: Made,
     analysis: Analysis,
     n_inputs: usize,
     n_outputs: usize,
 }
 
 impl PyAnalysis {
-    pub(crate) fn new(analysis: Analysis, model: &StateSpace) -> Self {
-        Self { analysis, n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
+    pub(crate) fn new(analysis: Analysis, model: &StateSpace, made: Made) -> Self {
+        Self { made, analysis, n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
     }
 }
 
@@ -56,6 +58,11 @@ fn array<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyAny> {
 
 #[pymethods]
 impl PyAnalysis {
+    /// Pickled and copied as the call that made it, which is made again.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
+    }
+
     /// Samples of a run.
     #[getter]
     fn n_samples(&self) -> usize {

@@ -15,8 +15,10 @@ use crate::argument::{Signal, misfit, read_vector};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::laws;
+use crate::made::made;
 use crate::model_argument::read_model;
 use crate::python_law::PythonLaw;
+use crate::whole;
 
 /// Say before the first run what a law will do with a model.
 ///
@@ -59,7 +61,8 @@ use crate::python_law::PythonLaw;
 /// updates; it should keep nothing from run to run. Of a `Gate` or a `Ladder` the
 /// law inside is analysed, with gain 1, of a law with bounds the same law without
 /// them: a bound that is reached can only hold the input there. Up to 640 inputs whole
-/// matrices are formed, beyond that products with signals.
+/// matrices are formed, beyond that products with signals; a law written in Python
+/// is tried input by input up to 3000 of them, and has no `monotonic_factor` beyond.
 ///
 /// References
 /// ----------
@@ -81,12 +84,13 @@ fn analyze(
     py: Python<'_>,
     law: &Bound<'_, PyAny>,
     model: &Bound<'_, PyAny>,
-    n_samples: Option<usize>,
+    #[pyo3(from_py_with = whole::maybe::n_samples)] n_samples: Option<usize>,
     uncertainty: Option<&Bound<'_, PyAny>>,
     reference: Option<&Bound<'_, PyAny>>,
     noise_std: Option<f64>,
-    n_runs: usize,
+    #[pyo3(from_py_with = whole::n_runs)] n_runs: usize,
 ) -> PyResult<PyAnalysis> {
+    let made = made!("analyze": law, model, n_samples, uncertainty, reference, noise_std, n_runs);
     let model = read_model("model", model)?;
     let uncertainty = read_uncertainty(uncertainty)?;
     let reference = read_reference(reference, &model, n_samples)?;
@@ -107,7 +111,7 @@ fn analyze(
     let reference = reference.map(|signal| signal.values);
     let question = Question { uncertainty, reference, noise_std, n_runs };
     let found = detached(py, || analysis::analyze(law.as_mut(), &model, n_samples, &question));
-    Ok(PyAnalysis::new(found.or_raise()?, &model))
+    Ok(PyAnalysis::new(found.or_raise()?, &model, made))
 }
 
 /// Refuse a law that will not converge with a model.
@@ -149,7 +153,7 @@ fn refuse_divergent(
     py: Python<'_>,
     law: &Bound<'_, PyAny>,
     model: &Bound<'_, PyAny>,
-    n_samples: usize,
+    #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
 ) -> PyResult<()> {
     let model = read_model("model", model)?;
     let Some(mut law) = laws::own_law(law, n_samples, model.n_inputs())? else { return Ok(()) };

@@ -246,9 +246,12 @@ fn converted<'py>(
     let dtype = array.getattr("dtype")?;
     let kind: String = dtype.getattr("kind")?.extract()?;
     let size: usize = dtype.getattr("itemsize")?.extract()?;
-    // An empty list becomes float64 by itself; integers are exact as far as they are set-points.
-    if !(matches!(kind.as_str(), "i" | "u") || kind == "f" && size == 8) {
-        return Err(PyTypeError::new_err(format!("{name} has dtype {dtype}; float64 is needed")));
+    // An empty list becomes float64 by itself; what is narrower is widened without loss, and integers
+    // are exact as far as they are set-points.
+    if !(matches!(kind.as_str(), "i" | "u") || kind == "f" && size <= 8) {
+        return Err(PyTypeError::new_err(format!(
+            "{name} has dtype {dtype}; float64, or what widens to it, is needed"
+        )));
     }
     let array = array.call_method1("astype", ("float64", "C", "unsafe", false, is_copied))?;
     Ok(array.cast_into::<PyArrayDyn<f64>>()?)

@@ -23,6 +23,7 @@ use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::experiment::read_experiment;
 use crate::python_law::PythonLaw;
+use crate::whole;
 
 /// Frames that may wait for the loop on the bus inside the process.
 const LOOPBACK_FRAMES: usize = 1024;
@@ -145,7 +146,7 @@ impl Drop for EventStream {
 #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 fn run_events(
     cell: &Bound<'_, PyCell>,
-    iterations: u32,
+    #[pyo3(from_py_with = whole::iterations)] iterations: u32,
     library: PathBuf,
     bus: Option<String>,
     measure: Option<&str>,

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 
 use crate::argument::give_signal;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 use crate::model::PyStateSpace;
 
 /// A cell description, read and validated.
@@ -23,6 +24,7 @@ use crate::model::PyStateSpace;
 #[pyclass(name = "Cell", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyCell {
+    made: Made,
     pub(crate) cell: Cell,
     reference_m: Vec<f64>,
     n_samples: usize,
@@ -53,12 +55,24 @@ impl PyCell {
     #[pyo3(signature = (path, allow_divergent=false))]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn load(path: std::path::PathBuf, allow_divergent: bool) -> PyResult<Self> {
+        let made = made!("load": path, allow_divergent);
         let mut cell = Cell::load(Path::new(&path)).or_raise()?;
         cell.learning.allow_divergent |= allow_divergent;
         let plan = Plan::new(&cell, None, false).or_raise()?;
         // Refuses a model or weights that cannot learn, before any drive is touched.
         let warnings = plan.law(&cell).or_raise()?.warnings;
-        Ok(Self { n_samples: plan.n_samples(), reference_m: plan.reference_m, cell, warnings })
+        Ok(Self {
+            made,
+            n_samples: plan.n_samples(),
+            reference_m: plan.reference_m,
+            cell,
+            warnings,
+        })
+    }
+
+    /// Pickled and copied as the file that it is read from.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Name of the cell.

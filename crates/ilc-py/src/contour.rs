@@ -11,6 +11,8 @@ use pyo3::types::PyList;
 use crate::argument::{Signal, give_signal, misfit, read_vector};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
+use crate::whole;
 
 /// Straight piece of a contour.
 ///
@@ -31,13 +33,22 @@ use crate::error::OrRaise;
 /// array([0.25])
 #[pyclass(name = "Line", module = "ilc_rt.trajectory", frozen)]
 #[derive(Debug)]
-struct PyLine(Line);
+struct PyLine(Line, Made);
 
 #[pymethods]
 impl PyLine {
     #[new]
     fn new(from_m: &Bound<'_, PyAny>, to_m: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self(Line { from_m: read_point("from_m", from_m)?, to_m: read_point("to_m", to_m)? }))
+        let made = made!(from_m, to_m);
+        Ok(Self(
+            Line { from_m: read_point("from_m", from_m)?, to_m: read_point("to_m", to_m)? },
+            made,
+        ))
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().1.reduce(slf.get_type().as_any())
     }
 
     fn __repr__(&self) -> String {
@@ -72,7 +83,7 @@ impl PyLine {
 /// array([0.5])
 #[pyclass(name = "Arc", module = "ilc_rt.trajectory", frozen)]
 #[derive(Debug)]
-struct PyArc(Arc);
+struct PyArc(Arc, Made);
 
 #[pymethods]
 impl PyArc {
@@ -84,9 +95,15 @@ impl PyArc {
         sweep_rad: f64,
         axis: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let made = made!(from_m, centre_m, sweep_rad, axis);
         let (from_m, centre_m) = (read_point("from_m", from_m)?, read_point("centre_m", centre_m)?);
         let axis = axis.map_or(Ok([0.0, 0.0, 1.0]), |axis| read_point("axis", axis))?;
-        Ok(Self(Arc::new(from_m, centre_m, axis, sweep_rad).or_raise()?))
+        Ok(Self(Arc::new(from_m, centre_m, axis, sweep_rad).or_raise()?, made))
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().1.reduce(slf.get_type().as_any())
     }
 
     fn __repr__(&self) -> String {
@@ -135,7 +152,7 @@ fn contour_error<'py>(
     py: Python<'py>,
     reference_m: &Bound<'py, PyAny>,
     actual_m: &Bound<'py, PyAny>,
-    window: Option<usize>,
+    #[pyo3(from_py_with = whole::maybe::window)] window: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     if let Some(shapes) = read_shapes(reference_m, window)? {
         let points = read_points("actual_m", actual_m)?;

@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use crate::argument::{Matrix, Signal, give_signal, misfit, read_vector};
 use crate::error::OrRaise;
 use crate::held::held;
+use crate::made::{Made, made};
 use crate::model::PyStateSpace;
 
 /// PID controller with a filtered derivative that does not wind up.
@@ -55,6 +56,7 @@ use crate::model::PyStateSpace;
 #[pyclass(name = "Pid", module = "ilc_rt.control", frozen)]
 #[derive(Debug)]
 struct PyPid {
+    made: Made,
     dt_s: f64,
     pid: Mutex<Pid>,
 }
@@ -72,6 +74,7 @@ impl PyPid {
         filter_s: f64,
         output_max: Option<f64>,
     ) -> PyResult<Self> {
+        let made = made!(kp, ki_per_s, kd_s, dt_s, derivative, filter_s, output_max);
         for (name, value) in [("kp", kp), ("ki_per_s", ki_per_s), ("kd_s", kd_s)] {
             finite(name, value)?;
         }
@@ -89,7 +92,12 @@ impl PyPid {
         };
         let output_max = limit("output_max", output_max)?;
         let gains = PidGains { kp, ki_per_s, kd_s, derivative, output_max };
-        Ok(Self { dt_s, pid: Mutex::new(Pid::new(gains, dt_s)) })
+        Ok(Self { made, dt_s, pid: Mutex::new(Pid::new(gains, dt_s)) })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Return the output for the error of this tick.
@@ -198,7 +206,7 @@ impl PyPid {
 /// 5.0
 #[pyclass(name = "Cascade", module = "ilc_rt.control", frozen)]
 #[derive(Debug)]
-struct PyCascade(Mutex<Cascade>);
+struct PyCascade(Mutex<Cascade>, Made);
 
 #[pymethods]
 impl PyCascade {
@@ -215,6 +223,16 @@ impl PyCascade {
         velocity_max_m_s: Option<f64>,
         force_max_n: Option<f64>,
     ) -> PyResult<Self> {
+        let made = made!(
+            position_gain_per_s,
+            velocity_gain_n_s_m,
+            integral_time_s,
+            dt_s,
+            velocity_feedforward,
+            acceleration_feedforward_kg,
+            velocity_max_m_s,
+            force_max_n
+        );
         for (name, value) in [
             ("position_gain_per_s", position_gain_per_s),
             ("velocity_gain_n_s_m", velocity_gain_n_s_m),
@@ -233,7 +251,12 @@ impl PyCascade {
             velocity_max_m_s: limit("velocity_max_m_s", velocity_max_m_s)?,
             force_max_n: limit("force_max_n", force_max_n)?,
         };
-        Ok(Self(Mutex::new(Cascade::new(gains, dt_s))))
+        Ok(Self(Mutex::new(Cascade::new(gains, dt_s)), made))
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().1.reduce(slf.get_type().as_any())
     }
 
     /// Return the force of this tick.
@@ -299,15 +322,21 @@ impl PyCascade {
 /// (array([0., 5.]), 0.5)
 #[pyclass(name = "CrossCoupled", module = "ilc_rt.control", frozen)]
 #[derive(Debug)]
-struct PyCrossCoupled(Mutex<CrossCoupled>);
+struct PyCrossCoupled(Mutex<CrossCoupled>, Made);
 
 #[pymethods]
 impl PyCrossCoupled {
     #[new]
-    fn new(controller: &Bound<'_, PyPid>) -> Self {
+    fn new(controller: &Bound<'_, PyPid>) -> PyResult<Self> {
+        let made = made!(controller);
         let mut pid = *held(&controller.get().pid);
         pid.reset();
-        Self(Mutex::new(CrossCoupled::new(pid)))
+        Ok(Self(Mutex::new(CrossCoupled::new(pid)), made))
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().1.reduce(slf.get_type().as_any())
     }
 
     /// Return what to add to the two commands, and the contour error.

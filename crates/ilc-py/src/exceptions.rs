@@ -13,8 +13,13 @@ create_exception!(
     "A learning law, or what it was given, that cannot be used."
 );
 
-create_exception!(ilc_rt, KinematicsError, PyValueError, "A pose or mechanism that cannot be.");
-create_exception!(ilc_rt, ContourError, PyValueError, "A path or an arc that is none.");
+create_exception!(
+    ilc_rt.kinematics,
+    KinematicsError,
+    PyValueError,
+    "A pose or mechanism that cannot be."
+);
+create_exception!(ilc_rt.trajectory, ContourError, PyValueError, "A path or an arc that is none.");
 create_exception!(
     ilc_rt,
     TrajectoryError,

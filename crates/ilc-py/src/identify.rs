@@ -16,6 +16,7 @@ use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::experiment::read_waveform;
 use crate::model::PyStateSpace;
+use crate::whole;
 
 /// Measured frequency response, and how far it can be trusted.
 ///
@@ -46,6 +47,14 @@ pub(crate) struct PyFrequencyResponse(FrequencyResponse);
 
 #[pymethods]
 impl PyFrequencyResponse {
+    /// Pickled and copied as its arrays.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let parts =
+            (this.frequency_hz(py), this.response(py), this.coherence(py), this.n_averages());
+        Ok((slf.get_type().into_any(), parts.into_pyobject(py)?.into_any()))
+    }
+
     #[new]
     #[pyo3(signature = (frequency_hz, response, coherence=None, n_averages=1.0))]
     fn new(
@@ -193,9 +202,9 @@ fn frequency_response(
     u: &Bound<'_, PyAny>,
     y: &Bound<'_, PyAny>,
     dt_s: f64,
-    period_samples: Option<usize>,
-    segment_samples: Option<usize>,
-    overlap_samples: Option<usize>,
+    #[pyo3(from_py_with = whole::maybe::period_samples)] period_samples: Option<usize>,
+    #[pyo3(from_py_with = whole::maybe::segment_samples)] segment_samples: Option<usize>,
+    #[pyo3(from_py_with = whole::maybe::overlap_samples)] overlap_samples: Option<usize>,
 ) -> PyResult<PyFrequencyResponse> {
     let (u, y) = (read_vector("u", u)?, read_vector("y", y)?);
     let averaging = match (period_samples, segment_samples) {
@@ -275,6 +284,24 @@ impl From<SecondOrderFit> for PySecondOrderFit {
 
 #[pymethods]
 impl PySecondOrderFit {
+    /// Pickled and copied as its figures.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let model = this.model();
+        let parts = (
+            (model.gain, model.natural_frequency_hz, model.damping, model.delay_s, model.dt_s),
+            (
+                this.gain_deviation,
+                this.natural_frequency_deviation_hz,
+                this.damping_deviation,
+                this.delay_deviation_s,
+            ),
+            this.residual_rms,
+        );
+        let maker = py.import("ilc_rt._native")?.getattr("_second_order_fit")?;
+        Ok((maker, parts.into_pyobject(py)?.into_any()))
+    }
+
     /// Delay in whole samples; 0 for a continuous model.
     #[getter]
     fn delay_samples(&self) -> usize {
@@ -403,6 +430,19 @@ struct PyVelocityLoopFit(VelocityLoopFit);
 
 #[pymethods]
 impl PyVelocityLoopFit {
+    /// Pickled and copied as its figures.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let (fit, model) = (&this.0, &this.0.model);
+        let parts = (
+            (model.gain, model.bandwidth_hz, model.delay_s, model.position_gain_per_s, model.dt_s),
+            (fit.gain_deviation, fit.bandwidth_deviation_hz, fit.delay_deviation_s),
+            fit.residual_rms,
+        );
+        let maker = py.import("ilc_rt._native")?.getattr("_velocity_loop_fit")?;
+        Ok((maker, parts.into_pyobject(py)?.into_any()))
+    }
+
     /// Gain K of the velocity loop.
     #[getter]
     fn gain(&self) -> f64 {
@@ -546,6 +586,15 @@ struct PyRationalFit(RationalFit);
 
 #[pymethods]
 impl PyRationalFit {
+    /// Pickled and copied as its figures.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let fit = &this.0;
+        let parts = (this.model(), fit.delay_s, fit.reflected_poles, fit.residual_rms);
+        let maker = py.import("ilc_rt._native")?.getattr("_rational_fit")?;
+        Ok((maker, parts.into_pyobject(py)?.into_any()))
+    }
+
     /// The model in state space, without the delay.
     #[getter]
     fn model(&self) -> PyStateSpace {
@@ -652,8 +701,8 @@ fn fit_rational(
     py: Python<'_>,
     frequency_hz: &Bound<'_, PyAny>,
     response: &Bound<'_, PyAny>,
-    n_zeros: usize,
-    n_poles: usize,
+    #[pyo3(from_py_with = whole::n_zeros)] n_zeros: usize,
+    #[pyo3(from_py_with = whole::n_poles)] n_poles: usize,
     coherence: Option<&Bound<'_, PyAny>>,
     n_averages: f64,
     delay_s: f64,
@@ -782,7 +831,7 @@ fn excitation<'py>(
     from_hz: f64,
     to_hz: f64,
     period_s: f64,
-    periods: usize,
+    #[pyo3(from_py_with = whole::periods)] periods: usize,
     dt_s: f64,
 ) -> PyResult<(Bound<'py, PyAny>, usize, usize)> {
     let waveform = read_waveform(waveform)?;
@@ -823,6 +872,57 @@ fn give_complex(py: Python<'_>, values: Vec<Complex<f64>>) -> Bound<'_, PyAny> {
     Array1::from(values).into_pyarray(py).into_any()
 }
 
+/// Makes a fit again from its figures, for copies.
+#[pyfunction]
+fn _second_order_fit(
+    model: (f64, f64, f64, f64, Option<f64>),
+    deviations: (f64, f64, f64, f64),
+    residual_rms: f64,
+) -> PySecondOrderFit {
+    let (gain, natural_frequency_hz, damping, delay_s, dt_s) = model;
+    PySecondOrderFit {
+        gain,
+        natural_frequency_hz,
+        damping,
+        delay_s,
+        dt_s,
+        gain_deviation: deviations.0,
+        natural_frequency_deviation_hz: deviations.1,
+        damping_deviation: deviations.2,
+        delay_deviation_s: deviations.3,
+        residual_rms,
+    }
+}
+
+/// Makes a fit again from its figures, for copies.
+#[pyfunction]
+fn _velocity_loop_fit(
+    model: (f64, f64, f64, f64, f64),
+    deviations: (f64, f64, f64),
+    residual_rms: f64,
+) -> PyVelocityLoopFit {
+    let (gain, bandwidth_hz, delay_s, position_gain_per_s, dt_s) = model;
+    PyVelocityLoopFit(VelocityLoopFit {
+        model: identify::VelocityLoop { gain, bandwidth_hz, delay_s, position_gain_per_s, dt_s },
+        gain_deviation: deviations.0,
+        bandwidth_deviation_hz: deviations.1,
+        delay_deviation_s: deviations.2,
+        residual_rms,
+    })
+}
+
+/// Makes a fit again from its figures, for copies.
+#[pyfunction]
+fn _rational_fit(
+    model: &Bound<'_, PyStateSpace>,
+    delay_s: f64,
+    #[pyo3(from_py_with = whole::n_poles)] reflected_poles: usize,
+    residual_rms: f64,
+) -> PyRationalFit {
+    let model = model.get().model().clone();
+    PyRationalFit(RationalFit { model, delay_s, reflected_poles, residual_rms })
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyFrequencyResponse>()?;
     module.add_class::<PySecondOrderFit>()?;
@@ -834,5 +934,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit_rational, module)?)?;
     module.add_function(wrap_pyfunction!(uncertainty, module)?)?;
     module.add_function(wrap_pyfunction!(doubt, module)?)?;
+    module.add_function(wrap_pyfunction!(_second_order_fit, module)?)?;
+    module.add_function(wrap_pyfunction!(_velocity_loop_fit, module)?)?;
+    module.add_function(wrap_pyfunction!(_rational_fit, module)?)?;
     module.add_function(wrap_pyfunction!(excitation, module)?)
 }

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use crate::argument::{Signal, give_signal, misfit};
 use crate::error::OrRaise;
 use crate::exceptions;
+use crate::made::{Made, made};
 
 /// Three-leg parallel mechanism.
 ///
@@ -45,6 +46,7 @@ use crate::exceptions;
 #[pyclass(name = "Delta", module = "ilc_rt.kinematics", frozen)]
 #[derive(Debug)]
 struct PyDelta {
+    made: Made,
     delta: Delta,
 }
 
@@ -53,7 +55,13 @@ impl PyDelta {
     #[new]
     #[pyo3(signature = (base_m=0.037, crank_m=0.060, rod_m=0.145))]
     fn new(base_m: f64, crank_m: f64, rod_m: f64) -> PyResult<Self> {
-        Ok(Self { delta: Delta::new(base_m, crank_m, rod_m).or_raise()? })
+        let made = made!(base_m, crank_m, rod_m);
+        Ok(Self { made, delta: Delta::new(base_m, crank_m, rod_m).or_raise()? })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Base radius in m.
@@ -247,6 +255,7 @@ impl PyDelta {
 #[pyclass(name = "Gantry", module = "ilc_rt.kinematics", frozen)]
 #[derive(Debug)]
 struct PyGantry {
+    made: Made,
     gantry: Gantry,
 }
 
@@ -255,7 +264,13 @@ impl PyGantry {
     #[new]
     #[pyo3(signature = (orthogonality_rad=0.0))]
     fn new(orthogonality_rad: f64) -> PyResult<Self> {
-        Ok(Self { gantry: Gantry::new(orthogonality_rad).or_raise()? })
+        let made = made!(orthogonality_rad);
+        Ok(Self { made, gantry: Gantry::new(orthogonality_rad).or_raise()? })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Error of the right angle in rad.

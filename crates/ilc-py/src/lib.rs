@@ -21,6 +21,7 @@ mod identify;
 mod kinematics;
 mod laws;
 mod library;
+mod made;
 mod model;
 mod model_argument;
 mod python_law;
@@ -30,12 +31,14 @@ mod time_varying;
 mod trajectory;
 mod tuning;
 mod weights;
+mod whole;
 
 use pyo3::prelude::*;
 
 /// The compiled part of `ilc_rt`.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     exceptions::register(module)?;
     model::register(module)?;
     time_varying::register(module)?;
@@ -54,5 +57,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;
+    made::register(module)?;
     Ok(())
 }

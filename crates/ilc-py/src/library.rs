@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 use ilc_rt::library::{Library, Row, Task};
-use ilc_rt::record::{Figures, IterationRecord, Meta, fingerprint, infinity_norm, rms};
+use ilc_rt::record::{AxisKinds, Figures, IterationRecord, Meta, distances_m, fingerprint};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -12,6 +12,8 @@ use pyo3::types::PyDict;
 use crate::argument::{Signal, give_signal, misfit, read_disturbance};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
+use crate::whole;
 
 /// Every run of every campaign, in one SQLite file.
 ///
@@ -33,6 +35,7 @@ use crate::error::OrRaise;
 #[pyclass(name = "Library", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyLibrary {
+    made: Made,
     library: Mutex<Library>,
 }
 
@@ -41,7 +44,13 @@ impl PyLibrary {
     #[new]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(path: PathBuf) -> PyResult<Self> {
-        Ok(Self { library: Mutex::new(Library::open(&path).or_raise()?) })
+        let made = made!(path);
+        Ok(Self { made, library: Mutex::new(Library::open(&path).or_raise()?) })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Return the runs kept, oldest first, without their arrays.
@@ -54,7 +63,9 @@ impl PyLibrary {
     /// Returns
     /// -------
     /// list of dict
-    ///     Provenance and figures of each run; lengths in metres.
+    ///     Provenance and figures of each run; lengths in metres, angles in radians. A
+    ///     figure over several axes is over the linear ones, or over all of a cell
+    ///     whose axes are all rotary; contour errors are None where the path has none.
     ///
     /// Raises
     /// ------
@@ -82,14 +93,18 @@ impl PyLibrary {
     ///     What `list` gives, and ``law_parameters`` and ``program`` (JSON),
     ///     ``reference_m``, ``input``, ``encoder_m``, ``tool_m`` (or None),
     ///     ``error_m`` of shape (n_samples, n_axes), ``contour_m`` of shape
-    ///     (n_samples,), ``disturbance`` of shape (n_disturbances,) (None: none is
-    ///     measured).
+    ///     (n_samples,) (None: the path has no contour), ``disturbance`` of shape
+    ///     (n_disturbances,) (None: none is measured).
     ///
     /// Raises
     /// ------
     /// OSError
     ///     If there is no such run, or its arrays do not match their digest.
-    fn load<'py>(&self, py: Python<'py>, id: i64) -> PyResult<Bound<'py, PyDict>> {
+    fn load<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole::id)] id: i64,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let row = detached(py, || self.lock().load(id)).or_raise()?;
         let run = describe(py, &row)?;
         let n_axes = row.meta.n_axes;
@@ -103,7 +118,10 @@ impl PyLibrary {
         let tool_m = if record.tool_m.is_empty() { None } else { Some(signal(record.tool_m)?) };
         run.set_item("tool_m", tool_m)?;
         run.set_item("error_m", signal(record.error_m)?)?;
-        run.set_item("contour_m", give_signal(py, record.contour_m, 1, true)?)?;
+        let contour_m = record.contour_m;
+        let has_contour = record.figures.contour_inf_m.is_some() && !contour_m.is_empty();
+        let contour_m = has_contour.then(|| give_signal(py, contour_m, 1, true)).transpose()?;
+        run.set_item("contour_m", contour_m)?;
         let disturbance = record.disturbance;
         let disturbance = (!disturbance.is_empty()).then(|| give_signal(py, disturbance, 1, true));
         run.set_item("disturbance", disturbance.transpose()?)?;
@@ -138,7 +156,7 @@ impl PyLibrary {
         &self,
         py: Python<'py>,
         disturbance: &Bound<'py, PyAny>,
-        top: usize,
+        #[pyo3(from_py_with = whole::top)] top: usize,
         cell: Option<String>,
     ) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let disturbance = read_disturbance("disturbance", disturbance)?;
@@ -243,13 +261,13 @@ impl PyLibrary {
             axis_names: (1..=n_axes).map(|axis| format!("axis {axis}")).collect(),
             input_units: vec!["m".to_owned(); n_axes],
         };
-        let figures = Figures {
-            tracking_inf_m: infinity_norm(&error_m),
-            tracking_rms_m: rms(&error_m, n_axes),
-            ..Figures::default()
-        };
-        let encoder_m = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
-        let contour_m = vec![0.0; u.n_samples];
+        let encoder_m: Vec<f64> = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
+        let kinds = AxisKinds::new(&meta.input_units, n_axes);
+        let contour_m = distances_m(&reference_m, &encoder_m, &kinds, cycle_s);
+        let mut figures = Figures::default();
+        figures.set_tracking(&error_m, &kinds);
+        figures.set_places(&reference_m, &encoder_m, &[], &kinds);
+        figures.set_contour(&contour_m);
         let input = u.values;
         detached(py, || {
             let library = self.lock();
@@ -296,7 +314,12 @@ impl PyLibrary {
     /// spread over these runs, summed over the disturbances of all of them; without
     /// disturbances the smallest errors stay. The space in the file is used again.
     #[pyo3(signature = (keep, cell=None))]
-    fn trim(&self, py: Python<'_>, keep: usize, cell: Option<String>) -> PyResult<usize> {
+    fn trim(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::keep)] keep: usize,
+        cell: Option<String>,
+    ) -> PyResult<usize> {
         let task = Task { cell };
         detached(py, || self.lock().trim(keep, &task)).or_raise()
     }
@@ -316,7 +339,12 @@ impl PyLibrary {
     ///     If the ending is unknown or the file cannot be written.
     /// OSError
     ///     If there is no such run, or its arrays do not match their digest.
-    fn export(&self, py: Python<'_>, id: i64, path: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn export(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::id)] id: i64,
+        path: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
         let run = self.load(py, id)?;
         py.import("ilc_rt.export")?.call_method1("export_run", (run, path)).map(drop)
     }
@@ -356,6 +384,10 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     run.set_item("late_updates", figures.late_updates)?;
     run.set_item("update_ms", figures.update_ms)?;
     run.set_item("rolled_back", figures.rolled_back)?;
+    run.set_item("learning_off", figures.learning_off)?;
+    run.set_item("remark", &figures.remark)?;
+    run.set_item("axes_tracking_inf_m", &figures.axes_tracking_inf_m)?;
+    run.set_item("axes_tracking_rms_m", &figures.axes_tracking_rms_m)?;
     run.set_item("digest", &row.digest)?;
     Ok(run)
 }

@@ -11,6 +11,7 @@ use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_mat
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
+use crate::whole;
 
 /// Linear time-invariant model, sampled or continuous.
 ///
@@ -77,6 +78,13 @@ impl PyStateSpace {
         let (a, b) = (read_matrix("a", a)?, read_matrix("b", b)?);
         let (c, d) = (read_matrix("c", c)?, read_matrix("d", d)?);
         StateSpace::new(a, b, c, d, dt_s).or_raise().map(Self)
+    }
+
+    /// Pickled and copied as its matrices.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let parts = (this.a(py), this.b(py), this.c(py), this.d(py), this.0.dt_s());
+        Ok((slf.get_type().into_any(), parts.into_pyobject(py)?.into_any()))
     }
 
     /// State matrix, shape (n_states, n_states).
@@ -176,7 +184,11 @@ impl PyStateSpace {
     /// ------
     /// ModelError
     ///     If the model is continuous.
-    fn markov<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Bound<'py, PyAny>> {
+    fn markov<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole::n)] n: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let parameters = detached(py, || self.0.markov(n)).or_raise()?;
         let shape = (n, self.0.n_outputs(), self.0.n_inputs());
         let array = Array3::from_shape_fn(shape, |(k, row, col)| parameters[k][(row, col)]);
@@ -200,7 +212,11 @@ impl PyStateSpace {
     /// ------
     /// ModelError
     ///     If the model is continuous.
-    fn lifted<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Bound<'py, PyAny>> {
+    fn lifted<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = whole::n)] n: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let lifted = detached(py, || self.0.lifted(n)).or_raise()?;
         Ok(give_matrix(py, &lifted))
     }
@@ -306,7 +322,7 @@ impl PyStateSpace {
     /// ------
     /// ModelError
     ///     If the model is continuous.
-    fn delayed(&self, n_samples: usize) -> PyResult<Self> {
+    fn delayed(&self, #[pyo3(from_py_with = whole::n_samples)] n_samples: usize) -> PyResult<Self> {
         self.0.delayed(n_samples).or_raise().map(Self)
     }
 
@@ -396,8 +412,8 @@ impl PyStateSpace {
         &self,
         py: Python<'py>,
         w_rad_s: &Bound<'py, PyAny>,
-        output: usize,
-        input: usize,
+        #[pyo3(from_py_with = whole::output)] output: usize,
+        #[pyo3(from_py_with = whole::input)] input: usize,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let w = read_vector("w_rad_s", w_rad_s)?;
         let bode = detached(py, || self.0.bode(&w, output, input)).or_raise()?;

@@ -108,6 +108,19 @@ impl PyTimeVarying {
         TimeVarying::new(samples.or_raise()?).or_raise().map(Self)
     }
 
+    /// Pickled and copied as its matrices.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let parts = (
+            this.give(py, StateSpace::a),
+            this.give(py, StateSpace::b),
+            this.give(py, StateSpace::c),
+            this.give(py, StateSpace::d),
+            this.0.dt_s(),
+        );
+        Ok((slf.get_type().into_any(), parts.into_pyobject(py)?.into_any()))
+    }
+
     /// State matrices, shape (n_samples, n_states, n_states).
     #[getter]
     fn a<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {

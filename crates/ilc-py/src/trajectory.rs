@@ -18,9 +18,10 @@ use crate::argument::{Signal, give_signal, read_vector};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::exceptions;
+use crate::whole;
 
 /// Place of an alpha, the alpha, and the intervals in which it might be.
-pub(crate) type Alpha = (usize, &'static str, f64, Vec<(f64, f64)>);
+pub(crate) type Alpha = (usize, String, f64, Vec<(f64, f64)>);
 
 /// A planned motion, sampled.
 ///
@@ -35,7 +36,7 @@ pub(crate) type Alpha = (usize, &'static str, f64, Vec<(f64, f64)>);
 /// ...     velocity_max_m_s=0.5, acceleration_max_m_s2=2.0, jerk_max_m_s3=50.0)
 /// >>> float(move.position_m[-1, 0])
 /// 0.1
-#[pyclass(name = "Trajectory", module = "ilc_rt", frozen)]
+#[pyclass(name = "Trajectory", module = "ilc_rt.trajectory", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyTrajectory {
     motion: SampledMotion,
@@ -47,6 +48,20 @@ pub(crate) struct PyTrajectory {
 
 #[pymethods]
 impl PyTrajectory {
+    /// Pickled and copied as its samples.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let samples = (
+            this.position_m(py)?,
+            this.velocity_m_s(py)?,
+            this.acceleration_m_s2(py)?,
+            this.programmed_m(py)?,
+        );
+        let parts = (this.motion.dt_s, samples, this.alphas(), this.computing_s);
+        let maker = py.import("ilc_rt._native")?.getattr("_trajectory")?;
+        Ok((maker, parts.into_pyobject(py)?.into_any()))
+    }
+
     /// Sample time in seconds.
     #[getter]
     fn dt_s(&self) -> f64 {
@@ -240,7 +255,7 @@ fn sample_exponential(
         .iter()
         .map(|choice| {
             let intervals = choice.admissible.iter().map(|i| (i.from, i.to)).collect();
-            (choice.segment, choice.place, choice.alpha, intervals)
+            (choice.segment, choice.place.to_owned(), choice.alpha, intervals)
         })
         .collect();
     Ok((motion.verified(limits)?, alphas))
@@ -797,7 +812,7 @@ fn raster(
     py: Python<'_>,
     width_m: f64,
     pitch_m: f64,
-    rows: usize,
+    #[pyo3(from_py_with = whole::rows)] rows: usize,
     feed_m_s: f64,
     dt_s: f64,
     velocity_max_m_s: &Bound<'_, PyAny>,
@@ -964,8 +979,30 @@ fn tracking_index(
     Ok((index.tracking, index.acceleration))
 }
 
+/// Makes a trajectory again from its samples, for copies.
+#[pyfunction]
+fn _trajectory(
+    dt_s: f64,
+    samples: [Bound<'_, PyAny>; 4],
+    alphas: Vec<Alpha>,
+    computing_s: f64,
+) -> PyResult<PyTrajectory> {
+    let [position, velocity, acceleration, programmed] = samples;
+    let position = Signal::read("position_m", &position)?;
+    let motion = SampledMotion {
+        dt_s,
+        n_axes: position.n_channels,
+        velocity_m_s: Signal::read("velocity_m_s", &velocity)?.values,
+        acceleration_m_s2: Signal::read("acceleration_m_s2", &acceleration)?.values,
+        programmed_m: Signal::read("programmed_m", &programmed)?.values,
+        position_m: position.values,
+    };
+    Ok(PyTrajectory { motion, alphas, computing_s })
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyTrajectory>()?;
+    module.add_function(wrap_pyfunction!(_trajectory, module)?)?;
     module.add_function(wrap_pyfunction!(jerk_limited, module)?)?;
     module.add_function(wrap_pyfunction!(exponential_sigmoid, module)?)?;
     module.add_function(wrap_pyfunction!(modulated, module)?)?;

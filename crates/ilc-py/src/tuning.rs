@@ -8,7 +8,9 @@ use crate::analysis::PyAnalysis;
 use crate::analyze::{read_reference, read_uncertainty};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 use crate::model_argument::read_model;
+use crate::whole;
 
 /// Weights of norm-optimal learning, with the reasons for them.
 ///
@@ -25,12 +27,18 @@ use crate::model_argument::read_model;
 #[pyclass(name = "Tuning", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyTuning {
+    made: Made,
     tuning: Tuning,
     analysis: Py<PyAnalysis>,
 }
 
 #[pymethods]
 impl PyTuning {
+    /// Pickled and copied as the call that made it, which is made again.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
+    }
+
     /// Weight of the error.
     #[getter]
     fn q(&self) -> f64 {
@@ -138,12 +146,13 @@ impl PyTuning {
 fn propose(
     py: Python<'_>,
     model: &Bound<'_, PyAny>,
-    n_samples: usize,
+    #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
     uncertainty: Option<&Bound<'_, PyAny>>,
     noise_std: Option<f64>,
     reference: Option<&Bound<'_, PyAny>>,
-    n_runs: usize,
+    #[pyo3(from_py_with = whole::n_runs)] n_runs: usize,
 ) -> PyResult<PyTuning> {
+    let made = made!("tune": model, n_samples, uncertainty, noise_std, reference, n_runs);
     let model = read_model("model", model)?;
     let knowledge = Knowledge {
         uncertainty: read_uncertainty(uncertainty)?,
@@ -152,8 +161,9 @@ fn propose(
         n_runs,
     };
     let tuning = detached(py, || tune::tune(&model, n_samples, &knowledge)).or_raise()?;
-    let analysis = Py::new(py, PyAnalysis::new(tuning.analysis.clone(), &model))?;
-    Ok(PyTuning { tuning, analysis })
+    let part = made.part(py, "analysis");
+    let analysis = Py::new(py, PyAnalysis::new(tuning.analysis.clone(), &model, part))?;
+    Ok(PyTuning { made, tuning, analysis })
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

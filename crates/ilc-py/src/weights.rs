@@ -12,6 +12,7 @@ use crate::argument::{Matrix, Signal, give_signal, misfit, read_array};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::laws::weight;
+use crate::whole;
 
 /// An argument that has a default.
 pub(crate) type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
@@ -238,7 +239,7 @@ fn contour<'py>(
     q: Option<&Bound<'py, PyAny>>,
     contour: Option<&Bound<'py, PyAny>>,
     along: Option<&Bound<'py, PyAny>>,
-    axes: Option<Vec<usize>>,
+    #[pyo3(from_py_with = whole::maybe_list::axes)] axes: Option<Vec<usize>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (weight, n_samples, p) = read_contour(py, reference, q, contour, along, axes)?;
     give_blocks(py, &weight, n_samples, p)
@@ -347,8 +348,8 @@ fn coupled<'py>(
 #[expect(clippy::needless_pass_by_value, reason = "arguments from Python are owned")]
 fn schedule(
     py: Python<'_>,
-    segments: Vec<(usize, f64)>,
-    n_samples: usize,
+    #[pyo3(from_py_with = whole::segments)] segments: Vec<(usize, f64)>,
+    #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
     bandwidth_hz: Option<f64>,
     dt_s: Option<f64>,
 ) -> PyResult<Bound<'_, PyAny>> {
@@ -431,17 +432,17 @@ fn schedule(
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 fn formation<'py>(
     py: Python<'py>,
-    n_agents: usize,
-    n_axes: usize,
-    n_samples: usize,
+    #[pyo3(from_py_with = whole::n_agents)] n_agents: usize,
+    #[pyo3(from_py_with = whole::n_axes)] n_axes: usize,
+    #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
     tracking: Option<&Bound<'py, PyAny>>,
     own: Option<&Bound<'py, PyAny>>,
     centre: Option<&Bound<'py, PyAny>>,
     sigma: Option<&Bound<'py, PyAny>>,
     weight: Option<&Bound<'py, PyAny>>,
-    leaders: Option<Vec<usize>>,
-    pairs: Option<Vec<(usize, usize)>>,
-    axes: Option<Vec<usize>>,
+    #[pyo3(from_py_with = whole::maybe_list::leaders)] leaders: Option<Vec<usize>>,
+    #[pyo3(from_py_with = whole::maybe_pairs::pairs)] pairs: Option<Vec<(usize, usize)>>,
+    #[pyo3(from_py_with = whole::maybe_list::axes)] axes: Option<Vec<usize>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let task = Task { tracking, own, centre, sigma, weight, leaders, pairs, axes };
     let weight = task.read(py, n_samples, n_agents, n_axes)?;
@@ -489,9 +490,9 @@ fn formation<'py>(
 fn formation_errors<'py>(
     py: Python<'py>,
     e: &Bound<'py, PyAny>,
-    n_agents: usize,
-    pairs: Option<Vec<(usize, usize)>>,
-    axes: Option<Vec<usize>>,
+    #[pyo3(from_py_with = whole::n_agents)] n_agents: usize,
+    #[pyo3(from_py_with = whole::maybe_pairs::pairs)] pairs: Option<Vec<(usize, usize)>>,
+    #[pyo3(from_py_with = whole::maybe_list::axes)] axes: Option<Vec<usize>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let e = Signal::read("e", e)?;
     if n_agents == 0 || !e.n_channels.is_multiple_of(n_agents) {

@@ -19,8 +19,12 @@ from ilc_rt.commands.options import (
     Lockstep,
 )
 from ilc_rt.commands.run import carry_out
+from ilc_rt.commands.targets import report_target
 
-ReportFile = Annotated[Path, typer.Option("--report", metavar="PATH", help="The HTML report.")]
+ReportFile = Annotated[
+    Path,
+    typer.Option("--report", metavar="PATH", callback=report_target, help="The HTML report."),
+]
 
 
 def demo(

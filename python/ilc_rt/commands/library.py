@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -19,19 +19,29 @@ from ilc_rt.commands.options import (
 )
 from ilc_rt.errors import BadInputError
 from ilc_rt.export import export_run
-from ilc_rt.result import library_rows, micrometres
+from ilc_rt.quantity import unit_for
+from ilc_rt.result import library_rows
+from ilc_rt.text import printable
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 app = Typer(
     no_args_is_help=True,
     help="List, show, export and trim the runs in a library.",
 )
 
+# Characters of a program or of a law's parameters that are shown; `export` gives all of them.
+LENGTH_SHOWN = 2000
+
 RunId = Annotated[int, typer.Argument(metavar="ID", help="Number of the run in the library.")]
 CellName = Annotated[str | None, typer.Option("--cell", metavar="NAME", help="Only this cell's.")]
 CampaignOption = Annotated[
     str | None, typer.Option("--campaign", metavar="ID", help="Only this campaign's.")
 ]
-Keep = Annotated[int, typer.Argument(min=0, metavar="KEEP", help="How many runs stay.")]
+Keep = Annotated[
+    int, typer.Argument(min=0, max=2**63 - 1, metavar="KEEP", help="How many runs stay.")
+]
 ExportFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="The file; .npz, .csv or .json says the format.")
 ]
@@ -51,17 +61,17 @@ def list_runs(
     if campaign is not None:
         rows = [row for row in rows if str(row["campaign"]).startswith(campaign)]
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("id", "campaign", "cell", "run", "law", "learned from", "max tracking µm",
-                 "max contour µm", "created (UTC)"):  # fmt: skip
-        right = name in {"id", "run"} or name.endswith("µm")
+    for name in ("id", "campaign", "cell", "run", "law", "learned from", "max tracking",
+                 "max contour", "note", "created (UTC)"):  # fmt: skip
+        right = name in {"id", "run"} or name.startswith("max")
         table.add_column(name, justify="right" if right else "left", no_wrap=True)
     for row in rows:
         table.add_row(
-            str(row["id"]), str(row["campaign"]), str(row["cell"]), str(row["index"]),
-            str(row["law"]), str(row["measure"]), micrometres(row["tracking_inf_m"]),
-            micrometres(row["contour_inf_m"]), str(row["created_utc"]),
+            str(row["id"]), printable(row["campaign"]), printable(row["cell"]), str(row["index"]),
+            printable(row["law"]), printable(row["measure"]), error_text(row, "tracking_inf_m"),
+            error_text(row, "contour_inf_m"), note(row), printable(row["created_utc"]),
         )  # fmt: skip
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False, emoji=False)
     if not console.is_terminal:
         console.width = 200
     console.print(table)
@@ -74,15 +84,19 @@ def show(library: LibraryArgument, run_id: RunId) -> None:
 
     Example: ilc library show ilc-library.db 12
     """
-    for key, value in _load(library, run_id).items():
+    row = _load(library, run_id)
+    for key, value in row.items():
         if key == "disturbance" and value is not None:
             typer.echo(f"{key:22} {', '.join(f'{number:g}' for number in value)}")
+        elif isinstance(value, float) and key.endswith(("_inf_m", "_rms_m")):
+            typer.echo(f"{key:22} {value:.6g}, {error_text(row, key)}")
         elif isinstance(value, np.ndarray):
             size = " x ".join(str(length) for length in value.shape)
-            largest = float(np.abs(value).max()) if value.size else 0.0
+            largest = float(np.abs(value).max(initial=0.0))
             typer.echo(f"{key:22} {size} samples, largest {largest:.6g}")
         else:
-            typer.echo(f"{key:22} {'-' if value is None else value}")
+            shown = "-" if value is None else printable(value, LENGTH_SHOWN)
+            typer.echo(f"{key:22} {shown}")
 
 
 @app.command("export")
@@ -107,6 +121,19 @@ def trim(library: LibraryArgument, keep: Keep, cell: CellName = None) -> None:
     except OSError as error:
         raise BadInputError(str(error)) from error
     typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")
+
+
+def error_text(row: Mapping[str, Any], figure: str) -> str:
+    """Return a figure of a run in the unit of its axes: angles where all axes are rotary."""
+    units = {str(unit).removesuffix("/s") for unit in row["input_units"]}
+    base = "rad" if units == {"rad"} else "m"
+    return unit_for(base, row[figure]).text(row[figure])
+
+
+def note(row: Mapping[str, Any]) -> str:
+    """Return what became of a run in a few words."""
+    said = ("rolled back", row["rolled_back"]), ("learning off", row["learning_off"])
+    return ", ".join(words for words, holds in said if holds)
 
 
 def _load(library: Path, run_id: int) -> dict[str, Any]:

@@ -19,13 +19,18 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
+from ilc_rt.commands.targets import make_folder, report_target
 from ilc_rt.errors import CampaignError
 from ilc_rt.progress import CampaignView
+from ilc_rt.text import printable
 
 ReportFile = Annotated[
     Path | None,
     typer.Option(
-        "--report", metavar="PATH", help="Write an HTML report: a .html file or a folder."
+        "--report",
+        metavar="PATH",
+        callback=report_target,
+        help="Write an HTML report: a .html file, or a folder in one that exists.",
     ),
 ]
 Resume = Annotated[
@@ -95,12 +100,14 @@ def carry_out(
 
 def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> None:
     result = campaign.result
-    typer.echo(f"library: {campaign.library} (campaign {result.campaign})")
+    typer.echo(f"library: {printable(campaign.library)} (campaign {printable(result.campaign)})")
     if json_file is not None:
         result.write_json(json_file)
-        typer.echo(f"figures: {json_file}")
+        typer.echo(f"figures: {printable(json_file)}")
     if report is not None:
         # Here and not above: matplotlib takes its time, and bad input should not wait for it.
         from ilc_rt.report import write_report
 
-        typer.echo(f"report:  {write_report(result, report)}")
+        if not report.suffix:
+            make_folder(report)
+        typer.echo(f"report:  {printable(write_report(result, report))}")

@@ -119,8 +119,8 @@ const RANGES: &[Edit] = &[
     ),
     (
         "position_start_m = 0.04",
-        "position_start_m = 0.2",
-        &["simulation.position_start_m = 0.2", "allowed -0.02 to 0.1"],
+        "position_start_m = 22.0",
+        &["simulation.position_start_m = 22", "allowed -21.47483647 to 21.47483647"],
     ),
     ("q = 1.0", "q = -1.0", &["[learning.norm_optimal] q = -1", "allowed 0"]),
     ("input_max_m = 0.005", "input_max_m = nan", &["[learning] input_max_m = NaN", "allowed"]),

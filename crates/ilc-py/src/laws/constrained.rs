@@ -13,7 +13,9 @@ use super::weight::read_weight;
 use crate::argument::{Signal, misfit, read_numbers};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 use crate::model_argument::read_model;
+use crate::whole;
 
 /// Norm-optimal learning within bounds, in linear time.
 ///
@@ -100,6 +102,7 @@ use crate::model_argument::read_model;
 #[pyclass(name = "ConstrainedIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyConstrainedIlc {
+    made: Made,
     law: FixedSize<Constrained>,
 }
 
@@ -125,7 +128,7 @@ impl PyConstrainedIlc {
     fn new(
         py: Python<'_>,
         model: &Bound<'_, PyAny>,
-        n_samples: usize,
+        #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
         q: Option<&Bound<'_, PyAny>>,
         s: Option<&Bound<'_, PyAny>>,
         r: Option<&Bound<'_, PyAny>>,
@@ -140,6 +143,23 @@ impl PyConstrainedIlc {
         output_bounds: Option<&Bound<'_, PyAny>>,
         output_reference: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let made = made!(
+            model,
+            n_samples,
+            q,
+            s,
+            r,
+            rate,
+            u_bounds,
+            v_bounds,
+            step_bounds,
+            reference,
+            position_bounds,
+            velocity_bounds,
+            acceleration_bounds,
+            output_bounds,
+            output_reference
+        );
         let model = read_model("model", model)?;
         let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
         let weight = |name: &str, given: Option<&Bound<'_, PyAny>>, default: f64, n_channels| {
@@ -182,7 +202,12 @@ impl PyConstrainedIlc {
             reference: given_reference.filter(|_| is_setpoint),
         };
         let law = detached(py, || Constrained::new(&model, n_samples, cost, bounds)).or_raise()?;
-        Ok(Self { law: FixedSize::new(law, &model, n_samples) })
+        Ok(Self { made, law: FixedSize::new(law, &model, n_samples) })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Samples of a run.

@@ -7,7 +7,9 @@ use pyo3::prelude::*;
 
 use super::any_size::AnySize;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 use crate::signal::{kind, read_filter};
+use crate::whole;
 
 /// Feed-forward learned from the filtered error.
 ///
@@ -50,6 +52,7 @@ use crate::signal::{kind, read_filter};
 #[pyclass(name = "ErrorFeedforwardIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyErrorFeedforwardIlc {
+    made: Made,
     rule: Feedforward,
     filter: QFilter,
     law: AnySize<ErrorFeedforward>,
@@ -74,13 +77,19 @@ impl PyErrorFeedforwardIlc {
     fn new(
         gain: f64,
         filter: Option<&Bound<'_, PyAny>>,
-        lead: usize,
+        #[pyo3(from_py_with = whole::lead)] lead: usize,
         limit: Option<f64>,
     ) -> PyResult<Self> {
+        let made = made!(gain, filter, lead, limit);
         let rule = Feedforward { gain, lead, limit: limit.unwrap_or(f64::INFINITY) };
         // Made once for nothing, so that a wrong gain shows here and not after the first run.
         ErrorFeedforward::new(rule, 1, 1, QFilter::None).or_raise()?;
-        Ok(Self { rule, filter: read_filter("filter", filter)?, law: AnySize::new() })
+        Ok(Self { made, rule, filter: read_filter("filter", filter)?, law: AnySize::new() })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Values of the last input that stand at the limit.

@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use super::recalled::{Recalled, Size};
 use crate::error::OrRaise;
 use crate::library::PyLibrary;
+use crate::made::{Made, made};
 
 /// Learning with a table of inputs over the disturbance (Flexible ILC).
 ///
@@ -58,6 +59,7 @@ use crate::library::PyLibrary;
 #[pyclass(name = "FlexibleIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyFlexibleIlc {
+    made: Made,
     tolerance: f64,
     recalled: Recalled<Flexible>,
 }
@@ -72,11 +74,17 @@ impl PyFlexibleIlc {
         tolerance: f64,
         cell: Option<String>,
     ) -> PyResult<Self> {
+        let made = made!(library, core, tolerance, cell);
         if !(tolerance.is_finite() && tolerance >= 0.0) {
             let (what, allowed) = ("tolerance", "a tolerance must be finite and not negative");
             return Err(LearningError::Parameter { what, value: tolerance, allowed }).or_raise();
         }
-        Ok(Self { tolerance, recalled: Recalled::new(library, core, cell)? })
+        Ok(Self { made, tolerance, recalled: Recalled::new(library, core, cell)? })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Return the input of the next run.

@@ -2,13 +2,15 @@
 
 use std::sync::Mutex;
 
-use ilc_rt::learning::Law;
 use ilc_rt::learning::gate::{Gate, GateRule, GateState, Measure};
+use ilc_rt::learning::{Law, Standing};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::inner::{InnerLaw, look, shown, update_around};
 use crate::error::OrRaise;
+use crate::made::{Made, made};
+use crate::whole;
 
 /// Stop any law when the error is good enough, or before it diverges.
 ///
@@ -20,8 +22,9 @@ use crate::error::OrRaise;
 /// tolerance : float or None
 ///     Error up to which the input is kept as it is; None to learn for ever.
 /// measure : {"rms", "max"}
-///     What a run is judged by: the root mean square over samples and channels,
-///     or the largest magnitude.
+///     What a run is judged by: the root of the mean over the samples of the squared
+///     length of the error, all channels taken together, as a cell description and
+///     `tracking_rms_m` have it; or the largest magnitude of any channel.
 /// resume : float
 ///     By what factor the error must leave the tolerance before learning resumes.
 /// growth : float
@@ -61,6 +64,7 @@ use crate::error::OrRaise;
 #[pyclass(name = "Gate", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyGate {
+    made: Made,
     rule: GateRule,
     /// The law inside.
     #[pyo3(get)]
@@ -69,6 +73,11 @@ pub(super) struct PyGate {
 }
 
 impl PyGate {
+    /// Returns what the gate decided after the last update, and why.
+    pub(super) fn standing(&self, py: Python<'_>) -> (Standing, Option<String>) {
+        look(py, &self.gate, |gate| (gate.standing(), gate.remark()))
+    }
+
     /// Returns the law inside.
     pub(super) fn inside<'py>(&self, py: Python<'py>) -> &Bound<'py, PyAny> {
         self.law.bind(py)
@@ -85,10 +94,11 @@ impl PyGate {
         measure: &str,
         resume: f64,
         growth: f64,
-        patience: usize,
+        #[pyo3(from_py_with = whole::patience)] patience: usize,
     ) -> PyResult<Self> {
+        let made = made!(law, tolerance, measure, resume, growth, patience);
         let measure = match measure {
-            "rms" => Measure::Rms,
+            "rms" => Measure::Rms { n_channels: 1 },
             "max" => Measure::Max,
             other => {
                 return Err(PyValueError::new_err(format!(
@@ -99,7 +109,12 @@ impl PyGate {
         let tolerance = tolerance.unwrap_or(0.0);
         let rule = GateRule { measure, tolerance, resume, growth, patience };
         let gate = Gate::new(InnerLaw::new(law)?, rule).or_raise()?;
-        Ok(Self { rule, law: law.clone().unbind(), gate: Mutex::new(gate) })
+        Ok(Self { made, rule, law: law.clone().unbind(), gate: Mutex::new(gate) })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// What the gate is doing: "learning", "holding" or "rolled_back".

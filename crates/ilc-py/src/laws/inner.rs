@@ -125,9 +125,17 @@ impl Law for InnerLaw {
 pub(super) trait Around: Law {
     fn inner(&self) -> &InnerLaw;
     fn inner_mut(&mut self) -> &mut InnerLaw;
+
+    /// Says how many channels the error of the coming update has.
+    fn set_channels(&mut self, n_channels: usize) {
+        let _ = n_channels;
+    }
 }
 
 impl Around for Gate<InnerLaw> {
+    fn set_channels(&mut self, n_channels: usize) {
+        Self::set_channels(self, n_channels);
+    }
     fn inner(&self) -> &InnerLaw {
         self.law()
     }
@@ -167,6 +175,7 @@ pub(super) fn update_around<'py, W: Around>(
     let disturbance = disturbance.map(|given| given.clone().unbind());
     let (result, raised) = look(py, law, |law| {
         law.inner_mut().prepare(&u, &e, disturbance);
+        law.set_channels(e.n_channels);
         let result = next(law, &u, &e);
         (result, law.inner_mut().take_raised())
     });

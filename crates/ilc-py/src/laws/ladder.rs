@@ -8,6 +8,8 @@ use pyo3::prelude::*;
 
 use super::inner::{InnerLaw, look, shown, update_around};
 use crate::error::OrRaise;
+use crate::made::{Made, made};
+use crate::whole;
 
 /// Learn from the mean error of several runs with the same input.
 ///
@@ -60,6 +62,7 @@ use crate::error::OrRaise;
 #[pyclass(name = "Ladder", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyLadder {
+    made: Made,
     rule: LadderRule,
     /// The law inside.
     #[pyo3(get)]
@@ -80,15 +83,21 @@ impl PyLadder {
     #[pyo3(signature = (law, repeats, slow=0.8, increase=1.25, lowest=0.0625, highest=1.5))]
     fn new(
         law: &Bound<'_, PyAny>,
-        repeats: usize,
+        #[pyo3(from_py_with = whole::repeats)] repeats: usize,
         slow: f64,
         increase: f64,
         lowest: f64,
         highest: f64,
     ) -> PyResult<Self> {
+        let made = made!(law, repeats, slow, increase, lowest, highest);
         let rule = LadderRule { repeats, slow, increase, lowest, highest };
         let ladder = Ladder::new(InnerLaw::new(law)?, rule).or_raise()?;
-        Ok(Self { rule, law: law.clone().unbind(), ladder: Mutex::new(ladder) })
+        Ok(Self { made, rule, law: law.clone().unbind(), ladder: Mutex::new(ladder) })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Gain of the next step.

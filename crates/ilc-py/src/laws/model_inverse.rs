@@ -8,8 +8,10 @@ use pyo3::prelude::*;
 use super::fixed_size::FixedSize;
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 use crate::model_argument::read_model;
 use crate::signal::{kind, read_filter};
+use crate::whole;
 
 /// Learning with the inverse of the model.
 ///
@@ -58,6 +60,7 @@ use crate::signal::{kind, read_filter};
 #[pyclass(name = "ModelInverseIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyModelInverseIlc {
+    made: Made,
     gain: f64,
     q_filter: QFilter,
     law: FixedSize<ModelInverse>,
@@ -81,15 +84,21 @@ impl PyModelInverseIlc {
     fn new(
         py: Python<'_>,
         model: &Bound<'_, PyAny>,
-        n_samples: usize,
+        #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
         gain: f64,
         q_filter: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let made = made!(model, n_samples, gain, q_filter);
         let model = read_model("model", model)?;
         let q_filter = read_filter("q_filter", q_filter)?;
         let law = detached(py, || ModelInverse::new(&model, n_samples, gain, q_filter.clone()))
             .or_raise()?;
-        Ok(Self { gain, q_filter, law: FixedSize::new(law, &model, n_samples) })
+        Ok(Self { made, gain, q_filter, law: FixedSize::new(law, &model, n_samples) })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Gain of the step.

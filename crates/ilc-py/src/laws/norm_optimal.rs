@@ -14,8 +14,10 @@ use super::weight::give_weight;
 use crate::argument::misfit;
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 use crate::model_argument::{AnyModel, read_any_model};
 use crate::weights::{Task, read_contour, read_weight};
+use crate::whole;
 
 /// Norm-optimal learning, exact and in linear time.
 ///
@@ -75,6 +77,7 @@ use crate::weights::{Task, read_contour, read_weight};
 #[pyclass(name = "NormOptimalIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyNormOptimalIlc {
+    made: Made,
     model: AnyModel,
     filter: Option<Filter>,
     cost: Cost,
@@ -92,15 +95,16 @@ impl PyNormOptimalIlc {
     fn new(
         py: Python<'_>,
         model: &Bound<'_, PyAny>,
-        n_samples: usize,
+        #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
         q: Option<&Bound<'_, PyAny>>,
         s: Option<&Bound<'_, PyAny>>,
         r: Option<&Bound<'_, PyAny>>,
         rate: f64,
     ) -> PyResult<Self> {
+        let made = made!(model, n_samples, q, s, r, rate);
         let model = read_any_model("model", model)?;
         let q = read_weight("q", q, 1.0, n_samples, model.n_outputs())?;
-        Self::make(py, &model, n_samples, q, &Effort { s, r, rate }, None)
+        Self::make(py, made, &model, n_samples, q, &Effort { s, r, rate }, None)
     }
 
     /// Return the law that learns the contour rather than each axis.
@@ -163,15 +167,16 @@ impl PyNormOptimalIlc {
         s: Option<&Bound<'_, PyAny>>,
         r: Option<&Bound<'_, PyAny>>,
         rate: f64,
-        axes: Option<Vec<usize>>,
+        #[pyo3(from_py_with = whole::maybe_list::axes)] axes: Option<Vec<usize>>,
     ) -> PyResult<Self> {
+        let made = made!("contour": model, reference, q, contour, along, s, r, rate, axes);
         let model = read_any_model("model", model)?;
         let (q, n_samples, p) = read_contour(py, reference, q, contour, along, axes)?;
         if p != model.n_outputs() {
             let rule = format!("(n_samples, {}), one column an output,", model.n_outputs());
             return Err(misfit("reference", &[n_samples, p], &rule));
         }
-        Self::make(py, &model, n_samples, q, &Effort { s, r, rate }, None)
+        Self::make(py, made, &model, n_samples, q, &Effort { s, r, rate }, None)
     }
 
     /// Return the law of several agents that keep a formation.
@@ -227,7 +232,7 @@ impl PyNormOptimalIlc {
     fn formation(
         py: Python<'_>,
         models: Vec<Bound<'_, PyAny>>,
-        n_samples: usize,
+        #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
         tracking: Option<&Bound<'_, PyAny>>,
         own: Option<&Bound<'_, PyAny>>,
         centre: Option<&Bound<'_, PyAny>>,
@@ -236,15 +241,16 @@ impl PyNormOptimalIlc {
         s: Option<&Bound<'_, PyAny>>,
         r: Option<&Bound<'_, PyAny>>,
         rate: f64,
-        leaders: Option<Vec<usize>>,
-        pairs: Option<Vec<(usize, usize)>>,
-        axes: Option<Vec<usize>>,
+        #[pyo3(from_py_with = whole::maybe_list::leaders)] leaders: Option<Vec<usize>>,
+        #[pyo3(from_py_with = whole::maybe_pairs::pairs)] pairs: Option<Vec<(usize, usize)>>,
+        #[pyo3(from_py_with = whole::maybe_list::axes)] axes: Option<Vec<usize>>,
     ) -> PyResult<Self> {
+        let made = made!("formation": models, n_samples, tracking, own, centre, sigma, weight, s, r, rate, leaders, pairs, axes);
         let (model, n_outputs) = side_by_side(&models)?;
         let task = Task { tracking, own, centre, sigma, weight, leaders, pairs, axes };
         let q = task.read(py, n_samples, models.len(), n_outputs)?;
         let model = AnyModel::Invariant(model);
-        Self::make(py, &model, n_samples, q, &Effort { s, r, rate }, None)
+        Self::make(py, made, &model, n_samples, q, &Effort { s, r, rate }, None)
     }
 
     /// Return the law that weighs the error through a filter.
@@ -308,7 +314,7 @@ impl PyNormOptimalIlc {
     fn dynamic(
         py: Python<'_>,
         model: &Bound<'_, PyAny>,
-        n_samples: usize,
+        #[pyo3(from_py_with = whole::n_samples)] n_samples: usize,
         filter: &Bound<'_, PyAny>,
         q: Option<&Bound<'_, PyAny>>,
         plain: Option<&Bound<'_, PyAny>>,
@@ -317,10 +323,16 @@ impl PyNormOptimalIlc {
         r: Option<&Bound<'_, PyAny>>,
         rate: f64,
     ) -> PyResult<Self> {
+        let made = made!("dynamic": model, n_samples, filter, q, plain, coupling, s, r, rate);
         let model = read_any_model("model", model)?;
         let filter = Filter::read(filter, n_samples, coupling, plain)?;
         let q = read_weight("q", q, 1.0, n_samples, filter.n_outputs())?;
-        Self::make(py, &model, n_samples, q, &Effort { s, r, rate }, Some(filter))
+        Self::make(py, made, &model, n_samples, q, &Effort { s, r, rate }, Some(filter))
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Samples of a run.
@@ -419,6 +431,7 @@ impl PyNormOptimalIlc {
 impl PyNormOptimalIlc {
     fn make(
         py: Python<'_>,
+        made: Made,
         model: &AnyModel,
         n_samples: usize,
         q: Weight,
@@ -430,7 +443,7 @@ impl PyNormOptimalIlc {
         let solver = || Solver::new(model.plant(), n_samples, cost.clone(), filter.clone());
         let law = Mutex::new(detached(py, solver).or_raise()?);
         let model = model.clone();
-        Ok(Self { model, filter, cost, n_samples, n_inputs, n_outputs, law })
+        Ok(Self { made, model, filter, cost, n_samples, n_inputs, n_outputs, law })
     }
 
     /// Makes the law anew.

@@ -7,7 +7,9 @@ use pyo3::prelude::*;
 
 use super::any_size::AnySize;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 use crate::signal::{kind, read_filter};
+use crate::whole;
 
 /// Proportional-derivative learning with a low-pass filter.
 ///
@@ -51,6 +53,7 @@ use crate::signal::{kind, read_filter};
 #[pyclass(name = "PdIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyPdIlc {
+    made: Made,
     gains: PdGains,
     q_filter: QFilter,
     law: AnySize<Pd>,
@@ -71,11 +74,22 @@ impl PyPdIlc {
 impl PyPdIlc {
     #[new]
     #[pyo3(signature = (kp, kd, q_filter=None, lead=1))]
-    fn new(kp: f64, kd: f64, q_filter: Option<&Bound<'_, PyAny>>, lead: usize) -> PyResult<Self> {
+    fn new(
+        kp: f64,
+        kd: f64,
+        q_filter: Option<&Bound<'_, PyAny>>,
+        #[pyo3(from_py_with = whole::lead)] lead: usize,
+    ) -> PyResult<Self> {
+        let made = made!(kp, kd, q_filter, lead);
         let gains = PdGains { kp, kd, lead };
         // Made once for nothing, so that a wrong gain shows here and not after the first run.
         Pd::new(gains, 1, 1, QFilter::None).or_raise()?;
-        Ok(Self { gains, q_filter: read_filter("q_filter", q_filter)?, law: AnySize::new() })
+        Ok(Self { made, gains, q_filter: read_filter("q_filter", q_filter)?, law: AnySize::new() })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Return the input of the next run.

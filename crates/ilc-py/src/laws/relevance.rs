@@ -11,6 +11,8 @@ use super::relevance_weights::read_weights;
 use crate::argument::read_disturbance;
 use crate::error::OrRaise;
 use crate::library::PyLibrary;
+use crate::made::{Made, made};
+use crate::whole;
 
 /// Learning from every past run, weighted by its relevance (DPW-ILC).
 ///
@@ -72,6 +74,7 @@ use crate::library::PyLibrary;
 #[pyclass(name = "RelevanceIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyRelevanceIlc {
+    made: Made,
     weights: RelevanceWeights,
     top: Option<usize>,
     dt_s: Option<f64>,
@@ -86,10 +89,11 @@ impl PyRelevanceIlc {
         library: Option<&Bound<'_, PyLibrary>>,
         core: &Bound<'_, PyAny>,
         weights: &Bound<'_, PyAny>,
-        top: Option<usize>,
+        #[pyo3(from_py_with = whole::maybe::top)] top: Option<usize>,
         dt_s: Option<f64>,
         cell: Option<String>,
     ) -> PyResult<Self> {
+        let made = made!(library, core, weights, top, dt_s, cell);
         let weights = read_weights(weights)?;
         if top == Some(0) {
             return Err(LearningError::Empty { what: "top" }).or_raise();
@@ -102,7 +106,12 @@ impl PyRelevanceIlc {
             return Err(no_sample_time(&weights));
         }
         let recalled = Recalled::new(library, core, cell)?;
-        Ok(Self { weights, top, dt_s, recalled })
+        Ok(Self { made, weights, top, dt_s, recalled })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Return the input of the next run.
@@ -241,7 +250,7 @@ impl PyRelevanceIlc {
     fn trim<'py>(
         &self,
         py: Python<'py>,
-        keep: usize,
+        #[pyo3(from_py_with = whole::keep)] keep: usize,
         disturbances: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let given = match disturbances.filter(|given| !given.is_none()) {

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 
 use crate::argument::read_disturbance;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 
 /// What makes a past run relevant for the coming one.
 ///
@@ -54,6 +55,7 @@ use crate::error::OrRaise;
 #[pyclass(name = "RelevanceWeights", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyRelevanceWeights {
+    made: Made,
     weights: RelevanceWeights,
 }
 
@@ -70,6 +72,7 @@ impl PyRelevanceWeights {
         error_gain: f64,
         input_gain: f64,
     ) -> PyResult<Self> {
+        let made = made!(e, er, d, epsilon, rate_filter_s, error_gain, input_gain);
         let disturbance = match d {
             Some(d) => read_disturbance("d", d)?,
             None => vec![0.5],
@@ -85,7 +88,12 @@ impl PyRelevanceWeights {
             input_gain,
         };
         weights.clone().spread(n).or_raise()?;
-        Ok(Self { weights })
+        Ok(Self { made, weights })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Weight of the error.

@@ -6,11 +6,13 @@ use pyo3::prelude::*;
 use crate::argument::{Runs, give_signal};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 
 /// What several runs with the same input have in common.
 #[pyclass(name = "Repeatability", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyRepeatability {
+    made: Made,
     found: learning::Repeatability,
     n_channels: usize,
     is_flat: bool,
@@ -18,6 +20,11 @@ pub(super) struct PyRepeatability {
 
 #[pymethods]
 impl PyRepeatability {
+    /// Pickled and copied as the call that made it, which is made again.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
+    }
+
     /// Mean error of the runs, sample by sample.
     #[getter]
     fn mean<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -111,10 +118,11 @@ pub(super) fn repeatability(
     py: Python<'_>,
     errors: &Bound<'_, PyAny>,
 ) -> PyResult<PyRepeatability> {
+    let made = made!("repeatability": errors);
     let runs = Runs::read("errors", errors)?;
     let Runs { count, n_samples, n_channels, is_flat, .. } = runs;
     let found =
         detached(py, || learning::repeatability(&runs.values, count, n_samples, n_channels))
             .or_raise()?;
-    Ok(PyRepeatability { found, n_channels, is_flat })
+    Ok(PyRepeatability { made, found, n_channels, is_flat })
 }

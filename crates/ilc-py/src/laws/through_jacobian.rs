@@ -10,6 +10,7 @@ use super::inner::{InnerLaw, look, shown};
 use super::next;
 use crate::argument::{Signal, give_signal};
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 use crate::weights::read_matrices;
 
 /// Learn in the joints from errors at the tool, with any law.
@@ -56,6 +57,7 @@ use crate::weights::read_matrices;
 #[pyclass(name = "ThroughJacobian", module = "ilc_rt", frozen)]
 #[derive(Debug)]
 pub(super) struct PyThroughJacobian {
+    made: Made,
     /// The law inside.
     #[pyo3(get)]
     law: Py<PyAny>,
@@ -68,11 +70,17 @@ pub(super) struct PyThroughJacobian {
 impl PyThroughJacobian {
     #[new]
     fn new(law: &Bound<'_, PyAny>, jacobian: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let made = made!(law, jacobian);
         let jacobians = read_matrices("jacobian", jacobian)?;
         let through = ThroughJacobian::new(InnerLaw::new(law)?, &jacobians).or_raise()?;
         let (n_joints, n_coordinates) = through.shape();
         let law = law.clone().unbind();
-        Ok(Self { law, n_joints, n_coordinates, through: Mutex::new(through) })
+        Ok(Self { made, law, n_joints, n_coordinates, through: Mutex::new(through) })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Number of joints: channels of the input.

@@ -10,6 +10,8 @@ use super::filtered;
 use crate::argument::{Signal, give_signal};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
+use crate::whole;
 
 /// Butterworth low-pass filter.
 ///
@@ -35,9 +37,10 @@ use crate::error::OrRaise;
 /// >>> from ilc_rt import signal
 /// >>> signal.ButterworthFilter(2, 50.0, 0.002).sos.shape
 /// (1, 6)
-#[pyclass(name = "ButterworthFilter", module = "ilc_rt", frozen)]
+#[pyclass(name = "ButterworthFilter", module = "ilc_rt.signal", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyButterworthFilter {
+    made: Made,
     /// Order of the filter.
     #[pyo3(get)]
     order: usize,
@@ -65,9 +68,20 @@ impl PyButterworthFilter {
 impl PyButterworthFilter {
     #[new]
     #[pyo3(signature = (order, cutoff_hz, dt_s, causal=false))]
-    fn new(order: usize, cutoff_hz: f64, dt_s: f64, causal: bool) -> PyResult<Self> {
+    fn new(
+        #[pyo3(from_py_with = whole::order)] order: usize,
+        cutoff_hz: f64,
+        dt_s: f64,
+        causal: bool,
+    ) -> PyResult<Self> {
+        let made = made!(order, cutoff_hz, dt_s, causal);
         let sections = signal::butterworth(order, cutoff_hz, dt_s).or_raise()?;
-        Ok(Self { order, cutoff_hz, dt_s, causal, sections })
+        Ok(Self { made, order, cutoff_hz, dt_s, causal, sections })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Second-order sections, shape (n_sections, 6): b0 b1 b2 1 a1 a2.
@@ -178,7 +192,7 @@ impl PyButterworthFilter {
 #[pyfunction]
 #[pyo3(signature = (order, cutoff_hz, dt_s, causal=false))]
 pub(super) fn butterworth(
-    order: usize,
+    #[pyo3(from_py_with = whole::order)] order: usize,
     cutoff_hz: f64,
     dt_s: f64,
     causal: bool,

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use super::filtered;
 use crate::argument::read_vector;
 use crate::error::OrRaise;
+use crate::whole;
 
 /// Symmetric smoother of finite length, without lag.
 ///
@@ -43,7 +44,7 @@ use crate::error::OrRaise;
 /// >>> from ilc_rt import signal
 /// >>> signal.FirFilter(np.array([-1, 4, 10, 4, -1]) / 16, repeats=6).taps.shape
 /// (25,)
-#[pyclass(name = "FirFilter", module = "ilc_rt", frozen)]
+#[pyclass(name = "FirFilter", module = "ilc_rt.signal", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyFirFilter {
     pub(super) filter: FirFilter,
@@ -53,9 +54,19 @@ pub(crate) struct PyFirFilter {
 impl PyFirFilter {
     #[new]
     #[pyo3(signature = (taps, repeats=1))]
-    fn new(taps: &Bound<'_, PyAny>, repeats: usize) -> PyResult<Self> {
+    fn new(
+        taps: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = whole::repeats)] repeats: usize,
+    ) -> PyResult<Self> {
         let once = FirFilter::new(&read_vector("taps", taps)?).or_raise()?;
         Ok(Self { filter: once.repeated(repeats).or_raise()? })
+    }
+
+    /// Pickled and copied as its taps.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let py = slf.py();
+        let parts = (slf.get().taps(py),).into_pyobject(py)?.into_any();
+        Ok((slf.get_type().into_any(), parts))
     }
 
     /// Taps, shape (n_taps,).
@@ -121,6 +132,9 @@ impl PyFirFilter {
 /// FirFilter(3 taps)
 #[pyfunction]
 #[pyo3(signature = (taps, repeats=1))]
-pub(super) fn fir(taps: &Bound<'_, PyAny>, repeats: usize) -> PyResult<PyFirFilter> {
+pub(super) fn fir(
+    taps: &Bound<'_, PyAny>,
+    #[pyo3(from_py_with = whole::repeats)] repeats: usize,
+) -> PyResult<PyFirFilter> {
     PyFirFilter::new(taps, repeats)
 }

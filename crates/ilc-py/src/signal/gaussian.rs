@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 
 use super::filtered;
 use crate::error::OrRaise;
+use crate::made::{Made, made};
 
 /// Gaussian low-pass filter, without lag or overshoot.
 ///
@@ -38,9 +39,10 @@ use crate::error::OrRaise;
 /// >>> from ilc_rt import signal
 /// >>> float(signal.GaussianFilter(15.0, 0.002).zero_phase(np.ones(100))[3].round(12))
 /// 1.0
-#[pyclass(name = "GaussianFilter", module = "ilc_rt", frozen)]
+#[pyclass(name = "GaussianFilter", module = "ilc_rt.signal", frozen)]
 #[derive(Debug)]
 pub(crate) struct PyGaussianFilter {
+    made: Made,
     pub(super) filter: GaussianFilter,
 }
 
@@ -48,7 +50,13 @@ pub(crate) struct PyGaussianFilter {
 impl PyGaussianFilter {
     #[new]
     fn new(bandwidth_hz: f64, dt_s: f64) -> PyResult<Self> {
-        Ok(Self { filter: GaussianFilter::new(bandwidth_hz, dt_s).or_raise()? })
+        let made = made!(bandwidth_hz, dt_s);
+        Ok(Self { made, filter: GaussianFilter::new(bandwidth_hz, dt_s).or_raise()? })
+    }
+
+    /// Pickled and copied as the call that made it.
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Bandwidth in Hz.

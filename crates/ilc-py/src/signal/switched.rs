@@ -8,6 +8,7 @@ use super::filtered;
 use crate::argument::Signal;
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::whole;
 
 /// Zero-phase low-pass with another cut-off on each segment.
 ///
@@ -42,7 +43,7 @@ use crate::error::OrRaise;
 /// >>> from ilc_rt import signal
 /// >>> signal.SwitchedFilter([10.0, 50.0, 10.0], [0, 300, 600], 0.002, blend=50).starts
 /// [0, 300, 600]
-#[pyclass(name = "SwitchedFilter", module = "ilc_rt", frozen)]
+#[pyclass(name = "SwitchedFilter", module = "ilc_rt.signal", frozen)]
 #[derive(Debug)]
 pub(crate) struct PySwitchedFilter {
     pub(super) filter: SwitchedFilter,
@@ -54,10 +55,10 @@ impl PySwitchedFilter {
     #[pyo3(signature = (cutoffs_hz, starts, dt_s, order=2, blend=0))]
     fn new(
         cutoffs_hz: Vec<f64>,
-        starts: Vec<usize>,
+        #[pyo3(from_py_with = whole::list::starts)] starts: Vec<usize>,
         dt_s: f64,
-        order: usize,
-        blend: usize,
+        #[pyo3(from_py_with = whole::order)] order: usize,
+        #[pyo3(from_py_with = whole::blend)] blend: usize,
     ) -> PyResult<Self> {
         if cutoffs_hz.len() != starts.len() {
             return Err(crate::exceptions::SignalError::new_err(format!(
@@ -72,6 +73,15 @@ impl PySwitchedFilter {
             .map(|(start, cutoff_hz)| Segment { start, cutoff_hz })
             .collect();
         Ok(Self { filter: SwitchedFilter::new(order, &segments, blend, dt_s).or_raise()? })
+    }
+
+    /// Pickled and copied as its segments.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.get());
+        let filter = &this.filter;
+        let parts =
+            (this.cutoffs_hz(), this.starts(), filter.dt_s(), filter.order(), filter.blend());
+        Ok((slf.get_type().into_any(), parts.into_pyobject(py)?.into_any()))
     }
 
     /// Design the filter for a motion by its instantaneous frequency.
@@ -125,7 +135,7 @@ impl PySwitchedFilter {
         low_hz: f64,
         high_hz: f64,
         threshold_hz: f64,
-        order: usize,
+        #[pyo3(from_py_with = whole::order)] order: usize,
         window_s: Option<f64>,
         margin_s: Option<f64>,
         blend_s: Option<f64>,

@@ -3,15 +3,18 @@
 //! Imports everything and is imported by `main` only.
 
 mod check;
+mod completions;
 mod figures;
 mod identify;
 mod latency;
+mod quantity;
 mod run;
+mod runs;
 mod show;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use tracing::Level;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
@@ -43,6 +46,8 @@ enum Verb {
     Check(check::CheckArguments),
     /// Measure how late this machine wakes the loop's thread.
     Latency(latency::LatencyArguments),
+    /// Print a script that completes this command line in a shell.
+    Completions(completions::CompletionsArguments),
 }
 
 /// Runs the program's arguments and returns its exit status.
@@ -73,6 +78,7 @@ pub fn main() -> ExitCode {
         Verb::Identify(arguments) => identify::identify(&arguments),
         Verb::Check(arguments) => check::check(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),
+        Verb::Completions(arguments) => completions::completions(&arguments, Arguments::command()),
     };
     ExitCode::from(status)
 }

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 
 use super::figures::FiguresFile;
+use super::runs::Runs;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show};
 use crate::config::{Cell, LawName, Measure};
 use crate::fieldbus::{Bus, transport};
@@ -44,7 +45,7 @@ pub(super) struct RunArguments {
     /// Go on with the newest campaign of this cell, program, measurement and law.
     #[arg(long)]
     resume: bool,
-    /// Write the figures of all runs to a file.
+    /// Write the figures of all runs to a file; - for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Print one JSON object a line instead of a table.
@@ -77,7 +78,7 @@ impl From<MeasureName> for Measure {
 pub(super) fn run(arguments: &RunArguments) -> u8 {
     let figures_file = match &arguments.json {
         None => None,
-        Some(path) => match FiguresFile::reserve(path) {
+        Some(path) => match FiguresFile::reserve(path, arguments.events) {
             None => return EXIT_BAD_INPUT,
             reserved => reserved,
         },
@@ -110,11 +111,11 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
         telemetry: !arguments.no_telemetry,
         stop: stop_on_signals(),
     };
-    let mut first_contour_m = None;
+    let mut runs = Runs::default();
     let mut observe = |event: &Event| {
         if arguments.events {
             say_event(event, &options.stop);
-        } else if let Some(text) = show::sentence(event, &mut first_contour_m) {
+        } else if let Some(text) = show::sentence(event, &mut runs) {
             show::say(&text);
         }
     };
@@ -124,7 +125,7 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
 /// Prints an event as one line of JSON.
 pub(super) fn say_event(event: &Event, stop: &AtomicI32) {
     if let Ok(text) = serde_json::to_string(event)
-        && !show::say(&text)
+        && !show::say_json(&text)
     {
         // Whoever asked for the events is gone, and with it whoever would notice trouble.
         stop.store(SIGPIPE, Ordering::Relaxed);

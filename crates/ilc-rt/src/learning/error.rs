@@ -6,6 +6,9 @@ use crate::learning::law::constrained::BoundsError;
 use crate::model::ModelError;
 use crate::signal::SignalError;
 
+/// Values of a signal, samples times channels: as many as a trajectory may have.
+pub(crate) const MAX_VALUES: usize = 10_000_000;
+
 /// Why a law or a signal was refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum LearningError {
@@ -158,6 +161,16 @@ pub enum LearningError {
         /// Difference relative to the update.
         difference: f64,
     },
+    /// A run too long for any memory.
+    #[error("{what} = {value}; at most {allowed} are allowed here")]
+    TooMany {
+        /// What was asked for.
+        what: &'static str,
+        /// How many.
+        value: usize,
+        /// How many there may be.
+        allowed: usize,
+    },
     /// An eigenvalue or a fixed point could not be computed.
     #[error("{what} could not be computed: {reason}")]
     Numerics {
@@ -231,10 +244,17 @@ pub(crate) fn check_length(
     Err(LearningError::Length { what, found: signal.len(), n_samples, n_channels })
 }
 
-/// Refuses counts that are zero.
+/// Refuses counts that are zero, or runs too long for any memory: the first count is the samples, the
+/// others are channels.
 pub(crate) fn check_counts(counts: &[(&'static str, usize)]) -> Result<(), LearningError> {
-    match counts.iter().find(|(_, count)| *count == 0) {
-        Some((what, _)) => Err(LearningError::Empty { what }),
-        None => Ok(()),
+    if let Some((what, _)) = counts.iter().find(|(_, count)| *count == 0) {
+        return Err(LearningError::Empty { what });
     }
+    let Some(((what, value), channels)) = counts.split_first() else { return Ok(()) };
+    let widest = channels.iter().map(|(_, count)| *count).max().unwrap_or(1);
+    let allowed = MAX_VALUES / widest;
+    if *value > allowed {
+        return Err(LearningError::TooMany { what, value: *value, allowed });
+    }
+    Ok(())
 }

@@ -1,15 +1,13 @@
 //! The switching mechanism: when any law is to learn, to rest, or to go back to what was best.
 
-use super::{Law, LearningError, StandIn};
+use super::{Law, LearningError, StandIn, Standing};
 
 /// What a run is judged by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
-    /// Root of the mean square over all samples and channels.
-    Rms,
     /// Root of the mean over the samples of the squared length of the error, all channels taken
     /// together: the figure by which a controller reports its runs.
-    RmsLength {
+    Rms {
         /// Channels of the error.
         n_channels: usize,
     },
@@ -21,11 +19,10 @@ impl Measure {
     /// Returns the figure of a run's error.
     pub fn of(self, error: &[f64]) -> f64 {
         match self {
-            Self::Rms => {
+            Self::Rms { n_channels } => {
                 let sum: f64 = error.iter().map(|e| e * e).sum();
-                (sum / error.len().max(1) as f64).sqrt()
+                (sum * n_channels as f64 / error.len().max(1) as f64).sqrt()
             }
-            Self::RmsLength { n_channels } => Self::Rms.of(error) * (n_channels as f64).sqrt(),
             Self::Max => error.iter().fold(0.0, |largest: f64, e| largest.max(e.abs())),
         }
     }
@@ -33,8 +30,7 @@ impl Measure {
     /// Returns its name in records.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Rms => "rms",
-            Self::RmsLength { .. } => "rms_length",
+            Self::Rms { .. } => "rms",
             Self::Max => "max",
         }
     }
@@ -60,7 +56,13 @@ pub struct GateRule {
 
 impl Default for GateRule {
     fn default() -> Self {
-        Self { measure: Measure::Rms, tolerance: 0.0, resume: 1.5, growth: 1.5, patience: 2 }
+        Self {
+            measure: Measure::Rms { n_channels: 1 },
+            tolerance: 0.0,
+            resume: 1.5,
+            growth: 1.5,
+            patience: 2,
+        }
     }
 }
 
@@ -103,6 +105,8 @@ pub struct Gate<L> {
     best_input: Vec<f64>,
     best_figure: Option<f64>,
     runs_grown: usize,
+    /// Whether the last update restored the best input.
+    went_back: bool,
 }
 
 impl<L: Law> Gate<L> {
@@ -134,6 +138,7 @@ impl<L: Law> Gate<L> {
             best_input: Vec::new(),
             best_figure: None,
             runs_grown: 0,
+            went_back: false,
         })
     }
 
@@ -150,6 +155,14 @@ impl<L: Law> Gate<L> {
     /// Returns the input of that run; empty before the first one.
     pub fn best_input(&self) -> &[f64] {
         &self.best_input
+    }
+
+    /// Says how many channels the error has, for a [`Measure::Rms`]; for whoever learns it with the first
+    /// run only.
+    pub fn set_channels(&mut self, channels: usize) {
+        if let Measure::Rms { n_channels } = &mut self.rule.measure {
+            *n_channels = channels.max(1);
+        }
     }
 
     /// Returns the law inside.
@@ -169,6 +182,7 @@ impl<L: Law> Gate<L> {
         let has_grown = self.best_figure.is_some_and(|best| figure > growth * best);
         self.runs_grown = if has_grown { self.runs_grown + 1 } else { 0 };
         let too_long = self.runs_grown >= patience;
+        self.went_back = false;
         if left || self.state == GateState::RolledBack && too_long {
             self.state = GateState::Learning;
             self.best_figure = None;
@@ -178,6 +192,7 @@ impl<L: Law> Gate<L> {
         } else if self.state == GateState::Learning && too_long {
             self.state = GateState::RolledBack;
             self.runs_grown = 0;
+            self.went_back = true;
             self.law.taken_back();
         }
         if self.best_figure.is_none_or(|best| figure < best) {
@@ -246,11 +261,21 @@ impl<L: Law> Law for Gate<L> {
         }
     }
 
+    fn standing(&self) -> Standing {
+        match self.state {
+            GateState::Learning => self.law.standing(),
+            GateState::Holding => Standing::Holds,
+            GateState::RolledBack if self.went_back => Standing::GoesBack,
+            GateState::RolledBack => Standing::Rests,
+        }
+    }
+
     fn reset(&mut self) {
         self.law.reset();
         self.state = GateState::Learning;
         self.best_figure = None;
         self.runs_grown = 0;
+        self.went_back = false;
     }
 
     fn describe(&self) -> String {
@@ -330,6 +355,9 @@ mod tests {
         play(&mut gate, &[3.2]);
         assert_eq!(gate.law().n_taken_back, 1);
         assert!(gate.remark().unwrap().contains("best input is kept"));
+        assert_eq!(gate.standing(), Standing::GoesBack);
+        play(&mut gate, &[2.0]);
+        assert_eq!(gate.standing(), Standing::Rests, "once for each time");
         gate.taken_back();
         assert_eq!(gate.law().n_taken_back, 2);
     }
@@ -370,10 +398,10 @@ mod tests {
 
     #[test]
     fn the_measures_are_those_of_their_names() {
-        assert!((Measure::Rms.of(&[3.0, -4.0]) - 12.5_f64.sqrt()).abs() < 1e-15);
+        assert!((Measure::Rms { n_channels: 1 }.of(&[3.0, -4.0]) - 12.5_f64.sqrt()).abs() < 1e-15);
         assert_eq!(Measure::Max.of(&[3.0, -4.0]).to_bits(), 4_f64.to_bits());
         // One sample of two axes: the length is 5.
-        assert!((Measure::RmsLength { n_channels: 2 }.of(&[3.0, -4.0]) - 5.0).abs() < 1e-15);
+        assert!((Measure::Rms { n_channels: 2 }.of(&[3.0, -4.0]) - 5.0).abs() < 1e-15);
         let rule = GateRule { tolerance: 3.9, measure: Measure::Max, ..GateRule::default() };
         let mut gate = Gate::new(Counter::default(), rule).unwrap();
         gate.update(&[0.0; 2], &[3.0, -4.0], &mut [0.0; 2]).unwrap();

@@ -4,6 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{ModelError, StateSpace};
 
+/// States up to which a delay is added: its matrix has the square of them.
+const MAX_STATES: usize = 2000;
+
 impl StateSpace {
     /// Returns the block-diagonal model of two sets of axes side by side.
     ///
@@ -48,21 +51,32 @@ impl StateSpace {
     ///
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
+    /// - [`ModelError::TooMany`] if the result would have more than 2000 states.
     pub fn delayed(&self, n_delay: usize) -> Result<Self, ModelError> {
         let dt_s = self.sampled("delayed")?;
-        let m = self.n_inputs();
-        let mut model = self.clone();
-        for _ in 0..n_delay {
-            let hold = Self::discrete(
-                DMatrix::zeros(m, m),
-                DMatrix::identity(m, m),
-                DMatrix::identity(m, m),
-                DMatrix::zeros(m, m),
-                dt_s,
-            )?;
-            model = hold.series(&model)?;
+        let (n, m) = (self.n_states(), self.n_inputs());
+        let allowed = MAX_STATES.saturating_sub(n) / m.max(1);
+        if n_delay > allowed && m > 0 {
+            return Err(ModelError::TooMany { what: "n_delay", value: n_delay, allowed });
         }
-        Ok(model)
+        if n_delay == 0 || m == 0 {
+            return Ok(self.clone());
+        }
+        // A chain of holds, the one that takes the input first, and the model behind the last.
+        let (held, whole) = (n_delay * m, n_delay * m + n);
+        let (mut a, mut b) = (DMatrix::zeros(whole, whole), DMatrix::zeros(whole, m));
+        let mut c = DMatrix::zeros(self.n_outputs(), whole);
+        for i in 0..held - m {
+            a[(m + i, i)] = 1.0;
+        }
+        for i in 0..m {
+            b[(i, i)] = 1.0;
+        }
+        a.view_mut((held, held - m), (n, m)).copy_from(&self.b);
+        a.view_mut((held, held), (n, n)).copy_from(&self.a);
+        c.view_mut((0, held - m), (self.n_outputs(), m)).copy_from(&self.d);
+        c.view_mut((0, held), (self.n_outputs(), n)).copy_from(&self.c);
+        Self::discrete(a, b, c, DMatrix::zeros(self.n_outputs(), m), dt_s)
     }
 
     /// Returns the closed loop from set-point to output under negative feedback.
@@ -186,6 +200,32 @@ mod tests {
         let late = axis.delayed(2).unwrap().simulate(&U, None).unwrap();
         close(&late[..2], &[0.0, 0.0]);
         close(&late[2..], &now[..3]);
+    }
+
+    #[test]
+    fn a_delay_of_several_inputs_is_one_hold_after_the_other() {
+        let (x, y) = (scalar(0.5, 1.0, 2.0, 0.1), scalar(-0.3, 1.0, 1.0, 0.7));
+        let both = x.append(&y).unwrap();
+        let once = both.delayed(1).unwrap();
+        assert_eq!(once.delayed(2).unwrap(), both.delayed(3).unwrap());
+        let hold = StateSpace::static_gain(DMatrix::identity(2, 2), Some(0.5)).unwrap();
+        assert_eq!(hold.delayed(1).unwrap().series(&both).unwrap(), once);
+        let u: Vec<f64> = U.iter().flat_map(|u| [*u, 2.0 * u]).collect();
+        let now = both.simulate(&u, None).unwrap();
+        close(&both.delayed(3).unwrap().simulate(&u, None).unwrap()[6..], &now[..4]);
+    }
+
+    #[test]
+    fn a_delay_beyond_all_memory_is_refused_at_once() {
+        let axis = scalar(0.5, 1.0, 2.0, 0.1);
+        assert_eq!(axis.delayed(1999).unwrap().n_states(), 2000);
+        for n_delay in [2000, 1 << 31, usize::MAX] {
+            let line = axis.delayed(n_delay).unwrap_err().to_string();
+            assert!(
+                line.contains(&format!("n_delay = {n_delay}")) && line.contains("1999"),
+                "{line}"
+            );
+        }
     }
 
     #[test]

@@ -48,7 +48,9 @@ fn zero_order_hold(model: &StateSpace, dt_s: f64) -> Result<StateSpace, ModelErr
     let mut generator = DMatrix::zeros(n + m, n + m);
     generator.view_mut((0, 0), (n, n)).copy_from(&(&model.a * dt_s));
     generator.view_mut((0, n), (n, m)).copy_from(&(&model.b * dt_s));
-    let transition = generator.exp();
+    // Scaling by powers of two does not end for what is not finite.
+    let is_finite = generator.iter().all(|value| value.is_finite());
+    let transition = if is_finite { generator.exp() } else { generator };
     if transition.iter().any(|value| !value.is_finite()) {
         return Err(ModelError::Numerics {
             what: "the matrix exponential",

@@ -92,6 +92,22 @@ pub enum ModelError {
         /// What is wrong there.
         source: Box<ModelError>,
     },
+    /// More was asked for than is given.
+    #[error("{what} = {value}; at most {allowed} are allowed here")]
+    TooMany {
+        /// What was asked for.
+        what: &'static str,
+        /// How many.
+        value: usize,
+        /// How many there may be.
+        allowed: usize,
+    },
+    /// The model's answer leaves the range of floating-point numbers.
+    #[error("{what} is not finite: the model's answer grows beyond all numbers")]
+    Overflow {
+        /// What was computed.
+        what: &'static str,
+    },
     /// The instantaneous loop has no solution.
     #[error("the feedback loop is not well posed: I + D_c D_p is singular")]
     AlgebraicLoop,

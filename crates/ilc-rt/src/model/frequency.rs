@@ -49,13 +49,27 @@ impl StateSpace {
             for i in 0..n {
                 resolvent[(i, i)] += q;
             }
-            let states = resolvent.lu().solve(&b).ok_or(ModelError::Numerics {
-                what: "the frequency response",
-                reason: "a frequency is a pole of the model",
-            })?;
-            response.push(&c * states + &d);
+            match resolvent.lu().solve(&b).map(|states| &c * states + &d) {
+                Some(found) if is_finite(&found) => response.push(found),
+                // A pole, unless nothing reaches it or nothing sees it.
+                _ => response.push(self.without_hidden(w)?),
+            }
         }
         Ok(response)
+    }
+
+    /// Returns the response at a frequency at which some state is not determined: that of the model
+    /// without the states that no input reaches or no output sees.
+    fn without_hidden(&self, w: f64) -> Result<DMatrix<Complex<f64>>, ModelError> {
+        let is_a_pole = ModelError::Numerics {
+            what: "the frequency response",
+            reason: "a frequency is a pole of the model",
+        };
+        let minimal = self.minimal()?;
+        if minimal.n_states() == self.n_states() {
+            return Err(is_a_pole);
+        }
+        minimal.frequency_response(&[w])?.pop().ok_or(is_a_pole)
     }
 
     /// Returns magnitude and phase of the channel from one input to one output.
@@ -103,19 +117,32 @@ impl StateSpace {
             None => -&self.a,
             Some(_) => DMatrix::identity(n, n) - &self.a,
         };
-        let integrates = ModelError::Numerics {
-            what: "the static gain",
-            reason: "the model has a pole at rest: it integrates",
-        };
         let size = system.amax();
         let lu = system.full_piv_lu();
         // The last pivot tells how near the pole at rest is.
-        if lu.u()[(n - 1, n - 1)].abs() <= f64::EPSILON * size {
-            return Err(integrates);
+        if size > 0.0
+            && lu.u()[(n - 1, n - 1)].abs() > f64::EPSILON * size
+            && let Some(states) = lu.solve(&self.b)
+        {
+            let gain = &self.d + &self.c * states;
+            if gain.iter().all(|value| value.is_finite()) {
+                return Ok(gain);
+            }
         }
-        let states = lu.solve(&self.b).ok_or(integrates)?;
-        Ok(&self.d + &self.c * states)
+        // A state that no input reaches or no output sees may do what it likes.
+        let minimal = self.minimal()?;
+        if minimal.n_states() < n {
+            return minimal.dc_gain();
+        }
+        Err(ModelError::Numerics {
+            what: "the static gain",
+            reason: "the model has a pole at rest: it integrates",
+        })
     }
+}
+
+fn is_finite(matrix: &DMatrix<Complex<f64>>) -> bool {
+    matrix.iter().all(|value| value.re.is_finite() && value.im.is_finite())
 }
 
 /// Takes the jumps of a turn out of a phase, in place.
@@ -157,6 +184,31 @@ mod tests {
         }
     }
 
+    fn gain_of(value: f64) -> StateSpace {
+        StateSpace::static_gain(DMatrix::from_element(1, 1, value), Some(1e-3)).unwrap()
+    }
+
+    #[test]
+    fn states_that_nothing_reaches_or_nothing_sees_do_not_integrate() {
+        let one = |value: f64| DMatrix::from_element(1, 1, value);
+        // What SciPy makes of a gain: a state at rest that nothing moves.
+        for (b, c) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0)] {
+            for (pole, dt_s) in [(0.0, None), (1.0, Some(0.01))] {
+                let gain = StateSpace::new(one(pole), one(b), one(c), one(2.0), dt_s).unwrap();
+                assert!((gain.dc_gain().unwrap()[(0, 0)] - 2.0).abs() < 1e-15, "{b} {c}");
+                let response = gain.frequency_response(&[0.0]).unwrap();
+                assert!((response[0][(0, 0)] - Complex::new(2.0, 0.0)).norm() < 1e-15);
+            }
+        }
+        // Beside an axis that has a gain of its own.
+        let lag = from_transfer_function(&[0.5], &[1.0, -0.5], Some(1e-3)).unwrap();
+        let hidden = StateSpace::discrete(one(1.0), one(0.0), one(1.0), one(3.0), 1e-3).unwrap();
+        let both = lag.append(&hidden).unwrap().dc_gain().unwrap();
+        assert!((both - DMatrix::from_diagonal(&nalgebra::dvector![1.0, 3.0])).amax() < 1e-12);
+        // Dead beat: all poles at the origin.
+        assert!((gain_of(3.0).delayed(4).unwrap().dc_gain().unwrap()[(0, 0)] - 3.0).abs() < 1e-15);
+    }
+
     #[test]
     fn poles_on_the_axis_are_refused_by_name() {
         let integrator = from_transfer_function(&[1.0], &[1.0, 0.0], None).unwrap();
@@ -166,6 +218,11 @@ mod tests {
         let gain = StateSpace::static_gain(DMatrix::from_element(1, 1, 2.0), None).unwrap();
         assert!((gain.dc_gain().unwrap()[(0, 0)] - 2.0).abs() < 1e-15);
         assert!((gain.frequency_response(&[1.0]).unwrap()[0][(0, 0)].re - 2.0).abs() < 1e-15);
+        // A double integrator, one behind a gain of two axes, and one that forgets too little.
+        let double = from_transfer_function(&[1.0], &[1.0, -2.0, 1.0], Some(1e-3)).unwrap();
+        assert!(
+            double.dc_gain().is_err() && double.append(&gain_of(2.0)).unwrap().dc_gain().is_err()
+        );
         let axis = second_order(10.0, 0.5).unwrap();
         assert!(axis.bode(&[1.0], 1, 0).is_err() && axis.bode(&[1.0], 0, 1).is_err());
         assert!((axis.dc_gain().unwrap()[(0, 0)] - 1.0).abs() < 1e-14);

@@ -4,6 +4,11 @@ use nalgebra::{Complex, DMatrix, DVector, Schur};
 
 use super::ModelError;
 
+/// Numbers of all Markov parameters together.
+const MAX_MARKOV: usize = 10_000_000;
+/// Entries of a lifted operator, 400 MB.
+const MAX_LIFTED: usize = 50_000_000;
+
 /// A linear time-invariant model, discrete or continuous.
 ///
 /// `x[k+1] = A x[k] + B u[k]`, `y[k] = C x[k] + D u[k]` (discrete), or the same with `dx/dt` on the
@@ -150,6 +155,7 @@ impl StateSpace {
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
     /// - [`ModelError::Length`] if `input` is no whole number of samples or `x0` does not fit.
+    /// - [`ModelError::Overflow`] if the output leaves the range of floating-point numbers.
     pub fn simulate(&self, input: &[f64], x0: Option<&[f64]>) -> Result<Vec<f64>, ModelError> {
         self.sampled("simulate")?;
         let m = self.n_inputs();
@@ -185,7 +191,11 @@ impl StateSpace {
             next.gemv(1.0, &self.b, &u, 1.0);
             std::mem::swap(&mut x, &mut next);
         }
-        Ok(output)
+        if output.iter().all(|value| value.is_finite()) {
+            Ok(output)
+        } else {
+            Err(ModelError::Overflow { what: "the simulated output" })
+        }
     }
 
     /// Returns the first `count` Markov parameters: `D`, `C B`, `C A B`, ...
@@ -194,8 +204,10 @@ impl StateSpace {
     /// - each: (`n_outputs`, `n_inputs`)
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
+    /// - [`ModelError::TooMany`] for more than 10 000 000 numbers.
     pub fn markov(&self, count: usize) -> Result<Vec<DMatrix<f64>>, ModelError> {
         self.sampled("markov")?;
+        self.bounded("count", count, MAX_MARKOV)?;
         let mut parameters = Vec::with_capacity(count);
         let mut reached = self.b.clone();
         for k in 0..count {
@@ -206,7 +218,11 @@ impl StateSpace {
                 reached = &self.a * reached;
             }
         }
-        Ok(parameters)
+        if parameters.iter().flat_map(|parameter| parameter.iter()).all(|value| value.is_finite()) {
+            Ok(parameters)
+        } else {
+            Err(ModelError::Overflow { what: "a Markov parameter" })
+        }
     }
 
     /// Returns the dense lifted operator of `n_samples` samples, for analysis and as test oracle.
@@ -218,10 +234,16 @@ impl StateSpace {
     /// - (`n_samples * n_outputs`, `n_samples * n_inputs`)
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
+    /// - [`ModelError::TooMany`] for more than 50 000 000 entries.
     /// # Source
     /// - \[haas2016\], Eq. (3), which leaves out the first block row and the last block column.
     pub fn lifted(&self, n_samples: usize) -> Result<DMatrix<f64>, ModelError> {
         let (p, m) = (self.n_outputs(), self.n_inputs());
+        self.sampled("lifted")?;
+        let allowed = (MAX_LIFTED / (p * m).max(1)).isqrt();
+        if n_samples > allowed {
+            return Err(ModelError::TooMany { what: "n_samples", value: n_samples, allowed });
+        }
         let parameters = self.markov(n_samples)?;
         let mut lifted = DMatrix::zeros(n_samples * p, n_samples * m);
         for row in 0..n_samples {
@@ -245,6 +267,15 @@ impl StateSpace {
             ModelError::Numerics { what: "poles", reason: "the QR iteration did not converge" },
         )?;
         Ok(schur.complex_eigenvalues().iter().copied().collect())
+    }
+
+    /// Refuses more samples than `max` numbers of all channels.
+    fn bounded(&self, what: &'static str, value: usize, max: usize) -> Result<(), ModelError> {
+        let allowed = max / (self.n_outputs() * self.n_inputs()).max(1);
+        if value > allowed {
+            return Err(ModelError::TooMany { what, value, allowed });
+        }
+        Ok(())
     }
 
     /// Returns the sample time, or the error that `action` cannot do without one.
@@ -281,6 +312,15 @@ mod tests {
         for (simulated, multiplied) in y.iter().zip(lifted.iter()) {
             assert!((simulated - multiplied).abs() < 1e-13);
         }
+    }
+
+    #[test]
+    fn more_than_memory_holds_is_refused_at_once() {
+        let line = integrator().markov(10_usize.pow(10)).unwrap_err().to_string();
+        assert!(line.contains("count = 10000000000; at most 10000000"), "{line}");
+        let line = integrator().lifted(100_000).unwrap_err().to_string();
+        assert!(line.contains("n_samples = 100000; at most 7071"), "{line}");
+        assert!(integrator().lifted(usize::MAX).is_err());
     }
 
     #[test]

@@ -104,6 +104,7 @@ impl TimeVarying {
     ///   result: `n_samples` x `n_outputs`, time first
     /// # Errors
     /// - [`ModelError::Length`] if `input` or `x0` does not fit.
+    /// - [`ModelError::Overflow`] if the output leaves the range of floating-point numbers.
     pub fn simulate(&self, input: &[f64], x0: Option<&[f64]>) -> Result<Vec<f64>, ModelError> {
         let (n, m) = (self.n_states(), self.n_inputs());
         let (n_samples, found) = (self.n_samples(), input.len());
@@ -125,7 +126,11 @@ impl TimeVarying {
             output.extend_from_slice((model.c() * &x + model.d() * &u).as_slice());
             x = model.a() * &x + model.b() * &u;
         }
-        Ok(output)
+        if output.iter().all(|value| value.is_finite()) {
+            Ok(output)
+        } else {
+            Err(ModelError::Overflow { what: "the simulated output" })
+        }
     }
 }
 

@@ -4,6 +4,9 @@ use nalgebra::DMatrix;
 
 use super::{ModelError, StateSpace};
 
+/// The most coefficients of a polynomial: far more than any has whose zeros can still be told apart.
+const MAX_COEFFICIENTS: usize = 1000;
+
 /// Returns the controllable canonical form of a transfer function with one input and one output.
 ///
 /// `G = (b_0 s^n + ... + b_n) / (a_0 s^n + ... + a_n)`, highest power first; `z` in place of `s` if
@@ -15,13 +18,26 @@ use super::{ModelError, StateSpace};
 /// - `dt_s` in seconds
 /// # Errors
 /// - [`ModelError::Improper`] if the numerator has the higher degree.
-/// - [`ModelError::Parameter`] if the denominator is zero or a polynomial is empty.
+/// - [`ModelError::Parameter`] if the denominator is zero.
+/// - [`ModelError::Length`] for an empty polynomial, [`ModelError::TooMany`] for more than 1000
+///   coefficients.
 /// - [`ModelError::NotFinite`] for an infinite coefficient or one that is not a number.
 pub fn from_transfer_function(
     numerator: &[f64],
     denominator: &[f64],
     dt_s: Option<f64>,
 ) -> Result<StateSpace, ModelError> {
+    for (what, polynomial) in [("numerator", numerator), ("denominator", denominator)] {
+        if polynomial.is_empty() {
+            let found = 0;
+            let allowed = "at least one coefficient is needed".to_owned();
+            return Err(ModelError::Length { what, found, allowed });
+        }
+        if polynomial.len() > MAX_COEFFICIENTS {
+            let (value, allowed) = (polynomial.len(), MAX_COEFFICIENTS);
+            return Err(ModelError::TooMany { what, value, allowed });
+        }
+    }
     let numerator = significant("numerator", numerator)?;
     let denominator = significant("denominator", denominator)?;
     let Some((&leading, rest)) = denominator.split_first() else {
@@ -117,7 +133,17 @@ mod tests {
         let error = from_transfer_function(&[1.0, 0.0], &[1.0], None).unwrap_err();
         assert_eq!(error, ModelError::Improper { numerator: 1, denominator: 0 });
         assert!(from_transfer_function(&[1.0], &[0.0, 0.0], None).is_err());
-        assert!(from_transfer_function(&[1.0], &[], None).is_err());
+        for (numerator, denominator, what) in
+            [(&[][..], &[1.0, 1.0][..], "numerator"), (&[1.0], &[], "denominator")]
+        {
+            let line =
+                from_transfer_function(numerator, denominator, None).unwrap_err().to_string();
+            assert!(line.contains(what) && line.contains("holds 0 values"), "{line}");
+        }
+        let long = vec![1.0; 1001];
+        assert!(
+            from_transfer_function(&[1.0], &long, None).unwrap_err().to_string().contains("1001")
+        );
         assert!(from_transfer_function(&[f64::NAN], &[1.0], None).is_err());
         assert!(second_order(0.0, 0.5).is_err() && second_order(1.0, -0.1).is_err());
     }

@@ -9,6 +9,11 @@ use super::{Section, SignalError};
 /// The highest order that [`butterworth`] designs.
 pub const MAX_ORDER: usize = 12;
 
+/// Lowest cut-off, as part of the sampling rate: with it the static gain is 1 to six digits.
+const LOWEST: f64 = 1e-5;
+/// The same for the first order.
+const LOWEST_SINGLE: f64 = 1e-10;
+
 /// Returns a Butterworth low-pass as second-order sections.
 ///
 /// Analogue poles on the circle of radius `(2/T) tan(pi f_c T)`, brought to sampled time by the
@@ -20,7 +25,8 @@ pub const MAX_ORDER: usize = 12;
 /// # Units
 /// - `cutoff_hz` in hertz, `dt_s` in seconds
 /// # Errors
-/// - [`SignalError::Order`], [`SignalError::Cutoff`] or [`SignalError::SampleTime`].
+/// - [`SignalError::Order`], [`SignalError::Cutoff`], [`SignalError::CutoffTooLow`] or
+///   [`SignalError::SampleTime`].
 /// # Source
 /// - \[oppenheim2009\], Ch. 7: Butterworth poles and the bilinear rule.
 pub fn butterworth(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Vec<Section>, SignalError> {
@@ -33,6 +39,12 @@ pub fn butterworth(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Vec<Sectio
     let limit_hz = 0.5 / dt_s;
     if !(cutoff_hz > 0.0 && cutoff_hz < limit_hz) {
         return Err(SignalError::Cutoff { cutoff_hz, limit_hz });
+    }
+    // `1 + a1 + a2` is about the square of the ratio: below this one it is rounding. One real pole has
+    // only the ratio itself in it.
+    let lowest_hz = if order == 1 { LOWEST_SINGLE } else { LOWEST } / dt_s;
+    if cutoff_hz < lowest_hz {
+        return Err(SignalError::CutoffTooLow { cutoff_hz, order, lowest_hz });
     }
     // Everything is scaled by T/2, so that the bilinear rule is z = (1 + s) / (1 - s).
     let radius = (PI * cutoff_hz * dt_s).tan();
@@ -94,6 +106,33 @@ mod tests {
                 (top / bottom).norm()
             })
             .product()
+    }
+
+    #[test]
+    fn at_either_end_of_its_range_a_filter_is_one_and_beyond_it_is_refused() {
+        for dt_s in [1e-6, 1e-3, 2e-3, 10.0] {
+            for order in 1..=MAX_ORDER {
+                let lowest = if order == 1 { LOWEST_SINGLE } else { LOWEST };
+                for share in [lowest * 1.001, 3e-5, 1e-3, 0.1, 0.4999, 0.499_999_999_9] {
+                    let sections = butterworth(order, share / dt_s, dt_s).unwrap();
+                    let gain: f64 = sections.iter().map(Section::static_gain).product();
+                    assert!((gain - 1.0).abs() < 1e-4, "order {order}, {share}: {gain}");
+                    // Bounded and finite, whatever comes in: here the loudest input there is.
+                    let mut filter = super::super::SosFilter::new(sections);
+                    let largest = (0..2000)
+                        .map(|k| filter.step(if k % 2 == 0 { 1.0 } else { -1.0 }).abs())
+                        .fold(0.0, f64::max);
+                    assert!(largest < 10.0, "order {order}, {share}: {largest}");
+                }
+                for share in [lowest * 0.999, 1e-12, 1e-300, f64::MIN_POSITIVE] {
+                    let line = butterworth(order, share / dt_s, dt_s).unwrap_err().to_string();
+                    assert!(line.contains("cutoff_hz = "), "order {order}, {share}: {line}");
+                }
+            }
+        }
+        for (cutoff_hz, dt_s) in [(1.0, 1e-320), (1e300, 1e-310), (1.0, 1e300), (f64::NAN, 1e-3)] {
+            assert!(butterworth(2, cutoff_hz, dt_s).is_err(), "{cutoff_hz} {dt_s}");
+        }
     }
 
     #[test]

@@ -24,6 +24,48 @@ pub enum SignalError {
         /// Half the sampling rate, in hertz.
         limit_hz: f64,
     },
+    /// A cut-off so low that the coefficients of the filter have no digits left for it.
+    #[error(
+        "cutoff_hz = {cutoff_hz} Hz; at this sample time a filter of order {order} needs at least \
+         {lowest_hz} Hz, below which its coefficients have no digits left"
+    )]
+    CutoffTooLow {
+        /// The cut-off given, in hertz.
+        cutoff_hz: f64,
+        /// The order given.
+        order: usize,
+        /// The lowest cut-off of that order, in hertz.
+        lowest_hz: f64,
+    },
+    /// A section without a static gain: it has a pole at frequency zero or holds no numbers.
+    #[error(
+        "section {index} has the gain {gain} at frequency 0; a filter that starts settled needs a \
+         finite one"
+    )]
+    StaticGain {
+        /// Which section.
+        index: usize,
+        /// Its gain.
+        gain: f64,
+    },
+    /// A filtered signal that is not finite.
+    #[error(
+        "sample {sample} of the filtered signal is {value}: the filter is unstable or the signal too large"
+    )]
+    Overflow {
+        /// The first such sample.
+        sample: usize,
+        /// What it is.
+        value: f64,
+    },
+    /// More taps than a signal is ever filtered with.
+    #[error("{found} taps; at most {max} are allowed")]
+    TooManyTaps {
+        /// Taps asked for.
+        found: usize,
+        /// How many there may be.
+        max: usize,
+    },
     /// A sample time that is not a positive number.
     #[error("dt_s = {dt_s} s; a sample time must be finite and greater than 0 s")]
     SampleTime {

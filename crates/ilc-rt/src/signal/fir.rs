@@ -3,6 +3,9 @@
 use super::SignalError;
 use super::symmetric::{Ends, Symmetric};
 
+/// The most taps: each costs a multiplication a sample.
+const MAX_TAPS: usize = 20_001;
+
 /// How far the two halves of the taps may differ, as part of the largest tap.
 const ASYMMETRY: f64 = 1e-12;
 
@@ -33,10 +36,14 @@ impl FirFilter {
     /// Takes the taps.
     ///
     /// # Errors
-    /// - [`SignalError::TapCount`] for an even number of taps.
+    /// - [`SignalError::TapCount`] for an even number of taps, [`SignalError::TooManyTaps`] for more
+    ///   than 20 001.
     /// - [`SignalError::TapValue`] for a tap that is infinite or not a number.
     /// - [`SignalError::TapSymmetry`] for taps that are not their own mirror image.
     pub fn new(taps: &[f64]) -> Result<Self, SignalError> {
+        if taps.len() > MAX_TAPS {
+            return Err(SignalError::TooManyTaps { found: taps.len(), max: MAX_TAPS });
+        }
         if taps.len().is_multiple_of(2) {
             return Err(SignalError::TapCount { found: taps.len() });
         }
@@ -60,9 +67,15 @@ impl FirFilter {
     /// # Errors
     /// - [`SignalError::TapCount`] for no pass at all.
     /// - [`SignalError::TapValue`] if the product overflows.
+    /// - [`SignalError::TooManyTaps`] if it would have more than 20 001 taps.
     pub fn repeated(&self, times: usize) -> Result<Self, SignalError> {
         if times == 0 {
             return Err(SignalError::TapCount { found: 0 });
+        }
+        let found = (self.taps.len() - 1).saturating_mul(times).saturating_add(1);
+        // One tap makes the filter no longer, only its product longer to compute.
+        if found > MAX_TAPS || times > MAX_TAPS {
+            return Err(SignalError::TooManyTaps { found: found.max(times), max: MAX_TAPS });
         }
         let mut product = self.taps.clone();
         for _ in 1..times {
@@ -94,6 +107,17 @@ impl FirFilter {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn more_taps_than_anybody_filters_with_are_refused_at_once() {
+        let once = FirFilter::new(&ONCE).unwrap();
+        for times in [5001, 10_000_000, usize::MAX] {
+            let line = once.repeated(times).unwrap_err().to_string();
+            assert!(line.contains("at most 20001"), "{line}");
+        }
+        assert!(FirFilter::new(&[1.0]).unwrap().repeated(usize::MAX).is_err());
+        assert!(FirFilter::new(&vec![0.0; 20_003]).is_err());
+    }
 
     const ONCE: [f64; 5] = [-1.0 / 16.0, 0.25, 0.625, 0.25, -1.0 / 16.0];
 

@@ -210,6 +210,36 @@ impl Switched {
         }
         Ok(())
     }
+
+    /// Applies the transpose of [`Switched::apply`]: each band's share first, then its filter.
+    ///
+    /// # Shapes
+    /// - as [`Switched::apply`]
+    /// # Errors
+    /// - [`SignalError::Length`] if the signal has another length.
+    pub fn apply_transposed(
+        &mut self,
+        signal: &mut [f64],
+        channel: usize,
+        n_channels: usize,
+    ) -> Result<(), SignalError> {
+        check_channel(signal, channel, n_channels, self.n_samples())?;
+        self.sum.fill(0.0);
+        for Band { filter, weights } in &mut self.bands {
+            let given = signal.iter().skip(channel).step_by(n_channels);
+            for ((value, weight), given) in self.filtered.iter_mut().zip(weights).zip(given) {
+                *value = *weight * given;
+            }
+            filter.apply_transposed(&mut self.filtered, 0, 1)?;
+            for (sum, value) in self.sum.iter_mut().zip(&self.filtered) {
+                *sum += value;
+            }
+        }
+        for (place, sum) in signal.iter_mut().skip(channel).step_by(n_channels).zip(&self.sum) {
+            *place = *sum;
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]

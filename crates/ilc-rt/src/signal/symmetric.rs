@@ -84,6 +84,46 @@ impl Symmetric {
         Ok(())
     }
 
+    /// Applies the transpose of [`Symmetric::apply`], the ends included: what an end was held or mirrored
+    /// from gets its share back.
+    ///
+    /// # Shapes
+    /// - as [`Symmetric::apply`]
+    /// # Errors
+    /// - [`SignalError::Length`] if the signal has another length.
+    pub fn apply_transposed(
+        &mut self,
+        signal: &mut [f64],
+        channel: usize,
+        n_channels: usize,
+    ) -> Result<(), SignalError> {
+        let (n_samples, reach) = (self.n_samples(), self.reach());
+        check_channel(signal, channel, n_channels, n_samples)?;
+        let at = |sample: usize| sample * n_channels + channel;
+        let last = n_samples - 1;
+        self.extended.fill(0.0);
+        for k in 0..n_samples {
+            let (middle, value) = (reach + k, signal[at(k)]);
+            self.extended[middle] += self.weights[0] * value;
+            for (i, weight) in self.weights.iter().enumerate().skip(1) {
+                self.extended[middle + i] += weight * value;
+                self.extended[middle - i] += weight * value;
+            }
+        }
+        for k in 0..n_samples {
+            signal[at(k)] = self.extended[reach + k];
+        }
+        for i in 0..reach {
+            let (before, after) = match self.ends {
+                Ends::Held => (0, last),
+                Ends::Mirrored => (i, last - i),
+            };
+            signal[at(before)] += self.extended[reach - 1 - i];
+            signal[at(after)] += self.extended[reach + n_samples + i];
+        }
+        Ok(())
+    }
+
     fn reach(&self) -> usize {
         self.weights.len() - 1
     }

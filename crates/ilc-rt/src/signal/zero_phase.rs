@@ -29,8 +29,15 @@ impl ZeroPhase {
     /// # Errors
     /// - [`SignalError::TooShort`] unless the signal is longer than the extension of its ends,
     ///   three times the length of the filter's polynomials.
+    /// - [`SignalError::StaticGain`] for a section on which a pass cannot start settled.
     #[expect(clippy::disallowed_macros, reason = "cold: set-up")]
     pub fn new(sections: Vec<Section>, n_samples: usize) -> Result<Self, SignalError> {
+        for (index, section) in sections.iter().enumerate() {
+            let gain = section.static_gain();
+            if !gain.is_finite() {
+                return Err(SignalError::StaticGain { index, gain });
+            }
+        }
         let missing = |last: fn(&Section) -> f64| {
             sections.iter().filter(|section| last(section) == 0.0).count()
         };
@@ -54,6 +61,7 @@ impl ZeroPhase {
     /// - `signal`: time first, `n_samples` x `n_channels`; only `channel` is read and written
     /// # Errors
     /// - [`SignalError::Length`] if the signal has another length.
+    /// - [`SignalError::Overflow`] if what comes out is not finite; the signal is then as it was.
     pub fn apply(
         &mut self,
         signal: &mut [f64],
@@ -82,6 +90,10 @@ impl ZeroPhase {
         }
         for value in self.extended.iter_mut().rev() {
             *value = self.filter.step(*value);
+        }
+        let filtered = &self.extended[self.padding..self.padding + expected];
+        if let Some(sample) = filtered.iter().position(|value| !value.is_finite()) {
+            return Err(SignalError::Overflow { sample, value: filtered[sample] });
         }
         for k in 0..expected {
             signal[at(k)] = self.extended[self.padding + k];

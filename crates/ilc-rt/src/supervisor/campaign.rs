@@ -1,5 +1,6 @@
 //! One campaign from the first frame to the last: bring-up, runs, learning, library, end.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::announce::Announcer;
@@ -7,7 +8,7 @@ use super::collect::Collector;
 use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
-use super::learner::{Learner, expect};
+use super::learner::{Learner, Lesson, expect};
 use super::options::{Options, Outcome};
 use super::pace::Pacer;
 use super::plan::Plan;
@@ -18,7 +19,7 @@ use crate::config::Cell;
 use crate::fieldbus::Bus;
 use crate::learning::Law;
 use crate::library::Library;
-use crate::record::{EndStatus, Event, Figures, IterationRecord, Meta, StateName};
+use crate::record::{AxisKinds, EndStatus, Event, Figures, IterationRecord, Meta, StateName};
 use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
@@ -139,7 +140,10 @@ fn carry_out(
     announcer.tell(&Event::State { state: StateName::BringingUp, iteration: first });
     nodes::start(cell, bus.as_mut(), options.lockstep)?;
 
-    plan.servo.runs = first..options.iterations;
+    // Drives that were off do not begin where the last run left them. One run with the coming input
+    // brings them there; it is not kept, as it says nothing of the law.
+    let warm_up = u32::from(!resumed.runs.is_empty());
+    plan.servo.runs = first - warm_up..options.iterations;
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&options.stop));
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next) {
         progress.send(&mut mail, input, update_ms);
@@ -175,7 +179,7 @@ fn carry_out(
     let mut campaign = Running {
         collector: Collector::new(
             plan.n_samples(),
-            cell.n_axes(),
+            AxisKinds::new(&plan.meta.input_units, cell.n_axes()),
             plan.measure,
             cell.tcp_encoder.is_some(),
             cell.cycle_s(),
@@ -188,9 +192,11 @@ fn carry_out(
         runs: resumed.runs,
         disturbance: options.disturbance.clone(),
         present: resumed.coming,
+        first,
         iterations: options.iterations,
         mail,
         stopping: None,
+        unjudged: VecDeque::new(),
         remark: None,
         failure: None,
         phase_iteration: first,
@@ -219,9 +225,13 @@ struct Running<'a> {
     disturbance: Disturbance,
     /// Disturbance of the run that is on, or about to be.
     present: Vec<f64>,
+    /// The first run that counts.
+    first: u32,
     iterations: u32,
     mail: Mailbox,
     stopping: Option<StopReason>,
+    /// Runs that the law is asked about and has not answered yet, the oldest first: key and place.
+    unjudged: VecDeque<(i64, usize)>,
     /// What the law last had to say.
     remark: Option<String>,
     /// Why no more runs can be kept, if so: the axes are stopped, as nothing may be lost.
@@ -240,6 +250,7 @@ impl Running<'_> {
                     self.announcer.sample(&sample);
                     if let Some((run, k)) = sample.at {
                         self.collector.take(run, k, &sample);
+                        let run = run.max(self.first);
                         if k % self.progress_every == self.progress_every - 1 {
                             let (iteration, sample) = (run, k as usize + 1);
                             let n_samples = self.n_samples;
@@ -248,6 +259,7 @@ impl Running<'_> {
                     }
                 }
                 Message::Phase(phase, iteration) => {
+                    let iteration = iteration.max(self.first);
                     self.phase_iteration = iteration;
                     if let Some(state) = state_name(phase) {
                         self.announcer.tell(&Event::State { state, iteration });
@@ -257,20 +269,50 @@ impl Running<'_> {
                     self.collector.begin(run);
                     self.progress.started(table);
                 }
+                Message::RunEnded { run, .. } if run < self.first => {}
                 Message::RunEnded { overruns, .. } => self.run_ended(overruns),
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
         }
         while let Some(lesson) = self.learner.as_mut().and_then(Learner::take) {
-            // Once for each change: what stays as it is need not be said after every run.
-            if lesson.remark != self.remark {
-                tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
-                self.remark = lesson.remark;
-            }
-            match lesson.input {
-                Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
-                Err(error) => self.fail(format!("the law refused the last run: {error}")),
-            }
+            self.judged(&lesson);
+            self.learned(lesson);
+        }
+    }
+
+    /// Hands the loop what was learned.
+    fn learned(&mut self, lesson: Lesson) {
+        // Once for each change: what stays as it is need not be said after every run.
+        if lesson.remark != self.remark {
+            tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
+            self.remark = lesson.remark;
+        }
+        match lesson.input {
+            Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
+            Err(error) => self.fail(format!("the law refused the last run: {error}")),
+        }
+    }
+
+    /// Adds what the law decided to a run that was kept while it computed.
+    fn judged(&mut self, lesson: &Lesson) {
+        let Some((id, place)) = self.unjudged.pop_front() else { return };
+        let Some((index, figures)) = self.runs.get_mut(place) else { return };
+        let before = figures.clone();
+        lesson.note(figures);
+        if *figures == before {
+            return;
+        }
+        let event = Event::Judged {
+            id,
+            index: *index,
+            rolled_back: figures.rolled_back,
+            learning_off: figures.learning_off,
+            remark: figures.remark.clone(),
+        };
+        let written = self.library.judge(id, figures);
+        self.announcer.tell(&event);
+        if let Err(error) = written {
+            self.fail(error.to_string());
         }
     }
 
@@ -293,24 +335,41 @@ impl Running<'_> {
         }
         self.progress.note(&mut record);
         let decision = self.progress.decide(&mut record);
+        let mut asked = false;
+        let mut lesson = None;
         if let Some(learner) = &mut self.learner {
             if decision == Decision::Learn {
                 self.progress.asked();
                 learner.begin(&record.input, &record.error_m, &self.present);
+                asked = true;
+                if learner.is_in_line() {
+                    lesson = learner.take();
+                }
             } else {
                 if matches!(decision, Decision::RollBack(_)) {
                     learner.take_back();
                 }
                 learner.pass(&self.present);
             }
+        } else {
+            record.figures.remark = None;
+        }
+        if let Some(lesson) = lesson {
+            lesson.note(&mut record.figures);
+            self.learned(lesson);
+            asked = false;
         }
         if let Decision::RollBack(input) = decision {
             self.progress.send(&mut self.mail, input, 0.0);
         }
-        self.keep(&record);
+        if let Some(id) = self.keep(&record)
+            && asked
+        {
+            self.unjudged.push_back((id, self.runs.len() - 1));
+        }
     }
 
-    fn keep(&mut self, record: &IterationRecord) {
+    fn keep(&mut self, record: &IterationRecord) -> Option<i64> {
         match self.library.append(&self.meta, record) {
             Ok(id) => {
                 self.announcer.tell(&Event::Iteration {
@@ -320,8 +379,12 @@ impl Running<'_> {
                     figures: record.figures.clone(),
                 });
                 self.runs.push((record.index, record.figures.clone()));
+                Some(id)
             }
-            Err(error) => self.fail(error.to_string()),
+            Err(error) => {
+                self.fail(error.to_string());
+                None
+            }
         }
     }
 
@@ -335,6 +398,11 @@ impl Running<'_> {
     fn end(mut self, pacer: Pacer, cell: &Cell, options: &Options) -> Outcome {
         let remains = pacer.end();
         self.read_mail();
+        while !self.unjudged.is_empty()
+            && let Some(lesson) = self.learner.as_mut().and_then(Learner::take_last)
+        {
+            self.judged(&lesson);
+        }
         let (status, reason) = match (&self.failure, self.stopping, &remains) {
             (Some(why), _, _) => (EndStatus::Fault, why.clone()),
             (None, Some(reason), _) => {

@@ -174,7 +174,7 @@ fn surrounded(law: Box<dyn Law>, cell: &Cell) -> Made {
     if let Some(gate) = cell.learning.gate {
         let rule = GateRule {
             measure: match gate.measure {
-                GateMeasure::Rms => Measure::RmsLength { n_channels: cell.n_axes() },
+                GateMeasure::Rms => Measure::Rms { n_channels: cell.n_axes() },
                 GateMeasure::Max => Measure::Max,
             },
             tolerance: gate.tolerance_m,

@@ -5,6 +5,7 @@
 //! it reads the loop's mailbox and never shares anything else with it.
 
 mod announce;
+mod band;
 mod campaign;
 mod collect;
 mod disturbance;
@@ -24,6 +25,7 @@ mod reason;
 mod telemetry;
 mod weights;
 
+pub use band::{Band, BandSearch};
 pub use campaign::{identify, run};
 pub use disturbance::Disturbance;
 pub use error::SupervisorError;
@@ -31,5 +33,6 @@ pub use experiment::Experiment;
 pub use forecast::{first_error, learning_model};
 pub use identified::{Described, Identified};
 pub use law::Prepared;
+pub use nodes::drive_setup;
 pub use options::{Options, Outcome};
 pub use plan::Plan;

@@ -274,7 +274,7 @@ pub(super) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
     NodeId::new(number).ok_or_else(|| refused(cell, "node", &number, "1 to 127"))
 }
 
-fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
+pub(super) fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
     Scale::new(counts_per_m).ok_or_else(|| refused(cell, "counts_per_m", &counts_per_m, "above 0"))
 }
 

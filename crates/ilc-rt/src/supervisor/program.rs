@@ -124,6 +124,7 @@ pub(super) fn check_range(cell: &Cell, reference_m: &[f64]) -> Result<(), Superv
             return Err(SupervisorError::Range {
                 file: cell.file.display().to_string(),
                 axis: axis.name.clone(),
+                unit: axis.unit.symbol(),
                 reached_m: farthest,
                 low_m,
                 high_m,

@@ -4,8 +4,8 @@ use faer::Mat;
 use faer::linalg::solvers::Solve;
 
 use super::iteration::Iteration;
-use super::krylov::{Estimate, radius};
 use crate::learning::LearningError;
+use crate::learning::krylov::{Estimate, radius};
 
 /// The matrices of one iteration, without the inputs that have no part in convergence.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::condition::PdCondition;
-use super::krylov::Estimate;
+use crate::learning::krylov::Estimate;
 
 /// How figures were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -31,14 +31,15 @@ pub struct Analysis {
     pub method: Method,
     /// Whether the error converges, without growing beyond all measure before.
     pub converges: bool,
-    /// Whether it converges and the distance to the final input falls in every run.
+    /// Whether it converges and the distance to the final input is known to fall in every run.
     pub monotonic: bool,
     /// The verdict with its figures, as a sentence.
     pub why: String,
     /// Largest absolute eigenvalue of `T`: the factor of each iteration in the long run.
     pub spectral_radius: Estimate,
-    /// Largest singular value of `T`: the worst factor of a single iteration. `None` where the law has
-    /// no transpose and the run is too long for whole matrices.
+    /// Largest singular value of `T`: the worst factor of a single iteration, never below the spectral
+    /// radius. `None` where the law has no transpose and the run is longer than
+    /// [`COLUMNS_MAX`](super::COLUMNS_MAX).
     pub monotonic_factor: Option<Estimate>,
     /// How far an error may grow before it falls: the largest norm of a power of `T` (with
     /// [`Method::Structured`] the largest growth seen from a start without pattern).

@@ -2,11 +2,18 @@
 
 use super::hessian::Hessian;
 use super::plant::{Plant, first_effects};
+use crate::learning::error::check_counts;
+use crate::learning::krylov::{noise, norm};
 use crate::learning::{Law, LearningError, Structure};
 use crate::model::StateSpace;
 
 /// Difference from linearity, relative to the update, that rounding is granted.
 const LINEAR: f64 = 1e-6;
+/// The same for `<T u, v>` and `<u, T' v>`.
+const ADJOINT: f64 = 1e-6;
+
+/// Inputs up to which a run is analysed: more of them take minutes.
+const INPUTS_MAX: usize = 1_000_000;
 
 /// What [`lift`] puts in place of zero.
 pub(super) const FLOOR: f64 = 1e-60;
@@ -49,14 +56,21 @@ impl<'a> Iteration<'a> {
         model: &StateSpace,
         n_samples: usize,
     ) -> Result<Self, LearningError> {
-        if n_samples == 0 {
-            return Err(LearningError::Empty { what: "n_samples" });
-        }
         let plant = Plant::new(model)?;
         let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+        check_counts(&[
+            ("n_samples", n_samples),
+            ("n_inputs", n_inputs),
+            ("n_outputs", n_outputs),
+        ])?;
+        let allowed = INPUTS_MAX / n_inputs.max(n_outputs);
+        if n_samples > allowed {
+            let what = "n_samples of an analysis";
+            return Err(LearningError::TooMany { what, value: n_samples, allowed });
+        }
         let hessian = match law.structure() {
-            Structure::Optimal { model, weights: Some(weights) } => {
-                Hessian::new(model, n_samples, weights)?
+            Structure::Optimal { model: own, weights: Some(weights) } => {
+                Some(Hessian::new(own, model, n_samples, weights)?)
             }
             _ => None,
         };
@@ -85,6 +99,7 @@ impl<'a> Iteration<'a> {
             if law.transposed(&zero, input, dual)? { Transpose::Law } else { Transpose::None }
         };
         iteration.leave_out(model)?;
+        iteration.check_transpose()?;
         Ok(iteration)
     }
 
@@ -108,6 +123,31 @@ impl<'a> Iteration<'a> {
             return Ok(());
         }
         Err(LearningError::NotLinear { difference })
+    }
+
+    /// Does without a transpose that is not that of `T`, found by trying: `<T u, v> = <u, T' v>`.
+    ///
+    /// A figure from such a transpose would be none of the law's. Without one the law is looked at by
+    /// its columns.
+    fn check_transpose(&mut self) -> Result<(), LearningError> {
+        if !self.has_transpose() {
+            return Ok(());
+        }
+        let n = self.n_u();
+        let (mut u, mut v) = (noise(n, 6), noise(n, 7));
+        self.clear(&mut u);
+        self.clear(&mut v);
+        let (mut forward, mut back) = (vec![0.0; n], vec![0.0; n]);
+        self.apply(&u, &mut forward)?;
+        self.apply_transposed(&v, &mut back)?;
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (size_u, size_v) = (norm(&u), norm(&v));
+        let scale = norm(&forward) * size_v + norm(&back) * size_u + 1e-6 * size_u * size_v;
+        let apart = (dot(&forward, &v) - dot(&u, &back)).abs();
+        if apart.is_finite() && apart > ADJOINT * scale {
+            self.transpose = Transpose::None;
+        }
+        Ok(())
     }
 
     pub(super) fn n_u(&self) -> usize {
@@ -183,7 +223,7 @@ impl<'a> Iteration<'a> {
         self.clear(&mut input);
         lift(&mut input);
         match &mut self.transpose {
-            Transpose::Optimal(hessian) => hessian.transposed(&input, out)?,
+            Transpose::Optimal(hessian) => hessian.transposed(&input, &self.plant, out)?,
             Transpose::Law => {
                 self.law.transposed(&input, out, &mut self.dual)?;
                 self.plant.apply_transposed(&self.dual, &mut self.input);
@@ -249,22 +289,4 @@ pub(super) fn lift(signal: &mut [f64]) {
             *value = FLOOR;
         }
     }
-}
-
-/// Returns the Euclidean norm.
-pub(super) fn norm(x: &[f64]) -> f64 {
-    x.iter().map(|value| value * value).sum::<f64>().sqrt()
-}
-
-/// Returns numbers without pattern between -1 and 1, the same each time.
-pub(super) fn noise(count: usize, seed: u64) -> Vec<f64> {
-    let mut word = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    (0..count)
-        .map(|_| {
-            word ^= word << 13;
-            word ^= word >> 7;
-            word ^= word << 17;
-            (word >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        })
-        .collect()
 }

@@ -5,13 +5,13 @@
 //! matrices in short runs and from products with signals in long ones. `supervisor` (which refuses a
 //! law that diverges), [`tune`](super::tune) and the Python bindings import it.
 
+mod columns;
 mod condition;
 mod dense;
 mod figures;
 mod frequency;
 mod hessian;
 mod iteration;
-mod krylov;
 mod overreach;
 mod plant;
 mod question;
@@ -22,13 +22,15 @@ mod verdict;
 #[cfg(test)]
 mod every_law;
 #[cfg(test)]
+mod mismatch;
+#[cfg(test)]
 mod oracle;
 
+pub use crate::learning::krylov::Estimate;
 pub use condition::PdCondition;
 pub use figures::{Analysis, Method};
 pub(in crate::learning) use frequency::Spectrum;
-pub use krylov::Estimate;
 pub use overreach::{Overreach, overreach};
-pub use question::{DENSE_MAX, Question, analyze};
+pub use question::{COLUMNS_MAX, DENSE_MAX, Question, analyze};
 pub use refuse::{Verdict, divergence, refuse_divergent};
 pub use uncertainty::Uncertainty;

@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
-use super::iteration::{Iteration, noise};
+use super::iteration::Iteration;
 use super::question::structured;
 use super::*;
+use crate::learning::krylov::noise;
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
 use crate::learning::law::pd::{Pd, PdGains};
 use crate::learning::law::q_filter::QFilter;
@@ -479,9 +480,16 @@ fn laws_that_say_nothing_are_tried() {
     let silent = analyze(&mut Silent(pd()), &model, n, &question).unwrap();
     assert_eq!(open.monotonic_factor, silent.monotonic_factor);
     assert_eq!(open.spectral_radius, silent.spectral_radius);
-    let long = Pd::new(gains, 1000, 1, filter()).unwrap();
-    let found = analyze(&mut Silent(long), &model, 1000, &question).unwrap();
+    // Beyond whole matrices column by column, and beyond that not at all.
+    let long = |n| Pd::new(gains, n, 1, filter()).unwrap();
+    let open = analyze(&mut long(1000), &model, 1000, &question).unwrap();
+    let silent = analyze(&mut Silent(long(1000)), &model, 1000, &question).unwrap();
+    let (open, silent) = (open.monotonic_factor.unwrap(), silent.monotonic_factor.unwrap());
+    assert!(close(open.value, silent.value, 1e-8), "{open:?} {silent:?}");
+    let found = analyze(&mut Silent(long(3001)), &model, 3001, &question).unwrap();
     assert!(found.monotonic_factor.is_none() && !found.contraction.is_empty());
+    assert!(!found.monotonic, "{}", found.why);
+    assert!(!found.converges || found.why.contains("is not known"), "{}", found.why);
 }
 
 #[test]

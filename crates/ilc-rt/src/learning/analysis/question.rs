@@ -1,21 +1,24 @@
 //! The analysis of a law: which figure is found how.
 
+use super::columns::Columns;
 use super::condition::PdCondition;
 use super::dense::Dense;
 use super::figures::{Analysis, Method};
 use super::frequency::Spectrum;
-use super::iteration::{Iteration, norm};
-use super::krylov::{Estimate, fixed_point, largest_symmetric, spectral_radius};
+use super::iteration::Iteration;
 use super::refuse::transient_growth;
 use super::uncertainty::Uncertainty;
 use super::verdict;
 use crate::learning::error::check;
+use crate::learning::krylov::{Estimate, fixed_point, largest_symmetric, norm, spectral_radius};
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
 use crate::learning::{Law, LearningError, StandIn, Structure};
 use crate::model::StateSpace;
 
 /// Up to this many inputs (samples times channels) whole matrices are formed.
 pub const DENSE_MAX: usize = 640;
+/// Up to this many inputs a law without transpose is looked at column by column.
+pub const COLUMNS_MAX: usize = 3000;
 
 /// What else is known, and asked.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +53,7 @@ impl Default for Question {
 /// - `question.reference`: `n_samples` x `n_outputs`, time first
 /// # Real Time
 /// Cold path. `O(n^3)` in `n = n_samples n_inputs` up to [`DENSE_MAX`]; beyond, some hundred products
-/// of `O(n)`.
+/// of `O(n)`, and for a law without [transpose](Law::transposed) up to [`COLUMNS_MAX`] `n` of them.
 /// # Errors
 /// - [`LearningError::NotLinear`] for a law that is not linear.
 /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Parameter`] for a
@@ -96,6 +99,7 @@ pub fn analyze(
         }
         None => structured(&mut iteration)?,
     };
+    let factor = factor.map(|factor| above_radius(factor, radius)).transpose()?;
     let certain = optimal.is_some_and(|(own, _)| own);
     let converges = certain || verdict::converges(radius, growth);
     let spectrum = match optimal {
@@ -179,27 +183,46 @@ pub(super) fn structured(
     // Fewer vectors in long runs: they are what takes the memory.
     let n_basis = if n <= 1000 { 200 } else { (6_000_000 / n).clamp(20, 60) };
     let radius = spectral_radius(n, &mut |u, out| iteration.apply(u, out), 20, n_basis)?;
+    let products = (10_000_000 / n).clamp(60, 1500);
     let factor = if iteration.has_transpose() {
         let mut middle = vec![0.0; n];
-        let products = (10_000_000 / n).clamp(60, 1500);
-        let square = largest_symmetric(
-            n,
-            &mut |u, out| {
-                iteration.apply(u, &mut middle)?;
-                iteration.apply_transposed(&middle, out)
-            },
-            n_basis,
-            products,
-            1e-10,
-        )?;
-        let value = square.value.max(0.0).sqrt();
-        let error = square.error / (2.0 * value).max(square.error.sqrt()).max(f64::MIN_POSITIVE);
-        Some(Estimate { value, error })
+        let map = &mut |u: &[f64], out: &mut [f64]| {
+            iteration.apply(u, &mut middle)?;
+            iteration.apply_transposed(&middle, out)
+        };
+        Some(largest_symmetric(n, map, n_basis, products, 1e-10)?)
+    } else if n <= COLUMNS_MAX {
+        let columns = Columns::new(iteration)?;
+        let mut middle = vec![0.0; n];
+        let map = &mut |u: &[f64], out: &mut [f64]| {
+            columns.apply(u, &mut middle);
+            columns.apply_transposed(&middle, out);
+            Ok(())
+        };
+        Some(largest_symmetric(n, map, n_basis, products, 1e-10)?)
     } else {
         None
     };
+    let factor = factor.map(|square| {
+        let value = square.value.max(0.0).sqrt();
+        let error = square.error / (2.0 * value).max(square.error.sqrt()).max(f64::MIN_POSITIVE);
+        Estimate { value, error }
+    });
     let (growth, _) = transient_growth(iteration, 60)?;
     Ok((radius, factor, growth))
+}
+
+/// Raises the norm to the spectral radius, which no norm lies below; both are found to within their
+/// errors, from below.
+fn above_radius(factor: Estimate, radius: Estimate) -> Result<Estimate, LearningError> {
+    let (highest, lowest) = (factor.value + factor.error, radius.value - radius.error);
+    if lowest > highest * (1.0 + 1e-6) + 1e-9 {
+        return Err(LearningError::Numerics {
+            what: "monotonic factor",
+            reason: "it was found to lie below the spectral radius, which no norm can",
+        });
+    }
+    Ok(Estimate { value: factor.value.max(radius.value), ..factor })
 }
 
 /// Input and error to which learning converges.

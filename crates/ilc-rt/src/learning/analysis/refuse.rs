@@ -1,8 +1,8 @@
 //! Whether a law may start: the quick part of the analysis.
 
-use super::iteration::{Iteration, noise, norm};
-use super::krylov::{Estimate, spectral_radius};
+use super::iteration::Iteration;
 use super::verdict::{GROWTH_MAX, converges, with_bounds};
+use crate::learning::krylov::{Estimate, noise, norm, spectral_radius};
 use crate::learning::{Law, LearningError, StandIn, Structure};
 use crate::model::StateSpace;
 

@@ -1,7 +1,8 @@
 //! From figures to a verdict, in words.
 
 use super::figures::{Analysis, Method};
-use super::krylov::Estimate;
+use super::question::COLUMNS_MAX;
+use crate::learning::krylov::Estimate;
 
 /// Growth of an error beyond which no machine waits for it to fall again.
 pub(super) const GROWTH_MAX: f64 = 1e3;
@@ -24,16 +25,14 @@ pub(super) fn with_bounds(why: &str) -> String {
 /// Fills in the verdict.
 pub(super) fn tell(analysis: &mut Analysis, certain: bool) {
     let radius = analysis.spectral_radius.value;
-    let factor = analysis.monotonic_factor.map(|factor| factor.value);
+    let factor = analysis.monotonic_factor;
     let growing = analysis.critical_frequency_hz.map_or_else(String::new, |hz| {
         format!("; from {hz:.3} Hz on the error grows (largest contraction {:.4})", peak(analysis))
     });
-    // Where no whole-run norm is at hand the contraction over frequency bounds it, ends left aside.
-    let worst = factor.or_else(|| {
-        (analysis.method == Method::Structured && !analysis.contraction.is_empty())
-            .then(|| peak(analysis))
-    });
-    analysis.monotonic = analysis.converges && worst.is_some_and(|worst| worst < 1.0 + ROUNDING);
+    // On the safe side of what is known of the factor: "in every run" is a promise.
+    analysis.monotonic = analysis.converges
+        && factor.is_some_and(|factor| factor.value + factor.error < 1.0 + ROUNDING);
+    let worst = factor.map(said);
     analysis.why = if !analysis.converges {
         if radius >= 1.0 + ROUNDING {
             format!("each run multiplies the error by {radius:.6} in the long run{growing}")
@@ -43,16 +42,30 @@ pub(super) fn tell(analysis: &mut Analysis, certain: bool) {
                 analysis.transient_growth
             )
         }
-    } else if let (true, Some(worst)) = (analysis.monotonic, worst) {
+    } else if let (true, Some(worst)) = (analysis.monotonic, &worst) {
         format!(
             "every run brings the input nearer to its final value: the worst factor of a run is \
-             {worst:.6}, in the long run {radius:.6}"
+             {worst}, in the long run {radius:.6}"
         )
     } else if certain {
         format!(
             "the law minimises a cost of its own model, so that the error converges (factor {radius:.6} \
              in the long run); a single run may take the input away from its end by up to {}",
-            worst.map_or_else(|| "an unknown factor".to_owned(), |worst| format!("{worst:.6}"))
+            worst.unwrap_or_else(|| "an unknown factor".to_owned())
+        )
+    } else if let (None, Method::Structured) = (&worst, analysis.method) {
+        let over = if analysis.contraction.is_empty() {
+            String::new()
+        } else {
+            format!(
+                " (over frequency, the ends of the run left aside, it is {:.6})",
+                peak(analysis)
+            )
+        };
+        format!(
+            "the error converges (factor {radius:.6} in the long run); whether it falls in every run is \
+             not known: the worst factor of a run takes a law with a transpose, or a run of at most \
+             {COLUMNS_MAX} inputs{over}{growing}"
         )
     } else {
         format!(
@@ -60,10 +73,20 @@ pub(super) fn tell(analysis: &mut Analysis, certain: bool) {
              first grow {:.3}-fold{}{growing}",
             analysis.transient_growth,
             worst.map_or_else(String::new, |worst| format!(
-                ", the worst factor of a run being {worst:.6}"
+                ", the worst factor of a run being {worst}"
             )),
         )
     };
+}
+
+/// A factor in words: with what it may be at most where that is not the same to six digits.
+fn said(factor: Estimate) -> String {
+    let Estimate { value, error } = factor;
+    if error < 5e-7 * value.max(1.0) {
+        format!("{value:.6}")
+    } else {
+        format!("{value:.6} to {:.6}", value + error)
+    }
 }
 
 fn peak(analysis: &Analysis) -> f64 {

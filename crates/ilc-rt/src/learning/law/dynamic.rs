@@ -78,6 +78,20 @@ impl Law for DynamicNormOptimal {
         self.inner.update(input, &self.filtered, next)
     }
 
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        check("to_error", to_error, self.n_samples, self.filter.n_inputs())?;
+        if !self.inner.transposed(dual, to_input, &mut self.filtered)? {
+            return Ok(false);
+        }
+        self.filter.run_transposed(&self.filtered, to_error);
+        Ok(true)
+    }
+
     fn reset(&mut self) {}
 
     fn describe(&self) -> String {

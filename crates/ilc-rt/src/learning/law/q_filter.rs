@@ -189,7 +189,16 @@ impl QRunner {
                     }
                 }
             }
-            Kind::Symmetric(_) | Kind::Switched(_) => return Ok(false),
+            Kind::Symmetric(filter) => {
+                for channel in 0..n_channels {
+                    filter.apply_transposed(signal, channel, n_channels)?;
+                }
+            }
+            Kind::Switched(filter) => {
+                for channel in 0..n_channels {
+                    filter.apply_transposed(signal, channel, n_channels)?;
+                }
+            }
         }
         Ok(true)
     }

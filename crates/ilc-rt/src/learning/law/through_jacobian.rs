@@ -142,6 +142,46 @@ impl<L: Law> Law for ThroughJacobian<L> {
         self.law.expect(disturbance);
     }
 
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let (p, m) = (self.n_coordinates, self.n_joints);
+        let n_samples = self.n_samples(dual);
+        check("dual", dual, n_samples, m)?;
+        check("to_error", to_error, n_samples, p)?;
+        self.joint_error.resize(n_samples * m, 0.0);
+        if !self.law.transposed(dual, to_input, &mut self.joint_error)? {
+            return Ok(false);
+        }
+        let one_for_all = self.inverses.len() == m * p;
+        to_error.fill(0.0);
+        for k in 0..n_samples {
+            let at = if one_for_all { 0 } else { k * m * p };
+            for joint in 0..m {
+                let row = &self.inverses[at + joint * p..at + (joint + 1) * p];
+                for (value, entry) in to_error[k * p..(k + 1) * p].iter_mut().zip(row) {
+                    *value += entry * self.joint_error[k * m + joint];
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    fn taken_back(&mut self) {
+        self.law.taken_back();
+    }
+
+    fn goes_back(&self) -> bool {
+        self.law.goes_back()
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.law.remark()
+    }
+
     fn reset(&mut self) {
         self.law.reset();
     }

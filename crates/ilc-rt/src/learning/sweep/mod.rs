@@ -19,6 +19,7 @@ mod factor;
 mod fixed;
 mod fixed_step;
 mod general;
+mod inverse;
 mod lanes;
 mod rate;
 mod record;
@@ -30,6 +31,7 @@ mod wide;
 
 pub use factor::{FactorError, Form, Gains};
 pub use general::General;
+pub use inverse::Inverse;
 pub use rate::Rate;
 pub use stage::{Stage, Stages};
 

@@ -267,6 +267,43 @@ impl ErrorFilter {
             std::mem::swap(state, next);
         }
     }
+
+    /// Applies the transpose of [`ErrorFilter::run`]: the same recursion from the end of the run.
+    ///
+    /// # Shapes
+    /// - as [`ErrorFilter::run`], `error` being overwritten
+    pub fn run_transposed(&mut self, filtered: &[f64], error: &mut [f64]) {
+        let n_outputs = self.n_outputs();
+        let Self { filter, coupling, n_inputs, passes, coupled, state, next } = self;
+        let skip = if *passes { *n_inputs } else { 0 };
+        let n_samples = (filtered.len() / n_outputs.max(1)).min(error.len() / (*n_inputs).max(1));
+        state.fill(0.0);
+        for k in (0..n_samples).rev() {
+            let (plain, out) = filtered[k * n_outputs..(k + 1) * n_outputs].split_at(skip);
+            for (i, value) in coupled.iter_mut().enumerate() {
+                *value = dot_column(filter.b(), i, state) + dot_column(filter.d(), i, out);
+            }
+            for (i, value) in next.iter_mut().enumerate() {
+                *value = dot_column(filter.a(), i, state) + dot_column(filter.c(), i, out);
+            }
+            std::mem::swap(state, next);
+            let sample = &mut error[k * *n_inputs..(k + 1) * *n_inputs];
+            match coupling.get(k) {
+                Some(coupling) => {
+                    let to = sample.iter_mut().enumerate();
+                    to.for_each(|(i, value)| *value = dot_column(coupling, i, coupled));
+                }
+                None => sample.copy_from_slice(coupled),
+            }
+            for (value, plain) in sample.iter_mut().zip(plain) {
+                *value += plain;
+            }
+        }
+    }
+}
+
+fn dot_column(matrix: &DMatrix<f64>, col: usize, signal: &[f64]) -> f64 {
+    signal.iter().enumerate().map(|(row, value)| matrix[(row, col)] * value).sum()
 }
 
 fn dot(matrix: &DMatrix<f64>, row: usize, signal: &[f64]) -> f64 {

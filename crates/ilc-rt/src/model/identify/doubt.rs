@@ -12,6 +12,9 @@ const RESIDUAL_MAX: f64 = 0.25;
 /// What speaks against a model.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Doubt {
+    /// There is no output.
+    #[error("the output does not answer at any frequency: the axis sticks or is not connected")]
+    Silent,
     /// Most of the output is not due to the input.
     #[error(
         "the output hardly follows the input (median coherence {median:.2}, {COHERENCE_MIN} is \
@@ -32,12 +35,28 @@ pub enum Doubt {
         /// Weighted RMS of the fit's residual, relative to the response.
         residual_rms: f64,
     },
+    /// A cell description does not take such a model.
+    #[error("the fit has {what} {value:.4}, a cell takes {low} to {high}")]
+    BeyondCell {
+        /// Which figure, with its unit.
+        what: &'static str,
+        /// The figure.
+        value: f64,
+        /// The least that a cell takes.
+        low: f64,
+        /// The most.
+        high: f64,
+    },
 }
 
 /// Returns what speaks against a model with that residual; `None` if nothing does.
 ///
-/// A coherence with a median below 0.7, or a relative residual above 0.25.
+/// No output at all, a coherence with a median below 0.7, or a relative residual above 0.25.
 pub fn doubt(measured: &FrequencyResponse, residual_rms: f64) -> Option<Doubt> {
+    let is_silent = measured.response.iter().all(|response| response.norm() <= 0.0);
+    if is_silent && !measured.response.is_empty() {
+        return Some(Doubt::Silent);
+    }
     let mut coherence = measured.coherence.clone();
     coherence.sort_by(f64::total_cmp);
     let n = coherence.len();

@@ -7,6 +7,7 @@
 
 mod doubt;
 mod excitation;
+mod fraction_start;
 mod least_squares;
 mod multisine;
 mod rational;

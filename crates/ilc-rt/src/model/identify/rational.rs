@@ -13,6 +13,13 @@ const POLES_MAX: usize = 20;
 /// Rounds of linear fits, each weighted by the last one's denominator.
 const ROUNDS: usize = 40;
 
+/// Residual up to which a fit without reflected poles is not questioned.
+const GOOD: f64 = 0.25;
+/// By what factor the residual of a lower degree must be smaller to be taken.
+const LOWER_IS_BETTER: f64 = 0.1;
+/// Residual above which a fit is none.
+const HOPELESS: f64 = 3.0;
+
 /// A fitted fraction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RationalFit {
@@ -40,7 +47,8 @@ pub struct RationalFit {
 /// # Errors
 /// - [`ModelError::Parameter`] for degrees out of range, [`ModelError::SampleTime`], and as
 ///   [`super::fit_second_order`] for the response.
-/// - [`ModelError::Numerics`] if the linear fit has no solution.
+/// - [`ModelError::Numerics`] if the linear fit has no solution; [`ModelError::Parameter`] with the
+///   residual if what comes out has nothing of the response.
 /// # Source
 /// - \[sanathanan1963\]; \[pintelon2012\], section 9.8.
 pub fn fit_rational(
@@ -68,6 +76,45 @@ pub fn fit_rational(
         return Err(ModelError::SampleTime { dt_s });
     }
     measured.check(n_zeros + n_poles + 1)?;
+    let measured = &measured.answered();
+    measured.check(n_zeros + n_poles + 1)?;
+    let mut best = fit_degrees(measured, (n_zeros, n_poles), delay_s, dt_s);
+    // With more poles than the response has some of them have nowhere to be: they come out anywhere,
+    // also unstable, and their reflection is another model. The fraction of lower degree, which is one
+    // of those asked for, has no such poles.
+    let is_good = |fit: &RationalFit| fit.reflected_poles == 0 && fit.residual_rms < GOOD;
+    for fewer in (1..n_poles).rev() {
+        if best.as_ref().is_ok_and(is_good) {
+            break;
+        }
+        let Ok(found) = fit_degrees(measured, (n_zeros.min(fewer), fewer), delay_s, dt_s) else {
+            continue;
+        };
+        let is_better = best
+            .as_ref()
+            .map_or(true, |fit| found.residual_rms < LOWER_IS_BETTER * fit.residual_rms);
+        if is_better && found.reflected_poles == 0 {
+            best = Ok(found);
+        }
+    }
+    let best = best?;
+    if best.residual_rms.is_nan() || best.residual_rms > HOPELESS {
+        return Err(ModelError::Parameter {
+            what: "residual of the rational fit",
+            value: best.residual_rms,
+            allowed: "above 3 the fraction has nothing of the response: try other degrees or a delay",
+        });
+    }
+    Ok(best)
+}
+
+/// Fits a fraction of exactly these degrees (zeros, poles).
+fn fit_degrees(
+    measured: &FrequencyResponse,
+    (n_zeros, n_poles): (usize, usize),
+    delay_s: f64,
+    dt_s: Option<f64>,
+) -> Result<RationalFit, ModelError> {
     let problem = Problem::new(measured, n_zeros, n_poles, delay_s, dt_s);
     let mut fraction = problem.linear_rounds()?;
     let reflected_poles = problem.stabilize(&mut fraction)?;
@@ -376,6 +423,34 @@ mod tests {
             let found = fit_rational(&data, 3, 4, 0.0, Some(dt_s)).unwrap();
             let worst = largest_difference(&found.model, &data, 0.0);
             assert!(worst < 1e-6, "dt_s = {dt_s}: {worst}, {}", found.residual_rms);
+        }
+    }
+
+    #[test]
+    fn more_poles_and_zeros_than_there_are_do_no_harm() {
+        // (s^2 + 6 s + 3600) / ((s^2 + 9 s + 8100) (s + 40)), and one of another kind.
+        let resonant =
+            from_transfer_function(&[1.0, 6.0, 3600.0], &[1.0, 49.0, 8460.0, 324_000.0], None)
+                .unwrap();
+        let lag = from_transfer_function(&[40.0], &[1.0, 40.0], None).unwrap();
+        for truth in [resonant, lag, flexible()] {
+            for dt_s in [None, Some(1e-3)] {
+                let model = match dt_s {
+                    None => truth.clone(),
+                    Some(dt_s) => discretize(&truth, dt_s, Method::ZeroOrderHold).unwrap(),
+                };
+                let data = measured(&model, 0.0);
+                let n = truth.n_states();
+                for n_poles in n..n + 4 {
+                    for n_zeros in n.saturating_sub(1)..=n_poles {
+                        let found = fit_rational(&data, n_zeros, n_poles, 0.0, dt_s).unwrap();
+                        let name = format!("{n_zeros}/{n_poles} for {n}, {dt_s:?}");
+                        assert!(found.residual_rms < 1e-4, "{name}: {}", found.residual_rms);
+                        let worst = largest_difference(&found.model, &data, 0.0);
+                        assert!(worst < 1e-3, "{name}: {worst}");
+                    }
+                }
+            }
         }
     }
 

@@ -83,8 +83,8 @@ pub fn frequency_response(
         let cross = spectra.cross[bin];
         measured.frequency_hz.push(bin as f64 / (spectra.n as f64 * dt_s));
         measured.response.push(cross / uu);
-        // An output that is zero follows the input as well as can be.
-        let coherence = if yy > 0.0 { cross.norm_sqr() / (uu * yy) } else { 1.0 };
+        // Of an output that is zero nothing follows the input.
+        let coherence = if yy > 0.0 { cross.norm_sqr() / (uu * yy) } else { 0.0 };
         measured.coherence.push(coherence.min(1.0));
     }
     Ok(measured)
@@ -110,6 +110,25 @@ impl FrequencyResponse {
             coherence: pick(&self.coherence),
             n_averages: self.n_averages,
         }
+    }
+
+    /// Returns the part that answers at all: a response of 0 has no logarithm to fit.
+    pub(super) fn answered(&self) -> Self {
+        let answers: Vec<usize> =
+            (0..self.response.len()).filter(|&i| self.response[i].norm() > 0.0).collect();
+        let pick = |values: &[f64]| answers.iter().map(|&i| values[i]).collect();
+        Self {
+            frequency_hz: pick(&self.frequency_hz),
+            response: answers.iter().map(|&i| self.response[i]).collect(),
+            coherence: pick(&self.coherence),
+            n_averages: self.n_averages,
+        }
+    }
+
+    /// Returns the middle of the band, where a model is put of which nothing is known.
+    pub(super) fn middle_hz(&self) -> f64 {
+        let ends = (self.frequency_hz.first(), self.frequency_hz.last());
+        if let (Some(low), Some(high)) = ends { (low * high).sqrt() } else { 1.0 }
     }
 
     /// Returns the relative standard deviation of each estimate, of magnitude as of phase in rad.
@@ -178,7 +197,8 @@ impl FrequencyResponse {
             if !(0.0..=1.0).contains(&c) {
                 return bad("coherence", c);
             }
-            if g.norm() <= 0.0 {
+            // Without coherence a response of 0 is what a silent axis shows; with it, a contradiction.
+            if g.norm() <= 0.0 && c > 0.0 {
                 return Err(ModelError::Parameter {
                     what: "response",
                     value: 0.0,

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DVector};
 
 use super::FrequencyResponse;
+use super::fraction_start::{Begin, begins};
 use super::least_squares::{Minimum, minimize};
 use crate::model::{Method, ModelError, StateSpace, discretize, second_order, unwrap_phase};
 
@@ -13,7 +14,9 @@ const FREQUENCIES: usize = 16;
 /// Damping ratios tried to begin from.
 const DAMPINGS: [f64; 4] = [0.05, 0.2, 0.7, 1.5];
 /// Starts that are followed to their minimum.
-const FOLLOWED: usize = 6;
+const FOLLOWED: usize = 10;
+/// Cost of each frequency's weight below which a start has led to the model itself.
+const EXACT: f64 = 1e-22;
 /// Delays tried to begin from, in periods of the highest frequency.
 const DELAYS: [f64; 5] = [0.0, 0.1, 0.25, 0.5, 1.0];
 /// Natural frequencies may lie outside the band by this factor.
@@ -69,7 +72,9 @@ pub struct SecondOrderFit {
 ///
 /// `min sum_k w_k |ln (H_k / G(f_k))|^2`, `w = gamma^2 / (1 - gamma^2)`: magnitude counts in relative
 /// terms and phase in radians, both as much as the coherence trusts them. Damping and natural
-/// frequency are positive by construction, so the model is stable.
+/// frequency are positive by construction, so the model is stable. An axis that answers at two
+/// frequencies or fewer gives a model without gain and a residual of 1, which [`super::doubt`] speaks
+/// against.
 ///
 /// # Shapes
 /// - `measured`: more than two frequencies, without 0 Hz
@@ -92,10 +97,14 @@ pub fn fit_second_order(
     }
     check_known(known)?;
     measured.check(4)?;
-    let fit = Fit::new(measured, dt_s, known);
+    let answered = measured.answered();
+    if 2 * answered.frequency_hz.len() <= 4 {
+        return Ok(SecondOrderFit::of_silence(measured, dt_s, known));
+    }
+    let fit = Fit::new(&answered, dt_s, known);
     let mut starts: Vec<(f64, Sign)> = Vec::new();
     let mut points = Vec::new();
-    for start in fit.starts() {
+    for start in fit.linear_starts().into_iter().chain(fit.starts()) {
         let cost = fit.residuals(&start.0, start.1).norm_squared();
         if cost.is_finite() {
             starts.push((cost, start.1));
@@ -104,12 +113,16 @@ pub fn fit_second_order(
     }
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| starts[a].0.total_cmp(&starts[b].0));
+    let all: f64 = fit.root_weight.iter().map(|weight| weight * weight).sum();
     let mut best: Option<(Minimum, Sign)> = None;
     for &i in order.iter().take(FOLLOWED) {
         let sign = starts[i].1;
         let found = minimize(&points[i], &|x| fit.residuals(x, sign));
         if best.as_ref().is_none_or(|(least, _)| found.cost < least.cost) {
             best = Some((found, sign));
+        }
+        if best.as_ref().is_some_and(|(least, _)| least.cost <= EXACT * all) {
+            break;
         }
     }
     let (minimum, sign) = best.ok_or(ModelError::Numerics {
@@ -120,6 +133,27 @@ pub fn fit_second_order(
 }
 
 type Sign = f64;
+
+impl SecondOrderFit {
+    /// The fit to an axis that does not answer: no gain, and all of the response left over.
+    fn of_silence(measured: &FrequencyResponse, dt_s: Option<f64>, known: Known) -> Self {
+        let model = SecondOrder {
+            gain: known.gain.unwrap_or(0.0),
+            natural_frequency_hz: measured.middle_hz(),
+            damping: 1.0,
+            delay_s: known.delay_s.unwrap_or(0.0),
+            dt_s,
+        };
+        Self {
+            model,
+            gain_deviation: 0.0,
+            natural_frequency_deviation_hz: model.natural_frequency_hz,
+            damping_deviation: 1.0,
+            delay_deviation_s: 0.0,
+            residual_rms: 1.0,
+        }
+    }
+}
 
 fn check_known(known: Known) -> Result<(), ModelError> {
     let bad = |value: f64| !value.is_finite();
@@ -200,6 +234,42 @@ impl<'a> Fit<'a> {
             residuals[2 * k + 1] = weight * ratio.arg();
         }
         residuals
+    }
+
+    /// The fractions of linear fits, each with the gain that suits it, and with either sign.
+    fn linear_starts(&self) -> Vec<(Vec<f64>, Sign)> {
+        let f = &self.measured.frequency_hz;
+        let (low_hz, high_hz) = (f[0] / BEYOND_BAND, f[f.len() - 1] * BEYOND_BAND);
+        let mut starts = Vec::new();
+        for begin in begins(self.measured, &self.root_weight, self.dt_s, self.known.delay_s) {
+            let Begin { w0_rad_s, damping, delay_s, sign } = begin;
+            let natural_frequency_hz =
+                (w0_rad_s / TAU).clamp(low_hz * (1.0 + 1e-6), high_hz * (1.0 - 1e-6));
+            let damping = damping.clamp(2.0 * DAMPING_RANGE.0, 0.5 * DAMPING_RANGE.1);
+            let dt_s = self.dt_s;
+            let bare = SecondOrder { gain: 1.0, natural_frequency_hz, damping, delay_s, dt_s };
+            let shape = bare.shape();
+            let (mut log, mut all) = (0.0, 0.0);
+            for (k, f) in f.iter().enumerate() {
+                let weight = self.root_weight[k].powi(2);
+                log += weight * (self.measured.response[k] / shape.at(*f)).norm().ln();
+                all += weight;
+            }
+            for sign in [sign, -sign] {
+                if self.known.gain.is_some_and(|gain| gain * sign < 0.0) {
+                    continue;
+                }
+                let mut start = vec![(TAU * natural_frequency_hz).ln(), damping.ln()];
+                if self.known.gain.is_none() {
+                    start.push(log / all);
+                }
+                if self.known.delay_s.is_none() {
+                    start.push(delay_s / self.tau_0);
+                }
+                starts.push((start, sign));
+            }
+        }
+        starts
     }
 
     /// Natural frequencies and dampings over the band, each with the gain and the delay that suit it.
@@ -410,6 +480,92 @@ mod tests {
             prop_assert!((model.delay_s - delay_s).abs() < 1e-8);
             prop_assert!(found.residual_rms < 1e-6);
         }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+        #[test]
+        fn a_resonance_below_or_above_the_band_is_found_too(
+            low_hz in 1.0..40.0_f64,
+            width in 1.6..6.0_f64,
+            place in prop_oneof![0.25..1.0, 1.0..2.5_f64],
+            damping in 0.05..1.5,
+            gain in prop_oneof![-3.0..-0.3, 0.3..3.0],
+            delay_s in prop::sample::select(vec![0.0, 2e-3, 6e-3, 0.0133]),
+            is_sampled: bool,
+        ) {
+            let dt_s = is_sampled.then_some(2e-3);
+            let high_hz = low_hz * width;
+            // Below the lower end or above the upper one.
+            let natural_frequency_hz = place * if place < 1.0 { low_hz } else { high_hz };
+            let truth = SecondOrder { gain, natural_frequency_hz, damping, delay_s, dt_s };
+            let frequency_hz: Vec<f64> =
+                (0..90).map(|k| low_hz + (high_hz - low_hz) * f64::from(k) / 89.0).collect();
+            prop_assume!(high_hz < 220.0 && natural_frequency_hz < 220.0);
+            let found = fit_second_order(&measured(&truth, frequency_hz), dt_s, Known::default())
+                .map_err(|error| TestCaseError::fail(error.to_string()))?;
+            let model = found.model;
+            prop_assert!(found.residual_rms < 1e-7, "{found:?} {truth:?}");
+            prop_assert!((model.natural_frequency_hz / natural_frequency_hz - 1.0).abs() < 1e-2);
+            prop_assert!((model.gain / gain - 1.0).abs() < 1e-2, "{model:?} {truth:?}");
+        }
+    }
+
+    #[test]
+    fn bands_far_above_the_resonance_are_extrapolated() {
+        for (natural_frequency_hz, damping, low, high) in [(12.0, 0.5, 36, 80), (12.0, 0.1, 24, 60)]
+        {
+            let (gain, dt_s) = (1.0, Some(2e-3));
+            let truth = SecondOrder { gain, natural_frequency_hz, damping, delay_s: 0.0, dt_s };
+            let frequency_hz: Vec<f64> = (2 * low..=2 * high).map(|k| 0.5 * f64::from(k)).collect();
+            let data = measured(&truth, frequency_hz);
+            for known in [
+                Known::default(),
+                Known { gain: Some(1.0), delay_s: None },
+                Known { gain: None, delay_s: Some(0.0) },
+                Known { gain: Some(1.0), delay_s: Some(0.0) },
+            ] {
+                let found = fit_second_order(&data, dt_s, known).unwrap();
+                let off = found.model.natural_frequency_hz / natural_frequency_hz - 1.0;
+                assert!(off.abs() < 1e-5 && found.residual_rms < 1e-8, "{found:?}");
+                assert!((found.model.gain - 1.0).abs() < 1e-4, "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_axis_that_does_not_answer_has_no_gain_and_all_left_over() {
+        let n = band().len();
+        let silence = FrequencyResponse {
+            frequency_hz: band(),
+            response: vec![Complex::new(0.0, 0.0); n],
+            coherence: vec![0.0; n],
+            n_averages: 4.0,
+        };
+        for dt_s in [None, Some(2e-3)] {
+            let found = fit_second_order(&silence, dt_s, Known::default()).unwrap();
+            assert!(found.model.gain.abs() < 1e-300 && (found.residual_rms - 1.0).abs() < 1e-15);
+            let doubt = super::super::doubt(&silence, found.residual_rms).unwrap();
+            assert!(doubt.to_string().contains("does not answer"), "{doubt}");
+            let bound =
+                super::super::uncertainty(&silence, &found.model.response(&band()), 3.0).unwrap();
+            assert!(bound.bound.iter().all(|bound| (bound - 1.0).abs() < 1e-12), "{bound:?}");
+        }
+        // Silence at some frequencies, between others that answer, is left out.
+        let truth = SecondOrder {
+            gain: 1.3,
+            natural_frequency_hz: 15.0,
+            damping: 0.4,
+            delay_s: 6e-3,
+            dt_s: Some(2e-3),
+        };
+        let mut data = measured(&truth, band());
+        for k in (0..n).step_by(3) {
+            data.response[k] = Complex::new(0.0, 0.0);
+            data.coherence[k] = 0.0;
+        }
+        let found = fit_second_order(&data, Some(2e-3), Known::default()).unwrap();
+        assert!((found.model.natural_frequency_hz - 15.0).abs() < 1e-5, "{found:?}");
     }
 
     #[test]

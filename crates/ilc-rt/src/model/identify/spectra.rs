@@ -43,6 +43,17 @@ impl Spectra {
     /// # Errors
     /// [`ModelError::Length`] or [`ModelError::Parameter`] if the signals hold no piece.
     pub(super) fn of(u: &[f64], y: &[f64], averaging: Averaging) -> Result<Self, ModelError> {
+        let n = match averaging {
+            Averaging::Periods { period_samples: n } => n,
+            Averaging::Welch { segment_samples: n, .. } => n,
+        };
+        if n < 8 || n > u.len() {
+            return Err(ModelError::Parameter {
+                what: "samples of a period or segment",
+                value: n as f64,
+                allowed: "at least 8, and no more than the signals hold, are needed",
+            });
+        }
         let (n, step, window) = match averaging {
             Averaging::Periods { period_samples: n } => (n, n, vec![1.0; n]),
             Averaging::Welch { segment_samples: n, overlap_samples } => {
@@ -57,13 +68,6 @@ impl Spectra {
                 (n, n - overlap_samples, (0..n).map(hann).collect())
             }
         };
-        if n < 8 || n > u.len() {
-            return Err(ModelError::Parameter {
-                what: "samples of a period or segment",
-                value: n as f64,
-                allowed: "at least 8, and no more than the signals hold, are needed",
-            });
-        }
         let bins = n / 2 + 1;
         let mut sums = Self {
             n,

@@ -51,8 +51,10 @@ pub fn uncertainty(
     let sigma = measured.relative_deviation();
     let mut pointwise = Vec::with_capacity(model.len());
     for (row, ((h, g), sigma)) in measured.response.iter().zip(model).zip(&sigma).enumerate() {
-        let ratio = h / g;
-        let value = (ratio - 1.0).norm() + deviations * sigma * ratio.norm();
+        // What does not answer is off by all that the model says, whatever that is.
+        let ratio = if h.norm() > 0.0 { h / g } else { Complex::new(0.0, 0.0) };
+        let spread = if h.norm() > 0.0 { deviations * sigma * ratio.norm() } else { 0.0 };
+        let value = (ratio - 1.0).norm() + spread;
         if !value.is_finite() {
             return Err(ModelError::NotFinite { what: "the uncertainty", row, col: 0, value });
         }

@@ -79,6 +79,24 @@ pub fn fit_velocity_loop(
         return Err(refused("delay_s", value, "a known delay must be finite"));
     }
     measured.check(3)?;
+    let answered = measured.answered();
+    if 2 * answered.frequency_hz.len() <= 3 {
+        let model = VelocityLoop {
+            gain: if delay_s.is_some() { 1.0 } else { 0.0 },
+            bandwidth_hz: measured.middle_hz(),
+            delay_s: delay_s.unwrap_or(0.0),
+            position_gain_per_s: kv,
+            dt_s,
+        };
+        return Ok(VelocityLoopFit {
+            model,
+            gain_deviation: 0.0,
+            bandwidth_deviation_hz: model.bandwidth_hz,
+            delay_deviation_s: 0.0,
+            residual_rms: 1.0,
+        });
+    }
+    let measured = &answered;
     let root_weight: Vec<f64> = measured.weights().iter().map(|weight| weight.sqrt()).collect();
     let f = &measured.frequency_hz;
     let tau_0 = 1.0 / (TAU * f[f.len() - 1]);

@@ -12,8 +12,10 @@ pub use cost::{Cost, Weights};
 pub use pairing::Paired;
 pub use plant::Plant;
 
-use crate::learning::error::{check, check_length, check_place, is_finite};
-use crate::learning::sweep::{self, Channels, FactorError, Form, Gains, Rate, Run, Stages, Sweep};
+use crate::learning::error::{check, check_counts, check_length, check_place, is_finite};
+use crate::learning::sweep::{
+    self, Channels, FactorError, Form, Gains, Inverse, Rate, Run, Stages, Sweep,
+};
 use crate::learning::{Law, LearningError, Structure};
 use crate::model::StateSpace;
 
@@ -38,7 +40,6 @@ use decouple::{Part, parts};
 /// # Source
 /// - \[haas2016\], Eq. (5) to (12); \[barton2010\], Eq. (3.13) to (3.15). They solve the same problem
 ///   with dense matrices; here it is solved by a Riccati recursion.
-#[derive(Debug)]
 pub struct NormOptimal {
     n_samples: usize,
     n_inputs: usize,
@@ -51,6 +52,28 @@ pub struct NormOptimal {
     parts: Vec<Box<dyn Sweep>>,
     /// Samples at the start of the run whose error no part looks at, at least in some output.
     n_unread: usize,
+    inverses: Inverses,
+}
+
+/// The Hessians of the parts, factorised only if somebody asks for them.
+enum Inverses {
+    /// What there is to factorise: the stages of each part, its channels and its free samples.
+    Of(Vec<(Box<dyn Stages + Send>, Channels, usize)>),
+    Made(Vec<Inverse>),
+    /// The stages were not given away.
+    None,
+}
+
+impl std::fmt::Debug for NormOptimal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("NormOptimal")
+            .field("n_samples", &self.n_samples)
+            .field("n_inputs", &self.n_inputs)
+            .field("n_outputs", &self.n_outputs)
+            .field("weights", &self.weights)
+            .field("parts", &self.parts)
+            .finish_non_exhaustive()
+    }
 }
 
 impl NormOptimal {
@@ -87,18 +110,13 @@ impl NormOptimal {
         form: Form,
     ) -> Result<Self, LearningError> {
         let (plant, cost) = (model.into(), weights.into());
-        let none = |what| Err(LearningError::Empty { what });
-        if n_samples == 0 {
-            return none("n_samples");
-        }
-        plant.check(n_samples)?;
         let (n_inputs, n_outputs) = (plant.at(0).n_inputs(), plant.at(0).n_outputs());
-        if n_inputs == 0 {
-            return none("n_inputs");
-        }
-        if n_outputs == 0 {
-            return none("n_outputs");
-        }
+        check_counts(&[
+            ("n_samples", n_samples),
+            ("n_inputs", n_inputs),
+            ("n_outputs", n_outputs),
+        ])?;
+        plant.check(n_samples)?;
         cost.check(n_samples, n_inputs, n_outputs)?;
         let mut law = Self {
             n_samples,
@@ -110,8 +128,10 @@ impl NormOptimal {
             conditioning: 1.0,
             parts: Vec::new(),
             n_unread: 0,
+            inverses: Inverses::None,
         };
         let mut n_read = 0;
+        let mut problems: Vec<(Box<dyn Stages + Send>, Channels, usize)> = Vec::new();
         for Part { plant, cost, inputs, outputs } in parts(plant, &cost)? {
             let (told, rate) = (cost.told(), cost.rate);
             let paired = Paired::new(plant.borrow(), n_samples, cost)?;
@@ -120,11 +140,14 @@ impl NormOptimal {
             n_read += channels.outputs.len();
             if rate > 0.0 {
                 let rated = Rate { inner: paired, weight: rate * rate };
-                law.add(&rated, channels, free_samples, form, &told)?;
+                law.add(&rated, channels.clone(), free_samples, form, &told)?;
+                problems.push((Box::new(rated), channels, free_samples));
             } else {
-                law.add(&paired, channels, free_samples, form, &told)?;
+                law.add(&paired, channels.clone(), free_samples, form, &told)?;
+                problems.push((Box::new(paired), channels, free_samples));
             }
         }
+        law.inverses = Inverses::Of(problems);
         if n_read < n_outputs {
             law.n_unread = n_samples;
         }
@@ -164,6 +187,7 @@ impl NormOptimal {
             conditioning: 1.0,
             parts: Vec::new(),
             n_unread: 0,
+            inverses: Inverses::None,
         };
         law.add(stages, channels, free_samples, Form::default(), told)?;
         Ok(law)
@@ -203,6 +227,40 @@ impl NormOptimal {
     pub fn n_parts(&self) -> usize {
         self.parts.len()
     }
+
+    /// Writes `H^-1 x`, `H` being the Hessian of the cost; returns whether it can be had.
+    ///
+    /// # Errors
+    /// - [`LearningError::Length`] for signals of another length.
+    pub(in crate::learning) fn solve(
+        &mut self,
+        x: &[f64],
+        z: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        check_length("x", x, self.n_samples, self.n_inputs)?;
+        check_length("z", z, self.n_samples, self.n_inputs)?;
+        let n_inputs = self.n_inputs;
+        let Some(inverses) = self.inverses() else { return Ok(false) };
+        for inverse in inverses {
+            inverse.solve(x, z, n_inputs);
+        }
+        Ok(true)
+    }
+
+    /// Returns the inverses of the parts' Hessians; `None` where they cannot be had.
+    fn inverses(&mut self) -> Option<&mut Vec<Inverse>> {
+        if let Inverses::Of(problems) = &mut self.inverses {
+            let made: Result<Vec<Inverse>, FactorError> = std::mem::take(problems)
+                .into_iter()
+                .map(|(stages, channels, free)| Inverse::new(stages, channels, free))
+                .collect();
+            self.inverses = made.map_or(Inverses::None, Inverses::Made);
+        }
+        match &mut self.inverses {
+            Inverses::Made(inverses) => Some(inverses),
+            _ => None,
+        }
+    }
 }
 
 impl Law for NormOptimal {
@@ -229,6 +287,24 @@ impl Law for NormOptimal {
         check("input", input, n_samples, n_inputs)?;
         check("error", error, n_samples, n_outputs)?;
         check("next", next, n_samples, n_inputs)
+    }
+
+    fn transposed(
+        &mut self,
+        dual: &[f64],
+        to_input: &mut [f64],
+        to_error: &mut [f64],
+    ) -> Result<bool, LearningError> {
+        let Self { n_samples, n_inputs, n_outputs, .. } = *self;
+        check("dual", dual, n_samples, n_inputs)?;
+        check_length("to_input", to_input, n_samples, n_inputs)?;
+        check_length("to_error", to_error, n_samples, n_outputs)?;
+        let Some(inverses) = self.inverses() else { return Ok(false) };
+        to_error.fill(0.0);
+        for inverse in inverses {
+            inverse.transposed(dual, to_input, to_error, (n_inputs, n_outputs));
+        }
+        Ok(true)
     }
 
     fn structure(&self) -> Structure<'_> {

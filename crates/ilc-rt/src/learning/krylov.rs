@@ -1,12 +1,12 @@
 //! Largest eigenvalues and fixed points of maps that are only known by what they do to a signal.
 //!
 //! Lanczos for symmetric maps, Arnoldi for the others, GMRES for fixed points; nothing of the square
-//! of the run's length is ever stored. Used by this folder only.
+//! of the run's length is ever stored. [`analysis`](super::analysis) and the norm of
+//! the lifted operator are found with it.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::iteration::{noise, norm};
 use crate::learning::LearningError;
 
 /// A figure with how far off it may be.
@@ -20,7 +20,7 @@ pub struct Estimate {
 
 impl Estimate {
     /// A figure that is exact up to rounding.
-    pub(super) fn exact(value: f64) -> Self {
+    pub(in crate::learning) fn exact(value: f64) -> Self {
         Self { value, error: value.abs() * 1e-12 }
     }
 }
@@ -31,7 +31,7 @@ type Map<'a> = dyn FnMut(&[f64], &mut [f64]) -> Result<(), LearningError> + 'a;
 ///
 /// Lanczos with full orthogonalisation, restarted with the best vectors. The error is the residual of
 /// the eigenvector, within which an eigenvalue lies.
-pub(super) fn largest_symmetric(
+pub(in crate::learning) fn largest_symmetric(
     n: usize,
     map: &mut Map,
     n_basis: usize,
@@ -92,7 +92,7 @@ pub(super) fn largest_symmetric(
 /// Returns the largest absolute eigenvalue of a map, by Arnoldi after some plain steps.
 ///
 /// The error is how much the estimate still moved over the last sixth of the basis.
-pub(super) fn spectral_radius(
+pub(in crate::learning) fn spectral_radius(
     n: usize,
     map: &mut Map,
     n_plain: usize,
@@ -140,7 +140,7 @@ pub(super) fn spectral_radius(
 }
 
 /// Solves `x = map(x) + right` by restarted GMRES; returns the solution and its relative residual.
-pub(super) fn fixed_point(
+pub(in crate::learning) fn fixed_point(
     map: &mut Map,
     right: &[f64],
     n_basis: usize,
@@ -197,7 +197,7 @@ pub(super) fn fixed_point(
 }
 
 /// Returns the largest absolute eigenvalue of a small matrix.
-pub(super) fn radius(matrix: &DMatrix<f64>) -> Result<f64, LearningError> {
+pub(in crate::learning) fn radius(matrix: &DMatrix<f64>) -> Result<f64, LearningError> {
     let (rows, cols) = matrix.shape();
     let values = Mat::from_fn(rows, cols, |i, j| matrix[(i, j)]).eigenvalues().map_err(|_| {
         LearningError::Numerics {
@@ -241,4 +241,22 @@ fn unit(mut vector: Vec<f64>) -> Vec<f64> {
         }
     }
     vector
+}
+
+/// Returns the Euclidean norm.
+pub(in crate::learning) fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+/// Returns numbers without pattern between -1 and 1, the same each time.
+pub(in crate::learning) fn noise(count: usize, seed: u64) -> Vec<f64> {
+    let mut word = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    (0..count)
+        .map(|_| {
+            word ^= word << 13;
+            word ^= word >> 7;
+            word ^= word << 17;
+            (word >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        })
+        .collect()
 }
