@@ -36,8 +36,11 @@ ALLOWED = (ValueError, TypeError, MemoryError, OSError)
 # What runs machines or writes files where it is told to.
 SKIPPED = {"Campaign", "Law", "CampaignResult", "IterationRecord", "Experiment", "Identification",
            "swept_sine", "Library", "Cell"}  # fmt: skip
-# Figures that may be infinite by what they mean: a growth without bound, no limit at all.
-UNBOUNDED = {"transient_growth", "spectral_radius", "expected_rms", "growth", "limit",
+# Figures that may be infinite by what they mean: a growth without bound, no limit at all, the
+# deviation of what a measurement does not determine.
+UNBOUNDED = {"bandwidth_deviation_hz", "gain_deviation", "delay_deviation_s", "damping_deviation",
+             "natural_frequency_deviation_hz",
+             "transient_growth", "spectral_radius", "expected_rms", "growth", "limit",
              "uncertainty_allowed", "robust_factor", "contraction", "monotonic_factor",
              "expected_rms_limit", "robust_lifted", "ratio"}  # fmt: skip
 
