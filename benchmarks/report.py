@@ -9,6 +9,7 @@ import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
+from typing import NoReturn
 
 import bounded
 import update
@@ -19,6 +20,8 @@ PEERS = ("numpy", "scipy", "osqp", "clarabel", "piqp")
 
 def main() -> None:
     """Measure, and write what came out."""
+    # Looked for first: the comparisons take minutes.
+    in_rust = criterion(criterion_folder())
     lines = [
         "# Benchmarks",
         "",
@@ -59,7 +62,7 @@ def main() -> None:
         "| bench | median |",
         "|---|--:|",
     ]
-    lines += [f"| {name} | {readable(seconds)} |" for name, seconds in criterion()]
+    lines += [f"| {name} | {readable(seconds)} |" for name, seconds in in_rust]
     (ROOT / "docs" / "benchmarks.md").write_text("\n".join(lines) + "\n")
     print("wrote docs/benchmarks.md")
 
@@ -72,7 +75,9 @@ def progress(what: str, compare: object, n_samples: int) -> dict[str, float]:
 
 def table(columns: dict[int, dict[str, float]]) -> list[str]:
     """Return rows of solvers, each with its time and how many times as long as ours it takes."""
-    names = list(next(iter(columns.values())))
+    names = list(next(iter(columns.values()), {}))
+    if not names or any("ilc-rt" not in seconds for seconds in columns.values()):
+        fail(f"a table of {', '.join(f'N = {n}' for n in columns) or 'nothing'} has no figures")
     head = "| solver |" + "".join(f" N = {n} | times ours |" for n in columns)
     rows = [head, "|---|" + "--:|--:|" * len(columns)]
     for name in names:
@@ -86,16 +91,29 @@ def table(columns: dict[int, dict[str, float]]) -> list[str]:
     return rows
 
 
-def criterion() -> list[tuple[str, float]]:
-    """Return the medians that the Rust benches left, by name."""
+def criterion_folder() -> Path:
+    """Return where the Rust benches leave their figures."""
+    if home := os.environ.get("CRITERION_HOME"):
+        return Path(home)
     described = json.loads(command("cargo", "metadata", "--no-deps", "--format-version", "1"))
-    folder = Path(described["target_directory"]) / "criterion"
+    return Path(described["target_directory"]) / "criterion"
+
+
+def criterion(folder: Path) -> list[tuple[str, float]]:
+    """Return the medians that the Rust benches left, by name; fail if there are none."""
     found = []
     for about in folder.glob("**/new/benchmark.json"):
         estimates = json.loads((about.parent / "estimates.json").read_text())
         name = json.loads(about.read_text())["full_id"]
         found.append((name, estimates["median"]["point_estimate"] * 1e-9))
+    if not found:
+        fail(f"no figures of the Rust benches in {folder}; `make bench` runs them before this")
     return sorted(found)
+
+
+def fail(reason: str) -> NoReturn:
+    """End with one line; what was written before stays as it is."""
+    sys.exit(f"benchmarks/report.py: {reason}")
 
 
 def readable(seconds: float) -> str:

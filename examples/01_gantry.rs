@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         iterations: 10,
         measure: None,
         lockstep: true,
+        simulated: false,
         resume: false,
         library: PathBuf::from(":memory:"),
         disturbance: Disturbance::default(),
@@ -33,7 +34,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("run  max tracking um  max contour um");
     let outcome = supervisor::run(&cell, &options, bus, None, &mut |event| {
         if let Event::Iteration { index, figures, .. } = event {
-            let (tracking, contour) = (figures.tracking_inf_m * 1e6, figures.contour_inf_m * 1e6);
+            let tracking = figures.tracking_inf_m * 1e6;
+            // Absent where one axis moves alone.
+            let contour = figures.contour_inf_m.unwrap_or_default() * 1e6;
             println!("{index:>3}  {tracking:>15.1}  {contour:>14.1}");
         }
     })?;

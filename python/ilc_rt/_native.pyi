@@ -49,6 +49,7 @@ __all__ = [
     "TrajectoryError",
     "Tuning",
     "VelocityLoopFit",
+    "__version__",
     "analyze",
     "butterfly",
     "butterworth",
@@ -88,6 +89,8 @@ __all__ = [
     "uncertainty",
     "zero_phase",
 ]
+
+__version__: str
 
 # Docstrings are those of the compiled classes: help(ilc_rt.StateSpace).
 
@@ -524,7 +527,7 @@ def raster(
     setting: str = "complete",
 ) -> Trajectory: ...
 def gcode(
-    text: str,
+    text: str | bytes,
     *,
     start_m: ArrayLike,
     feed_m_s: float,
@@ -534,6 +537,7 @@ def gcode(
     jerk_max_m_s3: float | ArrayLike,
     rapid_m_s: float | None = None,
     blend_s: float | None = None,
+    block_delete: bool = False,
 ) -> Trajectory: ...
 def tracking_index(
     trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0
@@ -1185,4 +1189,5 @@ def run_events(
     learning: bool = True,
     experiment: object | None = None,
     disturbance: Callable[[int], ArrayLike] | None = None,
+    simulated: bool = False,
 ) -> EventStream: ...

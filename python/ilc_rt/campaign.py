@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from ilc_rt.experiment import Experiment
 
 DEFAULT_LIBRARY = "ilc-library.db"
+# Runs are counted in 32 bits.
+ITERATIONS_MAX = 2**32 - 1
 TRANSPORTS = ("can", "udp", "zenoh", "loopback")
 Drives = Literal["auto", "simulated", "external"]
 
@@ -104,9 +106,12 @@ class Campaign:
 
     Examples
     --------
-    >>> campaign = Campaign("examples/01_gantry.toml", bus="loopback:")  # doctest: +SKIP
-    >>> for record in campaign.run(10):                                  # doctest: +SKIP
-    ...     print(record.index, record.contour_inf_m)
+    >>> campaign = Campaign("examples/01_gantry.toml", bus="loopback:")
+    >>> for record in campaign.run(3):
+    ...     print(f"run {record.index}: {1e6 * record.contour_inf_m:.0f} µm")
+    run 0: 5... µm
+    run 1: ... µm
+    run 2: ... µm
     """
 
     def __init__(
@@ -184,8 +189,9 @@ class Campaign:
         Leaving the loop early stops the axes in a controlled way before this
         iterator is closed. Parameters and errors are those of `run`.
         """
-        if iterations < 1:
-            message = f"iterations = {iterations}: at least 1"
+        if not 1 <= iterations <= ITERATIONS_MAX:
+            allowed = "at least 1" if iterations < 1 else f"at most {ITERATIONS_MAX}"
+            message = f"iterations = {iterations}: {allowed}"
             raise BadInputError(message)
         measure = _measure(self.disturbance, iterations)
         self.result = CampaignResult(self.library)
@@ -250,6 +256,7 @@ class Campaign:
             "learning": self.learning,
             "experiment": self.experiment,
             "disturbance": measure,
+            "simulated": self.simulated,
         }
         apart = self.simulated and self.transport != "loopback"
         drives = None

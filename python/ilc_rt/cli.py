@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Typer
 
+from ilc_rt._native import __version__
 from ilc_rt.commands import (
     demo,
     identify,
@@ -27,6 +28,7 @@ from ilc_rt.errors import (
     EXIT_INTERRUPTED,
     CampaignError,
 )
+from ilc_rt.text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,11 +36,34 @@ if TYPE_CHECKING:
 app = Typer(
     name="ilc",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     help="The motion controller that learns: each run corrects the next.",
 )
+
+
+def _tell_version(*, wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"ilc {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    *,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            is_eager=True,
+            callback=lambda value: _tell_version(wanted=value),
+            help="Show the version and exit.",
+        ),
+    ] = False,
+) -> None:
+    """Take the options that stand before the verb."""
+
+
 app.command("demo")(demo.demo)
 app.command("run")(run.run)
 app.command("identify")(identify.identify)
@@ -94,12 +119,15 @@ def _unexpected(error: Exception) -> int:
         if text:
             _say(text + hint)
         return int(getattr(error, "exit_code", EXIT_BAD_INPUT))
+    if isinstance(error, OverflowError):
+        _say(f"a number is out of range: {error}")
+        return EXIT_BAD_INPUT
     _say(f"unexpected {type(error).__name__}: {error} (ILC_TRACEBACK=1 shows where)")
     return EXIT_FAILURE
 
 
 def _say(reason: str) -> None:
-    typer.echo(f"ilc: {' '.join(reason.split())}", err=True)
+    typer.echo(f"ilc: {printable(' '.join(reason.split()))}", err=True)
 
 
 if __name__ == "__main__":

@@ -86,12 +86,14 @@ class ProgressEvent:
 
 @dataclass(frozen=True, slots=True)
 class IterationEvent:
-    """One run is over and in the library; lengths in metres.
+    """One run is over and in the library; lengths in metres, angles in radians.
 
     `id` is the key of the run in the library, `index` counts the runs of the
     campaign from 0. `tracking_inf_m` and `contour_inf_m` are the largest
     values over time, the `_rms_m` ones root mean squares; all of them are of
-    the measurement that is learned from.
+    the measurement that is learned from. Contour errors are None where the
+    path has none. `axes_tracking_inf_m` and `axes_tracking_rms_m` have one
+    number for each axis, in its own unit.
     """
 
     name: ClassVar[str] = "iteration"
@@ -109,6 +111,22 @@ class IterationEvent:
     update_ms: float | None = None
     rolled_back: bool = False
     digest: str = ""
+    axes_tracking_inf_m: tuple[float, ...] = ()
+    axes_tracking_rms_m: tuple[float, ...] = ()
+    learning_off: bool = False
+    remark: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedEvent:
+    """What the law decided on a run that was told already, as it computed meanwhile."""
+
+    name: ClassVar[str] = "judged"
+    id: int
+    index: int
+    rolled_back: bool
+    learning_off: bool
+    remark: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +160,14 @@ class EndEvent:
 
 
 Event = (
-    StartEvent | StateEvent | ProgressEvent | IterationEvent | LatencyEvent | FaultEvent | EndEvent
+    StartEvent
+    | StateEvent
+    | ProgressEvent
+    | IterationEvent
+    | JudgedEvent
+    | LatencyEvent
+    | FaultEvent
+    | EndEvent
 )
 
 _CLASSES: dict[str, type[Any]] = {
@@ -152,6 +177,7 @@ _CLASSES: dict[str, type[Any]] = {
         StateEvent,
         ProgressEvent,
         IterationEvent,
+        JudgedEvent,
         LatencyEvent,
         FaultEvent,
         EndEvent,
@@ -230,9 +256,12 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Event:
             values["input_units"] = tuple(values.get("input_units", ()))
             report = values.get("rt")
             values["rt"] = _real_time_report(report) if report else None
+        elif cls is IterationEvent:
+            for name in ("axes_tracking_inf_m", "axes_tracking_rms_m"):
+                values[name] = tuple(values.get(name) or ())
         elif cls is LatencyEvent:
             values = {key: parse_histogram(value) for key, value in values.items()}
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
         message = f'event "{data["event"]}" is malformed ({error}): {data!r}'
         raise EventError(message) from error
     event: Event = cls(**values)

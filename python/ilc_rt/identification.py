@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ilc_rt._native import FrequencyResponse, SecondOrderFit, VelocityLoopFit, doubt
-from ilc_rt.result import write_text
+from ilc_rt.result import json_text, write_text
+from ilc_rt.text import label
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,6 +23,22 @@ if TYPE_CHECKING:
     from ilc_rt.experiment import Experiment
 
     Array = NDArray[np.float64]
+
+
+def beyond_cell(fit: SecondOrderFit | VelocityLoopFit) -> str | None:
+    """Return what of a fit a cell description does not take; None if it takes all of it."""
+    if isinstance(fit, VelocityLoopFit):
+        figures = [("velocity bandwidth in Hz", fit.bandwidth_hz, 0.1, 10_000.0)]
+    else:
+        figures = [
+            ("natural frequency in Hz", fit.natural_frequency_hz, 0.1, 1000.0),
+            ("damping", fit.damping, 0.05, 5.0),
+        ]
+    figures.append(("delay in cycles", float(fit.delay_samples), 0.0, 20.0))
+    for what, value, low, high in figures:
+        if not low <= value <= high:
+            return f"the fit has {what} {value:.4g}, a cell takes {low:g} to {high:g}"
+    return None
 
 
 @dataclass(frozen=True, repr=False)
@@ -89,7 +105,8 @@ class Identification:
     @property
     def doubt(self) -> str | None:
         """Why the model should not be used; None if nothing speaks against it."""
-        return doubt(self.measured, self.described.residual_rms)
+        found = doubt(self.measured, self.described.residual_rms)
+        return found if found or self.interface is None else beyond_cell(self.described)
 
     def uncertainty_on_grid(self, count: int = 257) -> Array:
         """Return the bound at equally spaced frequencies from 0 to Nyquist.
@@ -132,18 +149,38 @@ class Identification:
         return "\n".join(lines) + "\n"
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Return name, value and standard deviation of every figure, as text."""
-        model = self.model
+        """Return name, value and standard deviation of every figure, as text.
+
+        Of an axis of a cell the figures are those of ``[axis.model]``.
+        """
+        free, described = self.model, self.described
+        gain = ("gain", f"{free.gain:.5f}", f"{free.gain_deviation:.1e}")
+        left = ("left over in %", f"{described.residual_rms * 1e2:.2f}", "")
+        if isinstance(described, VelocityLoopFit):
+            bandwidth = f"{described.bandwidth_hz:.4f}"
+            return [
+                gain,
+                ("velocity bandwidth in Hz", bandwidth, f"{described.bandwidth_deviation_hz:.1e}"),
+                ("delay in ms", f"{described.delay_s * 1e3:.4f}", ""),
+                left,
+            ]
+        if self.interface is None:
+            described, left = free, ("left over in %", f"{free.residual_rms * 1e2:.2f}", "")
+        delay_deviation = described.delay_deviation_s * 1e3
         return [
-            ("gain", f"{model.gain:.5f}", f"{model.gain_deviation:.1e}"),
+            gain,
             (
                 "natural frequency in Hz",
-                f"{model.natural_frequency_hz:.4f}",
-                f"{model.natural_frequency_deviation_hz:.1e}",
+                f"{described.natural_frequency_hz:.4f}",
+                f"{described.natural_frequency_deviation_hz:.1e}",
             ),
-            ("damping", f"{model.damping:.5f}", f"{model.damping_deviation:.1e}"),
-            ("delay in ms", f"{model.delay_s * 1e3:.4f}", f"{model.delay_deviation_s * 1e3:.1e}"),
-            ("left over in %", f"{model.residual_rms * 1e2:.2f}", ""),
+            ("damping", f"{described.damping:.5f}", f"{described.damping_deviation:.1e}"),
+            (
+                "delay in ms",
+                f"{described.delay_s * 1e3:.4f}",
+                f"{delay_deviation:.1e}" if delay_deviation else "",
+            ),
+            left,
         ]
 
     def to_json(self) -> dict[str, Any]:
@@ -172,7 +209,7 @@ class Identification:
                 "residual_rms": model.residual_rms,
             },
             "uncertainty": {"frequency_hz": bound[0].tolist(), "bound": bound[1].tolist()},
-            "axis_model": self.section(),
+            "axis_model": None if self.doubt else self.section(),
             "doubt": self.doubt,
         }
 
@@ -184,7 +221,7 @@ class Identification:
         BadInputError
             If the file cannot be written.
         """
-        write_text(path, json.dumps(self.to_json(), indent=1) + "\n")
+        write_text(path, json_text(self.to_json()))
 
     def figure(self) -> Figure:
         """Return the Bode diagram of measurement and model."""
@@ -193,5 +230,5 @@ class Identification:
         return bode(
             self.frequency_hz, self.response, self.coherence,
             self.described.response(self.frequency_hz), self.uncertainty[1],
-            f"axis {self.experiment.axis}" if self.experiment.axis else "",
+            f"axis {label(self.experiment.axis)}" if self.experiment.axis else "",
         )  # fmt: skip

@@ -2,31 +2,45 @@
 
 Under ``ilc/<cell>/`` the controller publishes ``state``, ``iteration``,
 ``fault``, ``servo`` and ``latency``: the JSON objects of its event stream. A
-monitor can command nothing, and the controller never waits for one.
+monitor can command nothing, and the loop never waits for one; at the end of a
+campaign the controller asks on ``heard`` whether all of it has arrived.
+
+Anybody on the network can publish under these keys, so that nothing received is
+believed: texts are cleaned of control characters, and what is not of the right
+types is told as one warning.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import queue
+import socket
 import time
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+import types
+import typing
+from dataclasses import dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import EventError, parse_event
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from types import TracebackType
 
     import zenoh
     from typing_extensions import Self
+    from zenoh import handlers
 
     from ilc_rt.events import Event
 
+_T = TypeVar("_T")
+
 POLL_S = 0.2
 QUEUE_MAX = 10_000
+PAYLOAD_MAX_BYTES = 1 << 20
+TEXT_MAX = 2_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +59,15 @@ class Message:
         The JSON object; empty for ``alive`` and ``gone``.
     event : Event or None
         The same as a typed event, where it is one.
+    warning : str or None
+        What is wrong with the message, if it is not what it should be.
     """
 
     cell: str
     topic: str
     payload: dict[str, Any]
     event: Event | None = None
+    warning: str | None = None
 
 
 class Monitor:
@@ -74,8 +91,8 @@ class Monitor:
 
     Examples
     --------
-    >>> with Monitor("gantry") as monitor:           # doctest: +SKIP
-    ...     for message in monitor.messages(60.0):
+    >>> with Monitor("press-7") as monitor:
+    ...     for message in monitor.messages(timeout_s=1.0):
     ...         print(message.topic, message.payload)
     """
 
@@ -91,9 +108,10 @@ class Monitor:
         self._session = _open(connect, scouting=scouting)
         # The token first: a controller seen alive is asked for its state at once.
         self._tokens = self._session.liveliness().declare_subscriber(
-            f"ilc/{cell}/alive", self._on_token, history=True
+            f"ilc/{cell}/alive", _direct(self._on_token), history=True
         )
-        self._values = self._session.declare_subscriber(f"ilc/{cell}/*", self._on_value)
+        self._values = self._session.declare_subscriber(f"ilc/{cell}/*", _direct(self._on_value))
+        self._heard = self._session.declare_queryable(f"ilc/{cell}/heard", _direct(_answer))
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -150,7 +168,7 @@ class Monitor:
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         topic = "gone" if str(sample.kind).endswith("DELETE") else "alive"
-        self._put(Message(str(sample.key_expr).split("/")[1], topic, {}))
+        self._put(Message(_clean(str(sample.key_expr).split("/")[1]), topic, {}))
 
     def _on_value(self, sample: zenoh.Sample) -> None:
         self._put(_message(sample))
@@ -175,6 +193,9 @@ def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
         config.insert_json5("connect/endpoints", json.dumps(list(connect)))
         config.insert_json5("scouting/multicast/enabled", json.dumps(scouting))
         config.insert_json5("listen/endpoints", "[]")
+        # By itself Zenoh leaves the host's own interface out, where controllers are that keep to it.
+        interfaces = ",".join(name for _, name in socket.if_nameindex())
+        config.insert_json5("scouting/multicast/interface", json.dumps(interfaces))
     except zenoh.ZError as error:
         message = f"connect = {', '.join(connect)}: not an endpoint, as tcp/192.168.1.5:7447"
         raise BadInputError(message) from error
@@ -186,16 +207,94 @@ def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
         raise CampaignError(message) from error
 
 
+def _direct(callback: Callable[[_T], None]) -> handlers.Callback[_T]:
+    """Return a callback that runs in the order of arrival with all others.
+
+    By default each subscriber has a thread of its own, and the end of a
+    controller could overtake its last words.
+    """
+    from zenoh.handlers import Callback
+
+    return Callback(callback, indirect=False)
+
+
+def _answer(query: zenoh.Query) -> None:
+    """Tell a controller that all it has published before has arrived."""
+    query.reply(query.key_expr, b"")
+
+
 def _message(sample: zenoh.Sample) -> Message | None:
-    _, cell, topic = str(sample.key_expr).split("/", 2)
+    _, cell, topic = (_clean(part) for part in str(sample.key_expr).split("/", 2))
+    if topic == "heard":
+        return None
+    raw = sample.payload.to_bytes()
+    if len(raw) > PAYLOAD_MAX_BYTES:
+        return None
     try:
-        payload = json.loads(sample.payload.to_bytes())
-    except ValueError:
+        payload = _clean_all(json.loads(raw))
+    except (ValueError, RecursionError):
         return None
     if not isinstance(payload, dict):
         return None
     try:
         event = parse_event(json.dumps({"event": topic, **payload}))
-    except EventError:
-        event = None
+    except EventError as error:
+        return Message(cell, topic, payload, warning=_clean(f"a message left out: {error}"))
+    misfit = None if event is None else _misfit(event)
+    if misfit is not None:
+        return Message(cell, topic, payload, warning=f"a message left out: {misfit}")
     return Message(cell, topic, payload, event)
+
+
+def _clean(text: str) -> str:
+    """Return a text printable and of bounded length."""
+    kept = "".join(
+        sign if sign.isprintable() else sign.encode("unicode_escape", "surrogatepass").decode()
+        for sign in text[:TEXT_MAX]
+    )
+    return kept if len(text) <= TEXT_MAX else f"{kept} ..."
+
+
+def _clean_all(value: object) -> object:
+    """Return the same with every text in it cleaned."""
+    if isinstance(value, str):
+        return _clean(value)
+    if isinstance(value, dict):
+        return {_clean(key): _clean_all(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_clean_all(item) for item in value]
+    return value
+
+
+def _misfit(event: object) -> str | None:
+    """Return which field of a typed object holds something of another type."""
+    hints = typing.get_type_hints(type(event))
+    for field in fields(event):  # type: ignore[arg-type]
+        value = getattr(event, field.name)
+        if is_dataclass(value):
+            inner = _misfit(value)
+            if inner is not None:
+                return f"{field.name}: {inner}"
+        elif not _fits(value, hints[field.name]):
+            return f"{field.name} = {str(value)[:80]} is not of its type"
+    return None
+
+
+def _fits(value: object, hint: object) -> bool:
+    """Return whether a value is of an annotated type; numbers are finite."""
+    origin = typing.get_origin(hint)
+    if origin in {typing.Union, types.UnionType}:
+        return any(_fits(value, one) for one in typing.get_args(hint))
+    if origin is tuple:
+        kinds = typing.get_args(hint)
+        if not isinstance(value, tuple):
+            return False
+        if len(kinds) == 2 and kinds[1] is Ellipsis:
+            return all(_fits(item, kinds[0]) for item in value)
+        return len(value) == len(kinds) and all(map(_fits, value, kinds))
+    if hint in {int, float}:
+        allowed = int if hint is int else (int, float)
+        if isinstance(value, bool) or not isinstance(value, allowed):
+            return False
+        return abs(value) < 1e300 if isinstance(value, int) else math.isfinite(value)
+    return isinstance(hint, type) and isinstance(value, hint)

@@ -14,11 +14,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from ilc_rt.deviation import magnification, path_deviation
+from ilc_rt.quantity import Unit, unit_for
+from ilc_rt.text import label
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from ilc_rt.comparison import Column
     from ilc_rt.events import Histogram
     from ilc_rt.record import IterationRecord
     from ilc_rt.result import CampaignResult
@@ -32,6 +38,9 @@ PATH = "#DADDE2"
 INK = "#30343B"
 WIDTH_IN = 5.6
 FIRST_BIN_RATIO = 1.5
+# Range of a coordinate from which on an axis moves, and the distance below which there is rounding.
+MOVES_M = 1e-9
+ROUNDING_M = 1e-12
 
 STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
@@ -72,61 +81,58 @@ def convergence(result: CampaignResult) -> Figure:
     result : CampaignResult
         At least one run.
     """
+    comparison = result.comparison
+    bases = dict.fromkeys(column.unit.base for column in comparison.errors())
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH_IN, 3.5))
-        axes = figure.subplots()
-        index = [record.index for record in result.records]
-        curves = [
-            ("tracking, max", LAST, "o", "-", "tracking_inf_m"),
-            ("tracking, RMS", LAST, "o", ":", "tracking_rms_m"),
-            ("contour, max", CONTOUR, "s", "-", "contour_inf_m"),
-            ("contour, RMS", CONTOUR, "s", ":", "contour_rms_m"),
-        ]
-        for label, colour, marker, line, name in curves:
-            values = [getattr(record, name) for record in result.records]
-            if any(value is None for value in values):
-                continue
-            in_um = np.maximum(np.asarray(values, dtype=np.float64) * 1e6, 1e-6)
-            filled = colour if line == "-" else "white"
-            axes.plot(
-                index, in_um, line, color=colour, marker=marker, markersize=4.5,
-                markerfacecolor=filled, label=label,
-            )  # fmt: skip
-        back = [record.index for record in result.records if record.rolled_back]
-        for number in back:
-            axes.axvline(number, color=FIRST, linewidth=1, linestyle="--")
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.yaxis.set_minor_formatter(FuncFormatter(_minor_label))
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
-        axes.set_xlabel("run (0 is without learning)")
-        axes.set_ylabel("error in µm")
-        figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4,
+        figure = Figure(figsize=(WIDTH_IN, 0.6 + 2.9 * len(bases)))
+        panels = figure.subplots(len(bases), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, base in zip(panels, bases, strict=True):
+            columns = [c for c in comparison.errors() if c.unit.base == base]
+            _convergence_panel(axes, result.records, columns, base)
+        panels[-1].set_xlabel("run (0 is without learning)")
+        shown: dict[str, Artist] = {}
+        for axes in panels:
+            handles, labels = axes.get_legend_handles_labels()
+            shown.update(zip(labels, handles, strict=True))
+        figure.legend(list(shown.values()), list(shown), loc="outside upper center", ncols=4,
                       columnspacing=1.2)  # fmt: skip
+        figure.align_ylabels()
         return figure
 
 
 def contour(result: CampaignResult) -> Figure | None:
-    """Draw the path with its deviations magnified; None for a single axis.
+    """Draw the path with its deviations magnified; None for a path without a contour.
 
     The upper picture shows first and last run at the same magnification, the
-    lower one the last run at its own. Only the first two axes are drawn.
+    lower one the last run at its own. Only the first two linear axes that move
+    are drawn.
     """
-    if result.n_axes < 2 or not result.records:
+    if not result.records:
         return None
     first, last = result.records[0], result.records[-1]
+    if first.contour_inf_m is None or last.contour_inf_m is None:
+        return None
+    reference = first.reference_m
+    linear = [axis for axis in range(reference.shape[1]) if result.axis_unit(axis) == "m"]
+    shown = [axis for axis in linear if np.ptp(reference[:, axis]) > MOVES_M][:2]
+    if len(shown) < 2:
+        return None
+    extent_m = float(np.ptp(reference[:, shown], axis=0).max())
     with mpl.rc_context(STYLE):
-        reference = first.reference_m
-        extent_m = float(np.ptp(reference[:, :2], axis=0).max())
-        if extent_m <= 0.0:
-            return None
-        aspect = float(np.ptp(reference[:, 1]) / extent_m)
+        aspect = float(np.ptp(reference[:, shown[1]]) / extent_m)
         panels = [[first, last], [last]] if first is not last else [[first]]
         height = 0.6 + max(1.6, (WIDTH_IN - 0.8) * 1.15 * min(aspect, 1.0)) + 0.3
         figure = Figure(figsize=(WIDTH_IN, height * len(panels)))
         grid = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+        deviations = {
+            record.id: _deviation(record, linear)[:, [linear.index(axis) for axis in shown]]
+            for record in (first, last)
+        }
+        names = tuple(label(result.axis_names[axis]) for axis in shown)
         for axes, records in zip(grid, panels, strict=True):
-            _contour_panel(axes, records, first, result.axis_names, extent_m)
+            colours = [FIRST if record is first else LAST for record in records]
+            paths = [(r, r.reference_m[:, shown], deviations[r.id]) for r in records]
+            _contour_panel(axes, paths, colours, names, extent_m)
         figure.align_ylabels()
         return figure
 
@@ -137,18 +143,18 @@ def learned_input(result: CampaignResult) -> Figure | None:
     if not learned:
         return None
     first, last = learned[0], learned[-1]
+    shown = [(first, FIRST), (last, LAST)][first is last :]
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 1.1 + 1.6 * result.n_axes))
         grid = figure.subplots(result.n_axes, 1, sharex=True, squeeze=False)[:, 0]
-        time_s = np.arange(len(last.input)) * result.cycle_s
         for number, axes in enumerate(grid):
-            if first is not last:
-                axes.plot(time_s, first.input[:, number] * 1e3, color=FIRST, linewidth=1.2,
-                          label=f"run {first.index}")  # fmt: skip
-            axes.plot(time_s, last.input[:, number] * 1e3, color=LAST, linewidth=1.2,
-                      label=f"run {last.index}")  # fmt: skip
-            axes.set_title(result.axis_names[number])
-            axes.set_ylabel(f"input in m{result.input_unit(number)}")
+            size = max(_largest(record.input[:, number]) for record, _ in shown)
+            unit = unit_for(result.input_unit(number), size)
+            for record, colour in shown:
+                _over_time(axes, record.input[:, number], result.cycle_s, unit,
+                           color=colour, linewidth=1.2, label=f"run {record.index}")  # fmt: skip
+            axes.set_title(label(result.axis_names[number]))
+            axes.set_ylabel(f"input in {unit.symbol}")
         grid[-1].set_xlabel("time in s")
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
         figure.align_ylabels()
@@ -164,21 +170,23 @@ def tracking(result: CampaignResult) -> Figure | None:
         panels = 2 if first is not last else 1
         figure = Figure(figsize=(WIDTH_IN, 0.8 + 1.45 * result.n_axes * panels))
         grid = figure.subplots(result.n_axes * panels, 1, sharex=True, squeeze=False)[:, 0]
-        time_s = np.arange(len(last.error_m)) * result.cycle_s
         for number in range(result.n_axes):
-            name = result.axis_names[number]
+            name, base = label(result.axis_names[number]), result.axis_unit(number)
+            errors = [record.error_m[:, number] for record in (first, last)]
             upper = grid[number * panels]
-            upper.plot(time_s, first.error_m[:, number] * 1e6, color=FIRST, linewidth=1.2,
-                       label=f"run {first.index}")  # fmt: skip
+            unit = unit_for(base, max(map(_largest, errors)))
+            for record, error, colour in zip((first, last), errors, (FIRST, LAST), strict=True):
+                if record is first or panels == 2:
+                    _over_time(upper, error, result.cycle_s, unit, color=colour, linewidth=1.2,
+                               label=f"run {record.index}")  # fmt: skip
             upper.set_title(name)
-            upper.set_ylabel(f"error in µ{result.axis_unit(number)}")
+            upper.set_ylabel(f"error in {unit.symbol}")
             if panels == 2:
-                upper.plot(time_s, last.error_m[:, number] * 1e6, color=LAST, linewidth=1.2,
-                           label=f"run {last.index}")  # fmt: skip
                 lower = grid[number * panels + 1]
-                lower.plot(time_s, last.error_m[:, number] * 1e6, color=LAST, linewidth=1.0)
+                unit = unit_for(base, _largest(errors[1]))
+                _over_time(lower, errors[1], result.cycle_s, unit, color=LAST, linewidth=1.0)
                 lower.set_title(f"{name}, run {last.index} on a scale of its own")
-                lower.set_ylabel(f"error in µ{result.axis_unit(number)}")
+                lower.set_ylabel(f"error in {unit.symbol}")
         grid[-1].set_xlabel("time in s")
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
         figure.align_ylabels()
@@ -198,33 +206,75 @@ def latency(result: CampaignResult) -> Figure | None:
         return figure
 
 
+def _convergence_panel(
+    axes: Axes, records: Sequence[IterationRecord], columns: list[Column], base: str
+) -> None:
+    """Draw the errors of one unit; one of 0 has no place on a logarithmic scale."""
+    index = [record.index for record in records]
+    rows = [(column, [column.of(record) for record in records]) for column in columns]
+    known = [value for _, row in rows for value in row if value]
+    unit = unit_for(base, max(known, default=0.0))
+    for column, row in rows:
+        what, kind = column.name.split(" ", 1)[::-1]
+        colour, marker = (CONTOUR, "s") if what == "contour" else (LAST, "o")
+        filled = colour if kind == "max" else "white"
+        values = [value * unit.scale if value else np.nan for value in row]
+        axes.plot(
+            index, values, "-" if kind == "max" else ":", color=colour, marker=marker,
+            markersize=4.5, markerfacecolor=filled, label=f"{what}, {kind}",
+        )  # fmt: skip
+    for record in records:
+        if record.rolled_back:
+            axes.axvline(record.index, color=FIRST, linewidth=1, linestyle="--")
+    if known:
+        axes.set_yscale("log")
+        axes.yaxis.set_minor_formatter(FuncFormatter(_minor_label))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    axes.set_ylabel(f"error in {unit.symbol}")
+
+
+def _deviation(record: IterationRecord, linear: list[int]) -> Array:
+    return path_deviation(record.reference_m[:, linear], record.tool_or_encoder_m[:, linear])
+
+
+def _largest(signal: Array) -> float:
+    return float(np.abs(signal).max(initial=0.0))
+
+
+def _over_time(axes: Axes, signal: Array, cycle_s: float, unit: Unit, **style: str | float) -> None:
+    look: dict[str, Any] = dict(style)
+    axes.plot(np.arange(len(signal)) * cycle_s, signal * unit.scale, **look)
+
+
 def _contour_panel(
     axes: Axes,
-    records: list[IterationRecord],
-    widest: IterationRecord,
+    paths: list[tuple[IterationRecord, Array, Array]],
+    colours: list[str],
     names: tuple[str, ...],
     extent_m: float,
 ) -> None:
-    deviations = {record.id: path_deviation(record.reference_m, record.tool_or_encoder_m)
-                  for record in {r.id: r for r in (*records, widest)}.values()}  # fmt: skip
-    scale_by = widest if widest in records else records[0]
-    largest_m = float(np.linalg.norm(deviations[scale_by.id], axis=1).max())
+    """Draw paths and their deviations; the first one's size decides on the magnification."""
+    largest_m = float(np.linalg.norm(paths[0][2], axis=1).max())
+    largest_m = 0.0 if largest_m < ROUNDING_M else largest_m
     factor = magnification(largest_m, extent_m)
-    reference = records[0].reference_m
-    axes.plot(*(reference[:, :2].T * 1e3), color=PATH, linewidth=5.0, label="programmed",
+    unit = unit_for("m", 10.0 * extent_m)
+    reference = paths[0][1]
+    axes.plot(*(reference.T * unit.scale), color=PATH, linewidth=5.0, label="programmed",
               solid_capstyle="round")  # fmt: skip
-    for record in records:
-        colour = FIRST if record is widest else LAST
-        shown = record.reference_m + factor * deviations[record.id]
-        axes.plot(*(shown[:, :2].T * 1e3), color=colour, linewidth=1.3,
-                  label=f"run {record.index}")  # fmt: skip
+    for (record, path, deviation), colour in zip(paths, colours, strict=True):
+        shown = path + factor * deviation
+        axes.plot(*(shown.T * unit.scale), color=colour, linewidth=1.3, label=f"run {record.index}")
     axes.set_aspect("equal")
     round_m = _round_down(largest_m)
+    own = unit_for("m", round_m)
     axes.set_title(
-        f"deviation shown {factor:,} times: {round_m * 1e6:g} µm as {round_m * factor * 1e3:.2g} mm"
-    )
-    axes.set_xlabel(f"{names[0]} in mm")
-    axes.set_ylabel(f"{names[1]} in mm")
+        f"deviation shown {factor:,} times: {round_m * own.scale:g} {own.symbol} as "
+        f"{round_m * factor * unit.scale:.2g} {unit.symbol}"
+        if round_m > 0.0 else "no deviation"
+    )  # fmt: skip
+    axes.set_xlabel(f"{names[0]} in {unit.symbol}")
+    axes.set_ylabel(f"{names[1]} in {unit.symbol}")
     axes.legend(loc="center")
 
 

@@ -8,25 +8,31 @@ from typing import TYPE_CHECKING
 from rich.console import Console, Group
 from rich.live import Live
 from rich.progress import BarColumn, Progress, TextColumn
+from rich.text import Text
 
 from ilc_rt.events import (
     EndEvent,
     FaultEvent,
     IterationEvent,
+    JudgedEvent,
     ProgressEvent,
     StartEvent,
     StateEvent,
 )
-from ilc_rt.table import HEAD, plain_line, run_cells, runs_table
+from ilc_rt.table import headings, plain_line, run_cells, runs_table
+from ilc_rt.text import printable
 
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from rich.console import RenderableType
     from typing_extensions import Self
 
     from ilc_rt.events import Event
     from ilc_rt.result import CampaignResult
 
+# Lines below the table of a terminal: the newest ones.
+REMARKS_SHOWN = 8
 WORDS = {
     "bringing_up": "bringing the drives up",
     "enabling": "switching the drives on",
@@ -42,9 +48,13 @@ def describe(start: StartEvent) -> str:
     """Return one line that says what is about to run where."""
     clock = "real time" if start.mode == "realtime" else "lock-step"
     seconds = start.n_samples * start.cycle_s
-    return (
-        f"{start.cell}: {start.n_axes} axes, {seconds:.2f} s a run at {start.cycle_s * 1e3:g} ms, "
-        f"{start.law} learns from {start.measure}, {start.bus}, {clock}"
+    axes = f"{start.n_axes} {'axis' if start.n_axes == 1 else 'axes'}"
+    learns = (
+        "nothing is learned" if start.law == "none" else f"{start.law} learns from {start.measure}"
+    )
+    return printable(
+        f"{start.cell}: {axes}, {seconds:.2f} s a run at {start.cycle_s * 1e3:g} ms, "
+        f"{learns}, {start.bus}, {clock}"
     )
 
 
@@ -58,10 +68,11 @@ class CampaignView:
     """
 
     def __init__(self, console: Console | None = None) -> None:
-        self._console = console or Console(highlight=False)
+        # Names may have brackets and colons: nothing that is printed is markup.
+        self._console = console or Console(highlight=False, markup=False, emoji=False)
         self._live: Live | None = None
         self._bar = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=36),
             TextColumn("{task.percentage:3.0f} %"),
             console=self._console,
@@ -69,6 +80,7 @@ class CampaignView:
         self._task = self._bar.add_task("starting", total=1.0)
         self._runs = 0
         self._named = False
+        self._remarked = 0
 
     def __enter__(self) -> Self:
         """Start drawing."""
@@ -93,9 +105,10 @@ class CampaignView:
             self._runs = event.iterations
             self._console.print(describe(event), soft_wrap=True)
             for note in event.rt.notes if event.rt else ():
-                self._console.print(f"note: {note}", style="yellow", soft_wrap=True)
+                said = f"note: {printable(note)}"
+                self._console.print(said, style="yellow", soft_wrap=True)
         elif isinstance(event, StateEvent):
-            words = WORDS.get(event.state, event.state.replace("_", " "))
+            words = WORDS.get(event.state, printable(event.state.replace("_", " ")))
             index = event.iteration
             if index is None or index >= self._runs > 0:
                 run = ""  # the way home after the last run
@@ -110,20 +123,46 @@ class CampaignView:
             self._finish(result)
             return
         if self._live is not None:
-            self._live.update(Group(runs_table(result.records), self._bar))
+            self._live.update(Group(*_table(result), self._bar))
         elif isinstance(event, IterationEvent):
             self._print_plain(result)
+        elif isinstance(event, JudgedEvent):
+            self._print_remarks(result)
 
     def _print_plain(self, result: CampaignResult) -> None:
         if not self._named:
             self._named = True
-            print(plain_line([name for name, _ in HEAD]))
-        print(plain_line(run_cells(result.records[-1], result.records[0])))
+            # What a resumed campaign has behind it was told when it was made.
+            self._remarked = len(_remarks(result)) if len(result.records) > 1 else 0
+            names = headings(result.comparison)
+            print(plain_line(names, names))
+        comparison = result.comparison
+        print(plain_line(run_cells(comparison, result.records[-1]), headings(comparison)))
+        self._print_remarks(result)
+
+    def _print_remarks(self, result: CampaignResult) -> None:
+        remarks = _remarks(result)
+        for remark in remarks[self._remarked :]:
+            print(f"     {remark}")
+        self._remarked = len(remarks)
         sys.stdout.flush()
 
     def _finish(self, result: CampaignResult) -> None:
         if self._live is not None:
             self._live.stop()
             self._live = None
-            if result.records:
-                self._console.print(runs_table(result.records))
+            for part in _table(result):
+                self._console.print(part)
+
+
+def _table(result: CampaignResult) -> list[RenderableType]:
+    """Return the table of runs, and below it what was remarked on them."""
+    if not result.records:
+        return []
+    table = runs_table(result.comparison)
+    lines = [Text(line, style="yellow") for line in _remarks(result)[-REMARKS_SHOWN:]]
+    return [table, *lines]
+
+
+def _remarks(result: CampaignResult) -> list[str]:
+    return [printable(line) for line in result.comparison.remarks()]

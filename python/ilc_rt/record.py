@@ -25,6 +25,8 @@ FIGURES = (
     "tracking_rms_m",
     "contour_inf_m",
     "contour_rms_m",
+    "axes_tracking_inf_m",
+    "axes_tracking_rms_m",
     "encoder_tracking_inf_m",
     "tool_tracking_inf_m",
     "overruns",
@@ -32,8 +34,11 @@ FIGURES = (
     "late_updates",
     "update_ms",
     "rolled_back",
+    "learning_off",
+    "remark",
     "digest",
 )
+AXES_FIGURES = ("axes_tracking_inf_m", "axes_tracking_rms_m")
 SIGNALS = ("reference_m", "input", "encoder_m", "tool_m", "error_m", "contour_m")
 
 
@@ -47,14 +52,24 @@ class IterationRecord:
         Key in the library; number of the run in its campaign, from 0.
     tracking_inf_m, tracking_rms_m : float
         Largest and root-mean-square tracking error in m, of the measurement
-        that is learned from.
+        that is learned from: of the linear axes, or in rad of all axes where
+        all are rotary.
     contour_inf_m, contour_rms_m : float or None
-        Distance from the programmed path in m; None with a single axis.
+        Distance from the programmed path in m; None where the path has no
+        contour, as fewer than two linear axes move along it.
     overruns, missing_samples, late_updates : int
         Servo cycles that began too late; measurements that never arrived;
         runs so far that repeated the old input because learning was late.
     update_ms : float or None
         How long the learning took.
+    rolled_back, learning_off : bool
+        Whether the error had grown so far that the best input was restored
+        after this run; whether learning is off because of that.
+    remark : str or None
+        Why, or what else decided on the next input, in one sentence.
+    axes_tracking_inf_m, axes_tracking_rms_m : tuple of float
+        Largest and root-mean-square tracking error of each axis in its own
+        unit; empty if not known.
 
     Examples
     --------
@@ -79,6 +94,10 @@ class IterationRecord:
     update_ms: float | None = None
     rolled_back: bool = False
     digest: str = ""
+    axes_tracking_inf_m: tuple[float, ...] = ()
+    axes_tracking_rms_m: tuple[float, ...] = ()
+    learning_off: bool = False
+    remark: str | None = None
     _loaded: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
@@ -90,7 +109,10 @@ class IterationRecord:
     def from_row(cls, row: Mapping[str, Any], library: str) -> IterationRecord:
         """Return the record of one row of `Library.list`."""
         known = {f.name for f in fields(cls)} & set(FIGURES)
-        return cls(library=library, **{name: row[name] for name in known if name in row})
+        values = {name: row[name] for name in known if name in row}
+        for name in AXES_FIGURES:
+            values[name] = tuple(values.get(name) or ())
+        return cls(library=library, **values)
 
     def figures(self) -> dict[str, Any]:
         """Return the figures by name, in the order of the JSON file."""
@@ -124,7 +146,8 @@ class IterationRecord:
     @property
     def contour_m(self) -> NDArray[np.float64] | None:
         """Distance from the programmed path in m, shape (n_samples,), or None."""
-        return self._optional("contour_m")
+        # Older libraries hold rounding for a path that has no contour.
+        return None if self.contour_inf_m is None else self._optional("contour_m")
 
     @property
     def disturbance(self) -> NDArray[np.float64] | None:

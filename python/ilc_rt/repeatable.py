@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
@@ -14,7 +13,7 @@ import numpy as np
 from ilc_rt._native import repeatability
 from ilc_rt.campaign import Campaign, Drives, load_cell
 from ilc_rt.errors import BadInputError
-from ilc_rt.result import write_text
+from ilc_rt.result import json_text, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -92,7 +91,7 @@ class RepeatabilityCheck:
         BadInputError
             If the file cannot be written.
         """
-        write_text(path, json.dumps(self.to_json(), indent=2) + "\n")
+        write_text(path, json_text(self.to_json()))
 
 
 def compare_runs(errors: ArrayLike, axis_names: tuple[str, ...] = ()) -> RepeatabilityCheck:
@@ -185,8 +184,7 @@ def check_repeatability(
 
     Examples
     --------
-    >>> check_repeatability("examples/01_gantry.toml", runs=3,  # doctest: +SKIP
-    ...                     bus="loopback:").applicable
+    >>> check_repeatability("examples/01_gantry.toml", runs=3, bus="loopback:").applicable
     True
     """
     if runs < 2:

@@ -11,6 +11,7 @@ import io
 import json
 import platform
 import re
+import warnings
 from datetime import datetime, timezone
 from importlib import resources
 from pathlib import Path
@@ -19,17 +20,22 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 
 from ilc_rt import plots
+from ilc_rt.comparison import note
 from ilc_rt.errors import BadInputError
-from ilc_rt.result import CampaignResult, micrometres, reduction, write_text
+from ilc_rt.quantity import digits, in_words, signed, unit_for
+from ilc_rt.result import CampaignResult, write_text
+from ilc_rt.text import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from matplotlib.figure import Figure
 
     from ilc_rt.record import IterationRecord
 
 REPORT_NAME = "ilc-report.html"
+REMARKS_SHOWN = 12
+FACT_MAX = 4000
 
 
 def write_report(result: CampaignResult, path: str | Path) -> Path:
@@ -71,7 +77,7 @@ def render(result: CampaignResult) -> str:
     """Return the report as HTML text."""
     style = resources.files("ilc_rt").joinpath("data/report.css").read_text(encoding="utf-8")
     count = len(result.records)
-    title = f"{result.cell}: {count} run{'s' if count > 1 else ''}"
+    title = f"{printable(result.cell)}: {count} run{'s' if count > 1 else ''}"
     cards = "".join(_cards(result))
     return f"""<!DOCTYPE html>
 <html lang="en">
@@ -86,12 +92,12 @@ def render(result: CampaignResult) -> str:
 <main>
 <h1>{html.escape(title)}</h1>
 <p class="lead">{html.escape(result.sentence())}</p>
-{_warning(result)}<div class="tiles">{"".join(_tiles(result))}</div>
+{_warning(result)}{_remarks(result)}<div class="tiles">{"".join(_tiles(result))}</div>
 <div class="cards">
 {cards}</div>
 <section class="card"><h2>Every run</h2>
 <div class="scroll">{_table(result)}</div></section>
-<section class="card"><h2>What ran where</h2>
+{_axes(result)}<section class="card"><h2>What ran where</h2>
 {_facts(result)}</section>
 </main>
 </body>
@@ -110,7 +116,9 @@ def svg(figure: Figure, name: str) -> str:
         Prefix of the ids, different for every picture of a page.
     """
     buffer = io.StringIO()
-    with mpl.rc_context({**plots.STYLE, "svg.hashsalt": name}):
+    with mpl.rc_context({**plots.STYLE, "svg.hashsalt": name}), warnings.catch_warnings():
+        # A name may have letters that the font lacks; whoever reads the page has them.
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
@@ -149,59 +157,108 @@ def _cards(result: CampaignResult) -> Iterator[str]:
 
 
 def _tiles(result: CampaignResult) -> Iterator[str]:
+    comparison = result.comparison
     first, last = result.records[0], result.records[-1]
 
-    def tile(value: str, label: str, kind: str = "") -> str:
-        return f'<div class="tile {kind}"><b>{html.escape(value)}</b><span>{label}</span></div>'
+    def tile(value: str, what: str, kind: str = "") -> str:
+        return f'<div class="tile {kind}"><b>{html.escape(value)}</b><span>{what}</span></div>'
 
-    if first.contour_inf_m and last.contour_inf_m:
-        yield tile(
-            f"{micrometres(first.contour_inf_m)} → {micrometres(last.contour_inf_m)} µm",
-            "largest contour error, first → last run", "main",
-        )  # fmt: skip
-        yield tile(_percent(first.contour_inf_m, last.contour_inf_m), "contour error")
-    yield tile(
-        f"{micrometres(first.tracking_rms_m)} → {micrometres(last.tracking_rms_m)} µm",
-        "RMS tracking error, first → last run",
-    )
+    def course(before: float | None, after: float | None, base: str) -> str:
+        unit = unit_for(base, before)
+        if first is last:
+            return unit.text(after)
+        return f"{unit.number(before)} → {unit.number(after)} {unit.symbol}"
+
+    runs = "only run" if first is last else "first → last run"
+    if last.contour_inf_m is not None:
+        before_m = first.contour_inf_m
+        value = course(before_m, last.contour_inf_m, "m")
+        yield tile(value, f"largest contour error, {runs}", "main" * comparison.by_contour)
+    if change := signed(comparison.compared(first), comparison.compared(last)) * (
+        first is not last
+    ):
+        yield tile(_minus(change), f"{'contour' if comparison.by_contour else 'tracking'} error")
+    for base in dict.fromkeys(result.axis_units):
+        # Of one kind of axes alone, or of each kind its own.
+        rms = [c for c in comparison.tracking() if c.name == "RMS tracking"]
+        column = next(c for c in rms if c.unit.base == base)
+        whose = {"m": "of the linear axes, ", "rad": "of the rotary axes, "}[base]
+        value = course(column.of(first), column.of(last), base)
+        yield tile(value, f"RMS tracking error, {whose * comparison.is_mixed}{runs}")
     yield tile(str(sum(r.overruns for r in result.records)), "overruns of the servo cycle")
     if result.latency is not None:
         yield tile(f"{result.latency.wake_late_us.max:.0f} µs", "latest wake-up of the loop")
 
 
 def _table(result: CampaignResult) -> str:
+    comparison = result.comparison
+    columns = comparison.errors()
+    what = "contour" if comparison.by_contour else "tracking"
     head = (
-        "run", "max tracking µm", "RMS tracking µm", "max contour µm", "RMS contour µm",
-        "contour reduced by", "overruns", "learning ms", "",
+        "run", *(column.heading for column in columns), f"change of {what}", "overruns",
+        "learning ms", "",
     )  # fmt: skip
-    first = result.records[0]
-    rows = "".join(_row(record, first) for record in result.records)
-    cells = "".join(f"<th>{name}</th>" for name in head)
-    return f"<table><thead><tr>{cells}</tr></thead><tbody>{rows}</tbody></table>"
+    rows = "".join(
+        _cells(
+            str(record.index),
+            *(column.cell(record) for column in columns),
+            "" if record is comparison.first
+            else _minus(signed(comparison.compared(comparison.first), comparison.compared(record))),
+            str(record.overruns),
+            "-" if record.update_ms is None else digits(record.update_ms),
+            _notes(record, before),
+        )
+        for before, record in zip((None, *result.records), result.records, strict=False)
+    )  # fmt: skip
+    return f"<table><thead><tr>{_headings(head)}</tr></thead><tbody>{rows}</tbody></table>"
 
 
-def _row(record: IterationRecord, first: IterationRecord) -> str:
-    less = ""
-    if record is not first and None not in {record.contour_inf_m, first.contour_inf_m}:
-        change = reduction(first.contour_inf_m or 0.0, record.contour_inf_m or 0.0)
-        less = f"{change:.1f} %".replace("-", "\N{MINUS SIGN}")
-    notes = [note for flag, note in ((record.rolled_back, "rolled back"),
-                                     (record.late_updates, "learning late")) if flag]  # fmt: skip
-    values = (
-        str(record.index),
-        *map(micrometres, (record.tracking_inf_m, record.tracking_rms_m,
-                           record.contour_inf_m, record.contour_rms_m)),
-        less,
-        str(record.overruns),
-        "-" if record.update_ms is None else f"{record.update_ms:.2f}",
-        ", ".join(notes),
-    )  # fmt: skip
+def _notes(record: IterationRecord, before: IterationRecord | None) -> str:
+    # What is kept counts the late lessons of the campaign up to this run.
+    was_late = record.late_updates > (before.late_updates if before else 0)
+    gaps = f"{record.missing_samples} samples missing" if record.missing_samples else ""
+    return ", ".join(filter(None, (note(record), gaps, "learning late" if was_late else "")))
+
+
+def _axes(result: CampaignResult) -> str:
+    """Return the table of the single axes, where there are several and their figures are known."""
+    first, last = result.records[0], result.records[-1]
+    figures = [(record.axes_tracking_inf_m, record.axes_tracking_rms_m) for record in (first, last)]
+    if result.n_axes < 2 or any(len(row) < result.n_axes for pair in figures for row in pair):
+        return ""
+    rows = []
+    for axis, name in enumerate(result.axis_names):
+        cells = [printable(name)]
+        for before, after in zip(*figures, strict=True):
+            unit = unit_for(result.axis_unit(axis), before[axis])
+            values = [unit.number(before[axis]), unit.number(after[axis])][first is last :]
+            cells += [f"{' → '.join(values)} {unit.symbol}", in_words(before[axis], after[axis])]
+        rows.append(_cells(*cells))
+    head = ("axis", "max tracking", "", "RMS tracking", "")
+    runs = "in its only run" if first is last else "from the first run to the last"
+    return (
+        f'<section class="card"><h2>Every axis, {runs}</h2>\n<div class="scroll">'
+        f"<table><thead><tr>{_headings(head)}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+        "</div></section>\n"
+    )
+
+
+def _headings(names: Iterable[str]) -> str:
+    return "".join(f"<th>{name}</th>" for name in names)
+
+
+def _cells(*values: str) -> str:
     return "<tr>" + "".join(f"<td>{html.escape(value)}</td>" for value in values) + "</tr>"
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def _facts(result: CampaignResult) -> str:
     facts: list[tuple[str, str]] = [
-        ("Cell", f"{result.cell}: axes {', '.join(result.axis_names)}"),
+        ("Cell", f"{result.cell}: {'axes' if result.n_axes > 1 else 'axis'} "
+                 f"{', '.join(map(printable, result.axis_names))}"),
         ("Campaign", f"{result.campaign}, in {result.library}"),
         ("Law", result.law),
         ("Its parameters", _parameters(result)),
@@ -225,7 +282,9 @@ def _facts(result: CampaignResult) -> str:
         facts.append(("Host", f"{platform.node()}, {platform.system()} {platform.machine()}"))
     facts.append(("Written", datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")))
     rows = "".join(
-        f"<tr><th>{name}</th><td>{html.escape(value)}</td></tr>" for name, value in facts if value
+        f"<tr><th>{name}</th><td>{html.escape(printable(value, FACT_MAX))}</td></tr>"
+        for name, value in facts
+        if value
     )
     return f'<table class="facts"><tbody>{rows}</tbody></table>'
 
@@ -241,6 +300,16 @@ def _parameters(result: CampaignResult) -> str:
     return ", ".join(f"{key} = {json.dumps(value).strip(chr(34))}" for key, value in values.items())
 
 
+def _remarks(result: CampaignResult) -> str:
+    """Return what kept learning from going on, if anything did."""
+    if not any(map(note, result.records)):
+        return ""
+    lines = [printable(line) for line in result.comparison.remarks()]
+    if len(lines) > REMARKS_SHOWN:
+        lines = [*lines[:REMARKS_SHOWN], "…"]
+    return f'<p class="warn">{"<br>".join(map(html.escape, lines))}</p>\n'
+
+
 def _warning(result: CampaignResult) -> str:
     if result.status in {"completed", "running"}:
         return ""
@@ -248,9 +317,4 @@ def _warning(result: CampaignResult) -> str:
         result.status, result.status
     )
     why = f": {result.reason}" if result.reason else ""
-    return f'<p class="warn">{html.escape(what + why)}</p>\n'
-
-
-def _percent(before: float, after: float) -> str:
-    change = reduction(before, after)
-    return f"\N{MINUS SIGN}{change:.1f} %" if change >= 0 else f"+{-change:.1f} %"
+    return f'<p class="warn">{html.escape(printable(what + why))}</p>\n'

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+import math
+import sys
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from ilc_rt._native import Library
+from ilc_rt.comparison import Comparison
 from ilc_rt.errors import BadInputError
 from ilc_rt.events import (
     EndEvent,
     Event,
     FaultEvent,
     IterationEvent,
+    JudgedEvent,
     LatencyEvent,
     StartEvent,
 )
+from ilc_rt.quantity import digits
 from ilc_rt.record import IterationRecord
 
-# The best run is worth a word if it is this much better than the last.
-BEST_SHARE = 0.9
+# What stands for standard output in the place of a file.
+STANDARD_OUTPUT = Path("-")
 
 
 @dataclass(slots=True)
@@ -120,6 +125,8 @@ class CampaignResult:
                 self._recall_earlier_runs(event.first_index)
         elif isinstance(event, IterationEvent):
             self.records.append(IterationRecord.from_event(event, self.library))
+        elif isinstance(event, JudgedEvent):
+            self._judge(event)
         elif isinstance(event, LatencyEvent):
             self.latency = event
         elif isinstance(event, FaultEvent):
@@ -127,6 +134,11 @@ class CampaignResult:
         elif isinstance(event, EndEvent):
             self.status = event.status
             self.reason = event.reason or self.reason
+
+    @property
+    def unkept(self) -> bool:
+        """Whether the campaign was stopped as a run could not be kept."""
+        return self.status == "fault" and (self.reason or "").startswith("library ")
 
     @property
     def mode(self) -> str:
@@ -146,6 +158,16 @@ class CampaignResult:
         """Return what an axis is measured in: m or rad."""
         return self.input_unit(axis).removesuffix("/s")
 
+    @property
+    def axis_units(self) -> tuple[str, ...]:
+        """What each axis is measured in: m or rad."""
+        return tuple(self.axis_unit(axis) for axis in range(self.n_axes))
+
+    @property
+    def comparison(self) -> Comparison:
+        """What is shown of the runs; there must be one."""
+        return Comparison(self.records, self.axis_units)
+
     def sentence(self) -> str:
         """Say in one plain sentence what was learned.
 
@@ -156,24 +178,7 @@ class CampaignResult:
         """
         if not self.records:
             return "No run was completed."
-        by_contour = all(record.contour_inf_m for record in self.records)
-        what = "Contour error" if by_contour else "Tracking error"
-        errors_m = [
-            (by_contour and record.contour_inf_m) or record.tracking_inf_m
-            for record in self.records
-        ]
-        before, after = errors_m[0], errors_m[-1]
-        if len(errors_m) == 1:
-            return f"{what} {micrometres(before)} µm at most in 1 run."
-        change = reduction(before, after)
-        said = f"{change:.1f} % less" if change >= 0 else f"{-change:.1f} % more"
-        best = min(errors_m)
-        index = self.records[errors_m.index(best)].index
-        aside = f"; best {micrometres(best)} µm in run {index}" if best < BEST_SHARE * after else ""
-        return (
-            f"{what} from {micrometres(before)} µm to {micrometres(after)} µm "
-            f"({said}) within {len(errors_m)} runs{aside}."
-        )
+        return self.comparison.sentence()
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of the file of ``--json``."""
@@ -189,6 +194,7 @@ class CampaignResult:
             "n_samples": self.n_samples,
             "n_axes": self.n_axes,
             "axis_names": list(self.axis_names),
+            "axis_units": list(self.axis_units),
             "library": self.library,
             "status": self.status,
             "reason": self.reason,
@@ -205,8 +211,15 @@ class CampaignResult:
         BadInputError
             If the file cannot be written.
         """
-        text = json.dumps(self.to_json(), indent=2) + "\n"
-        write_text(path, text)
+        write_text(path, json_text(self.to_json()))
+
+    def _judge(self, event: JudgedEvent) -> None:
+        for place, record in enumerate(self.records):
+            if record.id == event.id:
+                self.records[place] = replace(
+                    record, rolled_back=event.rolled_back, learning_off=event.learning_off,
+                    remark=event.remark,
+                )  # fmt: skip
 
     def _recall_earlier_runs(self, first_index: int) -> None:
         if not Path(self.library).is_file():
@@ -236,8 +249,12 @@ def library_rows(library: str | Path, cell: str | None = None) -> list[dict[str,
     BadInputError
         If the file is missing or is not a library.
     """
-    if not Path(library).is_file():
+    path = Path(library)
+    if not path.exists():
         message = f"{library}: no such library"
+        raise BadInputError(message)
+    if path.is_file() and path.stat().st_size == 0:
+        message = f"{library}: an empty file, and no library yet"
         raise BadInputError(message)
     try:
         return list(Library(str(library)).list(cell))
@@ -254,23 +271,30 @@ def micrometres(length_m: float | None) -> str:
     >>> micrometres(1.23456e-3), micrometres(4.5678e-6), micrometres(None)
     ('1235', '4.57', '-')
     """
-    if length_m is None:
-        return "-"
-    value = length_m * 1e6
-    if abs(value) >= 100:
-        return f"{value:.0f}"
-    return f"{value:.1f}" if abs(value) >= 10 else f"{value:.2f}"
+    return "-" if length_m is None else digits(length_m * 1e6)
 
 
-def reduction(before: float, after: float) -> float:
-    """Return by how many percent `after` is below `before`.
+def json_text(content: object) -> str:
+    r"""Return a file's text; a number that is not finite is null, as JSON has none.
 
     Examples
     --------
-    >>> reduction(200.0, 50.0)
-    75.0
+    >>> json_text({"error_m": float("nan")})
+    '{\n  "error_m": null\n}\n'
     """
-    return 100.0 * (1.0 - after / before) if before > 0 else 0.0
+    text = json.dumps(_finite(content), indent=2, allow_nan=False)
+    # What is written as an escape already are the other control characters, and all beyond ASCII.
+    return text.replace("\x7f", "\\u007f") + "\n"
+
+
+def _finite(content: object) -> object:
+    if isinstance(content, dict):
+        return {key: _finite(value) for key, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_finite(value) for value in content]
+    if isinstance(content, float) and not math.isfinite(content):
+        return None
+    return content
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -280,9 +304,20 @@ def write_text(path: str | Path, text: str) -> None:
     ------
     BadInputError
         If it cannot be written.
+
+    Notes
+    -----
+    The path ``-`` is standard output.
     """
+    if Path(path) == STANDARD_OUTPUT:
+        # Where other lines were turned away from it, it is still the one the process has.
+        out = sys.__stdout__ or sys.stdout
+        out.write(text)
+        out.flush()
+        return
     try:
         Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        message = f"{path}: cannot be written: {error.strerror}"
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        message = f"{path}: cannot be written: {reason}"
         raise BadInputError(message) from error

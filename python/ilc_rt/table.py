@@ -1,4 +1,4 @@
-"""The table of runs that the terminal shows."""
+"""The table of runs that the terminal shows, and its lines for a file or a pipe."""
 
 from __future__ import annotations
 
@@ -7,59 +7,69 @@ from typing import TYPE_CHECKING
 from rich import box
 from rich.table import Table
 
-from ilc_rt.result import micrometres, reduction
+from ilc_rt.comparison import Comparison, note
+from ilc_rt.quantity import digits, signed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ilc_rt.comparison import Column
     from ilc_rt.record import IterationRecord
 
-HEAD = (
-    ("run", 3),
-    ("max tracking µm", 8),
-    ("RMS tracking µm", 8),
-    ("max contour µm", 8),
-    ("reduced by", 7),
-    ("overruns", 8),
-    ("learning ms", 8),
-)
+# What a column is at least, so that the table keeps its shape while runs come in.
+WIDTHS = {"run": 3, "change": 8, "overruns": 8, "learning ms": 8}
+ERROR_WIDTH = 8
 
 
-def run_cells(record: IterationRecord, first: IterationRecord) -> tuple[str, ...]:
-    """Return the cells of one run; `first` is what it is compared with."""
-    if first.contour_inf_m and record.contour_inf_m:
-        change = reduction(first.contour_inf_m, record.contour_inf_m)
-    else:
-        change = reduction(first.tracking_inf_m, record.tracking_inf_m)
+def headings(comparison: Comparison) -> tuple[str, ...]:
+    """Return the headings of the cells of a run; the last one, of what became of it, is empty."""
+    errors = (column.heading for column in _errors(comparison))
+    return ("run", *errors, "change", "overruns", "learning ms", "")
+
+
+def run_cells(comparison: Comparison, record: IterationRecord) -> tuple[str, ...]:
+    """Return the cells of one run."""
+    first = comparison.first
+    compared = comparison.compared(first), comparison.compared(record)
     return (
         str(record.index),
-        micrometres(record.tracking_inf_m),
-        micrometres(record.tracking_rms_m),
-        micrometres(record.contour_inf_m),
-        "" if record.index == first.index else f"{change:.1f} %",
+        *(column.cell(record) for column in _errors(comparison)),
+        "" if record.index == first.index else signed(*compared),
         str(record.overruns),
-        "-" if record.update_ms is None else f"{record.update_ms:.2f}",
+        "-" if record.update_ms is None else digits(record.update_ms),
+        note(record),
     )
 
 
-def runs_table(records: Sequence[IterationRecord]) -> Table:
+def runs_table(comparison: Comparison) -> Table:
     """Return a table with one row a run."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name, width in HEAD:
-        table.add_column(name, justify="right", min_width=width)
-    for record in records:
+    for name in headings(comparison):
+        if name:
+            table.add_column(name, justify="right", min_width=WIDTHS.get(name, ERROR_WIDTH))
+        elif any(map(note, comparison.records)):
+            table.add_column(name)
+    width = len(table.columns)
+    for record in comparison.records:
         style = "yellow" if record.rolled_back else ""
-        table.add_row(*run_cells(record, records[0]), style=style)
+        table.add_row(*run_cells(comparison, record)[:width], style=style)
     return table
 
 
-def plain_line(cells: Sequence[str]) -> str:
+def plain_line(cells: Sequence[str], names: Sequence[str]) -> str:
     """Return cells as one line of fixed columns, for a file or a pipe.
 
     Examples
     --------
-    >>> plain_line(("0", "812", "303", "97.1", "", "0", "0.12"))
-    '  0              812              303            97.1                     0         0.12'
+    >>> plain_line(("0", "812", "rolled back"), ("run", "max tracking µm", ""))
+    '  0              812  rolled back'
     """
-    widths = [max(width, len(name)) for name, width in HEAD]
-    return "  ".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()
+    widths = [max(WIDTHS.get(name, ERROR_WIDTH), len(name)) for name in names]
+    *numbers, last = (cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
+    return "  ".join((*numbers, cells[-1] if names[-1] == "" else last)).rstrip()
+
+
+def _errors(comparison: Comparison) -> list[Column]:
+    """Of linear and rotary axes the largest only: more would not fit."""
+    columns = comparison.errors(rms=not comparison.is_mixed)
+    return [column for column in columns if column.name != "RMS contour"]

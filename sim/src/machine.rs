@@ -55,6 +55,8 @@ struct Axis {
     is_muted: bool,
     nmt: NmtState,
     state: State,
+    /// Share of its force that the plant was told the motor may use.
+    force_share: f64,
 }
 
 /// The encoder of the tool, and what was last told of it.
@@ -119,7 +121,7 @@ impl Machine {
             let drive = DriveNode::new(node, parameters)
                 .map_err(|code| MachineError::Dictionary { node, code })?;
             let (nmt, state) = (drive.nmt(), drive.state());
-            axes.push(Axis { drive, is_muted: false, nmt, state });
+            axes.push(Axis { drive, is_muted: false, nmt, state, force_share: 1.0 });
         }
         let tool = match cell.tcp_encoder {
             None => None,
@@ -206,6 +208,18 @@ impl Machine {
         self.axes.iter().find(|axis| axis.drive.node() == node).map(|axis| axis.drive.state())
     }
 
+    /// Whether any drive has power over its axis, so that it may move.
+    pub fn is_energised(&self) -> bool {
+        self.axes.iter().any(|axis| {
+            let state = axis.drive.state();
+            !axis.is_muted
+                && matches!(
+                    state,
+                    State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive
+                )
+        })
+    }
+
     /// Objects of `node`, if there is one.
     pub fn dictionary(&self, node: NodeId) -> Option<&Dictionary> {
         let tool = self.tool.iter().map(|tool| (tool.encoder.node(), tool.encoder.dictionary()));
@@ -225,7 +239,11 @@ impl Machine {
     }
 
     fn step(&mut self, out: &mut dyn FnMut(Frame)) {
-        for (axis, demand) in self.axes.iter_mut().zip(&mut self.demands) {
+        for (number, (axis, demand)) in self.axes.iter_mut().zip(&mut self.demands).enumerate() {
+            let share = axis.drive.force_share();
+            if std::mem::replace(&mut axis.force_share, share).to_bits() != share.to_bits() {
+                self.plant.limit_force(number, share);
+            }
             *demand = if axis.is_muted { Demand::Off } else { axis.drive.step(self.step_us, out) };
         }
         if let Some(tool) = self.tool.as_mut().filter(|tool| !tool.is_muted) {

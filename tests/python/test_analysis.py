@@ -220,22 +220,6 @@ def test_the_cell_knows_its_model_and_its_first_error():
     np.testing.assert_allclose(error, way - model.simulate(way), atol=1e-15)
 
 
-def test_ilc_tune_prints_and_writes(tmp_path, capsys):
-    file = tmp_path / "figures.json"
-    arguments = ["tune", GANTRY, "--uncertainty", "0.3", "--noise-m", "1e-6"]
-    assert main([*arguments, "--json", str(file)]) == 0
-    text = capsys.readouterr().out
-    assert "[learning.norm_optimal]" in text
-    assert "s3" in text
-    figures = json.loads(file.read_text(encoding="utf-8"))
-    assert figures["analysis"]["converges"] is True
-    assert figures["analysis"]["robust_factor"] < 1
-    assert figures["analysis"]["expected_rms_limit"] > 1e-6
-    assert figures["q"] == 1
-    assert main(["tune", GANTRY, "--noise-m", "-1"]) == 2
-    assert "noise_std" in capsys.readouterr().err
-
-
 def divergent_cell(tmp_path):
     """Write the gantry with a proportional law that is far too eager."""
     text = Path(GANTRY).read_text(encoding="utf-8").replace('law = "norm_optimal"', 'law = "pd"')

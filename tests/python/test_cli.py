@@ -30,9 +30,10 @@ if TYPE_CHECKING:
 
 FIGURES = {
     "id": int, "index": int, "tracking_inf_m": float, "tracking_rms_m": float,
-    "contour_inf_m": float, "contour_rms_m": float, "encoder_tracking_inf_m": float,
-    "tool_tracking_inf_m": float, "overruns": int, "missing_samples": int, "late_updates": int,
-    "update_ms": float, "rolled_back": bool, "digest": str,
+    "contour_inf_m": float, "contour_rms_m": float, "axes_tracking_inf_m": list,
+    "axes_tracking_rms_m": list, "encoder_tracking_inf_m": float, "tool_tracking_inf_m": float,
+    "overruns": int, "missing_samples": int, "late_updates": int, "update_ms": float,
+    "rolled_back": bool, "learning_off": bool, "remark": type(None), "digest": str,
 }  # fmt: skip
 
 
@@ -70,6 +71,7 @@ def check_figures(data: dict[str, object], runs: int) -> None:
     assert isinstance(data["campaign"], str)
     assert data["n_axes"] == 2
     assert data["axis_names"] == ["x", "y"]
+    assert data["axis_units"] == ["m", "m"]
     iterations = data["iterations"]
     assert isinstance(iterations, list)
     assert [figures["index"] for figures in iterations] == list(range(runs))

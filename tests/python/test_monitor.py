@@ -17,6 +17,8 @@ from ilc_rt.result import micrometres
 
 zenoh = pytest.importorskip("zenoh")
 
+from ilc_rt.commands import monitor as commands_monitor  # noqa: E402
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -173,3 +175,77 @@ def test_a_real_controller_is_followed_from_beginning_to_end(gantry: Path, tmp_p
     assert micrometres(last.tracking_inf_m) in out
     servo = next(message.payload for message in seen if message.topic == "servo")
     assert len(servo["reference_m"][0]) == 2
+
+
+@pytest.mark.parametrize(
+    ("topic", "payload", "said"),
+    [
+        ("fault", {"event": "fault", "reason": 7}, "reason = 7 is not of its type"),
+        ("fault", {"event": "fault", "reason": None}, "reason = None"),
+        ("fault", {"event": "fault"}, 'lacks the key "reason"'),
+        ("state", {"event": "end", "status": [], "iterations": "2"}, "status = []"),
+        ("state", {"event": "progress", "iteration": 1, "sample": "1", "n_samples": 2}, "sample"),
+        (
+            "state",
+            {"event": "progress", "iteration": 1, "sample": 1, "n_samples": True},
+            "n_samples",
+        ),
+        ("iteration", iteration(0, 1e-3) | {"tracking_inf_m": "x"}, "tracking_inf_m = x"),
+        ("iteration", iteration(0, 1e-3) | {"index": {}}, "index = {}"),
+        ("iteration", iteration(0, float("nan")), "tracking_inf_m = nan"),
+        ("latency", {"event": "latency", "wake_late_us": 3, "execution_us": []}, "malformed"),
+        ("state", {"event": "start", "cell": 1}, "lacks the key"),
+    ],
+)
+def test_what_a_stranger_publishes_is_one_warning(
+    publisher: Publisher, topic: str, payload: object, said: str
+) -> None:
+    """Wrong types end neither the monitor nor the terminal view."""
+    with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
+        messages = monitor.messages(30.0)
+        assert next(messages).topic == "alive"
+        assert next(messages).topic == "state"
+        publisher.put(topic, payload)
+        message = next(messages)
+    assert message.event is None
+    assert message.warning is not None
+    assert said in message.warning
+    view = commands_monitor._View(events=False)
+    view.show(message)
+    assert (view.runs, view.faults) == (0, 0)
+
+
+def test_control_characters_of_strangers_do_not_reach_the_terminal(
+    publisher: Publisher, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An escape code is shown, not obeyed; texts have an end."""
+    with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
+        messages = monitor.messages(30.0)
+        assert next(messages).topic == "alive"
+        assert next(messages).topic == "state"
+        publisher.put("fault", {"event": "fault", "reason": "a\x1b[2J\r\n\x00\x9b31m" + "x" * 9000})
+        message = next(messages)
+    commands_monitor._View(events=False).show(message)
+    shown = capsys.readouterr().out
+    assert "FAULT: a\\x1b[2J\\r\\n\\x00\\x9b31mx" in shown
+    assert len(shown) < 2500
+    assert all(sign.isprintable() for sign in shown.rstrip("\n"))
+
+
+def test_a_controller_that_asks_is_told_that_all_was_heard(publisher: Publisher) -> None:
+    """What was published before the question arrives before the answer."""
+    with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
+        messages = monitor.messages(30.0)
+        assert next(messages).topic == "alive"
+        assert next(messages).topic == "state"
+        for index in range(200):
+            publisher.put("iteration", iteration(index, 1e-3))
+        replies = list(publisher.session.get("ilc/gantry/heard", timeout=20.0))
+        assert [reply.ok is not None for reply in replies] == [True]
+        publisher.token.undeclare()
+        seen = []
+        for message in messages:
+            seen.append(message.topic)
+            if message.topic == "gone":
+                break
+    assert seen == ["iteration"] * 200 + ["gone"]

@@ -38,6 +38,7 @@ use pyo3::prelude::*;
 /// The compiled part of `ilc_rt`.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     exceptions::register(module)?;
     model::register(module)?;
     time_varying::register(module)?;

@@ -1,6 +1,6 @@
 //! A learning law that is a Python object, as the supervisor's own or as the core of another law.
 
-use ilc_rt::learning::{Law, LearningError};
+use ilc_rt::learning::{Law, LearningError, Standing};
 use pyo3::prelude::*;
 
 use crate::argument::{Signal, give_signal};
@@ -92,6 +92,14 @@ impl Law for PythonLaw {
 
     fn goes_back(&self) -> bool {
         Python::attach(|py| laws::goes_back(self.law.bind(py)))
+    }
+
+    fn remark(&self) -> Option<String> {
+        Python::attach(|py| laws::standing(self.law.bind(py)).1)
+    }
+
+    fn standing(&self) -> Standing {
+        Python::attach(|py| laws::standing(self.law.bind(py)).0)
     }
 
     fn reset(&mut self) {

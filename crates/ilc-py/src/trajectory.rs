@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use ilc_rt::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
 use ilc_rt::trajectory::exponential::AlphaMax;
-use ilc_rt::trajectory::program::read_gcode;
+use ilc_rt::trajectory::program::{GcodeSetting, read_gcode};
 use ilc_rt::trajectory::{
     AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
     ModulatedSegment, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion, TrackingIndex,
@@ -236,7 +236,7 @@ fn sample_linear(
     let motion = SampledMotion::sample(plan.duration_s(), dt_s, plan.n_axes(), |t_s| {
         (plan.at(t_s), plan.programmed_m(t_s))
     })?;
-    Ok((motion, Vec::new()))
+    Ok((motion.verified(limits)?, Vec::new()))
 }
 
 fn sample_exponential(
@@ -258,7 +258,7 @@ fn sample_exponential(
             (choice.segment, choice.place.to_owned(), choice.alpha, intervals)
         })
         .collect();
-    Ok((motion, alphas))
+    Ok((motion.verified(limits)?, alphas))
 }
 
 fn sample_run(
@@ -833,12 +833,14 @@ fn raster(
 
 /// Plan a part program in G-code.
 ///
-/// G0 to G4, G17, G20, G21, G90, G91, M2, M30; arcs by I and J, or R; comments.
+/// G0 to G4, G17, G20, G21, G80, G90, G91, M2, M30; arcs by I and J, or R;
+/// comments; words that ask for what is so anyway. The words mean what they
+/// mean to LinuxCNC, or are refused.
 ///
 /// Parameters
 /// ----------
-/// text : str
-///     The program.
+/// text : str or bytes
+///     The program; bytes may have any encoding that continues ASCII.
 /// start_m : ndarray of float64, shape (n_axes,)
 ///     Where it begins, in m.
 /// feed_m_s : float
@@ -856,6 +858,8 @@ fn raster(
 /// blend_s : float, optional
 ///     Window that rounds the corners, in s; without it every move is at rest
 ///     at its end.
+/// block_delete : bool
+///     Whether blocks that begin with / are left out.
 ///
 /// Returns
 /// -------
@@ -878,11 +882,11 @@ fn raster(
 /// >>> path.position_m[-1].tolist()
 /// [0.0, 0.01]
 #[pyfunction]
-#[pyo3(signature = (text, *, start_m, feed_m_s, dt_s, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3, rapid_m_s=None, blend_s=None))]
+#[pyo3(signature = (text, *, start_m, feed_m_s, dt_s, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3, rapid_m_s=None, blend_s=None, block_delete=false))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 fn gcode(
     py: Python<'_>,
-    text: &str,
+    text: &Bound<'_, PyAny>,
     start_m: &Bound<'_, PyAny>,
     feed_m_s: f64,
     dt_s: f64,
@@ -891,10 +895,23 @@ fn gcode(
     jerk_max_m_s3: &Bound<'_, PyAny>,
     rapid_m_s: Option<f64>,
     blend_s: Option<f64>,
+    block_delete: bool,
 ) -> PyResult<PyTrajectory> {
+    let bytes = match text.extract::<&[u8]>() {
+        Ok(bytes) => bytes,
+        Err(_) => text.extract::<&str>()?.as_bytes(),
+    };
     let start = read_vector("start_m", start_m)?;
     let limits = read_limits(start.len(), velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
-    let program = read_gcode(text, &start, feed_m_s, rapid_m_s.unwrap_or(feed_m_s))
+    let setting = GcodeSetting {
+        start_m: &start,
+        feed_m_s,
+        rapid_m_s: rapid_m_s.unwrap_or(feed_m_s),
+        rotary: &[],
+        exact_corners: blend_s.is_none(),
+        block_delete,
+    };
+    let program = read_gcode(bytes, &setting)
         .map_err(|error| exceptions::TrajectoryError::new_err(error.to_string()))?;
     let spec = PathSpec {
         start_m: start,

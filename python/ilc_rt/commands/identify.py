@@ -6,6 +6,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import typer
 
 from ilc_rt.commands.options import (
@@ -18,13 +19,19 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
+from ilc_rt.commands.targets import make_folder, report_target
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import Event, StartEvent
+from ilc_rt.text import file_name, printable
 
 PICTURE = "identify-{axis}.png"
+PERIODS_MAX = 10_000
+COHERENCE_MIN = 0.7
+"""Median coherence below which the output does not follow the input."""
 
 PictureFolder = Annotated[
-    Path | None, typer.Option("--report", metavar="DIR", help="Folder for the picture.")
+    Path | None,
+    typer.Option("--report", metavar="DIR", callback=report_target, help="Folder for the picture."),
 ]
 
 
@@ -44,10 +51,18 @@ def identify(
         float | None, typer.Option(help="Peak for a csp axis; half of what the limits allow.")
     ] = None,
     amplitude_m_s: Annotated[float | None, typer.Option(help="Peak for a csv axis.")] = None,
-    from_hz: Annotated[float, typer.Option(help="Lowest frequency.")] = 1.0,
-    to_hz: Annotated[float, typer.Option(help="Highest frequency.")] = 50.0,
-    duration_s: Annotated[float, typer.Option(help="Length of one period.")] = 8.0,
-    periods: Annotated[int, typer.Option(help="Periods to evaluate, at least 2.")] = 5,
+    from_hz: Annotated[
+        float | None, typer.Option(help="Lowest frequency; 1 Hz, or less for a slow axis.")
+    ] = None,
+    to_hz: Annotated[
+        float | None, typer.Option(help="Highest frequency; tried out if not given.")
+    ] = None,
+    duration_s: Annotated[
+        float | None, typer.Option(help="Length of one period; 8 s, or more for a slow axis.")
+    ] = None,
+    periods: Annotated[
+        int, typer.Option(max=PERIODS_MAX, help="Periods to evaluate, at least 2.")
+    ] = 5,
     at_m: Annotated[
         float | None, typer.Option(help="Where to excite it; the program's start if not given.")
     ] = None,
@@ -83,7 +98,7 @@ def identify(
         "axis": name, "amplitude": amplitude, "from_hz": from_hz, "to_hz": to_hz,
         "duration_s": duration_s, "periods": periods, "at_m": at_m,
         "measure": measure.value if measure else None, "bus": bus, "lockstep": lockstep,
-        "drives": drives.value, "library": library, "observe": tell,
+        "drives": drives.value, "library": library, "observe": tell, "tell": typer.echo,
     }  # fmt: skip
     try:
         if method is Method.multisine:
@@ -99,7 +114,8 @@ def identify(
         found.write_json(json_file)
         typer.echo(f"figures: {json_file}")
     if report is not None:
-        typer.echo(f"picture: {_draw(found, report, PICTURE.format(axis=name))}")
+        picture = _draw(found, report, PICTURE.format(axis=file_name(name)))
+        typer.echo(f"picture: {printable(picture)}")
 
     if found.doubt is not None:
         # What was measured is written all the same: it shows what is wrong.
@@ -126,7 +142,9 @@ def _tell(found: object) -> None:
         f"{count} frequencies, amplitude {found.experiment.amplitude:.4g}, "
         f"coherence at least {worst:.4f}"
     )
-    for name, value, deviation in found.rows():
+    # Figures of an output that does not follow its input say nothing.
+    followed = float(np.median(found.coherence)) >= COHERENCE_MIN
+    for name, value, deviation in found.rows() if followed else []:
         typer.echo(f"  {name:<24} {value:>10}{f'  +- {deviation}' if deviation else ''}")
     if found.doubt is None:
         typer.echo(f"\n{found.section()}")
@@ -145,8 +163,8 @@ def _draw(found: object, folder: Path, name: str) -> Path:
     picture = io.BytesIO()
     with mpl.rc_context(plots.STYLE):
         found.figure().savefig(picture, format="png")
+    make_folder(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(picture.getvalue())
     except OSError as error:
         message = f"{folder}: cannot be written: {error.strerror}"

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -19,19 +23,48 @@ from ilc_rt.commands.options import (
 )
 from ilc_rt.errors import BadInputError
 from ilc_rt.export import export_run
-from ilc_rt.result import library_rows, micrometres
+from ilc_rt.quantity import unit_for
+from ilc_rt.result import STANDARD_OUTPUT, json_text, library_rows, write_text
+from ilc_rt.text import printable
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+# The last ones are shown if there is room for them; the campaign's name says when it began.
+COLUMNS = (
+    "id", "campaign", "run", "cell", "law", "max tracking", "max contour",
+    "learned from", "note", "created (UTC)",
+)  # fmt: skip
+N_NARROW = 7
+RIGHT = ("id", "run", "max tracking", "max contour")
+SHORTENED = (COLUMNS.index("cell"), COLUMNS.index("law"))
+SHORTEST = 6
+WIDE = 140
 
 app = Typer(
     no_args_is_help=True,
     help="List, show, export and trim the runs in a library.",
 )
 
+# Characters of a program or of a law's parameters that are shown; `export` gives all of them.
+LENGTH_SHOWN = 2000
+
 RunId = Annotated[int, typer.Argument(metavar="ID", help="Number of the run in the library.")]
 CellName = Annotated[str | None, typer.Option("--cell", metavar="NAME", help="Only this cell's.")]
 CampaignOption = Annotated[
     str | None, typer.Option("--campaign", metavar="ID", help="Only this campaign's.")
 ]
-Keep = Annotated[int, typer.Argument(min=0, metavar="KEEP", help="How many runs stay.")]
+Keep = Annotated[
+    int, typer.Argument(min=0, max=2**63 - 1, metavar="KEEP", help="How many runs stay.")
+]
+JsonRows = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write the runs as JSON; - is standard output."),
+]
+CsvRows = Annotated[
+    Path | None,
+    typer.Option("--csv", metavar="FILE", help="Write the runs as CSV; - is standard output."),
+]
 ExportFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="The file; .npz, .csv or .json says the format.")
 ]
@@ -42,6 +75,8 @@ def list_runs(
     library: LibraryArgument = DEFAULT_LIBRARY_FILE,
     cell: CellName = None,
     campaign: CampaignOption = None,
+    json_file: JsonRows = None,
+    csv_file: CsvRows = None,
 ) -> None:
     """List the runs, one a line.
 
@@ -50,22 +85,65 @@ def list_runs(
     rows = library_rows(library, cell)
     if campaign is not None:
         rows = [row for row in rows if str(row["campaign"]).startswith(campaign)]
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("id", "campaign", "cell", "run", "law", "learned from", "max tracking µm",
-                 "max contour µm", "created (UTC)"):  # fmt: skip
-        right = name in {"id", "run"} or name.endswith("µm")
-        table.add_column(name, justify="right" if right else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(
-            str(row["id"]), str(row["campaign"]), str(row["cell"]), str(row["index"]),
-            str(row["law"]), str(row["measure"]), micrometres(row["tracking_inf_m"]),
-            micrometres(row["contour_inf_m"]), str(row["created_utc"]),
+    if json_file is not None:
+        write_text(json_file, json_text(rows))
+    if csv_file is not None:
+        write_text(csv_file, _csv(rows))
+    if STANDARD_OUTPUT in {json_file, csv_file}:
+        return
+    console = Console(highlight=False, markup=False, emoji=False)
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = WIDE
+    console.print(_table(rows, console.width))
+    console.print(f"{len(rows)} run{'' if len(rows) == 1 else 's'} in {library}", soft_wrap=True)
+
+
+def _table(rows: list[dict[str, Any]], width: int) -> Table:
+    """Return the runs as a table; what `show` and `export` need is there at any width."""
+    texts = [
+        (
+            str(row["id"]), printable(row["campaign"]), str(row["index"]), printable(row["cell"]),
+            printable(row["law"]), error_text(row, "tracking_inf_m"),
+            error_text(row, "contour_inf_m"), printable(row["measure"]), note(row),
+            printable(row["created_utc"]),
+        )
+        for row in rows
+    ]  # fmt: skip
+    count = len(COLUMNS) if width >= WIDE else N_NARROW
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 0))
+    names = COLUMNS[:count]
+    wanted = [
+        max([len(name), *(len(text[column]) for text in texts)])
+        for column, name in enumerate(names)
+    ]
+    # Names give way, the longest first; a column is followed by two blanks.
+    excess = sum(wanted) + 2 * count - width
+    for column in sorted(SHORTENED, key=lambda column: -wanted[column]):
+        cut = max(0, min(excess, wanted[column] - SHORTEST))
+        wanted[column] -= cut
+        excess -= cut
+    for name, size in zip(names, wanted, strict=True):
+        right = name in RIGHT
+        table.add_column(
+            name, justify="right" if right else "left", no_wrap=True, width=size,
+            overflow="ellipsis",
         )  # fmt: skip
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console.width = 200
-    console.print(table)
-    console.print(f"{len(rows)} run{'' if len(rows) == 1 else 's'} in {library}")
+    for text in texts:
+        table.add_row(*text[:count])
+    return table
+
+
+def _csv(rows: list[dict[str, Any]]) -> str:
+    """Return the runs as CSV; lists within a field are JSON."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = list(rows[0]) if rows else ["id"]
+    writer.writerow(names)
+    for row in rows:
+        writer.writerow(
+            json.dumps(row[name]) if isinstance(row[name], list) else row[name] for name in names
+        )
+    return text.getvalue()
 
 
 @app.command("show")
@@ -74,15 +152,19 @@ def show(library: LibraryArgument, run_id: RunId) -> None:
 
     Example: ilc library show ilc-library.db 12
     """
-    for key, value in _load(library, run_id).items():
+    row = _load(library, run_id)
+    for key, value in row.items():
         if key == "disturbance" and value is not None:
             typer.echo(f"{key:22} {', '.join(f'{number:g}' for number in value)}")
+        elif isinstance(value, float) and key.endswith(("_inf_m", "_rms_m")):
+            typer.echo(f"{key:22} {value:.6g}, {error_text(row, key)}")
         elif isinstance(value, np.ndarray):
             size = " x ".join(str(length) for length in value.shape)
-            largest = float(np.abs(value).max()) if value.size else 0.0
+            largest = float(np.abs(value).max(initial=0.0))
             typer.echo(f"{key:22} {size} samples, largest {largest:.6g}")
         else:
-            typer.echo(f"{key:22} {'-' if value is None else value}")
+            shown = "-" if value is None else printable(value, LENGTH_SHOWN)
+            typer.echo(f"{key:22} {shown}")
 
 
 @app.command("export")
@@ -92,7 +174,7 @@ def export(library: LibraryArgument, run_id: RunId, file: ExportFile) -> None:
     Example: ilc library export ilc-library.db 12 run12.csv
     """
     export_run(_load(library, run_id), file)
-    typer.echo(f"run {run_id} written to {file}")
+    typer.echo(f"run {run_id} written to {printable(file)}")
 
 
 @app.command("trim")
@@ -101,12 +183,25 @@ def trim(library: LibraryArgument, keep: Keep, cell: CellName = None) -> None:
 
     Example: ilc library trim ilc-library.db 500 --cell gantry
     """
-    library_rows(library)
+    n_runs = len(library_rows(library))
     try:
-        deleted = Library(str(library)).trim(keep, cell)
+        deleted = Library(str(library)).trim(min(keep, n_runs), cell)
     except OSError as error:
         raise BadInputError(str(error)) from error
     typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")
+
+
+def error_text(row: Mapping[str, Any], figure: str) -> str:
+    """Return a figure of a run in the unit of its axes: angles where all axes are rotary."""
+    units = {str(unit).removesuffix("/s") for unit in row["input_units"]}
+    base = "rad" if units == {"rad"} else "m"
+    return unit_for(base, row[figure]).text(row[figure])
+
+
+def note(row: Mapping[str, Any]) -> str:
+    """Return what became of a run in a few words."""
+    said = ("rolled back", row["rolled_back"]), ("learning off", row["learning_off"])
+    return ", ".join(words for words, holds in said if holds)
 
 
 def _load(library: Path, run_id: int) -> dict[str, Any]:

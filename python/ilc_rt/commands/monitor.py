@@ -10,11 +10,13 @@ from typing import Annotated
 import typer
 
 from ilc_rt.campaign import load_cell
+from ilc_rt.comparison import Comparison
 from ilc_rt.errors import EXIT_FAULT
 from ilc_rt.events import (
     EndEvent,
     FaultEvent,
     IterationEvent,
+    JudgedEvent,
     LatencyEvent,
     ProgressEvent,
     StartEvent,
@@ -23,7 +25,10 @@ from ilc_rt.events import (
 from ilc_rt.monitor import Message, Monitor
 from ilc_rt.progress import WORDS, describe
 from ilc_rt.record import IterationRecord
-from ilc_rt.table import HEAD, plain_line, run_cells
+from ilc_rt.table import headings, plain_line, run_cells
+from ilc_rt.text import printable
+
+WARNINGS_MAX = 100
 
 CellName = Annotated[
     str, typer.Argument(metavar="[CELL]", help="Name of a cell, or its TOML file; * for all.")
@@ -79,12 +84,16 @@ class _View:
         self.faults = 0
         self._events = events
         self._present: set[str] = set()
+        self._warned: set[tuple[str, str]] = set()
         self._first: dict[str, IterationRecord] = {}
+        self._units: dict[str, tuple[str, ...]] = {}
 
     def show(self, message: Message) -> None:
         event = message.event
         self.runs += isinstance(event, IterationEvent)
-        self.faults += message.topic == "fault"
+        self.faults += isinstance(event, FaultEvent)
+        if message.warning is not None:
+            self._warn(message)
         if self._events:
             kept = {"cell": message.cell, "topic": message.topic, **message.payload}
             typer.echo(json.dumps(kept))
@@ -98,7 +107,12 @@ class _View:
                 f"{message.cell}: loop woke late by {late.p99:.3g} µs (99 %), "
                 f"{late.max:.3g} µs at most"
             )
+        elif isinstance(event, JudgedEvent):
+            if event.remark:
+                typer.echo(f"{message.cell}: run {event.index}: {printable(event.remark)}")
         elif isinstance(event, StartEvent):
+            units = (unit.removesuffix("/s") for unit in event.input_units)
+            self._units[message.cell] = tuple(units)
             typer.echo(describe(event))
         elif isinstance(event, StateEvent):
             run = "" if event.iteration is None else f" (run {event.iteration})"
@@ -117,8 +131,21 @@ class _View:
             self._present.add(message.cell)
         sys.stdout.flush()
 
+    def _warn(self, message: Message) -> None:
+        """Say what is wrong with a message, once for each cell and topic."""
+        whose = (message.cell, message.topic)
+        if whose not in self._warned and len(self._warned) < WARNINGS_MAX:
+            self._warned.add(whose)
+            typer.echo(f"{message.cell}: {message.topic}: {message.warning}", err=True)
+
     def _show_run(self, cell: str, record: IterationRecord) -> None:
         if cell not in self._first or record.index == 0:
             self._first[cell] = record
-            typer.echo(" " * len(cell) + "  " + plain_line([name for name, _ in HEAD]))
-        typer.echo(f"{cell}  {plain_line(run_cells(record, self._first[cell]))}")
+        first = self._first[cell]
+        comparison = Comparison((first, record), self._units.get(cell, ()))
+        names = headings(comparison)
+        if record is first:
+            typer.echo(" " * len(cell) + "  " + plain_line(names, names))
+        typer.echo(f"{cell}  {plain_line(run_cells(comparison, record), names)}")
+        if record.remark:
+            typer.echo(f"{' ' * len(cell)}       {printable(record.remark)}")

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from ilc_rt.campaign import DEFAULT_LIBRARY
+from ilc_rt.campaign import DEFAULT_LIBRARY, ITERATIONS_MAX
+from ilc_rt.commands.targets import json_target
 
 
 class Measure(str, Enum):
@@ -30,7 +31,10 @@ CellFile = Annotated[Path, typer.Argument(metavar="CELL", help="Cell description
 Iterations = Annotated[
     int,
     typer.Option(
-        "--iterations", "-n", help="Runs in the whole campaign; the first is without learning."
+        "--iterations",
+        "-n",
+        max=ITERATIONS_MAX,
+        help="Runs in the whole campaign; the first is without learning.",
     ),
 ]
 Bus = Annotated[
@@ -57,7 +61,13 @@ KeepIn = Annotated[
     Path | None, typer.Option("--library", metavar="FILE", help="Keep the runs in this library.")
 ]
 JsonFile = Annotated[
-    Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to this file.")
+    Path | None,
+    typer.Option(
+        "--json",
+        metavar="FILE",
+        callback=json_target,
+        help="Write the figures to this file; - for standard output.",
+    ),
 ]
 DriveOption = Annotated[
     DriveChoice, typer.Option(help="Start simulated drives; auto never does on a can: bus.")

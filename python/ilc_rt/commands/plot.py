@@ -12,8 +12,10 @@ from ilc_rt.commands.options import (
     REPORT_NAME,
     LibraryArgument,
 )
+from ilc_rt.commands.targets import check_report, make_folder
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import CampaignResult
+from ilc_rt.text import printable
 
 CampaignOption = Annotated[
     str | None, typer.Option(metavar="ID", help="Which campaign; the latest if not given.")
@@ -42,7 +44,7 @@ def plot(
 
     typer.echo(result.sentence())
     if out.suffix == ".html":
-        typer.echo(f"report: {write_report(result, out)}")
+        typer.echo(f"report: {printable(write_report(result, out))}")
         return
     if out.suffix:
         message = f"{out}: must be a .html file or a folder"
@@ -53,13 +55,14 @@ def plot(
         "tracking": plots.tracking(result),
         "input": plots.learned_input(result),
     }
+    check_report("--out", out)
+    make_folder(out)
     try:
-        out.mkdir(parents=True, exist_ok=True)
         for name, figure in figures.items():
             if figure is not None:
                 with mpl.rc_context(plots.STYLE):
                     figure.savefig(out / f"{name}.png")
-                typer.echo(f"picture: {out / name}.png")
+                typer.echo(f"picture: {printable(out / name)}.png")
     except OSError as error:
         message = f"{out}: cannot be written: {error.strerror}"
         raise BadInputError(message) from error

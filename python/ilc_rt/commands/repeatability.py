@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ilc_rt.campaign import ITERATIONS_MAX
 from ilc_rt.commands.options import (
     Bus,
     CellFile,
@@ -16,14 +17,19 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
-from ilc_rt.events import Event, IterationEvent
+from ilc_rt.comparison import Comparison
+from ilc_rt.events import Event, IterationEvent, StartEvent
+from ilc_rt.quantity import digits, unit_for
+from ilc_rt.record import IterationRecord
 from ilc_rt.repeatable import check_repeatability
-from ilc_rt.result import micrometres
+from ilc_rt.text import NAME_MAX, printable
 
 
 def repeatability(
     cell: CellFile,
-    runs: Annotated[int, typer.Option("--runs", "-n", help="Runs without learning.")] = 5,
+    runs: Annotated[
+        int, typer.Option("--runs", "-n", max=ITERATIONS_MAX, help="Runs without learning.")
+    ] = 5,
     measure: MeasureOption = None,
     bus: Bus = None,
     lockstep: Lockstep = None,
@@ -35,21 +41,30 @@ def repeatability(
 
     Example: ilc repeatability examples/01_gantry.toml --runs 10
     """
+    units: list[str] = []
 
     def tell(event: Event) -> None:
-        if isinstance(event, IterationEvent):
-            typer.echo(f"run {event.index}: RMS error {micrometres(event.tracking_rms_m)} µm")
+        if isinstance(event, StartEvent):
+            units[:] = [unit.removesuffix("/s") for unit in event.input_units]
+        elif isinstance(event, IterationEvent):
+            comparison = Comparison([IterationRecord.from_event(event, "")], units)
+            errors = [c for c in comparison.tracking() if c.name.startswith("RMS")]
+            said = ", ".join(column.unit.text(column.of(comparison.first)) for column in errors)
+            typer.echo(f"run {event.index}: RMS error {said}")
 
     found = check_repeatability(
         cell, runs, bus=bus, measure=measure.value if measure else None, lockstep=lockstep,
         drives=drives.value, library=library, observe=tell,
     )  # fmt: skip
-    typer.echo(f"{'axis':<8} {'repeats µm':>12} {'does not µm':>12} {'ratio':>8}  learning applies")
-    for axis in found.axes:
-        ratio = "-" if axis.ratio is None else f"{axis.ratio:.1f}"
+    names = [printable(axis.axis, NAME_MAX) for axis in found.axes]
+    width = max(8, *map(len, names))
+    typer.echo(f"{'axis':<{width}} {'repeats':>12} {'does not':>12} {'ratio':>8}  learning applies")
+    for name, axis, unit in zip(names, found.axes, units, strict=True):
+        shown = unit_for(unit, max(axis.repeatable_rms_m, axis.non_repeatable_rms_m))
         same, other = axis.repeatable_rms_m, axis.non_repeatable_rms_m
+        ratio = "-" if axis.ratio is None else digits(axis.ratio)
         typer.echo(
-            f"{axis.axis:<8} {micrometres(same):>12} {micrometres(other):>12} {ratio:>8}  "
+            f"{name:<{width}} {shown.text(same):>12} {shown.text(other):>12} {ratio:>8}  "
             f"{axis.verdict}"
         )
     if json_file is not None:

@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ilc_rt.commands.options import JsonFile  # noqa: TC001 - typer reads it
+from ilc_rt.commands.targets import make_folder, report_target
 from ilc_rt.errors import BadInputError
 from ilc_rt.reproduce.outcome import Outcome, compute, read_json, write_json
 from ilc_rt.reproduce.papers import chosen, load
@@ -30,7 +31,12 @@ PaperName = Annotated[
 ]
 ReportFolder = Annotated[
     Path | None,
-    typer.Option("--report", metavar="DIR", help="Write a page and pictures for each paper."),
+    typer.Option(
+        "--report",
+        metavar="DIR",
+        callback=report_target,
+        help="Write a page and pictures for each paper.",
+    ),
 ]
 FromFile = Annotated[
     Path | None,
@@ -62,7 +68,9 @@ def reproduce(
     if from_file is not None and reduced:
         message = f"--reduced: nothing is computed with --from {from_file}; give one of them"
         raise BadInputError(message)
-    _check_targets(json_file, report)
+    if report is not None and report.exists() and not report.is_dir():
+        message = f"{report}: is a file; a folder is needed"
+        raise BadInputError(message)
     console = Console(highlight=False)
     if not console.is_terminal:
         console.width = 160
@@ -79,20 +87,8 @@ def reproduce(
         # Here and not above: matplotlib takes its time, and bad input should not wait for it.
         from ilc_rt.reproduce.gallery import write_gallery
 
+        make_folder(report)
         typer.echo(f"report:  {write_gallery(outcomes, report)[0]}")
-
-
-def _check_targets(json_file: Path | None, report: Path | None) -> None:
-    """Refuse before minutes of computing what could not be written after them."""
-    if json_file is not None and not json_file.absolute().parent.is_dir():
-        message = f"{json_file}: no such folder: {json_file.parent}"
-        raise BadInputError(message)
-    if json_file is not None and json_file.is_dir():
-        message = f"{json_file}: is a folder; a file is needed"
-        raise BadInputError(message)
-    if report is not None and report.exists() and not report.is_dir():
-        message = f"{report}: is a file; a folder is needed"
-        raise BadInputError(message)
 
 
 def _compute(names: Sequence[str], console: Console, *, reduced: bool) -> list[Outcome]:

@@ -19,13 +19,18 @@ from ilc_rt.commands.options import (
     Lockstep,
     MeasureOption,
 )
-from ilc_rt.errors import CampaignError
+from ilc_rt.commands.targets import make_folder, report_target
+from ilc_rt.errors import EXIT_FAULT, CampaignError
 from ilc_rt.progress import CampaignView
+from ilc_rt.text import printable
 
 ReportFile = Annotated[
     Path | None,
     typer.Option(
-        "--report", metavar="PATH", help="Write an HTML report: a .html file or a folder."
+        "--report",
+        metavar="PATH",
+        callback=report_target,
+        help="Write an HTML report: a .html file, or a folder in one that exists.",
     ),
 ]
 Resume = Annotated[
@@ -71,17 +76,21 @@ def run(
 
 
 def carry_out(
-    campaign: Campaign, iterations: int, json_file: Path | None, report: Path | None
+    campaign: Campaign,
+    iterations: int,
+    json_file: Path | None,
+    report: Path | None,
+    *,
+    restarts: int = 0,
 ) -> None:
     """Run a campaign in the terminal, then write what was asked for.
 
     Files are written also after a fault or a stop on request, of the runs
-    that were completed.
+    that were completed. A fault of the machine is followed by going on where
+    the campaign was, `restarts` times at most.
     """
     try:
-        with CampaignView() as view:
-            for event in campaign.events(iterations):
-                view.show(event, campaign.result)
+        _show(campaign, iterations, restarts)
     except (CampaignError, KeyboardInterrupt, SystemExit) as stopped:
         if campaign.result.records:
             typer.echo(campaign.result.sentence())
@@ -93,14 +102,34 @@ def carry_out(
     _write(campaign, json_file, report)
 
 
+def _show(campaign: Campaign, iterations: int, restarts: int) -> None:
+    try:
+        with CampaignView() as view:
+            for event in campaign.events(iterations):
+                view.show(event, campaign.result)
+    except CampaignError as stopped:
+        # A run that cannot be kept would not be kept the next time either.
+        if stopped.exit_code != EXIT_FAULT or restarts == 0 or campaign.result.unkept:
+            raise
+        n_runs = len(campaign.result.records)
+        campaign.resume = n_runs > 0
+        onward = f"going on after run {n_runs - 1}" if n_runs else "beginning again"
+        typer.echo(f"ilc: {printable(stopped.reason)}; {onward}", err=True)
+    else:
+        return
+    _show(campaign, iterations, restarts - 1)
+
+
 def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> None:
     result = campaign.result
-    typer.echo(f"library: {campaign.library} (campaign {result.campaign})")
+    typer.echo(f"library: {printable(campaign.library)} (campaign {printable(result.campaign)})")
     if json_file is not None:
         result.write_json(json_file)
-        typer.echo(f"figures: {json_file}")
+        typer.echo(f"figures: {printable(json_file)}")
     if report is not None:
         # Here and not above: matplotlib takes its time, and bad input should not wait for it.
         from ilc_rt.report import write_report
 
-        typer.echo(f"report:  {write_report(result, report)}")
+        if not report.suffix:
+            make_folder(report)
+        typer.echo(f"report:  {printable(write_report(result, report))}")

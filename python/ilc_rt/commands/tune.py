@@ -1,114 +1,110 @@
-"""`ilc tune`: propose the weights of learning for a cell, and say why."""
+"""`ilc tune`: propose the weights of learning for a cell, say why, and write them if asked."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from ilc_rt._native import tune as propose
-from ilc_rt.campaign import load_cell
 from ilc_rt.commands.options import CellFile, JsonFile  # noqa: TC001 - typer reads them
 from ilc_rt.errors import BadInputError
+from ilc_rt.result import write_text
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from ilc_rt._native import Analysis, Tuning
+    from ilc_rt.tuning import Proposal
 
 Uncertainty = Annotated[
     list[float] | None,
     typer.Option(
         "--uncertainty",
-        help="How far the axes may be from the model, 0.2 for 20 %; several times for gains "
-        "at equally spaced frequencies up to half the cycle rate.",
+        help="How far the axes may be from the model where it is known, 0.3 for 30 %, which is "
+        "assumed; several times for gains at equally spaced frequencies up to half the cycle rate.",
+    ),
+]
+KnownHz = Annotated[
+    float | None,
+    typer.Option(
+        "--known-hz",
+        help="Frequency up to which the model is known, as that of the first mode; 1.3 times the "
+        "natural frequency of each axis if not given.",
     ),
 ]
 NoiseStd = Annotated[
     float | None,
     typer.Option("--noise-m", help="Standard deviation of the measurement's noise in metres."),
 ]
-Runs = Annotated[int, typer.Option("--runs", min=1, help="Runs in which learning should be done.")]
+# More say nothing that these do not.
+RUNS_MAX = 1_000_000
+Runs = Annotated[
+    int, typer.Option("--runs", min=1, max=RUNS_MAX, help="Runs in which learning should be done.")
+]
+Write = Annotated[bool, typer.Option("--write", help="Put the weights into the cell description.")]
 
 
 def tune(
     cell: CellFile,
     uncertainty: Uncertainty = None,
+    known_hz: KnownHz = None,
     noise_m: NoiseStd = None,
     runs: Runs = 10,
+    write: Write = False,
     json_file: JsonFile = None,
 ) -> None:
     """Propose weights of norm-optimal learning for a cell, with the reasons.
 
+    They are tried on what the axes might be, by the cell description alone:
+    nothing moves.
+
     Example: ilc tune examples/01_gantry.toml --uncertainty 0.3 --noise-m 1e-6
     """
-    # Weights are asked for because those in the file may be wrong.
-    description = load_cell(cell, allow_divergent=True)
-    gains: Any = uncertainty
-    if uncertainty is not None and len(uncertainty) == 1:
-        gains = uncertainty[0]
-    try:
-        tuning = propose(
-            description.model(),
-            description.n_samples,
-            uncertainty=gains,
-            noise_std=noise_m,
-            reference=description.first_error(),
-            n_runs=runs,
-        )
-    except ValueError as error:
-        raise BadInputError(" ".join(str(error).split())) from error
-    _show(tuning)
+    from ilc_rt.tuning import TUNED_LAWS, UNCERTAINTY, propose_weights
+
+    found = propose_weights(
+        cell,
+        uncertainty=UNCERTAINTY if uncertainty is None else uncertainty,
+        known_hz=known_hz,
+        noise_m=0.0 if noise_m is None else noise_m,
+        n_runs=runs,
+    )
+    _show(found)
     if json_file is not None:
-        _write(json_file, description.name, tuning)
+        write_text(json_file, json.dumps(found.to_json(), indent=2) + "\n")
         typer.echo(f"figures: {json_file}")
+    if not write:
+        return
+    if found.law not in TUNED_LAWS:
+        message = f"{cell}: left as it was: {found.notes[0]}"
+        raise BadInputError(message)
+    changed = found.write(cell)
+    typer.echo(f"written: {cell}" if changed else f"{cell} has these weights already")
 
 
-def _show(tuning: Tuning) -> None:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("step", no_wrap=True)
-    table.add_column("choice", no_wrap=True)
-    table.add_column("why")
-    for step in tuning.steps:
-        value = step["value"]
-        choice = step["what"] if value is None else f"{step['what']} = {value:.4g}"
-        table.add_row(step["name"], choice, step["why"])
+def _show(found: Proposal) -> None:
     console = Console(highlight=False)
     if not console.is_terminal:
         console.width = 160
-    console.print(table)
-    for line in _figures(tuning.analysis):
-        console.print(line)
+    why = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    why.add_column("weight", no_wrap=True)
+    why.add_column("why")
+    for reason in found.reasons:
+        why.add_row(f"{reason.key} = {reason.value:g}", reason.why)
+    console.print(why)
+    expected = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    expected.add_column("axis", no_wrap=True)
+    for title in ("RMS error at first", f"after {found.n_runs} runs", "at worst"):
+        expected.add_column(title, justify="right", no_wrap=True)
+    expected.add_column("which is with")
+    for axis in dict.fromkeys(trial.axis for trial in found.trials):
+        trials, unit = found.of(axis), found.units[axis]
+        plain, worst = trials[-1], max(trials, key=lambda trial: trial.rms[-1])
+        figures = [plain.rms[0], plain.rms[-1], worst.rms[-1]]
+        expected.add_row(axis, *(f"{1e6 * value:.4g} µ{unit}" for value in figures), worst.what)
+    console.print(expected)
+    for note in found.notes:
+        console.print(f"note: {note}", markup=False)
     console.print("for the cell:\n")
-    console.print("[learning.norm_optimal]", markup=False)
-    console.print(f"q = {tuning.q}\ns = {tuning.s:.6g}\nr = {tuning.r:.6g}\nrate = 0.0")
-
-
-def _figures(analysis: Analysis) -> list[str]:
-    named = {
-        "error before learning, RMS": analysis.initial_error_rms,
-        "error that stays, RMS": analysis.converged_error_rms,
-        "expected with the noise, RMS": analysis.expected_rms_limit,
-    }
-    return [f"{name:30} {1e6 * value:.3f} µm" for name, value in named.items() if value is not None]
-
-
-def _write(path: Path, name: str, tuning: Tuning) -> None:
-    figures = {
-        "cell": name,
-        "q": tuning.q,
-        "s": tuning.s,
-        "r": tuning.r,
-        "smoothing_hz": tuning.smoothing_hz,
-        "steps": tuning.steps,
-        "analysis": tuning.analysis.to_dict(),
-    }
-    try:
-        path.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        message = f"{path}: {error.strerror}"
-        raise BadInputError(message) from error
+    console.print(found.toml(), markup=False, end="")

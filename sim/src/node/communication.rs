@@ -21,6 +21,15 @@ const REGISTER_COMMUNICATION: i64 = 0x10;
 /// Bit 5 of the error register: device profile.
 const REGISTER_PROFILE: i64 = 0x20;
 
+/// In 0x1005: this node produces SYNC.
+const SYNC_PRODUCER: i64 = 1 << 30;
+/// In 0x1005: the identifier.
+const SYNC_IDENTIFIER: i64 = 0x7FF;
+/// "save", as it is written to 0x1010.
+const SAVE: i64 = 0x6576_6173;
+/// "load", as it is written to 0x1011.
+const LOAD: i64 = 0x6461_6F6C;
+
 /// What a frame means to the device behind the communication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Incoming {
@@ -54,6 +63,9 @@ struct Slots {
     consumer: Slot,
     producer_ms: Slot,
     behaviour: Slot,
+    sync: Slot,
+    sync_period_us: Slot,
+    sync_counter: Slot,
 }
 
 /// The CANopen side of a node.
@@ -66,6 +78,8 @@ pub struct Communication {
     sdo: SdoServer,
     slots: Slots,
     heartbeat_us: u64,
+    /// Since this node produced its last SYNC, if it produces any.
+    sync_us: u64,
     /// Since the controller's last heartbeat; `None` until the first.
     controller_us: Option<u64>,
     last_emergency: Option<u16>,
@@ -90,6 +104,9 @@ impl Communication {
             consumer: slot(objects::CONSUMER_HEARTBEAT, 1)?,
             producer_ms: slot(objects::PRODUCER_HEARTBEAT, 0)?,
             behaviour: slot(objects::ERROR_BEHAVIOUR, 1)?,
+            sync: slot(objects::COB_ID_SYNC, 0)?,
+            sync_period_us: slot(objects::CYCLE_PERIOD, 0)?,
+            sync_counter: slot(objects::SYNC_COUNTER_OVERFLOW, 0)?,
         };
         let pdos = PdoEngine::new(&dictionary);
         Ok(Self {
@@ -100,6 +117,7 @@ impl Communication {
             sdo: SdoServer::default(),
             slots,
             heartbeat_us: 0,
+            sync_us: 0,
             controller_us: None,
             last_emergency: None,
         })
@@ -166,7 +184,11 @@ impl Communication {
         if self.nmt != NmtState::Operational {
             return Incoming::Nothing;
         }
-        if sync::is_sync(frame) {
+        if self.is_sync(frame) {
+            if self.dictionary.number(self.slots.sync_counter) != 0 && frame.payload().is_empty() {
+                self.emergency(emcy::CODE_SYNC_LENGTH, out);
+                return Incoming::Nothing;
+            }
             return Incoming::Sync;
         }
         match self.pdos.receive(frame, &mut self.dictionary) {
@@ -199,6 +221,9 @@ impl Communication {
         if period_us > 0 && self.heartbeat_us >= period_us {
             self.heartbeat_us = 0;
             out(Heartbeat { node: self.node, state: self.nmt }.encode());
+        }
+        if self.nmt != NmtState::Stopped && self.is_sync_due(elapsed_us) {
+            out(sync::frame());
         }
         if self.nmt == NmtState::Operational {
             self.pdos.transmit_events(elapsed_us, &self.dictionary, out);
@@ -301,6 +326,29 @@ impl Communication {
         Incoming::Written
     }
 
+    /// Whether `frame` is a SYNC on the identifier that this node listens to.
+    fn is_sync(&self, frame: &Frame) -> bool {
+        let identifier = self.dictionary.number(self.slots.sync) & SYNC_IDENTIFIER;
+        i64::from(frame.id()) == identifier && frame.payload().len() <= 1
+    }
+
+    /// Counts time and tells whether this node is to produce a SYNC now.
+    fn is_sync_due(&mut self, elapsed_us: u64) -> bool {
+        let produces = self.dictionary.number(self.slots.sync) & SYNC_PRODUCER != 0;
+        let period_us =
+            u64::try_from(self.dictionary.number(self.slots.sync_period_us)).unwrap_or(0);
+        if !produces || period_us == 0 {
+            self.sync_us = 0;
+            return false;
+        }
+        self.sync_us += elapsed_us;
+        let is_due = self.sync_us >= period_us;
+        if is_due {
+            self.sync_us = 0;
+        }
+        is_due
+    }
+
     /// The node and period of the heartbeat that is watched, 0x1016:01.
     fn watched(&self) -> Option<(NodeId, u64)> {
         let [low, high, node, _] =
@@ -347,7 +395,14 @@ impl Objects for DictionaryAccess<'_> {
         let slot = self.dictionary.find(address)?;
         let value = self.dictionary.check(slot, bytes)?;
         pdo_rules::check(self.dictionary, address, value.number())?;
-        self.dictionary.store(slot, value);
+        match (address.index, value.number()) {
+            (objects::STORE_PARAMETERS, SAVE) => self.dictionary.save(),
+            (objects::RESTORE_DEFAULTS, LOAD) => self.dictionary.restore_factory(),
+            (objects::STORE_PARAMETERS | objects::RESTORE_DEFAULTS, _) => {
+                return Err(AbortCode::CannotStore);
+            }
+            _ => self.dictionary.store(slot, value),
+        }
         self.written = Some(address);
         Ok(())
     }

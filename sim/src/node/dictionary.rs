@@ -54,6 +54,7 @@ pub struct Entry {
     pub allowed: Allowed,
     /// Value at power-on.
     pub power_on: Value,
+    factory: Value,
     value: Value,
     written: bool,
 }
@@ -68,6 +69,7 @@ impl Entry {
             mappable: Mappable::No,
             allowed: Allowed::Any,
             power_on: value,
+            factory: value,
             value,
             written: false,
         }
@@ -195,6 +197,22 @@ impl Dictionary {
     /// Tells whether the object was written since this was last asked, equal value or not.
     pub fn take_written(&mut self, slot: Slot) -> bool {
         std::mem::take(&mut self.entries[slot.0].written)
+    }
+
+    /// Makes what users have written the values at power-on, as in a memory that keeps them.
+    pub fn save(&mut self) {
+        for entry in &mut self.entries {
+            if entry.access == Access::ReadWrite {
+                entry.power_on = entry.value;
+            }
+        }
+    }
+
+    /// Forgets what was saved; it shows at the next reset.
+    pub fn restore_factory(&mut self) {
+        for entry in &mut self.entries {
+            entry.power_on = entry.factory;
+        }
     }
 
     /// Gives the objects from `first` to `last` their power-on values.

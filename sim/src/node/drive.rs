@@ -7,12 +7,11 @@ use ilc_rt::fieldbus::cia402::{Mode, State, Statusword};
 use super::communication::{Communication, Incoming, Silence};
 use super::dictionary::{Dictionary, Slot};
 use super::drive_objects::{self, DriveSlots, whole};
-use super::motion::{Motion, MotionLimits};
+use super::motion::Motion;
 use super::state_machine::StateMachine;
+use super::units::Units;
 use crate::plant::Demand;
 
-/// Communication fault: a frozen controller, or NMT left operational under power (0x603F).
-const CODE_CONNECTION: u16 = 0x7500;
 /// The following-error monitor is off at this window.
 const WINDOW_OFF: i64 = 0xFFFF_FFFF;
 /// Bit 8 of the controlword.
@@ -56,6 +55,8 @@ pub struct DriveNode {
     communication: Communication,
     slots: DriveSlots,
     parameters: DriveParameters,
+    /// As the dictionary has them; read again when it is written.
+    units: Units,
     machine: StateMachine,
     motion: Motion,
     measured: Measured,
@@ -73,10 +74,12 @@ impl DriveNode {
     pub fn new(node: NodeId, parameters: DriveParameters) -> Result<Self, AbortCode> {
         let communication = Communication::new(node, drive_objects::all(node, &parameters))?;
         let slots = DriveSlots::find(communication.dictionary())?;
+        let units = Units::read(communication.dictionary(), &slots, parameters.counts_per_m);
         Ok(Self {
             communication,
             slots,
             parameters,
+            units,
             machine: StateMachine::default(),
             motion: Motion::default(),
             measured: Measured::default(),
@@ -106,6 +109,11 @@ impl DriveNode {
         self.communication.dictionary()
     }
 
+    /// Share of its force that the motor may use, 0 to 1.
+    pub fn force_share(&self) -> f64 {
+        self.units.force_share()
+    }
+
     /// Takes the last emergency sent since this was last asked.
     pub fn take_emergency(&mut self) -> Option<u16> {
         self.communication.take_emergency()
@@ -129,8 +137,12 @@ impl DriveNode {
         }
         match self.communication.receive(frame, out) {
             Incoming::Nothing => {}
-            Incoming::Nmt(command) => self.on_nmt(command, out),
+            Incoming::Nmt(command) => {
+                self.on_nmt(command, out);
+                self.read_units();
+            }
             Incoming::Written => {
+                self.read_units();
                 self.show_mode();
                 self.heed_controlword(out);
             }
@@ -156,10 +168,10 @@ impl DriveNode {
         }
         let dt_s = f64::from(step_us) * 1e-6;
         let demand = self.motion.step(
-            &self.limits(),
+            self.units.limits(),
             self.measured.position_m,
             self.measured.velocity_m_s,
-            self.si(self.slots.velocity_offset),
+            self.units.velocity_m_s(self.number(self.slots.velocity_offset)),
             dt_s,
         );
         self.end_ramp();
@@ -171,7 +183,7 @@ impl DriveNode {
         match command {
             NmtCommand::Start => {}
             NmtCommand::Stop | NmtCommand::PreOperational | NmtCommand::ResetCommunication => {
-                self.on_connection_loss(CODE_CONNECTION, Some(out));
+                self.on_connection_loss(emcy::CODE_COMMUNICATION, Some(out));
             }
             NmtCommand::ResetNode => {
                 self.machine = StateMachine::default();
@@ -231,13 +243,25 @@ impl DriveNode {
                 self.is_halted = false;
                 self.astray_us = 0;
             }
-            State::QuickStopActive => {
-                if self.number(self.slots.quick_stop_option) == 0 {
+            State::QuickStopActive => match self.number(self.slots.quick_stop_option) {
+                0 => {
                     self.machine.quick_stop_done();
                     self.motion.off();
-                } else {
-                    self.motion.ramp_down(self.measured.velocity_m_s);
                 }
+                1 | 5 => self.slow_down(),
+                _ => self.stop_quickly(),
+            },
+            State::ReadyToSwitchOn
+                if before == State::OperationEnabled
+                    && self.number(self.slots.shutdown_option) == 1 =>
+            {
+                self.slow_down();
+            }
+            State::SwitchedOn
+                if before == State::OperationEnabled
+                    && self.number(self.slots.disable_option) == 1 =>
+            {
+                self.slow_down();
             }
             State::NotReadyToSwitchOn
             | State::SwitchOnDisabled
@@ -253,12 +277,22 @@ impl DriveNode {
             return;
         }
         self.is_halted = asked;
-        if asked {
-            self.motion.ramp_down(self.measured.velocity_m_s);
+        if asked && self.number(self.slots.halt_option) == 1 {
+            self.slow_down();
+        } else if asked {
+            self.stop_quickly();
         } else {
             self.forget_targets();
             self.motion.hold(self.measured.position_m);
         }
+    }
+
+    fn slow_down(&mut self) {
+        self.motion.ramp_down(self.measured.velocity_m_s, self.units.slow_deceleration_m_s2());
+    }
+
+    fn stop_quickly(&mut self) {
+        self.motion.ramp_down(self.measured.velocity_m_s, self.units.quick_deceleration_m_s2());
     }
 
     fn forget_targets(&mut self) {
@@ -280,16 +314,15 @@ impl DriveNode {
             Some(Mode::Csp) if has_position => {
                 let counts = self.number(self.slots.target_position)
                     + self.number(self.slots.position_offset);
-                let target_m = counts as f64 / self.parameters.counts_per_m;
-                self.motion.position_target(target_m, self.period_s());
+                self.motion.position_target(self.units.place_m(counts), self.period_s());
             }
             // Without a promised deadline a target is there to stay, as when it is set by SDO.
             Some(Mode::Csp) if self.communication.has_deadline() => {
                 self.motion.extrapolate_once(self.period_s());
             }
             Some(Mode::Csv) if has_velocity => {
-                let velocity_m_s =
-                    self.si(self.slots.target_velocity) + self.si(self.slots.velocity_offset);
+                let velocity_m_s = self.units.velocity_m_s(self.number(self.slots.target_velocity))
+                    + self.units.velocity_m_s(self.number(self.slots.velocity_offset));
                 self.motion.velocity_target(velocity_m_s);
             }
             Some(Mode::Csp | Mode::Csv) | None => {}
@@ -320,10 +353,14 @@ impl DriveNode {
                 self.machine.fault_reaction_done();
                 self.motion.off();
             }
-            State::QuickStopActive if self.number(self.slots.quick_stop_option) != 6 => {
+            State::QuickStopActive
+                if !matches!(self.number(self.slots.quick_stop_option), 5 | 6) =>
+            {
                 self.machine.quick_stop_done();
                 self.motion.off();
             }
+            // The ramp of a shutdown, or of a disabled operation, is over.
+            State::ReadyToSwitchOn | State::SwitchedOn => self.motion.off(),
             _ => {}
         }
     }
@@ -354,18 +391,20 @@ impl DriveNode {
         self.set(self.slots.error_code, code.into());
         self.machine.fault();
         self.astray_us = 0;
-        if self.number(self.slots.fault_reaction_option) == 0 {
-            self.machine.fault_reaction_done();
-            self.motion.off();
-        } else {
-            self.motion.ramp_down(self.measured.velocity_m_s);
+        match self.number(self.slots.fault_reaction_option) {
+            0 => {
+                self.machine.fault_reaction_done();
+                self.motion.off();
+            }
+            1 => self.slow_down(),
+            _ => self.stop_quickly(),
         }
     }
 
     /// Demand before limits minus actual position; 0 where position is not controlled.
     fn following_error_counts(&self) -> f64 {
         let demand_m = self.motion.demand_m().unwrap_or(self.measured.position_m);
-        (demand_m - self.measured.position_m) * self.parameters.counts_per_m
+        self.units.distance(demand_m - self.measured.position_m)
     }
 
     fn mode(&self) -> Option<Mode> {
@@ -377,22 +416,13 @@ impl DriveNode {
         self.number(self.slots.period) as f64 * 10.0_f64.powi(exponent)
     }
 
-    fn limits(&self) -> MotionLimits {
-        MotionLimits {
-            position_min_m: self.si(self.slots.position_min),
-            position_max_m: self.si(self.slots.position_max),
-            velocity_max_m_s: self.si(self.slots.velocity_max),
-            deceleration_m_s2: self.si(self.slots.deceleration),
-        }
+    fn read_units(&mut self) {
+        let dictionary = self.communication.dictionary();
+        self.units = Units::read(dictionary, &self.slots, self.parameters.counts_per_m);
     }
 
     fn number(&self, slot: Slot) -> i64 {
         self.communication.dictionary().number(slot)
-    }
-
-    /// The value of an object in counts, in SI units.
-    fn si(&self, slot: Slot) -> f64 {
-        self.number(slot) as f64 / self.parameters.counts_per_m
     }
 
     fn set(&mut self, slot: Slot, number: i64) {
@@ -401,15 +431,15 @@ impl DriveNode {
 
     /// Shows what the drive measures and demands.
     fn show(&mut self) {
-        let counts = |value_si: f64| whole(value_si * self.parameters.counts_per_m);
+        let units = &self.units;
         let Measured { position_m, velocity_m_s, force_n } = self.measured;
         let demand_m = self.motion.demand_m().unwrap_or(position_m);
         let values = [
-            (self.slots.position_demand, counts(demand_m)),
-            (self.slots.position_internal, counts(position_m)),
-            (self.slots.position_actual, counts(position_m)),
-            (self.slots.velocity_demand, counts(self.motion.demand_m_s())),
-            (self.slots.velocity_actual, counts(velocity_m_s)),
+            (self.slots.position_demand, units.position(demand_m)),
+            (self.slots.position_internal, whole(position_m * self.parameters.counts_per_m)),
+            (self.slots.position_actual, units.position(position_m)),
+            (self.slots.velocity_demand, units.velocity(self.motion.demand_m_s())),
+            (self.slots.velocity_actual, units.velocity(velocity_m_s)),
             (self.slots.torque_actual, whole(force_n / self.parameters.force_max_n * 1000.0)),
             (self.slots.following_error, whole(self.following_error_counts())),
         ];

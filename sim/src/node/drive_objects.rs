@@ -16,9 +16,21 @@ const TYPE_EVENT: u8 = 255;
 /// Some masters take a TPDO that came twice for periodic, and then miss it on a quiet drive.
 const DISPLAY_EVENT_MS: u16 = 100;
 
+/// Rated torque, and rated current, in thousandths.
+const RATED: u16 = 1000;
+/// Positions in counts of the encoder.
+pub(super) const UNIT_COUNTS: u32 = 0x00B5_0000;
+/// Velocities in counts of the encoder a second.
+const UNIT_COUNTS_PER_S: u32 = 0x00B5_0300;
+/// Counts; metres with a prefix of 1, milli, micro and nano.
+const POSITION_UNITS: [i64; 5] = [0x00B5_0000, 0x0001_0000, 0xFD01_0000, 0xFA01_0000, 0xF701_0000];
+/// The same, a second.
+const VELOCITY_UNITS: [i64; 5] = [0x00B5_0300, 0x0001_0300, 0xFD01_0300, 0xFA01_0300, 0xF701_0300];
+
 /// Returns all objects of a drive.
 ///
-/// 0x6502 names the modes that are simulated and no others; option codes admit what is simulated.
+/// 0x6502 names the modes that are simulated and no others; option codes admit
+/// what is simulated.
 pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
     let mode_map = [mapped(objects::MODE_OF_OPERATION, 8)];
     let display_map = [mapped(objects::MODE_DISPLAY, 8), mapped(objects::ERROR_CODE, 16)];
@@ -75,13 +87,17 @@ fn words_and_options() -> Vec<Entry> {
         output(objects::ERROR_CODE, Value::U16(0)),
         input(objects::CONTROLWORD, Value::U16(0)),
         output(objects::STATUSWORD, Value::U16(0)),
-        // 0: power off, 2: ramp and power off, 6: ramp and hold.
-        setting(objects::QUICK_STOP_OPTION, 0, Value::I16(6)).allowing(Allowed::OneOf(&[0, 2, 6])),
-        setting(objects::SHUTDOWN_OPTION, 0, Value::I16(0)).allowing(Allowed::OneOf(&[0])),
-        setting(objects::DISABLE_OPTION, 0, Value::I16(0)).allowing(Allowed::OneOf(&[0])),
-        setting(objects::HALT_OPTION, 0, Value::I16(2)).allowing(Allowed::OneOf(&[2])),
-        // 0: power off, 2: ramp and power off.
-        setting(objects::FAULT_REACTION_OPTION, 0, Value::I16(2)).allowing(Allowed::OneOf(&[0, 2])),
+        // 0: power off; 1, 2: slow and quick ramp, then power off; 5, 6: the same, and hold.
+        setting(objects::QUICK_STOP_OPTION, 0, Value::I16(6))
+            .allowing(Allowed::OneOf(&[0, 1, 2, 5, 6])),
+        // 0: power off, 1: slow ramp, then power off.
+        setting(objects::SHUTDOWN_OPTION, 0, Value::I16(0)).allowing(Allowed::OneOf(&[0, 1])),
+        setting(objects::DISABLE_OPTION, 0, Value::I16(0)).allowing(Allowed::OneOf(&[0, 1])),
+        // 1, 2: slow and quick ramp.
+        setting(objects::HALT_OPTION, 0, Value::I16(2)).allowing(Allowed::OneOf(&[1, 2])),
+        // 0: power off; 1, 2: slow and quick ramp, then power off.
+        setting(objects::FAULT_REACTION_OPTION, 0, Value::I16(2))
+            .allowing(Allowed::OneOf(&[0, 1, 2])),
         input(objects::MODE_OF_OPERATION, Value::I8(0)).allowing(Allowed::OneOf(&[0, 8, 9])),
         output(objects::MODE_DISPLAY, Value::I8(0)),
         Entry::constant(objects::SUPPORTED_MODES, 0, "Supported drive modes", Value::U32(modes)),
@@ -94,6 +110,8 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
     let counts = |value_si: f64| value_si * parameters.counts_per_m;
     let limit = objects::POSITION_LIMIT;
     let period = objects::INTERPOLATION_PERIOD;
+    let range = objects::POSITION_RANGE_LIMIT;
+    let deceleration = unsigned(counts(parameters.deceleration_m_s2));
     let mut entries = vec![
         output(objects::POSITION_DEMAND, Value::I32(0)),
         output(objects::POSITION_INTERNAL, Value::I32(0)),
@@ -106,7 +124,10 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         setting(objects::FOLLOWING_ERROR_TIME, 0, Value::U16(10)),
         output(objects::VELOCITY_DEMAND, Value::I32(0)),
         output(objects::VELOCITY_ACTUAL, Value::I32(0)),
-        setting(objects::MAX_TORQUE, 0, Value::U16(1000)).allowing(Allowed::OneOf(&[1000])),
+        setting(objects::MAX_TORQUE, 0, Value::U16(RATED)),
+        setting(objects::MAX_CURRENT, 0, Value::U16(RATED)),
+        setting(objects::POSITIVE_TORQUE_LIMIT, 0, Value::U16(RATED)),
+        setting(objects::NEGATIVE_TORQUE_LIMIT, 0, Value::U16(RATED)),
         Entry::constant(
             objects::RATED_TORQUE,
             0,
@@ -119,12 +140,25 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         setting(limit, 1, signed(counts(parameters.position_min_m))),
         setting(limit, 2, signed(counts(parameters.position_max_m))),
         setting(objects::MAX_VELOCITY, 0, unsigned(counts(parameters.velocity_max_m_s))),
-        setting(
-            objects::QUICK_STOP_DECELERATION,
-            0,
-            unsigned(counts(parameters.deceleration_m_s2)),
-        )
-        .allowing(Allowed::Range(1, i64::from(u32::MAX))),
+        Entry::constant(range, 0, "Highest sub-index", Value::U8(2)),
+        setting(range, 1, Value::I32(i32::MIN)),
+        setting(range, 2, Value::I32(i32::MAX)),
+        setting(objects::HOME_OFFSET, 0, Value::I32(0)),
+        // Bit 7: positions, bit 6: velocities.
+        setting(objects::POLARITY, 0, Value::U8(0))
+            .allowing(Allowed::OneOf(&[0, 0x40, 0x80, 0xC0])),
+        setting(objects::MAX_MOTOR_SPEED, 0, Value::U32(u32::MAX)),
+        setting(objects::PROFILE_ACCELERATION, 0, deceleration),
+        setting(objects::PROFILE_DECELERATION, 0, deceleration)
+            .allowing(Allowed::Range(1, i64::from(u32::MAX))),
+        setting(objects::QUICK_STOP_DECELERATION, 0, deceleration)
+            .allowing(Allowed::Range(1, i64::from(u32::MAX))),
+        setting(objects::MAX_ACCELERATION, 0, Value::U32(u32::MAX)),
+        setting(objects::MAX_DECELERATION, 0, Value::U32(u32::MAX)),
+        setting(objects::POSITION_UNIT, 0, Value::U32(UNIT_COUNTS))
+            .allowing(Allowed::OneOf(&POSITION_UNITS)),
+        setting(objects::VELOCITY_UNIT, 0, Value::U32(UNIT_COUNTS_PER_S))
+            .allowing(Allowed::OneOf(&VELOCITY_UNITS)),
         input(objects::POSITION_OFFSET, Value::I32(0)),
         input(objects::VELOCITY_OFFSET, Value::I32(0)),
         input(objects::TORQUE_OFFSET, Value::I16(0)),
@@ -134,11 +168,20 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         output(objects::FOLLOWING_ERROR_ACTUAL, Value::I32(0)),
         input(objects::TARGET_VELOCITY, Value::I32(0)),
     ];
-    for ratio in [objects::ENCODER_RESOLUTION, objects::GEAR_RATIO, objects::FEED_CONSTANT] {
-        let name = objects::name(ratio).unwrap_or("Ratio");
+    let ratios = [
+        objects::ENCODER_RESOLUTION,
+        objects::VELOCITY_RESOLUTION,
+        objects::GEAR_RATIO,
+        objects::FEED_CONSTANT,
+        objects::VELOCITY_FACTOR,
+        objects::ACCELERATION_FACTOR,
+    ];
+    for ratio in ratios {
         entries.push(Entry::constant(ratio, 0, "Highest sub-index", Value::U8(2)));
-        entries.push(Entry::constant(ratio, 1, name, Value::U32(1)));
-        entries.push(Entry::constant(ratio, 2, name, Value::U32(1)));
+        for sub in [1, 2] {
+            let positive = Allowed::Range(1, i64::from(u32::MAX));
+            entries.push(setting(ratio, sub, Value::U32(1)).allowing(positive));
+        }
     }
     entries
 }
@@ -171,6 +214,9 @@ slots! {
     controlword = objects::CONTROLWORD, 0;
     statusword = objects::STATUSWORD, 0;
     quick_stop_option = objects::QUICK_STOP_OPTION, 0;
+    shutdown_option = objects::SHUTDOWN_OPTION, 0;
+    disable_option = objects::DISABLE_OPTION, 0;
+    halt_option = objects::HALT_OPTION, 0;
     fault_reaction_option = objects::FAULT_REACTION_OPTION, 0;
     mode = objects::MODE_OF_OPERATION, 0;
     mode_display = objects::MODE_DISPLAY, 0;
@@ -186,7 +232,33 @@ slots! {
     position_min = objects::POSITION_LIMIT, 1;
     position_max = objects::POSITION_LIMIT, 2;
     velocity_max = objects::MAX_VELOCITY, 0;
+    range_min = objects::POSITION_RANGE_LIMIT, 1;
+    range_max = objects::POSITION_RANGE_LIMIT, 2;
+    home_offset = objects::HOME_OFFSET, 0;
+    polarity = objects::POLARITY, 0;
+    motor_speed_max = objects::MAX_MOTOR_SPEED, 0;
+    profile_deceleration = objects::PROFILE_DECELERATION, 0;
     deceleration = objects::QUICK_STOP_DECELERATION, 0;
+    acceleration_max = objects::MAX_ACCELERATION, 0;
+    deceleration_max = objects::MAX_DECELERATION, 0;
+    torque_max = objects::MAX_TORQUE, 0;
+    current_max = objects::MAX_CURRENT, 0;
+    positive_torque = objects::POSITIVE_TORQUE_LIMIT, 0;
+    negative_torque = objects::NEGATIVE_TORQUE_LIMIT, 0;
+    encoder_increments = objects::ENCODER_RESOLUTION, 1;
+    encoder_revolutions = objects::ENCODER_RESOLUTION, 2;
+    velocity_increments = objects::VELOCITY_RESOLUTION, 1;
+    velocity_revolutions = objects::VELOCITY_RESOLUTION, 2;
+    gear_motor = objects::GEAR_RATIO, 1;
+    gear_shaft = objects::GEAR_RATIO, 2;
+    feed = objects::FEED_CONSTANT, 1;
+    feed_revolutions = objects::FEED_CONSTANT, 2;
+    velocity_numerator = objects::VELOCITY_FACTOR, 1;
+    velocity_denominator = objects::VELOCITY_FACTOR, 2;
+    acceleration_numerator = objects::ACCELERATION_FACTOR, 1;
+    acceleration_denominator = objects::ACCELERATION_FACTOR, 2;
+    position_unit = objects::POSITION_UNIT, 0;
+    velocity_unit = objects::VELOCITY_UNIT, 0;
     position_offset = objects::POSITION_OFFSET, 0;
     velocity_offset = objects::VELOCITY_OFFSET, 0;
     period = objects::INTERPOLATION_PERIOD, 1;

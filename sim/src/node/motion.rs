@@ -16,8 +16,10 @@ pub struct MotionLimits {
     pub position_max_m: f64,
     /// Highest speed.
     pub velocity_max_m_s: f64,
-    /// Deceleration of a ramp.
-    pub deceleration_m_s2: f64,
+    /// Highest acceleration of a demand.
+    pub acceleration_max_m_s2: f64,
+    /// Highest deceleration of a demand.
+    pub deceleration_max_m_s2: f64,
 }
 
 /// What the drive is doing.
@@ -37,6 +39,7 @@ enum Phase {
     /// Brakes to standstill.
     Ramp {
         velocity_m_s: f64,
+        deceleration_m_s2: f64,
         settling_s: f64,
     },
     Hold {
@@ -51,12 +54,20 @@ pub struct Motion {
     /// Position given to the controller: the interpolated one, rate-limited and inside the limits.
     limited_m: f64,
     last_delta_m: f64,
+    /// Speed of the demand in the last step.
+    rate_m_s: f64,
     is_limited: bool,
 }
 
 impl Default for Motion {
     fn default() -> Self {
-        Self { phase: Phase::Off, limited_m: 0.0, last_delta_m: 0.0, is_limited: false }
+        Self {
+            phase: Phase::Off,
+            limited_m: 0.0,
+            last_delta_m: 0.0,
+            rate_m_s: 0.0,
+            is_limited: false,
+        }
     }
 }
 
@@ -71,12 +82,13 @@ impl Motion {
         self.phase = Phase::Hold { position_m };
         self.limited_m = position_m;
         self.last_delta_m = 0.0;
+        self.rate_m_s = 0.0;
         self.is_limited = false;
     }
 
     /// Brakes from the velocity the axis has.
-    pub fn ramp_down(&mut self, velocity_m_s: f64) {
-        self.phase = Phase::Ramp { velocity_m_s, settling_s: 0.0 };
+    pub fn ramp_down(&mut self, velocity_m_s: f64, deceleration_m_s2: f64) {
+        self.phase = Phase::Ramp { velocity_m_s, deceleration_m_s2, settling_s: 0.0 };
         self.is_limited = false;
     }
 
@@ -166,10 +178,10 @@ impl Motion {
             Phase::Hold { .. } => {}
             Phase::Velocity { velocity_m_s: wanted_m_s } => {
                 let wanted_m_s = *wanted_m_s;
-                return self.velocity_demand(wanted_m_s, limits, position_m);
+                return self.velocity_demand(wanted_m_s, limits, position_m, dt_s);
             }
-            Phase::Ramp { velocity_m_s: wanted_m_s, settling_s } => {
-                let change_m_s = limits.deceleration_m_s2 * dt_s;
+            Phase::Ramp { velocity_m_s: wanted_m_s, deceleration_m_s2, settling_s } => {
+                let change_m_s = *deceleration_m_s2 * dt_s;
                 *wanted_m_s -= wanted_m_s.clamp(-change_m_s, change_m_s);
                 if wanted_m_s.abs() > 0.0 {
                     return Demand::Velocity { velocity_m_s: *wanted_m_s };
@@ -190,6 +202,7 @@ impl Motion {
         wanted_m_s: f64,
         limits: &MotionLimits,
         position_m: f64,
+        dt_s: f64,
     ) -> Demand {
         let top_m_s = limits.velocity_max_m_s;
         let mut velocity_m_s = wanted_m_s.clamp(-top_m_s, top_m_s);
@@ -199,8 +212,24 @@ impl Motion {
         if position_m <= limits.position_min_m {
             velocity_m_s = velocity_m_s.max(0.0);
         }
+        let velocity_m_s = self.reachable_m_s(velocity_m_s, limits, dt_s);
+        self.rate_m_s = velocity_m_s;
         self.is_limited = velocity_m_s.to_bits() != wanted_m_s.to_bits();
         Demand::Velocity { velocity_m_s }
+    }
+
+    /// The speed nearest to `wanted_m_s` that the acceleration limits let the demand have now.
+    fn reachable_m_s(&self, wanted_m_s: f64, limits: &MotionLimits, dt_s: f64) -> f64 {
+        let speeds_up = wanted_m_s.abs() > self.rate_m_s.abs();
+        let most_m_s2 =
+            if speeds_up { limits.acceleration_max_m_s2 } else { limits.deceleration_max_m_s2 };
+        let change_m_s = most_m_s2 * dt_s;
+        // Compared first: what is within the limits must come out to the last bit.
+        if (wanted_m_s - self.rate_m_s).abs() <= change_m_s {
+            wanted_m_s
+        } else {
+            self.rate_m_s + change_m_s.copysign(wanted_m_s - self.rate_m_s)
+        }
     }
 
     fn position_demand(
@@ -211,13 +240,22 @@ impl Motion {
     ) -> Demand {
         let wanted_m = self.demand_m().unwrap_or(self.limited_m);
         let inside_m = if matches!(self.phase, Phase::Hold { .. }) {
-            // An axis that stands outside the limits stays there until it is told to come back.
             wanted_m
         } else {
-            wanted_m.max(limits.position_min_m).min(limits.position_max_m)
+            // An axis that stands outside the limits stays there until it is told to come back.
+            let (low_m, high_m) = (
+                limits.position_min_m.min(self.limited_m),
+                limits.position_max_m.max(self.limited_m),
+            );
+            wanted_m.max(low_m).min(high_m)
         };
         let reach_m = limits.velocity_max_m_s * dt_s;
-        let moved_m = (inside_m - self.limited_m).clamp(-reach_m, reach_m);
+        let asked_m = (inside_m - self.limited_m).clamp(-reach_m, reach_m);
+        let asked_m_s = asked_m / dt_s;
+        let given_m_s = self.reachable_m_s(asked_m_s, limits, dt_s);
+        self.rate_m_s = given_m_s;
+        let moved_m =
+            if given_m_s.to_bits() == asked_m_s.to_bits() { asked_m } else { given_m_s * dt_s };
         let reached_m = self.limited_m + moved_m;
         let is_there = (inside_m - reached_m).abs() <= f64::EPSILON * inside_m.abs().max(1.0);
         self.limited_m = if is_there { inside_m } else { reached_m };
@@ -234,7 +272,8 @@ mod tests {
         position_min_m: -1.0,
         position_max_m: 1.0,
         velocity_max_m_s: 1.0,
-        deceleration_m_s2: 10.0,
+        acceleration_max_m_s2: f64::INFINITY,
+        deceleration_max_m_s2: f64::INFINITY,
     };
 
     fn position(demand: Demand) -> f64 {
@@ -284,7 +323,7 @@ mod tests {
     #[test]
     fn a_ramp_ends_in_a_hold_where_the_axis_is() {
         let mut motion = Motion::default();
-        motion.ramp_down(0.1);
+        motion.ramp_down(0.1, 10.0);
         let mut n_steps = 0;
         while motion.is_ramping() {
             motion.step(&LIMITS, 0.3, 0.0, 0.0, 0.001);

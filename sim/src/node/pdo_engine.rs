@@ -137,20 +137,23 @@ impl PdoEngine {
 
     /// Takes a frame that may be an RPDO.
     pub fn receive(&mut self, frame: &Frame, dictionary: &mut Dictionary) -> Received {
-        let Some(pdo) = self.receive.iter_mut().find(|pdo| pdo.cob_id == Some(frame.id())) else {
-            return Received::Foreign;
-        };
-        if frame.payload().len() < pdo.n_bytes {
-            return Received::TooShort;
+        let mut received = Received::Foreign;
+        // More than one PDO may listen to an identifier; each of them takes the frame.
+        for pdo in self.receive.iter_mut().filter(|pdo| pdo.cob_id == Some(frame.id())) {
+            received = if frame.payload().len() < pdo.n_bytes {
+                Received::TooShort
+            } else {
+                pdo.since_us = Some(0);
+                if pdo.is_synchronous() {
+                    pdo.latched = Some(*frame);
+                    Received::Latched
+                } else {
+                    pdo.unpack(frame, dictionary);
+                    Received::Applied
+                }
+            };
         }
-        pdo.since_us = Some(0);
-        if pdo.is_synchronous() {
-            pdo.latched = Some(*frame);
-            Received::Latched
-        } else {
-            pdo.unpack(frame, dictionary);
-            Received::Applied
-        }
+        received
     }
 
     /// Takes over the RPDOs that arrived since the last SYNC.

@@ -39,8 +39,8 @@ pub fn communication(
         Entry::read_only(objects::ERROR_REGISTER, 0, "Error register", Value::U8(0)),
         Entry::read_write(objects::ERROR_HISTORY, 0, "Number of errors", Value::U8(0))
             .allowing(Allowed::OneOf(&[0])),
-        Entry::read_write(objects::COB_ID_SYNC, 0, "COB-ID SYNC", Value::U32(0x80))
-            .allowing(Allowed::OneOf(&[0x80])),
+        // Bit 30: this node produces SYNC itself, every 0x1006 microseconds.
+        Entry::read_write(objects::COB_ID_SYNC, 0, "COB-ID SYNC", Value::U32(0x80)),
         Entry::read_write(objects::CYCLE_PERIOD, 0, "Communication cycle period", Value::U32(0)),
         Entry::read_write(objects::SYNC_WINDOW, 0, "Synchronous window length", Value::U32(0)),
         Entry::constant(objects::DEVICE_NAME, 0, "Manufacturer device name", text(device_name)),
@@ -56,6 +56,10 @@ pub fn communication(
             "Manufacturer software version",
             text(env!("CARGO_PKG_VERSION")),
         ),
+        Entry::constant(objects::STORE_PARAMETERS, 0, "Highest sub-index", Value::U8(1)),
+        Entry::read_write(objects::STORE_PARAMETERS, 1, "Save all parameters", Value::U32(1)),
+        Entry::constant(objects::RESTORE_DEFAULTS, 0, "Highest sub-index", Value::U8(1)),
+        Entry::read_write(objects::RESTORE_DEFAULTS, 1, "Restore all defaults", Value::U32(1)),
         Entry::constant(objects::COB_ID_EMCY, 0, "COB-ID EMCY", Value::U32(0x80 + id)),
         Entry::constant(objects::CONSUMER_HEARTBEAT, 0, "Highest sub-index", Value::U8(1)),
         Entry::read_write(objects::CONSUMER_HEARTBEAT, 1, "Consumer heartbeat time", Value::U32(0)),
@@ -65,6 +69,13 @@ pub fn communication(
         Entry::constant(objects::IDENTITY, 2, "Product code", Value::U32(product)),
         Entry::constant(objects::IDENTITY, 3, "Revision number", Value::U32(1)),
         Entry::constant(objects::IDENTITY, 4, "Serial number", Value::U32(id)),
+        Entry::read_write(
+            objects::SYNC_COUNTER_OVERFLOW,
+            0,
+            "Synchronous counter overflow value",
+            Value::U8(0),
+        )
+        .allowing(Allowed::Range(0, 240)),
         Entry::constant(objects::ERROR_BEHAVIOUR, 0, "Highest sub-index", Value::U8(1)),
         // 0: to pre-operational, 1: no change, 2: to stopped.
         Entry::read_write(objects::ERROR_BEHAVIOUR, 1, "Communication error", Value::U8(0))

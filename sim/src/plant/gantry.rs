@@ -20,6 +20,8 @@ pub struct GantryAxis {
     mechanics: Mechanics,
     friction: Friction,
     drive: DriveLoop,
+    /// What the motor can do at most; the drive may allow it less.
+    force_max_n: f64,
     step: ExactStep,
     state: State,
     integral_n: f64,
@@ -51,6 +53,7 @@ impl GantryAxis {
                 simulation.integral_time_s,
                 simulation.force_max_n,
             ),
+            force_max_n: simulation.force_max_n,
             step: ExactStep::new(&mechanics, STEP_S),
             state: [simulation.position_start_m, 0.0, 0.0, 0.0],
             integral_n: 0.0,
@@ -71,7 +74,7 @@ impl GantryAxis {
             dt_s,
         );
         // The brake holds as much as the motor can pull.
-        let brake_n = if demand == Demand::Off { self.drive.force_max_n } else { 0.0 };
+        let brake_n = if demand == Demand::Off { self.force_max_n } else { 0.0 };
         self.state = self.friction.step(&self.step, &self.state, self.force_n, brake_n);
     }
 }
@@ -136,6 +139,12 @@ impl Plant for Gantry {
             if self.noise_m > 0.0 {
                 axis.noise_m = self.noise_m * self.noise.normal();
             }
+        }
+    }
+
+    fn limit_force(&mut self, axis: usize, share: f64) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.drive.force_max_n = axis.force_max_n * share;
         }
     }
 

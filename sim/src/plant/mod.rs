@@ -36,6 +36,9 @@ pub trait Plant: Send {
     fn n_axes(&self) -> usize;
     /// Advances by `dt_s`; axis `i` follows `demand[i]`, and is off where there is none.
     fn step(&mut self, demand: &[Demand], dt_s: f64);
+    /// Lets the motor of an axis use only this share of its force from now on, 0 to 1; a plant without
+    /// forces has nothing to limit.
+    fn limit_force(&mut self, _axis: usize, _share: f64) {}
     /// Position at the axis' own encoder.
     fn encoder_m(&self, axis: usize) -> f64;
     /// Velocity at the axis' own encoder.

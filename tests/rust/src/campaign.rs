@@ -8,6 +8,7 @@ use ilc_rt::config::{Cell, Measure};
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::library::Library;
+use ilc_rt::record::Figures;
 use ilc_rt::supervisor::{self, Disturbance, Options, Outcome};
 use ilc_sim::{ClockMode, Machine};
 
@@ -35,6 +36,7 @@ pub fn options(library: PathBuf, iterations: u32) -> Options {
         iterations,
         measure: None,
         lockstep: true,
+        simulated: false,
         resume: false,
         library,
         disturbance: Disturbance::default(),
@@ -54,8 +56,12 @@ pub struct Kept {
 
 impl Kept {
     /// Largest contour error of each run.
+    ///
+    /// # Panics
+    /// If the path has no contour.
     pub fn contour_m(&self) -> Vec<f64> {
-        self.outcome.runs.iter().map(|(_, figures)| figures.contour_inf_m).collect()
+        let of = |figures: &Figures| figures.contour_inf_m.expect("a path with a contour");
+        self.outcome.runs.iter().map(|(_, figures)| of(figures)).collect()
     }
 
     /// By how much the contour error has fallen from the first run to run `index`, as a share.

@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Mode, State, bring_up, bring_up_encoder};
+use ilc_rt::fieldbus::cia402::{Command, State, bring_up, bring_up_encoder};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};
-use ilc_rt::supervisor::Plan;
+use ilc_rt::supervisor::{Plan, drive_setup};
 use ilc_sim::Machine;
 
 use crate::campaign::machine;
@@ -33,6 +33,10 @@ pub struct Row {
 /// What a test does to the machine; frames it hands over go to the controller.
 pub type Meddle = Box<dyn FnOnce(&mut Machine, &mut dyn FnMut(Frame)) + Send>;
 
+/// What a test does to the answers on their way to the controller: it is given the count of SYNCs so far
+/// and a frame, and puts into the queue what arrives.
+pub type Distort = Box<dyn FnMut(usize, Frame, &mut VecDeque<Frame>) + Send>;
+
 /// The bus between loop and machine.
 pub struct Line {
     bus: InProcess<Machine>,
@@ -42,6 +46,9 @@ pub struct Line {
     pending: Vec<(i32, u16)>,
     injected: VecDeque<Frame>,
     meddle: Option<(u32, Meddle)>,
+    distort: Option<Distort>,
+    /// Axis by axis, SYNC by SYNC: where the plant was when the SYNC had been answered.
+    plant_m: Vec<f64>,
 }
 
 impl Line {
@@ -59,6 +66,16 @@ impl Line {
     /// Does something to the machine just before the n-th SYNC from now.
     pub fn meddle_after(&mut self, n_syncs: u32, meddle: Meddle) {
         self.meddle = Some((n_syncs, meddle));
+    }
+
+    /// Does something to every answer from now on.
+    pub fn distort(&mut self, distort: Distort) {
+        self.distort = Some(distort);
+    }
+
+    /// Where an axis of the plant truly was, SYNC by SYNC.
+    pub fn plant_m(&self, axis: usize) -> Vec<f64> {
+        self.plant_m.chunks(self.nodes.len()).map(|row| row[axis]).collect()
     }
 
     /// What went out with each SYNC.
@@ -119,6 +136,8 @@ impl Tap {
             nodes,
             injected: VecDeque::with_capacity(FRAMES),
             meddle: None,
+            distort: None,
+            plant_m: Vec::with_capacity(ROWS),
         })))
     }
 
@@ -132,14 +151,28 @@ impl Bus for Tap {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let mut line = self.line();
         line.note(frame);
-        line.bus.send(frame)
+        let sent = line.bus.send(frame);
+        if sync::is_sync(frame) {
+            let line = &mut *line;
+            let plant = line.bus.responder().plant();
+            line.plant_m.extend((0..line.nodes.len()).map(|axis| plant.encoder_m(axis)));
+        }
+        sent
     }
 
     fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
         let mut line = self.line();
-        match line.injected.pop_front() {
-            Some(frame) => Ok(Some(frame)),
-            None => line.bus.recv(timeout),
+        let line = &mut *line;
+        loop {
+            if let Some(frame) = line.injected.pop_front() {
+                return Ok(Some(frame));
+            }
+            let received = line.bus.recv(timeout)?;
+            let (Some(frame), Some(distort)) = (received, &mut line.distort) else {
+                return Ok(received);
+            };
+            let n_syncs = line.rows.len() / line.nodes.len();
+            distort(n_syncs, frame, &mut line.injected);
         }
     }
 }
@@ -178,23 +211,22 @@ impl Rig {
     /// # Panics
     /// If a node cannot be brought up.
     pub fn new(cell: &Cell, runs: u32) -> Self {
+        Self::paced(cell, runs, true)
+    }
+
+    /// The same with a loop that is paced by the clock, whose ticks the test is: an answer that is not
+    /// there in a tick is late.
+    ///
+    /// # Panics
+    /// If a node cannot be brought up.
+    pub fn on_clock(cell: &Cell, runs: u32) -> Self {
+        Self::paced(cell, runs, false)
+    }
+
+    fn paced(cell: &Cell, runs: u32, lockstep: bool) -> Self {
         let mut tap = Tap::new(cell);
         for axis in &cell.axes {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1e6")]
-            let following_error_max_counts =
-                (axis.limits.following_error_max_m * axis.counts_per_m).round() as u32;
-            let setup = DriveSetup {
-                node: node(axis.node),
-                mode: match axis.interface {
-                    ilc_rt::config::Interface::Csp => Mode::Csp,
-                    ilc_rt::config::Interface::Csv => Mode::Csv,
-                },
-                cycle_us: cell.cell.cycle_us,
-                following_error_max_counts,
-                heartbeat_ms: 0,
-                rpdo_deadline_ms: 0,
-                answer_timeout: Duration::from_secs(1),
-            };
+            let setup = drive_setup(cell, axis, true).expect("a validated cell");
             bring_up(&mut tap, &setup).expect("the drive comes up");
         }
         if let Some(tool) = &cell.tcp_encoder {
@@ -202,7 +234,7 @@ impl Rig {
                 .expect("the encoder comes up");
         }
         tap.send(&NmtCommand::Start.frame(None)).expect("the bus carries");
-        let mut plan = Plan::new(cell, None, true).expect("the cell can be run");
+        let mut plan = Plan::new(cell, None, lockstep).expect("the cell can be run");
         plan.servo.runs = 0..runs;
         let n_samples = plan.n_samples();
         let stop = Arc::new(AtomicI32::new(0));

@@ -8,7 +8,6 @@ use ilc_rt::fieldbus::transport::Address;
 use ilc_rt::supervisor::Plan;
 use ilc_tests::example_text;
 use proptest::prelude::{any, prop, proptest};
-use proptest::test_runner::Config;
 
 const FILE: &str = "cell.toml";
 const EXAMPLES: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
@@ -119,8 +118,8 @@ const RANGES: &[Edit] = &[
     ),
     (
         "position_start_m = 0.04",
-        "position_start_m = 0.2",
-        &["simulation.position_start_m = 0.2", "allowed -0.02 to 0.1"],
+        "position_start_m = 22.0",
+        &["simulation.position_start_m = 22", "allowed -21.47483647 to 21.47483647"],
     ),
     ("q = 1.0", "q = -1.0", &["[learning.norm_optimal] q = -1", "allowed 0"]),
     ("input_max_m = 0.005", "input_max_m = nan", &["[learning] input_max_m = NaN", "allowed"]),
@@ -244,7 +243,7 @@ fn a_program_that_would_take_for_ever_is_refused_before_it_fills_the_memory() {
 }
 
 proptest! {
-    #![proptest_config(Config { cases: 600, failure_persistence: None, ..Config::default() })]
+    #![proptest_config(ilc_cases::cases(600))]
 
     #[test]
     fn random_edits_never_panic(

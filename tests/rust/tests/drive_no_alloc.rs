@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, Controlword, DriveSetup, Mode, State, bring_up};
+use ilc_rt::fieldbus::cia402::{Command, Controlword, DriveSetup, State, bring_up};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
+use ilc_rt::supervisor::drive_setup;
 use ilc_sim::{ClockMode, Machine};
 use ilc_tests::counting::{Counting, allocations};
 
@@ -22,13 +23,10 @@ fn cycles_faults_and_questions_allocate_nothing() {
     let node = NodeId::new(1).unwrap();
     let mut bus = InProcess::new(Machine::from_cell(&cell, ClockMode::LockStep).unwrap(), 256);
     let setup = DriveSetup {
-        node,
-        mode: Mode::Csp,
-        cycle_us: cell.cell.cycle_us,
         following_error_max_counts: 1_000_000,
         heartbeat_ms: 10,
         rpdo_deadline_ms: 50,
-        answer_timeout: Duration::from_secs(1),
+        ..drive_setup(&cell, &cell.axes[0], true).unwrap()
     };
     bring_up(&mut bus, &setup).unwrap();
     bus.send(&NmtCommand::Start.frame(None)).unwrap();

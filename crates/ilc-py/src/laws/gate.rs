@@ -2,8 +2,8 @@
 
 use std::sync::Mutex;
 
-use ilc_rt::learning::Law;
 use ilc_rt::learning::gate::{Gate, GateRule, GateState, Measure};
+use ilc_rt::learning::{Law, Standing};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -73,6 +73,11 @@ pub(super) struct PyGate {
 }
 
 impl PyGate {
+    /// Returns what the gate decided after the last update, and why.
+    pub(super) fn standing(&self, py: Python<'_>) -> (Standing, Option<String>) {
+        look(py, &self.gate, |gate| (gate.standing(), gate.remark()))
+    }
+
     /// Returns the law inside.
     pub(super) fn inside<'py>(&self, py: Python<'py>) -> &Bound<'py, PyAny> {
         self.law.bind(py)

@@ -23,7 +23,7 @@ pub(crate) mod weight;
 
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
 
-use ilc_rt::learning::{Law, LearningError};
+use ilc_rt::learning::{Law, LearningError, Standing};
 use ilc_rt::model::StateSpace;
 use pyo3::prelude::*;
 
@@ -82,6 +82,14 @@ fn inside<'py>(object: &Bound<'py, PyAny>) -> Option<Bound<'py, PyAny>> {
 /// Returns whether a law goes back to its best input by itself: a gate does, also inside a ladder.
 pub(crate) fn goes_back(object: &Bound<'_, PyAny>) -> bool {
     object.is_instance_of::<gate::PyGate>() || inside(object).is_some_and(|law| goes_back(&law))
+}
+
+/// Returns what a gate, also one inside a ladder, decided after the last update, and why.
+pub(crate) fn standing(object: &Bound<'_, PyAny>) -> (Standing, Option<String>) {
+    if let Ok(gate) = object.cast::<gate::PyGate>() {
+        return gate.get().standing(object.py());
+    }
+    inside(object).map_or((Standing::Learns, None), |law| standing(&law))
 }
 
 /// Returns the number of samples that a law was made for, if it says so.

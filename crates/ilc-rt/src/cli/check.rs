@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
-use crate::config::{Cell, GateMeasure, LawName, PathKind};
+use crate::config::{AxisUnit, Cell, GateMeasure, LawName, PathKind};
+use crate::record::AxisKinds;
 use crate::supervisor::{Plan, Prepared, SupervisorError};
 
 #[derive(Args)]
@@ -32,9 +33,9 @@ fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
     let plan = Plan::new(&cell, None, false)?;
     let Prepared { law, verdict, warnings } = plan.law(&cell)?;
     show::say(&format!(
-        "cell {}: {} axes on {}, {} us cycle; a classical CAN bus at {} bit/s would be {:.0} % loaded",
+        "cell {}: {} on {}, {} us cycle; a classical CAN bus at {} bit/s would be {:.0} % loaded",
         cell.cell.name,
-        cell.n_axes(),
+        if cell.n_axes() == 1 { "1 axis".to_owned() } else { format!("{} axes", cell.n_axes()) },
         cell.bus.address,
         cell.cell.cycle_us,
         cell.bus.bitrate_bit_s,
@@ -93,14 +94,14 @@ fn learning(cell: &Cell) -> Vec<String> {
     }
     lines.push(match &learning.gate {
         Some(gate) => format!(
-            "gate: the input is kept while the {} error is within {:.3} um (learning resumes at {:.3} um); after \
+            "gate: the input is kept while the {} error is within {} (learning resumes at {}); after \
              {} {} in a row above {} times the best error the best input is restored",
             match gate.measure {
                 GateMeasure::Rms => "RMS",
                 GateMeasure::Max => "largest",
             },
-            gate.tolerance_m * 1e6,
-            gate.tolerance_m * gate.resume * 1e6,
+            tolerance(cell, gate.tolerance_m),
+            tolerance(cell, gate.tolerance_m * gate.resume),
             gate.patience,
             if learning.ladder.is_some() { "steps" } else { "runs" },
             gate.growth
@@ -128,13 +129,35 @@ fn path(cell: &Cell, plan: &Plan) -> String {
         PathKind::Gcode => format!("part program {file}"),
         PathKind::Table => format!("set points of {file}"),
     };
-    let rows = || plan.reference_m.chunks_exact(cell.n_axes());
-    let steps_m = rows().zip(rows().skip(1)).map(|(from, to)| {
-        from.iter().zip(to).fold(0.0_f64, |sum, (from, to)| sum.hypot(to - from))
+    let units: Vec<String> = plan.meta.input_units.clone();
+    let kinds = AxisKinds::new(&units, cell.n_axes());
+    let parts = [("m", kinds.of_kind(false)), ("rad", kinds.of_kind(true))];
+    let told = parts.iter().filter(|(_, axes)| !axes.is_empty()).map(|(unit, axes)| {
+        let (length, fastest) = course(&plan.reference_m, cell.n_axes(), axes);
+        format!("{length:.4} {unit} long, {:.4} {unit}/s at most", fastest / cell.cycle_s())
     });
-    let (length_m, fastest_m) =
-        steps_m.fold((0.0, 0.0_f64), |(sum, most), step| (sum + step, most.max(step)));
-    format!("{kind}, {length_m:.4} m long, {:.4} m/s at most", fastest_m / cell.cycle_s())
+    format!("{kind}, {}", told.collect::<Vec<_>>().join(" and "))
+}
+
+/// Length of the path of some axes, and its longest step from one set point to the next.
+fn course(reference_m: &[f64], n_axes: usize, axes: &[usize]) -> (f64, f64) {
+    let rows = || reference_m.chunks_exact(n_axes);
+    let steps = rows()
+        .zip(rows().skip(1))
+        .map(|(from, to)| axes.iter().fold(0.0_f64, |sum, &axis| sum.hypot(to[axis] - from[axis])));
+    steps.fold((0.0, 0.0_f64), |(sum, most), step| (sum + step, most.max(step)))
+}
+
+/// A tolerance of the gate in the unit of the axes; both units where lengths and angles are judged by
+/// the same number.
+fn tolerance(cell: &Cell, value: f64) -> String {
+    let has = |unit| cell.axes.iter().any(|axis| axis.unit == unit);
+    let number = format!("{:.3}", value * 1e6);
+    match (has(AxisUnit::M), has(AxisUnit::Rad)) {
+        (false, true) => format!("{number} urad"),
+        (true, true) => format!("{number} um or urad"),
+        _ => format!("{number} um"),
+    }
 }
 
 #[cfg(test)]

@@ -1,19 +1,34 @@
-//! The file that `--json` names: looked at before anything moves, written when all is over.
+//! What `--json` names, a file or standard output: looked at before anything moves, written when all is
+//! over.
 
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
 use super::show;
+use crate::record::{TEXT_MAX, printable, printable_json};
 
-/// A file that can be written, as far as the system can tell.
+/// What stands for standard output in the place of a file.
+const STANDARD_OUTPUT: &str = "-";
+
+/// A place for figures that can be written, as far as the system can tell.
 pub(super) struct FiguresFile {
     path: PathBuf,
     is_new: bool,
 }
 
 impl FiguresFile {
-    /// Opens the file without changing it; says in one line why it cannot be, if so.
-    pub(super) fn reserve(path: &Path) -> Option<Self> {
+    /// Opens the file without changing it; says in one line why it cannot be, if so. For `-` all other
+    /// lines go to standard error from now on, so that the figures stand alone, which they cannot beside
+    /// `events`.
+    pub(super) fn reserve(path: &Path, events: bool) -> Option<Self> {
+        if path.as_os_str() == STANDARD_OUTPUT {
+            if events {
+                show::complain(&"--json -: not with --events, which go to standard output as well");
+                return None;
+            }
+            show::leave_standard_output();
+            return Some(Self { path: path.to_owned(), is_new: false });
+        }
         let is_new = !path.exists();
         match OpenOptions::new().create(true).append(true).open(path) {
             Ok(_) => Some(Self { path: path.to_owned(), is_new }),
@@ -34,7 +49,11 @@ impl FiguresFile {
 
     /// Writes the figures; returns whether they are there now.
     pub(super) fn write(&self, figures: &serde_json::Value) -> bool {
-        match std::fs::write(&self.path, format!("{figures:#}\n")) {
+        let text = printable_json(&format!("{figures:#}\n"));
+        if self.path.as_os_str() == STANDARD_OUTPUT {
+            return show::print(&text);
+        }
+        match std::fs::write(&self.path, text) {
             Ok(()) => true,
             Err(error) => {
                 complain(&self.path, &error);
@@ -46,7 +65,8 @@ impl FiguresFile {
 
 fn complain(path: &Path, error: &std::io::Error) {
     show::complain(&format!(
-        "--json {}: cannot be written: {error}; allowed: a file in a folder that exists",
-        path.display()
+        "--json {}: cannot be written: {error}; allowed: a file in a folder that exists, or - for \
+         standard output",
+        printable(&path.display().to_string(), TEXT_MAX)
     ));
 }

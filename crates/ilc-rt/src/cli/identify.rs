@@ -1,19 +1,25 @@
 //! `ilc-rt identify`: an experiment with one axis, and the model that comes of it.
 
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicI32;
 
 use clap::{Args, ValueEnum};
 
 use super::figures::FiguresFile;
 use super::run::{MeasureName, exit_status, open, say_event, stop_on_signals};
 use super::{EXIT_BAD_INPUT, show};
-use crate::config::Measure;
+use crate::config::{Cell, Measure};
 use crate::library::Library;
-use crate::model::identify::{Excitation, Waveform};
+use crate::model::identify::{Doubt, Excitation, Waveform};
 use crate::record::{EndStatus, Event};
 use crate::supervisor::{
-    self, Disturbance, Experiment, Identified, Options, Outcome, SupervisorError,
+    self, Band, BandSearch, Described, Disturbance, Experiment, Identified, Options, Outcome,
+    SupervisorError,
 };
+
+/// Where an axis is excited if only the highest frequency is asked for.
+const FALLBACK: Band = Band { from_hz: 1.0, to_hz: 50.0, period_s: 8.0 };
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -26,20 +32,20 @@ pub(super) struct IdentifyArguments {
     #[arg(long)]
     axis: String,
     /// What the axis is excited with.
-    #[arg(long, value_enum, default_value = "multisine")]
+    #[arg(long, visible_alias = "method", value_enum, default_value = "multisine")]
     waveform: WaveformName,
     /// Peak of the excitation, m (csp) or m/s (csv); half of what the limits allow if not given.
-    #[arg(long)]
+    #[arg(long, visible_aliases = ["amplitude-m", "amplitude-m-s"])]
     amplitude: Option<f64>,
-    /// Lowest frequency.
-    #[arg(long, default_value_t = 1.0)]
-    from_hz: f64,
-    /// Highest frequency.
-    #[arg(long, default_value_t = 50.0)]
-    to_hz: f64,
-    /// Length of a period.
-    #[arg(long, default_value_t = 8.0)]
-    period_s: f64,
+    /// Lowest frequency; 1 Hz, or less for a slow axis.
+    #[arg(long)]
+    from_hz: Option<f64>,
+    /// Highest frequency; tried out if not given.
+    #[arg(long)]
+    to_hz: Option<f64>,
+    /// Length of a period; 8 s, or more for a slow axis.
+    #[arg(long, visible_alias = "duration-s")]
+    period_s: Option<f64>,
     /// Periods that are evaluated.
     #[arg(long, default_value_t = 5)]
     periods: usize,
@@ -55,10 +61,17 @@ pub(super) struct IdentifyArguments {
     /// Pace the loop by the drives' answers instead of the clock.
     #[arg(long)]
     lockstep: bool,
+    /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
+    #[arg(long)]
+    simulated_drives: bool,
+    /// Stop the axes and end when standard input closes, as it does when the program that started this
+    /// one ends.
+    #[arg(long)]
+    with_parent: bool,
     /// Where the experiment is kept.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     library: PathBuf,
-    /// Write response, coherence, model and uncertainty to a file.
+    /// Write response, coherence, model and uncertainty to a file; - for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Print one JSON object a line, and leave the evaluation to whoever reads them.
@@ -80,7 +93,7 @@ enum WaveformName {
 pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
     let file = match &arguments.json {
         None => None,
-        Some(path) => match FiguresFile::reserve(path) {
+        Some(path) => match FiguresFile::reserve(path, arguments.events) {
             None => return EXIT_BAD_INPUT,
             reserved => reserved,
         },
@@ -118,8 +131,61 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
 fn experiment(
     arguments: &IdentifyArguments,
 ) -> Result<(Outcome, Option<Identified>), SupervisorError> {
-    let (cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
-    let mut experiment = Experiment {
+    let cell = Cell::load(&arguments.cell)?;
+    let stop = stop_on_signals(arguments.with_parent);
+    let mut search = BandSearch::new(&cell, &laid_out(arguments, FALLBACK))?;
+    if let Some(to_hz) = arguments.to_hz {
+        let band = Band { to_hz, ..FALLBACK };
+        let (outcome, found) = excite(arguments, &laid_out(arguments, band), &stop)?;
+        return Ok((outcome, told(found)));
+    }
+    let mut best: Option<(Experiment, Identified)> = None;
+    let mut last = None;
+    while let Some(band) = search.next_band() {
+        let (outcome, found) = match excite(arguments, &laid_out(arguments, band), &stop) {
+            // An amplitude that was asked for may fit into a narrower band only.
+            Err(SupervisorError::Experiment { .. })
+                if arguments.amplitude.is_some() && best.is_none() && search.is_open() =>
+            {
+                continue;
+            }
+            found => found?,
+        };
+        let completed = outcome.status == EndStatus::Completed;
+        last = Some(outcome);
+        let Some((experiment, found)) = found.filter(|_| completed) else { break };
+        let left = 100.0 * found.residual_rms;
+        let why = found.doubt.map_or(format!("the model leaves {left:.0} %"), |doubt| {
+            let text = doubt.to_string();
+            text.split(':').next().unwrap_or_default().to_owned()
+        });
+        show::say(&format_args!(
+            "{:.3} to {:.3} Hz, amplitude {:.3e}: {why}",
+            band.from_hz, band.to_hz, experiment.excitation.amplitude
+        ));
+        if search.judge(band, &found, best.as_ref().map(|(_, found)| found)) {
+            best = Some((experiment, found));
+        }
+    }
+    let Some(outcome) = last else {
+        let band = Band { to_hz: 50.0, ..FALLBACK };
+        let (outcome, found) = excite(arguments, &laid_out(arguments, band), &stop)?;
+        return Ok((outcome, told(found)));
+    };
+    Ok((outcome, told(best)))
+}
+
+/// Prints what was found.
+fn told(found: Option<(Experiment, Identified)>) -> Option<Identified> {
+    found.map(|(experiment, identified)| {
+        show::say(&describe(&experiment, &identified));
+        identified
+    })
+}
+
+/// The experiment that the arguments ask for, in a band where they say nothing of it.
+fn laid_out(arguments: &IdentifyArguments, band: Band) -> Experiment {
+    Experiment {
         axis: arguments.axis.clone(),
         excitation: Excitation {
             waveform: match arguments.waveform {
@@ -128,13 +194,23 @@ fn experiment(
                 WaveformName::Multisine => Waveform::Multisine,
             },
             amplitude: arguments.amplitude.unwrap_or(1.0),
-            from_hz: arguments.from_hz,
-            to_hz: arguments.to_hz,
-            period_s: arguments.period_s,
+            from_hz: arguments.from_hz.unwrap_or(band.from_hz),
+            to_hz: arguments.to_hz.unwrap_or(band.to_hz),
+            period_s: arguments.period_s.unwrap_or(band.period_s),
             periods: arguments.periods,
         },
         at_m: arguments.at_m,
-    };
+    }
+}
+
+/// Makes an experiment and evaluates it.
+fn excite(
+    arguments: &IdentifyArguments,
+    experiment: &Experiment,
+    stop: &Arc<AtomicI32>,
+) -> Result<(Outcome, Option<(Experiment, Identified)>), SupervisorError> {
+    let (cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
+    let mut experiment = experiment.clone();
     if arguments.amplitude.is_none() {
         experiment = experiment.with_default_amplitude(&cell)?;
     }
@@ -142,11 +218,12 @@ fn experiment(
         iterations: 1,
         measure: arguments.measure.map(Measure::from),
         lockstep: arguments.lockstep,
+        simulated: arguments.simulated_drives,
         resume: false,
         library: arguments.library.clone(),
         disturbance: Disturbance::default(),
         telemetry: !arguments.no_telemetry,
-        stop: stop_on_signals(),
+        stop: Arc::clone(stop),
     };
     let mut kept = None;
     let mut observe = |event: &Event| {
@@ -163,37 +240,48 @@ fn experiment(
     let (Some(id), EndStatus::Completed, false) = (kept, outcome.status, arguments.events) else {
         return Ok((outcome, None));
     };
-    let record = Library::open(&arguments.library)?.load(id)?.record;
+    let record = Library::read(&arguments.library)?.load(id)?.record;
     let identified = Identified::new(&cell, &experiment, &record)?;
-    show::say(&describe(&experiment, &identified));
-    Ok((outcome, Some(identified)))
+    Ok((outcome, Some((experiment, identified))))
 }
 
+/// The figures of `[axis.model]`; of an output that does not follow its input there are none.
 fn describe(experiment: &Experiment, found: &Identified) -> String {
-    let (fit, model) = (&found.fit, &found.fit.model);
     let worst = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
-    format!(
-        "axis {}: {} frequencies from {} to {} Hz, amplitude {:.3e}, coherence at least {:.4}\n\
-         gain               {:>10.5} +- {:.1e}\n\
-         natural frequency  {:>10.4} +- {:.1e} Hz\n\
-         damping            {:>10.5} +- {:.1e}\n\
-         delay              {:>10.4} +- {:.1e} ms\n\
-         left over          {:>10.2} % rms{}",
+    let head = format!(
+        "axis {}: {} frequencies from {} to {} Hz, amplitude {:.3e}, coherence at least {:.4}",
         experiment.axis,
         found.measured.frequency_hz.len(),
         experiment.excitation.from_hz,
         experiment.excitation.to_hz,
         experiment.excitation.amplitude,
         worst(&found.measured.coherence),
-        model.gain,
-        fit.gain_deviation,
-        model.natural_frequency_hz,
-        fit.natural_frequency_deviation_hz,
-        model.damping,
-        fit.damping_deviation,
-        model.delay_s * 1e3,
-        fit.delay_deviation_s * 1e3,
-        fit.residual_rms * 100.0,
+    );
+    if matches!(found.doubt, Some(Doubt::Incoherent { .. })) {
+        return head;
+    }
+    let (figures, delay_s) = match found.described {
+        Described::Position(model) => (
+            format!(
+                "natural frequency  {:>10.4} Hz\ndamping            {:>10.5}",
+                model.natural_frequency_hz, model.damping
+            ),
+            model.delay_s,
+        ),
+        Described::Velocity(model) => {
+            (format!("velocity bandwidth {:>10.4} Hz", model.bandwidth_hz), model.delay_s)
+        }
+    };
+    format!(
+        "{head}\n\
+         gain               {:>10.5} +- {:.1e}\n\
+         {figures}\n\
+         delay              {:>10.4} ms\n\
+         left over          {:>10.2} % rms{}",
+        found.fit.model.gain,
+        found.fit.gain_deviation,
+        delay_s * 1e3,
+        found.residual_rms * 100.0,
         if found.doubt.is_none() { format!("\n\n{}", found.section()) } else { String::new() }
     )
 }

@@ -22,7 +22,7 @@ pub(super) struct LatencyArguments {
     /// Spin the last microseconds before each deadline.
     #[arg(long, default_value_t = 100)]
     spin_us: u32,
-    /// Write the figures to a file.
+    /// Write the figures to a file; - for standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -31,7 +31,7 @@ pub(super) struct LatencyArguments {
 pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
     let figures_file = match &arguments.json {
         None => None,
-        Some(path) => match FiguresFile::reserve(path) {
+        Some(path) => match FiguresFile::reserve(path, false) {
             None => return EXIT_BAD_INPUT,
             reserved => reserved,
         },

@@ -3,15 +3,22 @@
 //! Imports everything and is imported by `main` only.
 
 mod check;
+mod completions;
 mod figures;
 mod identify;
 mod latency;
+mod parent;
+mod quantity;
 mod run;
+mod runs;
 mod show;
+
+pub use parent::when_parent_ends;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use crate::record::printable_lines;
+use clap::{CommandFactory, Parser, Subcommand};
 use tracing::Level;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
@@ -43,6 +50,8 @@ enum Verb {
     Check(check::CheckArguments),
     /// Measure how late this machine wakes the loop's thread.
     Latency(latency::LatencyArguments),
+    /// Print a script that completes this command line in a shell.
+    Completions(completions::CompletionsArguments),
 }
 
 /// Runs the program's arguments and returns its exit status.
@@ -73,6 +82,7 @@ pub fn main() -> ExitCode {
         Verb::Identify(arguments) => identify::identify(&arguments),
         Verb::Check(arguments) => check::check(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),
+        Verb::Completions(arguments) => completions::completions(&arguments, Arguments::command()),
     };
     ExitCode::from(status)
 }
@@ -85,5 +95,6 @@ pub fn refusal_line(refusal: &clap::Error) -> String {
         .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
         .collect();
     let line = words.join("; ").replace(":; ", ": ");
-    format!("{}; --help tells what is allowed", line.trim_start_matches("error: "))
+    let line = format!("{}; --help tells what is allowed", line.trim_start_matches("error: "));
+    printable_lines(&line)
 }

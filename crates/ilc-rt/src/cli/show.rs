@@ -1,66 +1,79 @@
 //! Text for people: the table of runs, and lines on standard error.
 
 use std::io::Write;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::record::{Event, StateName};
-
-/// Columns of the table of runs.
-const HEADINGS: [&str; 7] = [
-    "run",
-    "max tracking um",
-    "rms tracking um",
-    "max contour um",
-    "change",
-    "overruns",
-    "update ms",
-];
+use super::runs::Runs;
+use crate::record::{Event, StateName, printable_json, printable_lines};
 
 /// Prints one line on standard error.
 pub(super) fn complain(line: &dyn std::fmt::Display) {
+    let line = printable_lines(&line.to_string());
     let _ = writeln!(std::io::stderr(), "ilc-rt: {line}");
 }
 
 /// Prints one line on standard output, and tells whether somebody can read it. A reader who has gone
 /// must not end the program while axes move.
 pub(super) fn say(line: &dyn std::fmt::Display) -> bool {
+    let line = printable_lines(&line.to_string());
+    if ASIDE.load(Ordering::Relaxed) {
+        return writeln!(std::io::stderr(), "{line}").is_ok();
+    }
     writeln!(std::io::stdout(), "{line}").is_ok()
 }
 
-/// What an event says to a person, if anything; `first_contour_m` remembers the first run's.
-pub(super) fn sentence(event: &Event, first_contour_m: &mut Option<f64>) -> Option<String> {
+/// Whether lines for people go to standard error, as figures go to standard output.
+static ASIDE: AtomicBool = AtomicBool::new(false);
+
+/// Lets lines for people go to standard error from now on.
+pub(super) fn leave_standard_output() {
+    ASIDE.store(true, Ordering::Relaxed);
+}
+
+/// Prints a text on standard output as it is, and tells whether somebody can read it.
+pub(super) fn print(text: &str) -> bool {
+    let mut out = std::io::stdout();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).is_ok()
+}
+
+/// Prints JSON in one line, and tells whether somebody can read it.
+pub(super) fn say_json(text: &str) -> bool {
+    writeln!(std::io::stdout(), "{}", printable_json(text)).is_ok()
+}
+
+/// What an event says to a person, if anything; `runs` remembers what came before.
+pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
     match event {
         Event::Start {
-            cell, bus, mode, law, measure, n_samples, cycle_s, campaign, rt, ..
+            cell,
+            bus,
+            mode,
+            law,
+            measure,
+            n_samples,
+            n_axes,
+            input_units,
+            cycle_s,
+            campaign,
+            rt,
+            ..
         } => {
+            runs.begin(input_units, *n_axes);
             let thread = rt.as_ref().map_or_else(String::new, |rt| {
                 let memory = if rt.mlock { "locked" } else { "not locked" };
                 let notes: String = rt.notes.iter().flat_map(|note| ["\n  note: ", note]).collect();
                 format!(
-                    "servo thread: {} {}, memory {memory}, kernel {}{notes}\n",
+                    "\nservo thread: {} {}, memory {memory}, kernel {}{notes}",
                     rt.policy, rt.priority, rt.kernel
                 )
             });
-            let [run, max, rms, contour, change, overruns, update] = HEADINGS;
             Some(format!(
                 "cell {cell} on {bus}, {mode}, {:.0} us cycle, {n_samples} samples a run; law {law} from \
-                 the {measure}; campaign {campaign}\n{thread}{run:>4} {max:>16} {rms:>16} {contour:>15} \
-                 {change:>9} {overruns:>9} {update:>10}",
+                 the {measure}; campaign {campaign}{thread}",
                 cycle_s * 1e6
             ))
         }
-        Event::Iteration { index, figures, .. } => {
-            let first = *first_contour_m.get_or_insert(figures.contour_inf_m);
-            Some(format!(
-                "{index:>4} {:>16.1} {:>16.1} {:>15.1} {:>8.1}% {:>9} {:>10.3}{}",
-                figures.tracking_inf_m * 1e6,
-                figures.tracking_rms_m * 1e6,
-                figures.contour_inf_m * 1e6,
-                (figures.contour_inf_m / first - 1.0) * 100.0,
-                figures.overruns,
-                figures.update_ms,
-                if figures.rolled_back { "  error grew: best input restored" } else { "" }
-            ))
-        }
+        Event::Iteration { index, figures, .. } => Some(runs.row(*index, figures)),
         Event::State { state: StateName::Stopping, iteration } => {
             Some(format!("bringing the axes to rest (run {iteration})"))
         }
@@ -74,7 +87,11 @@ pub(super) fn sentence(event: &Event, first_contour_m: &mut Option<f64>) -> Opti
             execution_us.max,
             wake_late_us.count
         )),
-        Event::End { reason, .. } => Some(reason.clone()),
+        Event::End { reason, .. } => Some(match runs.sentence() {
+            Some(sentence) => format!("{sentence}\n{reason}"),
+            None => reason.clone(),
+        }),
+        Event::Judged { index, remark, .. } => runs.judged(*index, remark.as_deref()),
         Event::State { .. } | Event::Progress { .. } | Event::Fault { .. } => None,
     }
 }

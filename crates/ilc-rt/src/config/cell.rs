@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::error::ConfigError;
+use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
 use super::program::Program;
 use super::simulation::{AxisSimulation, Simulation};
@@ -230,8 +231,13 @@ impl Cell {
     /// [`ConfigError`] with file, key, value and what is allowed.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| ConfigError::Read { file: file.clone(), reason: error.to_string() })?;
+        let refused = |reason: String| ConfigError::Read { file: file.clone(), reason };
+        let bytes = read_file(path, CELL_BYTES_MAX).map_err(refused)?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            let line = good.split(|&byte| byte == b'\n').count();
+            refused(format!("line {line} is not UTF-8"))
+        })?;
         Self::parse(&text, &file)
     }
 

@@ -5,6 +5,7 @@
 
 mod cell;
 mod error;
+mod file;
 mod law;
 mod learning;
 mod norm_optimal;
@@ -18,6 +19,7 @@ pub use cell::{
     Safety, TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
+pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};
 pub use law::{
     AdjointSection, ConstrainedSection, ErrorFeedforwardSection, ModelInverseSection, PdSection,
 };

@@ -17,11 +17,14 @@ pub struct Program {
     /// What kind of path it is.
     #[serde(default)]
     pub kind: PathKind,
-    /// Part program of `kind = "gcode"`, set points of `kind = "table"`; a relative path begins at the
-    /// cell description.
+    /// Part program of `kind = "gcode"`, set points of `kind = "table"`; in the folder of the cell
+    /// description, or below it.
     pub file: Option<PathBuf>,
     /// Speed of G0; `feed_m_s` if it is not given.
     pub rapid_m_s: Option<f64>,
+    /// Whether blocks of the part program that begin with `/` are left out.
+    #[serde(default)]
+    pub block_delete: bool,
     /// Highest acceleration across a smooth curve; the axes' own limits if it is not given.
     pub curvature_acceleration_m_s2: Option<f64>,
     /// `[program.butterfly]`

@@ -1,6 +1,6 @@
 //! The switching mechanism: when any law is to learn, to rest, or to go back to what was best.
 
-use super::{Law, LearningError, StandIn};
+use super::{Law, LearningError, StandIn, Standing};
 
 /// What a run is judged by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +105,8 @@ pub struct Gate<L> {
     best_input: Vec<f64>,
     best_figure: Option<f64>,
     runs_grown: usize,
+    /// Whether the last update restored the best input.
+    went_back: bool,
 }
 
 impl<L: Law> Gate<L> {
@@ -136,6 +138,7 @@ impl<L: Law> Gate<L> {
             best_input: Vec::new(),
             best_figure: None,
             runs_grown: 0,
+            went_back: false,
         })
     }
 
@@ -179,6 +182,7 @@ impl<L: Law> Gate<L> {
         let has_grown = self.best_figure.is_some_and(|best| figure > growth * best);
         self.runs_grown = if has_grown { self.runs_grown + 1 } else { 0 };
         let too_long = self.runs_grown >= patience;
+        self.went_back = false;
         if left || self.state == GateState::RolledBack && too_long {
             self.state = GateState::Learning;
             self.best_figure = None;
@@ -188,6 +192,7 @@ impl<L: Law> Gate<L> {
         } else if self.state == GateState::Learning && too_long {
             self.state = GateState::RolledBack;
             self.runs_grown = 0;
+            self.went_back = true;
             self.law.taken_back();
         }
         if self.best_figure.is_none_or(|best| figure < best) {
@@ -256,11 +261,21 @@ impl<L: Law> Law for Gate<L> {
         }
     }
 
+    fn standing(&self) -> Standing {
+        match self.state {
+            GateState::Learning => self.law.standing(),
+            GateState::Holding => Standing::Holds,
+            GateState::RolledBack if self.went_back => Standing::GoesBack,
+            GateState::RolledBack => Standing::Rests,
+        }
+    }
+
     fn reset(&mut self) {
         self.law.reset();
         self.state = GateState::Learning;
         self.best_figure = None;
         self.runs_grown = 0;
+        self.went_back = false;
     }
 
     fn describe(&self) -> String {
@@ -340,6 +355,9 @@ mod tests {
         play(&mut gate, &[3.2]);
         assert_eq!(gate.law().n_taken_back, 1);
         assert!(gate.remark().unwrap().contains("best input is kept"));
+        assert_eq!(gate.standing(), Standing::GoesBack);
+        play(&mut gate, &[2.0]);
+        assert_eq!(gate.standing(), Standing::Rests, "once for each time");
         gate.taken_back();
         assert_eq!(gate.law().n_taken_back, 2);
     }

@@ -1,6 +1,6 @@
 //! The ladder mechanism: several runs with the same input before each step of learning.
 
-use super::{Law, LearningError, StandIn};
+use super::{Law, LearningError, StandIn, Standing};
 
 /// How a [`Ladder`] averages and adapts.
 ///
@@ -237,6 +237,10 @@ impl<L: Law> Law for Ladder<L> {
 
     fn remark(&self) -> Option<String> {
         self.law.remark()
+    }
+
+    fn standing(&self) -> Standing {
+        self.law.standing()
     }
 
     fn reset(&mut self) {

@@ -99,11 +99,30 @@ pub trait Law: Send {
         None
     }
 
+    /// Returns whether the law goes on learning after the last update.
+    fn standing(&self) -> Standing {
+        Standing::Learns
+    }
+
     /// Forgets everything that earlier runs taught the law itself.
     fn reset(&mut self);
 
     /// Returns the law and its parameters as one line of JSON, for the record of the run.
     fn describe(&self) -> String;
+}
+
+/// What came of the last update of a law that may also rest.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// It learned.
+    #[default]
+    Learns,
+    /// It keeps the input, as the error is good enough.
+    Holds,
+    /// The error had grown: it restored the best input, and rests.
+    GoesBack,
+    /// It rests with the best input.
+    Rests,
 }
 
 impl<L: Law + ?Sized> Law for Box<L> {
@@ -151,6 +170,10 @@ impl<L: Law + ?Sized> Law for Box<L> {
 
     fn remark(&self) -> Option<String> {
         (**self).remark()
+    }
+
+    fn standing(&self) -> Standing {
+        (**self).standing()
     }
 
     fn reset(&mut self) {

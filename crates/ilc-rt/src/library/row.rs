@@ -1,6 +1,6 @@
 //! One row of the table, as it is written and read.
 
-use crate::record::{Figures, IterationRecord, Meta};
+use crate::record::{AxisKinds, Figures, IterationRecord, Meta, distances_m};
 
 /// One kept run with its provenance.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,9 +78,39 @@ pub(super) fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::
                 late_updates: row.get("late_updates")?,
                 update_ms: row.get("update_ms")?,
                 rolled_back: row.get("rolled_back")?,
+                axes_tracking_inf_m: numbers(
+                    row.get::<_, Option<String>>("axes_tracking_inf_m")?.as_deref(),
+                ),
+                axes_tracking_rms_m: numbers(
+                    row.get::<_, Option<String>>("axes_tracking_rms_m")?.as_deref(),
+                ),
+                learning_off: row.get::<_, Option<bool>>("learning_off")?.unwrap_or(false),
+                remark: row.get("remark")?,
             },
         },
     })
+}
+
+/// Whether a row was written before each axis had figures of its own.
+pub(super) fn is_old(row: &Row) -> bool {
+    row.record.figures.axes_tracking_inf_m.is_empty() && row.meta.n_axes > 0
+}
+
+/// Works out the figures of a run that was kept before each axis had its own: from its arrays, which the
+/// row must have.
+pub(super) fn refresh(row: &mut Row) {
+    let kinds = AxisKinds::new(&row.meta.input_units, row.meta.n_axes);
+    let record = &mut row.record;
+    record.figures.set_tracking(&record.error_m, &kinds);
+    let (encoder_m, tool_m) = (&record.encoder_m, &record.tool_m);
+    record.figures.set_places(&record.reference_m, encoder_m, tool_m, &kinds);
+    if kinds.is_mixed() || !kinds.has_contour(&record.reference_m) {
+        let seen = if record.tool_m.is_empty() { &record.encoder_m } else { &record.tool_m };
+        let distances_m = distances_m(&record.reference_m, seen, &kinds, row.meta.cycle_s);
+        record.figures.set_contour(&distances_m);
+    } else {
+        record.figures.set_contour(&record.contour_m);
+    }
 }
 
 pub(super) fn json_list(names: &[String]) -> String {

@@ -68,6 +68,19 @@ pub enum Event {
         #[serde(flatten)]
         figures: Figures,
     },
+    /// What the law decided on a run that is told and kept already, as it computed meanwhile.
+    Judged {
+        /// Row in the library.
+        id: i64,
+        /// Number of the run.
+        index: u32,
+        /// Whether the best input was restored after it.
+        rolled_back: bool,
+        /// Whether learning is off.
+        learning_off: bool,
+        /// Why; one sentence.
+        remark: Option<String>,
+    },
     /// Timing of the loop over the whole campaign; in real time only.
     Latency {
         /// How late the loop woke on its grid.

@@ -2,17 +2,32 @@
 
 use serde::Serialize;
 
+use super::axes::AxisKinds;
+use crate::trajectory::contour_error_m;
+
+/// Farthest that a tool is looked for along the path, before or after its own time.
+const CONTOUR_WINDOW_S: f64 = 0.25;
+/// Distance below which there is rounding of positions, and nothing that was measured: a picometre.
+const ROUNDING_M: f64 = 1e-12;
+
 /// Figures of one run; metres unless the name says otherwise.
+///
+/// Lengths and angles are never put into one figure: what is over several axes is over the linear ones,
+/// or, where all are rotary, over all of them and in radians.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Figures {
     /// Largest absolute tracking error of any axis, in the measurement learned from.
     pub tracking_inf_m: f64,
     /// Root of the mean over time of the squared length of the tracking error.
     pub tracking_rms_m: f64,
-    /// Largest distance of the tool from the reference path.
-    pub contour_inf_m: f64,
+    /// Largest distance of the tool from the reference path; absent where the path has no contour.
+    pub contour_inf_m: Option<f64>,
     /// Root mean square of that distance.
-    pub contour_rms_m: f64,
+    pub contour_rms_m: Option<f64>,
+    /// Largest absolute tracking error of each axis, in its own unit.
+    pub axes_tracking_inf_m: Vec<f64>,
+    /// Root-mean-square tracking error of each axis, in its own unit.
+    pub axes_tracking_rms_m: Vec<f64>,
     /// Largest absolute tracking error of any axis at the encoders.
     pub encoder_tracking_inf_m: f64,
     /// Largest absolute tracking error of any axis at the tool; absent without such a measurement.
@@ -27,6 +42,83 @@ pub struct Figures {
     pub update_ms: f64,
     /// Whether this run's error had grown so far that the best input was restored after it.
     pub rolled_back: bool,
+    /// Whether nothing was learned from this run and learning is off, as the error had grown.
+    pub learning_off: bool,
+    /// What decided on the next input, where it was not the law's lesson alone; one sentence.
+    pub remark: Option<String>,
+}
+
+impl Figures {
+    /// Takes the tracking error that was learned from, `n_samples * n_axes`.
+    pub fn set_tracking(&mut self, error_m: &[f64], kinds: &AxisKinds) {
+        let axis = |axis| kinds.columns(error_m, &[axis]);
+        let axes = || 0..kinds.n_axes();
+        self.axes_tracking_inf_m = axes().map(|i| infinity_norm(&axis(i))).collect();
+        self.axes_tracking_rms_m = axes().map(|i| rms(&axis(i), 1)).collect();
+        let comparable = kinds.comparable();
+        let error_m = kinds.columns(error_m, &comparable);
+        self.tracking_inf_m = infinity_norm(&error_m);
+        self.tracking_rms_m = rms(&error_m, comparable.len());
+    }
+
+    /// Takes where the axes were, at the encoders and, if it is measured (`tool_m` is not empty), at the
+    /// tool.
+    pub fn set_places(
+        &mut self,
+        reference_m: &[f64],
+        encoder_m: &[f64],
+        tool_m: &[f64],
+        kinds: &AxisKinds,
+    ) {
+        let comparable = kinds.comparable();
+        let largest = |measured_m: &[f64]| {
+            let errors: Vec<_> = reference_m.iter().zip(measured_m).map(|(r, y)| r - y).collect();
+            infinity_norm(&kinds.columns(&errors, &comparable))
+        };
+        self.encoder_tracking_inf_m = largest(encoder_m);
+        self.tool_tracking_inf_m = (!tool_m.is_empty()).then(|| largest(tool_m));
+    }
+
+    /// Takes the distances from the path; none where it has no contour.
+    pub fn set_contour(&mut self, contour_m: &[f64]) {
+        let measured = |value: f64| if value < ROUNDING_M { 0.0 } else { value };
+        let there = !contour_m.is_empty();
+        self.contour_inf_m = there.then(|| measured(infinity_norm(contour_m)));
+        self.contour_rms_m = there.then(|| measured(rms(contour_m, 1)));
+    }
+
+    /// What a run is judged by, all axes together: a number to compare runs with, without a unit of its
+    /// own where axes differ in theirs.
+    pub fn judged_by(&self) -> f64 {
+        if self.axes_tracking_rms_m.is_empty() {
+            return self.tracking_rms_m;
+        }
+        self.axes_tracking_rms_m.iter().map(|rms| rms * rms).sum::<f64>().sqrt()
+    }
+}
+
+/// Distances of measured points from the path near their own time, in the linear axes; empty where the
+/// path has no contour.
+///
+/// # Shapes
+/// - `reference_m`, `measured_m`: `n_samples * n_axes`, time first; returns `n_samples` or nothing
+pub fn distances_m(
+    reference_m: &[f64],
+    measured_m: &[f64],
+    kinds: &AxisKinds,
+    cycle_s: f64,
+) -> Vec<f64> {
+    if !kinds.has_contour(reference_m) {
+        return Vec::new();
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0.25 s")]
+    let window = (CONTOUR_WINDOW_S / cycle_s) as usize;
+    if kinds.is_mixed() {
+        let linear = kinds.of_kind(false);
+        let only = |signal| kinds.columns(signal, &linear);
+        return contour_error_m(&only(reference_m), &only(measured_m), linear.len(), window);
+    }
+    contour_error_m(reference_m, measured_m, kinds.n_axes(), window)
 }
 
 /// Largest absolute value; 0 for an empty array.
@@ -47,10 +139,47 @@ pub fn rms(values: &[f64], n_columns: usize) -> f64 {
 mod tests {
     use super::*;
 
+    fn kinds(units: &[&str]) -> AxisKinds {
+        let units: Vec<_> = units.iter().map(|unit| (*unit).to_owned()).collect();
+        AxisKinds::new(&units, units.len())
+    }
+
     #[test]
     fn rms_is_over_rows() {
         // Two rows (3, 4) and (0, 0): sqrt((25 + 0) / 2).
         assert!((rms(&[3.0, 4.0, 0.0, 0.0], 2) - 12.5_f64.sqrt()).abs() < 1e-15);
         assert!((infinity_norm(&[3.0, -4.0]) - 4.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_angle_is_no_part_of_a_length() {
+        let mut figures = Figures::default();
+        figures.set_tracking(&[3e-3, 0.5, 4e-3, 3e-3, -0.7, 4e-3], &kinds(&["m", "rad", "m"]));
+        assert!((figures.tracking_inf_m - 4e-3).abs() < 1e-18);
+        assert!((figures.tracking_rms_m - 5e-3).abs() < 1e-18);
+        assert!((figures.axes_tracking_inf_m[1] - 0.7).abs() < 1e-15);
+        assert!((figures.judged_by() - (25e-6 + 0.37_f64).sqrt()).abs() < 1e-12);
+        figures.set_places(&[1e-3, 0.0, 0.0], &[0.0, 9.0, 2e-3], &[], &kinds(&["m", "rad", "m"]));
+        assert!((figures.encoder_tracking_inf_m - 2e-3).abs() < 1e-18);
+        assert_eq!(figures.tool_tracking_inf_m, None);
+        let mut turning = Figures::default();
+        turning.set_tracking(&[0.5, -0.7], &kinds(&["rad"]));
+        assert!((turning.tracking_inf_m - 0.7).abs() < 1e-15);
+    }
+
+    #[test]
+    fn contour_is_of_the_linear_axes_and_rounding_is_none() {
+        let reference_m = [0.0, 0.0, 0.0, 0.01, 0.0, 1.0, 0.01, 0.01, 2.0];
+        let measured_m = [0.0, 0.0, 9.0, 0.01, 0.0, 9.0, 0.011, 0.01, 9.0];
+        let seen = distances_m(&reference_m, &measured_m, &kinds(&["m", "m", "rad"]), 0.001);
+        assert!((seen[2] - 1e-3).abs() < 1e-15, "{seen:?}");
+        let mut figures = Figures::default();
+        figures.set_contour(&seen);
+        assert!((figures.contour_inf_m.unwrap() - 1e-3).abs() < 1e-15);
+        figures.set_contour(&[1e-20, 3e-18]);
+        assert_eq!((figures.contour_inf_m, figures.contour_rms_m), (Some(0.0), Some(0.0)));
+        let line = distances_m(&[0.0, 0.0, 0.01, 0.0], &[0.0; 4], &kinds(&["m", "m"]), 0.001);
+        figures.set_contour(&line);
+        assert_eq!((figures.contour_inf_m, figures.contour_rms_m), (None, None));
     }
 }

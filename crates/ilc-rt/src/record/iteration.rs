@@ -27,14 +27,15 @@ pub struct Meta {
     pub n_axes: usize,
     /// Their names.
     pub axis_names: Vec<String>,
-    /// Unit of each axis' learned input: `m` or `m/s`.
+    /// Unit of each axis' learned input: `m`, `m/s`, `rad` or `rad/s`.
     pub input_units: Vec<String>,
 }
 
 /// One run.
 ///
 /// # Shapes
-/// All arrays are time first, `n_samples * n_axes`, row by row; `contour_m` is `n_samples`.
+/// All arrays are time first, `n_samples * n_axes`, row by row; `contour_m` is `n_samples`, or empty
+/// where the path has no contour.
 /// # Units
 /// Positions and errors in metres. `input` in metres (csp) or metres per second (csv).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,7 +52,8 @@ pub struct IterationRecord {
     pub tool_m: Vec<f64>,
     /// Error learned from: reference minus the chosen measurement.
     pub error_m: Vec<f64>,
-    /// Distance of the tool (of the encoders, without a tool measurement) from the reference path.
+    /// Distance of the tool (of the encoders, without a tool measurement) from the reference path, in the
+    /// linear axes.
     pub contour_m: Vec<f64>,
     /// What was measured of the run's surroundings before it, as a temperature; empty if nothing.
     pub disturbance: Vec<f64>,

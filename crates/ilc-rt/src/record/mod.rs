@@ -3,10 +3,14 @@
 //! The supervisor fills it, the library keeps it, telemetry and Python read it. Imports signal,
 //! trajectory and models at most; never the loop, the library or the bus.
 
+mod axes;
 mod event;
 mod figures;
 mod iteration;
+mod text;
 
+pub use axes::AxisKinds;
 pub use event::{EndStatus, Event, StateName};
-pub use figures::{Figures, infinity_norm, rms};
+pub use figures::{Figures, distances_m, infinity_norm, rms};
 pub use iteration::{IterationRecord, Meta, fingerprint};
+pub use text::{NAME_MAX, TEXT_MAX, is_hidden, printable, printable_json, printable_lines};

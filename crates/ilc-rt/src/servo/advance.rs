@@ -3,10 +3,10 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::cycle::Cycle;
-use super::mailbox::{Message, StopReason};
+use super::mailbox::StopReason;
 use super::phase::Phase;
 use crate::fieldbus::cia402::{Mode, State};
-use crate::trajectory::{ControlledStop, MAX_AXES, PointToPoint};
+use crate::trajectory::PointToPoint;
 
 /// How long the axes shall rest after a stop before the drives are switched off.
 const REST_S: f64 = 0.1;
@@ -82,10 +82,9 @@ impl Cycle {
         for axis in 0..self.n_axes() {
             // Until a drive follows, its command is where it is: nothing can jump when it does.
             if !self.drives[axis].enabled() {
-                self.reference.position_m[axis] = self.drives[axis].encoder_m;
-                for past in &mut self.commanded_m {
-                    past[axis] = self.drives[axis].encoder_m;
-                }
+                let encoder_m = self.drives[axis].encoder_m;
+                self.reference.position_m[axis] = encoder_m;
+                self.hold(axis, encoder_m);
             }
         }
         if (0..self.n_axes()).all(|axis| self.drives[axis].enabled()) {
@@ -93,6 +92,18 @@ impl Cycle {
         } else {
             self.phase = Phase::Enabling { ticks: ticks + 1 };
         }
+    }
+
+    /// Takes it that an axis has been commanded to stand at a place for long.
+    fn hold(&mut self, axis: usize, position_m: f64) {
+        let command = match self.spec.axes[axis].mode {
+            Mode::Csp => position_m,
+            Mode::Csv => 0.0,
+        };
+        for past in &mut self.commanded {
+            past[axis] = command;
+        }
+        self.gates[axis].begin(command);
     }
 
     fn return_to_start(&mut self) {
@@ -120,46 +131,5 @@ impl Cycle {
         self.reference = self.interpolator.next();
         self.phase = Phase::Running { sample: sample + 1 };
         Some((self.run, sample))
-    }
-
-    /// Begins a controlled stop of all axes, unless one is under way or nothing moves any more.
-    pub(super) fn begin_stop(&mut self, reason: StopReason) {
-        if self.stopping.is_some() || matches!(self.phase, Phase::Disabling { .. } | Phase::Stopped)
-        {
-            return;
-        }
-        self.stopping = Some(reason);
-        self.mail.tell(Message::Stopping(reason));
-        if matches!(self.phase, Phase::Enabling { .. }) {
-            self.phase = Phase::Disabling { ticks: 0 };
-            return;
-        }
-        let dt_s = self.spec.cycle.as_secs_f64();
-        let [newest, middle, oldest] = self.commanded_m;
-        let mut position_m = self.reference.position_m;
-        let mut velocity_m_s = self.reference.velocity_m_s;
-        let mut acceleration_m_s2 = [0.0; MAX_AXES];
-        let mut absorb = false;
-        for axis in 0..self.n_axes() {
-            if self.spec.axes[axis].mode == Mode::Csp {
-                // The stop starts from what was commanded, learned input included.
-                position_m[axis] = newest[axis];
-                velocity_m_s[axis] = (newest[axis] - middle[axis]) / dt_s;
-                acceleration_m_s2[axis] =
-                    (newest[axis] - 2.0 * middle[axis] + oldest[axis]) / (dt_s * dt_s);
-                absorb = true;
-            }
-        }
-        if absorb {
-            self.input.absorb();
-        }
-        let stop = ControlledStop::new(
-            &position_m,
-            &velocity_m_s,
-            &acceleration_m_s2,
-            self.n_axes(),
-            &self.limits,
-        );
-        self.phase = Phase::Stopping { stop, rest_ticks: 0 };
     }
 }

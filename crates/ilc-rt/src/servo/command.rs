@@ -3,6 +3,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::cycle::Cycle;
+use super::gate::{Bounds, Gate};
 use super::mailbox::StopReason;
 use super::phase::Phase;
 use crate::fieldbus::Bus;
@@ -13,64 +14,73 @@ impl Cycle {
     /// Sends every drive its command, then SYNC. A frame that the bus has no room for is one that
     /// the drive misses: it goes on for a cycle by itself, and its silence is noticed if that lasts.
     pub(super) fn command(&mut self) {
-        let dt_s = self.spec.cycle.as_secs_f64();
-        let mut newest = self.commanded_m[0];
+        let mut newest = self.commanded[0];
+        let mut fault = None;
         for axis in 0..self.n_axes() {
-            let target = self.target(axis, dt_s, &mut newest);
-            let spec = &self.spec.axes[axis];
-            match spec.scale.to_counts(target) {
-                Some(counts) => self.drives[axis].target_counts = counts,
-                None => self.begin_stop(StopReason::NotFinite { axis }),
+            let scale = self.spec.axes[axis].scale;
+            let mut target = self.target(axis);
+            if !target.is_finite() {
+                fault = fault.or(Some(StopReason::NotFinite { axis }));
+                // On as before for this cycle; the stop begins from there.
+                let [last, before, _] = self.commanded;
+                target = match self.spec.axes[axis].mode {
+                    Mode::Csp => 2.0 * last[axis] - before[axis],
+                    Mode::Csv => last[axis],
+                };
+            }
+            newest[axis] = target;
+            if let Some(counts) = scale.to_counts(target) {
+                self.drives[axis].target_counts = counts;
             }
             let controlword = self.controlword(axis);
             self.drives[axis].controlword = controlword;
             let frame = self.drives[axis].command(controlword).encode(self.spec.axes[axis].node);
             let _ = self.bus.send(&frame);
         }
-        self.commanded_m = [newest, self.commanded_m[0], self.commanded_m[1]];
+        self.commanded = [newest, self.commanded[0], self.commanded[1]];
         if let Err(error) = self.bus.send(&sync::frame()) {
-            self.begin_stop(StopReason::Bus(error));
+            fault = fault.or(Some(StopReason::Bus(error)));
+        }
+        if let Some(reason) = fault {
+            self.begin_stop(reason);
         }
     }
 
     /// The bounded target of an axis: m (position-commanded) or m/s (velocity-commanded).
-    fn target(
-        &self,
-        axis: usize,
-        dt_s: f64,
-        newest: &mut [f64; crate::trajectory::MAX_AXES],
-    ) -> f64 {
+    fn target(&mut self, axis: usize) -> f64 {
         let spec = &self.spec.axes[axis];
+        let drive = &self.drives[axis];
+        let bounds = Bounds {
+            limits: spec.limits,
+            position_min_m: spec.position_min_m,
+            position_max_m: spec.position_max_m,
+            dt_s: self.spec.cycle.as_secs_f64(),
+        };
         let input = self.input.value()[axis];
         match spec.mode {
+            // Until it follows, an axis is commanded to where it is, wherever that may be.
+            Mode::Csp if matches!(self.phase, Phase::Enabling { .. }) && !drive.enabled() => {
+                drive.encoder_m
+            }
             Mode::Csp => {
-                let last = self.commanded_m[0][axis];
-                let step = spec.limits.velocity_max_m_s * dt_s;
-                let wanted = self.reference.position_m[axis] + input;
-                let target = wanted
-                    .max(spec.position_min_m)
-                    .min(spec.position_max_m)
-                    .max(last - step)
-                    .min(last + step);
-                newest[axis] = target;
-                target
+                let last = [self.commanded[0][axis], self.commanded[1][axis]];
+                let wanted_m = self.reference.position_m[axis] + input;
+                self.gates[axis].position_m(wanted_m, last, &bounds)
             }
-            Mode::Csv => {
-                newest[axis] = self.reference.position_m[axis];
-                let drive = &self.drives[axis];
-                if matches!(self.phase, Phase::Enabling { .. } | Phase::Disabling { .. })
-                    || !drive.enabled()
-                {
-                    return 0.0;
+            Mode::Csv => match self.phase {
+                Phase::Enabling { .. } | Phase::Disabling { .. } | Phase::Stopped => 0.0,
+                // Open loop: what is measured may be what failed.
+                Phase::Stopping { .. } => self.reference.velocity_m_s[axis],
+                Phase::Returning(_) | Phase::Settling { .. } | Phase::Running { .. } => {
+                    let control = spec.position_loop.command_m_s(
+                        self.reference.position_m[axis],
+                        self.reference.velocity_m_s[axis],
+                        drive.encoder_m,
+                    );
+                    let last_m_s = self.commanded[0][axis];
+                    Gate::velocity_m_s(control + input, last_m_s, drive.encoder_m, &bounds)
                 }
-                let most = spec.limits.velocity_max_m_s;
-                let control = spec.position_loop.command_m_s(
-                    self.reference.position_m[axis],
-                    self.reference.velocity_m_s[axis],
-                    drive.encoder_m,
-                );
-                (control + input).max(-most).min(most)
-            }
+            },
         }
     }
 
@@ -83,14 +93,33 @@ impl Cycle {
             return Controlword::DISABLE_VOLTAGE;
         };
         match self.phase {
+            // No drive is switched on before all are known to stand where they may.
+            Phase::Enabling { .. } if !self.all_heard() => Controlword::DISABLE_VOLTAGE,
             Phase::Enabling { .. } if state == State::Fault => {
                 Controlword::fault_reset_after(drive.controlword)
             }
+            Phase::Enabling { .. }
+            | Phase::Returning(_)
+            | Phase::Settling { .. }
+            | Phase::Running { .. } => next_command(state),
+            // What has switched itself off in a stop stays off.
+            Phase::Stopping { .. } => match state {
+                State::OperationEnabled => Controlword::ENABLE_OPERATION,
+                State::QuickStopActive => Controlword::QUICK_STOP,
+                _ => Controlword::DISABLE_VOLTAGE,
+            },
             Phase::Disabling { .. } | Phase::Stopped => match state {
+                State::OperationEnabled | State::QuickStopActive if drive.distrusted => {
+                    Controlword::QUICK_STOP
+                }
                 State::OperationEnabled | State::SwitchedOn => Controlword::SHUTDOWN,
                 _ => Controlword::DISABLE_VOLTAGE,
             },
-            _ => next_command(state),
         }
+    }
+
+    /// Whether every drive has told its state and position.
+    fn all_heard(&self) -> bool {
+        self.drives[..self.n_axes()].iter().all(|drive| drive.heard)
     }
 }

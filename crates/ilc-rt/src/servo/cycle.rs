@@ -2,12 +2,14 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use super::gate::Gate;
 use super::input::LearnedInput;
 use super::mailbox::{LoopSide, Message, Sample, StopReason, Table};
 use super::node::Drive;
 use super::phase::Phase;
 use super::slots::Slots;
 use super::spec::ServoSpec;
+use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::Bus;
 use crate::fieldbus::cia402::Mode;
 use crate::rt::Nanos;
@@ -35,15 +37,19 @@ pub struct Cycle {
     pub(super) mail: LoopSide,
     pub(super) drives: [Drive; MAX_AXES],
     pub(super) tool_m: [f64; MAX_AXES],
+    /// Length of the tool's last PDO that could not be read, if there was one.
+    pub(super) tool_unreadable: Option<u8>,
     pub(super) slots: Slots,
     pub(super) interpolator: Interpolator,
     pub(super) input: LearnedInput,
     pub(super) phase: Phase,
     pub(super) reference: Setpoint,
-    /// The last three position commands of each axis, newest first: where a stop has to begin.
-    pub(super) commanded_m: [[f64; MAX_AXES]; 3],
+    /// The last three commands of each axis, newest first, m or m/s as it takes them: where a stop has
+    /// to begin.
+    pub(super) commanded: [[f64; MAX_AXES]; 3],
+    pub(super) gates: [Gate; MAX_AXES],
     pub(super) run: u32,
-    pub(super) overrun_streak: u32,
+    pub(super) stall: Stall,
     pub(super) run_overruns: u32,
     pub(super) stopping: Option<StopReason>,
     pub(super) limits: [AxisLimits; MAX_AXES],
@@ -95,7 +101,8 @@ impl Cycle {
             mail,
             drives: [Drive::default(); MAX_AXES],
             tool_m: [0.0; MAX_AXES],
-            slots: Slots::new(n_axes + usize::from(spec.tool.is_some())),
+            tool_unreadable: None,
+            slots: Slots::new(n_axes, spec.tool.is_some()),
             interpolator,
             input: LearnedInput::new(most, step_max, fade_ticks),
             phase: Phase::Enabling { ticks: 0 },
@@ -104,9 +111,10 @@ impl Cycle {
                 velocity_m_s: [0.0; MAX_AXES],
                 done: false,
             },
-            commanded_m: [[0.0; MAX_AXES]; 3],
+            commanded: [[0.0; MAX_AXES]; 3],
+            gates: [Gate::default(); MAX_AXES],
             run: spec.runs.start,
-            overrun_streak: 0,
+            stall: Stall::default(),
             run_overruns: 0,
             stopping: None,
             limits: AxisLimits::padded(&limits),
@@ -123,13 +131,14 @@ impl Cycle {
 
     /// One servo cycle; `missed` cycles before it were skipped because it came too late.
     pub fn tick(&mut self, missed: u32) -> TickStatus {
-        if missed > 0 {
-            self.overrun_streak = self.overrun_streak.saturating_add(missed);
-            self.run_overruns = self.run_overruns.saturating_add(missed);
-        } else {
-            self.overrun_streak = 0;
-        }
+        self.stall.note(missed);
+        self.run_overruns = self.run_overruns.saturating_add(missed);
         let received = self.receive();
+        let nodes_wait = self.slots.waits(HOLD_AFTER);
+        if received.is_ok() && self.stall.holds(nodes_wait, self.spec.hold_cycles_max) {
+            self.run_overruns = self.run_overruns.saturating_add(1);
+            return TickStatus::Running;
+        }
         self.give_out();
         let fault = received.err().or_else(|| self.find_fault());
         let before = self.phase.name();
@@ -137,6 +146,7 @@ impl Cycle {
             self.begin_stop(reason);
         }
         let at = self.advance();
+        self.watch_age();
         let after = self.phase.name();
         if before != after {
             self.mail.tell(Message::Phase(after, self.run));

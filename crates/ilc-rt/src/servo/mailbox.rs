@@ -9,6 +9,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::phase::PhaseName;
 use crate::fieldbus::BusError;
+use crate::fieldbus::canopen::{NmtCommand, NmtState, NodeId};
 use crate::trajectory::MAX_AXES;
 
 /// One servo cycle as it was: what was asked and what was measured at the same SYNC.
@@ -35,7 +36,7 @@ pub struct Sample {
 pub enum StopReason {
     /// Asked to, with the number of the signal.
     Asked(i32),
-    /// A drive reported a fault; its last emergency code, or 0.
+    /// A drive reported a fault; its last emergency code, or 0 if it sent none.
     DriveFault {
         /// Axis.
         axis: usize,
@@ -58,16 +59,43 @@ pub enum StopReason {
         /// Cycles without an answer.
         cycles: u32,
     },
+    /// One of a drive's two PDOs did not come, the other one did.
+    SilentPdo {
+        /// Axis.
+        axis: usize,
+        /// Number of the TPDO, 1 or 2.
+        pdo: u8,
+        /// Cycles without it.
+        cycles: u32,
+    },
+    /// A PDO of a node cannot be read, as it has another length than its mapping.
+    WrongLength {
+        /// CANopen node.
+        node: u8,
+        /// Number of the TPDO, 1 or 2.
+        pdo: u8,
+        /// Its length.
+        n_bytes: u8,
+    },
     /// The tool measurement did not answer.
     SilentTool {
         /// Cycles without an answer.
         cycles: u32,
     },
-    /// A node restarted or left operation by itself.
+    /// A node restarted: it sent its boot-up message.
     NodeLeft {
         /// CANopen node.
         node: u8,
     },
+    /// A node says that it is no longer operational.
+    NodeStopped {
+        /// CANopen node.
+        node: u8,
+        /// What it is instead.
+        state: NmtState,
+    },
+    /// Somebody else commands on the bus.
+    OtherMaster(Stranger),
     /// Command and encoder came too far apart.
     FollowingError {
         /// Axis.
@@ -75,10 +103,31 @@ pub enum StopReason {
         /// Distance found.
         error_m: f64,
     },
+    /// An axis stands outside its limits before its drive is switched on.
+    OutsideLimits {
+        /// Axis.
+        axis: usize,
+        /// Where it stands.
+        position_m: f64,
+    },
+    /// A position jumped farther than the axis can move.
+    Jump {
+        /// Axis.
+        axis: usize,
+        /// By how much, from one answer to the next.
+        step_m: f64,
+    },
     /// A number in the command was not finite.
     NotFinite {
         /// Axis.
         axis: usize,
+    },
+    /// A drive missed its commands because this computer stalled.
+    Stalled {
+        /// Axis.
+        axis: usize,
+        /// Consecutive cycles missed.
+        cycles: u32,
     },
     /// The loop could not keep its cycle.
     Overrun {
@@ -87,6 +136,45 @@ pub enum StopReason {
     },
     /// The bus failed.
     Bus(BusError),
+}
+
+/// What another master was seen to send.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stranger {
+    /// SYNC.
+    Sync,
+    /// An NMT command to a node, or to all.
+    Nmt(NmtCommand, Option<NodeId>),
+    /// A command (RPDO) to a node of this cell.
+    Command(NodeId),
+    /// A request for an object (SDO) to a node of this cell.
+    Request(NodeId),
+}
+
+impl StopReason {
+    /// The axis whose measurement has failed, or may have, if it is for that.
+    pub(super) fn distrusted(self) -> Option<usize> {
+        match self {
+            Self::SilentAxis { axis, .. }
+            | Self::SilentPdo { axis, pdo: 1, .. }
+            | Self::FollowingError { axis, .. }
+            | Self::Jump { axis, .. } => Some(axis),
+            Self::Asked(_)
+            | Self::DriveFault { .. }
+            | Self::NotEnabled { .. }
+            | Self::SilentPdo { .. }
+            | Self::WrongLength { .. }
+            | Self::SilentTool { .. }
+            | Self::NodeLeft { .. }
+            | Self::NodeStopped { .. }
+            | Self::OtherMaster(_)
+            | Self::OutsideLimits { .. }
+            | Self::NotFinite { .. }
+            | Self::Stalled { .. }
+            | Self::Overrun { .. }
+            | Self::Bus(_) => None,
+        }
+    }
 }
 
 /// What the loop reports.

@@ -6,17 +6,22 @@
 mod advance;
 mod command;
 mod cycle;
+mod gate;
 mod input;
 mod mailbox;
 mod node;
 mod phase;
 mod realtime;
 mod receive;
+mod silence;
 mod slots;
 mod spec;
+mod stall;
+mod stopping;
+mod strangers;
 
 pub use cycle::{Cycle, TickStatus};
-pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, mailbox};
+pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, Stranger, mailbox};
 pub use phase::PhaseName;
 pub use realtime::{Timing, run_on_clock};
 pub use spec::{AxisSpec, Pace, ServoSpec, ToolSpec};

@@ -15,10 +15,16 @@ pub(super) struct Drive {
     pub(super) encoder_m: f64,
     /// Last distance of demand and position as the drive sees it.
     pub(super) following_error_m: f64,
-    /// Last emergency code; 0 for none.
-    pub(super) emergency: u16,
+    /// Last emergency code since it was switched on.
+    pub(super) emergency: Option<u16>,
     /// Whether it is lost and shall only be told to stop.
     pub(super) lost: bool,
+    /// Whether what it measures is not to be trusted any more.
+    pub(super) distrusted: bool,
+    /// Distance of the last two positions, if it is farther than the axis can move.
+    pub(super) jump_m: Option<f64>,
+    /// Length of the last TPDO1 and TPDO2 that could not be read, if there was one.
+    pub(super) unreadable: [Option<u8>; 2],
     /// Last controlword sent.
     pub(super) controlword: Controlword,
     /// Last target sent.
@@ -32,8 +38,11 @@ impl Default for Drive {
             statusword: 0,
             encoder_m: 0.0,
             following_error_m: 0.0,
-            emergency: 0,
+            emergency: None,
             lost: false,
+            distrusted: false,
+            jump_m: None,
+            unreadable: [None; 2],
             controlword: Controlword::DISABLE_VOLTAGE,
             target_counts: 0,
         }
@@ -43,9 +52,14 @@ impl Default for Drive {
 impl Drive {
     /// Takes over a status, its position already in metres.
     pub(super) fn status(&mut self, status: Status, encoder_m: f64) {
+        let was_enabled = self.enabled();
         self.heard = true;
         self.statusword = status.statusword.0;
         self.encoder_m = encoder_m;
+        if self.enabled() && !was_enabled {
+            // What was reported before it could be switched on is not the cause of a later fault.
+            self.emergency = None;
+        }
     }
 
     /// The state that its statusword tells, if it tells one.

@@ -7,13 +7,23 @@ use std::time::Duration;
 use super::cycle::Cycle;
 use super::mailbox::StopReason;
 use super::phase::Phase;
+use super::silence::saturate;
+use super::slots::Part;
 use super::spec::Pace;
-use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtState};
+use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
+use crate::fieldbus::cia402::pdo_map::{ENCODER_PDO, EXTRA_PDO, STATUS_PDO};
 use crate::fieldbus::cia402::{EncoderSample, Extra, Mode, State, Status};
 use crate::fieldbus::{Bus, Frame};
 
 /// Most frames taken in one tick, so that a babbling bus cannot hold the loop.
 const FRAMES_MAX: usize = 256;
+/// Ways at full speed that an axis may be ahead of its last position.
+const JUMP_WAYS: f64 = 2.0;
+/// Share of the following error allowed that it may be ahead beyond that, for noise.
+const JUMP_SHARE: f64 = 0.1;
+/// Share of the following error allowed by which an axis may stand outside its limits at the start: one
+/// that has been at its limit rests as far from it as noise and friction say.
+const OUTSIDE_SHARE: f64 = 0.02;
 /// Cycles without an answer after which a position is too old to blame the drive for its distance.
 const STALE_CYCLES: u64 = 5;
 
@@ -28,58 +38,95 @@ impl Cycle {
             };
             match self.bus.recv(timeout) {
                 Ok(Some(frame)) => left = left.and(self.take(&frame)),
-                Ok(None) => break,
+                Ok(None) => return left,
                 Err(error) => return Err(StopReason::Bus(error)),
             }
         }
+        // Answers may lie behind the flood.
+        self.slots.spoil_next();
         left
     }
 
     fn take(&mut self, frame: &Frame) -> Result<(), StopReason> {
+        if self.take_answer(frame) {
+            return Ok(());
+        }
+        if let Some(stranger) = self.stranger(frame) {
+            return Err(StopReason::OtherMaster(stranger));
+        }
+        if let Some(emergency) = Emergency::decode(frame) {
+            let sender = self.spec.axes.iter().position(|axis| axis.node == emergency.node);
+            if let Some(axis) = sender {
+                self.drives[axis].emergency =
+                    Some(emergency.code).filter(|code| *code != emcy::CODE_RESET);
+            }
+        } else if let Some(heartbeat) = Heartbeat::decode(frame)
+            && self.is_ours(heartbeat.node)
+        {
+            let node = heartbeat.node.get();
+            return match heartbeat.state {
+                NmtState::Operational => Ok(()),
+                NmtState::BootUp => Err(StopReason::NodeLeft { node }),
+                state => Err(StopReason::NodeStopped { node, state }),
+            };
+        }
+        Ok(())
+    }
+
+    /// Takes a frame if it is an answer to SYNC.
+    fn take_answer(&mut self, frame: &Frame) -> bool {
         for axis in 0..self.n_axes() {
             let spec = &self.spec.axes[axis];
             let drive = &mut self.drives[axis];
             if let Some(status) = Status::decode(frame, spec.node) {
-                drive.status(status, spec.scale.to_si(status.position_counts));
-                return Ok(());
+                let encoder_m = spec.scale.to_si(status.position_counts);
+                #[expect(clippy::cast_precision_loss, reason = "a count of cycles")]
+                let cycles = self.slots.silence(Part::Status(axis)).max(1) as f64;
+                let way_m = spec.limits.velocity_max_m_s * self.spec.cycle.as_secs_f64() * cycles;
+                let step_m = encoder_m - drive.encoder_m;
+                if drive.heard
+                    && step_m.abs() > JUMP_WAYS * way_m + JUMP_SHARE * spec.following_error_max_m
+                {
+                    drive.jump_m = drive.jump_m.or(Some(step_m));
+                }
+                drive.status(status, encoder_m);
+                self.slots.answer(Part::Status(axis), [encoder_m, 0.0]);
+                return true;
             }
-            // A drive sends this one last, so it completes the answer to a SYNC.
             if let Some(extra) = Extra::decode(frame, spec.node) {
                 // In a fault it has no demand any more; what led there is the last one before.
                 if !drive.faulted() {
                     drive.following_error_m = spec.scale.to_si(extra.following_error_counts);
                 }
-                let encoder_m = drive.encoder_m;
-                self.slots.answer(axis, |sample| sample.encoder_m[axis] = encoder_m);
-                return Ok(());
+                self.slots.answer(Part::Extra(axis), [0.0; 2]);
+                return true;
+            }
+            let unreadable = [STATUS_PDO, EXTRA_PDO]
+                .iter()
+                .position(|pdo| frame.id() == pdo.default_cob_id(spec.node));
+            if let Some(pdo) = unreadable {
+                drive.unreadable[pdo] = u8::try_from(frame.payload().len()).ok();
+                return true;
             }
         }
-        if let Some(tool) = self.spec.tool
-            && let Some(measured) = EncoderSample::decode(frame, tool.node)
-        {
+        let Some(tool) = self.spec.tool else { return false };
+        if let Some(measured) = EncoderSample::decode(frame, tool.node) {
             self.tool_m[0] = tool.scale.to_si(measured.x_counts);
             self.tool_m[1] = tool.scale.to_si(measured.y_counts);
-            let tool_m = self.tool_m;
-            self.slots.answer(self.n_axes(), |sample| sample.tool_m = tool_m);
-            return Ok(());
+            self.slots.answer(Part::Tool, [self.tool_m[0], self.tool_m[1]]);
+            return true;
         }
-        if let Some(emergency) = Emergency::decode(frame) {
-            let sender = self.spec.axes.iter().position(|axis| axis.node == emergency.node);
-            if let Some(axis) = sender {
-                self.drives[axis].emergency = emergency.code;
-            }
-        } else if let Some(heartbeat) = Heartbeat::decode(frame)
-            && heartbeat.state != NmtState::Operational
-            && self.is_ours(heartbeat)
-        {
-            return Err(StopReason::NodeLeft { node: heartbeat.node.get() });
+        if frame.id() == ENCODER_PDO.default_cob_id(tool.node) {
+            self.tool_unreadable = u8::try_from(frame.payload().len()).ok();
+            return true;
         }
-        Ok(())
+        false
     }
 
-    fn is_ours(&self, heartbeat: Heartbeat) -> bool {
-        self.spec.axes.iter().any(|axis| axis.node == heartbeat.node)
-            || self.spec.tool.is_some_and(|tool| tool.node == heartbeat.node)
+    /// Whether a node belongs to this cell.
+    pub(super) fn is_ours(&self, node: NodeId) -> bool {
+        self.spec.axes.iter().any(|axis| axis.node == node)
+            || self.spec.tool.is_some_and(|tool| tool.node == node)
     }
 
     /// The first thing that is a reason to stop.
@@ -93,70 +140,69 @@ impl Cycle {
         if asked != 0 {
             return Some(StopReason::Asked(asked));
         }
-        if self.overrun_streak > self.spec.overrun_cycles_max {
-            return Some(StopReason::Overrun { cycles: self.overrun_streak });
+        if self.stall.streak() > self.spec.overrun_cycles_max {
+            return Some(StopReason::Overrun { cycles: self.stall.streak() });
         }
-        silence.or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)))
-    }
-
-    fn find_silence(&mut self) -> Option<StopReason> {
-        // Paced by answers, the wait is over when this is asked: one unanswered SYNC is silence.
-        let most = match self.spec.pace {
-            Pace::Answers(_) => 0,
-            Pace::Clock => u64::from(self.spec.silent_cycles_max),
-        };
-        let mut found = None;
-        for axis in 0..self.n_axes() {
-            let lag = self.slots.silence(axis);
-            if lag > most && !self.drives[axis].lost {
-                self.drives[axis].lost = true;
-                self.slots.give_up(axis);
-                found = found.or(Some(StopReason::SilentAxis { axis, cycles: saturate(lag) }));
-            }
+        let fault = silence.or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)));
+        for drive in &mut self.drives {
+            drive.jump_m = None;
         }
-        let lag = self.slots.silence(self.n_axes());
-        if self.spec.tool.is_some() && lag > most {
-            self.slots.give_up(self.n_axes());
-            found = found.or(Some(StopReason::SilentTool { cycles: saturate(lag) }));
-        }
-        found
+        fault
     }
 
     fn axis_fault(&self, axis: usize) -> Option<StopReason> {
         let drive = &self.drives[axis];
         let spec = &self.spec.axes[axis];
         if let Phase::Enabling { ticks } = self.phase {
+            let slack_m = OUTSIDE_SHARE * spec.following_error_max_m;
+            let position_m = drive.encoder_m;
+            if drive.heard
+                && (position_m < spec.position_min_m - slack_m
+                    || position_m > spec.position_max_m + slack_m)
+            {
+                return Some(StopReason::OutsideLimits { axis, position_m });
+            }
             // A fault from before is reset on the way; what is not enabled in time is refused.
-            return (ticks > self.spec.enable_ticks && !drive.enabled())
-                .then_some(StopReason::NotEnabled { axis, statusword: drive.statusword });
+            if ticks <= self.spec.enable_ticks || drive.enabled() {
+                return None;
+            }
+            if !drive.heard {
+                return Some(self.silent_axis(axis, self.slots.silence(Part::Status(axis))));
+            }
+            return Some(StopReason::NotEnabled { axis, statusword: drive.statusword });
+        }
+        if drive.faulted()
+            && drive.emergency == Some(emcy::CODE_RPDO_TIMEOUT)
+            && let Some(cycles) = self.stall.blamed()
+        {
+            return Some(StopReason::Stalled { axis, cycles });
         }
         if drive.faulted() {
             return Some(StopReason::DriveFault {
                 axis,
-                code: drive.emergency,
+                code: drive.emergency.unwrap_or(emcy::CODE_RESET),
                 following_error_m: drive.following_error_m,
             });
         }
         if !drive.enabled() || drive.state() == Some(State::QuickStopActive) {
             return Some(StopReason::NotEnabled { axis, statusword: drive.statusword });
         }
+        if let Some(step_m) = drive.jump_m {
+            return Some(StopReason::Jump { axis, step_m });
+        }
         let wanted_m = match spec.mode {
-            Mode::Csp => self.commanded_m[0][axis],
+            Mode::Csp => self.commanded[0][axis],
             Mode::Csv => self.reference.position_m[axis],
         };
         let error_m = wanted_m - drive.encoder_m;
         if error_m.abs() <= spec.following_error_max_m {
             return None;
         }
-        let silence = self.slots.silence(axis);
+        let silence = self.slots.silence(Part::Status(axis));
         Some(if silence > STALE_CYCLES {
             StopReason::SilentAxis { axis, cycles: saturate(silence) }
         } else {
             StopReason::FollowingError { axis, error_m }
         })
     }
-}
-
-fn saturate(cycles: u64) -> u32 {
-    u32::try_from(cycles).unwrap_or(u32::MAX)
 }

@@ -39,7 +39,7 @@ impl<'a> Announcer<'a> {
         (self.observe)(event);
         let Some(telemetry) = &mut self.telemetry else { return };
         let key = match event {
-            Event::Iteration { .. } => "iteration",
+            Event::Iteration { .. } | Event::Judged { .. } => "iteration",
             Event::Fault { .. } => "fault",
             Event::Latency { .. } => "latency",
             Event::Start { .. }

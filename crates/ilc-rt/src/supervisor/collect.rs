@@ -1,12 +1,8 @@
 //! Gathers the samples of a run into its record.
 
 use crate::config::Measure;
-use crate::record::{Figures, IterationRecord, infinity_norm, rms};
+use crate::record::{AxisKinds, Figures, IterationRecord, distances_m};
 use crate::servo::Sample;
-use crate::trajectory::contour_error_m;
-
-/// Farthest that a tool is looked for along the path, before or after its own time.
-const CONTOUR_WINDOW_S: f64 = 0.25;
 
 /// The run that is on.
 #[derive(Debug)]
@@ -15,7 +11,8 @@ pub(super) struct Collector {
     n_axes: usize,
     measure: Measure,
     has_tool: bool,
-    window: usize,
+    kinds: AxisKinds,
+    cycle_s: f64,
     record: IterationRecord,
     n_collected: usize,
     n_missing: u32,
@@ -24,19 +21,18 @@ pub(super) struct Collector {
 impl Collector {
     pub(super) fn new(
         n_samples: usize,
-        n_axes: usize,
+        kinds: AxisKinds,
         measure: Measure,
         has_tool: bool,
         cycle_s: f64,
     ) -> Self {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0.25 s")]
-        let window = (CONTOUR_WINDOW_S / cycle_s) as usize;
         Self {
             n_samples,
-            n_axes,
+            n_axes: kinds.n_axes(),
             measure,
             has_tool,
-            window,
+            kinds,
+            cycle_s,
             record: IterationRecord::default(),
             n_collected: 0,
             n_missing: 0,
@@ -88,21 +84,16 @@ impl Collector {
         let encoder_error_m = difference(&record.encoder_m);
         let tool_error_m = difference(&record.tool_m);
         let seen = if self.has_tool { &record.tool_m } else { &record.encoder_m };
-        record.contour_m = contour_error_m(&record.reference_m, seen, self.n_axes, self.window);
-        record.figures.encoder_tracking_inf_m = infinity_norm(&encoder_error_m);
-        record.figures.tool_tracking_inf_m = self.has_tool.then(|| infinity_norm(&tool_error_m));
+        record.contour_m = distances_m(&record.reference_m, seen, &self.kinds, self.cycle_s);
         record.error_m = match self.measure {
             Measure::Tcp if self.has_tool => tool_error_m,
             Measure::Tcp | Measure::Encoder => encoder_error_m,
         };
-        record.figures = Figures {
-            tracking_inf_m: infinity_norm(&record.error_m),
-            tracking_rms_m: rms(&record.error_m, self.n_axes),
-            contour_inf_m: infinity_norm(&record.contour_m),
-            contour_rms_m: rms(&record.contour_m, 1),
-            missing_samples: self.n_missing,
-            ..record.figures
-        };
+        let mut figures = Figures { missing_samples: self.n_missing, ..Figures::default() };
+        figures.set_places(&record.reference_m, &record.encoder_m, &record.tool_m, &self.kinds);
+        figures.set_tracking(&record.error_m, &self.kinds);
+        figures.set_contour(&record.contour_m);
+        record.figures = figures;
         Some(record)
     }
 }

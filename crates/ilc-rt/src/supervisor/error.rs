@@ -47,6 +47,19 @@ pub enum SupervisorError {
         /// Why.
         source: Box<BringUpError>,
     },
+    /// Somebody else commands the bus.
+    #[error(
+        "{file}: [bus] address = {address}: another master is at work on this bus ({heard} heard); \
+         nothing was sent; stop it, or choose another address"
+    )]
+    Occupied {
+        /// Cell description.
+        file: String,
+        /// Bus address.
+        address: String,
+        /// What was heard of it.
+        heard: crate::fieldbus::canopen::listen::Command,
+    },
     /// The bus failed while the nodes were started.
     #[error("{file}: [bus] address = {address}: {source}")]
     Start {
@@ -95,13 +108,15 @@ pub enum SupervisorError {
     },
     /// The path leaves the range of an axis.
     #[error(
-        "{file}: [program]: axis {axis} goes to {reached_m} m: it reaches {low_m} to {high_m} m"
+        "{file}: [program]: axis {axis} goes to {reached_m} {unit}: it reaches {low_m} to {high_m} {unit}"
     )]
     Range {
         /// Cell description.
         file: String,
         /// Name of the axis.
         axis: String,
+        /// What it is measured in.
+        unit: &'static str,
         /// The farthest position beyond the range.
         reached_m: f64,
         /// Smallest allowed.

@@ -2,10 +2,14 @@
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::error::SupervisorError;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Standing};
+use crate::record::Figures;
+
+/// How long the end of a campaign waits for what the law makes of the last run.
+const LAST_LESSON: Duration = Duration::from_millis(500);
 
 /// What a law made of a run.
 #[derive(Debug)]
@@ -16,6 +20,19 @@ pub(super) struct Lesson {
     pub(super) update_ms: f64,
     /// What a person should know of it.
     pub(super) remark: Option<String>,
+    /// Whether the law goes on learning.
+    pub(super) standing: Standing,
+}
+
+impl Lesson {
+    /// Writes what the law decided into the figures of the run that it learned from.
+    pub(super) fn note(&self, figures: &mut Figures) {
+        figures.rolled_back |= self.standing == Standing::GoesBack;
+        figures.learning_off |= matches!(self.standing, Standing::GoesBack | Standing::Rests);
+        if figures.remark.is_none() {
+            figures.remark.clone_from(&self.remark);
+        }
+    }
 }
 
 /// What a law is to do.
@@ -62,6 +79,11 @@ impl Learner {
             })
             .map_err(|source| SupervisorError::Thread { what: "learning", source })?;
         Ok(Self::Thread { jobs: Some(jobs), lessons, thread: Some(thread) })
+    }
+
+    /// Whether a lesson is there at once.
+    pub(super) fn is_in_line(&self) -> bool {
+        matches!(self, Self::InLine { .. })
     }
 
     /// Begins to learn from a run, for the one to come under this disturbance.
@@ -111,6 +133,20 @@ impl Learner {
     }
 }
 
+impl Learner {
+    /// What a law that computes on a thread makes of the last run, if it is there in time: so that the
+    /// run's record says if it went back.
+    pub(super) fn take_last(&mut self) -> Option<Lesson> {
+        match self {
+            Self::InLine { done, .. } => done.take(),
+            Self::Thread { jobs, lessons, .. } => {
+                drop(jobs.take());
+                lessons.recv_timeout(LAST_LESSON).ok()
+            }
+        }
+    }
+}
+
 impl Drop for Learner {
     fn drop(&mut self) {
         if let Self::Thread { jobs, thread, .. } = self {
@@ -135,5 +171,6 @@ pub(super) fn learn(law: &mut dyn Law, input: &[f64], error: &[f64]) -> Lesson {
     let mut next = vec![0.0; input.len()];
     let result = law.update(input, error, &mut next);
     let update_ms = began.elapsed().as_secs_f64() * 1e3;
-    Lesson { input: result.map(|()| next), update_ms, remark: law.remark() }
+    let (remark, standing) = (law.remark(), law.standing());
+    Lesson { input: result.map(|()| next), update_ms, remark, standing }
 }

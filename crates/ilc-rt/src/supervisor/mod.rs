@@ -5,13 +5,16 @@
 //! it reads the loop's mailbox and never shares anything else with it.
 
 mod announce;
+mod band;
 mod campaign;
+mod claim;
 mod collect;
 mod disturbance;
 mod error;
 mod experiment;
 mod forecast;
 mod identified;
+mod keeper;
 mod law;
 mod learner;
 mod nodes;
@@ -24,6 +27,7 @@ mod reason;
 mod telemetry;
 mod weights;
 
+pub use band::{Band, BandSearch};
 pub use campaign::{identify, run};
 pub use disturbance::Disturbance;
 pub use error::SupervisorError;
@@ -31,5 +35,6 @@ pub use experiment::Experiment;
 pub use forecast::{first_error, learning_model};
 pub use identified::{Described, Identified};
 pub use law::Prepared;
+pub use nodes::drive_setup;
 pub use options::{Options, Outcome};
 pub use plan::Plan;

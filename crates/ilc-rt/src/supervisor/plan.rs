@@ -266,6 +266,7 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
         enable_ticks: ticks(ENABLE_S),
         silent_cycles_max: cell.safety.silent_cycles_max,
         overrun_cycles_max: cell.safety.overrun_cycles_max,
+        hold_cycles_max: 0,
     })
 }
 
@@ -274,7 +275,7 @@ pub(super) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
     NodeId::new(number).ok_or_else(|| refused(cell, "node", &number, "1 to 127"))
 }
 
-fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
+pub(super) fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
     Scale::new(counts_per_m).ok_or_else(|| refused(cell, "counts_per_m", &counts_per_m, "above 0"))
 }
 

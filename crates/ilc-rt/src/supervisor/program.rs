@@ -1,15 +1,17 @@
 //! From `[program]` to the interpolator: which planner each kind of path goes to.
 
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-
 use serde_json::json;
+use std::fmt::Write as _;
 
 use super::error::SupervisorError;
-use crate::config::{Cell, Corner, PathKind};
+use crate::config::{
+    AxisUnit, Cell, Corner, GCODE_BYTES_MAX, PathKind, TABLE_BYTES_MAX, read_beside,
+};
 use crate::record::fingerprint;
 use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
-use crate::trajectory::program::{SetPointTable, TableError, read_gcode, read_table};
+use crate::trajectory::program::{
+    GcodeProgram, GcodeSetting, SetPointTable, TableError, read_gcode, read_table,
+};
 use crate::trajectory::{
     ArcSpec, AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, ModulatedSegment,
     PathSegment, PathSpec, SampledMotion, TrajectoryError, raster, set_points,
@@ -20,7 +22,8 @@ const START_M: f64 = 1e-9;
 /// How far set points may round beyond the range of an axis.
 const ROUNDING_M: f64 = 1e-12;
 
-/// Plans the program of a cell.
+/// Plans the program of a cell; its set points, whatever kind of path they belong to, are verified as
+/// they will be sent.
 ///
 /// # Errors
 /// [`SupervisorError::Program`] for a path beyond the limits, [`SupervisorError::PartProgram`] for
@@ -29,16 +32,20 @@ pub(super) fn interpolator(
     cell: &Cell,
     limits: &[AxisLimits],
 ) -> Result<Interpolator, SupervisorError> {
+    planned(cell, limits)?.verified(limits).map_err(|source| refused(cell, source))
+}
+
+fn planned(cell: &Cell, limits: &[AxisLimits]) -> Result<Interpolator, SupervisorError> {
     let program = &cell.program;
     let refused = |source| refused(cell, source);
     let dwells = (program.dwell_before_s, program.dwell_after_s);
     let play = |motion: &SampledMotion| Interpolator::play(motion, dwells.0, dwells.1);
     let start = || [program.start_m[0], program.start_m.get(1).copied().unwrap_or(0.0)];
     match program.kind {
-        PathKind::Points => straight(cell, limits, points(cell), 0.0),
+        PathKind::Points => straight(cell, limits, points(cell), &[], 0.0),
         PathKind::Gcode => {
-            let (segments, dwell_s) = gcode(cell)?;
-            straight(cell, limits, segments, dwell_s)
+            let read = gcode(cell)?;
+            straight(cell, limits, read.segments, &read.rapid, read.dwell_before_s)
         }
         PathKind::Table => {
             let table = table(cell)?;
@@ -56,7 +63,7 @@ pub(super) fn interpolator(
                 shape.there_and_back,
             )
             .map_err(refused)?;
-            straight(cell, limits, segments, 0.0)
+            straight(cell, limits, segments, &[], 0.0)
         }
         PathKind::Spline => {
             let points_m: Vec<Vec<f64>> = std::iter::once(program.start_m.clone())
@@ -117,6 +124,7 @@ pub(super) fn check_range(cell: &Cell, reference_m: &[f64]) -> Result<(), Superv
             return Err(SupervisorError::Range {
                 file: cell.file.display().to_string(),
                 axis: axis.name.clone(),
+                unit: axis.unit.symbol(),
                 reached_m: farthest,
                 low_m,
                 high_m,
@@ -186,19 +194,25 @@ fn points(cell: &Cell) -> Vec<PathSegment> {
         .collect()
 }
 
-/// The segments of the part program, and the rest before them.
-fn gcode(cell: &Cell) -> Result<(Vec<PathSegment>, f64), SupervisorError> {
+/// What the part program says.
+fn gcode(cell: &Cell) -> Result<GcodeProgram, SupervisorError> {
     let program = &cell.program;
-    let (file, text) = read_file(cell, "G-code")?;
-    let rapid_m_s = program.rapid_m_s.unwrap_or(program.feed_m_s);
-    let read = read_gcode(&text, &program.start_m, program.feed_m_s, rapid_m_s)
-        .map_err(|source| SupervisorError::PartProgram { file, source })?;
-    Ok((read.segments, read.dwell_before_s))
+    let (file, text) = read_file(cell, "G-code", GCODE_BYTES_MAX)?;
+    let rotary: Vec<bool> = cell.axes.iter().map(|axis| axis.unit == AxisUnit::Rad).collect();
+    let setting = GcodeSetting {
+        start_m: &program.start_m,
+        feed_m_s: program.feed_m_s,
+        rapid_m_s: program.rapid_m_s.unwrap_or(program.feed_m_s),
+        rotary: &rotary,
+        exact_corners: program.corner == Corner::ExactStop,
+        block_delete: program.block_delete,
+    };
+    read_gcode(&text, &setting).map_err(|source| SupervisorError::PartProgram { file, source })
 }
 
 /// The set points of the table; refused unless they begin where the axes rest before a run.
 fn table(cell: &Cell) -> Result<SetPointTable, SupervisorError> {
-    let (file, text) = read_file(cell, "set points")?;
+    let (file, text) = read_file(cell, "set points", TABLE_BYTES_MAX)?;
     let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
     let refused = |source| SupervisorError::Table { file: file.clone(), source };
     let table = read_table(&text, &names).map_err(refused)?;
@@ -217,20 +231,25 @@ fn table(cell: &Cell) -> Result<SetPointTable, SupervisorError> {
 }
 
 /// The name and the text of `[program] file`, which is a text file of `what`.
-fn read_file(cell: &Cell, what: &'static str) -> Result<(String, String), SupervisorError> {
-    let path = cell.program.file.clone().unwrap_or_default();
-    let path: PathBuf = cell.file.parent().unwrap_or(Path::new("")).join(path);
-    let file = path.display().to_string();
-    match std::fs::read_to_string(&path) {
+fn read_file(
+    cell: &Cell,
+    what: &'static str,
+    bytes_max: u64,
+) -> Result<(String, Vec<u8>), SupervisorError> {
+    let name = cell.program.file.clone().unwrap_or_default();
+    let file = cell.file.with_file_name(&name).display().to_string();
+    match read_beside(&cell.file, &name, bytes_max) {
         Ok(text) => Ok((file, text)),
-        Err(error) => Err(SupervisorError::ProgramFile { file, reason: error.to_string(), what }),
+        Err(reason) => Err(SupervisorError::ProgramFile { file, reason, what }),
     }
 }
 
+/// Plans lines and arcs; `rapid` tells which of them go as fast as the axes allow, up to their feed.
 fn straight(
     cell: &Cell,
     limits: &[AxisLimits],
     segments: Vec<PathSegment>,
+    rapid: &[bool],
     dwell_s: f64,
 ) -> Result<Interpolator, SupervisorError> {
     let program = &cell.program;
@@ -244,6 +263,9 @@ fn straight(
         dwell_before_s: program.dwell_before_s + dwell_s,
         dwell_after_s: program.dwell_after_s,
     };
+    if spec.corner == CornerRule::ExactStop {
+        spec.check_feeds(limits, rapid).map_err(|source| refused(cell, source))?;
+    }
     Interpolator::plan(&spec, limits, cell.cycle_s()).map_err(|source| refused(cell, source))
 }
 

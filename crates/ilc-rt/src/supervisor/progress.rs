@@ -10,6 +10,8 @@ use crate::servo::Mailbox;
 
 /// Times that the best input is restored before learning is switched off for good.
 const ROLLBACKS_MAX: u32 = 2;
+/// Why learning is off then.
+const GROWN: &str = "the error grew twice";
 
 /// What to do after a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +44,8 @@ pub(super) struct Progress {
     /// Time of the lesson in each table handed to the loop; table n at n - 1.
     update_ms: Vec<f64>,
     table_in_use: u32,
+    /// Whether overruns are no disturbance, as the plant stood still as well.
+    forgives_overruns: bool,
 }
 
 impl Progress {
@@ -54,7 +58,19 @@ impl Progress {
             late_updates: 0,
             update_ms: Vec::new(),
             table_in_use: 0,
+            forgives_overruns: false,
         }
+    }
+
+    /// The same, where a computer that stalls stalls the plant too: its time passes by SYNC, so that the
+    /// samples of a run with overruns are those of one without.
+    pub(super) fn forgiving(self, forgives_overruns: bool) -> Self {
+        Self { forgives_overruns, ..self }
+    }
+
+    /// Whether a run was disturbed by computer or bus, so that it is no evidence.
+    pub(super) fn is_disturbed(&self, figures: &Figures) -> bool {
+        figures.missing_samples > 0 || figures.overruns > 0 && !self.forgives_overruns
     }
 
     /// A run began with a table.
@@ -85,16 +101,24 @@ impl Progress {
     /// Decides what follows a run, and marks it if the best input is restored because of it.
     ///
     /// Growth is measured in the RMS error over the best run so far. After two restorations the law
-    /// has shown that it does not converge here, and learning stays off. A run that the computer
-    /// disturbed (overruns, missing samples) is no evidence: unless it is the best all the same, its
-    /// input is repeated. Nor is a larger error under another disturbance than the best run's evidence
-    /// against the law: it goes on learning.
+    /// has shown that it does not converge here, and learning stays off. A run that computer or bus
+    /// disturbed (overruns, missing samples) is no evidence, for the law or against it, be it the first
+    /// or seemingly the best: its input is repeated. Nor is a larger error under another disturbance than
+    /// the best run's evidence against the law: it goes on learning.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
-        let rms = record.figures.tracking_rms_m;
+        let rms = record.figures.judged_by();
         let off = self.rollbacks >= ROLLBACKS_MAX;
-        let disturbed = record.figures.overruns > 0 || record.figures.missing_samples > 0;
+        if off {
+            record.figures.learning_off = true;
+            record.figures.remark = Some(format!("learning is off: {GROWN}"));
+        }
+        if self.is_disturbed(&record.figures) {
+            if !off {
+                record.figures.remark = Some(disturbance_remark(&record.figures));
+            }
+            return Decision::Hold;
+        }
         match &self.best {
-            Some(best) if disturbed && rms >= best.rms => Decision::Hold,
             Some(best)
                 if rms > best.rms * self.rollback_ratio
                     && !off
@@ -102,6 +126,9 @@ impl Progress {
             {
                 self.rollbacks += 1;
                 record.figures.rolled_back = true;
+                record.figures.learning_off = self.rollbacks >= ROLLBACKS_MAX;
+                record.figures.remark =
+                    Some(growth_remark(rms / best.rms, record.figures.learning_off));
                 Decision::RollBack(best.input.clone())
             }
             Some(best) if rms >= best.rms => {
@@ -182,6 +209,24 @@ impl Progress {
     }
 }
 
+fn disturbance_remark(figures: &Figures) -> String {
+    format!(
+        "nothing is learned from it, its input is repeated: {} overruns, {} samples missing",
+        figures.overruns, figures.missing_samples
+    )
+}
+
+/// What is told when the best input is restored; `growth` is the error over the best one.
+fn growth_remark(growth: f64, off: bool) -> String {
+    let how_far = if growth < 1e3 {
+        format!("to {growth:.2} times the best one")
+    } else {
+        "far beyond the best one".to_owned()
+    };
+    let then = if off { format!("; learning is off from here on: {GROWN}") } else { String::new() };
+    format!("the RMS error grew {how_far}: the best input is restored{then}")
+}
+
 #[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
 fn refused(error: LearningError) -> SupervisorError {
     SupervisorError::Resume(format!("the law refused a run: {error}"))
@@ -218,10 +263,22 @@ mod tests {
         assert_eq!(progress.decide(&mut record(0.5)), Decision::Learn, "within the ratio");
         let mut grown = record(0.7);
         assert_eq!(progress.decide(&mut grown), Decision::RollBack(vec![0.4]));
-        assert!(grown.figures.rolled_back);
+        assert!(grown.figures.rolled_back && !grown.figures.learning_off);
+        let said = grown.figures.remark.unwrap();
+        assert_eq!(
+            said,
+            "the RMS error grew to 1.75 times the best one: the best input is restored"
+        );
         assert_eq!(progress.decide(&mut record(0.4)), Decision::Learn);
-        assert_eq!(progress.decide(&mut record(f64::INFINITY)), Decision::RollBack(vec![0.4]));
-        assert_eq!(progress.decide(&mut record(0.4)), Decision::Hold);
+        let mut burst = record(f64::INFINITY);
+        assert_eq!(progress.decide(&mut burst), Decision::RollBack(vec![0.4]));
+        assert!(burst.figures.learning_off);
+        let said = burst.figures.remark.unwrap();
+        assert!(said.contains("far beyond") && said.contains("off from here on"), "{said}");
+        let mut after = record(0.4);
+        assert_eq!(progress.decide(&mut after), Decision::Hold);
+        assert!(after.figures.learning_off && !after.figures.rolled_back);
+        assert_eq!(after.figures.remark.unwrap(), "learning is off: the error grew twice");
         assert_eq!(progress.decide(&mut record(9.0)), Decision::Hold);
     }
 
@@ -237,15 +294,33 @@ mod tests {
 
     #[test]
     fn a_disturbed_run_is_neither_learned_from_nor_held_against_the_law() {
+        let disturbed = |rms, overruns, missing_samples| {
+            let mut record = record(rms);
+            (record.figures.overruns, record.figures.missing_samples) = (overruns, missing_samples);
+            record
+        };
         let mut progress = Progress::new(1.5);
+        // The first one neither, nor one that seems to be the best.
+        assert_eq!(progress.decide(&mut disturbed(0.1, 0, 1)), Decision::Hold);
         assert_eq!(progress.decide(&mut record(1.0)), Decision::Learn);
-        let mut disturbed = record(9.0);
-        disturbed.figures.overruns = 3;
-        assert_eq!(progress.decide(&mut disturbed), Decision::Hold);
-        assert!(!disturbed.figures.rolled_back);
-        let mut better = record(0.5);
-        better.figures.missing_samples = 1;
-        assert_eq!(progress.decide(&mut better), Decision::Learn);
+        let mut worse = disturbed(9.0, 3, 0);
+        assert_eq!(progress.decide(&mut worse), Decision::Hold);
+        assert!(!worse.figures.rolled_back);
+        let said = worse.figures.remark.unwrap();
+        assert!(said.ends_with("its input is repeated: 3 overruns, 0 samples missing"), "{said}");
+        assert_eq!(progress.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
+        assert_eq!(progress.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
+        assert_eq!(progress.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
+    }
+
+    #[test]
+    fn a_stall_that_stalls_the_plant_as_well_disturbs_nothing() {
+        let mut progress = Progress::new(1.5).forgiving(true);
+        let mut stalled = record(1.0);
+        stalled.figures.overruns = 50;
+        assert_eq!(progress.decide(&mut stalled), Decision::Learn);
+        stalled.figures.missing_samples = 1;
+        assert_eq!(progress.decide(&mut stalled), Decision::Hold);
     }
 
     #[test]

@@ -6,23 +6,27 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use zenoh::Wait;
 use zenoh::qos::CongestionControl;
+use zenoh::query::{ConsolidationMode, QueryTarget};
 
 use super::error::SupervisorError;
 use crate::config::{Cell, Telemetry as Settings};
+use crate::fieldbus::transport::zenoh_reach::{self, Reach};
 
 /// Messages that may wait for the network.
 const QUEUE: usize = 1024;
-/// How long the end of a campaign waits for what is still in the queue. A monitor that no longer
-/// reads would hold the session up for much longer.
-const CLOSE_MAX: Duration = Duration::from_secs(2);
+/// How long the end of a campaign waits for what is still in the queue, and for those who watch. One
+/// that no longer reads is left after a second.
+const CLOSE_MAX: Duration = Duration::from_secs(6);
+/// How long those who watch may take to say that they have heard all.
+const HEARD_MAX: Duration = Duration::from_secs(3);
 
 /// How long the token outlives the last message: Zenoh sends declarations before data that waits, and
 /// whoever watches leaves when the token goes.
-const LINGER: Duration = Duration::from_millis(100);
+const LINGER: Duration = Duration::from_millis(250);
 
 /// Something to publish.
 struct Message {
@@ -53,7 +57,8 @@ impl Telemetry {
             .spawn(move || {
                 let _end = end;
                 if let Err(error) = publish(&settings, &prefix, &messages) {
-                    tracing::warn!("[telemetry]: {error}; the cell runs unseen");
+                    let reason = zenoh_reach::reason(&error);
+                    tracing::warn!("[telemetry]: {reason}; the cell runs unseen");
                 }
             })
             .map_err(|source| SupervisorError::Thread { what: "telemetry", source })?;
@@ -89,21 +94,15 @@ impl Drop for Telemetry {
     }
 }
 
-fn configuration(settings: &Settings) -> zenoh::Result<zenoh::Config> {
-    let mut config = zenoh::Config::default();
-    let list = |endpoints: &[String]| serde_json::to_string(endpoints).unwrap_or_default();
-    if !settings.listen.is_empty() {
-        config.insert_json5("listen/endpoints", &list(&settings.listen))?;
-    }
-    if !settings.connect.is_empty() {
-        config.insert_json5("connect/endpoints", &list(&settings.connect))?;
-    }
-    config.insert_json5("scouting/multicast/enabled", &settings.scouting.to_string())?;
-    Ok(config)
-}
-
 fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> zenoh::Result<()> {
-    let session = zenoh::open(configuration(settings)?).wait()?;
+    let reach = Reach {
+        listen: &settings.listen,
+        connect: &settings.connect,
+        scouting: settings.scouting,
+        scouting_off_host: true,
+        group: None,
+    };
+    let session = zenoh::open(reach.configuration()?).wait()?;
     let alive = session.liveliness().declare_token(format!("{prefix}/alive")).wait()?;
     let latest: Arc<Mutex<Option<String>>> = Arc::default();
     let state_key = format!("{prefix}/state");
@@ -133,8 +132,24 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
             .encoding(zenoh::bytes::Encoding::APPLICATION_JSON)
             .wait()?;
     }
-    std::thread::sleep(LINGER);
+    await_readers(&session, prefix)?;
     queryable.undeclare().wait()?;
     alive.undeclare().wait()?;
     session.close().wait()
+}
+
+/// Waits until whoever watches has got all that was published: a monitor answers on `heard`, and its
+/// answer comes after what it was sent before. Those that do not answer get [`LINGER`].
+fn await_readers(session: &zenoh::Session, prefix: &str) -> zenoh::Result<()> {
+    let asked = Instant::now();
+    let answers = session
+        .get(format!("{prefix}/heard"))
+        .target(QueryTarget::All)
+        .consolidation(ConsolidationMode::None)
+        .congestion_control(CongestionControl::Block)
+        .timeout(HEARD_MAX)
+        .wait()?;
+    while answers.recv().is_ok() {}
+    std::thread::sleep(LINGER.saturating_sub(asked.elapsed()));
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::MAX_AXES;
 use super::limits::{AxisLimits, PathLimits};
@@ -14,28 +14,51 @@ const BEND_SHARE: f64 = 0.7;
 const TURN_SHARE: f64 = 0.5;
 const SPEED_UP_SHARE: f64 = 0.6;
 
+/// How far the ends of an arc may differ in their distance from the centre: this much, or this share
+/// of the radius; never more than half of the smaller one.
+const GAP_M: f64 = 1e-5;
+const GAP_SHARE: f64 = 1e-3;
+/// Ends that are as close as this, seen from the centre, are one: the arc is a full circle.
+const FULL_M: f64 = 1e-11;
+
 /// An arc in the plane of two axes; the others go along in proportion.
+///
+/// The centre is where it is said to be. Ends that are not equally far from it, as rounded decimals
+/// make them, are joined by a radius that grows in proportion to the angle: no point of the arc is
+/// farther from either circle than the two are apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Arc {
     pub(super) from_m: [f64; MAX_AXES],
     pub(super) to_m: [f64; MAX_AXES],
     plane: [usize; 2],
     center_m: [f64; 2],
+    /// Radius at the start.
     radius_m: f64,
+    /// What it grows by until the end.
+    growth_m: f64,
     from_rad: f64,
     /// Signed: anticlockwise is positive.
     sweep_rad: f64,
     pub(super) length_m: f64,
-    /// Share of the length that is in the plane.
+    /// Largest share of the length that is in the plane.
     share: f64,
 }
 
+/// Whether both ends of an arc are as far from its centre as rounding explains.
+pub(super) fn ends_agree(start_radius_m: f64, end_radius_m: f64) -> bool {
+    let gap_m = (start_radius_m - end_radius_m).abs();
+    let allowed_m =
+        GAP_M.max(GAP_SHARE * start_radius_m).min(0.5 * start_radius_m.min(end_radius_m));
+    // The differences of decimals are rounded themselves.
+    start_radius_m > 0.0 && end_radius_m > 0.0 && gap_m <= allowed_m * (1.0 + 1e-9)
+}
+
 impl Arc {
-    /// The arc around a centre; `None` if radius or length is 0, or the ends are not equally far
-    /// from the centre (to a thousandth, or 10 µm).
+    /// The arc around a centre; `None` if a radius is 0, or the ends are not equally far from the
+    /// centre (to a thousandth, or 10 µm).
     ///
-    /// A centre that is a little off is moved onto the ends' bisector, so that the arc ends where it
-    /// is told to. An arc that ends where it starts is a full circle.
+    /// An arc that ends where it starts is a full circle; otherwise the direction alone decides how
+    /// far round it goes, however near the ends are.
     pub(super) fn new(
         from_m: [f64; MAX_AXES],
         to_m: [f64; MAX_AXES],
@@ -47,32 +70,22 @@ impl Arc {
         let start = [from_m[p] - center_m[0], from_m[q] - center_m[1]];
         let end = [to_m[p] - center_m[0], to_m[q] - center_m[1]];
         let (near, far) = (start[0].hypot(start[1]), end[0].hypot(end[1]));
-        let usable = near.is_finite() && far.is_finite() && near > 0.0;
-        if !usable || (near - far).abs() > 1e-5_f64.max(1e-3 * near) {
+        if !(near.is_finite() && far.is_finite() && ends_agree(near, far)) {
             return None;
         }
-        let chord = [to_m[p] - from_m[p], to_m[q] - from_m[q]];
-        let gap = chord[0].hypot(chord[1]);
-        let full = gap <= 1e-12 * near;
-        let mut center = center_m;
-        if !full {
-            let unit = chord.map(|share| share / gap);
-            // How far the centre is from the bisector, along the chord.
-            let off = 0.5 * gap + (start[0] * unit[0] + start[1] * unit[1]);
-            center = [center[0] + off * unit[0], center[1] + off * unit[1]];
-        }
-        let angle = |at: [f64; MAX_AXES]| (at[q] - center[1]).atan2(at[p] - center[0]);
-        let (from_rad, to_rad) = (angle(from_m), angle(to_m));
-        let mut sweep_rad = to_rad - from_rad;
-        if full {
-            sweep_rad = if clockwise { -TAU } else { TAU };
-        } else if clockwise && sweep_rad >= 0.0 {
-            sweep_rad -= TAU;
-        } else if !clockwise && sweep_rad <= 0.0 {
-            sweep_rad += TAU;
-        }
-        let radius_m = (from_m[p] - center[0]).hypot(from_m[q] - center[1]);
-        let flat_m = radius_m * sweep_rad.abs();
+        let from_rad = start[1].atan2(start[0]);
+        // From the products of both: differences of angles near a turn would lose their last digits.
+        let turned_rad =
+            (start[0] * end[1] - start[1] * end[0]).atan2(start[0] * end[0] + start[1] * end[1]);
+        let direction = if clockwise { -1.0 } else { 1.0 };
+        let full = turned_rad.abs() * near <= FULL_M;
+        let sweep_rad = if full || turned_rad * direction < 0.0 {
+            turned_rad + direction * TAU
+        } else {
+            turned_rad
+        };
+        let growth_m = far - near;
+        let flat_m = sweep_rad.abs() * near.max(far).hypot(growth_m / sweep_rad);
         let others: f64 = (0..MAX_AXES)
             .filter(|axis| !plane.contains(axis))
             .map(|axis| (to_m[axis] - from_m[axis]).powi(2))
@@ -82,8 +95,9 @@ impl Arc {
             from_m,
             to_m,
             plane,
-            center_m: center,
-            radius_m,
+            center_m,
+            radius_m: near,
+            growth_m,
             from_rad,
             sweep_rad,
             length_m,
@@ -105,12 +119,13 @@ impl Arc {
             *coordinate += part * (self.to_m[axis] - self.from_m[axis]);
         }
         let (sin, cos) = (self.from_rad + part * self.sweep_rad).sin_cos();
-        point_m[self.plane[0]] = self.center_m[0] + self.radius_m * cos;
-        point_m[self.plane[1]] = self.center_m[1] + self.radius_m * sin;
+        let radius_m = self.radius_m + part * self.growth_m;
+        point_m[self.plane[0]] = self.center_m[0] + radius_m * cos;
+        point_m[self.plane[1]] = self.center_m[1] + radius_m * sin;
         point_m
     }
 
-    /// The unit tangent at `s_m` from the start, times `scale`.
+    /// The tangent at `s_m` from the start, times `scale`; its length is 1 where the radius is largest.
     pub(super) fn along(&self, s_m: f64, scale: f64) -> [f64; MAX_AXES] {
         let part = (s_m / self.length_m).clamp(0.0, 1.0);
         let mut tangent = [0.0; MAX_AXES];
@@ -118,17 +133,35 @@ impl Arc {
             *share = scale * (self.to_m[axis] - self.from_m[axis]) / self.length_m;
         }
         let (sin, cos) = (self.from_rad + part * self.sweep_rad).sin_cos();
-        let flat = scale * self.share * self.sweep_rad.signum();
-        tangent[self.plane[0]] = -flat * sin;
-        tangent[self.plane[1]] = flat * cos;
+        let across = (self.radius_m + part * self.growth_m) * self.sweep_rad;
+        tangent[self.plane[0]] = scale * (self.growth_m * cos - across * sin) / self.length_m;
+        tangent[self.plane[1]] = scale * (self.growth_m * sin + across * cos) / self.length_m;
         tangent
+    }
+
+    /// The largest share of the path's speed that an axis has somewhere on the arc.
+    pub(super) fn share(&self, axis: usize) -> f64 {
+        if !self.plane.contains(&axis) {
+            return (self.to_m[axis] - self.from_m[axis]).abs() / self.length_m;
+        }
+        // The tangent lies along an axis where the radius is across it, twice a turn.
+        let first = if self.plane[1] == axis { 0.0 } else { FRAC_PI_2 };
+        let to_rad = self.from_rad + self.sweep_rad;
+        let (low, high) = (self.from_rad.min(to_rad), self.from_rad.max(to_rad));
+        if first + ((low - first) / PI).ceil() * PI <= high {
+            return self.share;
+        }
+        let [begin, end] = [0.0, self.length_m].map(|s_m| self.along(s_m, 1.0)[axis].abs());
+        begin.max(end)
     }
 
     /// What the axes leave for a jerk-limited move along the arc.
     ///
-    /// With the share `c` in the plane and radius `r`: acceleration `c a` along and `c² v²/r` across,
-    /// jerk `c j - c³ v³/r²` along and `3 c² v a/r` across; each pair stays within its limit in
-    /// whichever direction the axes lie.
+    /// By the distance, the derivatives of the point in the plane are at most `c`, `k` and `w`: of a
+    /// circle of radius `r` the share `c`, `c²/r` and `c³/r²`, the second across the others. Then
+    /// the acceleration has the parts `c a` along and `k v²` across, the jerk `c j + w v³` along and
+    /// `3 k v a` across; their sum stays within each limit in whichever direction the axes lie. Where
+    /// the radius grows, along and across are not at right angles, and `lean` is the cosine.
     pub(super) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
         let outside = self.outside();
         let mut path = PathLimits::along(&outside, limits, feed_m_s);
@@ -138,19 +171,27 @@ impl Arc {
             a_max = a_max.min(limit.acceleration_max_m_s2);
             j_max = j_max.min(limit.jerk_max_m_s3);
         }
-        let (c, r) = (self.share, self.radius_m);
+        let turn = self.sweep_rad.abs() / self.length_m;
+        let (first, last) = (self.radius_m, self.radius_m + self.growth_m);
+        let (largest, slope) = (first.max(last), self.growth_m / self.sweep_rad);
+        let c = self.share;
+        let k = turn.powi(2) * largest.hypot(2.0 * slope);
+        let w = turn.powi(3) * largest.hypot(3.0 * slope);
+        let lean = (slope.abs() / first.min(last)).min(0.5);
+        // The longest vector that stays within `limit` together with one of length `across`.
+        let rest = |limit: f64, across: f64| {
+            (limit * limit - across * across * (1.0 - lean * lean)).sqrt() - lean * across
+        };
         let lower = |so_far: f64, bound: f64| if bound < so_far { bound } else { so_far };
-        let bend = (BEND_SHARE * a_max * r).sqrt() / c;
-        let turn = (TURN_SHARE * j_max * r * r).cbrt() / c;
-        path.velocity_m_s = lower(lower(lower(path.velocity_m_s, v_max / c), bend), turn);
+        let bend = (BEND_SHARE * a_max / k).sqrt();
+        let twist = (TURN_SHARE * j_max / w).cbrt();
+        path.velocity_m_s = lower(lower(lower(path.velocity_m_s, v_max / c), bend), twist);
         let v = path.velocity_m_s;
-        let across = c * c * v * v / r;
-        let along = (a_max * a_max - across * across).sqrt() / c;
-        let speed_up = SPEED_UP_SHARE * j_max * r / (3.0 * c * c * v);
+        let along = rest(a_max, k * v * v) / c;
+        let speed_up = SPEED_UP_SHARE * j_max / (3.0 * k * v);
         path.acceleration_m_s2 = lower(lower(path.acceleration_m_s2, along), speed_up);
-        let across = 3.0 * c * c * v * path.acceleration_m_s2 / r;
-        let rest = (j_max * j_max - across * across).sqrt() - (c * v).powi(3) / (r * r);
-        path.jerk_m_s3 = lower(path.jerk_m_s3, rest / c);
+        let across = 3.0 * k * v * path.acceleration_m_s2;
+        path.jerk_m_s3 = lower(path.jerk_m_s3, (rest(j_max, across) - w * v.powi(3)) / c);
         path
     }
 
@@ -163,5 +204,125 @@ impl Arc {
             }
         }
         direction
+    }
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    clippy::float_cmp,
+    reason = "tests are cold, and exact where exactness is promised"
+)]
+mod tests {
+    use super::*;
+    use crate::trajectory::random::Random;
+
+    fn at(x: f64, y: f64) -> [f64; MAX_AXES] {
+        let mut point = [0.0; MAX_AXES];
+        (point[0], point[1]) = (x, y);
+        point
+    }
+
+    /// Farthest that the arc is from the circle through its start, and how long it is as a polyline.
+    fn walked(arc: &Arc, center: [f64; 2], radius: f64) -> (f64, f64) {
+        let n = 20_000;
+        let mut before = arc.point_m(0.0);
+        let (mut off, mut length) = (0.0_f64, 0.0);
+        for k in 1..=n {
+            let here = arc.point_m(arc.length_m * f64::from(k) / f64::from(n));
+            off = off.max(((here[0] - center[0]).hypot(here[1] - center[1]) - radius).abs());
+            length += (here[0] - before[0]).hypot(here[1] - before[1]);
+            before = here;
+        }
+        (off, length)
+    }
+
+    #[test]
+    fn ends_that_are_near_each_other_leave_the_centre_where_it_is() {
+        for (from, to, center, clockwise, length) in [
+            ([0.01, 0.0], [9.999e-3, -1e-6], [0.0, 0.0], false, 0.062_831),
+            ([0.01, 0.0], [10.001e-3, -1e-4], [0.0, 0.0], false, 0.062_731),
+            ([0.0, 0.0], [1e-6, -1e-6], [0.005, 0.0], true, 0.031_415),
+        ] {
+            let [from, to] = [from, to].map(|[x, y]: [f64; 2]| at(x, y));
+            let arc = Arc::new(from, to, [0, 1], center, clockwise).unwrap();
+            let radius = (from[0] - center[0]).hypot(from[1] - center[1]);
+            let (off, found) = walked(&arc, center, radius);
+            assert!(off < 1.01e-6, "{to:?}: {off}");
+            assert!((found - length).abs() < 1e-5, "{to:?}: {found}");
+        }
+    }
+
+    #[test]
+    fn no_point_is_farther_off_than_the_ends_are_whatever_their_distance() {
+        let mut random = Random(51);
+        for round in 0..1_500 {
+            let radius = random.log(1e-3, 1.0);
+            let center = [random.signed(), random.signed()];
+            let begin = std::f64::consts::PI * random.signed();
+            let clockwise = round % 2 == 0;
+            // From almost nothing to almost a full turn, most of them near either.
+            let small = random.log(1e-9 / radius, 3.0);
+            let sweep = if round % 4 < 2 { small } else { TAU - small };
+            let rounded = |value: f64| (value * 1e6).round() / 1e6;
+            let point = |angle: f64, radius: f64| {
+                at(center[0] + radius * angle.cos(), center[1] + radius * angle.sin())
+            };
+            let from = point(begin, radius);
+            let signed = if clockwise { -sweep } else { sweep };
+            let mut to = point(begin + signed, radius);
+            if round % 3 == 0 {
+                // To the micrometre, as in most programs.
+                (to[0], to[1]) = (rounded(to[0]), rounded(to[1]));
+            }
+            let arc = Arc::new(from, to, [0, 1], center, clockwise).unwrap();
+            let end = (to[0] - center[0]).hypot(to[1] - center[1]);
+            let (off, length) = walked(&arc, center, radius);
+            assert!(off <= (end - radius).abs() + 1e-14, "{off} {arc:?}");
+            if round % 3 != 0 {
+                assert!((length - radius * sweep).abs() < 1e-6 * radius * sweep + 1e-12, "{arc:?}");
+            }
+            assert_eq!(arc.point_m(arc.length_m), to);
+        }
+    }
+
+    #[test]
+    fn an_arc_that_ends_where_it_starts_is_a_full_circle_also_with_a_rounded_end() {
+        let center = [0.1, 0.2];
+        let from = at(0.11, 0.2);
+        for to in [from, at(0.11 + 1e-17, 0.2 - 1e-17), at(0.110_001, 0.2), at(0.109_999, 0.2)] {
+            for clockwise in [false, true] {
+                let arc = Arc::new(from, to, [0, 1], center, clockwise).unwrap();
+                assert!((arc.length_m - 0.01 * TAU).abs() < 1e-5, "{arc:?}");
+                assert_eq!(arc.sweep_rad > 0.0, !clockwise);
+            }
+        }
+        // A nanometre is told by its direction.
+        let arc =
+            |y: f64| Arc::new(from, at(0.11, 0.2 + y), [0, 1], center, false).unwrap().length_m;
+        assert!((arc(1e-9) - 1e-9).abs() < 1e-13 && (arc(-1e-9) - 0.01 * TAU).abs() < 1e-8);
+    }
+
+    #[test]
+    fn the_tangent_is_the_slope_of_the_points() {
+        let (from, to) = (at(0.01, 0.0), at(0.0, 0.010_009));
+        let arc = Arc::new(from, to, [0, 1], [0.0, 0.0], false).unwrap();
+        for k in 1..50 {
+            let s = arc.length_m * f64::from(k) / 50.0;
+            let (before, after) = (arc.point_m(s - 1e-8), arc.point_m(s + 1e-8));
+            for (axis, slope) in arc.along(s, 1.0).into_iter().enumerate() {
+                assert!(((after[axis] - before[axis]) / 2e-8 - slope).abs() < 1e-7, "{arc:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn ends_that_decimals_do_not_explain_are_refused() {
+        assert!(ends_agree(0.01, 0.01 + 1e-5) && ends_agree(1.0, 1.001));
+        assert!(!ends_agree(0.01, 0.010_011) && !ends_agree(1.0, 1.0011));
+        assert!(!ends_agree(1e-6, 8e-6), "a multiple of the radius");
+        assert!(!ends_agree(0.0, 0.0) && !ends_agree(1e-6, 0.0) && !ends_agree(f64::NAN, 1.0));
     }
 }

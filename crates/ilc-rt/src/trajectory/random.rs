@@ -21,4 +21,14 @@ impl Random {
     pub(super) fn log(&mut self, low: f64, high: f64) -> f64 {
         (low.ln() + self.unit() * (high / low).ln()).exp()
     }
+
+    /// Uniform from 0 to one less than `n`.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "from 0 to the number of choices"
+    )]
+    pub(super) fn below(&mut self, n: usize) -> usize {
+        ((self.unit() * n as f64) as usize).min(n - 1)
+    }
 }

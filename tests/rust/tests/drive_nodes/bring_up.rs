@@ -179,3 +179,178 @@ fn node_numbers_are_1_to_127() {
     assert_eq!(NodeId::new(128), None);
     assert_eq!(NodeId::new(127).map(NodeId::get), Some(127));
 }
+
+/// A bus on which frames on the node's own answer channel come before each true answer.
+struct Disturbed {
+    inner: InProcess<Machine>,
+    strays: Vec<[u8; 8]>,
+    pending: Vec<Frame>,
+}
+
+impl Bus for Disturbed {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        if frame.id() == 0x601 {
+            self.pending =
+                self.strays.iter().rev().map(|b| Frame::new(0x581, b).unwrap()).collect();
+        }
+        self.inner.send(frame)
+    }
+
+    fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        match self.pending.pop() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.inner.recv(timeout),
+        }
+    }
+}
+
+/// Answers that belong to no question of the client: of other objects, other requests, other transfers.
+const STRAYS: [[u8; 8]; 9] = [
+    // 0x2030 read, and written; 0x6502:01, whose index alone is right.
+    [0x43, 0x30, 0x20, 0x01, 0x11, 0x22, 0x33, 0x44],
+    [0x60, 0x30, 0x20, 0x01, 0, 0, 0, 0],
+    [0x43, 0x02, 0x65, 0x01, 0xFF, 0xFF, 0xFF, 0xFF],
+    // Aborts of others.
+    [0x80, 0x30, 0x20, 0x01, 0x00, 0x00, 0x02, 0x06],
+    [0x80, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x08],
+    // A segmented read of another object begins.
+    [0x41, 0x08, 0x10, 0x05, 0xFF, 0, 0, 0],
+    // A segment that was taken, with the toggle that no first one has.
+    [0x30, 0, 0, 0, 0, 0, 0, 0],
+    // No SDO message at all, and a block transfer.
+    [0xFF, 1, 2, 3, 4, 5, 6, 7],
+    [0xC2, 0x08, 0x10, 0, 0, 0, 0, 0],
+];
+
+#[test]
+fn answers_to_other_questions_change_nothing() {
+    for strays in STRAYS.iter().map(|one| vec![*one]).chain([STRAYS.to_vec()]) {
+        let bench = Bench::new(ClockMode::LockStep);
+        let mut bus = Disturbed { inner: bench.bus, strays: strays.clone(), pending: Vec::new() };
+        let identity = bring_up(&mut bus, &setup(Mode::Csp)).unwrap();
+        assert_eq!(identity.identity, [0, 402, 1, 1], "{strays:02X?}");
+        let client = SdoClient::new(node(1), ANSWER);
+        let text = b"a label of some length";
+        client.download(&mut bus, 0x2000, 0, text).unwrap();
+        assert_eq!(client.upload(&mut bus, 0x2000, 0).unwrap(), text, "{strays:02X?}");
+        let absent = client.upload(&mut bus, 0x5FFF, 0).unwrap_err();
+        assert!(matches!(absent, SdoError::Aborted { code: AbortCode::NoObject, .. }), "{absent}");
+    }
+}
+
+#[test]
+fn a_node_that_answers_other_questions_only_is_silent() {
+    for (stray, words) in [
+        (STRAYS[0], "an answer for object 0x2030:01"),
+        (STRAYS[3], "an answer for object 0x2030:01"),
+        ([0x60, 0x02, 0x65, 0, 0, 0, 0, 0], "an answer to another request"),
+        ([0x30, 0, 0, 0, 0, 0, 0, 0], "a segment out of turn"),
+        ([0xFF; 8], "a frame that is no SDO answer"),
+    ] {
+        let mut bench = Bench::new(ClockMode::LockStep);
+        bench.bus.responder_mut().mute(node(1));
+        let mut bus = Disturbed { inner: bench.bus, strays: vec![stray], pending: Vec::new() };
+        let client = SdoClient::new(node(1), Duration::from_millis(5));
+        let line = client.upload(&mut bus, 0x6502, 0).unwrap_err().to_string();
+        assert_eq!(
+            line,
+            format!(
+                "node 1: object 0x6502:00: no answer within 5ms, tried 2 times; what came instead: {words}"
+            )
+        );
+    }
+}
+
+#[test]
+fn a_segment_that_comes_twice_is_taken_once() {
+    /// Sends each answer of the node twice.
+    struct Twice(InProcess<Machine>, Option<Frame>);
+
+    impl Bus for Twice {
+        fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+            self.0.send(frame)
+        }
+
+        fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+            if let Some(again) = self.1.take() {
+                return Ok(Some(again));
+            }
+            self.1 = self.0.recv(timeout)?;
+            Ok(self.1)
+        }
+    }
+
+    let mut bus = Twice(Bench::new(ClockMode::LockStep).bus, None);
+    // To the bring-up, a node all of whose answers come twice is two nodes.
+    let line = bring_up(&mut bus, &setup(Mode::Csv)).unwrap_err().to_string();
+    assert!(line.starts_with("two nodes answer as node 1: "), "{line}");
+    let client = SdoClient::new(node(1), ANSWER);
+    let text = b"thirty-two characters, all of it";
+    client.download(&mut bus, 0x2000, 0, text).unwrap();
+    assert_eq!(client.upload(&mut bus, 0x2000, 0).unwrap(), text);
+}
+
+/// A drive that says of some objects that it does not have them.
+struct Without {
+    inner: InProcess<Machine>,
+    absent: Vec<u16>,
+    code: AbortCode,
+    answers: Vec<Frame>,
+}
+
+impl Bus for Without {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        if let (0x601, &[command, low, high, sub, ..]) = (frame.id(), frame.payload())
+            && self.absent.contains(&u16::from_le_bytes([low, high]))
+            && command >> 5 != 4
+        {
+            let [a, b, c, d] = self.code.code().to_le_bytes();
+            let abort = Frame::new(0x581, &[0x80, low, high, sub, a, b, c, d]).unwrap();
+            self.answers.push(abort);
+            return Ok(());
+        }
+        self.inner.send(frame)
+    }
+
+    fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        match self.answers.pop() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.inner.recv(timeout),
+        }
+    }
+}
+
+fn without(absent: &[u16], code: AbortCode, deadline_ms: u16) -> Result<(), BringUpError> {
+    let inner = Bench::new(ClockMode::LockStep).bus;
+    let mut bus = Without { inner, absent: absent.to_vec(), code, answers: Vec::new() };
+    let setup = DriveSetup { rpdo_deadline_ms: deadline_ms, ..setup(Mode::Csp) };
+    bring_up(&mut bus, &setup).map(|_| ())
+}
+
+#[test]
+fn a_drive_need_not_have_what_it_can_do_without() {
+    let optional = [
+        0x1006, 0x1007, 0x1014, 0x1016, 0x1019, 0x1029, 0x6007, 0x605A, 0x605B, 0x605C, 0x605D,
+        0x605E, 0x6065, 0x6066, 0x6072, 0x6073, 0x607B, 0x607C, 0x607D, 0x607E, 0x607F, 0x6080,
+        0x6083, 0x6084, 0x6085, 0x608F, 0x6090, 0x6091, 0x6092, 0x6096, 0x6097, 0x60A8, 0x60A9,
+        0x60B0, 0x60B1, 0x60B2, 0x60C2, 0x60C5, 0x60C6, 0x60E0, 0x60E1,
+    ];
+    for code in [AbortCode::NoObject, AbortCode::NoSubIndex] {
+        for index in optional {
+            assert_eq!(without(&[index], code, 20), Ok(()), "0x{index:04X}");
+        }
+        assert_eq!(without(&optional, code, 20), Ok(()), "all of them");
+    }
+}
+
+#[test]
+fn a_drive_must_have_what_makes_it_stop() {
+    let line = without(&[0x1400], AbortCode::NoSubIndex, 20).unwrap_err().to_string();
+    assert_eq!(
+        line,
+        "node 1: object 0x1400:02 (RPDO communication parameter): the node has none, and needs it to \
+         be read at every SYNC"
+    );
+    let refused = without(&[0x6085], AbortCode::DeviceState, 20).unwrap_err().to_string();
+    assert!(refused.contains("object 0x6085:00: refused with abort code 0x08000022"), "{refused}");
+}

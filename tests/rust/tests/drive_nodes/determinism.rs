@@ -5,27 +5,21 @@ use std::time::Duration;
 
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Mode, Status, bring_up, next_command};
+use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Status, bring_up, next_command};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
+use ilc_rt::supervisor::drive_setup;
 use ilc_sim::{ClockMode, Machine};
-
-use crate::bench::ANSWER;
 
 fn run() -> Vec<Frame> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/01_gantry.toml");
     let cell = Cell::load(&path).unwrap();
     let mut bus = InProcess::new(Machine::from_cell(&cell, ClockMode::LockStep).unwrap(), 256);
     let nodes: Vec<NodeId> = cell.axes.iter().map(|a| NodeId::new(a.node).unwrap()).collect();
-    for &node in &nodes {
+    for axis in &cell.axes {
         let setup = DriveSetup {
-            node,
-            mode: Mode::Csp,
-            cycle_us: cell.cell.cycle_us,
             following_error_max_counts: 1_000_000,
-            heartbeat_ms: 0,
-            rpdo_deadline_ms: 0,
-            answer_timeout: ANSWER,
+            ..drive_setup(&cell, axis, true).unwrap()
         };
         bring_up(&mut bus, &setup).unwrap();
     }

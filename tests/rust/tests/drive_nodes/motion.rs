@@ -223,3 +223,74 @@ fn a_silent_controller_in_velocity_mode_ends_in_a_ramp() {
     assert_eq!(states[79], State::Fault);
     assert_eq!(answers[79].position(), answers[60].position());
 }
+
+#[test]
+fn a_silent_controller_is_survived_whatever_an_earlier_master_left() {
+    // Each of these by itself would let the axis run on, or coast.
+    let left: [(u16, &[u8]); 6] = [
+        (0x6085, &1_u32.to_le_bytes()),
+        (0x6084, &1_u32.to_le_bytes()),
+        (0x60C6, &1_u32.to_le_bytes()),
+        (0x605E, &0_i16.to_le_bytes()),
+        (0x6007, &0_i16.to_le_bytes()),
+        (0x605A, &0_i16.to_le_bytes()),
+    ];
+    for (index, bytes) in left {
+        let mut bench = Bench::new(ClockMode::LockStep);
+        bench.write(index, 0, bytes);
+        let with_deadline = DriveSetup { rpdo_deadline_ms: 20, ..setup(Mode::Csv) };
+        bring_up(&mut bench.bus, &with_deadline).unwrap();
+        bench.bus.send(&NmtCommand::Start.frame(Some(node(1)))).unwrap();
+        bench.enable(0);
+        for _ in 0..10 {
+            bench.follow(-200_000);
+        }
+        let answers: Vec<_> = (0..80).map(|_| bench.sync()).collect();
+        let way = answers[0].position() - answers[79].position();
+        // 20 ms at 0.2 m/s and a ramp of 2 mm; a cycle or two to take notice.
+        assert!((5_000..7_000).contains(&way), "0x{index:04X}: {way} counts");
+        assert_eq!(answers[79].position(), answers[60].position(), "0x{index:04X}");
+        let ramps = answers.iter().any(|answer| answer.state() == State::FaultReactionActive);
+        assert!(ramps, "0x{index:04X}: no ramp");
+    }
+}
+
+#[test]
+fn a_drive_left_under_power_is_brought_to_rest_before_anything_is_set() {
+    let mut bench = Bench::enabled(Mode::Csv);
+    // Nothing happens to it when it is reset: the master before wanted it so.
+    bench.write(0x6007, 0, &0_i16.to_le_bytes());
+    bench.write(0x6085, 0, &1_u32.to_le_bytes());
+    for _ in 0..5 {
+        bench.follow(-200_000);
+    }
+    bring_up(&mut bench.bus, &setup(Mode::Csp)).unwrap();
+    assert_eq!(bench.bus.responder().drive_state(node(1)), Some(State::SwitchOnDisabled));
+    assert_eq!(bench.read(0x6085, 0), 10_000_000);
+}
+
+#[test]
+fn option_codes_have_their_ramps() {
+    // 0.2 m/s: at 10 m/s2 over after 20 ms, at 2 m/s2 after 100 ms.
+    for (option, n_cycles, ends_in) in [
+        (0, 0_usize, State::SwitchOnDisabled),
+        (1, 100, State::SwitchOnDisabled),
+        (2, 20, State::SwitchOnDisabled),
+        (5, 100, State::QuickStopActive),
+        (6, 20, State::QuickStopActive),
+    ] {
+        let mut bench = Bench::enabled(Mode::Csv);
+        bench.write(0x605A, 0, &i16::to_le_bytes(option));
+        bench.write(0x6084, 0, &2_000_000_u32.to_le_bytes());
+        for _ in 0..10 {
+            bench.follow(-200_000);
+        }
+        let answers: Vec<_> =
+            (0..150).map(|_| bench.cycle(Controlword::QUICK_STOP, -200_000)).collect();
+        let moving = answers.windows(2).filter(|two| two[0].position() != two[1].position());
+        let n_moving = moving.count();
+        let allowed = n_cycles.saturating_sub(2)..=n_cycles + 2;
+        assert!(allowed.contains(&n_moving), "605A = {option}: {n_moving} cycles");
+        assert_eq!(answers[149].state(), ends_in, "605A = {option}");
+    }
+}

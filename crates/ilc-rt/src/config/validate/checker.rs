@@ -1,6 +1,10 @@
 //! The one way to refuse a value: file, key, value, and what is allowed.
 
 use crate::config::ConfigError;
+use crate::record::{TEXT_MAX, printable};
+
+/// Most characters of a value that is refused.
+const VALUE_MAX: usize = 80;
 
 /// Refuses values of one file.
 pub(super) struct Checker {
@@ -15,10 +19,10 @@ impl Checker {
         allowed: &str,
     ) -> ConfigError {
         ConfigError::Value {
-            file: self.file.clone(),
-            key: key.to_owned(),
-            value: value.to_string(),
-            allowed: allowed.to_owned(),
+            file: printable(&self.file, TEXT_MAX),
+            key: printable(key, TEXT_MAX),
+            value: printable(&value.to_string(), VALUE_MAX),
+            allowed: printable(allowed, TEXT_MAX),
         }
     }
 

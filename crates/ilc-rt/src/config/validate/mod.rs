@@ -7,6 +7,7 @@ mod program;
 
 use super::cell::Cell;
 use super::error::ConfigError;
+use crate::record::{NAME_MAX, TEXT_MAX, printable};
 use crate::trajectory::MAX_AXES;
 
 use checker::Checker;
@@ -32,8 +33,9 @@ pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigE
         _ if row.starts_with('[') => row.split('#').next().unwrap_or("").trim().to_owned(),
         _ => table.to_owned(),
     };
-    let reason = error.message().replace('\n', " ");
-    ConfigError::Syntax { file: file.to_owned(), line, key, reason }
+    let reason = printable(&error.message().replace('\n', " "), TEXT_MAX);
+    let (file, key) = (printable(file, TEXT_MAX), printable(&key, TEXT_MAX));
+    ConfigError::Syntax { file, line, key, reason }
 }
 
 /// Checks every range and every pair of values that must agree; for cells changed after loading.
@@ -45,20 +47,21 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     let name = &cell.cell.name;
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     v.that(
-        !name.is_empty() && name.chars().all(plain),
+        !name.is_empty() && name.len() <= NAME_MAX && name.chars().all(plain),
         "[cell] name",
         name,
-        "letters, digits, '-' and '_' only",
+        &format!("1 to {NAME_MAX} letters, digits, '-' and '_'"),
     )?;
     v.range("[cell] cycle_us", f64::from(cell.cell.cycle_us), 100.0, 1e5)?;
     v.range("[bus] load_max", cell.bus.load_max, 0.05, 1.0)?;
-    v.range("[bus] bitrate_bit_s", f64::from(cell.bus.bitrate_bit_s), 1e4, 8e6)?;
+    v.range("[bus] bitrate_bit_s", f64::from(cell.bus.bitrate_bit_s), 1e4, 1e6)?;
     v.that(
         (1..=MAX_AXES).contains(&cell.axes.len()),
         "[[axis]] count",
         &cell.axes.len(),
         &format!("1 to {MAX_AXES} axes"),
     )?;
+    axis::names(cell, &v)?;
     axis::nodes(cell, &v)?;
     for axis in &cell.axes {
         axis::check(axis, &v)?;

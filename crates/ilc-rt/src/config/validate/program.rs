@@ -41,6 +41,7 @@ fn check_kind(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
             true,
         ),
         ("[program] rapid_m_s", program.rapid_m_s.is_some(), kind == PathKind::Gcode, false),
+        ("[program] block_delete", program.block_delete, kind == PathKind::Gcode, false),
         ("[program.butterfly]", program.butterfly.is_some(), kind == PathKind::Butterfly, false),
         ("[program.spiral]", program.spiral.is_some(), kind == PathKind::Spiral, true),
         ("[program.raster]", program.raster.is_some(), kind == PathKind::Raster, true),
@@ -63,6 +64,15 @@ fn check_kind(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
         &"a plane shape",
         "needs a cell of 2 axes",
     )?;
+    if let Some(file) = &program.file {
+        let name = file.to_string_lossy();
+        v.that(
+            !name.contains(char::is_control) && (1..=255).contains(&name.len()),
+            "[program] file",
+            &format!("{:?}", name.chars().take(60).collect::<String>()),
+            "a name of 1 to 255 bytes without control characters",
+        )?;
+    }
     if let Some(rapid_m_s) = program.rapid_m_s {
         v.range("[program] rapid_m_s", rapid_m_s, 1e-6, 1e2)?;
     }

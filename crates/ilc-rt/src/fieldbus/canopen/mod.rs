@@ -2,10 +2,11 @@
 //!
 //! Codecs shared by the controller and the simulated nodes, so that both sides name a byte the same
 //! way; imported by `cia402`, `servo`, `supervisor` and the simulator. All files are hot (values in,
-//! values out) except [`sdo_client`], which waits for answers and belongs to set-up.
+//! values out) except [`listen`] and [`sdo_client`], which wait and belong to set-up.
 
 pub mod cob_id;
 pub mod emcy;
+pub mod listen;
 pub mod nmt;
 pub mod node_id;
 pub mod pdo;

@@ -27,8 +27,11 @@ pub enum SdoError {
         /// The node's reason.
         code: AbortCode,
     },
-    /// The node did not answer.
-    #[error("node {node}: object {address}: no answer within {timeout:?}, tried {TRIES} times")]
+    /// The node did not answer this question.
+    #[error(
+        "node {node}: object {address}: no answer within {timeout:?}, tried {TRIES} times{}",
+        beside(.other)
+    )]
     Timeout {
         /// The node that was asked.
         node: NodeId,
@@ -36,6 +39,8 @@ pub enum SdoError {
         address: ObjectAddress,
         /// How long each try waited.
         timeout: Duration,
+        /// What came from the node instead, last.
+        other: Option<Stray>,
     },
     /// The node answered against the protocol.
     #[error("node {node}: object {address}: expected {expected}, found {found}")]
@@ -61,7 +66,41 @@ pub enum SdoError {
     },
 }
 
+/// A frame on the node's answer channel that answered no question of this client.
+///
+/// It may answer another master on the bus, a second node of the same number may have sent it, or it
+/// is the late answer to a question that was given up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stray {
+    /// It speaks of another object.
+    Object(ObjectAddress),
+    /// It speaks of this object, but answers another request, as a write where a read was asked.
+    Request,
+    /// It is a segment of another transfer, or one that has come already.
+    Segment,
+    /// It is no SDO message.
+    Garbage,
+}
+
+impl std::fmt::Display for Stray {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Object(address) => write!(f, "an answer for object {address}"),
+            Self::Request => f.write_str("an answer to another request"),
+            Self::Segment => f.write_str("a segment out of turn"),
+            Self::Garbage => f.write_str("a frame that is no SDO answer"),
+        }
+    }
+}
+
+fn beside(other: &Option<Stray>) -> String {
+    other.map_or_else(String::new, |stray| format!("; what came instead: {stray}"))
+}
+
 /// Reads and writes objects of one node, one at a time.
+///
+/// Only what answers the question counts: the right kind of answer, for the same object, or the next
+/// segment of the transfer. Everything else on the node's channel is ignored until the time-out.
 #[derive(Clone, Copy, Debug)]
 pub struct SdoClient {
     node: NodeId,
@@ -93,6 +132,41 @@ impl SdoClient {
             return Err(self.protocol(ObjectAddress::new(index, sub), "1 to 4 bytes", found));
         }
         Ok(bytes.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte)))
+    }
+
+    /// Reads sub-index 0 of an object once and counts the answers until `wait` after the first; 0 if
+    /// none came in time, or the bus failed, as the next question will tell.
+    pub(crate) fn count_answers(
+        &self,
+        bus: &mut dyn Bus,
+        index: u16,
+        timeout: Duration,
+        wait: Duration,
+    ) -> usize {
+        let address = ObjectAddress::new(index, 0);
+        if self.drain(bus, address).is_err()
+            || self.send(bus, address, SdoRequest::UploadInitiate(address)).is_err()
+        {
+            return 0;
+        }
+        let mut deadline = Instant::now() + timeout;
+        let mut n_answers = 0;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            let Ok(Some(frame)) = bus.recv(left) else { return n_answers };
+            let answer = (frame.id() == cob_id::of(cob_id::SDO_RESPONSE, self.node))
+                .then(|| SdoResponse::decode(frame.payload()))
+                .flatten();
+            if answer.is_some_and(|answer| named(&answer) == Some(address)) {
+                n_answers += 1;
+                if n_answers == 1 {
+                    deadline = Instant::now() + wait;
+                }
+            }
+            if left.is_zero() {
+                return n_answers;
+            }
+        }
     }
 
     /// Writes an object: expedited up to four bytes, segmented beyond; little endian.
@@ -142,20 +216,21 @@ impl SdoClient {
 
     fn upload_once(&self, bus: &mut dyn Bus, address: ObjectAddress) -> Result<Vec<u8>, SdoError> {
         self.drain(bus, address)?;
-        let size = match self.ask(bus, address, SdoRequest::UploadInitiate(address))? {
-            SdoResponse::UploadExpedited(found, data) if found == address => {
-                return Ok(data.data().to_vec());
-            }
-            SdoResponse::UploadInitiate(found, size) if found == address => size,
-            other => return Err(self.unexpected(address, "an answer to a read", other)),
+        let first = self.ask(bus, address, SdoRequest::UploadInitiate(address), |answer| {
+            matches!(answer, SdoResponse::UploadExpedited(..) | SdoResponse::UploadInitiate(..))
+        })?;
+        let size = match first {
+            SdoResponse::UploadExpedited(_, data) => return Ok(data.data().to_vec()),
+            SdoResponse::UploadInitiate(_, size) => size,
+            _ => None,
         };
         let mut bytes = Vec::new();
         let mut toggle = false;
         loop {
-            let segment = match self.ask(bus, address, SdoRequest::UploadSegment(toggle))? {
-                SdoResponse::UploadSegment(segment) if segment.toggle == toggle => segment,
-                other => return Err(self.unexpected(address, "the next segment", other)),
-            };
+            let next = self.ask(bus, address, SdoRequest::UploadSegment(toggle), |answer| {
+                matches!(answer, SdoResponse::UploadSegment(segment) if segment.toggle == toggle)
+            })?;
+            let SdoResponse::UploadSegment(segment) = next else { continue };
             bytes.extend_from_slice(segment.data());
             if bytes.len() > UPLOAD_MAX {
                 let found = format!("{} bytes and more", bytes.len());
@@ -186,10 +261,7 @@ impl SdoClient {
             Some(data) => SdoRequest::DownloadExpedited(address, data),
             None => SdoRequest::DownloadInitiate(address, u32::try_from(bytes.len()).ok()),
         };
-        match self.ask(bus, address, first)? {
-            SdoResponse::DownloadInitiate(found) if found == address => {}
-            other => return Err(self.unexpected(address, "an answer to a write", other)),
-        }
+        self.ask(bus, address, first, |answer| matches!(answer, SdoResponse::DownloadInitiate(_)))?;
         if matches!(first, SdoRequest::DownloadExpedited(..)) {
             return Ok(());
         }
@@ -201,10 +273,9 @@ impl SdoClient {
             let Some(segment) = Segment::new(toggle, number + 1 == n_segments, data) else {
                 return Err(self.protocol(address, "segments of at most 7 bytes", String::new()));
             };
-            match self.ask(bus, address, SdoRequest::DownloadSegment(segment))? {
-                SdoResponse::DownloadSegment(found) if found == toggle => {}
-                other => return Err(self.unexpected(address, "a taken segment", other)),
-            }
+            self.ask(bus, address, SdoRequest::DownloadSegment(segment), |answer| {
+                *answer == SdoResponse::DownloadSegment(toggle)
+            })?;
         }
         Ok(())
     }
@@ -225,49 +296,48 @@ impl SdoClient {
             .map_err(|source| self.bus(address, source))
     }
 
-    /// Sends a request and waits for the node's answer, past all other traffic.
+    /// Sends a request and waits for its answer, past all other traffic. An abort answers if it names
+    /// the object, any other answer if `answers` says so and it does not name another object.
     fn ask(
         &self,
         bus: &mut dyn Bus,
         address: ObjectAddress,
         request: SdoRequest,
+        answers: impl Fn(&SdoResponse) -> bool,
     ) -> Result<SdoResponse, SdoError> {
         self.send(bus, address, request)?;
         let deadline = Instant::now() + self.timeout;
         let answer_id = cob_id::of(cob_id::SDO_RESPONSE, self.node);
+        let mut other = None;
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
             let frame = bus.recv(left).map_err(|source| self.bus(address, source))?;
-            let Some(frame) = frame else {
-                return Err(SdoError::Timeout { node: self.node, address, timeout: self.timeout });
-            };
-            if frame.id() != answer_id {
-                if left.is_zero() {
-                    let timeout = self.timeout;
-                    return Err(SdoError::Timeout { node: self.node, address, timeout });
+            if let Some(frame) = frame
+                && frame.id() == answer_id
+            {
+                match SdoResponse::decode(frame.payload()) {
+                    None => other = Some(Stray::Garbage),
+                    Some(answer) => match named(&answer) {
+                        Some(named) if named != address => other = Some(Stray::Object(named)),
+                        _ => match answer {
+                            SdoResponse::Abort(_, code) => {
+                                return Err(SdoError::Aborted { node: self.node, address, code });
+                            }
+                            answer if answers(&answer) => return Ok(answer),
+                            SdoResponse::UploadSegment(_) | SdoResponse::DownloadSegment(_) => {
+                                other = Some(Stray::Segment);
+                            }
+                            _ => other = Some(Stray::Request),
+                        },
+                    },
                 }
-                continue;
             }
-            return match SdoResponse::decode(frame.payload()) {
-                Some(SdoResponse::Abort(_, code)) => {
-                    Err(SdoError::Aborted { node: self.node, address, code })
-                }
-                Some(response) => Ok(response),
-                None => {
-                    let found = format!("{:02X?}", frame.payload());
-                    Err(self.protocol(address, "an SDO answer of 8 bytes", found))
-                }
-            };
+            // A bus that babbles must not hold the question for ever.
+            if frame.is_none() || left.is_zero() {
+                let (node, timeout) = (self.node, self.timeout);
+                return Err(SdoError::Timeout { node, address, timeout, other });
+            }
         }
-    }
-
-    fn unexpected(
-        &self,
-        address: ObjectAddress,
-        expected: &'static str,
-        found: SdoResponse,
-    ) -> SdoError {
-        self.protocol(address, expected, format!("{found:?}"))
     }
 
     fn protocol(&self, address: ObjectAddress, expected: &'static str, found: String) -> SdoError {
@@ -276,5 +346,16 @@ impl SdoClient {
 
     fn bus(&self, address: ObjectAddress, source: BusError) -> SdoError {
         SdoError::Bus { node: self.node, address, source }
+    }
+}
+
+/// The object that an answer names, if it is of a kind that names one.
+fn named(answer: &SdoResponse) -> Option<ObjectAddress> {
+    match *answer {
+        SdoResponse::UploadExpedited(address, _)
+        | SdoResponse::UploadInitiate(address, _)
+        | SdoResponse::DownloadInitiate(address)
+        | SdoResponse::Abort(address, _) => Some(address),
+        SdoResponse::UploadSegment(_) | SdoResponse::DownloadSegment(_) => None,
     }
 }

@@ -2,18 +2,26 @@
 
 use std::time::{Duration, Instant};
 
+use super::bring_up_error::BringUpError;
 use super::mode::Mode;
-use super::{objects, pdo_map};
-use crate::fieldbus::canopen::pdo::{
-    COB_INVALID, COB_NO_RTR, MappedObject, PdoNumber, TYPE_EVERY_SYNC,
-};
-use crate::fieldbus::canopen::{
-    AbortCode, Heartbeat, NmtCommand, NmtState, NodeId, SdoClient, SdoError,
-};
-use crate::fieldbus::{Bus, BusError};
+use super::remote::Remote;
+use super::state::{Controlword, State, Statusword};
+use super::{objects, pdo_map, process_data, scaling, settings};
+use crate::fieldbus::Bus;
+use crate::fieldbus::canopen::{Heartbeat, NmtCommand, NmtState, NodeId, SdoClient};
 
 /// How long the following error may exceed its window before the drive faults (object 0x6066), in ms.
 pub const FOLLOWING_ERROR_TIME_MS: u16 = 10;
+
+/// How long a drive that was left moving may take to come to rest before its power is taken.
+const REST: Duration = Duration::from_millis(500);
+/// How often a question is asked again whose answer takes time.
+const ASK_EVERY: Duration = Duration::from_millis(1);
+
+/// How often a question must be answered twice until two nodes are the reason.
+const TWIN_QUESTIONS: u32 = 4;
+/// How long after an answer a second one is waited for.
+const TWIN_WAIT: Duration = Duration::from_millis(20);
 
 /// What a drive is set up to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,6 +34,18 @@ pub struct DriveSetup {
     pub cycle_us: u32,
     /// Following error at which the drive faults, in counts.
     pub following_error_max_counts: u32,
+    /// Lowest position, in counts.
+    pub position_min_counts: i32,
+    /// Highest position, in counts.
+    pub position_max_counts: i32,
+    /// Highest speed, in counts/s.
+    pub velocity_max_counts_s: u32,
+    /// Highest acceleration, in counts/s²: the deceleration of every stop.
+    pub acceleration_max_counts_s2: u32,
+    /// The SI unit, coded as in object 0x60A8, that one count is, if it is one.
+    pub position_unit: Option<u32>,
+    /// The SI unit, coded as in object 0x60A9, that one count per second is, if it is one.
+    pub velocity_unit: Option<u32>,
     /// Period of the drive's heartbeat, in milliseconds; 0: none (lock-step).
     pub heartbeat_ms: u16,
     /// How long the drive goes on without a command before it stops, in milliseconds; 0: for ever
@@ -55,132 +75,49 @@ pub struct EncoderIdentity {
     pub identity: [u32; 4],
 }
 
-/// Why a node could not be brought up: node, step, expected and found.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BringUpError {
-    /// Nothing came after the reset.
-    #[error(
-        "node {node}: no boot-up within {timeout:?} after reset; is it powered, on this bus and set to this number?"
-    )]
-    NoBootUp {
-        /// The node.
-        node: NodeId,
-        /// How long was waited.
-        timeout: Duration,
-    },
-    /// The node is of another kind.
-    #[error(
-        "node {node}: device type: expected profile {expected}, found {found} (0x1000 = 0x{device_type:08X})"
-    )]
-    Profile {
-        /// The node.
-        node: NodeId,
-        /// Profile number that was expected.
-        expected: u16,
-        /// Profile number that was found.
-        found: u16,
-        /// The whole object.
-        device_type: u32,
-    },
-    /// The drive lacks the mode.
-    #[error(
-        "node {node}: supported modes: expected {mode}, found 0x6502 = 0x{supported:08X}, which lacks it"
-    )]
-    ModeNotSupported {
-        /// The node.
-        node: NodeId,
-        /// The mode that was asked for.
-        mode: Mode,
-        /// Object 0x6502.
-        supported: u32,
-    },
-    /// The drive does not show the mode it was set to.
-    #[error(
-        "node {node}: mode of operation: expected {mode}, found 0x6061 = {found} after {timeout:?}"
-    )]
-    ModeNotShown {
-        /// The node.
-        node: NodeId,
-        /// The mode that was asked for.
-        mode: Mode,
-        /// Object 0x6061.
-        found: i8,
-        /// How long was waited.
-        timeout: Duration,
-    },
-    /// 0x60C2 cannot hold the cycle.
-    #[error(
-        "node {node}: interpolation period: a cycle of {cycle_us} us is not 1 to 255 times a power of ten; choose one that is, as 2000"
-    )]
-    Cycle {
-        /// The node.
-        node: NodeId,
-        /// The cycle that was asked for.
-        cycle_us: u32,
-    },
-    /// A question to the node failed.
-    #[error("{source} (step: {step})")]
-    Sdo {
-        /// What was being done.
-        step: &'static str,
-        /// What went wrong, with node and object.
-        source: SdoError,
-    },
-    /// The bus failed.
-    #[error("node {node}: {step}: {source}")]
-    Bus {
-        /// The node.
-        node: NodeId,
-        /// What was being done.
-        step: &'static str,
-        /// What went wrong.
-        source: BusError,
-    },
-}
-
-/// Resets a drive, checks what it is and configures it; it is left pre-operational.
+/// Resets a drive, checks what it is and configures it; it is left pre-operational and without power.
 ///
-/// Reset communication, boot-up, identity (0x1000 profile 402, 0x6502), PDOs (each made invalid,
-/// remapped and made valid again), interpolation period, following-error window, command deadline,
-/// heartbeat and mode. NMT start is the caller's, for all nodes at once. Frames of others that
-/// arrive meanwhile are discarded.
+/// Reset communication, boot-up, identity (0x1000 profile 402, 0x6502), power off, PDOs (all switched
+/// off, then those of the loop mapped), and every object that shapes motion or the stop after a fault:
+/// read, put right where it is wrong, read again. NMT start is the caller's, for all nodes at once.
+/// Frames of others that arrive meanwhile are discarded.
 ///
 /// # Errors
-/// [`BringUpError`] names node, step, what was expected and what was found.
+/// [`BringUpError`] names node, object or step, what was found and what was needed.
 pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, BringUpError> {
     let node = setup.node;
-    let (period, exponent) = interpolation_period(setup.cycle_us)
+    let period = interpolation_period(setup.cycle_us)
         .ok_or(BringUpError::Cycle { node, cycle_us: setup.cycle_us })?;
     reset(bus, node, setup.answer_timeout)?;
     let mut remote = Remote { bus, client: SdoClient::new(node, setup.answer_timeout), node };
     let device_type = remote.check_profile(objects::PROFILE_DRIVE)?;
+    remote.refuse_twins(setup.answer_timeout)?;
     let identity = remote.identity()?;
     let supported_modes = remote.read("supported modes", objects::SUPPORTED_MODES, 0)?;
     if supported_modes & setup.mode.supported_bit() == 0 {
         let (mode, supported) = (setup.mode, supported_modes);
         return Err(BringUpError::ModeNotSupported { node, mode, supported });
     }
+    remote.take_power(setup)?;
 
-    remote.map_pdo("mapping RPDO1", pdo_map::COMMAND_PDO, &pdo_map::command_map(setup.mode))?;
-    remote.map_pdo("mapping TPDO1", pdo_map::STATUS_PDO, &pdo_map::STATUS_MAP)?;
-    remote.map_pdo("mapping TPDO2", pdo_map::EXTRA_PDO, &pdo_map::EXTRA_MAP)?;
-    for unused in
-        [1, 2, 3].map(PdoNumber::receive).into_iter().chain([2, 3].map(PdoNumber::transmit))
-    {
-        remote.switch_pdo_off(unused)?;
-    }
+    process_data::close_all(&mut remote)?;
+    remote.ensure_all(&settings::communication(node, setup.heartbeat_ms, setup.cycle_us))?;
+    remote.forget_heartbeats()?;
+    process_data::open(
+        &mut remote,
+        pdo_map::COMMAND_PDO,
+        &pdo_map::command_map(setup.mode),
+        setup.rpdo_deadline_ms,
+    )?;
+    process_data::open(&mut remote, pdo_map::STATUS_PDO, &pdo_map::STATUS_MAP, 0)?;
+    process_data::open(&mut remote, pdo_map::EXTRA_PDO, &pdo_map::EXTRA_MAP, 0)?;
 
-    let step = "interpolation period";
-    remote.write(step, objects::INTERPOLATION_PERIOD, 1, &[period])?;
-    remote.write(step, objects::INTERPOLATION_PERIOD, 2, &exponent.to_le_bytes())?;
-    let step = "following-error window";
-    let window = setup.following_error_max_counts.to_le_bytes();
-    remote.write(step, objects::FOLLOWING_ERROR_WINDOW, 0, &window)?;
-    remote.write(step, objects::FOLLOWING_ERROR_TIME, 0, &FOLLOWING_ERROR_TIME_MS.to_le_bytes())?;
-    remote.write_deadline(setup.rpdo_deadline_ms)?;
-    let heartbeat = setup.heartbeat_ms.to_le_bytes();
-    remote.write("heartbeat", objects::PRODUCER_HEARTBEAT, 0, &heartbeat)?;
+    scaling::check(&mut remote, setup)?;
+    remote.ensure_all(&settings::interpolation(period))?;
+    remote.ensure_all(&settings::reactions(setup))?;
+    remote.ensure_all(&settings::motion(setup))?;
     remote.set_mode(setup.mode, setup.answer_timeout)?;
+    remote.ensure_all(&settings::offsets())?;
     Ok(DriveIdentity { device_type, supported_modes, identity })
 }
 
@@ -196,8 +133,12 @@ pub fn bring_up_encoder(
     reset(bus, node, timeout)?;
     let mut remote = Remote { bus, client: SdoClient::new(node, timeout), node };
     let device_type = remote.check_profile(objects::PROFILE_ENCODER)?;
+    remote.refuse_twins(timeout)?;
     let identity = remote.identity()?;
-    remote.map_pdo("mapping TPDO1", pdo_map::ENCODER_PDO, &pdo_map::ENCODER_MAP)?;
+    process_data::close_all(&mut remote)?;
+    remote.ensure_all(&settings::communication(node, 0, 0))?;
+    remote.forget_heartbeats()?;
+    process_data::open(&mut remote, pdo_map::ENCODER_PDO, &pdo_map::ENCODER_MAP, 0)?;
     Ok(EncoderIdentity { device_type, identity })
 }
 
@@ -229,32 +170,7 @@ fn interpolation_period(cycle_us: u32) -> Option<(u8, i8)> {
     })
 }
 
-/// One node during its bring-up.
-struct Remote<'a> {
-    bus: &'a mut dyn Bus,
-    client: SdoClient,
-    node: NodeId,
-}
-
 impl Remote<'_> {
-    fn read(&mut self, step: &'static str, index: u16, sub: u8) -> Result<u32, BringUpError> {
-        self.client
-            .upload_u32(self.bus, index, sub)
-            .map_err(|source| BringUpError::Sdo { step, source })
-    }
-
-    fn write(
-        &mut self,
-        step: &'static str,
-        index: u16,
-        sub: u8,
-        bytes: &[u8],
-    ) -> Result<(), BringUpError> {
-        self.client
-            .download(self.bus, index, sub, bytes)
-            .map_err(|source| BringUpError::Sdo { step, source })
-    }
-
     fn check_profile(&mut self, expected: u16) -> Result<u32, BringUpError> {
         let device_type = self.read("device type", objects::DEVICE_TYPE, 0)?;
         let [low, high, ..] = device_type.to_le_bytes();
@@ -266,56 +182,82 @@ impl Remote<'_> {
         }
     }
 
+    /// Asks a question a few times and refuses a node that answers it twice each time: it is two. Once
+    /// would not do, as a bus may well carry a frame twice.
+    fn refuse_twins(&mut self, timeout: Duration) -> Result<(), BringUpError> {
+        for _ in 0..TWIN_QUESTIONS {
+            if self.client.count_answers(self.bus, objects::DEVICE_TYPE, timeout, TWIN_WAIT) < 2 {
+                return Ok(());
+            }
+        }
+        Err(BringUpError::TwoNodes { node: self.node })
+    }
+
     /// Reads the identity; all but the vendor are optional in CiA 301.
     fn identity(&mut self) -> Result<[u32; 4], BringUpError> {
         let mut identity = [0; 4];
         for (value, sub) in identity.iter_mut().zip(1..) {
-            *value = match self.read("identity", objects::IDENTITY, sub) {
-                Err(error) if is_absent(&error) => 0,
-                other => other?,
-            };
+            *value = self.find("identity", objects::IDENTITY, sub)?.unwrap_or(0);
         }
         Ok(identity)
     }
 
-    /// Maps a PDO in the order that CiA 301 asks for: invalid, type, no objects, objects, count, valid.
-    fn map_pdo(
+    /// Clears every heartbeat that the node watches: the one of a master that is gone would stop it.
+    fn forget_heartbeats(&mut self) -> Result<(), BringUpError> {
+        let step = "watched heartbeats";
+        let n_watched = self.find(step, objects::CONSUMER_HEARTBEAT, 0)?.unwrap_or(0);
+        for sub in 1..=u8::try_from(n_watched).unwrap_or(u8::MAX) {
+            self.ensure(&settings::watched_heartbeat(sub))?;
+        }
+        Ok(())
+    }
+
+    /// Brings a drive that an earlier master left under power to rest, and takes its power.
+    fn take_power(&mut self, setup: &DriveSetup) -> Result<(), BringUpError> {
+        if !has_power(self.state()?.1) {
+            return Ok(());
+        }
+        // How to brake may have been left wrong as well. What is refused now is told later, when the
+        // whole list is gone through.
+        for setting in settings::reactions(setup) {
+            match self.ensure(&setting) {
+                Ok(_) | Err(BringUpError::Value { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        self.command(Controlword::QUICK_STOP, REST)?;
+        let (word, state) = self.command(Controlword::DISABLE_VOLTAGE, setup.answer_timeout)?;
+        if !has_power(state) {
+            return Ok(());
+        }
+        Err(BringUpError::UnderPower {
+            node: self.node,
+            statusword: word.0,
+            state: state.map_or_else(|| "no known state".to_owned(), |state| state.to_string()),
+        })
+    }
+
+    /// Writes a controlword and waits until the drive has no power any more, or the time is over.
+    fn command(
         &mut self,
-        step: &'static str,
-        number: PdoNumber,
-        map: &[MappedObject],
-    ) -> Result<(), BringUpError> {
-        let cob_id = u32::from(number.default_cob_id(self.node)) | COB_NO_RTR;
-        let (communication, mapping) = (number.communication_index(), number.mapping_index());
-        self.write(step, communication, 1, &(cob_id | COB_INVALID).to_le_bytes())?;
-        self.write(step, communication, 2, &[TYPE_EVERY_SYNC])?;
-        self.write(step, mapping, 0, &[0])?;
-        let mut n_objects = 0;
-        for object in map {
-            n_objects += 1;
-            self.write(step, mapping, n_objects, &object.entry().to_le_bytes())?;
-        }
-        self.write(step, mapping, 0, &[n_objects])?;
-        self.write(step, communication, 1, &cob_id.to_le_bytes())
-    }
-
-    /// Makes a PDO that is not used invalid: it would cost bus time that the load check does not know.
-    fn switch_pdo_off(&mut self, number: PdoNumber) -> Result<(), BringUpError> {
-        let cob_id = u32::from(number.default_cob_id(self.node)) | COB_NO_RTR | COB_INVALID;
-        let index = number.communication_index();
-        match self.write("switching off unused PDOs", index, 1, &cob_id.to_le_bytes()) {
-            Err(error) if is_absent(&error) => Ok(()),
-            other => other,
+        controlword: Controlword,
+        timeout: Duration,
+    ) -> Result<(Statusword, Option<State>), BringUpError> {
+        self.write("taking power", objects::CONTROLWORD, 0, &controlword.0.to_le_bytes())?;
+        let deadline = Instant::now() + timeout;
+        loop {
+            let (word, state) = self.state()?;
+            if !has_power(state) || Instant::now() >= deadline {
+                return Ok((word, state));
+            }
+            std::thread::sleep(ASK_EVERY);
         }
     }
 
-    /// Sets the deadline of commands. A drive without one is accepted only if none is asked for.
-    fn write_deadline(&mut self, deadline_ms: u16) -> Result<(), BringUpError> {
-        let index = pdo_map::COMMAND_PDO.communication_index();
-        match self.write("command deadline", index, 5, &deadline_ms.to_le_bytes()) {
-            Err(error) if deadline_ms == 0 && is_absent(&error) => Ok(()),
-            other => other,
-        }
+    fn state(&mut self) -> Result<(Statusword, Option<State>), BringUpError> {
+        let [low, high, ..] = self.read("state", objects::STATUSWORD, 0)?.to_le_bytes();
+        let word = Statusword(u16::from_le_bytes([low, high]));
+        Ok((word, word.state()))
     }
 
     /// Sets the mode and waits until the drive shows it.
@@ -332,19 +274,28 @@ impl Remote<'_> {
             if Instant::now() >= deadline {
                 return Err(BringUpError::ModeNotShown { node: self.node, mode, found, timeout });
             }
-            // Waiting on the bus, as it paces the question on a real one and costs nothing elsewhere.
-            let failed = |source| BringUpError::Bus { node: self.node, step, source };
-            self.bus.recv(Duration::from_millis(1)).map_err(failed)?;
+            std::thread::sleep(ASK_EVERY);
         }
     }
 }
 
-/// Whether the node said that it has no such object.
-fn is_absent(error: &BringUpError) -> bool {
-    let BringUpError::Sdo { source: SdoError::Aborted { code, .. }, .. } = error else {
-        return false;
-    };
-    matches!(code, AbortCode::NoObject | AbortCode::NoSubIndex)
+/// Whether a drive in this state may move its axis.
+fn has_power(state: Option<State>) -> bool {
+    match state {
+        Some(
+            State::SwitchedOn
+            | State::OperationEnabled
+            | State::QuickStopActive
+            | State::FaultReactionActive,
+        )
+        | None => true,
+        Some(
+            State::NotReadyToSwitchOn
+            | State::SwitchOnDisabled
+            | State::ReadyToSwitchOn
+            | State::Fault,
+        ) => false,
+    }
 }
 
 #[cfg(test)]
@@ -360,15 +311,5 @@ mod tests {
         assert_eq!(interpolation_period(125), Some((125, -6)));
         assert_eq!(interpolation_period(1001), None);
         assert_eq!(interpolation_period(0), None);
-    }
-
-    #[test]
-    fn an_error_is_one_line_that_names_the_node() {
-        let node = NodeId::new(1).unwrap();
-        let error = BringUpError::NoBootUp { node, timeout: Duration::from_secs(2) };
-        assert_eq!(
-            error.to_string(),
-            "node 1: no boot-up within 2s after reset; is it powered, on this bus and set to this number?"
-        );
     }
 }

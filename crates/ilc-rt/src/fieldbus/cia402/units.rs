@@ -2,6 +2,13 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+/// The metre, as CiA 303-2 codes it.
+pub const UNIT_METRE: u32 = 0x01;
+/// The radian, as CiA 303-2 codes it.
+pub const UNIT_RADIAN: u32 = 0x10;
+/// The second, as CiA 303-2 codes it.
+const UNIT_SECOND: u32 = 0x03;
+
 /// Counts of a drive or encoder per SI unit; for positions (m) and velocities (m/s) alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
@@ -29,6 +36,18 @@ impl Scale {
     /// Returns the position (m) or velocity (m/s) of `counts`.
     pub fn to_si(self, counts: i32) -> f64 {
         f64::from(counts) / self.counts_per_m
+    }
+
+    /// Returns the SI units that one count and one count per second are, coded as in objects 0x60A8 and
+    /// 0x60A9, if a count is a power of ten of the unit; `unit` is that of the axis without prefix, as
+    /// [`UNIT_METRE`].
+    pub fn si_units(self, unit: u32) -> Option<(u32, u32)> {
+        (-9..=6_i8).find_map(|prefix| {
+            let exact = 10.0_f64.powi((-prefix).into());
+            let is_it = (self.counts_per_m / exact - 1.0).abs() < 1e-9;
+            let position = u32::from(prefix.cast_unsigned()) << 24 | unit << 16;
+            is_it.then_some((position, position | UNIT_SECOND << 8))
+        })
     }
 
     /// Counts in one metre.
@@ -79,6 +98,15 @@ mod tests {
         for counts in [i32::MIN, -1, 0, 1, 77_777, i32::MAX] {
             assert_eq!(scale.to_counts(scale.to_si(counts)), Some(counts));
         }
+    }
+
+    #[test]
+    fn decimal_counts_are_si_units() {
+        let units = |counts| Scale::new(counts).unwrap().si_units(UNIT_METRE);
+        assert_eq!(units(1e6), Some((0xFA01_0000, 0xFA01_0300)), "micrometres");
+        assert_eq!(units(1.0), Some((0x0001_0000, 0x0001_0300)), "metres");
+        assert_eq!(units(1e9), Some((0xF701_0000, 0xF701_0300)), "nanometres");
+        assert_eq!(units(131_072.0), None);
     }
 
     #[test]

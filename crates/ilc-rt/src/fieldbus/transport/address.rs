@@ -6,6 +6,7 @@ use std::str::FromStr;
 use super::error::OpenError;
 use super::udp_multicast::{DEFAULT_PORT, DEFAULT_TTL};
 use super::zenoh_link::Settings;
+use super::zenoh_reach::stays_on_host;
 
 /// Longest name of a network interface in Linux (`IFNAMSIZ` without its zero).
 const INTERFACE_NAME_MAX: usize = 15;
@@ -27,7 +28,7 @@ pub enum Address {
         /// Routers the frames may cross, plus one; 0 keeps them on this host.
         ttl: u8,
     },
-    /// `zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off]`.
+    /// `zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off][&insecure=1]`.
     Zenoh(Settings),
     /// `loopback:`.
     Loopback,
@@ -64,6 +65,14 @@ impl FromStr for Address {
                 Ok(Self::Can { interface: place.to_owned() })
             }
             "udp" => {
+                // In brackets or without, with a port or without: only IPv6 has two colons.
+                if place.starts_with('[') || place.matches(':').count() > 1 {
+                    return Err(part(
+                        "group",
+                        place,
+                        "an IPv4 group, 224.0.0.0 to 239.255.255.255",
+                    ));
+                }
                 let (group, port) = match place.split_once(':') {
                     None => (place, DEFAULT_PORT),
                     Some((group, port)) => match port.parse() {
@@ -90,13 +99,14 @@ impl FromStr for Address {
             }
             "zenoh" => {
                 let mut settings = Settings::new(place);
-                if place.is_empty() || place.contains(['*', '$', '#']) {
+                if !is_key(place) {
                     return Err(part(
                         "key",
                         place,
-                        "one key without wildcards, such as `cell1/bus`",
+                        "one key without wildcards and without empty parts, such as `cell1/bus`",
                     ));
                 }
+                let mut insecure = false;
                 for option in options {
                     match option? {
                         ("listen", endpoint) => settings.listen.push(endpoint.to_owned()),
@@ -106,13 +116,26 @@ impl FromStr for Address {
                         ("scouting", value) => {
                             return Err(part("scouting", value, "`on` and `off` are"));
                         }
+                        ("insecure", "1") => insecure = true,
+                        ("insecure", value) => return Err(part("insecure", value, "`1` is")),
                         (name, _) => {
                             return Err(part(
                                 "option",
                                 name,
-                                "`listen`, `connect` and `scouting` are",
+                                "`listen`, `connect`, `scouting` and `insecure` are",
                             ));
                         }
+                    }
+                }
+                let mut endpoints = settings.listen.iter().chain(&settings.connect);
+                if let Some(far) = endpoints.find(|endpoint| !stays_on_host(endpoint)) {
+                    if !insecure {
+                        return Err(part(
+                            "endpoint",
+                            far,
+                            "one of this host, as tcp/127.0.0.1:7447; whoever reaches another one \
+                             can move the axes: `insecure=1` allows it on a network of your own",
+                        ));
                     }
                 }
                 Ok(Self::Zenoh(settings))
@@ -121,6 +144,15 @@ impl FromStr for Address {
             _ => Err(unknown()),
         }
     }
+}
+
+/// Whether Zenoh takes a text for one key, and `KEY/*` for the keys under it.
+fn is_key(text: &str) -> bool {
+    let is_part = |part: &str| {
+        !part.is_empty()
+            && part.chars().all(|c| !c.is_control() && !c.is_whitespace() && !"*$#?".contains(c))
+    };
+    text.split('/').all(is_part)
 }
 
 #[cfg(test)]
@@ -147,7 +179,7 @@ mod tests {
             Address::Udp { group, port: 5000, ttl: 1 }
         );
         let Address::Zenoh(zenoh) =
-            "zenoh:cell/bus?listen=tcp/127.0.0.1:7000&connect=tcp/10.0.0.1:7000#iface=eth0&scouting=off"
+            "zenoh:cell/bus?listen=tcp/127.0.0.1:7000&connect=tcp/10.0.0.1:7000#iface=eth0&scouting=off&insecure=1"
                 .parse()
                 .unwrap()
         else {
@@ -175,6 +207,23 @@ mod tests {
             ("udp:239.1.1.1?hops=2", "option `hops` is not allowed: `ttl` is"),
             ("zenoh:", "one key without wildcards"),
             ("zenoh:a/*", "one key without wildcards"),
+            (
+                "zenoh:a//b",
+                "key `a//b` is not allowed: one key without wildcards and without empty",
+            ),
+            ("zenoh:/a", "key `/a`"),
+            ("zenoh:a/", "key `a/`"),
+            ("zenoh:/", "key `/`"),
+            ("zenoh://", "key `//`"),
+            ("zenoh:a b", "key `a b`"),
+            ("zenoh:a$*", "key `a$*`"),
+            ("zenoh:a?listen=tcp/0.0.0.0:7447", "endpoint `tcp/0.0.0.0:7447` is not allowed"),
+            ("zenoh:a?connect=tcp/10.0.0.1:7447", "`insecure=1` allows it"),
+            ("zenoh:a?insecure=yes", "insecure `yes` is not allowed: `1` is"),
+            ("udp:ff15:7079:7468:6f6e:6465:6d6f:6d63:6173", "an IPv4 group"),
+            ("udp:[ff15::1]", "group `[ff15::1]` is not allowed: an IPv4 group"),
+            ("udp:[ff15::1]:5000", "an IPv4 group"),
+            ("udp:ff15::1?ttl=1", "an IPv4 group"),
             ("zenoh:a?scouting=maybe", "scouting `maybe`"),
             ("zenoh:a?listen", "write NAME=VALUE"),
         ] {

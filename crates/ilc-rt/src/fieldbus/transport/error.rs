@@ -9,7 +9,7 @@ pub enum OpenError {
     /// Not the address of any carrier.
     #[error(
         "`{address}` is not a bus address: `can:INTERFACE`, `udp:GROUP[:PORT][?ttl=N]`, \
-         `zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off]` and `loopback:` are allowed"
+         `zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off][&insecure=1]` and `loopback:` are allowed"
     )]
     Scheme {
         /// The address as given.

@@ -14,6 +14,7 @@ pub mod udp_multicast;
 mod wait;
 pub mod zenoh;
 mod zenoh_link;
+pub(crate) mod zenoh_reach;
 
 pub use address::Address;
 pub use error::OpenError;
@@ -31,7 +32,7 @@ use super::bus::Bus;
 /// |---|---|
 /// | `can:vcan0` | the CAN interface of that name |
 /// | `udp:239.74.163.2[:port][?ttl=N]` | UDP multicast, in the format of python-can's `udp_multicast` |
-/// | `zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off]` | a Zenoh key expression |
+/// | `zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off][&insecure=1]` | a Zenoh key expression |
 ///
 /// # Errors
 /// [`OpenError`]: one line with the address, what is wrong with it and what is allowed. `loopback:` has

@@ -18,6 +18,7 @@ use super::super::frame::Frame;
 use super::doorbell::{Bell, Ringer, bell};
 use super::error::OpenError;
 use super::zenoh::{decode, encode};
+use super::zenoh_reach::{self, Reach};
 
 /// Frames that a ring buffer holds each way.
 const RING_FRAMES: usize = 4096;
@@ -28,12 +29,16 @@ const POLL: Duration = Duration::from_millis(1);
 /// How long a peer may leave its frames lying before they are dropped.
 const STALL_US: u32 = 100_000;
 
+/// Multicast group in which endpoints of buses look for each other. Not the one of all Zenoh programs: a
+/// bus shall not be found by what merely watches, and be carried off the host by it.
+const GROUP: &str = "224.0.0.224:7448";
+
 /// What a `zenoh:` address says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Key expression of the bus, without wildcards.
     pub key: String,
-    /// Zenoh endpoints to listen on, such as `tcp/192.168.0.1:7447`; if empty, a free port of the
+    /// Zenoh endpoints to listen on, such as `tcp/127.0.0.1:7447`; if empty, a free port of the
     /// host's own address.
     pub listen: Vec<String>,
     /// Zenoh endpoints to connect to.
@@ -83,7 +88,7 @@ impl Link {
             move |reason: zenoh::Error| OpenError::Zenoh {
                 key: settings.key.clone(),
                 action,
-                reason: reason.to_string(),
+                reason: zenoh_reach::reason(&reason),
             }
         };
         let config = config(settings).map_err(refused("configuring the session"))?;
@@ -151,21 +156,17 @@ impl Drop for Link {
 }
 
 fn config(settings: &Settings) -> zenoh::Result<zenoh::Config> {
-    let listen = if settings.listen.is_empty() {
-        vec!["tcp/127.0.0.1:0".to_owned()]
-    } else {
-        settings.listen.clone()
+    let reach = Reach {
+        listen: &settings.listen,
+        connect: &settings.connect,
+        scouting: settings.scouting,
+        // Endpoints on other hosts are named, never found.
+        scouting_off_host: false,
+        group: Some(GROUP),
     };
-    let mut config = zenoh::Config::default();
+    let mut config = reach.configuration()?;
     let mut set =
         |key: &str, value: serde_json::Value| config.insert_json5(key, &value.to_string());
-    set("mode", "peer".into())?;
-    set("listen/endpoints", listen.into())?;
-    set("connect/endpoints", settings.connect.clone().into())?;
-    set("scouting/multicast/enabled", settings.scouting.into())?;
-    // Endpoints on other hosts are named, never found.
-    set("scouting/multicast/ttl", 0.into())?;
-    set("scouting/gossip/enabled", settings.scouting.into())?;
     // Express frames travel one by one, so the queue counts frames; 16 is the most that Zenoh takes.
     set("transport/link/tx/queue/size/real_time", 16.into())?;
     // The publisher's thread may wait where the caller's may not. Beyond this a peer has stalled, and its

@@ -35,6 +35,18 @@ pub enum Doubt {
         /// Weighted RMS of the fit's residual, relative to the response.
         residual_rms: f64,
     },
+    /// A cell description does not take such a model.
+    #[error("the fit has {what} {value:.4}, a cell takes {low} to {high}")]
+    BeyondCell {
+        /// Which figure, with its unit.
+        what: &'static str,
+        /// The figure.
+        value: f64,
+        /// The least that a cell takes.
+        low: f64,
+        /// The most.
+        high: f64,
+    },
 }
 
 /// Returns what speaks against a model with that residual; `None` if nothing does.

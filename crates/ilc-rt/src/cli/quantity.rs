@@ -1,0 +1,120 @@
+//! Numbers for people: three digits, a unit with a sensible prefix, and a change in percent.
+
+/// Change beyond which a percentage says nothing any more.
+const CHANGE_MAX_PERCENT: f64 = 1e4;
+
+/// A unit to print a quantity in that is kept in metres or radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Unit {
+    /// As it is written.
+    pub(super) symbol: &'static str,
+    scale: f64,
+    milli: &'static str,
+    nano: &'static str,
+}
+
+impl Unit {
+    /// Micrometres, as errors usually are.
+    pub(super) const LENGTH: Self = Self { symbol: "um", scale: 1e6, milli: "mm", nano: "nm" };
+    /// Microradians.
+    pub(super) const ANGLE: Self = Self { symbol: "urad", scale: 1e6, milli: "mrad", nano: "nrad" };
+
+    /// The same unit with the prefix that suits a quantity of this size.
+    pub(super) fn for_size(self, value: f64) -> Self {
+        match value.abs() {
+            size if size >= 1e-2 && size.is_finite() => {
+                Self { symbol: self.milli, scale: 1e3, ..self }
+            }
+            size if size < 1e-7 && size > 0.0 => Self { symbol: self.nano, scale: 1e9, ..self },
+            _ => self,
+        }
+    }
+
+    /// A quantity as a number in this unit.
+    pub(super) fn of(self, value: f64) -> String {
+        digits(value * self.scale)
+    }
+
+    /// A quantity as a number with its unit.
+    pub(super) fn with(self, value: f64) -> String {
+        format!("{} {}", self.of(value), self.symbol)
+    }
+}
+
+/// Three significant digits without an exponent, where that is possible; `-` for what is no number.
+pub(super) fn digits(value: f64) -> String {
+    match value.abs() {
+        size if !size.is_finite() => "-".to_owned(),
+        size if size >= 1e9 => format!("{value:.2e}"),
+        size if size >= 100.0 => format!("{value:.0}"),
+        size if size >= 10.0 => format!("{value:.1}"),
+        size if size >= 1.0 || size < 5e-5 => format!("{value:.2}"),
+        size if size >= 0.1 => format!("{value:.3}"),
+        _ => format!("{value:.4}"),
+    }
+}
+
+/// Change in percent; none where there is nothing to compare with, or no percentage tells it.
+fn percent(before: f64, after: f64) -> Option<f64> {
+    let percent = (after / before - 1.0) * 100.0;
+    (before > 0.0 && percent.abs() <= CHANGE_MAX_PERCENT).then_some(percent)
+}
+
+/// A change with its sign: `-94.0 %`.
+pub(super) fn change(before: f64, after: f64) -> Option<String> {
+    percent(before, after).map(|percent| match format!("{percent:+.1} %") {
+        zero if zero == "-0.0 %" || zero == "+0.0 %" => "0.0 %".to_owned(),
+        text => text,
+    })
+}
+
+/// A change in words: `94.0 % less`.
+pub(super) fn less(before: f64, after: f64) -> Option<String> {
+    percent(before, after).map(|percent| {
+        let way = if percent > 0.0 { "more" } else { "less" };
+        format!("{:.1} % {way}", percent.abs())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits() {
+        for (value, text) in [
+            (0.0, "0.00"),
+            (1235.4, "1235"),
+            (45.678, "45.7"),
+            (4.5678, "4.57"),
+            (0.45678, "0.457"),
+            (0.045678, "0.0457"),
+            (1e-6, "0.00"),
+            (f64::NAN, "-"),
+            (f64::INFINITY, "-"),
+            (3e12, "3.00e12"),
+        ] {
+            assert_eq!(digits(value), text);
+        }
+        assert_eq!(Unit::LENGTH.for_size(0.02).with(0.02), "20.0 mm");
+        assert_eq!(Unit::ANGLE.for_size(5e-8).with(5e-8), "50.0 nrad");
+        assert_eq!(Unit::LENGTH.for_size(0.0), Unit::LENGTH);
+        assert_eq!(Unit::LENGTH.for_size(f64::INFINITY), Unit::LENGTH);
+    }
+
+    #[test]
+    fn a_change_is_told_only_where_there_is_one() {
+        assert_eq!(change(200.0, 50.0).unwrap(), "-75.0 %");
+        assert_eq!(less(200.0, 50.0).unwrap(), "75.0 % less");
+        assert_eq!(
+            (change(1.0, 3.0).unwrap(), less(1.0, 3.0).unwrap()),
+            ("+200.0 %".into(), "200.0 % more".into())
+        );
+        assert_eq!(change(1.0, 1.0 - 1e-9).unwrap(), "0.0 %");
+        for (before, after) in
+            [(0.0, 1.0), (1.0, f64::NAN), (1e-20, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)]
+        {
+            assert_eq!((change(before, after), less(before, after)), (None, None));
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! The table of runs, and what came of them in a sentence: the words and signs of `ilc`, in ASCII.
+
+use super::quantity::{Unit, change, digits, less};
+use crate::record::{AxisKinds, Figures};
+
+/// Part of the last run's error that a better one must have fallen to, to be worth a word.
+const BEST_SHARE: f64 = 0.9;
+
+/// The runs of a campaign as they come.
+#[derive(Default)]
+pub(super) struct Runs {
+    kinds: Option<AxisKinds>,
+    runs: Vec<(u32, Figures)>,
+    /// What was last remarked on a run; it is told once.
+    remark: Option<String>,
+}
+
+impl Runs {
+    /// A campaign begins: these are the units of its inputs.
+    pub(super) fn begin(&mut self, input_units: &[String], n_axes: usize) {
+        self.kinds = Some(AxisKinds::new(input_units, n_axes));
+    }
+
+    /// A row of the table, with the heading before the first one and a remark after it.
+    pub(super) fn row(&mut self, index: u32, figures: &Figures) -> String {
+        self.runs.push((index, figures.clone()));
+        let heading = if self.runs.len() == 1 { heading(&self.columns()) } else { String::new() };
+        let mut text = format!("{heading}{index:>4}");
+        for column in self.columns() {
+            let value = (column.of)(figures);
+            text += &format!("{:>14}", value.map_or_else(|| "-".to_owned(), |v| column.unit.of(v)));
+        }
+        let (first_index, first) = &self.runs[0];
+        let compared = (index != *first_index)
+            .then(|| change(self.compared(first), self.compared(figures)))
+            .flatten();
+        text += &format!(
+            "{:>11}{:>10}{:>10}",
+            compared.unwrap_or_default(),
+            figures.overruns,
+            digits(figures.update_ms)
+        );
+        if figures.remark != self.remark
+            && let Some(remark) = &figures.remark
+        {
+            text += &format!("\n     {remark}");
+        }
+        self.remark.clone_from(&figures.remark);
+        text
+    }
+
+    /// What a law remarks on a run whose row is there already.
+    pub(super) fn judged(&mut self, index: u32, remark: Option<&str>) -> Option<String> {
+        let is_new = remark != self.remark.as_deref();
+        self.remark = remark.map(str::to_owned);
+        remark.filter(|_| is_new).map(|remark| format!("     run {index}: {remark}"))
+    }
+
+    /// What was learned, in one sentence.
+    pub(super) fn sentence(&self) -> Option<String> {
+        let (first, last) = (&self.runs.first()?.1, &self.runs.last()?.1);
+        let n = self.runs.len();
+        if self.by_contour() {
+            return Some(format!(
+                "Contour error {}.",
+                self.course(|f| f.contour_inf_m, Unit::LENGTH)
+            ));
+        }
+        let kinds = self.kinds.as_ref()?;
+        if !kinds.is_mixed() {
+            let unit = if kinds.all_rotary() { Unit::ANGLE } else { Unit::LENGTH };
+            return Some(format!(
+                "Tracking error {}.",
+                self.course(|f| Some(f.tracking_inf_m), unit)
+            ));
+        }
+        let part = |rotary: bool| {
+            let unit = if rotary { Unit::ANGLE } else { Unit::LENGTH };
+            let unit = unit.for_size(largest(first, kinds, rotary).unwrap_or(0.0));
+            let of = |figures| largest(figures, kinds, rotary).unwrap_or(0.0);
+            let what = if rotary { "rotary" } else { "linear" };
+            let (before, after) = (of(first), of(last));
+            let less = less(before, after).map_or_else(String::new, |less| format!(" ({less})"));
+            format!("of the {what} axes from {} to {}{less}", unit.with(before), unit.with(after))
+        };
+        Some(format!("Tracking error {}, {} within {n} runs.", part(false), part(true)))
+    }
+
+    /// How a figure went from the first run to the last.
+    fn course(&self, of: impl Fn(&Figures) -> Option<f64>, unit: Unit) -> String {
+        let values: Vec<(u32, f64)> =
+            self.runs.iter().map(|(index, f)| (*index, of(f).unwrap_or(0.0))).collect();
+        let (before, after) = (values[0].1, values[values.len() - 1].1);
+        let unit = unit.for_size(before);
+        if values.len() == 1 {
+            return format!("{} at most in 1 run", unit.with(before));
+        }
+        let less = less(before, after).map_or_else(String::new, |less| format!(" ({less})"));
+        let (index, best) = values
+            .iter()
+            .copied()
+            .fold(values[0], |best, run| if run.1 < best.1 { run } else { best });
+        let aside = if best < BEST_SHARE * after {
+            format!("; best {} in run {index}", unit.with(best))
+        } else {
+            String::new()
+        };
+        format!(
+            "from {} to {}{less} within {} runs{aside}",
+            unit.with(before),
+            unit.with(after),
+            values.len()
+        )
+    }
+
+    /// Whether runs are compared by their contour error: where there is one from the first run on.
+    fn by_contour(&self) -> bool {
+        self.runs.iter().all(|(_, figures)| figures.contour_inf_m.is_some())
+            && self.runs.first().is_some_and(|(_, first)| first.contour_inf_m > Some(0.0))
+    }
+
+    fn compared(&self, figures: &Figures) -> f64 {
+        let contour_m = figures.contour_inf_m.filter(|_| self.by_contour());
+        contour_m.unwrap_or(figures.tracking_inf_m)
+    }
+
+    fn columns(&self) -> Vec<Column<'_>> {
+        let Some((_, first)) = self.runs.first() else { return Vec::new() };
+        let Some(kinds) = &self.kinds else { return Vec::new() };
+        let mut columns: Vec<Column<'_>> = Vec::new();
+        if kinds.is_mixed() {
+            for rotary in [false, true] {
+                let unit = if rotary { Unit::ANGLE } else { Unit::LENGTH };
+                columns.push(Column {
+                    name: "max tracking",
+                    unit: unit.for_size(largest(first, kinds, rotary).unwrap_or(0.0)),
+                    of: Box::new(move |figures| largest(figures, kinds, rotary)),
+                });
+            }
+        } else {
+            let unit = if kinds.all_rotary() { Unit::ANGLE } else { Unit::LENGTH };
+            let unit = unit.for_size(first.tracking_inf_m);
+            let max = Box::new(|figures: &Figures| Some(figures.tracking_inf_m));
+            let rms = Box::new(|figures: &Figures| Some(figures.tracking_rms_m));
+            columns.push(Column { name: "max tracking", unit, of: max });
+            columns.push(Column { name: "RMS tracking", unit, of: rms });
+        }
+        if let Some(contour_m) = first.contour_inf_m {
+            let unit = Unit::LENGTH.for_size(first.tracking_inf_m.max(contour_m));
+            let of = Box::new(|figures: &Figures| figures.contour_inf_m);
+            columns.push(Column { name: "max contour", unit, of });
+        }
+        columns
+    }
+}
+
+struct Column<'a> {
+    name: &'static str,
+    unit: Unit,
+    of: Box<dyn Fn(&Figures) -> Option<f64> + 'a>,
+}
+
+/// Two lines: a machine's console may have 80 columns.
+fn heading(columns: &[Column<'_>]) -> String {
+    let names: String = columns.iter().map(|column| format!("{:>14}", column.name)).collect();
+    let units: String =
+        columns.iter().map(|column| format!("{:>14}", column.unit.symbol)).collect();
+    format!(
+        "    {names}{:>11}{:>10}{:>10}\n run{units}{:>11}{:>10}{:>10}\n",
+        "", "", "learning", "change", "overruns", "ms"
+    )
+}
+
+/// Largest tracking error of the axes of a kind.
+fn largest(figures: &Figures, kinds: &AxisKinds, rotary: bool) -> Option<f64> {
+    let axes = kinds.of_kind(rotary);
+    axes.iter()
+        .map(|&axis| figures.axes_tracking_inf_m.get(axis).copied())
+        .reduce(|a, b| a.zip(b).map(|(a, b)| f64::max(a, b)))?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn runs(units: &[&str], figures: &[Figures]) -> (Runs, Vec<String>) {
+        let units: Vec<_> = units.iter().map(|unit| (*unit).to_owned()).collect();
+        let mut runs = Runs::default();
+        runs.begin(&units, units.len());
+        let rows = (0..).zip(figures).map(|(index, run)| runs.row(index, run)).collect();
+        (runs, rows)
+    }
+
+    fn tracked(tracking_inf_m: f64, contour_inf_m: Option<f64>) -> Figures {
+        Figures { tracking_inf_m, contour_inf_m, ..Figures::default() }
+    }
+
+    #[test]
+    fn a_path_without_a_contour_is_told_by_its_tracking_error() {
+        let (runs, rows) = runs(&["m"], &[tracked(2283e-6, None), tracked(134e-6, None)]);
+        assert!(!rows[0].contains("contour") && rows[0].contains("max tracking"), "{}", rows[0]);
+        assert!(rows[1].contains("-94.1 %"), "{}", rows[1]);
+        assert_eq!(
+            runs.sentence().unwrap(),
+            "Tracking error from 2283 um to 134 um (94.1 % less) within 2 runs."
+        );
+    }
+
+    #[test]
+    fn nothing_is_compared_with_nothing() {
+        let (at_zero, rows) =
+            runs(&["m", "m"], &[tracked(0.0, Some(0.0)), tracked(95e-6, Some(95e-6))]);
+        assert!(!rows[1].contains('%'), "{}", rows[1]);
+        assert_eq!(
+            at_zero.sentence().unwrap(),
+            "Tracking error from 0.00 um to 95.0 um within 2 runs."
+        );
+        let (alone, _) = runs(&["m"], &[tracked(1e-3, None)]);
+        assert_eq!(alone.sentence().unwrap(), "Tracking error 1000 um at most in 1 run.");
+        assert_eq!(Runs::default().sentence(), None);
+        let (far, rows) = runs(&["m"], &[tracked(1e-9, None), tracked(1e-3, None)]);
+        assert!(!rows[1].contains('%') && !far.sentence().unwrap().contains('%'));
+    }
+
+    #[test]
+    fn angles_have_units_of_their_own() {
+        let (turning, rows) = runs(&["rad", "rad/s"], &[tracked(0.025, None), tracked(1e-3, None)]);
+        assert!(rows[0].contains("mrad") && !rows[0].contains("um"), "{}", rows[0]);
+        assert_eq!(
+            turning.sentence().unwrap(),
+            "Tracking error from 25.0 mrad to 1.00 mrad (96.0 % less) within 2 runs."
+        );
+        let both = |linear_m, rotary| Figures {
+            axes_tracking_inf_m: vec![linear_m, rotary],
+            ..tracked(linear_m, None)
+        };
+        let (mixed, rows) = runs(&["m", "rad"], &[both(2e-3, 1e-3), both(1e-4, 5e-4)]);
+        assert!(rows[0].contains("um") && rows[0].contains("urad"), "{}", rows[0]);
+        assert_eq!(
+            mixed.sentence().unwrap(),
+            "Tracking error of the linear axes from 2000 um to 100 um (95.0 % less), of the rotary axes \
+             from 1000 urad to 500 urad (50.0 % less) within 2 runs."
+        );
+    }
+
+    #[test]
+    fn the_table_fits_a_console_and_tells_a_remark_once() {
+        let back = Figures { remark: Some("learning is off".into()), ..tracked(1e-3, Some(1e-4)) };
+        let (_, rows) = runs(&["m", "m"], &[back.clone(), back]);
+        assert!(rows.iter().flat_map(|row| row.lines()).all(|line| line.len() <= 80), "{rows:?}");
+        assert!(rows[0].ends_with("learning is off") && !rows[1].contains("learning is off"));
+    }
+}

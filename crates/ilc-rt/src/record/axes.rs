@@ -1,0 +1,102 @@
+//! What the axes of a record are measured in, and what may be compared: lengths with lengths, angles with
+//! angles.
+
+/// Range of a coordinate from which on an axis moves: below it there is rounding, and no machine.
+const MOVES_M: f64 = 1e-9;
+
+/// The kind of each axis: linear, in metres, or rotary, in radians.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AxisKinds {
+    rotary: Vec<bool>,
+}
+
+impl AxisKinds {
+    /// Reads the kinds from the units of the learned inputs; an axis without one is linear.
+    pub fn new(input_units: &[String], n_axes: usize) -> Self {
+        let unit = |axis: usize| input_units.get(axis).map_or("m", String::as_str);
+        Self { rotary: (0..n_axes).map(|axis| unit(axis).starts_with("rad")).collect() }
+    }
+
+    /// Number of axes.
+    pub fn n_axes(&self) -> usize {
+        self.rotary.len()
+    }
+
+    /// Whether every axis is rotary.
+    pub fn all_rotary(&self) -> bool {
+        !self.rotary.is_empty() && self.rotary.iter().all(|rotary| *rotary)
+    }
+
+    /// Whether there are linear and rotary axes side by side.
+    pub fn is_mixed(&self) -> bool {
+        self.rotary.contains(&true) && self.rotary.contains(&false)
+    }
+
+    /// Axes of this kind, in their order.
+    pub fn of_kind(&self, rotary: bool) -> Vec<usize> {
+        (0..self.n_axes()).filter(|&axis| self.rotary[axis] == rotary).collect()
+    }
+
+    /// The axes that one figure over several axes is made of: the linear ones, or all of a cell that has
+    /// only rotary ones.
+    pub fn comparable(&self) -> Vec<usize> {
+        self.of_kind(self.all_rotary())
+    }
+
+    /// Whether a path has a contour to leave: two linear axes or more move along it.
+    ///
+    /// Where one axis alone moves, what is across the path is the position of axes that stand still, and
+    /// what is left of the distance is rounding, or over-travel at an end.
+    ///
+    /// # Shapes
+    /// - `reference_m`: `n_samples * n_axes`, time first
+    pub fn has_contour(&self, reference_m: &[f64]) -> bool {
+        let moves = |axis: &usize| {
+            let column = || reference_m.iter().skip(*axis).step_by(self.n_axes().max(1));
+            let low = column().copied().fold(f64::INFINITY, f64::min);
+            let high = column().copied().fold(f64::NEG_INFINITY, f64::max);
+            high - low > MOVES_M
+        };
+        self.of_kind(false).iter().filter(|axis| moves(axis)).count() >= 2
+    }
+
+    /// Some axes of a signal, time first.
+    pub fn columns(&self, signal: &[f64], axes: &[usize]) -> Vec<f64> {
+        let rows = signal.chunks_exact(self.n_axes().max(1));
+        rows.flat_map(|row| axes.iter().map(|&axis| row[axis])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kinds(units: &[&str]) -> AxisKinds {
+        let units: Vec<_> = units.iter().map(|unit| (*unit).to_owned()).collect();
+        AxisKinds::new(&units, units.len())
+    }
+
+    #[test]
+    fn lengths_are_put_with_lengths() {
+        let mixed = kinds(&["m", "rad/s", "m/s"]);
+        assert!(mixed.is_mixed() && !mixed.all_rotary());
+        assert_eq!(mixed.comparable(), [0, 2]);
+        assert_eq!(mixed.columns(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], &[0, 2]), [1.0, 3.0, 4.0, 6.0]);
+        let turning = kinds(&["rad", "rad/s"]);
+        assert_eq!(turning.comparable(), [0, 1]);
+        assert!(!kinds(&["m", "m"]).is_mixed());
+    }
+
+    #[test]
+    fn a_contour_takes_two_linear_axes_that_move() {
+        let diagonal = [0.0, 0.0, 0.01, 0.02];
+        assert!(kinds(&["m", "m"]).has_contour(&diagonal));
+        assert!(!kinds(&["rad", "rad"]).has_contour(&diagonal));
+        assert!(!kinds(&["m", "rad"]).has_contour(&diagonal));
+        assert!(!kinds(&["m"]).has_contour(&[0.0, 0.01]));
+        // Rounding of a program in inches is no movement.
+        assert!(!kinds(&["m", "m"]).has_contour(&[0.0, 0.0, 0.01, 3e-17]));
+        let plane_and_turn = [0.0, 0.0, 0.0, 0.01, 0.02, 1.0];
+        assert!(kinds(&["m", "m", "rad"]).has_contour(&plane_and_turn));
+    }
+}

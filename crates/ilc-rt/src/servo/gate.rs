@@ -1,0 +1,212 @@
+//! The last gate before the bus: what leaves it is within the limits of its axis, whatever the sum of
+//! program and learned input asks for.
+//!
+//! A command that keeps the limits passes bit for bit. One that does not is followed as closely as the
+//! axis' own acceleration allows, and met again without a step. Limits of position are kept by braking
+//! ahead of them; an axis that stands outside is never pulled in by them, it is only kept from going
+//! farther out.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use crate::trajectory::AxisLimits;
+
+/// How much faster than the axis' own limit a command may change while it keeps all other limits.
+///
+/// The program keeps the acceleration limit. What is learned on top of it makes up for the lag of the
+/// drive, and so changes faster than the axis will ever move: that shall pass.
+const LEARNED_SHARE: f64 = 4.0;
+
+/// What a gate has to keep.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    pub(super) limits: AxisLimits,
+    pub(super) position_min_m: f64,
+    pub(super) position_max_m: f64,
+    pub(super) dt_s: f64,
+}
+
+impl Bounds {
+    /// Highest velocity from which an axis still comes to rest within `distance_m`, a cycle of moving
+    /// on included: `v T/2 + v^2/2a = d`.
+    fn braking_m_s(&self, distance_m: f64, acceleration_m_s2: f64) -> f64 {
+        let (half_s, distance_m) = (0.5 * self.dt_s, distance_m.max(0.0));
+        let root = half_s * half_s + 2.0 * distance_m / acceleration_m_s2;
+        (acceleration_m_s2 * (root.sqrt() - half_s)).max(0.0).min(distance_m / self.dt_s)
+    }
+}
+
+/// The gate of an axis.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Gate {
+    /// What was asked for last.
+    asked_m: f64,
+    /// Whether the command is not yet what is asked for.
+    behind: bool,
+}
+
+impl Gate {
+    /// Begins at a command that has been given.
+    pub(super) fn begin(&mut self, command_m: f64) {
+        *self = Self { asked_m: command_m, behind: false };
+    }
+
+    /// The position to command where `wanted_m` is asked for; `last` are the two commands before,
+    /// newest first. What is not a number stays so.
+    pub(super) fn position_m(&mut self, wanted_m: f64, last: [f64; 2], bounds: &Bounds) -> f64 {
+        if !wanted_m.is_finite() {
+            return wanted_m;
+        }
+        let (dt_s, own) = (bounds.dt_s, bounds.limits.acceleration_max_m_s2);
+        let at_m = last[0];
+        let before_m_s = (last[0] - last[1]) / dt_s;
+        let low_m = bounds.position_min_m.min(at_m);
+        let high_m = bounds.position_max_m.max(at_m);
+        let inside_m = wanted_m.max(low_m).min(high_m);
+        let cut = inside_m.to_bits() != wanted_m.to_bits();
+        let asked_m_s = if cut { 0.0 } else { (wanted_m - self.asked_m) / dt_s };
+        self.asked_m = wanted_m;
+
+        let top_m_s = bounds.limits.velocity_max_m_s;
+        let up_m_s = top_m_s.min(bounds.braking_m_s(high_m - at_m, own));
+        let down_m_s = -top_m_s.min(bounds.braking_m_s(at_m - low_m, own));
+        let wanted_m_s = (inside_m - at_m) / dt_s;
+        let catching_up = self.behind || cut;
+        let reach = if catching_up { own } else { LEARNED_SHARE * own } * dt_s;
+        // A count of rounding must not hold a command back that keeps the limits.
+        let slack = 1e-9 * top_m_s;
+        let free = wanted_m_s <= up_m_s + slack
+            && wanted_m_s >= down_m_s - slack
+            && (wanted_m_s - before_m_s).abs() <= reach + slack
+            // What is met must be met at its own speed, or the next cycle would step.
+            && (!catching_up || (wanted_m_s - asked_m_s).abs() <= reach + slack);
+        if free {
+            self.behind = cut;
+            return inside_m;
+        }
+        self.behind = true;
+        // Half of the acceleration closes the gap; the other half is for what is asked to accelerate.
+        let gap_m = inside_m - at_m - asked_m_s * dt_s;
+        let closing_m_s = bounds.braking_m_s(gap_m.abs(), 0.5 * own).copysign(gap_m);
+        let next_m_s = (asked_m_s + closing_m_s)
+            .min(before_m_s + own * dt_s)
+            .max(before_m_s - own * dt_s)
+            .min(up_m_s.max(before_m_s - own * dt_s))
+            .max(down_m_s.min(before_m_s + own * dt_s))
+            .min(top_m_s)
+            .max(-top_m_s);
+        (at_m + next_m_s * dt_s).max(low_m).min(high_m)
+    }
+
+    /// The velocity to command where `wanted_m_s` is asked for of an axis that is at `at_m`.
+    pub(super) fn velocity_m_s(wanted_m_s: f64, last_m_s: f64, at_m: f64, bounds: &Bounds) -> f64 {
+        if !wanted_m_s.is_finite() {
+            return wanted_m_s;
+        }
+        let (top_m_s, own) = (bounds.limits.velocity_max_m_s, bounds.limits.acceleration_max_m_s2);
+        let up_m_s = top_m_s.min(bounds.braking_m_s(bounds.position_max_m - at_m, own));
+        let down_m_s = -top_m_s.min(bounds.braking_m_s(at_m - bounds.position_min_m, own));
+        let reach = LEARNED_SHARE * own * bounds.dt_s;
+        wanted_m_s.min(up_m_s).max(down_m_s).min(last_m_s + reach).max(last_m_s - reach)
+    }
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    reason = "tests are cold"
+)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+
+    const BOUNDS: Bounds = Bounds {
+        limits: AxisLimits {
+            velocity_max_m_s: 0.5,
+            acceleration_max_m_s2: 8.0,
+            jerk_max_m_s3: 1000.0,
+        },
+        position_min_m: -0.02,
+        position_max_m: 0.08,
+        dt_s: 0.002,
+    };
+
+    /// The commands where `wanted_m` is asked for from a rest at `start_m`.
+    fn commands(start_m: f64, n: usize, wanted_m: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut gate = Gate::default();
+        gate.begin(start_m);
+        let mut out = vec![start_m; 2];
+        for k in 0..n {
+            let last = [out[k + 1], out[k]];
+            out.push(gate.position_m(wanted_m(k as f64 * BOUNDS.dt_s), last, &BOUNDS));
+        }
+        out
+    }
+
+    fn largest_acceleration(commands: &[f64]) -> f64 {
+        let second = |w: &[f64]| (w[2] - 2.0 * w[1] + w[0]).abs() / (BOUNDS.dt_s * BOUNDS.dt_s);
+        commands.windows(3).map(second).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn what_keeps_the_limits_passes_bit_for_bit() {
+        let wanted = |t: f64| 0.03 + 0.02 * (1.0 - (TAU * 2.0 * t).cos());
+        for (k, command) in commands(0.03, 2000, wanted)[2..].iter().enumerate() {
+            assert_eq!(command.to_bits(), wanted(k as f64 * BOUNDS.dt_s).to_bits());
+        }
+    }
+
+    #[test]
+    fn a_limit_is_kept_by_braking_ahead_of_it_and_left_without_a_step() {
+        for (amplitude_m, frequency_hz) in [(0.03, 0.5), (0.1, 1.0), (0.2, 2.0), (0.0215, 3.0)] {
+            let wanted = |t: f64| 0.06 + amplitude_m * t.min(1.0) * (TAU * frequency_hz * t).sin();
+            let out = commands(0.06, 5000, wanted);
+            assert!(out.iter().all(|m| (-0.02..=0.08).contains(m)));
+            let most = largest_acceleration(&out);
+            assert!(most <= 1.15 * 8.0, "{amplitude_m} {frequency_hz}: {most} m/s2");
+        }
+    }
+
+    #[test]
+    fn a_step_becomes_a_move_that_does_not_overshoot() {
+        let out = commands(0.0, 400, |t| if t < 0.005 { 0.0 } else { 0.05 });
+        assert!(largest_acceleration(&out) <= 8.0 + 1e-6);
+        assert!(out.iter().all(|m| *m <= 0.05));
+        assert_eq!(out[401].to_bits(), 0.05_f64.to_bits());
+    }
+
+    #[test]
+    fn what_stands_outside_is_not_pulled_in_and_goes_no_farther() {
+        for (start_m, farther_m) in [(0.15, 0.2), (-0.3, -0.5)] {
+            assert!(commands(start_m, 50, |_| start_m).iter().all(|m| *m == start_m));
+            assert!(commands(start_m, 50, |_| farther_m).iter().all(|m| *m == start_m));
+            let back = commands(start_m, 900, |t| start_m * (1.0 - 0.1 * t * t));
+            assert!(largest_acceleration(&back) <= 8.0 && back[901] != start_m);
+        }
+    }
+
+    #[test]
+    fn a_velocity_is_bounded_and_does_not_carry_the_axis_beyond_its_limits() {
+        let top = |wanted, last, at| Gate::velocity_m_s(wanted, last, at, &BOUNDS);
+        assert_eq!(top(0.3, 0.29, 0.0).to_bits(), 0.3_f64.to_bits());
+        assert!((top(9.0, 0.49, 0.0) - 0.5).abs() < 1e-12);
+        assert!((top(0.5, 0.0, 0.0) - LEARNED_SHARE * 8.0 * 0.002).abs() < 1e-12);
+        assert!(top(0.1, 0.1, 0.08) < 0.1 - 0.05 && top(0.01, 0.0, 0.081) == 0.0);
+        assert!(top(-0.01, 0.0, 0.081) == -0.01, "back is free");
+        let (mut at, mut last) = (0.0, 0.0);
+        for _ in 0..2000 {
+            last = top(0.5, last, at);
+            at += last * BOUNDS.dt_s;
+        }
+        assert!(at <= 0.08 + 1e-9 && at > 0.0799, "{at}");
+    }
+
+    #[test]
+    fn what_is_no_number_stays_so() {
+        let mut gate = Gate::default();
+        assert!(gate.position_m(f64::NAN, [0.0; 2], &BOUNDS).is_nan());
+        assert!(Gate::velocity_m_s(f64::NAN, 0.0, 0.0, &BOUNDS).is_nan());
+    }
+}

@@ -1,0 +1,96 @@
+//! Silence: each PDO of each node is waited for, and named when it stays away.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::cycle::Cycle;
+use super::mailbox::StopReason;
+use super::phase::Phase;
+use super::slots::Part;
+use super::spec::Pace;
+use crate::fieldbus::cia402::Mode;
+
+/// Cycles that a position may be old when a velocity is computed from it in a run that counts.
+const OLD_CYCLES: u64 = 2;
+
+impl Cycle {
+    /// The first part that has been silent for too long, each one told once.
+    pub(super) fn find_silence(&mut self) -> Option<StopReason> {
+        // Paced by answers, the wait is over when this is asked: one unanswered SYNC is silence.
+        let most = match self.spec.pace {
+            Pace::Answers(_) => 0,
+            Pace::Clock => u64::from(self.spec.silent_cycles_max),
+        };
+        let mut found = None;
+        for axis in 0..self.n_axes() {
+            for part in [Part::Status(axis), Part::Extra(axis)] {
+                let silence = self.slots.silence(part);
+                if silence <= most || self.slots.is_given_up(part) {
+                    continue;
+                }
+                found = found.or(Some(self.silent_part(axis, part, silence)));
+                self.slots.give_up(part);
+                if part == Part::Status(axis) {
+                    // Its state is not known any more, so that it can only be told to stop.
+                    self.drives[axis].lost = true;
+                }
+            }
+        }
+        let silence = self.slots.silence(Part::Tool);
+        if let Some(tool) = self.spec.tool
+            && silence > most
+            && !self.slots.is_given_up(Part::Tool)
+        {
+            self.slots.give_up(Part::Tool);
+            let reason = match self.tool_unreadable {
+                Some(n_bytes) => StopReason::WrongLength { node: tool.node.get(), pdo: 1, n_bytes },
+                None => StopReason::SilentTool { cycles: saturate(silence) },
+            };
+            found = found.or(Some(reason));
+        }
+        found
+    }
+
+    /// Why a part of an axis stays away, as far as that can be told.
+    fn silent_part(&self, axis: usize, part: Part, silence: u64) -> StopReason {
+        let (pdo, other) = match part {
+            Part::Extra(_) => (2, Part::Status(axis)),
+            Part::Status(_) | Part::Tool => (1, Part::Extra(axis)),
+        };
+        if let Some(n_bytes) = self.drives[axis].unreadable[usize::from(pdo - 1)] {
+            let node = self.spec.axes[axis].node.get();
+            return StopReason::WrongLength { node, pdo, n_bytes };
+        }
+        // Both fall silent together if the node does; a cycle between them is chance.
+        if 2 * self.slots.silence(other) > silence {
+            return self.silent_axis(axis, silence);
+        }
+        StopReason::SilentPdo { axis, pdo, cycles: saturate(silence) }
+    }
+
+    pub(super) fn silent_axis(&self, axis: usize, silence: u64) -> StopReason {
+        match self.drives[axis].unreadable[0] {
+            Some(n_bytes) => {
+                StopReason::WrongLength { node: self.spec.axes[axis].node.get(), pdo: 1, n_bytes }
+            }
+            None => StopReason::SilentAxis { axis, cycles: saturate(silence) },
+        }
+    }
+
+    /// Notes whether this cycle of a run is commanded on a position that is too old.
+    pub(super) fn watch_age(&mut self) {
+        if !matches!(self.phase, Phase::Running { .. }) {
+            return;
+        }
+        let is_old = (0..self.n_axes()).any(|axis| {
+            self.spec.axes[axis].mode == Mode::Csv
+                && self.slots.lag(Part::Status(axis)) > OLD_CYCLES
+        });
+        if is_old {
+            self.slots.spoil_next();
+        }
+    }
+}
+
+pub(super) fn saturate(cycles: u64) -> u32 {
+    u32::try_from(cycles).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,67 @@
+//! How a stop begins: every axis to rest from what it was commanded, whatever has failed.
+//!
+//! A stop is open loop in both modes. Its set points start from the last commands, learned input
+//! included, so that nothing steps; and no measurement takes part in it, so that one that froze, is
+//! late or is false can neither drive the axis on nor hold it back. Only then are the drives told to
+//! let go.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::cycle::Cycle;
+use super::mailbox::{Message, StopReason};
+use super::phase::Phase;
+use crate::fieldbus::cia402::Mode;
+use crate::trajectory::{ControlledStop, MAX_AXES};
+
+impl Cycle {
+    /// Begins a controlled stop of all axes, unless one is under way or nothing moves any more.
+    pub(super) fn begin_stop(&mut self, reason: StopReason) {
+        if let Some(reason) = self.better_reason(reason) {
+            self.stopping = Some(reason);
+            self.mail.tell(Message::Stopping(reason));
+            return;
+        }
+        if self.stopping.is_some() || matches!(self.phase, Phase::Disabling { .. } | Phase::Stopped)
+        {
+            return;
+        }
+        self.stopping = Some(reason);
+        self.mail.tell(Message::Stopping(reason));
+        if let Some(axis) = reason.distrusted() {
+            self.drives[axis.min(MAX_AXES - 1)].distrusted = true;
+        }
+        if matches!(self.phase, Phase::Enabling { .. }) {
+            self.phase = Phase::Disabling { ticks: 0 };
+            return;
+        }
+        let dt_s = self.spec.cycle.as_secs_f64();
+        let [newest, middle, oldest] = self.commanded;
+        let mut position_m = self.reference.position_m;
+        let mut velocity_m_s = [0.0; MAX_AXES];
+        let mut acceleration_m_s2 = [0.0; MAX_AXES];
+        for axis in 0..self.n_axes() {
+            match self.spec.axes[axis].mode {
+                Mode::Csp => {
+                    position_m[axis] = newest[axis];
+                    velocity_m_s[axis] = (newest[axis] - middle[axis]) / dt_s;
+                    acceleration_m_s2[axis] =
+                        (newest[axis] - 2.0 * middle[axis] + oldest[axis]) / (dt_s * dt_s);
+                }
+                Mode::Csv => {
+                    velocity_m_s[axis] = newest[axis];
+                    acceleration_m_s2[axis] = (newest[axis] - middle[axis]) / dt_s;
+                }
+            }
+        }
+        // It is part of the last commands, from which the stop goes on.
+        self.input.absorb();
+        let stop = ControlledStop::new(
+            &position_m,
+            &velocity_m_s,
+            &acceleration_m_s2,
+            self.n_axes(),
+            &self.limits,
+        );
+        self.phase = Phase::Stopping { stop, rest_ticks: 0 };
+    }
+}

@@ -1,0 +1,53 @@
+//! Another master on the bus: what this controller alone may send, seen coming from somebody else.
+//!
+//! No transport hands a sender its own frames, so each of these that is received was sent by another.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+use super::cycle::Cycle;
+use super::mailbox::{StopReason, Stranger};
+use crate::fieldbus::Frame;
+use crate::fieldbus::canopen::{NmtCommand, NodeId, cob_id, sync};
+
+/// Bases of the identifiers of the four receive PDOs.
+const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
+
+impl Cycle {
+    /// What a frame tells of another master, if it does. Traffic with nodes that are not of this cell is
+    /// no business of this controller.
+    pub(super) fn stranger(&self, frame: &Frame) -> Option<Stranger> {
+        if sync::is_sync(frame) {
+            return Some(Stranger::Sync);
+        }
+        if let Some((command, node)) = NmtCommand::decode(frame) {
+            return node
+                .is_none_or(|node| self.is_ours(node))
+                .then_some(Stranger::Nmt(command, node));
+        }
+        let to = |base| cob_id::node_of(base, frame.id()).filter(|node| self.is_ours(*node));
+        if let Some(node) = to(cob_id::SDO_REQUEST) {
+            return Some(Stranger::Request(node));
+        }
+        RPDOS.iter().find_map(|base| to(*base)).map(Stranger::Command)
+    }
+
+    /// What a stop was for, when something that comes in it says why: a drive that was silent tells
+    /// that it was stopped or restarted, or a command to it is seen.
+    pub(super) fn better_reason(&self, later: StopReason) -> Option<StopReason> {
+        let silent: NodeId = match self.stopping? {
+            StopReason::SilentAxis { axis, .. } => self.spec.axes.get(axis)?.node,
+            StopReason::SilentTool { .. } => self.spec.tool?.node,
+            _ => return None,
+        };
+        let is_why = match later {
+            StopReason::NodeLeft { node } | StopReason::NodeStopped { node, .. } => {
+                node == silent.get()
+            }
+            StopReason::OtherMaster(Stranger::Nmt(_, node)) => {
+                node.is_none_or(|node| node == silent)
+            }
+            _ => false,
+        };
+        is_why.then_some(later)
+    }
+}

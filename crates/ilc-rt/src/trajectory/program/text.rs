@@ -1,0 +1,59 @@
+//! What the files of programs have in common: how they are encoded, and how a piece is shown.
+
+/// Most characters of the text that a refusal shows.
+const SHOWN_MAX: usize = 40;
+
+/// The text behind a byte order mark of UTF-8, which editors and spreadsheets put in front.
+///
+/// # Errors
+/// What is wrong, for a text in UTF-16 or UTF-32.
+pub(super) fn without_mark(text: &[u8]) -> Result<&[u8], &'static str> {
+    if text.starts_with(&[0xff, 0xfe]) || text.starts_with(&[0xfe, 0xff]) {
+        return Err("the text is in UTF-16: save it in UTF-8 or plain ASCII");
+    }
+    // UTF-16 without a mark: every other byte of plain text is 0.
+    if text.len() > 3
+        && (text[..4] == [text[0], 0, text[2], 0] || text[..4] == [0, text[1], 0, text[3]])
+    {
+        return Err("the text is in UTF-16: save it in UTF-8 or plain ASCII");
+    }
+    Ok(text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text))
+}
+
+/// A piece of the text in one line and without control characters, as an error shows it.
+pub(super) fn shown(text: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&text[..text.len().min(8 * SHOWN_MAX)]);
+    let mut shown = String::new();
+    let mut characters = text.trim().chars();
+    for character in characters.by_ref().take(SHOWN_MAX) {
+        match character {
+            '\'' | '"' | '\\' => shown.push(character),
+            _ => shown.extend(character.escape_debug()),
+        }
+    }
+    if characters.next().is_some() {
+        shown.push('…');
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_are_passed_over_and_other_encodings_named() {
+        assert_eq!(without_mark(b"\xef\xbb\xbfG1"), Ok(&b"G1"[..]));
+        assert_eq!(without_mark(b"G1"), Ok(&b"G1"[..]));
+        for text in [&b"\xff\xfeG\0"[..], b"\xfe\xff\0G", b"G\x001\0", b"\0G\x001"] {
+            assert!(without_mark(text).unwrap_err().contains("UTF-16"), "{text:?}");
+        }
+        assert!(without_mark(b"").is_ok() && without_mark(b"\0").is_ok());
+    }
+
+    #[test]
+    fn what_is_shown_is_short_and_has_no_control_characters() {
+        assert_eq!(shown(b" X\x1b[31m\r\n\xff "), "X\\u{1b}[31m\\r\\n\u{fffd}");
+        assert_eq!(shown(&[b'9'; 5000]).chars().count(), SHOWN_MAX + 1);
+    }
+}

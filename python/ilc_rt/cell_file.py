@@ -1,0 +1,126 @@
+"""Changes of a cell description that leave everything else in it as it was written."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable, Item
+
+from ilc_rt._native import Cell
+from ilc_rt.errors import BadInputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+BOM = "\ufeff"
+
+
+def write_values(path: str | Path, tables: Mapping[str, Mapping[str, float]]) -> bool:
+    """Put numbers into tables of a cell description, in one step.
+
+    Comments, order and spelling of everything else stay. The file is replaced
+    only by one that the controller accepts.
+
+    Parameters
+    ----------
+    path : path
+        The cell description.
+    tables : mapping
+        The numbers by key, by table, as ``learning.norm_optimal``; a table that
+        is not there is made.
+
+    Returns
+    -------
+    bool
+        Whether anything changed.
+
+    Raises
+    ------
+    BadInputError
+        If the file cannot be read or written, or would not be accepted.
+    """
+    # A link stays a link: what it points to is replaced.
+    place = Path(path).resolve()
+    try:
+        text = place.read_bytes().decode("utf-8")
+    except OSError as error:
+        message = f"{path}: {error.strerror}"
+        raise BadInputError(message) from error
+    except UnicodeDecodeError as error:
+        message = f"{path}: not UTF-8 at byte {error.start}"
+        raise BadInputError(message) from error
+    mark, text = (BOM, text[1:]) if text.startswith(BOM) else ("", text)
+    changed = text
+    for section, values in tables.items():
+        changed = changed_text(changed, section, values, str(path))
+    changed = mark + changed
+    if changed == mark + text:
+        return False
+    _replace(place, changed, str(path))
+    return True
+
+
+def changed_text(text: str, section: str, values: Mapping[str, float], name: str) -> str:
+    """Return a TOML text with numbers put into a table.
+
+    Raises
+    ------
+    BadInputError
+        If the text is not TOML, or something else has the table's name.
+    """
+    try:
+        document = tomlkit.parse(text)
+        table: Any = document
+        for part in section.split("."):
+            if part not in table:
+                table[part] = (
+                    tomlkit.inline_table() if isinstance(table, InlineTable) else tomlkit.table()
+                )
+            table = table[part]
+            if not hasattr(table, "items"):
+                message = f"{name}: {section}: {part} is not a table"
+                raise BadInputError(message)
+        for key, value in values.items():
+            if key in table and _is_equal(table[key], value):
+                continue
+            table[key] = float(value)
+        return tomlkit.dumps(document)
+    except TOMLKitError as error:
+        message = f"{name}: {' '.join(str(error).split())}"
+        raise BadInputError(message) from error
+
+
+def _is_equal(found: object, value: float) -> bool:
+    plain = found.unwrap() if isinstance(found, Item) else found
+    return isinstance(plain, (int, float)) and float(plain) == float(value)
+
+
+def _replace(place: Path, text: str, name: str) -> None:
+    """Replace a file by one that the controller accepts, or leave it."""
+    draft: str | None = None
+    try:
+        # In the same folder: what it names lies beside it, and a move within one is one step.
+        handle, draft = tempfile.mkstemp(prefix=f".{place.stem}-", suffix=".toml", dir=place.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(text.encode("utf-8"))
+            file.flush()
+            os.fsync(file.fileno())
+        Path(draft).chmod(place.stat().st_mode & 0o7777)
+        Cell.load(draft, allow_divergent=True)
+        Path(draft).replace(place)
+        draft = None
+    except OSError as error:
+        message = f"{name}: cannot be written: {error.strerror}"
+        raise BadInputError(message) from error
+    except ValueError as error:
+        told = " ".join(str(error).split()).replace(str(draft), name)
+        message = f"{name}: left as it was: {told}"
+        raise BadInputError(message) from error
+    finally:
+        if draft is not None:
+            Path(draft).unlink(missing_ok=True)

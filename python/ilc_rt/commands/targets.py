@@ -1,0 +1,122 @@
+"""Where figures and reports go: looked at before anything moves, written when all is over."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path  # noqa: TC003 - typer reads it
+
+import typer
+
+from ilc_rt.errors import BadInputError
+from ilc_rt.result import STANDARD_OUTPUT
+from ilc_rt.text import printable
+
+
+def json_target(context: typer.Context, path: Path | None) -> Path | None:
+    """Look at what ``--json`` names before anything moves.
+
+    Where the figures go to standard output, whatever else the verb prints
+    goes to standard error.
+
+    Raises
+    ------
+    BadInputError
+        If it cannot be written.
+    """
+    if path is None or context.resilient_parsing:
+        return path
+    if path == STANDARD_OUTPUT:
+        context.with_resource(redirect_stdout(sys.stderr))
+    else:
+        check_file("--json", path)
+    return path
+
+
+def report_target(context: typer.Context, path: Path | None) -> Path | None:
+    """Look at what ``--report`` names before anything moves.
+
+    Raises
+    ------
+    BadInputError
+        If it cannot be written.
+    """
+    if path is not None and not context.resilient_parsing:
+        check_report("--report", path)
+    return path
+
+
+def check_file(option: str, path: Path) -> None:
+    """Refuse a file that cannot be written; it stays as it is, or away.
+
+    Raises
+    ------
+    BadInputError
+        With the option, the file and the reason.
+    """
+    is_new = not path.exists()
+    if not is_new and not path.is_file() and not path.is_dir():
+        return  # a device or a pipe: to open it now would be to use it
+    try:
+        with path.open("a"):
+            pass
+        if is_new:
+            path.unlink()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        message = (
+            f"{option} {path}: cannot be written: {reason}; allowed: a file in a folder that exists"
+        )
+        raise BadInputError(message) from error
+
+
+def check_report(option: str, path: Path) -> None:
+    """Refuse a report's file or folder that could not be written at the end.
+
+    A folder need not be there, but the one that it is made in must be.
+
+    Raises
+    ------
+    BadInputError
+        With the option, the path and the reason.
+    """
+    if path.is_dir():
+        folder = path
+    elif path.suffix:
+        check_file(option, path)
+        return
+    elif path.exists():
+        message = f"{option} {path}: is a file; a folder or a .html file is needed"
+        raise BadInputError(message)
+    else:
+        folder = path.absolute().parent
+    if not folder.is_dir():
+        message = f"{option} {path}: no such folder: {folder}"
+        raise BadInputError(message)
+    probe = folder / ".ilc-probe"
+    try:
+        probe.touch()
+        probe.unlink()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        message = f"{option} {path}: cannot be written: {reason}"
+        raise BadInputError(message) from error
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder that is not there, and say so.
+
+    Raises
+    ------
+    BadInputError
+        If it cannot be made.
+    """
+    if folder.is_dir():
+        return
+    try:
+        folder.mkdir()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        message = f"{folder}: cannot be made: {reason}"
+        raise BadInputError(message) from error
+    typer.echo(f"folder:  {printable(folder)} is new")

@@ -1,0 +1,194 @@
+"""What is shown of the runs of a campaign, and by which error they are compared.
+
+Runs are compared by their contour error where their path has one, else by
+their tracking error. Lengths and angles are never put into one figure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ilc_rt.quantity import Unit, in_words, unit_for
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ilc_rt.record import IterationRecord
+
+    Figure = Callable[[IterationRecord], "float | None"]
+
+# The best run is worth a word if it is this much better than the last.
+BEST_SHARE = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """An error of every run, and the unit it is shown in."""
+
+    name: str
+    unit: Unit
+    of: Figure
+
+    @property
+    def heading(self) -> str:
+        """What stands above it: ``"max tracking µm"``."""
+        return f"{self.name} {self.unit.symbol}"
+
+    def cell(self, record: IterationRecord) -> str:
+        """Return the number of a run."""
+        return self.unit.number(self.of(record))
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """The errors of a campaign's runs.
+
+    Attributes
+    ----------
+    records : sequence of IterationRecord
+        The runs in their order, at least one.
+    units : sequence of str
+        What each axis is measured in, ``"m"`` or ``"rad"``; all linear if empty.
+    """
+
+    records: Sequence[IterationRecord]
+    units: Sequence[str] = ()
+
+    @property
+    def first(self) -> IterationRecord:
+        """The run that the others are compared with."""
+        return self.records[0]
+
+    @property
+    def is_mixed(self) -> bool:
+        """Whether there are linear and rotary axes side by side."""
+        return len(set(self.units)) > 1
+
+    @property
+    def by_contour(self) -> bool:
+        """Whether the runs are compared by their contour error."""
+        there = all(record.contour_inf_m is not None for record in self.records)
+        return there and (self.first.contour_inf_m or 0.0) > 0.0
+
+    def compared(self, record: IterationRecord) -> float:
+        """Return the error by which a run is compared."""
+        contour_m = record.contour_inf_m if self.by_contour else None
+        return record.tracking_inf_m if contour_m is None else contour_m
+
+    def errors(self, *, rms: bool = True) -> list[Column]:
+        """Return the errors that are shown of every run.
+
+        Parameters
+        ----------
+        rms : bool
+            Whether root mean squares are among them.
+        """
+        columns = self.tracking(rms=rms)
+        first = self.first
+        if first.contour_inf_m is not None:
+            unit = unit_for("m", max(first.contour_inf_m, first.tracking_inf_m))
+            columns.append(Column("max contour", unit, lambda record: record.contour_inf_m))
+            if rms:
+                columns.append(Column("RMS contour", unit, lambda record: record.contour_rms_m))
+        return columns
+
+    def tracking(self, *, rms: bool = True) -> list[Column]:
+        """Return the tracking errors that are shown: of linear and rotary axes apart."""
+        if not self.is_mixed:
+            base = self.units[0] if self.units else "m"
+            unit = unit_for(base, self.first.tracking_inf_m)
+            columns = [Column("max tracking", unit, lambda record: record.tracking_inf_m)]
+            if rms:
+                columns.append(Column("RMS tracking", unit, lambda record: record.tracking_rms_m))
+            return columns
+        columns = []
+        for base in ("m", "rad"):
+            axes = [axis for axis, unit in enumerate(self.units) if unit == base]
+            unit = unit_for(base, largest(self.first.axes_tracking_inf_m, axes))
+            columns.append(Column("max tracking", unit, _largest_of(axes)))
+            if rms:
+                columns.append(Column("RMS tracking", unit, _rms_of(axes)))
+        return columns
+
+    def sentence(self) -> str:
+        """Say in one plain sentence what was learned."""
+        if self.by_contour:
+            unit = unit_for("m", self.first.contour_inf_m)
+            return f"Contour error {self._course(Column('', unit, self.compared))}."
+        if not self.is_mixed:
+            return f"Tracking error {self._course(self.tracking(rms=False)[0])}."
+        parts = []
+        for what, column in zip(("linear", "rotary"), self.tracking(rms=False), strict=True):
+            before, after = column.of(self.records[0]), column.of(self.records[-1])
+            said = in_words(before, after)
+            parts.append(
+                f"of the {what} axes from {column.unit.text(before)} to {column.unit.text(after)}"
+                + (f" ({said})" if said else "")
+            )
+        return f"Tracking error {', '.join(parts)} within {self._count()}."
+
+    def remarks(self) -> list[str]:
+        """Return what decided on the next input where it was not learning alone, a line each.
+
+        What is remarked on one run after the other stands once.
+        """
+        before: str | None = None
+        lines = []
+        for record in self.records:
+            remark = remark_on(record)
+            if remark and remark != before:
+                lines.append(f"run {record.index}: {remark}")
+            before = remark
+        return lines
+
+    def _course(self, column: Column) -> str:
+        errors = [column.of(record) or 0.0 for record in self.records]
+        before, after, unit = errors[0], errors[-1], column.unit
+        if len(errors) == 1:
+            return f"{unit.text(before)} at most in 1 run"
+        said = in_words(before, after)
+        best = min(errors)
+        index = self.records[errors.index(best)].index
+        aside = f"; best {unit.text(best)} in run {index}" if best < BEST_SHARE * after else ""
+        change = f" ({said})" if said else ""
+        course = f"from {unit.text(before)} to {unit.text(after)}{change}"
+        return f"{course} within {self._count()}{aside}"
+
+    def _count(self) -> str:
+        return f"{len(self.records)} run{'' if len(self.records) == 1 else 's'}"
+
+
+def remark_on(record: IterationRecord) -> str | None:
+    """Return what decided on the input after a run, if it was not learning alone."""
+    if record.remark:
+        return record.remark
+    # Kept by a version that did not say why.
+    return "the error grew: the best input is restored" if record.rolled_back else None
+
+
+def note(record: IterationRecord) -> str:
+    """Return what became of a run in a few words, for a column of a table."""
+    said = ("rolled back", record.rolled_back), ("learning off", record.learning_off)
+    return ", ".join(words for words, holds in said if holds)
+
+
+def largest(figures: Sequence[float], axes: Sequence[int]) -> float | None:
+    """Return the largest figure of some axes; None if one of them has none."""
+    if not axes or max(axes) >= len(figures):
+        return None
+    return max(figures[axis] for axis in axes)
+
+
+def _largest_of(axes: Sequence[int]) -> Figure:
+    return lambda record: largest(record.axes_tracking_inf_m, axes)
+
+
+def _rms_of(axes: Sequence[int]) -> Figure:
+    def rms(record: IterationRecord) -> float | None:
+        figures = record.axes_tracking_rms_m
+        if max(axes) >= len(figures):
+            return None
+        return float(sum(figures[axis] ** 2 for axis in axes) ** 0.5)
+
+    return rms

@@ -1,0 +1,132 @@
+"""Numbers for people: three digits, a unit with a sensible prefix, a change in percent."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+# Change beyond which a percentage says nothing any more.
+CHANGE_MAX_PERCENT = 1e4
+PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit to show a quantity in that is kept in metres or radians.
+
+    Attributes
+    ----------
+    symbol : str
+        As it is written, ``"µm"``.
+    base : str
+        What it is a part of, ``"m"``.
+    scale : float
+        How many of it make one metre or radian.
+
+    Examples
+    --------
+    >>> unit_for("m", 2.283e-3).text(134e-6)
+    '134 µm'
+    """
+
+    symbol: str
+    base: str
+    scale: float
+
+    def number(self, value: float | None) -> str:
+        """Return a quantity as a number in this unit; ``-`` if there is none."""
+        return "-" if value is None else digits(value * self.scale)
+
+    def text(self, value: float | None) -> str:
+        """Return a quantity with its unit; ``-`` if there is none."""
+        return "-" if value is None else f"{self.number(value)} {self.symbol}"
+
+
+def unit_for(base: str, size: float | None) -> Unit:
+    """Return the unit that suits a quantity of this size.
+
+    Parameters
+    ----------
+    base : str
+        What it is kept in: ``"m"``, ``"rad"``, ``"m/s"`` or ``"rad/s"``.
+    size : float or None
+        Its size, or that of the first of a row of them.
+
+    Examples
+    --------
+    >>> unit_for("m", 1e-3).symbol, unit_for("rad", 0.02).symbol, unit_for("m", 4e-8).symbol
+    ('µm', 'mrad', 'nm')
+    """
+    largest = abs(size) if size is not None and math.isfinite(size) else 0.0
+    if largest >= 1e-2:
+        scale, prefix = PREFIXES[0]
+    elif 0.0 < largest < 1e-7:
+        scale, prefix = PREFIXES[2]
+    else:
+        scale, prefix = PREFIXES[1]
+    return Unit(prefix + base, base, scale)
+
+
+def digits(value: float) -> str:
+    """Return a number with three significant digits, without an exponent where possible.
+
+    Examples
+    --------
+    >>> digits(1234.56), digits(4.5678), digits(0.0), digits(float("nan"))
+    ('1235', '4.57', '0.00', '-')
+    """
+    size = abs(value)
+    if not math.isfinite(size):
+        return "-"
+    if size >= 1e9:
+        return f"{value:.2e}"
+    if size >= 100.0:
+        return f"{value:.0f}"
+    if size >= 10.0:
+        return f"{value:.1f}"
+    if size >= 1.0 or size < 5e-5:
+        return f"{value:.2f}"
+    return f"{value:.3f}" if size >= 0.1 else f"{value:.4f}"
+
+
+def percent(before: float | None, after: float | None) -> float | None:
+    """Return a change in percent; None where no percentage tells it.
+
+    Examples
+    --------
+    >>> percent(200.0, 50.0), percent(0.0, 1.0), percent(1e-20, 1.0)
+    (-75.0, None, None)
+    """
+    if before is None or after is None or not before > 0.0:
+        return None
+    change = (after / before - 1.0) * 100.0
+    return change if abs(change) <= CHANGE_MAX_PERCENT else None
+
+
+def signed(before: float | None, after: float | None) -> str:
+    """Return a change with its sign, ``""`` where there is none to tell.
+
+    Examples
+    --------
+    >>> signed(200.0, 50.0), signed(1.0, 3.0), signed(0.0, 3.0)
+    ('-75.0 %', '+200.0 %', '')
+    """
+    change = percent(before, after)
+    if change is None:
+        return ""
+    text = f"{change:+.1f} %"
+    return "0.0 %" if text[1:] == "0.0 %" else text
+
+
+def in_words(before: float | None, after: float | None) -> str:
+    """Return a change in words, ``""`` where there is none to tell.
+
+    Examples
+    --------
+    >>> in_words(200.0, 50.0), in_words(1.0, 3.0)
+    ('75.0 % less', '200.0 % more')
+    """
+    change = percent(before, after)
+    if change is None:
+        return ""
+    return f"{abs(change):.1f} % {'more' if change > 0.0 else 'less'}"

@@ -1,0 +1,479 @@
+"""Weights of norm-optimal learning for a cell, chosen by trials on what its axes might be."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ilc_rt._native import Cell
+from ilc_rt.cell_file import write_values
+from ilc_rt.errors import BadInputError
+from ilc_rt.trials import KNOWN_SHARE, BelievedAxis, Bench, Trial, Weights, believed_axes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    _Found = tuple[float, Weights, list[Trial]]
+
+TUNED_LAWS = ("norm_optimal", "constrained")
+UNCERTAINTY = 0.3
+"""How far the axes may be from their model if nobody says: what friction leaves of a good fit."""
+GROWTH_MAX = 1.2
+"""Growth of an error over the best one that a trial may show."""
+STEPS_PER_OCTAVE = 2
+WORTH_WHILE = 0.98
+"""Share of the expected error below which a weight of the change earns its place."""
+RUNS_MAX = 100
+"""Runs that a trial makes at most: what has not grown by then grows slowly enough to be seen."""
+ACROSS_TO_ALONG = 1.5
+"""How much more an error across the path may weigh than one along it."""
+BISECTIONS = 2
+"""Halvings, in octaves, of the step between the best rate and the first that grows."""
+SAMPLES_MAX = 20_000
+"""Samples of a run that a trial looks at."""
+
+
+@dataclass(frozen=True)
+class Reason:
+    """What a weight became, and why."""
+
+    key: str
+    value: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Weights for a cell, with the reasons and what to expect.
+
+    Attributes
+    ----------
+    cell : str
+        Name of the cell.
+    law : str
+        The law of the cell.
+    section : str
+        Table of the cell description that the weights belong in.
+    weights : Weights
+        What is proposed.
+    reasons : tuple of Reason
+        Why, weight by weight.
+    trials : tuple of Trial
+        What the weights did on everything that the axes might be.
+    notes : tuple of str
+        What else should be known, a sentence each.
+    uncertainty, known_hz, noise, n_runs
+        What the trials assumed; `known_hz` axis by axis.
+    units : dict
+        What each axis is measured in.
+    along : float or None
+        What the weight along the path should be, if the cell weighs contours and
+        has too little of it.
+    """
+
+    cell: str
+    law: str
+    section: str
+    weights: Weights
+    reasons: tuple[Reason, ...]
+    trials: tuple[Trial, ...]
+    notes: tuple[str, ...]
+    uncertainty: float
+    known_hz: dict[str, float]
+    noise: float
+    n_runs: int
+    units: dict[str, str]
+    along: float | None = None
+
+    def toml(self) -> str:
+        """Return the lines for the cell description."""
+        lines = [f"{key} = {value}" for key, value in self.values().items()]
+        if self.along is not None:
+            lines += ["", f"[{self.section}.contour]", f"along = {self.along}"]
+        return f"[{self.section}]\n" + "\n".join(lines) + "\n"
+
+    def values(self) -> dict[str, float]:
+        """Return the weights by key."""
+        w = self.weights
+        return {"q": w.q, "s": w.s, "r": w.r, "rate": w.rate}
+
+    def write(self, path: str | Path) -> bool:
+        """Put the weights into a cell description; return whether it changed.
+
+        Raises
+        ------
+        BadInputError
+            If the file cannot be read or written.
+        """
+        tables: dict[str, dict[str, float]] = {self.section: self.values()}
+        if self.along is not None:
+            tables[f"{self.section}.contour"] = {"along": self.along}
+        return write_values(path, tables)
+
+    def of(self, axis: str) -> list[Trial]:
+        """Return the trials of an axis."""
+        return [trial for trial in self.trials if trial.axis == axis]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of the file of ``--json``."""
+        return {
+            "cell": self.cell,
+            "law": self.law,
+            **self.values(),
+            "along": self.along,
+            "reasons": [asdict(reason) for reason in self.reasons],
+            "notes": list(self.notes),
+            "uncertainty": self.uncertainty,
+            "known_hz": self.known_hz,
+            "noise_m": self.noise,
+            "n_runs": self.n_runs,
+            "trials": [
+                {
+                    "axis": trial.axis,
+                    "what": trial.what,
+                    "unit": self.units[trial.axis],
+                    "rms": trial.rms.tolist(),
+                    "growth": trial.growth,
+                    "input_peak": trial.input_peak,
+                }
+                for trial in self.trials
+            ],
+        }
+
+
+def propose_weights(
+    cell: str | Path,
+    *,
+    uncertainty: float | Sequence[float] = UNCERTAINTY,
+    known_hz: float | None = None,
+    noise_m: float = 0.0,
+    n_runs: int = 10,
+) -> Proposal:
+    """Propose the weights of learning for a cell.
+
+    The weight `rate` is chosen by trials on what the axes might be: up to
+    `known_hz` the model but for `uncertainty`, above it with a mode, everywhere
+    with friction. Of the weights with which no trial's error grows by more than
+    20 % over its best one, those are taken that leave the least error after
+    `n_runs` runs, on the average of the trials.
+
+    Parameters
+    ----------
+    cell : path
+        The cell description.
+    uncertainty : float or sequence of float
+        How far the axes may be from their model where it is known, 0.3 for
+        30 %; several for gains at equally spaced frequencies from zero to half
+        the cycle rate: the first counts where the model is known, and the model
+        is known up to where they first reach 1.
+    known_hz : float or None
+        Frequency up to which the model is known; None for 1.3 times the natural
+        frequency of each axis.
+    noise_m : float
+        Standard deviation of white noise in the measurement.
+    n_runs : int
+        Runs in which learning should be done; beyond 100 as for 100.
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    BadInputError
+        If the file cannot be used, a value is out of range, or nothing moves.
+
+    Examples
+    --------
+    >>> found = propose_weights("examples/01_gantry.toml")
+    >>> found.weights.rate > 3
+    True
+    """
+    described = _load(cell)
+    law = described.law
+    section = "learning.constrained" if law == "constrained" else "learning.norm_optimal"
+    axes, written = believed_axes(described, SAMPLES_MAX)
+    low, known = _known(uncertainty, known_hz, described.cycle_s)
+    if not (np.isfinite(noise_m) and noise_m >= 0.0):
+        message = f"noise_m = {noise_m}; 0 or a positive number is needed"
+        raise BadInputError(message)
+    if n_runs < 1:
+        message = f"n_runs = {n_runs}; at least 1 is needed"
+        raise BadInputError(message)
+    n_runs = min(n_runs, RUNS_MAX)
+    known_of = {axis.name: known or KNOWN_SHARE * axis.natural_frequency_hz for axis in axes}
+    moving = [axis for axis in axes if np.any(axis.way != 0.0)]
+    if not moving:
+        message = f"{described.path}: no axis moves in the program: there is nothing to learn"
+        raise BadInputError(message)
+    benches = [Bench(axis, low, known_of[axis.name], noise_m, n_runs) for axis in moving]
+    table = written.get("learning", {}).get(section.removeprefix("learning."), {})
+    along = _along(table) if law == "norm_optimal" else None
+    if along is not None:
+        table = {**table, "contour": {**table["contour"], "along": along}}
+    varies = bool(table.get("contour") or table.get("phase")) and law not in {"constrained"}
+    q = float(table.get("q", 1.0)) if varies else 1.0
+    levels = _error_weights(table) if varies else [q]
+    search = _Search(benches, q, levels, _growth_max(written), n_runs)
+    weights, trials = search.weights()
+    return Proposal(
+        cell=described.name, law=law, section=section, weights=weights,
+        reasons=_reasons(search, weights, trials, low, known_of, noise_m, along), along=along,
+        trials=tuple(trials), notes=_notes(law, moving, written, trials),
+        uncertainty=low, known_hz=known_of, noise=noise_m, n_runs=n_runs,
+        units={axis.name: axis.unit for axis in axes},
+    )  # fmt: skip
+
+
+def _load(cell: str | Path) -> Cell:
+    try:
+        # Weights are asked for because those in the file may be wrong.
+        return Cell.load(cell, allow_divergent=True)
+    except ValueError as error:
+        raise BadInputError(" ".join(str(error).split())) from error
+
+
+def _known(
+    uncertainty: float | Sequence[float], known_hz: float | None, dt_s: float
+) -> tuple[float, float | None]:
+    """Return the uncertainty where the model is known, and up to where it is."""
+    gains = np.atleast_1d(np.asarray(uncertainty, dtype=np.float64))
+    if gains.ndim != 1 or len(gains) == 0 or not np.all(np.isfinite(gains) & (gains >= 0.0)):
+        message = f"uncertainty = {uncertainty}; gains of 0 or more are needed, as 0.3 for 30 %"
+        raise BadInputError(message)
+    low, nyquist_hz = float(gains[0]), 0.5 / dt_s
+    if low >= 1.0:
+        message = (
+            f"uncertainty = {low}; below 1 is needed at low frequencies: a model that may be wrong "
+            "by all of itself teaches nothing; `ilc identify` measures a better one"
+        )
+        raise BadInputError(message)
+    if known_hz is not None:
+        if not 0.0 < known_hz < nyquist_hz:
+            message = (
+                f"known_hz = {known_hz}; between 0 and {nyquist_hz:g} Hz, half the cycle rate, "
+                "is needed"
+            )
+            raise BadInputError(message)
+        return low, float(known_hz)
+    wrong = np.flatnonzero(gains >= 1.0)
+    if len(wrong) == 0:
+        return low, None
+    at = int(wrong[0])
+    share = (1.0 - gains[at - 1]) / (gains[at] - gains[at - 1])
+    return low, float((at - 1 + share) / (len(gains) - 1) * nyquist_hz)
+
+
+def _growth_max(written: dict[str, Any]) -> float:
+    """Return how much an error may grow: safely less than what makes the controller roll back."""
+    rollback = float(written.get("learning", {}).get("rollback_ratio", 1.5))
+    return min(GROWTH_MAX, 1.0 + 0.4 * (rollback - 1.0))
+
+
+def _error_weights(table: dict[str, Any]) -> list[float]:
+    """Return the least and the largest weight of an error that the cell's own table makes."""
+    contour = table.get("contour")
+    found = []
+    for phase in [{}, *table.get("phase", [])]:
+        q = float(phase.get("q", table.get("q", 1.0)))
+        found.append(q + (float(contour.get("along", 0.0)) if contour is not None else 0.0))
+        if contour is not None:
+            found.append(q + float(phase.get("contour", contour.get("weight", 1.0))))
+    positive = [value for value in found if value > 0.0]
+    return sorted({min(positive), max(positive)}) if positive else [1.0]
+
+
+def _along(table: dict[str, Any]) -> float | None:
+    """Return the weight along the path that a contour weight needs; None if it has it."""
+    contour = table.get("contour")
+    if contour is None:
+        return None
+    q, along = float(table.get("q", 1.0)), float(contour.get("along", 0.0))
+    across = q + float(contour.get("weight", 1.0))
+    if across <= 2.0 * (q + along):
+        return None
+    return _rounded(across / ACROSS_TO_ALONG - q)
+
+
+class _Search:
+    """The rates in question, and what the trials say of them."""
+
+    def __init__(
+        self, benches: list[Bench], q: float, levels: list[float], growth_max: float, n_runs: int
+    ) -> None:
+        self.q = q
+        self.benches, self.levels = benches, levels
+        self.growth_max, self.n_runs = growth_max, n_runs
+        self.refused: float | None = None
+        self.held = True
+        bases = [
+            abs(float(bench.model.dc_gain()[0, 0]))
+            / (bench.axis.dt_s * 2.0 * np.pi * bench.axis.natural_frequency_hz)
+            for bench in benches
+        ]
+        low, high = 0.25 * min(bases) * levels[0] ** 0.5, 32.0 * max(bases) * levels[-1] ** 0.5
+        count = int(np.ceil(STEPS_PER_OCTAVE * np.log2(high / low))) + 1
+        self.rates = [_rounded(rate) for rate in np.geomspace(high, low, count)]
+
+    def weights(self) -> tuple[Weights, list[Trial]]:
+        """Return the best weights, with their trials."""
+        best: _Found | None = None
+        for rate in self.rates:
+            weights = Weights(self.q, 0.0, 0.0, rate)
+            trials = self._trials(weights, self.growth_max)
+            if trials is None:
+                # Below a rate with which an error grows it grows all the more.
+                self.refused = rate
+                break
+            best = self._better(best, weights, trials)
+        for _ in range(BISECTIONS if best is not None and self.refused is not None else 0):
+            assert best is not None
+            assert self.refused is not None
+            if best[1].rate > 2.0 * self.refused:
+                break
+            weights = replace(best[1], rate=_rounded((best[1].rate * self.refused) ** 0.5))
+            trials = self._trials(weights, self.growth_max)
+            if trials is None:
+                self.refused = weights.rate
+            else:
+                best = self._better(best, weights, trials)
+        if best is None:
+            self.held = False
+            weights = Weights(self.q, 0.0, 0.0, self.rates[0])
+            trials = self._trials(weights, np.inf)
+            assert trials is not None
+            best = (self._score(trials), weights, trials)
+        score, weights, trials = best
+        for r in self._changes():
+            slower = Weights(weights.q, 0.0, r, weights.rate)
+            tried = self._trials(slower, self.growth_max)
+            if tried is not None and self._score(tried) < WORTH_WHILE * score:
+                score, weights, trials = self._score(tried), slower, tried
+        return weights, trials
+
+    def _better(self, best: _Found | None, weights: Weights, trials: list[Trial]) -> _Found:
+        score = self._score(trials)
+        return (score, weights, trials) if best is None or score < best[0] else best
+
+    def _changes(self) -> list[float]:
+        """Return weights of the change that may pay: only against noise."""
+        if all(bench.noise == 0.0 for bench in self.benches):
+            return []
+        square = max(float(bench.model.dc_gain()[0, 0]) ** 2 for bench in self.benches)
+        return [_rounded(self.levels[0] * square * share) for share in (0.3, 1.0, 3.0, 10.0)]
+
+    def _trials(self, weights: Weights, growth_max: float) -> list[Trial] | None:
+        """Return the trials of all axes; None if an error grows by more than allowed.
+
+        Of several weights of the error the larger, with which learning is bolder, may forbid a
+        rate; what is left is told of the smallest.
+        """
+        found: list[Trial] = []
+        for bench in self.benches:
+            for level in self.levels[::-1]:
+                trials = bench.try_weights(replace(weights, q=level), growth_max)
+                if trials is None:
+                    return None
+                if level == self.levels[0]:
+                    found += trials
+        return found
+
+    def _score(self, trials: list[Trial]) -> float:
+        """Return the mean of the trials' last errors, of all axes together."""
+        by_axis: dict[str, list[float]] = {}
+        for trial in trials:
+            by_axis.setdefault(trial.axis, []).append(float(trial.rms[-1]))
+        return float(np.sqrt(sum(np.mean(last) ** 2 for last in by_axis.values())))
+
+
+def _rounded(value: float) -> float:
+    """Return a value to three digits, as a person would write it."""
+    return float(f"{value:.3g}")
+
+
+def _reasons(
+    search: _Search,
+    weights: Weights,
+    trials: list[Trial],
+    uncertainty: float,
+    known_hz: dict[str, float],
+    noise: float,
+    along: float | None,
+) -> tuple[Reason, ...]:
+    count, runs = len(trials), search.n_runs
+    steep = 100.0 * (search.growth_max - 1.0)
+    q = (
+        "only ratios matter: every error counts alike"
+        if len(search.levels) == 1
+        else f"as it is in the file; the error weighs from {search.levels[0]:g} to "
+        f"{search.levels[-1]:g} along the run"
+    )
+    if weights.r > 0.0:
+        r = f"the measurement's noise of {1e6 * noise:.3g} µm is averaged over more runs"
+    elif noise > 0.0:
+        r = "the noise asks for no slower learning than `rate` makes it"
+    else:
+        r = "no noise is known that slower learning would average out"
+    known = ", ".join(f"{name} {hz:.3g} Hz" for name, hz in known_hz.items())
+    rate = (
+        f"keeps learning below what the model knows ({known}), where friction and modes outside it "
+        f"begin: of {len(search.rates)} rates the one with the least error after {runs} runs on "
+        f"{count} trials, of which none may grow by more than {steep:.0f} %; the model is taken to "
+        f"be right within {100.0 * uncertainty:.0f} %"
+    )
+    if search.refused is not None:
+        rate += f"; at {search.refused:g} one grows by more"
+    if not search.held:
+        rate = (
+            f"the largest of {len(search.rates)} rates; with every one of them some trial grows by "
+            f"more than {steep:.0f} %: the model is not good enough, `ilc identify` measures it"
+        )
+    reasons = [
+        Reason("q", weights.q, q),
+        Reason("s", weights.s, "a weight of the input would leave a part of every error"),
+        Reason("r", weights.r, r),
+        Reason("rate", weights.rate, rate),
+    ]
+    if along is not None:
+        why = (
+            "error along the path becomes error across it in every corner, so it must be learned "
+            f"nearly as quickly: it weighs {ACROSS_TO_ALONG:g} times less"
+        )
+        reasons.append(Reason("contour.along", along, why))
+    return tuple(reasons)
+
+
+def _notes(
+    law: str, axes: list[BelievedAxis], written: dict[str, Any], trials: list[Trial]
+) -> tuple[str, ...]:
+    notes = []
+    if law not in TUNED_LAWS:
+        notes.append(
+            f'[learning] law = "{law}" does not read these weights: law = "norm_optimal" does'
+        )
+    learning = written.get("learning", {})
+    for axis in axes:
+        key, default = (
+            ("input_max_m", 0.005) if axis.interface == "csp" else ("input_max_m_s", 0.05)
+        )
+        bound = float(learning.get(key, default))
+        own = [trial for trial in trials if trial.axis == axis.name]
+        needed = own[-1].input_peak
+        if needed > bound:
+            notes.append(
+                f"axis {axis.name}: learning wants {needed:.3g} of input, "
+                f"[learning] {key} = {bound:g} holds it there; raise {key}"
+            )
+        left = max(trial.rms[-1] / trial.rms[0] for trial in own if trial.rms[0] > 0.0)
+        if left > 0.3:
+            notes.append(
+                f"axis {axis.name}: a trial keeps {100.0 * left:.0f} % of its error; a better "
+                "model (`ilc identify`) or more runs (--runs) leave less"
+            )
+    return tuple(notes)

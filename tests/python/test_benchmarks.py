@@ -1,0 +1,52 @@
+"""The report of the benchmarks: figures or a sentence, never an empty table."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+@pytest.fixture
+def report(monkeypatch):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    # What the comparisons need is not installed where the tests run.
+    for name in ("bounded", "update"):
+        monkeypatch.setitem(sys.modules, name, type(sys)(name))
+    spec = importlib.util.spec_from_file_location("benchmark_report", FOLDER / "report.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_what_criterion_left_is_read(report, tmp_path, monkeypatch):
+    found = tmp_path / "one axis" / "update" / "new"
+    found.mkdir(parents=True)
+    (found / "benchmark.json").write_text(json.dumps({"full_id": "one axis/update"}))
+    (found / "estimates.json").write_text(json.dumps({"median": {"point_estimate": 7280.0}}))
+    monkeypatch.setenv("CRITERION_HOME", str(tmp_path))
+    assert report.criterion(report.criterion_folder()) == [
+        ("one axis/update", pytest.approx(7.28e-6))
+    ]
+
+
+def test_no_figures_are_a_failure_with_a_sentence(report, tmp_path, monkeypatch):
+    monkeypatch.setenv("CRITERION_HOME", str(tmp_path))
+    with pytest.raises(SystemExit, match=r"no figures of the Rust benches in .*make bench"):
+        report.main()
+    with pytest.raises(SystemExit, match="N = 400 has no figures"):
+        report.table({400: {}})
+    with pytest.raises(SystemExit, match="no figures"):
+        report.table({})
+
+
+def test_no_table_of_the_documents_is_empty():
+    root = FOLDER.parent
+    for page in [*root.glob("*.md"), *root.glob("docs/**/*.md")]:
+        lines = page.read_text(encoding="utf-8").splitlines()
+        for line, after in zip(lines, [*lines[1:], ""], strict=True):
+            if set(line) <= set("|-: ") and line.startswith("|-"):
+                assert after.startswith("|"), f"{page}: a table without rows"
