@@ -41,7 +41,7 @@ def beyond_cell(fit: SecondOrderFit | VelocityLoopFit) -> str | None:
     return None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Identification:
     """What an experiment showed.
 
@@ -79,6 +79,13 @@ class Identification:
     dt_s: float
     experiment: Experiment
     interface: Literal["csp", "csv"] | None = None
+
+    def __repr__(self) -> str:
+        """Return what was found on one line, without the signals."""
+        return (
+            f"Identification({self.experiment.waveform!r}, n_frequencies={len(self.frequency_hz)}, "
+            f"model={self.model!r}, doubt={self.doubt!r})"
+        )
 
     @property
     def frequency_hz(self) -> Array:

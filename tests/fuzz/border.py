@@ -6,9 +6,9 @@ Run it by itself for as long as wanted, with any seed::
 
 Calls are made in another process, with bounded memory, and watched. What is drawn are the
 arguments: mostly right ones, of which one or two are replaced by something else. A call may
-succeed or raise `ValueError` (which every error of the package is), `TypeError`, `MemoryError`
-or `OSError`; what it returns holds no number that is not finite. Exits 1 with the calls that
-broke a rule.
+succeed or raise `ValueError` (which every error of the package is), `TypeError`, `MemoryError` or
+`OSError`; what it returns holds no number that is not finite. Exits 1 with the calls that broke a
+rule.
 """
 
 from __future__ import annotations
@@ -37,8 +37,11 @@ ALLOWED = (ValueError, TypeError, MemoryError, OSError)
 # What runs machines or writes files where it is told to.
 SKIPPED = {"Campaign", "Law", "CampaignResult", "IterationRecord", "Experiment", "Identification",
            "swept_sine", "Library", "Cell"}  # fmt: skip
-# Figures that may be infinite by what they mean: a growth without bound, no limit at all.
-UNBOUNDED = {"transient_growth", "spectral_radius", "expected_rms", "growth", "limit",
+# Figures that may be infinite by what they mean: a growth without bound, no limit at all, the
+# deviation of what a measurement does not determine.
+UNBOUNDED = {"bandwidth_deviation_hz", "gain_deviation", "delay_deviation_s", "damping_deviation",
+             "natural_frequency_deviation_hz",
+             "transient_growth", "spectral_radius", "expected_rms", "growth", "limit",
              "uncertainty_allowed", "robust_factor", "contraction", "monotonic_factor",
              "expected_rms_limit", "robust_lifted", "ratio"}  # fmt: skip
 

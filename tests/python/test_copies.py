@@ -4,6 +4,7 @@ A new class without an example in `classes_fixture` fails the first test.
 """
 
 import copy
+import dataclasses
 import importlib
 import inspect
 import pickle
@@ -21,6 +22,8 @@ OTHERS = {Library, ilc_rt.Law, Campaign}
 
 def attributes(thing):
     """Return everything that can be read of a thing."""
+    if dataclasses.is_dataclass(thing):
+        return {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
     names = [
         name
         for name in dir(type(thing))

@@ -95,6 +95,10 @@ impl PyPid {
         Ok(Self { made, dt_s, pid: Mutex::new(Pid::new(gains, dt_s)) })
     }
 
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        self.made.shown(py, "Pid")
+    }
+
     /// Pickled and copied as the call that made it.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().made.reduce(slf.get_type().as_any())
@@ -254,6 +258,10 @@ impl PyCascade {
         Ok(Self(Mutex::new(Cascade::new(gains, dt_s)), made))
     }
 
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        self.1.shown(py, "Cascade")
+    }
+
     /// Pickled and copied as the call that made it.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().1.reduce(slf.get_type().as_any())
@@ -332,6 +340,10 @@ impl PyCrossCoupled {
         let mut pid = *held(&controller.get().pid);
         pid.reset();
         Ok(Self(Mutex::new(CrossCoupled::new(pid)), made))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        self.1.shown(py, "CrossCoupled")
     }
 
     /// Pickled and copied as the call that made it.

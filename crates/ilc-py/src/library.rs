@@ -79,6 +79,10 @@ impl PyLibrary {
         Ok(Self { made, held: Held::File(path) })
     }
 
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        self.made.shown(py, "Library")
+    }
+
     /// Pickled and copied as the call that made it.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().made.reduce(slf.get_type().as_any())

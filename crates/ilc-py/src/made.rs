@@ -43,6 +43,15 @@ impl Made {
         Self { how: self.how, arguments: self.arguments.clone_ref(py), part: Some(part) }
     }
 
+    /// Returns the call as Python would write it, for a class of this name.
+    pub(crate) fn shown(&self, py: Python<'_>, name: &str) -> PyResult<String> {
+        let mut words = Vec::new();
+        for (key, value) in self.arguments.bind(py) {
+            words.push(format!("{key}={}", value.repr()?));
+        }
+        Ok(format!("{name}({})", words.join(", ")))
+    }
+
     /// Returns what `__reduce__` returns for an object of a class.
     pub(crate) fn reduce(&self, class: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
         let py = class.py();
