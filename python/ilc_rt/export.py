@@ -12,11 +12,14 @@ import numpy as np
 
 from ilc_rt.errors import BadInputError
 from ilc_rt.record import SIGNALS
-from ilc_rt.result import axis_names, write_text
+from ilc_rt.result import axis_names, json_text, write_text
+from ilc_rt.text import NAME_MAX, printable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+# Characters of a value at the head of a table; a program or a law may have many.
+VALUE_MAX = 1_000_000
 FORMATS = (".npz", ".csv", ".json")
 
 
@@ -55,7 +58,7 @@ def export_run(row: Mapping[str, Any], path: str | Path) -> None:
         write_text(target, _csv_text(signals, rest))
     else:
         content = {**rest, **{name: signal.tolist() for name, signal in signals.items()}}
-        write_text(target, json.dumps(content, indent=1, default=str) + "\n")
+        write_text(target, json_text(content))
 
 
 def _write_npz(target: Path, signals: dict[str, Any], rest: dict[str, Any]) -> None:
@@ -80,10 +83,11 @@ def _csv_text(signals: dict[str, Any], rest: dict[str, Any]) -> str:
             continue
         for axis in range(signal.shape[1]):
             label = names[axis].replace(" ", "") if axis < len(names) else str(axis + 1)
+            label = printable(label, NAME_MAX)
             columns[f"{quantity}_{label}{ending}"] = signal[:, axis]
     text = io.StringIO()
     for key, value in rest.items():
-        text.write(f"# {key} = {value}\n")
+        text.write(f"# {key} = {printable(value, VALUE_MAX)}\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))

@@ -5,14 +5,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ilc_rt._native import FrequencyResponse, SecondOrderFit, VelocityLoopFit, doubt
-from ilc_rt.result import write_text
+from ilc_rt.result import json_text, write_text
+from ilc_rt.text import label
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -214,7 +214,7 @@ class Identification:
         BadInputError
             If the file cannot be written.
         """
-        write_text(path, json.dumps(self.to_json(), indent=1) + "\n")
+        write_text(path, json_text(self.to_json()))
 
     def figure(self) -> Figure:
         """Return the Bode diagram of measurement and model."""
@@ -223,5 +223,5 @@ class Identification:
         return bode(
             self.frequency_hz, self.response, self.coherence,
             self.described.response(self.frequency_hz), self.uncertainty[1],
-            f"axis {self.experiment.axis}" if self.experiment.axis else "",
+            f"axis {label(self.experiment.axis)}" if self.experiment.axis else "",
         )  # fmt: skip

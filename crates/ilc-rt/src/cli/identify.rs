@@ -61,6 +61,13 @@ pub(super) struct IdentifyArguments {
     /// Pace the loop by the drives' answers instead of the clock.
     #[arg(long)]
     lockstep: bool,
+    /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
+    #[arg(long)]
+    simulated_drives: bool,
+    /// Stop the axes and end when standard input closes, as it does when the program that started this
+    /// one ends.
+    #[arg(long)]
+    with_parent: bool,
     /// Where the experiment is kept.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     library: PathBuf,
@@ -125,7 +132,7 @@ fn experiment(
     arguments: &IdentifyArguments,
 ) -> Result<(Outcome, Option<Identified>), SupervisorError> {
     let cell = Cell::load(&arguments.cell)?;
-    let stop = stop_on_signals();
+    let stop = stop_on_signals(arguments.with_parent);
     let mut search = BandSearch::new(&cell, &laid_out(arguments, FALLBACK))?;
     if let Some(to_hz) = arguments.to_hz {
         let band = Band { to_hz, ..FALLBACK };
@@ -211,6 +218,7 @@ fn excite(
         iterations: 1,
         measure: arguments.measure.map(Measure::from),
         lockstep: arguments.lockstep,
+        simulated: arguments.simulated_drives,
         resume: false,
         library: arguments.library.clone(),
         disturbance: Disturbance::default(),
@@ -232,7 +240,7 @@ fn excite(
     let (Some(id), EndStatus::Completed, false) = (kept, outcome.status, arguments.events) else {
         return Ok((outcome, None));
     };
-    let record = Library::open(&arguments.library)?.load(id)?.record;
+    let record = Library::read(&arguments.library)?.load(id)?.record;
     let identified = Identified::new(&cell, &experiment, &record)?;
     Ok((outcome, Some((experiment, identified))))
 }

@@ -7,13 +7,17 @@ mod completions;
 mod figures;
 mod identify;
 mod latency;
+mod parent;
 mod quantity;
 mod run;
 mod runs;
 mod show;
 
+pub use parent::when_parent_ends;
+
 use std::process::ExitCode;
 
+use crate::record::printable_lines;
 use clap::{CommandFactory, Parser, Subcommand};
 use tracing::Level;
 use tracing_subscriber::filter::Targets;
@@ -91,5 +95,6 @@ pub fn refusal_line(refusal: &clap::Error) -> String {
         .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
         .collect();
     let line = words.join("; ").replace(":; ", ": ");
-    format!("{}; --help tells what is allowed", line.trim_start_matches("error: "))
+    let line = format!("{}; --help tells what is allowed", line.trim_start_matches("error: "));
+    printable_lines(&line)
 }
