@@ -380,7 +380,7 @@ def _evaluate(
     used = slice(first, first + period * experiment.periods)
     u, y = np.ascontiguousarray(u[used]), np.ascontiguousarray(y[used])
     whole = frequency_response(u, y, dt_s, period_samples=period)
-    measured = _without_silence(whole.band(experiment.from_hz, experiment.to_hz), u, y)
+    measured = _without_rounding(whole.band(experiment.from_hz, experiment.to_hz), u, y)
     f, h = measured.frequency_hz, measured.response
     trust: dict[str, Any] = {"coherence": measured.coherence, "n_averages": measured.n_averages}
     model = fit_second_order(f, h, dt_s=dt_s, **trust)
@@ -408,17 +408,14 @@ def _evaluate(
     )
 
 
-def _without_silence(measured: FrequencyResponse, u: Array, y: Array) -> FrequencyResponse:
-    """Return a response that has a logarithm everywhere: where nothing moved, no coherence."""
-    silent = np.abs(measured.response) == 0.0
-    if np.ptp(y) <= STILL * np.ptp(u):
-        silent = np.ones_like(silent)
-    if not silent.any():
+def _without_rounding(measured: FrequencyResponse, u: Array, y: Array) -> FrequencyResponse:
+    """Return the response of an axis that rests as that of nothing, not as one of rounding."""
+    if np.ptp(y) > STILL * np.ptp(u):
         return measured
+    nothing = np.zeros(len(measured.frequency_hz))
     return FrequencyResponse(
-        measured.frequency_hz, np.where(silent, STILL, measured.response),
-        np.where(silent, STILL, measured.coherence), measured.n_averages,
-    )  # fmt: skip
+        measured.frequency_hz, nothing + 0j, coherence=nothing, n_averages=measured.n_averages
+    )
 
 
 def _delays(model: SecondOrderFit, dt_s: float) -> int:
@@ -434,7 +431,8 @@ def _plainest(fits: list[_Fit]) -> _Fit:
     """Return the fit of least delay among those that a cell can take and that leave least."""
     possible = [fit for fit in fits if beyond_cell(fit) is None] or fits
     least = min(fit.residual_rms for fit in possible)
-    return next(fit for fit in possible if fit.residual_rms <= WORTH_A_CYCLE * least)
+    near = (fit for fit in possible if fit.residual_rms <= WORTH_A_CYCLE * least)
+    return next(near, possible[0])
 
 
 __all__ = [

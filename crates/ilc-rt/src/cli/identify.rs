@@ -257,7 +257,7 @@ fn describe(experiment: &Experiment, found: &Identified) -> String {
         experiment.excitation.amplitude,
         worst(&found.measured.coherence),
     );
-    if matches!(found.doubt, Some(Doubt::Incoherent { .. })) {
+    if matches!(found.doubt, Some(Doubt::Incoherent { .. } | Doubt::Silent)) {
         return head;
     }
     let (figures, delay_s) = match found.described {

@@ -86,18 +86,17 @@ fn delays(model: &SecondOrder, dt_s: f64) -> usize {
     found + 3
 }
 
-/// Returns a response that has a logarithm everywhere: where nothing moved, no coherence.
-fn without_silence(mut measured: FrequencyResponse, u: &[f64], y: &[f64]) -> FrequencyResponse {
+/// Returns the response of an axis that rests as that of nothing, not as one of rounding.
+fn without_rounding(mut measured: FrequencyResponse, u: &[f64], y: &[f64]) -> FrequencyResponse {
     let range = |values: &[f64]| {
         let (low, high) = values
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
         high - low
     };
-    let still = range(y) <= STILL * range(u);
-    for (response, coherence) in measured.response.iter_mut().zip(&mut measured.coherence) {
-        if still || response.norm() <= 0.0 {
-            (response.re, response.im, *coherence) = (STILL, 0.0, STILL);
+    if range(y) <= STILL * range(u) {
+        for (response, coherence) in measured.response.iter_mut().zip(&mut measured.coherence) {
+            (response.re, response.im, *coherence) = (0.0, 0.0, 0.0);
         }
     }
     measured
@@ -136,7 +135,7 @@ impl Identified {
             let dt_s = cell.cycle_s();
             let (u, y) = (column(&record.input, 1.0), column(&record.error_m, -1.0));
             let whole = frequency_response(&u, &y, dt_s, averaging)?.band(from_hz, to_hz);
-            let measured = without_silence(whole, &u, &y);
+            let measured = without_rounding(whole, &u, &y);
             let fit = fit_second_order(&measured, Some(dt_s), Known::default())?;
             let delays = 0..delays(&fit.model, dt_s);
             let tried: Vec<(Described, f64)> = match axis.position_loop {
