@@ -8,7 +8,7 @@ SOURCES := $(shell find crates sim python -name '*.rs' -o -name '*.py' -o -name 
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo gallery test test-rust test-python check fmt lint docs bench rt vcan clean
+.PHONY: help build demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -23,11 +23,11 @@ $(VENV)/.tools: pyproject.toml | $(BIN)/python
 
 $(VENV)/.built: $(SOURCES) $(VENV)/.tools
 	cargo build --release --workspace --bins
-	rm -rf build/wheels
+	rm -rf build/wheels build/data
+	install -D -m 755 -t build/data/scripts $(TARGET)/release/ilc-rt $(TARGET)/release/ilc-sim
 	$(BIN)/maturin build --quiet --release --out build/wheels
 	$(BIN)/pip install --quiet --force-reinstall --no-deps build/wheels/*.whl
 	$(BIN)/pip install --quiet build/wheels/*.whl
-	install -m 755 $(TARGET)/release/ilc-rt $(TARGET)/release/ilc-sim $(BIN)/
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.built
@@ -58,7 +58,17 @@ endif
 	cargo test --release --workspace --doc
 
 test-python: $(VENV)/.test ## Python tests
-	$(BIN)/python -m pytest -q
+	cargo build --release --workspace --example bus_echo
+	$(BIN)/python -m pytest -q --numprocesses auto --dist loadfile
+
+fuzz: $(VENV)/.test ## New problems for FUZZ_S seconds (60): property tests, readers, the border to Python
+	FUZZ_S="$(FUZZ_S)" FUZZ_SEED="$(FUZZ_SEED)" $(BIN)/python tests/fuzz/run.py
+
+soak: $(VENV)/.test ## Kills, full disks, strangers and a stalling computer, SOAK times (20) as many: long, with a tally
+	ILC_SOAK="$(or $(SOAK),20)" $(BIN)/python -m pytest -q tests/python/test_trials.py
+	$(BIN)/python tests/soak/demo.py stalls --times 10
+	$(BIN)/python tests/soak/demo.py load --times 40
+	$(BIN)/python tests/soak/demo.py kills --times 20
 
 vcan: build ## The bus contract and the main job on a real vcan0
 	tests/vcan/job

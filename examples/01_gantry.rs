@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         iterations: 10,
         measure: None,
         lockstep: true,
+        simulated: false,
         resume: false,
         library: PathBuf::from(":memory:"),
         disturbance: Disturbance::default(),

@@ -1189,4 +1189,5 @@ def run_events(
     learning: bool = True,
     experiment: object | None = None,
     disturbance: Callable[[int], ArrayLike] | None = None,
+    simulated: bool = False,
 ) -> EventStream: ...

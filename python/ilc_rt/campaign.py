@@ -106,9 +106,12 @@ class Campaign:
 
     Examples
     --------
-    >>> campaign = Campaign("examples/01_gantry.toml", bus="loopback:")  # doctest: +SKIP
-    >>> for record in campaign.run(10):                                  # doctest: +SKIP
-    ...     print(record.index, record.contour_inf_m)
+    >>> campaign = Campaign("examples/01_gantry.toml", bus="loopback:")
+    >>> for record in campaign.run(3):
+    ...     print(f"run {record.index}: {1e6 * record.contour_inf_m:.0f} µm")
+    run 0: 5... µm
+    run 1: ... µm
+    run 2: ... µm
     """
 
     def __init__(
@@ -253,6 +256,7 @@ class Campaign:
             "learning": self.learning,
             "experiment": self.experiment,
             "disturbance": measure,
+            "simulated": self.simulated,
         }
         apart = self.simulated and self.transport != "loopback"
         drives = None

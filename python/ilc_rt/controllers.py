@@ -76,11 +76,13 @@ class ProcessController:
         self._stop_by: float | None = None
         if simulated:
             self._drives = start_simulated_drives(cell_file, bus, lockstep=lockstep)
-        argv = [str(controller), verb, cell_file, "--events", *arguments]
+        argv = [str(controller), verb, cell_file, "--events", "--with-parent", *arguments]
         if bus is not None:
             argv += ["--bus", bus]
         if lockstep:
             argv.append("--lockstep")
+        elif simulated:
+            argv.append("--simulated-drives")
         try:
             self._controller = Program(argv)
         except BaseException:

@@ -142,18 +142,38 @@ class Identification:
         return "\n".join(lines) + "\n"
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Return name, value and standard deviation of every figure, as text."""
-        model = self.model
+        """Return name, value and standard deviation of every figure, as text.
+
+        Of an axis of a cell the figures are those of ``[axis.model]``.
+        """
+        free, described = self.model, self.described
+        gain = ("gain", f"{free.gain:.5f}", f"{free.gain_deviation:.1e}")
+        left = ("left over in %", f"{described.residual_rms * 1e2:.2f}", "")
+        if isinstance(described, VelocityLoopFit):
+            bandwidth = f"{described.bandwidth_hz:.4f}"
+            return [
+                gain,
+                ("velocity bandwidth in Hz", bandwidth, f"{described.bandwidth_deviation_hz:.1e}"),
+                ("delay in ms", f"{described.delay_s * 1e3:.4f}", ""),
+                left,
+            ]
+        if self.interface is None:
+            described, left = free, ("left over in %", f"{free.residual_rms * 1e2:.2f}", "")
+        delay_deviation = described.delay_deviation_s * 1e3
         return [
-            ("gain", f"{model.gain:.5f}", f"{model.gain_deviation:.1e}"),
+            gain,
             (
                 "natural frequency in Hz",
-                f"{model.natural_frequency_hz:.4f}",
-                f"{model.natural_frequency_deviation_hz:.1e}",
+                f"{described.natural_frequency_hz:.4f}",
+                f"{described.natural_frequency_deviation_hz:.1e}",
             ),
-            ("damping", f"{model.damping:.5f}", f"{model.damping_deviation:.1e}"),
-            ("delay in ms", f"{model.delay_s * 1e3:.4f}", f"{model.delay_deviation_s * 1e3:.1e}"),
-            ("left over in %", f"{model.residual_rms * 1e2:.2f}", ""),
+            ("damping", f"{described.damping:.5f}", f"{described.damping_deviation:.1e}"),
+            (
+                "delay in ms",
+                f"{described.delay_s * 1e3:.4f}",
+                f"{delay_deviation:.1e}" if delay_deviation else "",
+            ),
+            left,
         ]
 
     def to_json(self) -> dict[str, Any]:

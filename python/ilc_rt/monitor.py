@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import math
 import queue
+import socket
 import time
 import types
 import typing
@@ -90,8 +91,8 @@ class Monitor:
 
     Examples
     --------
-    >>> with Monitor("gantry") as monitor:           # doctest: +SKIP
-    ...     for message in monitor.messages(60.0):
+    >>> with Monitor("press-7") as monitor:
+    ...     for message in monitor.messages(timeout_s=1.0):
     ...         print(message.topic, message.payload)
     """
 
@@ -192,6 +193,9 @@ def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
         config.insert_json5("connect/endpoints", json.dumps(list(connect)))
         config.insert_json5("scouting/multicast/enabled", json.dumps(scouting))
         config.insert_json5("listen/endpoints", "[]")
+        # By itself Zenoh leaves the host's own interface out, where controllers are that keep to it.
+        interfaces = ",".join(name for _, name in socket.if_nameindex())
+        config.insert_json5("scouting/multicast/interface", json.dumps(interfaces))
     except zenoh.ZError as error:
         message = f"connect = {', '.join(connect)}: not an endpoint, as tcp/192.168.1.5:7447"
         raise BadInputError(message) from error

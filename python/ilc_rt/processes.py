@@ -1,7 +1,9 @@
 """Find, start, read and end the programs `ilc-rt` and `ilc-sim`.
 
 Both run in a session of their own: Ctrl-C in a terminal must reach the
-controller alone, which stops the axes while the drives still answer.
+controller alone, which stops the axes while the drives still answer. They end
+with the process that started them, also if it is killed: their standard input
+closes then.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import time
 from pathlib import Path
@@ -26,15 +29,17 @@ if TYPE_CHECKING:
 
     from typing_extensions import Self
 
-READY_DEADLINE_S = 15.0
+READY_DEADLINE_S = 60.0
 END_DEADLINE_S = 5.0
 
 
 def find_program(name: str) -> Path:
     """Find one of the two programs.
 
-    Looked for beside the running Python interpreter (a virtual environment's
-    ``bin``), then along ``PATH``.
+    Looked for where the wheel that brought this package put it, which
+    depends on how that was installed: beside the running interpreter (a
+    virtual environment's ``bin``), in the folder of this installation's or
+    this user's scripts, under ``pip install --target``; then along ``PATH``.
 
     Parameters
     ----------
@@ -44,19 +49,23 @@ def find_program(name: str) -> Path:
     Raises
     ------
     CampaignError
-        If it is in neither place.
+        If it is in none of these places.
     """
-    beside = Path(sys.executable).parent / name
-    if beside.is_file() and os.access(beside, os.X_OK):
-        return beside
-    found = shutil.which(name)
-    if found is None:
-        message = (
-            f"the program {name} is neither beside {sys.executable} nor on the PATH: "
-            "run `make build`"
-        )
-        raise CampaignError(message)
-    return Path(found)
+    folders = [
+        str(Path(sys.executable).parent),
+        sysconfig.get_path("scripts"),
+        sysconfig.get_path("scripts", sysconfig.get_preferred_scheme("user")),
+        str(Path(__file__).resolve().parents[1] / "bin"),
+    ]
+    for path in (os.pathsep.join(folders), None):
+        found = shutil.which(name, path=path)
+        if found is not None:
+            return Path(found)
+    message = (
+        f"the program {name} is neither beside {sys.executable} nor on the PATH: "
+        "install the wheel of ilc-rt, or run `make build` in a checkout"
+    )
+    raise CampaignError(message)
 
 
 class Program:
@@ -82,7 +91,8 @@ class Program:
         try:
             self._process = subprocess.Popen(
                 [str(argument) for argument in argv],
-                stdin=subprocess.DEVNULL,
+                # Open for as long as this process lives: programs that are told so end with it.
+                stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
                 start_new_session=True,
@@ -183,8 +193,9 @@ class Program:
             if self._wait(END_DEADLINE_S) is None:
                 self.signal(signal.SIGKILL)
                 self._process.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
         self._errors.close()
 
     def _wait(self, deadline_s: float) -> int | None:
@@ -211,7 +222,7 @@ def start_simulated_drives(cell_file: str | Path, bus: str | None, *, lockstep: 
     CampaignError
         If it does not get ready.
     """
-    argv: list[str | Path] = [find_program("ilc-sim"), "run", cell_file]
+    argv: list[str | Path] = [find_program("ilc-sim"), "run", cell_file, "--with-parent"]
     if bus is not None:
         argv += ["--bus", bus]
     if lockstep:

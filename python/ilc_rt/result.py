@@ -136,6 +136,11 @@ class CampaignResult:
             self.reason = event.reason or self.reason
 
     @property
+    def unkept(self) -> bool:
+        """Whether the campaign was stopped as a run could not be kept."""
+        return self.status == "fault" and (self.reason or "").startswith("library ")
+
+    @property
     def mode(self) -> str:
         """``"realtime"``, ``"lockstep"``, or ``""`` if not known."""
         return self.start.mode if self.start else ""
@@ -244,8 +249,12 @@ def library_rows(library: str | Path, cell: str | None = None) -> list[dict[str,
     BadInputError
         If the file is missing or is not a library.
     """
-    if not Path(library).is_file():
+    path = Path(library)
+    if not path.exists():
         message = f"{library}: no such library"
+        raise BadInputError(message)
+    if path.is_file() and path.stat().st_size == 0:
+        message = f"{library}: an empty file, and no library yet"
         raise BadInputError(message)
     try:
         return list(Library(str(library)).list(cell))

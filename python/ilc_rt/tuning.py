@@ -29,6 +29,8 @@ GROWTH_MAX = 1.2
 STEPS_PER_OCTAVE = 2
 WORTH_WHILE = 0.98
 """Share of the expected error below which a weight of the change earns its place."""
+RUNS_MAX = 100
+"""Runs that a trial makes at most: what has not grown by then grows slowly enough to be seen."""
 ACROSS_TO_ALONG = 1.5
 """How much more an error across the path may weigh than one along it."""
 BISECTIONS = 2
@@ -176,7 +178,7 @@ def propose_weights(
     noise_m : float
         Standard deviation of white noise in the measurement.
     n_runs : int
-        Runs in which learning should be done.
+        Runs in which learning should be done; beyond 100 as for 100.
 
     Returns
     -------
@@ -204,6 +206,7 @@ def propose_weights(
     if n_runs < 1:
         message = f"n_runs = {n_runs}; at least 1 is needed"
         raise BadInputError(message)
+    n_runs = min(n_runs, RUNS_MAX)
     known_of = {axis.name: known or KNOWN_SHARE * axis.natural_frequency_hz for axis in axes}
     moving = [axis for axis in axes if np.any(axis.way != 0.0)]
     if not moving:

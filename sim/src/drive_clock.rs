@@ -3,53 +3,94 @@
 //! A real drive samples in hardware and locks its control loop to SYNC; a SYNC that is handled a little
 //! late by a busy computer does not move the moment of sampling. So, while SYNCs come, each one stands
 //! for exactly one cycle, whenever it is handled. A computer that stalls stalls controller and plant
-//! alike: a few cycles left out by the controller are left out by the plant too, and it is the
-//! controller that counts them. Without SYNC the wall clock rules, and the drives miss their commands.
+//! alike: cycles left out by the controller are left out by the plant too, and it is the controller
+//! that counts them.
+//!
+//! Controller and drives share a computer, and whichever of them is stalled, the other must not take it
+//! for lost. The silence between two SYNCs is therefore the time for which this process *watched* the
+//! bus in vain: a gap in which it did not run itself counts as one look. Once the drives have run in step
+//! for a while, a long silence stops the plant's time before it sets it free; then the wall clock rules,
+//! from that moment on, and the drives miss their commands. Time that has been stood still is not made up
+//! for.
 
 use std::time::Duration;
 
-/// Cycles without SYNC after which the clock runs by itself.
-const LOST_AFTER: u32 = 15;
+/// Cycles without SYNC after which the clock runs by itself, unless it has run in step.
+const LOOSE_CYCLES: u32 = 15;
+/// SYNCs in a row, each within [`LOOSE_CYCLES`] of the one before, after which the clock is in step.
+const IN_STEP: u32 = 10;
+/// Most that passes between two looks at the bus; what is beyond it is a stall of this process.
+const LOOK_MAX: Duration = Duration::from_millis(10);
 
 /// The clock; it is told the wall time and gives steps to take.
 #[derive(Debug)]
 pub(crate) struct DriveClock {
     cycle: Duration,
     step: Duration,
-    /// Wall time up to which steps have been given.
-    reached: Duration,
-    last_sync: Option<Duration>,
+    patience: Duration,
+    looked: Duration,
+    /// Time that has passed and is not given as steps yet, while free.
+    owed: Duration,
+    /// Time watched in vain since the last SYNC; `None` while free.
+    silence: Option<Duration>,
+    n_in_step: u32,
 }
 
 impl DriveClock {
-    /// `step` must divide `cycle`.
-    pub(crate) fn new(cycle: Duration, step: Duration) -> Self {
-        Self { cycle, step, reached: Duration::ZERO, last_sync: None }
+    /// `step` must divide `cycle`; `patience` is the silence that ends a lock once the clock is in step.
+    pub(crate) fn new(cycle: Duration, step: Duration, patience: Duration) -> Self {
+        Self {
+            cycle,
+            step,
+            patience,
+            looked: Duration::ZERO,
+            owed: Duration::ZERO,
+            silence: None,
+            n_in_step: 0,
+        }
     }
 
     /// Steps to take before the nodes sample for a SYNC handled at `now`.
     pub(crate) fn at_sync(&mut self, now: Duration) -> u32 {
-        if self.last_sync.replace(now).is_none() {
-            return self.catch_up(now);
-        }
-        self.reached = now;
+        let passed = self.look(now);
+        let Some(silence) = self.silence.replace(Duration::ZERO) else {
+            return self.take(passed);
+        };
+        let is_regular = silence + passed < self.loose();
+        self.n_in_step = if is_regular { self.n_in_step.saturating_add(1) } else { 0 };
+        self.owed = Duration::ZERO;
         whole(self.cycle, self.step)
     }
 
     /// Steps to take at `now` when no SYNC has come: none while locked.
     pub(crate) fn idle(&mut self, now: Duration) -> u32 {
-        if let Some(last) = self.last_sync {
-            if now.saturating_sub(last) < self.cycle * LOST_AFTER {
-                return 0;
-            }
-            self.last_sync = None;
+        let passed = self.look(now);
+        let Some(silence) = self.silence else { return self.take(passed) };
+        let silence = silence + passed;
+        let most = if self.n_in_step >= IN_STEP { self.patience } else { self.loose() };
+        let is_lost = silence >= most;
+        self.silence = (!is_lost).then_some(silence);
+        if is_lost {
+            self.n_in_step = 0;
         }
-        self.catch_up(now)
+        0
     }
 
-    fn catch_up(&mut self, now: Duration) -> u32 {
-        let n_steps = whole(now.saturating_sub(self.reached), self.step);
-        self.reached += self.step * n_steps;
+    fn loose(&self) -> Duration {
+        (self.cycle * LOOSE_CYCLES).min(self.patience)
+    }
+
+    /// The time that has passed since the last look, as far as this process was awake.
+    fn look(&mut self, now: Duration) -> Duration {
+        let passed = now.saturating_sub(self.looked).min(LOOK_MAX);
+        self.looked = now;
+        passed
+    }
+
+    fn take(&mut self, passed: Duration) -> u32 {
+        self.owed += passed;
+        let n_steps = whole(self.owed, self.step);
+        self.owed -= self.step * n_steps;
         n_steps
     }
 }
@@ -66,10 +107,15 @@ mod tests {
     const CYCLE: Duration = Duration::from_millis(2);
     const STEP: Duration = Duration::from_micros(250);
     const STEPS: u32 = 8;
+    const PATIENCE: Duration = Duration::from_secs(1);
+
+    fn clock() -> DriveClock {
+        DriveClock::new(CYCLE, STEP, PATIENCE)
+    }
 
     /// A clock that has seen a SYNC at every cycle up to and including number `n`.
     fn locked(n: u32) -> DriveClock {
-        let mut clock = DriveClock::new(CYCLE, STEP);
+        let mut clock = clock();
         clock.at_sync(Duration::ZERO);
         for k in 1..=n {
             assert_eq!(clock.at_sync(CYCLE * k), STEPS);
@@ -77,9 +123,20 @@ mod tests {
         clock
     }
 
+    /// Looks once a millisecond for a while, and returns the steps given and the time at the end.
+    fn watch(clock: &mut DriveClock, from: Duration, span: Duration) -> (u32, Duration) {
+        let mut n_steps = 0;
+        let mut now = from;
+        while now < from + span {
+            now += Duration::from_millis(1);
+            n_steps += clock.idle(now);
+        }
+        (n_steps, now)
+    }
+
     #[test]
     fn without_sync_the_wall_clock_rules() {
-        let mut clock = DriveClock::new(CYCLE, STEP);
+        let mut clock = clock();
         assert_eq!(clock.idle(Duration::from_micros(600)), 2);
         assert_eq!(clock.idle(Duration::from_micros(700)), 0);
         assert_eq!(clock.idle(Duration::from_millis(1)), 2);
@@ -97,18 +154,50 @@ mod tests {
 
     #[test]
     fn a_controller_that_stalls_stalls_the_plant() {
-        let mut clock = locked(10);
-        assert_eq!(clock.idle(CYCLE * 13), 0);
-        assert_eq!(clock.at_sync(CYCLE * 14), STEPS);
+        for stall_ms in [20, 38, 100, 300, 900] {
+            let mut clock = locked(20);
+            let (n_steps, now) = watch(&mut clock, CYCLE * 20, Duration::from_millis(stall_ms));
+            assert_eq!((n_steps, clock.at_sync(now + CYCLE)), (0, STEPS), "{stall_ms} ms");
+        }
     }
 
     #[test]
-    fn when_sync_stays_away_time_goes_on() {
-        let mut clock = locked(10);
-        let lost = 10 + LOST_AFTER;
-        assert_eq!(clock.idle(CYCLE * (lost - 1)), 0);
-        assert_eq!(clock.idle(CYCLE * (lost + 1)), (LOST_AFTER + 1) * STEPS);
-        assert_eq!(clock.idle(CYCLE * (lost + 2)), STEPS);
-        assert_eq!(clock.at_sync(CYCLE * (lost + 3)), STEPS);
+    fn drives_that_stall_themselves_do_not_miss_what_lies_in_the_socket() {
+        for stall_ms in [20, 38, 100, 300, 5000] {
+            let mut clock = locked(20);
+            let woken = CYCLE * 20 + Duration::from_millis(stall_ms);
+            // The first frames to be seen are commands, and then comes the first SYNC of many.
+            assert_eq!(clock.idle(woken), 0, "{stall_ms} ms");
+            assert_eq!(clock.idle(woken), 0, "{stall_ms} ms");
+            assert_eq!(clock.at_sync(woken), STEPS, "{stall_ms} ms");
+        }
+    }
+
+    #[test]
+    fn when_sync_stays_away_for_good_time_goes_on_from_then() {
+        let mut clock = locked(20);
+        let (n_steps, now) = watch(&mut clock, CYCLE * 20, PATIENCE);
+        assert_eq!(n_steps, 0, "what stood still is not made up for");
+        let (n_steps, now) = watch(&mut clock, now, Duration::from_millis(40));
+        assert_eq!(n_steps, 20 * STEPS);
+        assert_eq!(clock.at_sync(now + CYCLE), STEPS);
+    }
+
+    #[test]
+    fn syncs_sent_by_hand_leave_the_time_between_them_to_the_wall_clock() {
+        let mut clock = clock();
+        let mut now = Duration::ZERO;
+        for _ in 0..5 {
+            clock.at_sync(now);
+            let (n_steps, later) = watch(&mut clock, now, Duration::from_millis(200));
+            assert_eq!(n_steps, 170 * 4, "30 ms of 200 are waited for the next SYNC");
+            now = later;
+        }
+    }
+
+    #[test]
+    fn a_stall_without_sync_is_not_run_through_at_once() {
+        let mut clock = clock();
+        assert_eq!(clock.idle(Duration::from_secs(5)), whole(LOOK_MAX, STEP));
     }
 }

@@ -208,6 +208,18 @@ impl Machine {
         self.axes.iter().find(|axis| axis.drive.node() == node).map(|axis| axis.drive.state())
     }
 
+    /// Whether any drive has power over its axis, so that it may move.
+    pub fn is_energised(&self) -> bool {
+        self.axes.iter().any(|axis| {
+            let state = axis.drive.state();
+            !axis.is_muted
+                && matches!(
+                    state,
+                    State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive
+                )
+        })
+    }
+
     /// Objects of `node`, if there is one.
     pub fn dictionary(&self, node: NodeId) -> Option<&Dictionary> {
         let tool = self.tool.iter().map(|tool| (tool.encoder.node(), tool.encoder.dictionary()));

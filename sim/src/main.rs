@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{Parser, Subcommand};
 use ilc_rt::cli::refusal_line;
@@ -15,7 +16,7 @@ mod drive_clock;
 mod presence;
 mod run;
 
-use run::Mute;
+use run::{Habits, Mute};
 
 /// Simulated CiA 402 drives that speak the real protocol.
 #[derive(Debug, Parser)]
@@ -48,6 +49,14 @@ enum Verb {
         /// Take the power from a node after some time; may be given more than once.
         #[arg(long, value_name = "NODE@SECONDS")]
         mute: Vec<Mute>,
+        /// Silence on the bus, in seconds, after which SYNC counts as lost and the drives' time goes on
+        /// by itself; until then a controller that stalls stalls the plant.
+        #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+        sync_lost_after: Duration,
+        /// End when standard input closes, as it does when the program that started this one ends: the
+        /// axes come to rest first.
+        #[arg(long)]
+        with_parent: bool,
     },
     /// Prints the electronic data sheet (EDS) of a node.
     Eds {
@@ -86,12 +95,14 @@ fn main() -> ExitCode {
 
 fn carry_out(verb: Verb) -> Result<(), Failure> {
     match verb {
-        Verb::Run { cell, bus, lockstep, mute } => run(&cell, bus, lockstep, &mute),
+        Verb::Run { cell, bus, lockstep, mute, sync_lost_after, with_parent } => {
+            run(&cell, bus, lockstep, &Habits { sync_lost_after, mutes: mute, with_parent })
+        }
         Verb::Eds { cell, node } => print_eds(&cell, node),
     }
 }
 
-fn run(path: &Path, bus: Option<String>, lockstep: bool, mute: &[Mute]) -> Result<(), Failure> {
+fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Result<(), Failure> {
     let cell = load(path)?;
     let address = bus.unwrap_or_else(|| cell.bus.address.clone());
     if address.starts_with("loopback:") {
@@ -102,15 +113,23 @@ fn run(path: &Path, bus: Option<String>, lockstep: bool, mute: &[Mute]) -> Resul
     }
     let clock = if lockstep { ClockMode::LockStep } else { ClockMode::RealTime };
     let machine = machine(&cell, clock)?;
-    for mute in mute {
+    for mute in &habits.mutes {
         require_node(&machine, mute.node, "--mute")?;
     }
     let bus = ilc_rt::fieldbus::transport::open(&address)
         .map_err(|error| Failure::Input(error.to_string()))?;
-    run::run(&cell, machine, bus, &address, clock, mute).map_err(|error| match error {
+    run::run(&cell, machine, bus, &address, clock, habits).map_err(|error| match error {
         run::RunError::Taken { .. } => Failure::Input(error.to_string()),
         error => Failure::Broken(error.to_string()),
     })
+}
+
+/// Reads a span between a millisecond and a minute.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let refused = || format!("{text}: allowed 0.001 to 60");
+    let span = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    let range = Duration::from_millis(1)..=Duration::from_secs(60);
+    span.filter(|span| range.contains(span)).ok_or_else(refused)
 }
 
 fn print_eds(path: &Path, node: u8) -> Result<(), Failure> {

@@ -13,8 +13,8 @@ use ilc_rt::fieldbus::{Bus, BusError, Frame};
 
 /// How long is listened: drives under way send in every cycle, and a heartbeat every 100 ms.
 const LISTEN: Duration = Duration::from_millis(150);
-/// How long a master is listened for: the longest servo cycle twice.
-const MASTER: Duration = Duration::from_millis(50);
+/// How long a master is listened for: the longest servo cycle, and some more.
+const MASTER: Duration = Duration::from_millis(120);
 /// How long an idle node may take to answer.
 const ANSWER: Duration = Duration::from_millis(150);
 

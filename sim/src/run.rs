@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use ilc_rt::cli::when_parent_ends;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NodeId, sync};
 use ilc_rt::fieldbus::transport::Responder;
@@ -43,12 +44,51 @@ impl FromStr for Mute {
     }
 }
 
+/// How long axes that lost their controller must have been at rest before the drives end.
+const REST: Duration = Duration::from_millis(300);
+/// When the drives end in any case after the program that started them is gone.
+const ORPHAN_MAX: Duration = Duration::from_secs(10);
+
+/// Drives whose parent is gone, and when they may go as well.
+#[derive(Debug, Default)]
+struct Orphan {
+    since: Option<Duration>,
+    moved: Option<Duration>,
+}
+
+impl Orphan {
+    /// Whether to end now: the axes have been at rest for a while, as the controller has stopped them or
+    /// the drives have, missing its commands.
+    fn is_over(&mut self, now: Duration, is_energised: bool) -> bool {
+        let since = *self.since.get_or_insert(now);
+        let moved = self.moved.get_or_insert(now);
+        if is_energised {
+            *moved = now;
+        }
+        now.saturating_sub(*moved) >= REST || now.saturating_sub(since) >= ORPHAN_MAX
+    }
+}
+
+/// What the machine shall do beyond what its cell says.
+#[derive(Clone, Debug)]
+pub(crate) struct Habits {
+    /// Silence after which SYNC counts as lost and time goes on by itself.
+    pub(crate) sync_lost_after: Duration,
+    /// Nodes that are to lose their power.
+    pub(crate) mutes: Vec<Mute>,
+    /// Whether to end, when the axes are at rest, once standard input closes.
+    pub(crate) with_parent: bool,
+}
+
 /// Why the machine cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunError {
     /// The bus failed.
     #[error("{address}: {source}")]
     Bus { address: String, source: BusError },
+    /// The thread that watches standard input cannot be started.
+    #[error("no thread to watch standard input: {0}")]
+    Thread(std::io::Error),
     /// The nodes are there already.
     #[error(
         "{address}: node {node} is on this bus already; another ilc-sim, or a real drive, has this \
@@ -85,7 +125,7 @@ pub(crate) fn run(
     bus: Box<dyn Bus>,
     address: &str,
     clock: ClockMode,
-    mutes: &[Mute],
+    habits: &Habits,
 ) -> Result<(), RunError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
@@ -98,16 +138,24 @@ pub(crate) fn run(
         return Err(RunError::Taken { address: address.to_owned(), node });
     }
     let mut outlet = Outlet { bus, n_sent: 0, n_dropped: 0, broken: None };
-    let mut mutes = mutes.to_vec();
+    let mut mutes = habits.mutes.clone();
     let start = Instant::now();
     let mut drive_clock = DriveClock::new(
         Duration::from_micros(cell.cell.cycle_us.into()),
         Duration::from_micros(machine.step_us().into()),
+        habits.sync_lost_after,
     );
     if clock == ClockMode::RealTime {
         // What is refused only makes the drives less punctual; the controller tells of its own rights.
         let _ = thread::enter(RtRequest { priority: PRIORITY, lock_memory: true });
     }
+    let is_orphan = Arc::new(AtomicBool::new(false));
+    if habits.with_parent {
+        let is_orphan = Arc::clone(&is_orphan);
+        when_parent_ends(move || is_orphan.store(true, Ordering::Relaxed))
+            .map_err(RunError::Thread)?;
+    }
+    let mut orphan = Orphan::default();
     let mut n_syncs = 0_u64;
     print(&ready(cell, address, clock));
     machine.boot(&mut |frame| outlet.send(frame));
@@ -134,6 +182,9 @@ pub(crate) fn run(
         });
         while let Some(event) = machine.take_event() {
             print(&event.to_string());
+        }
+        if is_orphan.load(Ordering::Relaxed) && orphan.is_over(elapsed, machine.is_energised()) {
+            break;
         }
         if let Some(error) = outlet.broken {
             return Err(failed(error));
@@ -181,4 +232,22 @@ fn summary(
 /// Prints a line. A reader who has gone must not stop the drives.
 fn print(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orphans_end_when_their_axes_have_been_at_rest_and_in_any_case() {
+        let ms = Duration::from_millis;
+        let mut orphan = Orphan::default();
+        assert!(!orphan.is_over(ms(1000), true));
+        assert!(!orphan.is_over(ms(2000), true));
+        assert!(!orphan.is_over(ms(2299), false));
+        assert!(orphan.is_over(ms(2300), false));
+        let mut stuck = Orphan::default();
+        assert!(!stuck.is_over(ms(0), true) && !stuck.is_over(ms(9999), true));
+        assert!(stuck.is_over(ms(10_000), true));
+    }
 }

@@ -5,9 +5,10 @@ Run it by itself for as long as wanted, with any seed::
     python tests/fuzz/border.py --seconds 60 --seed 7
 
 Calls are made in another process, with bounded memory, and watched. What is drawn are the
-arguments: mostly right ones, of which one or two are replaced by something else. A call may succeed
-or raise `ValueError` (which every error of the package is), `TypeError`, `MemoryError` or `OSError`;
-what it returns holds no number that is not finite. Exits 1 with the calls that broke a rule.
+arguments: mostly right ones, of which one or two are replaced by something else. A call may
+succeed or raise `ValueError` (which every error of the package is), `TypeError`, `MemoryError`
+or `OSError`; what it returns holds no number that is not finite. Exits 1 with the calls that
+broke a rule.
 """
 
 from __future__ import annotations

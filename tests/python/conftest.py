@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import settings
 
 from ilc_rt import Campaign, controllers, processes
 
@@ -21,6 +22,12 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 GANTRY = ROOT / "examples" / "01_gantry.toml"
+
+# A change is judged by fixed problems: every run draws the same examples. `make fuzz` names another
+# seed (and hands it to Hypothesis too); what it finds becomes an `@example` of the test.
+settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
+settings.register_profile("fuzz", deadline=None, database=None, print_blob=True)
+settings.load_profile("fuzz" if "ILC_FUZZ_SEED" in os.environ else "fixed")
 
 
 def pytest_sessionstart() -> None:

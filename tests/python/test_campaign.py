@@ -230,7 +230,7 @@ def test_arguments_reach_the_controller(
     list(campaign.run(5))
     said = (tmp_path / "argv").read_text()
     assert said == str(
-        ["run", str(gantry), "--events", "--iterations", "5", "--library", "l.db",
+        ["run", str(gantry), "--events", "--with-parent", "--iterations", "5", "--library", "l.db",
          "--measure", "encoder", "--resume", "--bus", "udp:239.1.1.1", "--lockstep"]
     )  # fmt: skip
 
@@ -418,6 +418,7 @@ def test_no_runs_are_refused(gantry: Path, tmp_path: Path) -> None:
 def test_missing_programs_say_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """One line with the remedy."""
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setattr("sysconfig.get_path", lambda *_: str(tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(CampaignError, match="make build"):
         processes.find_program("ilc-rt")

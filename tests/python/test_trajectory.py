@@ -297,3 +297,61 @@ def test_what_no_alpha_holds_is_refused_with_the_limit():
 def test_a_part_program_is_refused_with_its_line():
     with pytest.raises(TrajectoryError, match="line 2: G33: allowed G0 G1"):
         trajectory.gcode("G1 X1\nG33 X2", start_m=[0.0], feed_m_s=0.05, dt_s=0.001, **LIMITS)
+
+
+FAST = {"velocity_max_m_s": 0.5, "acceleration_max_m_s2": 8.0, "jerk_max_m_s3": 1000.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "start_m", "centre_m", "length_m"),
+    [
+        ("G3 X9.999 Y-0.001 I-10 J0 F1200", [0.01, 0.0], (0.0, 0.0), 0.06283),
+        ("G3 X10.001 Y-0.1 I-10 J0", [0.01, 0.0], (0.0, 0.0), 0.06273),
+        ("G2 X0.001 Y-0.001 I5 J0", [0.0, 0.0], (0.005, 0.0), 0.03141),
+    ],
+)
+def test_an_arc_keeps_its_centre_however_near_its_ends_are(text, start_m, centre_m, length_m):
+    path = trajectory.gcode(text, start_m=start_m, feed_m_s=0.05, dt_s=0.002, **FAST)
+    radius = np.hypot(*(path.position_m - centre_m).T)
+    assert abs(radius - radius[0]).max() <= 2e-6
+    length = np.hypot(*np.diff(path.position_m, axis=0).T).sum()
+    assert length == pytest.approx(length_m, abs=1e-5)
+
+
+TURNING = {
+    "one axis": [0.0, 0.05, 0.02],
+    "one line": [[0.0, 0.0], [0.05, 0.0], [0.02, 0.0], [0.08, 0.0]],
+    "almost one line": [[0.0, 0.0], [0.05, 1e-6], [0.02, 0.0], [0.08, 0.0]],
+    "by symmetry": [0.0, 0.05, 0.0],
+    "three axes": [[0.0, 0.0, 0.0], [0.05, 0.05, 0.1], [0.02, 0.02, 0.04]],
+}
+
+
+@pytest.mark.parametrize("points", TURNING)
+@pytest.mark.parametrize("dt_s", [1e-3, 1e-2])
+def test_a_spline_that_turns_back_holds_every_limit(points, dt_s):
+    limits = {"velocity_max_m_s": 0.2, "acceleration_max_m_s2": 2.0, "jerk_max_m_s3": 50.0}
+    path = trajectory.spline(TURNING[points], feed_m_s=0.1, dt_s=dt_s, **limits)
+    p = path.position_m
+    p = np.concatenate((p[:1], p[:1], p, p[-1:], p[-1:], p[-1:]))
+    for order, key in enumerate(limits, 1):
+        differences = np.diff(p, order, axis=0) / dt_s**order
+        assert abs(differences).max() <= limits[key] * (1 + 1e-9) + 1e-14 / dt_s**order
+    for points_m in np.atleast_2d(np.array(TURNING[points]).T).T:
+        assert abs(path.position_m - points_m).max(axis=1).min() < 2e-4
+    assert path.t_s[-1] < 4.0
+
+
+def test_a_part_program_may_be_bytes_in_any_encoding_and_leave_blocks_out():
+    def end(text, **more):
+        path = trajectory.gcode(text, start_m=[0.0], feed_m_s=0.05, dt_s=0.001, **FAST, **more)
+        return path.position_m[-1].item()
+
+    text = b"G20. (sp\xe4t)\nG1 X 1 F60\n/X2\n"
+    assert end(text) == pytest.approx(0.0508)
+    assert end(text, block_delete=True) == pytest.approx(0.0254)
+    assert end("%\nG1 X10 F600\n%\nG1 X50") == pytest.approx(0.01)
+    with pytest.raises(TrajectoryError, match=r"line 1: \(oops: a comment ends with \)"):
+        end("G1 X5 (oops\nX7")
+    with pytest.raises(TypeError):
+        end(5)

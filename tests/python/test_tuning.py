@@ -50,17 +50,13 @@ def test_the_cell_of_the_demo_gets_what_the_first_example_gets():
     assert demo.weights == propose_weights(GANTRY).weights
 
 
-def test_ten_other_cells_learn_with_what_is_proposed(tmp_path):
-    left = []
-    for seed in range(10):
-        path = tmp_path / f"cell{seed}.toml"
-        path.write_text(other_cell(seed), encoding="utf-8")
-        found = propose_weights(path, **README)
-        found.write(path)
-        contour, _ = learn(path, tmp_path / f"{seed}.db")
-        left.append(contour[-1] / contour[0])
-    assert max(left) < 1.0, left
-    assert sum(share <= 0.3 for share in left) >= 9, left
+@pytest.mark.parametrize("seed", range(10))
+def test_another_cell_learns_with_what_is_proposed(seed, tmp_path):
+    path = tmp_path / "cell.toml"
+    path.write_text(other_cell(seed), encoding="utf-8")
+    assert propose_weights(path, **README).write(path)
+    contour, _ = learn(path, tmp_path / "runs.db")
+    assert contour[-1] < 0.3 * contour[0]
 
 
 @pytest.mark.parametrize("cell", SHIPPED)

@@ -130,6 +130,9 @@ impl Drop for EventStream {
 /// disturbance : callable or None
 ///     Called with the number of each run before it begins; returns its
 ///     disturbance, a number or an array of shape (n_disturbances,).
+/// simulated : bool
+///     Whether the drives are simulated on this computer, so that a stall of it
+///     stalls them as well and is forgiven for longer.
 ///
 /// Returns
 /// -------
@@ -142,7 +145,7 @@ impl Drop for EventStream {
 ///     From the iterator, before anything moves, if something cannot be used.
 #[pyfunction]
 #[pyo3(signature = (cell, iterations, library, bus=None, measure=None, lockstep=true, resume=false, law=None,
-    learning=true, experiment=None, disturbance=None))]
+    learning=true, experiment=None, disturbance=None, simulated=false))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
 fn run_events(
     cell: &Bound<'_, PyCell>,
@@ -156,6 +159,7 @@ fn run_events(
     learning: bool,
     experiment: Option<&Bound<'_, PyAny>>,
     disturbance: Option<Py<PyAny>>,
+    simulated: bool,
 ) -> PyResult<EventStream> {
     let mut cell: Cell = cell.get().cell.clone();
     if let Some(address) = bus {
@@ -181,6 +185,7 @@ fn run_events(
         iterations,
         measure,
         lockstep,
+        simulated,
         resume,
         library,
         disturbance: disturbance.map_or_else(Disturbance::default, ask),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use ilc_rt::library::{Library, Row, Task};
+use ilc_rt::library::{Library, LibraryError, Row, Task};
 use ilc_rt::record::{AxisKinds, Figures, IterationRecord, Meta, distances_m, fingerprint};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -15,17 +15,27 @@ use crate::error::OrRaise;
 use crate::made::{Made, made};
 use crate::whole;
 
+/// Longest name of a cell, a campaign or a law.
+const NAME_MAX: usize = 200;
+
 /// Every run of every campaign, in one SQLite file.
 ///
 /// Parameters
 /// ----------
 /// path : str or os.PathLike
-///     The file; it is made if it is not there.
+///     The file; it is made if it is not there. ``:memory:`` is a library in
+///     memory. The name is never taken for an address.
 ///
 /// Raises
 /// ------
 /// OSError
-///     If the file cannot be opened or is no library.
+///     If the file cannot be opened or is no library; it is left as it is.
+///
+/// Notes
+/// -----
+/// What reads opens the file for reading only, and for no longer than that: a
+/// library that cannot be written is read all the same, and nothing is left
+/// beside it.
 ///
 /// Examples
 /// --------
@@ -36,7 +46,16 @@ use crate::whole;
 #[derive(Debug)]
 pub(crate) struct PyLibrary {
     made: Made,
-    library: Mutex<Library>,
+    held: Held,
+}
+
+/// Where the runs are.
+#[derive(Debug)]
+enum Held {
+    /// In memory, for as long as this object lives.
+    Memory(Box<Mutex<Library>>),
+    /// In a file, which is opened for each thing that is done.
+    File(PathBuf),
 }
 
 #[pymethods]
@@ -45,7 +64,19 @@ impl PyLibrary {
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(path: PathBuf) -> PyResult<Self> {
         let made = made!(path);
-        Ok(Self { made, library: Mutex::new(Library::open(&path).or_raise()?) })
+        if path.as_os_str() == ":memory:" {
+            let library = Library::in_memory().or_raise()?;
+            return Ok(Self { made, held: Held::Memory(Box::new(Mutex::new(library))) });
+        }
+        match Library::read(&path) {
+            Ok(_) => {}
+            // A new file is made at once, so that a name that cannot be used is refused here.
+            Err(LibraryError::Missing { .. } | LibraryError::Empty { .. }) => {
+                Library::open(&path).or_raise()?;
+            }
+            refused @ Err(_) => drop(refused.or_raise()?),
+        }
+        Ok(Self { made, held: Held::File(path) })
     }
 
     /// Pickled and copied as the call that made it.
@@ -73,7 +104,7 @@ impl PyLibrary {
     ///     If the file cannot be read.
     #[pyo3(signature = (cell=None))]
     fn list<'py>(&self, py: Python<'py>, cell: Option<&str>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let rows = detached(py, || self.lock().list(None)).or_raise()?;
+        let rows = detached(py, || self.read(|library| library.list(None))).or_raise()?;
         rows.iter()
             .filter(|row| cell.is_none_or(|name| row.meta.cell == name))
             .map(|row| describe(py, row))
@@ -105,7 +136,7 @@ impl PyLibrary {
         py: Python<'py>,
         #[pyo3(from_py_with = whole::id)] id: i64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let row = detached(py, || self.lock().load(id)).or_raise()?;
+        let row = detached(py, || self.read(|library| library.load(id))).or_raise()?;
         let run = describe(py, &row)?;
         let n_axes = row.meta.n_axes;
         let record = row.record;
@@ -161,7 +192,8 @@ impl PyLibrary {
     ) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let disturbance = read_disturbance("disturbance", disturbance)?;
         let task = Task { cell };
-        let found = detached(py, || self.lock().recall(&disturbance, top, &task)).or_raise()?;
+        let found = detached(py, || self.read(|library| library.recall(&disturbance, top, &task)))
+            .or_raise()?;
         found
             .iter()
             .map(|near| {
@@ -185,7 +217,9 @@ impl PyLibrary {
     /// disturbance : float, array_like of float64 or None
     ///     The disturbance it was made under, shape (n_disturbances,).
     /// reference_m : ndarray of float64 or None
-    ///     Its set points in m, same shape as `u`; None: zero.
+    ///     Its set points in m, same shape as `u`; None: zero, so that its path is
+    ///     one point. The contour error is the distance to the path near the same
+    ///     time.
     /// cell, campaign, law : str
     ///     Names; its number follows the last one of the campaign.
     ///
@@ -198,7 +232,7 @@ impl PyLibrary {
     /// ------
     /// ValueError, TypeError
     ///     If an array has the wrong shape, dtype or a number that is not finite,
-    ///     or cycle_s is not above 0.
+    ///     cycle_s is not above 0, or a name is empty or has control characters.
     /// OSError
     ///     If the file cannot be written.
     ///
@@ -248,6 +282,21 @@ impl PyLibrary {
             None => Vec::new(),
         };
         let n_axes = u.n_channels;
+        if u.n_samples == 0 || n_axes == 0 {
+            let line =
+                format!("u has shape {}: at least one sample of one axis is needed", u.shape());
+            return Err(PyValueError::new_err(line));
+        }
+        for (key, name) in [("cell", cell), ("campaign", campaign), ("law", law)] {
+            if name.is_empty() || name.len() > NAME_MAX || name.chars().any(char::is_control) {
+                let line = format!(
+                    "{key} = {}: 1 to {NAME_MAX} bytes without control characters are allowed",
+                    name.chars().take(40).collect::<String>().escape_debug()
+                );
+                return Err(PyValueError::new_err(line));
+            }
+        }
+        let encoder_m: Vec<f64> = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
         let meta = Meta {
             cell: cell.to_owned(),
             campaign: campaign.to_owned(),
@@ -261,7 +310,6 @@ impl PyLibrary {
             axis_names: (1..=n_axes).map(|axis| format!("axis {axis}")).collect(),
             input_units: vec!["m".to_owned(); n_axes],
         };
-        let encoder_m: Vec<f64> = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
         let kinds = AxisKinds::new(&meta.input_units, n_axes);
         let contour_m = distances_m(&reference_m, &encoder_m, &kinds, cycle_s);
         let mut figures = Figures::default();
@@ -269,21 +317,28 @@ impl PyLibrary {
         figures.set_places(&reference_m, &encoder_m, &[], &kinds);
         figures.set_contour(&contour_m);
         let input = u.values;
+        let told = [figures.tracking_inf_m, figures.tracking_rms_m, figures.encoder_tracking_inf_m];
+        let contour = [figures.contour_inf_m, figures.contour_rms_m];
+        if told.iter().chain(contour.iter().flatten()).any(|figure| !figure.is_finite()) {
+            let line = "e or reference_m is too large: the figures of this run are not finite";
+            return Err(PyValueError::new_err(line));
+        }
         detached(py, || {
-            let library = self.lock();
-            let index = library.next_index(campaign)?;
-            let record = IterationRecord {
-                index,
-                reference_m,
-                input,
-                encoder_m,
-                tool_m: Vec::new(),
-                error_m,
-                contour_m,
-                disturbance,
-                figures,
-            };
-            library.append(&meta, &record)
+            self.write(|library| {
+                let index = library.next_index(campaign)?;
+                let record = IterationRecord {
+                    index,
+                    reference_m,
+                    input,
+                    encoder_m,
+                    tool_m: Vec::new(),
+                    error_m,
+                    contour_m,
+                    disturbance,
+                    figures,
+                };
+                library.append(&meta, &record)
+            })
         })
         .or_raise()
     }
@@ -306,13 +361,14 @@ impl PyLibrary {
     /// ------
     /// OSError
     ///     If the file cannot be written, or the runs have different numbers of
-    ///     disturbances; nothing is deleted then.
+    ///     disturbances (nothing is deleted then), or the file could not be made
+    ///     smaller.
     ///
     /// Notes
     /// -----
     /// The relevance of DPW-ILC with RMS error and disturbance in units of their
     /// spread over these runs, summed over the disturbances of all of them; without
-    /// disturbances the smallest errors stay. The space in the file is used again.
+    /// disturbances the smallest errors stay. The file becomes smaller.
     #[pyo3(signature = (keep, cell=None))]
     fn trim(
         &self,
@@ -321,7 +377,7 @@ impl PyLibrary {
         cell: Option<String>,
     ) -> PyResult<usize> {
         let task = Task { cell };
-        detached(py, || self.lock().trim(keep, &task)).or_raise()
+        detached(py, || self.write(|library| library.trim(keep, &task))).or_raise()
     }
 
     /// Write one run to a file: ``.npz``, ``.csv`` or ``.json`` by its ending.
@@ -351,8 +407,26 @@ impl PyLibrary {
 }
 
 impl PyLibrary {
-    pub(crate) fn lock(&self) -> std::sync::MutexGuard<'_, Library> {
-        self.library.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Reads from the library.
+    pub(crate) fn read<T>(
+        &self,
+        work: impl FnOnce(&Library) -> Result<T, LibraryError>,
+    ) -> Result<T, LibraryError> {
+        match &self.held {
+            Held::Memory(library) => work(&library.lock().unwrap_or_else(PoisonError::into_inner)),
+            Held::File(path) => work(&Library::read(path)?),
+        }
+    }
+
+    /// Writes to the library.
+    fn write<T>(
+        &self,
+        work: impl FnOnce(&Library) -> Result<T, LibraryError>,
+    ) -> Result<T, LibraryError> {
+        match &self.held {
+            Held::Memory(library) => work(&library.lock().unwrap_or_else(PoisonError::into_inner)),
+            Held::File(path) => work(&Library::open(path)?),
+        }
     }
 }
 

@@ -236,7 +236,7 @@ fn sample_linear(
     let motion = SampledMotion::sample(plan.duration_s(), dt_s, plan.n_axes(), |t_s| {
         (plan.at(t_s), plan.programmed_m(t_s))
     })?;
-    Ok((motion, Vec::new()))
+    Ok((motion.verified(limits)?, Vec::new()))
 }
 
 fn sample_exponential(
@@ -258,7 +258,7 @@ fn sample_exponential(
             (choice.segment, choice.place.to_owned(), choice.alpha, intervals)
         })
         .collect();
-    Ok((motion, alphas))
+    Ok((motion.verified(limits)?, alphas))
 }
 
 fn sample_run(

@@ -21,6 +21,8 @@ from ilc_rt.commands.options import (
 from ilc_rt.commands.run import carry_out
 from ilc_rt.commands.targets import report_target
 
+RESTARTS = 3
+
 ReportFile = Annotated[
     Path,
     typer.Option("--report", metavar="PATH", callback=report_target, help="The HTML report."),
@@ -41,4 +43,5 @@ def demo(
     """
     with resources.as_file(resources.files("ilc_rt").joinpath("data/gantry.toml")) as cell:
         campaign = Campaign(cell, library=library, bus=bus, lockstep=lockstep, drives="simulated")
-        carry_out(campaign, iterations, json_file, report)
+        # Nothing real moves here: what stops the axes is this computer, and it may recover.
+        carry_out(campaign, iterations, json_file, report, restarts=RESTARTS)

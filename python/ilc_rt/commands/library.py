@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,11 +24,22 @@ from ilc_rt.commands.options import (
 from ilc_rt.errors import BadInputError
 from ilc_rt.export import export_run
 from ilc_rt.quantity import unit_for
-from ilc_rt.result import library_rows
+from ilc_rt.result import STANDARD_OUTPUT, json_text, library_rows, write_text
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+# The last ones are shown if there is room for them; the campaign's name says when it began.
+COLUMNS = (
+    "id", "campaign", "run", "cell", "law", "max tracking", "max contour",
+    "learned from", "note", "created (UTC)",
+)  # fmt: skip
+N_NARROW = 7
+RIGHT = ("id", "run", "max tracking", "max contour")
+SHORTENED = (COLUMNS.index("cell"), COLUMNS.index("law"))
+SHORTEST = 6
+WIDE = 140
 
 app = Typer(
     no_args_is_help=True,
@@ -42,6 +57,14 @@ CampaignOption = Annotated[
 Keep = Annotated[
     int, typer.Argument(min=0, max=2**63 - 1, metavar="KEEP", help="How many runs stay.")
 ]
+JsonRows = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write the runs as JSON; - is standard output."),
+]
+CsvRows = Annotated[
+    Path | None,
+    typer.Option("--csv", metavar="FILE", help="Write the runs as CSV; - is standard output."),
+]
 ExportFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="The file; .npz, .csv or .json says the format.")
 ]
@@ -52,6 +75,8 @@ def list_runs(
     library: LibraryArgument = DEFAULT_LIBRARY_FILE,
     cell: CellName = None,
     campaign: CampaignOption = None,
+    json_file: JsonRows = None,
+    csv_file: CsvRows = None,
 ) -> None:
     """List the runs, one a line.
 
@@ -60,22 +85,65 @@ def list_runs(
     rows = library_rows(library, cell)
     if campaign is not None:
         rows = [row for row in rows if str(row["campaign"]).startswith(campaign)]
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("id", "campaign", "cell", "run", "law", "learned from", "max tracking",
-                 "max contour", "note", "created (UTC)"):  # fmt: skip
-        right = name in {"id", "run"} or name.startswith("max")
-        table.add_column(name, justify="right" if right else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(
-            str(row["id"]), printable(row["campaign"]), printable(row["cell"]), str(row["index"]),
-            printable(row["law"]), printable(row["measure"]), error_text(row, "tracking_inf_m"),
-            error_text(row, "contour_inf_m"), note(row), printable(row["created_utc"]),
-        )  # fmt: skip
+    if json_file is not None:
+        write_text(json_file, json_text(rows))
+    if csv_file is not None:
+        write_text(csv_file, _csv(rows))
+    if STANDARD_OUTPUT in {json_file, csv_file}:
+        return
     console = Console(highlight=False, markup=False, emoji=False)
-    if not console.is_terminal:
-        console.width = 200
-    console.print(table)
-    console.print(f"{len(rows)} run{'' if len(rows) == 1 else 's'} in {library}")
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = WIDE
+    console.print(_table(rows, console.width))
+    console.print(f"{len(rows)} run{'' if len(rows) == 1 else 's'} in {library}", soft_wrap=True)
+
+
+def _table(rows: list[dict[str, Any]], width: int) -> Table:
+    """Return the runs as a table; what `show` and `export` need is there at any width."""
+    texts = [
+        (
+            str(row["id"]), printable(row["campaign"]), str(row["index"]), printable(row["cell"]),
+            printable(row["law"]), error_text(row, "tracking_inf_m"),
+            error_text(row, "contour_inf_m"), printable(row["measure"]), note(row),
+            printable(row["created_utc"]),
+        )
+        for row in rows
+    ]  # fmt: skip
+    count = len(COLUMNS) if width >= WIDE else N_NARROW
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 0))
+    names = COLUMNS[:count]
+    wanted = [
+        max([len(name), *(len(text[column]) for text in texts)])
+        for column, name in enumerate(names)
+    ]
+    # Names give way, the longest first; a column is followed by two blanks.
+    excess = sum(wanted) + 2 * count - width
+    for column in sorted(SHORTENED, key=lambda column: -wanted[column]):
+        cut = max(0, min(excess, wanted[column] - SHORTEST))
+        wanted[column] -= cut
+        excess -= cut
+    for name, size in zip(names, wanted, strict=True):
+        right = name in RIGHT
+        table.add_column(
+            name, justify="right" if right else "left", no_wrap=True, width=size,
+            overflow="ellipsis",
+        )  # fmt: skip
+    for text in texts:
+        table.add_row(*text[:count])
+    return table
+
+
+def _csv(rows: list[dict[str, Any]]) -> str:
+    """Return the runs as CSV; lists within a field are JSON."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = list(rows[0]) if rows else ["id"]
+    writer.writerow(names)
+    for row in rows:
+        writer.writerow(
+            json.dumps(row[name]) if isinstance(row[name], list) else row[name] for name in names
+        )
+    return text.getvalue()
 
 
 @app.command("show")
@@ -115,9 +183,9 @@ def trim(library: LibraryArgument, keep: Keep, cell: CellName = None) -> None:
 
     Example: ilc library trim ilc-library.db 500 --cell gantry
     """
-    library_rows(library)
+    n_runs = len(library_rows(library))
     try:
-        deleted = Library(str(library)).trim(keep, cell)
+        deleted = Library(str(library)).trim(min(keep, n_runs), cell)
     except OSError as error:
         raise BadInputError(str(error)) from error
     typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")

@@ -20,7 +20,7 @@ from ilc_rt.commands.options import (
     MeasureOption,
 )
 from ilc_rt.commands.targets import make_folder, report_target
-from ilc_rt.errors import CampaignError
+from ilc_rt.errors import EXIT_FAULT, CampaignError
 from ilc_rt.progress import CampaignView
 from ilc_rt.text import printable
 
@@ -76,17 +76,21 @@ def run(
 
 
 def carry_out(
-    campaign: Campaign, iterations: int, json_file: Path | None, report: Path | None
+    campaign: Campaign,
+    iterations: int,
+    json_file: Path | None,
+    report: Path | None,
+    *,
+    restarts: int = 0,
 ) -> None:
     """Run a campaign in the terminal, then write what was asked for.
 
     Files are written also after a fault or a stop on request, of the runs
-    that were completed.
+    that were completed. A fault of the machine is followed by going on where
+    the campaign was, `restarts` times at most.
     """
     try:
-        with CampaignView() as view:
-            for event in campaign.events(iterations):
-                view.show(event, campaign.result)
+        _show(campaign, iterations, restarts)
     except (CampaignError, KeyboardInterrupt, SystemExit) as stopped:
         if campaign.result.records:
             typer.echo(campaign.result.sentence())
@@ -96,6 +100,24 @@ def carry_out(
         raise
     typer.echo(campaign.result.sentence())
     _write(campaign, json_file, report)
+
+
+def _show(campaign: Campaign, iterations: int, restarts: int) -> None:
+    try:
+        with CampaignView() as view:
+            for event in campaign.events(iterations):
+                view.show(event, campaign.result)
+    except CampaignError as stopped:
+        # A run that cannot be kept would not be kept the next time either.
+        if stopped.exit_code != EXIT_FAULT or restarts == 0 or campaign.result.unkept:
+            raise
+        n_runs = len(campaign.result.records)
+        campaign.resume = n_runs > 0
+        onward = f"going on after run {n_runs - 1}" if n_runs else "beginning again"
+        typer.echo(f"ilc: {printable(stopped.reason)}; {onward}", err=True)
+    else:
+        return
+    _show(campaign, iterations, restarts - 1)
 
 
 def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> None:

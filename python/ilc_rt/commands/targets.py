@@ -55,6 +55,8 @@ def check_file(option: str, path: Path) -> None:
         With the option, the file and the reason.
     """
     is_new = not path.exists()
+    if not is_new and not path.is_file() and not path.is_dir():
+        return  # a device or a pipe: to open it now would be to use it
     try:
         with path.open("a"):
             pass

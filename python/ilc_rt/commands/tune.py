@@ -12,10 +12,9 @@ from rich.table import Table
 
 from ilc_rt.commands.options import CellFile, JsonFile  # noqa: TC001 - typer reads them
 from ilc_rt.errors import BadInputError
+from ilc_rt.result import write_text
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from ilc_rt.tuning import Proposal
 
 Uncertainty = Annotated[
@@ -73,7 +72,7 @@ def tune(
     )
     _show(found)
     if json_file is not None:
-        _write(json_file, found)
+        write_text(json_file, json.dumps(found.to_json(), indent=2) + "\n")
         typer.echo(f"figures: {json_file}")
     if not write:
         return
@@ -109,11 +108,3 @@ def _show(found: Proposal) -> None:
         console.print(f"note: {note}", markup=False)
     console.print("for the cell:\n")
     console.print(found.toml(), markup=False, end="")
-
-
-def _write(path: Path, found: Proposal) -> None:
-    try:
-        path.write_text(json.dumps(found.to_json(), indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        message = f"{path}: {error.strerror}"
-        raise BadInputError(message) from error

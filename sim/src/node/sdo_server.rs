@@ -260,6 +260,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn everything_but_an_abort_is_answered(
             payloads in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..=8), 1..40)

@@ -96,6 +96,7 @@ fn lockstep_against_real_time(n_runs: u32) -> Result<(), Box<dyn Error>> {
         iterations: n_runs,
         measure: None,
         lockstep: true,
+        simulated: false,
         resume: false,
         library: PathBuf::from(&library),
         disturbance: Disturbance::default(),

@@ -36,6 +36,7 @@ pub fn options(library: PathBuf, iterations: u32) -> Options {
         iterations,
         measure: None,
         lockstep: true,
+        simulated: false,
         resume: false,
         library,
         disturbance: Disturbance::default(),

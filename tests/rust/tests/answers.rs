@@ -173,7 +173,7 @@ fn a_pdo_of_another_length_is_named() {
         (0x181, 6, "no status of node 1: its TPDO1 has 6 bytes, 8 are needed"),
         (0x182, 0, "no status of node 2: its TPDO1 has 0 bytes, 8 are needed"),
         (0x281, 4, "no following error of node 1: its TPDO2 has 4 bytes, 8 are needed"),
-        (0x18A, 4, "no status of node 10: its TPDO1 has 4 bytes, 8 are needed"),
+        (0x18A, 4, "no position of node 10: its TPDO1 has 4 bytes, 8 are needed"),
     ] {
         let shorten = move |_, frame: Frame, out: &mut VecDeque<Frame>| {
             out.push_back(if frame.id() == id {
@@ -312,18 +312,20 @@ fn disturbed(name: &str, distort: Distort) -> Vec<IterationRecord> {
 #[test]
 fn a_disturbed_run_is_repeated_the_first_one_too() {
     for name in CELLS {
-        // In the middle of run 0: enabling and return take some 400 cycles.
+        // In the middle of run 0: enabling, return and settling take about a second.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1300")]
+        let first = (1.3 / short(name).cycle_s()) as u32;
         for (n, kind) in [(19, 0), (1, 0), (3, 1), (400, 2)] {
             let mut count = 0;
             let distort: Distort = Box::new(move |_, frame, out| {
                 let is_status = PDOS[0].1(&frame);
                 count += u32::from(is_status);
-                let on = (650..650 + n).contains(&count);
+                let on = (first..first + n).contains(&count);
                 match kind {
                     0 if on && is_status => return,
                     1 if on && is_status => out.push_back(frame),
                     // A flood of what is nobody's business.
-                    2 if count == 650 && is_status => {
+                    2 if count == first && is_status => {
                         for id in 0..300_u16 {
                             out.push_back(Frame::new(0x6E0, &id.to_le_bytes()).unwrap());
                         }

@@ -8,7 +8,6 @@ use ilc_rt::fieldbus::transport::Address;
 use ilc_rt::supervisor::Plan;
 use ilc_tests::example_text;
 use proptest::prelude::{any, prop, proptest};
-use proptest::test_runner::Config;
 
 const FILE: &str = "cell.toml";
 const EXAMPLES: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
@@ -244,7 +243,7 @@ fn a_program_that_would_take_for_ever_is_refused_before_it_fills_the_memory() {
 }
 
 proptest! {
-    #![proptest_config(Config { cases: 600, failure_persistence: None, ..Config::default() })]
+    #![proptest_config(ilc_cases::cases(600))]
 
     #[test]
     fn random_edits_never_panic(

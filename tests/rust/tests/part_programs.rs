@@ -103,3 +103,132 @@ fn a_bad_part_program_is_refused_with_its_line() {
     let line = Plan::new(&cell, None, true).unwrap_err().to_string();
     assert!(line.contains("04_gcode.ngc: line 2: G33: allowed G0 G1"), "{line}");
 }
+
+/// Largest differences of the set points over the cycle, with rest before and after.
+fn peaks(reference_m: &[f64], n_axes: usize, cycle_s: f64) -> [f64; 3] {
+    let mut peaks = [0.0_f64; 3];
+    for axis in 0..n_axes {
+        let column: Vec<f64> = reference_m.iter().skip(axis).step_by(n_axes).copied().collect();
+        let (first, last) = (column[0], column[column.len() - 1]);
+        let mut values = [vec![first; 3], column, vec![last; 3]].concat();
+        for peak in &mut peaks {
+            values = values.windows(2).map(|pair| (pair[1] - pair[0]) / cycle_s).collect();
+            *peak = values.iter().fold(*peak, |most, value| most.max(value.abs()));
+        }
+    }
+    peaks
+}
+
+#[test]
+fn a_spline_that_turns_back_comes_to_rest_where_it_does() {
+    let plan = cell_with(
+        "[program]\nkind = \"spline\"\nfeed_m_s = 0.1\nstart_m = [0.0, 0.0]\nsegment = [\
+         { to_m = [0.05, 0.0] }, { to_m = [0.02, 0.0] }, { to_m = [0.08, 0.0] }]",
+    )
+    .unwrap();
+    let [v, a, j] = peaks(&plan.reference_m, 2, 0.002);
+    assert!(v <= 0.1 + 1e-9 && a <= 8.0 + 1e-6 && j <= 1000.0 + 1e-3, "{v} {a} {j}");
+    let end = &plan.reference_m[plan.reference_m.len() - 2..];
+    assert!((end[0] - 0.08).abs() < 1e-9, "{end:?}");
+}
+
+#[test]
+fn with_exact_stops_a_feed_beyond_the_limits_is_refused() {
+    let program = |feed: f64| {
+        format!(
+            "[program]\nfeed_m_s = {feed}\nstart_m = [0.0, 0.0]\ncorner = \"exact_stop\"\n\
+             segment = [{{ to_m = [0.03, 0.04] }}]"
+        )
+    };
+    let line = cell_with(&program(1.0)).unwrap_err();
+    // 0.8 of it is y's share, which may be 0.5 m/s.
+    assert!(line.contains("(axis 2 is y)") && line.contains("velocity reaches 0.8"), "{line}");
+    assert!(line.contains("largest admissible feed 0.625 m/s"), "{line}");
+    assert!(cell_with(&program(0.625)).is_ok());
+}
+
+/// The G-code example with another part program beside it.
+fn part_program(text: impl AsRef<[u8]>) -> Result<Plan, String> {
+    let folder = Scratch::new();
+    std::fs::write(folder.file("cell.toml"), example_text("04_gcode.toml")).unwrap();
+    std::fs::write(folder.file("04_gcode.ngc"), text).unwrap();
+    let cell = Cell::load(&folder.file("cell.toml")).map_err(|error| error.to_string())?;
+    Plan::new(&cell, None, true).map_err(|error| error.to_string())
+}
+
+#[test]
+fn words_are_read_in_every_spelling_and_encoding() {
+    for text in [
+        &b"G20.\nG1 X1 F60\n"[..],
+        b"\xef\xbb\xbfg 2 0\r\nG01 x +1.0 F60\r\n",
+        b"G1 (sp\xe4t) X25.4\n",
+        b"%\nG91. (\xb5m)\nG1 X12.7 F600\nX 12. 7\n%\nsome text (",
+    ] {
+        let plan = part_program(text).unwrap();
+        let end = plan.reference_m[plan.reference_m.len() - 2];
+        assert!((end - 0.0254).abs() < 1e-9, "{end}");
+    }
+    let line = part_program("G1 X5 F600 (oops\nG1 Y5\nG1 X10 (ok)\n").unwrap_err();
+    assert!(line.contains("04_gcode.ngc: line 1: (oops: a comment ends with )"), "{line}");
+}
+
+#[test]
+fn only_regular_files_of_a_bounded_size_in_the_folder_of_the_cell_are_read() {
+    let folder = Scratch::new();
+    let refusal = |name: &str| {
+        let text = example_text("04_gcode.toml").replace("04_gcode.ngc", name);
+        std::fs::write(folder.file("cell.toml"), text).unwrap();
+        let planned = Cell::load(&folder.file("cell.toml"))
+            .map_err(|error| error.to_string())
+            .and_then(|cell| Plan::new(&cell, None, true).map_err(|error| error.to_string()));
+        let line = planned.unwrap_err();
+        assert!(!line.contains(char::is_control), "{line:?}");
+        line
+    };
+    let made = std::process::Command::new("mkfifo").arg(folder.file("pipe")).status().unwrap();
+    assert!(made.success());
+    assert!(refusal("pipe").contains("not a regular file"));
+    std::fs::create_dir(folder.file("folder")).unwrap();
+    assert!(refusal("folder").contains("not a regular file"));
+    std::os::unix::fs::symlink("/dev/zero", folder.file("zero")).unwrap();
+    assert!(refusal("zero").contains("a link leads out of it"));
+    std::os::unix::fs::symlink(folder.file("loop"), folder.file("loop")).unwrap();
+    assert!(refusal("loop").contains("cannot be read"));
+    for outside in ["/etc/hostname", "../x.ngc", "folder/../x.ngc"] {
+        assert!(refusal(outside).contains("must be in the folder"), "{outside}");
+    }
+    assert!(refusal("a\\u001bb.ngc").contains("without control characters"));
+    let large = std::fs::File::create(folder.file("large.ngc")).unwrap();
+    large.set_len(17 << 20).unwrap();
+    assert!(refusal("large.ngc").contains("more than 16777216 bytes"));
+    std::fs::write(folder.file("folder/below.ngc"), "G1 X10\n").unwrap();
+    let text = example_text("04_gcode.toml").replace("04_gcode.ngc", "folder/below.ngc");
+    std::fs::write(folder.file("cell.toml"), text).unwrap();
+    let cell = Cell::load(&folder.file("cell.toml")).unwrap();
+    assert!(Plan::new(&cell, None, true).is_ok());
+}
+
+#[test]
+fn a_cell_is_a_regular_file_of_a_bounded_size_in_utf_8() {
+    let folder = Scratch::new();
+    let refusal = |name: &str| Cell::load(&folder.file(name)).unwrap_err().to_string();
+    let made = std::process::Command::new("mkfifo").arg(folder.file("pipe")).status().unwrap();
+    assert!(made.success());
+    assert!(refusal("pipe").contains("not a regular file"));
+    std::os::unix::fs::symlink("/dev/zero", folder.file("zero")).unwrap();
+    assert!(refusal("zero").contains("not a regular file"));
+    assert!(refusal(".").contains("not a regular file"));
+    std::fs::File::create(folder.file("large")).unwrap().set_len(17 << 20).unwrap();
+    assert!(refusal("large").contains("more than 16777216 bytes"));
+    std::fs::write(folder.file("latin"), b"# a\n# \xb5\n").unwrap();
+    assert!(refusal("latin").contains("line 2 is not UTF-8"));
+    for deep in
+        ["a = ".to_owned() + &"[".repeat(100_000), "[a".to_owned() + &".a".repeat(100_000) + "]"]
+    {
+        std::fs::write(folder.file("deep"), deep).unwrap();
+        assert!(!refusal("deep").is_empty());
+    }
+    let bom = b"\xef\xbb\xbf".iter().copied().chain(example_text("01_gantry.toml").into_bytes());
+    std::fs::write(folder.file("bom"), bom.collect::<Vec<u8>>()).unwrap();
+    assert!(Cell::load(&folder.file("bom")).is_ok());
+}

@@ -103,6 +103,28 @@ fn a_library_that_is_not_there_cannot_be_gone_on_with() {
     assert!(!library.exists());
 }
 
+/// Drives that were switched off begin elsewhere than where the last run left them: what they show first
+/// is not held against a law that has converged.
+#[test]
+fn a_converged_campaign_goes_on_where_it_was() {
+    let (cell, scratch) = (example("01_gantry.toml"), Scratch::new());
+    let (library, other) = (scratch.file("library.db"), scratch.file("other.db"));
+    run(&cell, &options(library.clone(), 14)).unwrap();
+    let resumed = run(&cell, &Options { resume: true, ..options(library, 20) }).unwrap();
+    let whole = run(&cell, &options(other, 20)).unwrap();
+    assert_eq!(resumed.status, EndStatus::Completed, "{}", resumed.reason);
+    let rms = |outcome: &Outcome| -> Vec<f64> {
+        outcome.runs.iter().map(|(_, figures)| figures.tracking_rms_m).collect()
+    };
+    let (resumed_m, whole_m) = (rms(&resumed), rms(&whole));
+    assert_eq!(resumed_m.len(), 20);
+    assert_eq!(resumed_m[..14], whole_m[..14]);
+    assert!(resumed.runs.iter().all(|(_, figures)| !figures.rolled_back), "{resumed_m:?}");
+    for index in 14..20 {
+        assert!(resumed_m[index] < 1.3 * whole_m[13], "run {index}: {resumed_m:?} {whole_m:?}");
+    }
+}
+
 /// `u + g e`, with a gain that turns against the error after some updates.
 struct Fickle {
     n_good: u32,

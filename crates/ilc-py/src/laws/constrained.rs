@@ -97,7 +97,7 @@ use crate::whole;
 /// >>> law = ConstrainedIlc(axis, 400, rate=3.0, u_bounds=(-0.01, 0.01))
 /// >>> e = 0.05 * np.sin(0.05 * np.arange(400))
 /// >>> u = law.update(np.zeros(400), e)
-/// >>> law.status, float(u.max())
+/// >>> law.status, round(float(u.max()), 6)
 /// ('solved', 0.01)
 #[pyclass(name = "ConstrainedIlc", module = "ilc_rt", frozen)]
 #[derive(Debug)]

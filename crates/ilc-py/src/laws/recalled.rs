@@ -208,12 +208,14 @@ impl<L: Remember> Recalled<L> {
             return Ok(Vec::new());
         }
         detached(py, || -> Result<Vec<IterationRecord>, LibraryError> {
-            let library = library.lock();
-            let (ids, dt_s) = library.fitting(n_samples, n_inputs, n_disturbances, &self.task)?;
-            size.library_dt_s = dt_s;
-            ids.into_iter()
-                .map(|id| library.load(id).map(|row| row.record))
-                .collect::<Result<Vec<_>, _>>()
+            library.read(|library| {
+                let (ids, dt_s) =
+                    library.fitting(n_samples, n_inputs, n_disturbances, &self.task)?;
+                size.library_dt_s = dt_s;
+                ids.into_iter()
+                    .map(|id| library.load(id).map(|row| row.record))
+                    .collect::<Result<Vec<_>, _>>()
+            })
         })
         .or_raise()
     }

@@ -11,10 +11,11 @@ use super::run::{MeasureName, exit_status, open, say_event, stop_on_signals};
 use super::{EXIT_BAD_INPUT, show};
 use crate::config::{Cell, Measure};
 use crate::library::Library;
-use crate::model::identify::{Excitation, Waveform};
+use crate::model::identify::{Doubt, Excitation, Waveform};
 use crate::record::{EndStatus, Event};
 use crate::supervisor::{
-    self, Band, BandSearch, Disturbance, Experiment, Identified, Options, Outcome, SupervisorError,
+    self, Band, BandSearch, Described, Disturbance, Experiment, Identified, Options, Outcome,
+    SupervisorError,
 };
 
 /// Where an axis is excited if only the highest frequency is asked for.
@@ -60,6 +61,13 @@ pub(super) struct IdentifyArguments {
     /// Pace the loop by the drives' answers instead of the clock.
     #[arg(long)]
     lockstep: bool,
+    /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
+    #[arg(long)]
+    simulated_drives: bool,
+    /// Stop the axes and end when standard input closes, as it does when the program that started this
+    /// one ends.
+    #[arg(long)]
+    with_parent: bool,
     /// Where the experiment is kept.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     library: PathBuf,
@@ -124,7 +132,7 @@ fn experiment(
     arguments: &IdentifyArguments,
 ) -> Result<(Outcome, Option<Identified>), SupervisorError> {
     let cell = Cell::load(&arguments.cell)?;
-    let stop = stop_on_signals();
+    let stop = stop_on_signals(arguments.with_parent);
     let mut search = BandSearch::new(&cell, &laid_out(arguments, FALLBACK))?;
     if let Some(to_hz) = arguments.to_hz {
         let band = Band { to_hz, ..FALLBACK };
@@ -210,6 +218,7 @@ fn excite(
         iterations: 1,
         measure: arguments.measure.map(Measure::from),
         lockstep: arguments.lockstep,
+        simulated: arguments.simulated_drives,
         resume: false,
         library: arguments.library.clone(),
         disturbance: Disturbance::default(),
@@ -231,36 +240,48 @@ fn excite(
     let (Some(id), EndStatus::Completed, false) = (kept, outcome.status, arguments.events) else {
         return Ok((outcome, None));
     };
-    let record = Library::open(&arguments.library)?.load(id)?.record;
+    let record = Library::read(&arguments.library)?.load(id)?.record;
     let identified = Identified::new(&cell, &experiment, &record)?;
     Ok((outcome, Some((experiment, identified))))
 }
 
+/// The figures of `[axis.model]`; of an output that does not follow its input there are none.
 fn describe(experiment: &Experiment, found: &Identified) -> String {
-    let (fit, model) = (&found.fit, &found.fit.model);
     let worst = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
-    format!(
-        "axis {}: {} frequencies from {} to {} Hz, amplitude {:.3e}, coherence at least {:.4}\n\
-         gain               {:>10.5} +- {:.1e}\n\
-         natural frequency  {:>10.4} +- {:.1e} Hz\n\
-         damping            {:>10.5} +- {:.1e}\n\
-         delay              {:>10.4} +- {:.1e} ms\n\
-         left over          {:>10.2} % rms{}",
+    let head = format!(
+        "axis {}: {} frequencies from {} to {} Hz, amplitude {:.3e}, coherence at least {:.4}",
         experiment.axis,
         found.measured.frequency_hz.len(),
         experiment.excitation.from_hz,
         experiment.excitation.to_hz,
         experiment.excitation.amplitude,
         worst(&found.measured.coherence),
-        model.gain,
-        fit.gain_deviation,
-        model.natural_frequency_hz,
-        fit.natural_frequency_deviation_hz,
-        model.damping,
-        fit.damping_deviation,
-        model.delay_s * 1e3,
-        fit.delay_deviation_s * 1e3,
-        fit.residual_rms * 100.0,
+    );
+    if matches!(found.doubt, Some(Doubt::Incoherent { .. })) {
+        return head;
+    }
+    let (figures, delay_s) = match found.described {
+        Described::Position(model) => (
+            format!(
+                "natural frequency  {:>10.4} Hz\ndamping            {:>10.5}",
+                model.natural_frequency_hz, model.damping
+            ),
+            model.delay_s,
+        ),
+        Described::Velocity(model) => {
+            (format!("velocity bandwidth {:>10.4} Hz", model.bandwidth_hz), model.delay_s)
+        }
+    };
+    format!(
+        "{head}\n\
+         gain               {:>10.5} +- {:.1e}\n\
+         {figures}\n\
+         delay              {:>10.4} ms\n\
+         left over          {:>10.2} % rms{}",
+        found.fit.model.gain,
+        found.fit.gain_deviation,
+        delay_s * 1e3,
+        found.residual_rms * 100.0,
         if found.doubt.is_none() { format!("\n\n{}", found.section()) } else { String::new() }
     )
 }

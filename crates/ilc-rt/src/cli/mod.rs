@@ -7,10 +7,13 @@ mod completions;
 mod figures;
 mod identify;
 mod latency;
+mod parent;
 mod quantity;
 mod run;
 mod runs;
 mod show;
+
+pub use parent::when_parent_ends;
 
 use std::process::ExitCode;
 

@@ -9,7 +9,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 
 use super::figures::FiguresFile;
 use super::runs::Runs;
-use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show};
+use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show, when_parent_ends};
 use crate::config::{Cell, LawName, Measure};
 use crate::fieldbus::{Bus, transport};
 use crate::record::{EndStatus, Event};
@@ -36,6 +36,13 @@ pub(super) struct RunArguments {
     /// Pace the loop by the drives' answers instead of the clock: exact repetition, no wall clock.
     #[arg(long)]
     lockstep: bool,
+    /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
+    #[arg(long)]
+    simulated_drives: bool,
+    /// Stop the axes and end when standard input closes, as it does when the program that started this
+    /// one ends.
+    #[arg(long)]
+    with_parent: bool,
     /// Repeat the program without learning, whatever the cell says.
     #[arg(long)]
     no_learning: bool,
@@ -105,11 +112,12 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
         iterations: arguments.iterations,
         measure: arguments.measure.map(Measure::from),
         lockstep: arguments.lockstep,
+        simulated: arguments.simulated_drives,
         resume: arguments.resume,
         library: arguments.library.clone(),
         disturbance: Disturbance::default(),
         telemetry: !arguments.no_telemetry,
-        stop: stop_on_signals(),
+        stop: stop_on_signals(arguments.with_parent),
     };
     let mut runs = Runs::default();
     let mut observe = |event: &Event| {
@@ -154,8 +162,18 @@ pub(super) fn open(
 }
 
 /// A number that becomes a signal's when it comes: the loop reads it and brings the axes to rest.
-pub(super) fn stop_on_signals() -> Arc<AtomicI32> {
+/// With a parent, its end is such a signal as well.
+pub(super) fn stop_on_signals(with_parent: bool) -> Arc<AtomicI32> {
     let stop = Arc::new(AtomicI32::new(0));
+    if with_parent {
+        let stop = Arc::clone(&stop);
+        let watched = when_parent_ends(move || stop.store(SIGPIPE, Ordering::Relaxed));
+        if let Err(error) = watched {
+            tracing::warn!(
+                "the end of the program that started this one will go unnoticed: {error}"
+            );
+        }
+    }
     for signal in [SIGINT, SIGTERM, SIGHUP] {
         if signal == SIGHUP && is_ignored(signal) {
             continue;

@@ -235,7 +235,7 @@ impl Cell {
         let bytes = read_file(path, CELL_BYTES_MAX).map_err(refused)?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-            let line = good.iter().filter(|&&byte| byte == b'\n').count() + 1;
+            let line = good.split(|&byte| byte == b'\n').count();
             refused(format!("line {line} is not UTF-8"))
         })?;
         Self::parse(&text, &file)

@@ -35,7 +35,8 @@ pub enum LoadError {
     /// More bits than the limit allows.
     #[error(
         "the frames of one cycle need {bits_per_cycle} bits at worst, {allowed:.0} are allowed \
-         ({:.0} % of {available:.0}): lengthen the cycle, send fewer frames or use a second bus",
+         ({:.0} % of {available:.0}): raise [cell] cycle_us, or bitrate_bit_s or load_max where the \
+         bus allows it",
         load_max * 100.0
     )]
     TooMuch {

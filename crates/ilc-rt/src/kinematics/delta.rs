@@ -285,7 +285,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #![proptest_config(ilc_cases::cases(2000))]
 
         #[test]
         fn round_trips_over_the_workspace(

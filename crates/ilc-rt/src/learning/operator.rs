@@ -123,6 +123,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn both_directions_and_the_norm_are_those_of_the_dense_operator(
             values in prop::collection::vec(-1.0..1.0_f64, 61),

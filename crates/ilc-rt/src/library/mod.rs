@@ -3,12 +3,15 @@
 //! The supervisor appends the moment a run ends; Python and `--resume` read. Writers and readers of
 //! several processes may share a file (write-ahead log); a killed process loses nothing it appended.
 
+mod error;
+mod file;
 mod recall;
 mod row;
 mod schema;
 mod store;
 mod trim;
 
+pub use error::LibraryError;
 pub use recall::{Near, Task};
 pub use row::Row;
-pub use store::{Library, LibraryError};
+pub use store::Library;

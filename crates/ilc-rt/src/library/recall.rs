@@ -2,8 +2,10 @@
 
 use rusqlite::params;
 
+use super::error::LibraryError;
 use super::row::{Row, as_integer, numbers};
-use super::store::{Library, LibraryError};
+use super::schema;
+use super::store::Library;
 
 /// Which runs belong to the same task; without a name, all that a library holds.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -90,12 +92,19 @@ impl Library {
     /// Reads key and disturbance of every run of a task that has one.
     fn disturbances(&self, task: &Task) -> Result<Vec<(i64, Vec<f64>)>, LibraryError> {
         // Answered from the index alone: the arrays of all runs may be gigabytes.
-        let query = "SELECT id, disturbance FROM iteration INDEXED BY iteration_by_disturbance \
-            WHERE disturbance IS NOT NULL AND (?1 IS NULL OR cell = ?1)";
+        let index = if self.version >= schema::INDEXED {
+            "INDEXED BY iteration_by_disturbance"
+        } else {
+            ""
+        };
+        let query = format!(
+            "SELECT id, disturbance FROM iteration {index} \
+            WHERE disturbance IS NOT NULL AND (?1 IS NULL OR cell = ?1)"
+        );
         let read = |row: &rusqlite::Row<'_>| {
             Ok((row.get(0)?, numbers(row.get::<_, Option<String>>(1)?.as_deref())))
         };
-        let mut statement = self.connection.prepare_cached(query).map_err(|e| self.fail(e))?;
+        let mut statement = self.connection.prepare_cached(&query).map_err(|e| self.fail(e))?;
         let rows = statement.query_map(params![task.cell], read);
         rows.and_then(Iterator::collect).map_err(|source| self.fail(source))
     }

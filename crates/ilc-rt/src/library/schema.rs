@@ -2,6 +2,11 @@
 
 use rusqlite::Connection;
 
+/// Mark of this program's files, in SQLite's `application_id`: "ILCL".
+pub(super) const MARK: i64 = 0x494C_434C;
+/// The version from which on there is an index of disturbances.
+pub(super) const INDEXED: i64 = 2;
+
 /// Version of the schema, in SQLite's `user_version`.
 pub(super) const VERSION: i64 = 3;
 /// The oldest version that [`bring_up_to_date`] knows.
@@ -59,6 +64,12 @@ CREATE INDEX IF NOT EXISTS iteration_by_disturbance ON iteration (cell, disturba
     WHERE disturbance IS NOT NULL;
 ";
 
+/// Sets what must be said before the first page of a file is written: the pages of runs that are deleted
+/// can be given back to the system.
+pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
+    connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")
+}
+
 /// Columns that older versions do not have, with their types.
 const ADDED: [(&str, &str); 4] = [
     ("axes_tracking_inf_m", "TEXT"),
@@ -78,6 +89,7 @@ pub(super) fn bring_up_to_date(connection: &Connection) -> rusqlite::Result<()> 
         transaction.execute_batch(&format!("ALTER TABLE iteration ADD COLUMN {name} {kind}"))?;
     }
     allow_no_contour(&transaction)?;
+    transaction.pragma_update(None, "application_id", MARK)?;
     transaction.pragma_update(None, "user_version", VERSION)?;
     transaction.commit()
 }

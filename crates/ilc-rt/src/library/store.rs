@@ -1,110 +1,85 @@
 //! Appending and reading iterations.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rusqlite::{Connection, OptionalExtension, params};
 
+use super::error::{LibraryError, told};
+use super::file::{self, Found};
 use super::row::{
     ARRAYS, Row, as_integer, blob, is_old, json_list, json_numbers, read_row, refresh,
 };
 use super::schema;
 use crate::record::{Figures, IterationRecord, Meta};
 
-/// How long to wait for another process that is writing.
-const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+/// How long to wait for another process that is writing: a run that cannot be kept has to stop the axes.
+pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
+
+/// How long to wait for it when there was a wait in vain before.
+const HURRIED: Duration = Duration::from_millis(200);
+/// SQLite's extended code for a row that is there already.
+const UNIQUE: i32 = rusqlite::ffi::SQLITE_CONSTRAINT_UNIQUE;
 
 /// An open iteration library.
 #[derive(Debug)]
 pub struct Library {
     pub(super) connection: Connection,
     pub(super) path: String,
-}
-
-/// Why the library could not be used.
-#[derive(Debug, thiserror::Error)]
-pub enum LibraryError {
-    /// SQLite refused.
-    #[error("library {path}: {source}")]
-    Sqlite {
-        /// File.
-        path: String,
-        /// What SQLite said.
-        source: rusqlite::Error,
-    },
-    /// The file cannot be used as a library.
-    #[error(
-        "library {path}: cannot be opened: {source}; allowed: a library of this program, or a new \
-         file in a folder that exists and can be written"
-    )]
-    Open {
-        /// File.
-        path: String,
-        /// What SQLite said.
-        source: rusqlite::Error,
-    },
-    /// The file was written by another version of this program.
-    #[error("library {path}: schema version {found}; this program reads version {expected}")]
-    Version {
-        /// File.
-        path: String,
-        /// Version in the file.
-        found: i64,
-        /// Version of this program.
-        expected: i64,
-    },
-    /// There is no such row.
-    #[error("library {path}: no iteration with id {id}")]
-    NoSuchRow {
-        /// File.
-        path: String,
-        /// Key asked for.
-        id: i64,
-    },
-    /// There is no such disturbance.
-    #[error("library {path}: {what}")]
-    Disturbance {
-        /// File.
-        path: String,
-        /// What is wrong, and what is allowed.
-        what: String,
-    },
-    /// The stored arrays do not have the digest that was stored with them.
-    #[error("library {path}: iteration {id} is damaged: its arrays do not match its digest")]
-    Damaged {
-        /// File.
-        path: String,
-        /// Key of the row.
-        id: i64,
-    },
+    /// Path and identity of the file that runs are written to.
+    file: Option<(PathBuf, (u64, u64))>,
+    /// Version of the schema in the file; below the newest only if it is read.
+    pub(super) version: i64,
 }
 
 impl Library {
-    /// Opens a library, creating file and tables if they are not there.
+    /// Opens a library for reading and writing, creating file and tables if they are not there.
     ///
     /// # Errors
-    /// [`LibraryError::Open`] if the file cannot be opened or is no library;
-    /// [`LibraryError::Version`] if it has another version.
+    /// [`LibraryError::Foreign`] for a file that is no library of this program, which is left as it is;
+    /// [`LibraryError::Version`] if it has a later version; [`LibraryError::Open`],
+    /// [`LibraryError::ReadOnly`] or [`LibraryError::Locked`] if it cannot be written.
     pub fn open(path: &Path) -> Result<Self, LibraryError> {
+        if path.as_os_str() == file::IN_MEMORY {
+            return Self::in_memory();
+        }
+        let found = file::inspect(path)?;
+        let connection = file::writer(path)?;
         let name = path.display().to_string();
-        let fail = |source| LibraryError::Open { path: name.clone(), source };
-        let connection = Connection::open(path).map_err(fail)?;
+        let fail = |source: rusqlite::Error| match told(&name, source) {
+            LibraryError::Sqlite { path, source } => LibraryError::Open { path, source },
+            error => error,
+        };
         connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
+        if matches!(found, Found::Nothing | Found::Empty) {
+            schema::prepare(&connection).map_err(fail)?;
+        }
         connection.pragma_update(None, "journal_mode", "WAL").map_err(fail)?;
         // FULL: an appended run survives not only a kill but a power cut.
         connection.pragma_update(None, "synchronous", "FULL").map_err(fail)?;
-        let found: i64 =
-            connection.pragma_query_value(None, "user_version", |row| row.get(0)).map_err(fail)?;
-        match found {
-            0 | schema::OLDEST..schema::VERSION => {
-                schema::bring_up_to_date(&connection).map_err(fail)?;
-            }
-            schema::VERSION => {}
-            found => {
-                return Err(LibraryError::Version { path: name, found, expected: schema::VERSION });
-            }
+        // Asked once more, as what a killed process had begun is undone when the file is opened.
+        if file::found(&connection, path)? == Found::Library(schema::VERSION) {
+            // Whoever cannot write must hear of it now, and not when the first run is to be kept.
+            connection.execute_batch("BEGIN IMMEDIATE; ROLLBACK").map_err(fail)?;
+        } else {
+            schema::bring_up_to_date(&connection).map_err(fail)?;
         }
-        Ok(Self { connection, path: name })
+        Ok(Self {
+            connection,
+            path: name,
+            file: file::identity(path).map(|identity| (path.to_owned(), identity)),
+            version: schema::VERSION,
+        })
+    }
+
+    /// Opens a library for reading only; nothing is made or changed, also beside the file.
+    ///
+    /// # Errors
+    /// [`LibraryError::Missing`]; [`LibraryError::Empty`]; [`LibraryError::Foreign`] for a file that is no library;
+    /// [`LibraryError::Version`] if it has a later version; [`LibraryError::Open`] if it cannot be read.
+    pub fn read(path: &Path) -> Result<Self, LibraryError> {
+        let (connection, version) = file::reader(path)?;
+        Ok(Self { connection, path: path.display().to_string(), file: None, version })
     }
 
     /// Opens a library in memory, which is gone when dropped.
@@ -112,13 +87,19 @@ impl Library {
     /// # Errors
     /// [`LibraryError::Open`] if SQLite refuses.
     pub fn in_memory() -> Result<Self, LibraryError> {
-        Self::open(Path::new(":memory:"))
+        let path = file::IN_MEMORY.to_owned();
+        let fail = |source| LibraryError::Open { path: path.clone(), source };
+        let connection = Connection::open_in_memory().map_err(fail)?;
+        schema::bring_up_to_date(&connection).map_err(fail)?;
+        Ok(Self { connection, path, file: None, version: schema::VERSION })
     }
 
     /// Keeps one run and returns its key.
     ///
     /// # Errors
-    /// [`LibraryError::Sqlite`], also if the campaign has a run of this number already.
+    /// [`LibraryError::Taken`] if the campaign has a run of this number already;
+    /// [`LibraryError::Gone`] if the file is not there any more; [`LibraryError::Locked`] or
+    /// [`LibraryError::Sqlite`] if it cannot be written.
     pub fn append(&self, meta: &Meta, record: &IterationRecord) -> Result<i64, LibraryError> {
         let f = &record.figures;
         let n_samples = record.reference_m.len() / meta.n_axes.max(1);
@@ -131,7 +112,8 @@ impl Library {
             (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, \
             ?20, ?21, ?22, ?23, ?24, ?25, ?26, ?27, ?28, ?29, ?30, ?31, ?32, ?33, ?34, ?35, ?36)";
         let tool = (!record.tool_m.is_empty()).then(|| blob(&record.tool_m));
-        self.connection
+        let id = self
+            .connection
             .prepare_cached(statement)
             .and_then(|mut insert| {
                 insert.insert(params![
@@ -173,7 +155,24 @@ impl Library {
                     f.remark,
                 ])
             })
-            .map_err(|source| self.fail(source))
+            .map_err(|source| match source.sqlite_error() {
+                Some(error) if error.extended_code == UNIQUE => LibraryError::Taken {
+                    path: self.path.clone(),
+                    campaign: meta.campaign.clone(),
+                    index: record.index,
+                },
+                _ => self.fail(source),
+            })?;
+        self.require_file()?;
+        Ok(id)
+    }
+
+    /// Makes sure that what was written is where others will look for it.
+    fn require_file(&self) -> Result<(), LibraryError> {
+        let Some((path, identity)) = &self.file else { return Ok(()) };
+        let is_there =
+            file::identity(path) == Some(*identity) && file::beside(path, "-wal").exists();
+        if is_there { Ok(()) } else { Err(LibraryError::Gone { path: self.path.clone() }) }
     }
 
     /// Lists the runs kept, oldest first, without their arrays; of one campaign if asked.
@@ -295,8 +294,14 @@ impl Library {
             .map_err(|source| self.fail(source))
     }
 
+    /// Waits for other programs no longer than an instant from now on.
+    pub fn hurry(&self) {
+        // What cannot be set leaves the longer wait, which is not wrong.
+        let _ = self.connection.busy_timeout(HURRIED);
+    }
+
     pub(super) fn fail(&self, source: rusqlite::Error) -> LibraryError {
-        LibraryError::Sqlite { path: self.path.clone(), source }
+        told(&self.path, source)
     }
 }
 

@@ -4,10 +4,15 @@ use std::collections::HashSet;
 
 use rusqlite::params;
 
+use super::error::LibraryError;
 use super::recall::Task;
 use super::row::numbers;
-use super::store::{Library, LibraryError};
+use super::schema;
+use super::store::Library;
 use crate::learning::law::relevance::shares;
+
+/// Pages given back in one transaction.
+const STEP_PAGES: u32 = 1024;
 
 /// Runs as far as trimming looks at them.
 struct Candidate {
@@ -28,7 +33,8 @@ impl Library {
     ///
     /// # Errors
     /// [`LibraryError::Disturbance`] if runs have different numbers of disturbances;
-    /// [`LibraryError::Sqlite`] if the file cannot be written: nothing is deleted then.
+    /// [`LibraryError::Sqlite`] if the file cannot be written: nothing is deleted then;
+    /// [`LibraryError::NotShrunk`] if the runs are deleted, but their space could not be given back.
     /// # Source
     /// - \[dimarco2016\], Eq. (4.12), (4.13), and Sec. 5.1: trimming as future work.
     pub fn trim(&self, keep: usize, task: &Task) -> Result<usize, LibraryError> {
@@ -68,7 +74,39 @@ impl Library {
         order.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(b.cmp(&a)));
         let kept: HashSet<usize> = order.into_iter().take(keep).collect();
         let gone = (0..runs.len()).filter(|number| !kept.contains(number)).map(|n| runs[n].id);
-        self.delete(&gone.collect::<Vec<_>>())
+        let n_deleted = self.delete(&gone.collect::<Vec<_>>())?;
+        self.shrink().map_err(|source| LibraryError::NotShrunk {
+            path: self.path.clone(),
+            n_deleted,
+            source,
+        })?;
+        Ok(n_deleted)
+    }
+
+    /// Gives the pages of deleted runs back to the system. The runs that stay are never at stake: SQLite
+    /// changes the file by transactions, and one that is killed has not happened.
+    fn shrink(&self) -> rusqlite::Result<()> {
+        let whole: i64 =
+            self.connection.pragma_query_value(None, "auto_vacuum", |row| row.get(0))?;
+        if whole == 0 {
+            // A file of before, made without the books that giving back single pages needs.
+            schema::prepare(&self.connection)?;
+            self.connection.execute_batch("VACUUM")?;
+        } else {
+            // In small steps: a campaign that keeps its run meanwhile must not wait for all of them.
+            while self.free_pages()? > 0 {
+                let mut step =
+                    self.connection.prepare(&format!("PRAGMA incremental_vacuum({STEP_PAGES})"))?;
+                let mut rows = step.query([])?;
+                while rows.next()?.is_some() {}
+            }
+        }
+        // The file itself grows smaller when the log is written back; readers may hold that up.
+        self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
+    }
+
+    fn free_pages(&self) -> rusqlite::Result<i64> {
+        self.connection.pragma_query_value(None, "freelist_count", |row| row.get(0))
     }
 
     fn candidates(&self, task: &Task) -> Result<Vec<Candidate>, LibraryError> {

@@ -9,6 +9,7 @@ use super::node::Drive;
 use super::phase::Phase;
 use super::slots::Slots;
 use super::spec::ServoSpec;
+use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::Bus;
 use crate::fieldbus::cia402::Mode;
 use crate::rt::Nanos;
@@ -48,7 +49,7 @@ pub struct Cycle {
     pub(super) commanded: [[f64; MAX_AXES]; 3],
     pub(super) gates: [Gate; MAX_AXES],
     pub(super) run: u32,
-    pub(super) overrun_streak: u32,
+    pub(super) stall: Stall,
     pub(super) run_overruns: u32,
     pub(super) stopping: Option<StopReason>,
     pub(super) limits: [AxisLimits; MAX_AXES],
@@ -113,7 +114,7 @@ impl Cycle {
             commanded: [[0.0; MAX_AXES]; 3],
             gates: [Gate::default(); MAX_AXES],
             run: spec.runs.start,
-            overrun_streak: 0,
+            stall: Stall::default(),
             run_overruns: 0,
             stopping: None,
             limits: AxisLimits::padded(&limits),
@@ -130,13 +131,14 @@ impl Cycle {
 
     /// One servo cycle; `missed` cycles before it were skipped because it came too late.
     pub fn tick(&mut self, missed: u32) -> TickStatus {
-        if missed > 0 {
-            self.overrun_streak = self.overrun_streak.saturating_add(missed);
-            self.run_overruns = self.run_overruns.saturating_add(missed);
-        } else {
-            self.overrun_streak = 0;
-        }
+        self.stall.note(missed);
+        self.run_overruns = self.run_overruns.saturating_add(missed);
         let received = self.receive();
+        let nodes_wait = self.slots.waits(HOLD_AFTER);
+        if received.is_ok() && self.stall.holds(nodes_wait, self.spec.hold_cycles_max) {
+            self.run_overruns = self.run_overruns.saturating_add(1);
+            return TickStatus::Running;
+        }
         self.give_out();
         let fault = received.err().or_else(|| self.find_fault());
         let before = self.phase.name();

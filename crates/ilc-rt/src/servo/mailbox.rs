@@ -122,6 +122,13 @@ pub enum StopReason {
         /// Axis.
         axis: usize,
     },
+    /// A drive missed its commands because this computer stalled.
+    Stalled {
+        /// Axis.
+        axis: usize,
+        /// Consecutive cycles missed.
+        cycles: u32,
+    },
     /// The loop could not keep its cycle.
     Overrun {
         /// Consecutive cycles missed.
@@ -163,6 +170,7 @@ impl StopReason {
             | Self::OtherMaster(_)
             | Self::OutsideLimits { .. }
             | Self::NotFinite { .. }
+            | Self::Stalled { .. }
             | Self::Overrun { .. }
             | Self::Bus(_) => None,
         }

@@ -16,6 +16,7 @@ mod receive;
 mod silence;
 mod slots;
 mod spec;
+mod stall;
 mod stopping;
 mod strangers;
 

@@ -140,8 +140,8 @@ impl Cycle {
         if asked != 0 {
             return Some(StopReason::Asked(asked));
         }
-        if self.overrun_streak > self.spec.overrun_cycles_max {
-            return Some(StopReason::Overrun { cycles: self.overrun_streak });
+        if self.stall.streak() > self.spec.overrun_cycles_max {
+            return Some(StopReason::Overrun { cycles: self.stall.streak() });
         }
         let fault = silence.or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)));
         for drive in &mut self.drives {
@@ -170,6 +170,12 @@ impl Cycle {
                 return Some(self.silent_axis(axis, self.slots.silence(Part::Status(axis))));
             }
             return Some(StopReason::NotEnabled { axis, statusword: drive.statusword });
+        }
+        if drive.faulted()
+            && drive.emergency == Some(emcy::CODE_RPDO_TIMEOUT)
+            && let Some(cycles) = self.stall.blamed()
+        {
+            return Some(StopReason::Stalled { axis, cycles });
         }
         if drive.faulted() {
             return Some(StopReason::DriveFault {

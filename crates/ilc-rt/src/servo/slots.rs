@@ -133,6 +133,11 @@ impl Slots {
         self.number(part).map_or(0, |number| self.lags[number].silent)
     }
 
+    /// Whether a part that is not given up has stayed away for the last `n_cycles` SYNCs.
+    pub(super) fn waits(&self, n_cycles: u64) -> bool {
+        self.lags[..self.n_parts].iter().any(|lag| !lag.given_up && lag.silent >= n_cycles)
+    }
+
     /// Whether a part is no longer waited for.
     pub(super) fn is_given_up(&self, part: Part) -> bool {
         self.number(part).is_some_and(|number| self.lags[number].given_up)

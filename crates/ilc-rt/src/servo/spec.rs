@@ -74,4 +74,7 @@ pub struct ServoSpec {
     pub silent_cycles_max: u32,
     /// Consecutive overrun cycles at which the axes stop.
     pub overrun_cycles_max: u32,
+    /// Cycles for which the loop holds still, sending nothing, when nodes stop answering; 0 where nodes
+    /// are real and would move on by themselves.
+    pub hold_cycles_max: u32,
 }

@@ -4,12 +4,14 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::announce::Announcer;
+use super::claim::{Claim, claim};
 use super::collect::Collector;
 use super::disturbance::Disturbance;
 use super::error::SupervisorError;
 use super::experiment::Experiment;
+use super::keeper::{Keeper, Kept, Told};
 use super::learner::{Learner, Lesson, expect};
-use super::options::{Options, Outcome};
+use super::options::{Options, Outcome, SIMULATED_PATIENCE_S};
 use super::pace::Pacer;
 use super::plan::Plan;
 use super::progress::{Decision, Progress, Resumed};
@@ -19,7 +21,7 @@ use crate::config::Cell;
 use crate::fieldbus::Bus;
 use crate::learning::Law;
 use crate::library::Library;
-use crate::record::{AxisKinds, EndStatus, Event, Figures, IterationRecord, Meta, StateName};
+use crate::record::{AxisKinds, EndStatus, Event, Figures, IterationRecord, StateName};
 use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
@@ -108,11 +110,17 @@ fn carry_out(
         return Err(SupervisorError::Resume(format!("there is no library {path} to go on with")));
     }
     let library = Library::open(&options.library)?;
-    let mut progress = Progress::new(growth_allowed);
+    let mut progress = Progress::new(growth_allowed).forgiving(options.forgives_stalls());
+    let mut held = Claim::none();
     let resumed = if options.resume {
+        // Claimed before it is read: what another program adds to it meanwhile would be made twice.
+        if let Some(campaign) = library.newest_campaign(&plan.meta.fingerprint)? {
+            held = claim(&options.library, &campaign)?;
+        }
         progress.resume(&library, &mut plan.meta, law.as_deref_mut(), &options.disturbance)?
     } else {
         plan.meta.campaign = library.new_campaign()?;
+        held = claim(&options.library, &plan.meta.campaign)?;
         let coming = options.disturbance.of(0).map_err(SupervisorError::Disturbance)?;
         if let Some(law) = law.as_deref_mut() {
             expect(law, &coming);
@@ -138,12 +146,24 @@ fn carry_out(
     };
     let mut announcer = Announcer::new(observe, telemetry, cell.cycle_s(), cell.n_axes());
     announcer.tell(&Event::State { state: StateName::BringingUp, iteration: first });
-    nodes::start(cell, bus.as_mut(), options.lockstep)?;
+    nodes::start(cell, bus.as_mut(), options)?;
 
     // Drives that were off do not begin where the last run left them. One run with the coming input
     // brings them there; it is not kept, as it says nothing of the law.
     let warm_up = u32::from(!resumed.runs.is_empty());
     plan.servo.runs = first - warm_up..options.iterations;
+    if options.forgives_stalls() {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
+        let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;
+        plan.servo.hold_cycles_max = patience;
+        plan.servo.overrun_cycles_max = plan.servo.overrun_cycles_max.max(patience);
+    }
+    let meta = Arc::new(plan.meta.clone());
+    let keeper = if options.lockstep {
+        Keeper::in_line(library, meta)
+    } else {
+        Keeper::on_thread(library, meta)?
+    };
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&options.stop));
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next) {
         progress.send(&mut mail, input, update_ms);
@@ -185,8 +205,10 @@ fn carry_out(
             cell.cycle_s(),
         ),
         announcer,
-        library,
-        meta: plan.meta,
+        keeper,
+        campaign: plan.meta.campaign,
+        unkept: Vec::new(),
+        _claim: held,
         progress,
         learner,
         runs: resumed.runs,
@@ -197,6 +219,8 @@ fn carry_out(
         mail,
         stopping: None,
         unjudged: VecDeque::new(),
+        lessons: VecDeque::new(),
+        awaited: 0,
         remark: None,
         failure: None,
         phase_iteration: first,
@@ -217,8 +241,12 @@ fn carry_out(
 struct Running<'a> {
     collector: Collector,
     announcer: Announcer<'a>,
-    library: Library,
-    meta: Meta,
+    keeper: Keeper,
+    /// Name of the campaign.
+    campaign: String,
+    /// Runs that could not be kept, oldest first.
+    unkept: Vec<IterationRecord>,
+    _claim: Claim,
     progress: Progress,
     learner: Option<Learner>,
     runs: Vec<(u32, Figures)>,
@@ -232,6 +260,10 @@ struct Running<'a> {
     stopping: Option<StopReason>,
     /// Runs that the law is asked about and has not answered yet, the oldest first: key and place.
     unjudged: VecDeque<(i64, usize)>,
+    /// What the law made of runs that are not kept yet, the oldest first.
+    lessons: VecDeque<Lesson>,
+    /// Runs that the law on its thread was asked about and has not answered yet.
+    awaited: u32,
     /// What the law last had to say.
     remark: Option<String>,
     /// Why no more runs can be kept, if so: the axes are stopped, as nothing may be lost.
@@ -274,23 +306,36 @@ impl Running<'_> {
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
         }
+        self.heed_all();
         while let Some(lesson) = self.learner.as_mut().and_then(Learner::take) {
+            self.awaited = self.awaited.saturating_sub(1);
+            let lesson = self.learned(lesson);
+            self.lessons.push_back(lesson);
+            self.judge_kept();
+        }
+    }
+
+    /// Adds what the law decided to those runs that are kept by now.
+    fn judge_kept(&mut self) {
+        while !self.unjudged.is_empty()
+            && let Some(lesson) = self.lessons.pop_front()
+        {
             self.judged(&lesson);
-            self.learned(lesson);
         }
     }
 
     /// Hands the loop what was learned.
-    fn learned(&mut self, lesson: Lesson) {
+    fn learned(&mut self, mut lesson: Lesson) -> Lesson {
         // Once for each change: what stays as it is need not be said after every run.
         if lesson.remark != self.remark {
             tracing::info!("{}", lesson.remark.as_deref().unwrap_or("the law learns again"));
-            self.remark = lesson.remark;
+            self.remark.clone_from(&lesson.remark);
         }
-        match lesson.input {
+        match std::mem::replace(&mut lesson.input, Ok(Vec::new())) {
             Ok(input) => self.progress.send(&mut self.mail, input, lesson.update_ms),
             Err(error) => self.fail(format!("the law refused the last run: {error}")),
         }
+        lesson
     }
 
     /// Adds what the law decided to a run that was kept while it computed.
@@ -309,11 +354,8 @@ impl Running<'_> {
             learning_off: figures.learning_off,
             remark: figures.remark.clone(),
         };
-        let written = self.library.judge(id, figures);
+        self.keeper.judge(id, figures.clone());
         self.announcer.tell(&event);
-        if let Err(error) = written {
-            self.fail(error.to_string());
-        }
     }
 
     fn run_ended(&mut self, overruns: u32) {
@@ -327,7 +369,7 @@ impl Running<'_> {
             match self.disturbance.of(record.index + 1) {
                 Ok(coming) => self.present = coming,
                 Err(why) => {
-                    self.keep(&record);
+                    self.keep(record, false);
                     self.fail(why);
                     return;
                 }
@@ -362,29 +404,79 @@ impl Running<'_> {
         if let Decision::RollBack(input) = decision {
             self.progress.send(&mut self.mail, input, 0.0);
         }
-        if let Some(id) = self.keep(&record)
-            && asked
-        {
-            self.unjudged.push_back((id, self.runs.len() - 1));
+        self.awaited += u32::from(asked);
+        self.keep(record, asked);
+    }
+
+    fn keep(&mut self, record: IterationRecord, asked: bool) {
+        self.keeper.begin(record, asked);
+        self.heed_all();
+    }
+
+    /// Heeds whatever has become of runs that were to be kept.
+    fn heed_all(&mut self) {
+        while let Some(told) = self.keeper.take() {
+            self.heed(told);
         }
     }
 
-    fn keep(&mut self, record: &IterationRecord) -> Option<i64> {
-        match self.library.append(&self.meta, record) {
-            Ok(id) => {
-                self.announcer.tell(&Event::Iteration {
-                    id,
-                    index: record.index,
-                    digest: record.digest(),
-                    figures: record.figures.clone(),
-                });
-                self.runs.push((record.index, record.figures.clone()));
-                Some(id)
+    /// Tells of a run that is kept; the first one that is not stops the axes.
+    fn heed(&mut self, told: Told) {
+        let Kept { record, asked, result } = match told {
+            Told::Kept(kept) => kept,
+            Told::Unjudged(error) => return self.fail(error.to_string()),
+        };
+        match result {
+            Some(Ok(id)) => {
+                self.tell_kept(id, &record);
+                if asked {
+                    self.unjudged.push_back((id, self.runs.len() - 1));
+                    self.judge_kept();
+                }
             }
-            Err(error) => {
+            Some(Err(error)) => {
                 self.fail(error.to_string());
-                None
+                self.unkept.push(record);
             }
+            None => self.unkept.push(record),
+        }
+    }
+
+    fn tell_kept(&mut self, id: i64, record: &IterationRecord) {
+        self.announcer.tell(&Event::Iteration {
+            id,
+            index: record.index,
+            digest: record.digest(),
+            figures: record.figures.clone(),
+        });
+        self.runs.push((record.index, record.figures.clone()));
+    }
+
+    /// Waits for the runs that are being kept, and tries once more to keep those that could not be.
+    fn finish_keeping(&mut self) {
+        for told in self.keeper.finish() {
+            self.heed(told);
+        }
+        self.heed_all();
+        if self.unkept.is_empty() {
+            return;
+        }
+        let first = self.unkept[0].index;
+        let mut is_saved = true;
+        for record in std::mem::take(&mut self.unkept) {
+            let Some(id) = self.keeper.retry(&record) else {
+                is_saved = false;
+                break;
+            };
+            self.tell_kept(id, &record);
+        }
+        let lost = if is_saved { "could not be kept at once" } else { "could not be kept" };
+        let kept = match self.runs.len() {
+            1 => "1 run is kept".to_owned(),
+            n => format!("{n} runs are kept"),
+        };
+        if let Some(why) = &mut self.failure {
+            why.push_str(&format!("; run {first} {lost}, {kept}"));
         }
     }
 
@@ -398,15 +490,17 @@ impl Running<'_> {
     fn end(mut self, pacer: Pacer, cell: &Cell, options: &Options) -> Outcome {
         let remains = pacer.end();
         self.read_mail();
-        while !self.unjudged.is_empty()
+        while self.awaited > 0
             && let Some(lesson) = self.learner.as_mut().and_then(Learner::take_last)
         {
-            self.judged(&lesson);
+            self.awaited -= 1;
+            self.lessons.push_back(lesson);
         }
+        self.finish_keeping();
         let (status, reason) = match (&self.failure, self.stopping, &remains) {
             (Some(why), _, _) => (EndStatus::Fault, why.clone()),
             (None, Some(reason), _) => {
-                (reason::status(reason), reason::sentence(reason, cell, options.lockstep))
+                (reason::status(reason), reason::sentence(reason, cell, options))
             }
             (None, None, None) => (
                 EndStatus::Fault,
@@ -419,8 +513,8 @@ impl Running<'_> {
         if status == EndStatus::Fault {
             self.announcer.tell(&Event::Fault { reason: reason.clone() });
         }
-        if let Some(mut remains) = remains {
-            if let Err(error) = nodes::release(remains.bus.as_mut()) {
+        if let Some(remains) = remains {
+            if let Err(error) = remains.released {
                 tracing::warn!("nodes could not be taken out of operation: {error}");
             }
             if let Some(timing) = remains.timing {
@@ -438,7 +532,7 @@ impl Running<'_> {
             Some(StopReason::Asked(signal)) if self.failure.is_none() => signal,
             _ => 0,
         };
-        Outcome { status, reason, signal, campaign: self.meta.campaign, runs: self.runs }
+        Outcome { status, reason, signal, campaign: self.campaign, runs: self.runs }
     }
 }
 

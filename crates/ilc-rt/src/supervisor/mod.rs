@@ -7,12 +7,14 @@
 mod announce;
 mod band;
 mod campaign;
+mod claim;
 mod collect;
 mod disturbance;
 mod error;
 mod experiment;
 mod forecast;
 mod identified;
+mod keeper;
 mod law;
 mod learner;
 mod nodes;

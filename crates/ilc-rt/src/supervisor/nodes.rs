@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::error::SupervisorError;
+use super::options::{Options, SIMULATED_PATIENCE_S};
 use super::plan;
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::fieldbus::canopen::{NmtCommand, listen};
@@ -14,9 +15,15 @@ use crate::fieldbus::{Bus, BusError};
 const HEARTBEAT_MS: u16 = 100;
 
 /// Resets, checks and configures all nodes, then starts them together. No axis moves.
-pub(super) fn start(cell: &Cell, bus: &mut dyn Bus, lockstep: bool) -> Result<(), SupervisorError> {
+pub(super) fn start(
+    cell: &Cell,
+    bus: &mut dyn Bus,
+    options: &Options,
+) -> Result<(), SupervisorError> {
+    let lockstep = options.lockstep;
     let file = cell.file.display().to_string();
-    let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s);
+    let stall_s = if options.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
+    let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
     refuse_company(cell, bus)?;
     let refused = |key: String| {
         let file = file.clone();

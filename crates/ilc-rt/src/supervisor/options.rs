@@ -9,6 +9,9 @@ use super::disturbance::Disturbance;
 use crate::config::Measure;
 use crate::record::{EndStatus, Figures};
 
+/// How long a stall of controller or simulated drives is forgiven, as it stalls them alike.
+pub(super) const SIMULATED_PATIENCE_S: f64 = 1.0;
+
 /// What the caller chooses beyond the cell description.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -18,6 +21,9 @@ pub struct Options {
     pub measure: Option<Measure>,
     /// Paced by the nodes' answers instead of the clock.
     pub lockstep: bool,
+    /// Whether the drives are simulated on this computer: a stall of it stalls them as well, and is
+    /// forgiven for longer than real drives, which move on by themselves, could allow.
+    pub simulated: bool,
     /// Go on with the newest campaign of the same cell, program and law.
     pub resume: bool,
     /// Where every run is kept.
@@ -28,6 +34,13 @@ pub struct Options {
     pub telemetry: bool,
     /// Set to a signal's number to bring the axes to rest.
     pub stop: Arc<AtomicI32>,
+}
+
+impl Options {
+    /// Whether stalls are forgiven: in lock-step there is no clock that could tell of one.
+    pub(super) fn forgives_stalls(&self) -> bool {
+        self.simulated && !self.lockstep
+    }
 }
 
 /// How a campaign ended.

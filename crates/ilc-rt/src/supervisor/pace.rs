@@ -4,7 +4,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::error::SupervisorError;
-use crate::fieldbus::Bus;
+use super::nodes;
+use crate::fieldbus::BusError;
 use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
 use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
 
@@ -16,14 +17,15 @@ const SPIN: Nanos = Nanos::from_micros(100);
 /// The loop, wherever it runs.
 pub(super) enum Pacer {
     /// On a thread of its own.
-    Clock { thread: Option<JoinHandle<(Cycle, Timing)>> },
+    Clock { thread: Option<JoinHandle<Remains>> },
     /// Here, a tick at a time.
     Answers { cycle: Option<Box<Cycle>> },
 }
 
 /// What remains of the loop.
 pub(super) struct Remains {
-    pub(super) bus: Box<dyn Bus>,
+    /// Whether the nodes were taken out of operation.
+    pub(super) released: Result<(), BusError>,
     pub(super) timing: Option<Timing>,
 }
 
@@ -42,7 +44,9 @@ impl Pacer {
                 // Set-up of the thread is over before the first tick; nobody waits for the report.
                 let _ = report.send(thread::enter(RtRequest::default()));
                 run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
-                (cycle, timing)
+                // At once, and not when the campaign has put its things away: by then the nodes may have
+                // missed their commands, or be in somebody else's campaign.
+                Remains { released: release(cycle), timing: Some(timing) }
             })
             .map_err(|source| SupervisorError::Thread { what: "servo", source })?;
         let report = granted.recv().unwrap_or_default();
@@ -68,11 +72,12 @@ impl Pacer {
     /// Ends; `None` if the loop's thread has died.
     pub(super) fn end(self) -> Option<Remains> {
         match self {
-            Self::Clock { thread } => {
-                let (cycle, timing) = thread?.join().ok()?;
-                Some(Remains { bus: cycle.into_bus(), timing: Some(timing) })
-            }
-            Self::Answers { cycle } => Some(Remains { bus: cycle?.into_bus(), timing: None }),
+            Self::Clock { thread } => thread?.join().ok(),
+            Self::Answers { cycle } => Some(Remains { released: release(*cycle?), timing: None }),
         }
     }
+}
+
+fn release(cycle: Cycle) -> Result<(), BusError> {
+    nodes::release(cycle.into_bus().as_mut())
 }

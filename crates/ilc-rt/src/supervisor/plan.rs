@@ -266,6 +266,7 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
         enable_ticks: ticks(ENABLE_S),
         silent_cycles_max: cell.safety.silent_cycles_max,
         overrun_cycles_max: cell.safety.overrun_cycles_max,
+        hold_cycles_max: 0,
     })
 }
 

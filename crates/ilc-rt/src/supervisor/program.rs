@@ -9,7 +9,9 @@ use crate::config::{
 };
 use crate::record::fingerprint;
 use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
-use crate::trajectory::program::{GcodeSetting, SetPointTable, TableError, read_gcode, read_table};
+use crate::trajectory::program::{
+    GcodeProgram, GcodeSetting, SetPointTable, TableError, read_gcode, read_table,
+};
 use crate::trajectory::{
     ArcSpec, AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, ModulatedSegment,
     PathSegment, PathSpec, SampledMotion, TrajectoryError, raster, set_points,
@@ -20,7 +22,8 @@ const START_M: f64 = 1e-9;
 /// How far set points may round beyond the range of an axis.
 const ROUNDING_M: f64 = 1e-12;
 
-/// Plans the program of a cell.
+/// Plans the program of a cell; its set points, whatever kind of path they belong to, are verified as
+/// they will be sent.
 ///
 /// # Errors
 /// [`SupervisorError::Program`] for a path beyond the limits, [`SupervisorError::PartProgram`] for
@@ -29,16 +32,20 @@ pub(super) fn interpolator(
     cell: &Cell,
     limits: &[AxisLimits],
 ) -> Result<Interpolator, SupervisorError> {
+    planned(cell, limits)?.verified(limits).map_err(|source| refused(cell, source))
+}
+
+fn planned(cell: &Cell, limits: &[AxisLimits]) -> Result<Interpolator, SupervisorError> {
     let program = &cell.program;
     let refused = |source| refused(cell, source);
     let dwells = (program.dwell_before_s, program.dwell_after_s);
     let play = |motion: &SampledMotion| Interpolator::play(motion, dwells.0, dwells.1);
     let start = || [program.start_m[0], program.start_m.get(1).copied().unwrap_or(0.0)];
     match program.kind {
-        PathKind::Points => straight(cell, limits, points(cell), 0.0),
+        PathKind::Points => straight(cell, limits, points(cell), &[], 0.0),
         PathKind::Gcode => {
-            let (segments, dwell_s) = gcode(cell)?;
-            straight(cell, limits, segments, dwell_s)
+            let read = gcode(cell)?;
+            straight(cell, limits, read.segments, &read.rapid, read.dwell_before_s)
         }
         PathKind::Table => {
             let table = table(cell)?;
@@ -56,7 +63,7 @@ pub(super) fn interpolator(
                 shape.there_and_back,
             )
             .map_err(refused)?;
-            straight(cell, limits, segments, 0.0)
+            straight(cell, limits, segments, &[], 0.0)
         }
         PathKind::Spline => {
             let points_m: Vec<Vec<f64>> = std::iter::once(program.start_m.clone())
@@ -187,8 +194,8 @@ fn points(cell: &Cell) -> Vec<PathSegment> {
         .collect()
 }
 
-/// The segments of the part program, and the rest before them.
-fn gcode(cell: &Cell) -> Result<(Vec<PathSegment>, f64), SupervisorError> {
+/// What the part program says.
+fn gcode(cell: &Cell) -> Result<GcodeProgram, SupervisorError> {
     let program = &cell.program;
     let (file, text) = read_file(cell, "G-code", GCODE_BYTES_MAX)?;
     let rotary: Vec<bool> = cell.axes.iter().map(|axis| axis.unit == AxisUnit::Rad).collect();
@@ -200,9 +207,7 @@ fn gcode(cell: &Cell) -> Result<(Vec<PathSegment>, f64), SupervisorError> {
         exact_corners: program.corner == Corner::ExactStop,
         block_delete: program.block_delete,
     };
-    let read = read_gcode(&text, &setting)
-        .map_err(|source| SupervisorError::PartProgram { file, source })?;
-    Ok((read.segments, read.dwell_before_s))
+    read_gcode(&text, &setting).map_err(|source| SupervisorError::PartProgram { file, source })
 }
 
 /// The set points of the table; refused unless they begin where the axes rest before a run.
@@ -239,10 +244,12 @@ fn read_file(
     }
 }
 
+/// Plans lines and arcs; `rapid` tells which of them go as fast as the axes allow, up to their feed.
 fn straight(
     cell: &Cell,
     limits: &[AxisLimits],
     segments: Vec<PathSegment>,
+    rapid: &[bool],
     dwell_s: f64,
 ) -> Result<Interpolator, SupervisorError> {
     let program = &cell.program;
@@ -256,6 +263,9 @@ fn straight(
         dwell_before_s: program.dwell_before_s + dwell_s,
         dwell_after_s: program.dwell_after_s,
     };
+    if spec.corner == CornerRule::ExactStop {
+        spec.check_feeds(limits, rapid).map_err(|source| refused(cell, source))?;
+    }
     Interpolator::plan(&spec, limits, cell.cycle_s()).map_err(|source| refused(cell, source))
 }
 

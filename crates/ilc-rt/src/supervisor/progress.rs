@@ -44,6 +44,8 @@ pub(super) struct Progress {
     /// Time of the lesson in each table handed to the loop; table n at n - 1.
     update_ms: Vec<f64>,
     table_in_use: u32,
+    /// Whether overruns are no disturbance, as the plant stood still as well.
+    forgives_overruns: bool,
 }
 
 impl Progress {
@@ -56,7 +58,19 @@ impl Progress {
             late_updates: 0,
             update_ms: Vec::new(),
             table_in_use: 0,
+            forgives_overruns: false,
         }
+    }
+
+    /// The same, where a computer that stalls stalls the plant too: its time passes by SYNC, so that the
+    /// samples of a run with overruns are those of one without.
+    pub(super) fn forgiving(self, forgives_overruns: bool) -> Self {
+        Self { forgives_overruns, ..self }
+    }
+
+    /// Whether a run was disturbed by computer or bus, so that it is no evidence.
+    pub(super) fn is_disturbed(&self, figures: &Figures) -> bool {
+        figures.missing_samples > 0 || figures.overruns > 0 && !self.forgives_overruns
     }
 
     /// A run began with a table.
@@ -98,7 +112,7 @@ impl Progress {
             record.figures.learning_off = true;
             record.figures.remark = Some(format!("learning is off: {GROWN}"));
         }
-        if is_disturbed(&record.figures) {
+        if self.is_disturbed(&record.figures) {
             if !off {
                 record.figures.remark = Some(disturbance_remark(&record.figures));
             }
@@ -193,11 +207,6 @@ impl Progress {
         let runs = rows.into_iter().map(|row| (row.record.index, row.record.figures)).collect();
         Ok(Resumed { runs, next, coming })
     }
-}
-
-/// Whether something other than the axes had a part in the error of a run.
-fn is_disturbed(figures: &Figures) -> bool {
-    figures.overruns > 0 || figures.missing_samples > 0
 }
 
 fn disturbance_remark(figures: &Figures) -> String {
@@ -302,6 +311,16 @@ mod tests {
         assert_eq!(progress.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
         assert_eq!(progress.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
         assert_eq!(progress.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
+    }
+
+    #[test]
+    fn a_stall_that_stalls_the_plant_as_well_disturbs_nothing() {
+        let mut progress = Progress::new(1.5).forgiving(true);
+        let mut stalled = record(1.0);
+        stalled.figures.overruns = 50;
+        assert_eq!(progress.decide(&mut stalled), Decision::Learn);
+        stalled.figures.missing_samples = 1;
+        assert_eq!(progress.decide(&mut stalled), Decision::Hold);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Why the axes were stopped, in one sentence that names axis, node and numbers.
 
+use super::options::{Options, SIMULATED_PATIENCE_S};
 use crate::config::{AxisUnit, Cell};
 use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
@@ -7,7 +8,7 @@ use crate::record::EndStatus;
 use crate::servo::{StopReason, Stranger};
 
 /// The sentence for a reason to stop.
-pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> String {
+pub(super) fn sentence(reason: StopReason, cell: &Cell, options: &Options) -> String {
     let axis = |index: usize| {
         cell.axes.get(index).map_or_else(
             || format!("axis {index}"),
@@ -16,7 +17,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
     };
     // In lock-step the loop waits for every answer, so that the count of cycles says nothing.
     let unanswered = |cycles: u32| {
-        if lockstep {
+        if options.lockstep {
             format!("no answer in {} s", cell.safety.answer_timeout_s)
         } else {
             format!(
@@ -27,13 +28,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
     };
     let ms = |cycles: u32| f64::from(cycles) * cell.cycle_s() * 1e3;
     match reason {
-        StopReason::Asked(signal) => match signal {
-            libc::SIGINT => "stopped by Ctrl-C".to_owned(),
-            libc::SIGTERM => "stopped by SIGTERM".to_owned(),
-            libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
-            libc::SIGHUP => "stopped as its terminal is gone (SIGHUP)".to_owned(),
-            other => format!("stopped by signal {other}"),
-        },
+        StopReason::Asked(signal) => asked(signal),
         StopReason::DriveFault { axis: index, code, following_error_m } => format!(
             "drive of {} faulted: {}; its following error was {}",
             axis(index),
@@ -62,18 +57,21 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             unanswered(cycles),
             3 - pdo
         ),
-        StopReason::WrongLength { node, pdo, n_bytes } => format!(
-            "no {} of node {node}: its TPDO{pdo} has {n_bytes} bytes, 8 are needed",
-            if pdo == 1 { "status" } else { "following error" }
-        ),
+        StopReason::WrongLength { node, pdo, n_bytes } => {
+            let is_tool = cell.tcp_encoder.is_some_and(|tool| tool.node == node);
+            let what = match pdo {
+                _ if is_tool => "position",
+                1 => "status",
+                _ => "following error",
+            };
+            format!("no {what} of node {node}: its TPDO{pdo} has {n_bytes} bytes, 8 are needed")
+        }
         StopReason::SilentTool { cycles } => format!(
             "tool measurement (node {}) is silent: {}",
             cell.tcp_encoder.map_or(0, |tool| tool.node),
             unanswered(cycles)
         ),
-        StopReason::NodeLeft { node } => {
-            format!("node {node} restarted")
-        }
+        StopReason::NodeLeft { node } => format!("node {node} restarted"),
         StopReason::NodeStopped { node, state: NmtState::Stopped } => {
             format!("node {node} was stopped by NMT")
         }
@@ -94,21 +92,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
                 cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m)
             )
         ),
-        StopReason::OutsideLimits { axis: index, position_m } => cell.axes.get(index).map_or_else(
-            || format!("axis {index} is at {position_m}, outside its limits"),
-            |axis| {
-                let unit = axis.unit.symbol();
-                let (low, high) = (axis.limits.position_min_m, axis.limits.position_max_m);
-                // As the counts have it, without the digits that are only rounding.
-                let resolution = 10_f64.powf(axis.counts_per_m.log10().ceil());
-                let position = (position_m * resolution).round() / resolution;
-                format!(
-                    "axis {} is at {position} {unit}, outside {low} to {high} {unit}: \
-                     bring it back by other means; nothing has moved",
-                    axis.name
-                )
-            },
-        ),
+        StopReason::OutsideLimits { axis, position_m } => outside(cell, axis, position_m),
         StopReason::Jump { axis: index, step_m } => format!(
             "{}: its position jumped by {} from one answer to the next, farther than it can move",
             axis(index),
@@ -118,12 +102,51 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, lockstep: bool) -> Strin
             format!("{}: the command was not a finite number", axis(index))
         }
         StopReason::Overrun { cycles } => format!(
-            "the loop missed {cycles} cycles in a row ({:.0} ms); safety.overrun_cycles_max allows {}",
+            "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late; {}",
             ms(cycles),
-            cell.safety.overrun_cycles_max
+            if options.simulated {
+                format!("with simulated drives {SIMULATED_PATIENCE_S} s are forgiven")
+            } else {
+                format!("safety.overrun_cycles_max allows {}", cell.safety.overrun_cycles_max)
+            }
+        ),
+        StopReason::Stalled { axis: index, cycles } => format!(
+            "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late, and the drive of \
+             {} stopped by itself, as no command came in time (0x{:04X})",
+            ms(cycles),
+            axis(index),
+            emcy::CODE_RPDO_TIMEOUT
         ),
         StopReason::Bus(error) => format!("{error}"),
     }
+}
+
+/// Who asked for the stop.
+fn asked(signal: i32) -> String {
+    match signal {
+        libc::SIGINT => "stopped by Ctrl-C".to_owned(),
+        libc::SIGTERM => "stopped by SIGTERM".to_owned(),
+        libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
+        libc::SIGHUP => "stopped as its terminal is gone (SIGHUP)".to_owned(),
+        other => format!("stopped by signal {other}"),
+    }
+}
+
+/// Where an axis stands that may not be switched on there.
+fn outside(cell: &Cell, axis: usize, position_m: f64) -> String {
+    let Some(axis) = cell.axes.get(axis) else {
+        return format!("axis {axis} is at {position_m}, outside its limits");
+    };
+    let unit = axis.unit.symbol();
+    let (low, high) = (axis.limits.position_min_m, axis.limits.position_max_m);
+    // As the counts have it, without the digits that are only rounding.
+    let resolution = 10_f64.powf(axis.counts_per_m.log10().ceil());
+    let position = (position_m * resolution).round() / resolution;
+    format!(
+        "axis {} is at {position} {unit}, outside {low} to {high} {unit}: bring it back by other \
+         means; nothing has moved",
+        axis.name
+    )
 }
 
 /// What another master was seen to send.
@@ -169,6 +192,7 @@ pub(super) fn status(reason: StopReason) -> EndStatus {
         | StopReason::OutsideLimits { .. }
         | StopReason::Jump { .. }
         | StopReason::NotFinite { .. }
+        | StopReason::Stalled { .. }
         | StopReason::Overrun { .. }
         | StopReason::Bus(_) => EndStatus::Fault,
     }

@@ -2,7 +2,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::MAX_AXES;
 use super::limits::{AxisLimits, PathLimits};
@@ -137,6 +137,22 @@ impl Arc {
         tangent[self.plane[0]] = scale * (self.growth_m * cos - across * sin) / self.length_m;
         tangent[self.plane[1]] = scale * (self.growth_m * sin + across * cos) / self.length_m;
         tangent
+    }
+
+    /// The largest share of the path's speed that an axis has somewhere on the arc.
+    pub(super) fn share(&self, axis: usize) -> f64 {
+        if !self.plane.contains(&axis) {
+            return (self.to_m[axis] - self.from_m[axis]).abs() / self.length_m;
+        }
+        // The tangent lies along an axis where the radius is across it, twice a turn.
+        let first = if self.plane[1] == axis { 0.0 } else { FRAC_PI_2 };
+        let to_rad = self.from_rad + self.sweep_rad;
+        let (low, high) = (self.from_rad.min(to_rad), self.from_rad.max(to_rad));
+        if first + ((low - first) / PI).ceil() * PI <= high {
+            return self.share;
+        }
+        let [begin, end] = [0.0, self.length_m].map(|s_m| self.along(s_m, 1.0)[axis].abs());
+        begin.max(end)
     }
 
     /// What the axes leave for a jerk-limited move along the arc.

@@ -51,6 +51,14 @@ impl Element {
         }
     }
 
+    /// The largest share of the path's speed that an axis has anywhere on it.
+    pub(super) fn share(&self, axis: usize) -> f64 {
+        match self {
+            Self::Line(line) => line.direction[axis].abs(),
+            Self::Arc(arc) => arc.share(axis),
+        }
+    }
+
     /// What the axes' limits and the feed leave for a jerk-limited move.
     pub(super) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
         match self {

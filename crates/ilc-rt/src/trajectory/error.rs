@@ -179,6 +179,24 @@ pub enum TrajectoryError {
         /// The limit.
         limit: f64,
     },
+    /// A set point of a planned path that is too far from those before it.
+    #[error(
+        "axis {}: at {} s the {quantity} of the set points over the cycle is {} {unit}, limit {} {unit}: \
+         lower the feed or smooth the path",
+        axis + 1, Figure(*at_s), Figure(*reached), Figure(*limit), unit = quantity.unit()
+    )]
+    SetPoint {
+        /// When, from the first set point.
+        at_s: f64,
+        /// Which axis.
+        axis: usize,
+        /// Which limit.
+        quantity: Quantity,
+        /// What is reached there.
+        reached: f64,
+        /// The limit.
+        limit: f64,
+    },
     /// No α holds the limits.
     #[error(
         "segment {} {place}: no alpha holds every limit: at alpha {} the {quantity} along the path \
@@ -261,14 +279,22 @@ pub enum TrajectoryError {
         at_m: f64,
     },
     /// No speed was found at which a curve holds the limits.
-    #[error("axis {}: {quantity} is {} times its limit on the curve after {rounds} attempts to slow down: raise the limit or smooth the curve", axis + 1, Figure(*ratio))]
+    #[error(
+        "axis {}: at {} m from the start of the curve the {quantity} is {} {unit}, limit {} {unit}, after \
+         {rounds} attempts to slow down: raise the limit or smooth the curve",
+        axis + 1, Figure(*at_m), Figure(*reached), Figure(*limit), unit = quantity.unit()
+    )]
     Unproven {
         /// Which axis.
         axis: usize,
+        /// Where, along the curve.
+        at_m: f64,
         /// Which limit.
         quantity: Quantity,
-        /// Reached over allowed.
-        ratio: f64,
+        /// What is reached there.
+        reached: f64,
+        /// The limit.
+        limit: f64,
         /// Attempts made.
         rounds: usize,
     },
@@ -331,6 +357,7 @@ impl TrajectoryError {
             | Self::Position { axis, .. }
             | Self::Unproven { axis, .. }
             | Self::Row { axis, .. }
+            | Self::SetPoint { axis, .. }
             | Self::Exceeds { axis, .. } => Some(axis),
             _ => None,
         }

@@ -12,6 +12,7 @@ use super::path::{self, CornerRule, DWELL_MAX_S, PathSpec, check_time};
 use super::proof::{self, Proof};
 use super::setpoint::Setpoint;
 use super::table::Table;
+use super::verification::Verification;
 
 /// How the corners of this run are taken.
 #[derive(Clone, Debug)]
@@ -66,7 +67,9 @@ impl Interpolator {
             }
         };
         let n_samples = rest_tick + proof::n_ticks(spec.dwell_after_s, cycle_s)? + 1;
-        Ok(Self { motion, n_axes: spec.start_m.len(), cycle_s, n_samples, tick: 0 })
+        let plan = Self { motion, n_axes: spec.start_m.len(), cycle_s, n_samples, tick: 0 };
+        // A blended path has been through its proof already.
+        if spec.corner == CornerRule::ExactStop { plan.verified(limits) } else { Ok(plan) }
     }
 
     /// Rests at a point for some samples, as while an axis is identified.
@@ -117,6 +120,25 @@ impl Interpolator {
             tick: 0,
         };
         Ok(motion)
+    }
+
+    /// Verifies the set points of the run, whatever it was planned by: their finite differences over
+    /// the cycle, from rest to rest, are within the limits.
+    ///
+    /// # Shapes
+    /// - `limits`: one entry an axis
+    /// # Real Time
+    /// Cold: allocates, and walks through the run.
+    /// # Errors
+    /// [`TrajectoryError::SetPoint`] for the first set point that breaks a limit.
+    pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, TrajectoryError> {
+        if limits.len() != self.n_axes {
+            let (found, expected) = (limits.len(), self.n_axes);
+            return Err(TrajectoryError::LimitCount { found, expected });
+        }
+        let reference_m = self.reference();
+        Verification::of_motion(&reference_m, limits, self.cycle_s).accept(&reference_m)?;
+        Ok(self)
     }
 
     /// Goes back to the first set point.

@@ -33,6 +33,7 @@ mod stop;
 mod table;
 mod to_rest;
 mod tracking_index;
+mod verification;
 
 pub use contour::{contour_error_m, path_tangents};
 pub use error::{Quantity, TrajectoryError};

@@ -3,6 +3,8 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::MAX_AXES;
+use super::limits::AxisLimits;
+use super::verification::Verification;
 
 /// Position and its derivatives at one time; axes beyond the motion's own stay at 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +74,25 @@ impl SampledMotion {
             motion.programmed_m.extend_from_slice(&programmed_m[..n_axes]);
         }
         Ok(motion)
+    }
+
+    /// Verifies the set points: their finite differences over the sample time, from rest to rest, are
+    /// within the limits.
+    ///
+    /// # Shapes
+    /// - `limits`: one entry an axis
+    /// # Real Time
+    /// Cold.
+    /// # Errors
+    /// [`TrajectoryError::SetPoint`](super::TrajectoryError::SetPoint) for the first set point that
+    /// breaks a limit.
+    pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, super::TrajectoryError> {
+        if limits.len() != self.n_axes {
+            let (found, expected) = (limits.len(), self.n_axes);
+            return Err(super::TrajectoryError::LimitCount { found, expected });
+        }
+        Verification::of_motion(&self.position_m, limits, self.dt_s).accept(&self.position_m)?;
+        Ok(self)
     }
 
     /// Number of samples.

@@ -3,8 +3,9 @@
 use super::MAX_AXES;
 use super::arc::Arc;
 use super::element::Element;
-use super::error::TrajectoryError;
+use super::error::{Quantity, TrajectoryError};
 use super::limits::{AxisLimits, Line, is_positive};
+use super::verification::TOLERANCE;
 
 /// Farthest position of a plan; the blend's fixed-point numbers hold it with room to spare.
 pub(super) const POSITION_MAX_M: f64 = 4096.0;
@@ -88,6 +89,43 @@ impl PathSpec {
             check_time("dwell", segment.dwell_s, (0.0, DWELL_MAX_S))?;
         }
         checked_elements(&self.start_m, &self.segments, limits)
+    }
+
+    /// Refuses feeds at which an axis would have to be faster than it may: a plan with exact stops
+    /// would be slower instead. Segments that are `rapid` are not looked at.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::Exceeds`] for the axis that a feed is most too high for, with the factor on
+    /// every feed that would do; others for values out of range.
+    pub fn check_feeds(
+        &self,
+        limits: &[AxisLimits],
+        rapid: &[bool],
+    ) -> Result<(), TrajectoryError> {
+        let elements = checked_elements(&self.start_m, &self.segments, limits)?;
+        let mut worst: Option<(f64, usize, f64)> = None;
+        for (index, (element, segment)) in elements.iter().zip(&self.segments).enumerate() {
+            if rapid.get(index).copied().unwrap_or(false) {
+                continue;
+            }
+            for (axis, limit) in limits.iter().enumerate() {
+                let reached = element.share(axis) * segment.feed_m_s;
+                let ratio = reached / limit.velocity_max_m_s;
+                if ratio > 1.0 + TOLERANCE && worst.is_none_or(|(most, ..)| ratio > most) {
+                    worst = Some((ratio, axis, reached));
+                }
+            }
+        }
+        let Some((ratio, axis, reached)) = worst else { return Ok(()) };
+        Err(TrajectoryError::Exceeds {
+            axis,
+            quantity: Quantity::Velocity,
+            reached,
+            limit: limits[axis].velocity_max_m_s,
+            feed_factor: 1.0 / ratio,
+            feed_admissible_m_s: self.feed_max_m_s() / ratio,
+            window_admissible_s: None,
+        })
     }
 
     /// The same path with every feed times `factor`.

@@ -9,13 +9,12 @@ use super::element::Element;
 use super::error::{Quantity, TrajectoryError};
 use super::limits::AxisLimits;
 use super::path::{PathSpec, check_time};
+use super::verification::{Differences, ROWS_AFTER, TOLERANCE, rounding_noise};
 
 /// Most samples of one run.
 pub(super) const N_SAMPLES_MAX: usize = 10_000_000;
 /// Longest blend window.
 const WINDOW_MAX_S: f64 = 10.0;
-/// Relative excess that still counts as holding a limit.
-pub(super) const TOLERANCE: f64 = 1e-9;
 /// Steps of each bracketing search for a remedy.
 const SEARCH_STEPS: usize = 12;
 
@@ -162,12 +161,6 @@ impl Proof<'_> {
     }
 }
 
-/// What differences of rounded positions carry of their own, for velocity (0) to jerk (2).
-pub(super) fn rounding_noise(farthest_m: f64, order: usize, cycle_s: f64) -> f64 {
-    let power = i32::try_from(order).unwrap_or(2) + 1;
-    8.0 * f64::EPSILON * (2.0 + farthest_m) / cycle_s.powi(power)
-}
-
 /// Largest finite differences of order 1, 2 and 3 over the cycle.
 struct Peaks {
     of_axis: [[f64; 3]; MAX_AXES],
@@ -176,25 +169,16 @@ struct Peaks {
 
 fn peaks(blend: &mut Blend, n_axes: usize, rest_tick: usize, cycle_s: f64) -> Peaks {
     let mut peaks = Peaks { of_axis: [[0.0; 3]; MAX_AXES], farthest_m: 0.0 };
-    let mut before: Option<[[f64; 3]; MAX_AXES]> = None;
-    // Three more ticks of rest: the last jerk is felt when the acceleration is back at 0.
-    for _ in 0..=rest_tick + 3 {
-        let setpoint = blend.next();
-        let mut now = [[0.0; 3]; MAX_AXES];
-        for axis in 0..n_axes {
-            now[axis][0] = setpoint.position_m[axis];
-            peaks.farthest_m = peaks.farthest_m.max(now[axis][0].abs());
-            let Some(before) = before else { continue };
-            let velocity = (now[axis][0] - before[axis][0]) / cycle_s;
-            let acceleration = (velocity - before[axis][1]) / cycle_s;
-            let jerk = (acceleration - before[axis][2]) / cycle_s;
-            (now[axis][1], now[axis][2]) = (velocity, acceleration);
-            for (peak, value) in peaks.of_axis[axis].iter_mut().zip([velocity, acceleration, jerk])
-            {
+    let mut differences = Differences::from_rest(&blend.next().position_m[..n_axes], cycle_s);
+    for _ in 0..rest_tick + ROWS_AFTER {
+        let row_m = blend.next().position_m;
+        let found = differences.next(&row_m[..n_axes]);
+        for (axis, found) in found.iter().enumerate().take(n_axes) {
+            peaks.farthest_m = peaks.farthest_m.max(row_m[axis].abs());
+            for (peak, value) in peaks.of_axis[axis].iter_mut().zip(found) {
                 *peak = peak.max(value.abs());
             }
         }
-        before = Some(now);
     }
     peaks
 }

@@ -1,18 +1,14 @@
 //! A motion that is given set point by set point, and the proof that it holds the limits. Cold.
 //!
-//! For programs that come as a table instead of a path. The supervisor calls it; it shares its idea of
-//! a proof with blended paths: the finite differences over the cycle are what the drives get.
+//! For programs that come as a table instead of a path. The supervisor calls it.
 
 use super::MAX_AXES;
 use super::error::TrajectoryError;
 use super::limits::AxisLimits;
 use super::motion::SampledMotion;
 use super::path::{CYCLE_S, check_time};
-use super::proof::{N_SAMPLES_MAX, TOLERANCE, rounding_noise};
-
-/// Rows of rest after the last one that are proven too: the last jerk is felt when the acceleration is
-/// back at 0.
-const ROWS_AFTER: usize = 3;
+use super::proof::N_SAMPLES_MAX;
+use super::verification::{Excess, Verification};
 
 /// Makes a motion of its set points, one a cycle, from rest at the first to rest at the last.
 ///
@@ -54,7 +50,10 @@ pub fn set_points(
             n_samples_max: N_SAMPLES_MAX,
         });
     }
-    prove(position_m, limits, dt_s)?;
+    if let Some(excess) = Verification::of_rows(position_m, limits, dt_s).first_excess(position_m) {
+        let Excess { row, axis, quantity, reached, limit } = excess;
+        return Err(TrajectoryError::Row { row, axis, quantity, reached, limit });
+    }
     let mut motion = SampledMotion {
         dt_s,
         n_axes,
@@ -73,33 +72,6 @@ pub fn set_points(
         }
     }
     Ok(motion)
-}
-
-/// Compares the finite differences over the cycle with the limits, with rest before and after.
-fn prove(position_m: &[f64], limits: &[AxisLimits], dt_s: f64) -> Result<(), TrajectoryError> {
-    let n_axes = limits.len();
-    let farthest_m = position_m.iter().fold(0.0_f64, |most, p| most.max(p.abs()));
-    let (first, last) = (&position_m[..n_axes], &position_m[position_m.len() - n_axes..]);
-    // Position, velocity and acceleration of the row before.
-    let mut before: Vec<[f64; 3]> = first.iter().map(|&p| [p, 0.0, 0.0]).collect();
-    let rows = position_m.chunks_exact(n_axes).chain(std::iter::repeat_n(last, ROWS_AFTER));
-    for (row, points_m) in rows.enumerate() {
-        for (axis, (&point_m, limit)) in points_m.iter().zip(limits).enumerate() {
-            let velocity = (point_m - before[axis][0]) / dt_s;
-            let acceleration = (velocity - before[axis][1]) / dt_s;
-            let jerk = (acceleration - before[axis][2]) / dt_s;
-            for (order, (reached, (quantity, limit))) in
-                [velocity, acceleration, jerk].into_iter().zip(limit.named()).enumerate()
-            {
-                let allowed = limit * (1.0 + TOLERANCE) + rounding_noise(farthest_m, order, dt_s);
-                if reached.is_nan() || reached.abs() > allowed {
-                    return Err(TrajectoryError::Row { row, axis, quantity, reached, limit });
-                }
-            }
-            before[axis] = [point_m, velocity, acceleration];
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -289,3 +289,68 @@ fn a_segment_that_comes_twice_is_taken_once() {
     client.download(&mut bus, 0x2000, 0, text).unwrap();
     assert_eq!(client.upload(&mut bus, 0x2000, 0).unwrap(), text);
 }
+
+/// A drive that says of some objects that it does not have them.
+struct Without {
+    inner: InProcess<Machine>,
+    absent: Vec<u16>,
+    code: AbortCode,
+    answers: Vec<Frame>,
+}
+
+impl Bus for Without {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        if let (0x601, &[command, low, high, sub, ..]) = (frame.id(), frame.payload())
+            && self.absent.contains(&u16::from_le_bytes([low, high]))
+            && command >> 5 != 4
+        {
+            let [a, b, c, d] = self.code.code().to_le_bytes();
+            let abort = Frame::new(0x581, &[0x80, low, high, sub, a, b, c, d]).unwrap();
+            self.answers.push(abort);
+            return Ok(());
+        }
+        self.inner.send(frame)
+    }
+
+    fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        match self.answers.pop() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.inner.recv(timeout),
+        }
+    }
+}
+
+fn without(absent: &[u16], code: AbortCode, deadline_ms: u16) -> Result<(), BringUpError> {
+    let inner = Bench::new(ClockMode::LockStep).bus;
+    let mut bus = Without { inner, absent: absent.to_vec(), code, answers: Vec::new() };
+    let setup = DriveSetup { rpdo_deadline_ms: deadline_ms, ..setup(Mode::Csp) };
+    bring_up(&mut bus, &setup).map(|_| ())
+}
+
+#[test]
+fn a_drive_need_not_have_what_it_can_do_without() {
+    let optional = [
+        0x1006, 0x1007, 0x1014, 0x1016, 0x1019, 0x1029, 0x6007, 0x605A, 0x605B, 0x605C, 0x605D,
+        0x605E, 0x6065, 0x6066, 0x6072, 0x6073, 0x607B, 0x607C, 0x607D, 0x607E, 0x607F, 0x6080,
+        0x6083, 0x6084, 0x6085, 0x608F, 0x6090, 0x6091, 0x6092, 0x6096, 0x6097, 0x60A8, 0x60A9,
+        0x60B0, 0x60B1, 0x60B2, 0x60C2, 0x60C5, 0x60C6, 0x60E0, 0x60E1,
+    ];
+    for code in [AbortCode::NoObject, AbortCode::NoSubIndex] {
+        for index in optional {
+            assert_eq!(without(&[index], code, 20), Ok(()), "0x{index:04X}");
+        }
+        assert_eq!(without(&optional, code, 20), Ok(()), "all of them");
+    }
+}
+
+#[test]
+fn a_drive_must_have_what_makes_it_stop() {
+    let line = without(&[0x1400], AbortCode::NoSubIndex, 20).unwrap_err().to_string();
+    assert_eq!(
+        line,
+        "node 1: object 0x1400:02 (RPDO communication parameter): the node has none, and needs it to \
+         be read at every SYNC"
+    );
+    let refused = without(&[0x6085], AbortCode::DeviceState, 20).unwrap_err().to_string();
+    assert!(refused.contains("object 0x6085:00: refused with abort code 0x08000022"), "{refused}");
+}

@@ -52,7 +52,7 @@ fn frame() -> impl Strategy<Value = Frame> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ilc_cases::cases(96))]
 
     #[test]
     fn random_frames_never_break_a_drive(

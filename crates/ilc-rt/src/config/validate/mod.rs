@@ -54,7 +54,7 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     )?;
     v.range("[cell] cycle_us", f64::from(cell.cell.cycle_us), 100.0, 1e5)?;
     v.range("[bus] load_max", cell.bus.load_max, 0.05, 1.0)?;
-    v.range("[bus] bitrate_bit_s", f64::from(cell.bus.bitrate_bit_s), 1e4, 8e6)?;
+    v.range("[bus] bitrate_bit_s", f64::from(cell.bus.bitrate_bit_s), 1e4, 1e6)?;
     v.that(
         (1..=MAX_AXES).contains(&cell.axes.len()),
         "[[axis]] count",

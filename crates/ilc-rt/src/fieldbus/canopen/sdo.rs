@@ -299,6 +299,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn requests_round_trip(request in prop_oneof![
             (address(), expedited()).prop_map(|(a, d)| SdoRequest::DownloadExpedited(a, d)),

@@ -229,6 +229,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn all_round_trip(id in 1_u8..=127, word: u16, a: i32, b: i32, last: i16) {
             let node = NodeId::new(id).unwrap();

@@ -306,6 +306,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn every_frame_comes_back(id in 0_u16..=0x7FF, payload in prop::collection::vec(any::<u8>(), 0..=8)) {
             let frame = Frame::new(id, &payload).unwrap();

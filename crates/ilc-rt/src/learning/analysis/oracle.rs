@@ -512,7 +512,7 @@ fn wrong_questions_are_refused_one_at_a_time() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ilc_cases::cases(48))]
 
     #[test]
     fn an_optimal_law_with_a_true_model_falls_in_every_run(

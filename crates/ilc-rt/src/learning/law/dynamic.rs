@@ -205,7 +205,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
+        #![proptest_config(ilc_cases::cases(40))]
 
         #[test]
         fn a_filter_is_the_dense_solution(

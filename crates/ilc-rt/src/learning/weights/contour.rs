@@ -223,6 +223,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         /// Printed: theta from the angle of the tangent, `C'C` from the sines and cosines.
         #[test]
         fn two_axes_give_the_printed_coupling(

@@ -108,6 +108,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         /// Against the lifted products of the source, built entry by entry.
         #[test]
         fn it_is_the_printed_product(

@@ -395,6 +395,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn the_error_filter_is_the_lifted_filter(
             error in prop::collection::vec(-1.0..1.0_f64, 3 * 9),

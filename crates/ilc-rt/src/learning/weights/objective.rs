@@ -262,6 +262,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn equal_gains_give_the_printed_product(
             (p, d, n) in (1..5_usize, 1..4_usize, 1..4_usize),

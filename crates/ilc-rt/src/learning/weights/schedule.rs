@@ -170,6 +170,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn no_value_leaves_the_range_of_those_given(
             values in prop::collection::vec(0.0..50.0_f64, 1..8),

@@ -460,7 +460,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
+        #![proptest_config(ilc_cases::cases(40))]
         #[test]
         fn any_second_order_model_is_found_again(
             gain in prop_oneof![-3.0..-0.3, 0.3..3.0],
@@ -483,7 +483,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(60))]
+        #![proptest_config(ilc_cases::cases(60))]
         #[test]
         fn a_resonance_below_or_above_the_band_is_found_too(
             low_hz in 1.0..40.0_f64,

@@ -127,6 +127,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         #[test]
         fn every_tangent_has_unit_length(
             steps in prop::collection::vec((0..3_u8, -1.0..1.0_f64, -1.0..1.0_f64), 2..40),

@@ -15,7 +15,8 @@ pub(super) struct Frame {
     pub(super) twist: [f64; MAX_AXES],
 }
 
-fn dot(a: &[f64; MAX_AXES], b: &[f64; MAX_AXES]) -> f64 {
+/// The inner product of two vectors of the tick.
+pub(super) fn dot(a: &[f64; MAX_AXES], b: &[f64; MAX_AXES]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 

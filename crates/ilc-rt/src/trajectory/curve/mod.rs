@@ -10,6 +10,7 @@ mod run;
 mod spiral;
 mod spline;
 mod time_law;
+mod turn;
 
 pub use butterfly::Butterfly;
 pub use run::{Run, RunLimits};

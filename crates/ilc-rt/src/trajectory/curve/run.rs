@@ -4,12 +4,14 @@ use super::Curve;
 use super::arc_length::ArcLength;
 use super::frame::{Frame, norm};
 use super::time_law::{Tick, TimeLaw};
+use super::turn::{Piece, pieces};
 use crate::trajectory::MAX_AXES;
 use crate::trajectory::error::{Quantity, TrajectoryError};
 use crate::trajectory::limits::{AxisLimits, is_positive};
 use crate::trajectory::motion::{MotionState, SampledMotion};
 use crate::trajectory::path::{CYCLE_S, check_limits, check_time};
 use crate::trajectory::proof;
+use crate::trajectory::verification::Verification;
 
 /// Places on the curve at which the speed limit is computed.
 const PLACES: usize = 4_000;
@@ -22,6 +24,10 @@ const JERK_SHARE: f64 = 0.4;
 /// for what lies between two ticks.
 const SOUGHT: f64 = 1.0 - 2e-3;
 const KEPT: f64 = 1.0 - 5e-4;
+/// Share of the feed below which going round a bend takes longer than coming to rest in it.
+const CREEP_SHARE: f64 = 0.05;
+/// How near a turn, in steps between places, the direction is looked at.
+const EDGE_SHARE: f64 = 1e-3;
 /// Attempts that slow down only where a limit is broken, and attempts in all.
 const LOCAL_ROUNDS: usize = 16;
 const ROUNDS: usize = 40;
@@ -44,20 +50,22 @@ pub struct Run {
     length_m: f64,
 }
 
-/// The worst ratio of a value to its limit: how much slower it has to be, and what it is.
+/// A value beyond its limit: how much slower it has to be, and what it is.
 #[derive(Clone, Copy, Debug)]
 struct Worst {
     slower: f64,
-    ratio: f64,
+    reached: f64,
+    limit: f64,
     axis: usize,
     quantity: Quantity,
 }
 
 impl Run {
     /// Plans a run: `v` is at most the feed, `√(a_c/κ)`, and what every axis allows, rises and falls
-    /// with limited acceleration and jerk, and the finished set points are checked: slower, first
+    /// with limited acceleration and jerk, and the finished set points are verified: slower, first
     /// where a limit is broken and then everywhere, until each axis holds velocity, acceleration and
-    /// jerk at every tick.
+    /// jerk at every tick and over every cycle. Where the curve turns back, or bends more tightly than
+    /// the plan can see, it comes to rest.
     ///
     /// # Real Time
     /// Cold: allocates.
@@ -89,76 +97,39 @@ impl Run {
                 allowed: "above 0",
             });
         }
-        let measured = ArcLength::new(curve)?;
-        let length_m = measured.total_m();
-        let frame = |s_m: f64| Frame::new(curve.at(measured.parameter(curve, s_m)));
-        let n_places = places(length_m, limits.feed_m_s, dt_s);
-        let step_m = length_m / (n_places - 1) as f64;
-        let lowest =
-            |of: fn(&AxisLimits) -> f64| limits.axes.iter().map(of).fold(f64::INFINITY, f64::min);
-        let jerk = JERK_SHARE * lowest(|axis| axis.jerk_max_m_s3);
-        // Not more than what the jerk lets a change of speed by the feed make use of.
-        let mut acceleration = (SHARE * lowest(|axis| axis.acceleration_max_m_s2))
-            .min((jerk * limits.feed_m_s).sqrt());
-        let mut window = ticks_at_least(2.0 * acceleration / (jerk * dt_s));
-        let frames: Vec<Frame> = (0..n_places).map(|i| frame(i as f64 * step_m)).collect();
-        let mut speed: Vec<f64> = Vec::with_capacity(n_places);
-        for (i, here) in frames.iter().enumerate() {
-            let allowed = speed_limit(here, limits);
-            if !is_positive(allowed) {
-                return Err(TrajectoryError::Cusp { at_m: i as f64 * step_m });
-            }
-            speed.push(allowed);
-        }
-        let mut worst = None;
-        for round in 0..ROUNDS {
-            // Speeding up in a bend takes the jerk 3 K v a.
-            let accelerations: Vec<f64> = frames
-                .iter()
-                .zip(&speed)
-                .map(|(frame, v)| acceleration.min(jerk / (3.0 * norm(&frame.bend) * v)))
-                .collect();
-            let law = TimeLaw {
-                length_m,
-                speed_m_s: &speed,
-                acceleration_m_s2: &accelerations,
-                window,
-                dt_s,
-            };
-            proof::n_ticks(law.swept_s() + 2.0 * window as f64 * dt_s, dt_s)?;
-            let ticks = law.ticks();
-            let near: Vec<Frame> =
-                ticks.iter().map(|tick| between(&frames, tick.s / step_m)).collect();
-            let mut found = judge(&ticks, &near, limits, SOUGHT);
-            if found.iter().all(Option::is_none) {
-                let exact: Vec<Frame> = ticks.iter().map(|tick| frame(tick.s)).collect();
-                found = judge(&ticks, &exact, limits, KEPT);
-                if found.iter().all(Option::is_none) {
-                    let motion = sampled(&ticks, &exact, curve.n_axes(), dt_s);
-                    return Ok(Self { motion, length_m });
+        let length_m = ArcLength::new(curve)?.total_m();
+        let step_m = length_m / (places(length_m, limits.feed_m_s, dt_s) - 1) as f64;
+        let creep_m = creep_radius_m(limits);
+        let mut refused = None;
+        for radius_m in [creep_m.max(0.01 * step_m), creep_m.max(3.0 * step_m)] {
+            let mut motion =
+                SampledMotion { dt_s, n_axes: curve.n_axes(), ..SampledMotion::default() };
+            let mut planned = Ok(());
+            let mut gone_m = 0.0;
+            for piece in pieces(curve, radius_m) {
+                match plan_piece(&piece, limits, dt_s, gone_m) {
+                    Ok((next, length_m)) => {
+                        append(&mut motion, &next);
+                        gone_m += length_m;
+                    }
+                    Err(error) => {
+                        planned = Err(error);
+                        break;
+                    }
                 }
             }
-            worst = found.iter().flatten().copied().fold(None, |most: Option<Worst>, next| {
-                if most.is_none_or(|most| next.slower < most.slower) { Some(next) } else { most }
-            });
-            let Some(most) = worst else { continue };
-            if round < LOCAL_ROUNDS {
-                slow_down(&mut speed, &ticks, &found, step_m, window);
-            } else {
-                let factor = most.slower.min(0.98);
-                for v in &mut speed {
-                    *v *= factor;
+            // The joints of the pieces are verified with the whole.
+            match planned.and_then(|()| motion.verified(&limits.axes)) {
+                Ok(motion) => return Ok(Self { motion, length_m }),
+                Err(
+                    error @ (TrajectoryError::Unproven { .. } | TrajectoryError::SetPoint { .. }),
+                ) => {
+                    refused = Some(error);
                 }
-                acceleration *= factor * factor;
-                window = ticks_at_least(window as f64 / factor);
+                Err(error) => return Err(error),
             }
         }
-        Err(worst.map_or(TrajectoryError::Empty, |worst| TrajectoryError::Unproven {
-            axis: worst.axis,
-            quantity: worst.quantity,
-            ratio: worst.ratio,
-            rounds: ROUNDS,
-        }))
+        Err(refused.unwrap_or(TrajectoryError::Empty))
     }
 
     /// The set points.
@@ -170,6 +141,189 @@ impl Run {
     pub fn length_m(&self) -> f64 {
         self.length_m
     }
+}
+
+/// Plans one piece from rest to rest, `before_m` along the curve; gives its set points and its length.
+fn plan_piece<C: Curve>(
+    piece: &Piece<C>,
+    limits: &RunLimits,
+    dt_s: f64,
+    before_m: f64,
+) -> Result<(SampledMotion, f64), TrajectoryError> {
+    let measured = ArcLength::new(piece)?;
+    let length_m = measured.total_m();
+    let n_places = places(length_m, limits.feed_m_s, dt_s);
+    let step_m = length_m / (n_places - 1) as f64;
+    // In a turn the curve has no direction: it has that of a place nearby.
+    let frame = |s_m: f64, edge_m: f64| {
+        let [low_m, high_m] = [edge_m, length_m - edge_m];
+        let inside_m = match piece.turns {
+            [true, _] if s_m < low_m => low_m,
+            [_, true] if s_m > high_m => high_m,
+            _ => s_m,
+        };
+        let here = curve_at(piece, &measured, inside_m);
+        let mut frame = Frame::new(here);
+        if (inside_m - s_m).abs() > 0.0 {
+            frame.point_m = curve_at(piece, &measured, s_m)[0];
+        }
+        frame
+    };
+    let lowest =
+        |of: fn(&AxisLimits) -> f64| limits.axes.iter().map(of).fold(f64::INFINITY, f64::min);
+    let jerk = JERK_SHARE * lowest(|axis| axis.jerk_max_m_s3);
+    // Not more than what the jerk lets a change of speed by the feed make use of.
+    let mut acceleration =
+        (SHARE * lowest(|axis| axis.acceleration_max_m_s2)).min((jerk * limits.feed_m_s).sqrt());
+    let mut window = ticks_at_least(2.0 * acceleration / (jerk * dt_s));
+    let frames: Vec<Frame> =
+        (0..n_places).map(|i| frame(i as f64 * step_m, 0.5 * step_m)).collect();
+    let mut speed: Vec<f64> = Vec::with_capacity(n_places);
+    for (i, here) in frames.iter().enumerate() {
+        let allowed = speed_limit(here, limits);
+        if !is_positive(allowed) {
+            return Err(TrajectoryError::Cusp { at_m: before_m + i as f64 * step_m });
+        }
+        speed.push(allowed);
+    }
+    let launch = launch_speeds(piece.turns, n_places, step_m, acceleration, jerk);
+    for (speed, launch) in speed.iter_mut().zip(&launch) {
+        if *launch < *speed {
+            *speed = limits.feed_m_s;
+        }
+    }
+    let mut worst: Option<(Worst, f64)> = None;
+    for round in 0..ROUNDS {
+        // Speeding up in a bend takes the jerk 3 K v a.
+        let accelerations: Vec<f64> = frames
+            .iter()
+            .zip(speed.iter().zip(&launch))
+            .map(|(frame, (v, launch))| {
+                acceleration
+                    .min(jerk / (3.0 * norm(&frame.bend) * v.min(*launch).max(f64::MIN_POSITIVE)))
+            })
+            .collect();
+        let law = TimeLaw {
+            length_m,
+            speed_m_s: &speed,
+            acceleration_m_s2: &accelerations,
+            window,
+            dt_s,
+        };
+        proof::n_ticks(law.swept_s() + 2.0 * window as f64 * dt_s, dt_s)?;
+        let ticks = law.ticks();
+        let near: Vec<Frame> = ticks.iter().map(|tick| between(&frames, tick.s / step_m)).collect();
+        let mut found = judge(&ticks, &near, limits, SOUGHT);
+        if found.iter().all(Option::is_none) {
+            let exact: Vec<Frame> =
+                ticks.iter().map(|tick| frame(tick.s, EDGE_SHARE * step_m)).collect();
+            found = judge(&ticks, &exact, limits, KEPT);
+            if found.iter().all(Option::is_none) {
+                let motion = sampled(&ticks, &exact, piece.n_axes(), dt_s);
+                found = sent(&motion, &limits.axes);
+                if found.iter().all(Option::is_none) {
+                    return Ok((motion, length_m));
+                }
+            }
+        }
+        worst = None;
+        for (tick, next) in ticks.iter().zip(&found) {
+            let Some(next) = next else { continue };
+            if worst.is_none_or(|(most, _)| next.slower < most.slower) {
+                worst = Some((*next, before_m + tick.s));
+            }
+        }
+        let Some((most, _)) = worst else { continue };
+        if round < LOCAL_ROUNDS {
+            slow_down(&mut speed, &ticks, &found, step_m, window);
+        } else {
+            let factor = most.slower.min(0.98);
+            for v in &mut speed {
+                *v *= factor;
+            }
+            acceleration *= factor * factor;
+            window = ticks_at_least(window as f64 / factor);
+        }
+    }
+    Err(worst.map_or(TrajectoryError::Empty, |(worst, at_m)| TrajectoryError::Unproven {
+        axis: worst.axis,
+        at_m,
+        quantity: worst.quantity,
+        reached: worst.reached,
+        limit: worst.limit,
+        rounds: ROUNDS,
+    }))
+}
+
+/// The speed that a run reaches at each place from rest in a turn, or to rest: it is slow there by
+/// itself, and the tightest bend, which is there, slows down nothing else.
+fn launch_speeds(
+    turns: [bool; 2],
+    n_places: usize,
+    step_m: f64,
+    acceleration: f64,
+    jerk: f64,
+) -> Vec<f64> {
+    (0..n_places)
+        .map(|i| {
+            let from = if turns[0] { i as f64 * step_m } else { f64::INFINITY };
+            let to = if turns[1] { (n_places - 1 - i) as f64 * step_m } else { f64::INFINITY };
+            let gone_m = from.min(to);
+            let by_jerk = 0.5 * jerk.cbrt() * (6.0 * gone_m).powf(2.0 / 3.0);
+            by_jerk.min((2.0 * acceleration * gone_m).sqrt())
+        })
+        .collect()
+}
+
+/// The radius of a bend that no axis goes round faster than at a small share of the feed.
+fn creep_radius_m(limits: &RunLimits) -> f64 {
+    let v = CREEP_SHARE * limits.feed_m_s;
+    let tightest = |axis: &AxisLimits| {
+        let by_jerk = (v.powi(3) / (JERK_SHARE * axis.jerk_max_m_s3)).sqrt();
+        by_jerk.max(v * v / (SHARE * axis.acceleration_max_m_s2))
+    };
+    limits.axes.iter().map(tightest).fold(0.0, f64::max)
+}
+
+/// The derivatives at a distance from the start.
+fn curve_at(curve: &impl Curve, measured: &ArcLength, s_m: f64) -> super::Derivatives {
+    curve.at(measured.parameter(curve, s_m))
+}
+
+/// Adds a motion that begins where the other one rests.
+fn append(motion: &mut SampledMotion, next: &SampledMotion) {
+    let skipped = if motion.position_m.is_empty() { 0 } else { next.n_axes };
+    motion.position_m.extend_from_slice(&next.position_m[skipped..]);
+    motion.velocity_m_s.extend_from_slice(&next.velocity_m_s[skipped..]);
+    motion.acceleration_m_s2.extend_from_slice(&next.acceleration_m_s2[skipped..]);
+    motion.programmed_m.extend_from_slice(&next.programmed_m[skipped..]);
+}
+
+/// The worst excess of the set points at every tick, by their differences.
+fn sent(motion: &SampledMotion, limits: &[AxisLimits]) -> Vec<Option<Worst>> {
+    let mut found: Vec<Option<Worst>> = vec![None; motion.n_samples()];
+    let last = motion.n_samples() - 1;
+    let rows = &motion.position_m;
+    Verification::of_motion(rows, limits, motion.dt_s).each_excess(rows, |excess| {
+        let order = match excess.quantity {
+            Quantity::Velocity => 1.0,
+            Quantity::Acceleration => 2.0,
+            Quantity::Jerk => 3.0,
+        };
+        let worst = Worst {
+            slower: (KEPT * excess.limit / excess.reached.abs()).powf(1.0 / order),
+            reached: excess.reached.abs(),
+            limit: excess.limit,
+            axis: excess.axis,
+            quantity: excess.quantity,
+        };
+        let here = &mut found[excess.row.min(last)];
+        if here.is_none_or(|here| worst.slower < here.slower) {
+            *here = Some(worst);
+        }
+        true
+    });
+    found
 }
 
 /// A few places for each tick of the feed, but never too few nor too many.
@@ -239,22 +393,24 @@ fn judge(ticks: &[Tick], frames: &[Frame], limits: &RunLimits, kept: f64) -> Vec
         .zip(frames)
         .map(|(tick, frame)| {
             let mut worst: Option<Worst> = None;
-            let mut note = |ratio: f64, order: usize, axis: usize| {
+            let mut note = |reached: f64, limit: f64, order: usize, axis: usize| {
+                let ratio = reached / limit;
                 let slower = (kept / ratio).powf(1.0 / (order + 1) as f64);
                 if ratio > kept && worst.is_none_or(|worst| slower < worst.slower) {
-                    worst = Some(Worst { slower, ratio, axis, quantity: quantities[order] });
+                    let quantity = quantities[order];
+                    worst = Some(Worst { slower, reached, limit, axis, quantity });
                 }
             };
             for (axis, limit) in limits.axes.iter().enumerate() {
                 for jerk in [before_j, tick.j] {
                     let values = frame.axis(axis, tick.v, tick.a, jerk);
                     for (order, (_, most)) in limit.named().into_iter().enumerate() {
-                        note(values[order].abs() / most, order, axis);
+                        note(values[order].abs(), most, order, axis);
                     }
                 }
             }
             let across = tick.v * tick.v * norm(&frame.bend);
-            note(across / limits.curvature_acceleration_m_s2, 1, 0);
+            note(across, limits.curvature_acceleration_m_s2, 1, 0);
             before_j = tick.j;
             worst
         })

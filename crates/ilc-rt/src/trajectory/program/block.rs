@@ -20,6 +20,7 @@ pub(super) struct Word<'a> {
 }
 
 /// The words of a line.
+#[expect(clippy::struct_excessive_bools, reason = "each tells whether a word is there")]
 #[derive(Clone, Debug, Default)]
 pub(super) struct Block<'a> {
     /// Line, from 1.

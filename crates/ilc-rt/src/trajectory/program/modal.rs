@@ -142,7 +142,6 @@ impl<'a> Modal<'a> {
                 None
             }
         };
-        #[expect(clippy::float_cmp, reason = "a move of any length is one")]
         let still = to_m == self.position_m;
         if arc.is_some() || !still {
             if self.program.segments.len() >= MOVES_MAX {

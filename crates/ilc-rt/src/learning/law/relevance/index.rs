@@ -179,7 +179,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
+        #![proptest_config(ilc_cases::cases(40))]
         // Coarse values make ties, also at the border of the top.
         #[test]
         fn the_tree_and_brute_force_find_the_same_runs(

@@ -136,7 +136,7 @@ fn close(found: &[f64], expected: &[f64]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(ilc_cases::cases(60))]
     #[test]
     fn the_law_is_the_listing(
         (runs, epsilon) in (0_usize..=3).prop_flat_map(|n| (runs(n), 1e-6..2.0_f64)),

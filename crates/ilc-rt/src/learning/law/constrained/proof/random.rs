@@ -113,7 +113,7 @@ fn problems_that_lead_corrections_round_in_a_circle_are_solved() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ilc_cases::cases(400))]
 
     #[test]
     fn no_bound_is_ever_exceeded(case in random_case()) {
@@ -127,7 +127,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(100))]
+    #![proptest_config(ilc_cases::cases(100))]
 
     #[test]
     fn random_problems_agree_with_the_other_solver(case in random_case()) {

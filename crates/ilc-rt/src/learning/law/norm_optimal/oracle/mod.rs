@@ -222,7 +222,7 @@ fn random_model() -> impl Strategy<Value = StateSpace> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(96))]
+    #![proptest_config(ilc_cases::cases(96))]
 
     #[test]
     fn any_coupled_model_agrees_with_dense_algebra(

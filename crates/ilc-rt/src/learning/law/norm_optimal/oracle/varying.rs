@@ -149,7 +149,7 @@ fn weight(size: usize, n_samples: usize, kind: usize, seed: u32) -> Weight {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(96))]
+    #![proptest_config(ilc_cases::cases(96))]
 
     #[test]
     fn any_problem_agrees_with_dense_algebra(

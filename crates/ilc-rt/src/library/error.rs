@@ -1,0 +1,139 @@
+//! Why a library could not be used, in one line that says what is allowed.
+
+use rusqlite::ErrorCode;
+
+/// Why the library could not be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LibraryError {
+    /// SQLite refused.
+    #[error("library {path}: {source}")]
+    Sqlite {
+        /// File.
+        path: String,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+    /// Somebody else is writing, and went on for longer than was waited.
+    #[error("library {path}: locked by another program that is writing to it")]
+    Locked {
+        /// File.
+        path: String,
+    },
+    /// The file cannot be opened or written.
+    #[error(
+        "library {path}: cannot be opened: {source}; allowed: a library of this program, or a new \
+         file in a folder that exists and can be written"
+    )]
+    Open {
+        /// File.
+        path: String,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+    /// The file is there and is none of this program's libraries.
+    #[error(
+        "library {path}: {found}; allowed: a library of this program, or a new file in a folder \
+         that exists and can be written"
+    )]
+    Foreign {
+        /// File.
+        path: String,
+        /// What it is instead.
+        found: String,
+    },
+    /// The file, or the folder of a library that is to grow, cannot be written.
+    #[error("library {path}: cannot be written: {found}")]
+    ReadOnly {
+        /// File.
+        path: String,
+        /// What stands in the way.
+        found: &'static str,
+    },
+    /// There is no such file.
+    #[error("library {path}: no such library")]
+    Missing {
+        /// File.
+        path: String,
+    },
+    /// There is a file, but nothing was put into it yet.
+    #[error("library {path}: an empty file; there is no run in it")]
+    Empty {
+        /// File.
+        path: String,
+    },
+    /// The file was deleted or replaced while it was in use.
+    #[error("library {path}: the file was deleted or replaced while it was in use")]
+    Gone {
+        /// File.
+        path: String,
+    },
+    /// The file was written by another version of this program.
+    #[error("library {path}: schema version {found}; this program reads version {expected}")]
+    Version {
+        /// File.
+        path: String,
+        /// Version in the file.
+        found: i64,
+        /// Version of this program.
+        expected: i64,
+    },
+    /// The campaign has a run of this number already.
+    #[error(
+        "library {path}: campaign {campaign} has a run {index} already; is another program going \
+         on with it?"
+    )]
+    Taken {
+        /// File.
+        path: String,
+        /// Campaign.
+        campaign: String,
+        /// Number of the run.
+        index: u32,
+    },
+    /// There is no such row.
+    #[error("library {path}: no iteration with id {id}")]
+    NoSuchRow {
+        /// File.
+        path: String,
+        /// Key that was asked for.
+        id: i64,
+    },
+    /// There is no such disturbance.
+    #[error("library {path}: {what}")]
+    Disturbance {
+        /// File.
+        path: String,
+        /// What is wrong, and what is allowed.
+        what: String,
+    },
+    /// The stored arrays do not have the digest that was stored with them.
+    #[error("library {path}: iteration {id} is damaged: its arrays do not match its digest")]
+    Damaged {
+        /// File.
+        path: String,
+        /// Key of the row.
+        id: i64,
+    },
+    /// Runs were deleted, but the file could not be made smaller.
+    #[error(
+        "library {path}: {n_deleted} runs were deleted, but the file could not be made smaller: \
+         {source}; their space is used again"
+    )]
+    NotShrunk {
+        /// File.
+        path: String,
+        /// Runs deleted.
+        n_deleted: usize,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+}
+
+/// Turns what SQLite said about a file into an error of the library.
+pub(super) fn told(path: &str, source: rusqlite::Error) -> LibraryError {
+    let path = path.to_owned();
+    match source.sqlite_error_code() {
+        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => LibraryError::Locked { path },
+        _ => LibraryError::Sqlite { path, source },
+    }
+}

@@ -1,0 +1,325 @@
+//! The file of a library: what it is before anything is written to it, and whether it is still there.
+//!
+//! A file that somebody else's program keeps its data in must never be changed, not even by switching
+//! its journal on. So it is looked at through a connection that cannot write, and only what has the mark
+//! and the table of this program is opened for more.
+
+use std::fs::Metadata;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use rusqlite::{Connection, ErrorCode, OpenFlags};
+
+use super::error::{LibraryError, told};
+use super::schema;
+
+/// The name that stands for a library in memory.
+pub(super) const IN_MEMORY: &str = ":memory:";
+
+/// What a path leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// Nothing, or a file without a byte.
+    Nothing,
+    /// A database that nothing was put into yet, as one whose making was interrupted.
+    Empty,
+    /// A library of this version.
+    Library(i64),
+}
+
+/// Looks at a path without changing anything.
+///
+/// # Errors
+/// [`LibraryError::Foreign`] for whatever is no library; [`LibraryError::Version`] for one of a later
+/// version; [`LibraryError::Open`] if it cannot be read.
+pub(super) fn inspect(path: &Path) -> Result<Found, LibraryError> {
+    let Some(metadata) = metadata(path)? else { return Ok(Found::Nothing) };
+    if metadata.len() == 0 {
+        return Ok(Found::Nothing);
+    }
+    look(path).map(|(_, found)| found)
+}
+
+/// Opens a library for reading only; leaves no trace beside it.
+///
+/// # Errors
+/// [`LibraryError::Missing`], or as [`inspect`].
+pub(super) fn reader(path: &Path) -> Result<(Connection, i64), LibraryError> {
+    let name = || path.display().to_string();
+    match metadata(path)? {
+        None => return Err(LibraryError::Missing { path: name() }),
+        Some(metadata) if metadata.len() == 0 => {
+            return Err(LibraryError::Empty { path: name() });
+        }
+        Some(_) => {}
+    }
+    match look(path)? {
+        (connection, Found::Library(version)) => Ok((connection, version)),
+        (_, Found::Nothing | Found::Empty) => Err(LibraryError::Empty { path: name() }),
+    }
+}
+
+/// Opens a file for writing, making it if it is not there. To be called after [`inspect`].
+///
+/// # Errors
+/// [`LibraryError::Open`] or [`LibraryError::ReadOnly`].
+pub(super) fn writer(path: &Path) -> Result<Connection, LibraryError> {
+    let name = path.display().to_string();
+    let fail = |source| LibraryError::Open { path: name.clone(), source };
+    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE
+        | OpenFlags::SQLITE_OPEN_CREATE
+        | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let connection = Connection::open_with_flags(plain(path), flags).map_err(fail)?;
+    // What cannot be written is opened for reading, without a word.
+    if connection.is_readonly("main").map_err(fail)? {
+        return Err(LibraryError::ReadOnly { path: name, found: "the file is read-only" });
+    }
+    Ok(connection)
+}
+
+/// Which file a path leads to: device and number; `None` if it leads nowhere.
+pub(super) fn identity(path: &Path) -> Option<(u64, u64)> {
+    std::fs::metadata(path).ok().map(|metadata| (metadata.dev(), metadata.ino()))
+}
+
+/// The file beside a library that ends in `ending`.
+pub(super) fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    name.into()
+}
+
+/// What a path leads to, if that is a regular file. Only looked at, as opening a pipe would wait.
+fn metadata(path: &Path) -> Result<Option<Metadata>, LibraryError> {
+    let name = || path.display().to_string();
+    let foreign = |found: &str| LibraryError::Foreign { path: name(), found: found.to_owned() };
+    if path.as_os_str().is_empty() {
+        return Err(foreign("an empty name"));
+    }
+    match std::fs::metadata(path) {
+        Ok(metadata) if metadata.is_file() => Ok(Some(metadata)),
+        Ok(metadata) if metadata.is_dir() => Err(foreign("a folder")),
+        Ok(_) => Err(foreign("no regular file")),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(foreign(&format!("cannot be read ({error})"))),
+    }
+}
+
+/// Connects for reading and looks at what is there. Where no writer has left a log, nothing beside the
+/// file is made or asked for, so that an archive that cannot be written is read as well; and what is
+/// somebody else's is not even asked for its log.
+fn look(path: &Path) -> Result<(Connection, Found), LibraryError> {
+    let at_rest = connect(path, true).and_then(|connection| tell(connection, path));
+    let log = std::fs::metadata(beside(path, "-wal"));
+    let is_foreign =
+        matches!(at_rest, Err(LibraryError::Foreign { .. } | LibraryError::Version { .. }));
+    if is_foreign || !log.is_ok_and(|log| log.len() > 0) {
+        return at_rest;
+    }
+    tell(connect(path, false)?, path)
+}
+
+fn connect(path: &Path, at_rest: bool) -> Result<Connection, LibraryError> {
+    let name = path.display().to_string();
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let fail = |source: rusqlite::Error| match source.sqlite_error_code() {
+        Some(ErrorCode::NotADatabase) => {
+            LibraryError::Foreign { path: name.clone(), found: "not a database".to_owned() }
+        }
+        Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => told(&name, source),
+        Some(ErrorCode::CannotOpen | ErrorCode::ReadOnly) if !at_rest => LibraryError::ReadOnly {
+            path: name.clone(),
+            found: "its last runs are in the log beside it (-wal), which can be read in a folder only \
+                    that can be written: copy both files to one",
+        },
+        _ => LibraryError::Open { path: name.clone(), source },
+    };
+    let connection = if at_rest {
+        Connection::open_with_flags(immutable(path), flags | OpenFlags::SQLITE_OPEN_URI)
+    } else {
+        Connection::open_with_flags(plain(path), flags)
+    };
+    let connection = connection.map_err(fail)?;
+    connection.busy_timeout(super::store::BUSY_TIMEOUT).map_err(fail)?;
+    // The first look at the file: until now nothing was read.
+    connection.query_row("SELECT count(*) FROM sqlite_master", [], |_| Ok(())).map_err(fail)?;
+    Ok(connection)
+}
+
+fn tell(connection: Connection, path: &Path) -> Result<(Connection, Found), LibraryError> {
+    let found = found(&connection, path)?;
+    Ok((connection, found))
+}
+
+/// Tells a library by its mark, its version and the columns of its table.
+pub(super) fn found(connection: &Connection, path: &Path) -> Result<Found, LibraryError> {
+    let name = path.display().to_string();
+    let fail = |source| LibraryError::Open { path: name.clone(), source };
+    let pragma = |pragma| connection.pragma_query_value(None, pragma, |row| row.get::<_, i64>(0));
+    let mark = pragma("application_id").map_err(fail)?;
+    let version = pragma("user_version").map_err(fail)?;
+    let n_objects: i64 = connection
+        .query_row("SELECT count(*) FROM sqlite_master", [], |row| row.get(0))
+        .map_err(fail)?;
+    if mark == 0 && version == 0 && n_objects == 0 {
+        return Ok(Found::Empty);
+    }
+    // Libraries of before had no mark; their table tells them from somebody else's database.
+    let may_be_ours = mark == schema::MARK
+        || mark == 0 && (n_objects == 0 || has_columns(connection).map_err(fail)?);
+    if may_be_ours && version > schema::VERSION {
+        return Err(LibraryError::Version {
+            path: name,
+            found: version,
+            expected: schema::VERSION,
+        });
+    }
+    let is_ours = may_be_ours
+        && (schema::OLDEST..=schema::VERSION).contains(&version)
+        && has_columns(connection).map_err(fail)?;
+    if is_ours {
+        return Ok(Found::Library(version));
+    }
+    Err(LibraryError::Foreign { path: name, found: "the database of another program".to_owned() })
+}
+
+fn has_columns(connection: &Connection) -> rusqlite::Result<bool> {
+    let mut statement = connection.prepare("SELECT name FROM pragma_table_info('iteration')")?;
+    let names: Vec<String> =
+        statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
+    let mut wanted = super::row::COLUMNS.split(',').chain(super::row::ARRAYS.split(','));
+    Ok(wanted.all(|column| names.iter().any(|name| name == column.trim())))
+}
+
+/// A path that SQLite takes as it is: an absolute one is no address, whatever its letters.
+fn plain(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// The address of a file that nobody changes while it is read.
+fn immutable(path: &Path) -> String {
+    let path = plain(path);
+    let mut address = "file://".to_owned();
+    for byte in path.as_os_str().as_encoded_bytes() {
+        match byte {
+            b'/' | b'.' | b'-' | b'_' | b'0'..=b'9' | b'A'..=b'Z' | b'a'..=b'z' => {
+                address.push(char::from(*byte));
+            }
+            byte => address.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    address.push_str("?immutable=1");
+    address
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Library;
+    use super::super::store::tests::{meta, record};
+    use super::*;
+
+    /// A folder of its own, gone when dropped.
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("ilc-{name}-{}", std::process::id()));
+            std::fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+
+        fn names(&self) -> Vec<String> {
+            let entries = std::fs::read_dir(&self.0).unwrap();
+            let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name();
+            let mut names: Vec<String> =
+                entries.map(|entry| name(entry).to_string_lossy().into_owned()).collect();
+            names.sort();
+            names
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    #[test]
+    fn a_foreign_database_is_neither_opened_nor_changed() {
+        let folder = Folder::new("foreign");
+        for (number, sql) in [
+            "CREATE TABLE customers (id)",
+            "CREATE TABLE customers (id); PRAGMA user_version = 2",
+            "CREATE TABLE iteration (id); PRAGMA user_version = 3",
+            "CREATE TABLE iteration (id); PRAGMA application_id = 7",
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let path = folder.0.join(format!("{number}.db"));
+            let connection = Connection::open(&path).unwrap();
+            connection.execute_batch(sql).unwrap();
+            drop(connection);
+            let before = std::fs::read(&path).unwrap();
+            for refused in [Library::open(&path), Library::read(&path)] {
+                assert!(matches!(refused, Err(LibraryError::Foreign { .. })), "{sql}: {refused:?}");
+            }
+            assert_eq!(std::fs::read(&path).unwrap(), before);
+        }
+        assert_eq!(folder.names(), ["0.db", "1.db", "2.db", "3.db"], "nothing is beside them");
+    }
+
+    #[test]
+    fn readers_see_what_a_writer_has_kept_and_leave_nothing_behind() {
+        let folder = Folder::new("readers");
+        let path = folder.0.join("a #1?.db");
+        assert!(matches!(Library::read(&path), Err(LibraryError::Missing { .. })));
+        let library = Library::open(&path).unwrap();
+        library.append(&meta("a"), &record(0)).unwrap();
+        assert_eq!(Library::read(&path).unwrap().list(None).unwrap().len(), 1, "in the log");
+        drop(library);
+        assert_eq!(Library::read(&path).unwrap().list(None).unwrap().len(), 1);
+        assert!(Library::read(&path).unwrap().append(&meta("a"), &record(1)).is_err());
+        assert_eq!(folder.names(), ["a #1?.db"]);
+    }
+
+    #[test]
+    fn what_a_killed_process_had_begun_to_make_is_made_whole() {
+        let folder = Folder::new("begun");
+        let path = folder.0.join("begun.db");
+        let connection = Connection::open(&path).unwrap();
+        connection.pragma_update(None, "journal_mode", "WAL").unwrap();
+        drop(connection);
+        assert!(matches!(Library::read(&path), Err(LibraryError::Empty { .. })));
+        Library::open(&path).unwrap().append(&meta("a"), &record(0)).unwrap();
+        assert_eq!(Library::read(&path).unwrap().list(None).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn a_run_is_not_kept_in_a_file_that_is_gone() {
+        let folder = Folder::new("gone");
+        let path = folder.0.join("gone.db");
+        let library = Library::open(&path).unwrap();
+        library.append(&meta("a"), &record(0)).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let refused = library.append(&meta("a"), &record(1));
+        assert!(matches!(refused, Err(LibraryError::Gone { .. })));
+    }
+
+    #[test]
+    fn another_writer_is_named_and_a_run_kept_twice_too() {
+        let folder = Folder::new("busy");
+        let path = folder.0.join("busy.db");
+        let library = Library::open(&path).unwrap();
+        library.append(&meta("a"), &record(0)).unwrap();
+        let twice = library.append(&meta("a"), &record(0));
+        assert!(matches!(twice, Err(LibraryError::Taken { index: 0, .. })));
+        let other = Connection::open(&path).unwrap();
+        other.execute_batch("BEGIN IMMEDIATE").unwrap();
+        library.hurry();
+        let refused = library.append(&meta("a"), &record(1));
+        assert!(matches!(refused, Err(LibraryError::Locked { .. })), "{refused:?}");
+        drop(other);
+        library.append(&meta("a"), &record(1)).unwrap();
+    }
+}

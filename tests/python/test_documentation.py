@@ -1,0 +1,251 @@
+"""Everything that a document or a help text tells one to type is typed here.
+
+Runs are made fewer, the bus of a real machine becomes one of this host, and a folder holds what a
+reader would have by then. What a line does stays what it does.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from documentation_fixture import (
+    DOCUMENTS,
+    LANGUAGES,
+    PROGRAMS,
+    ROOT,
+    Block,
+    Command,
+    blocks,
+    commands_of_blocks,
+    commands_of_help,
+    help_of,
+    launcher,
+    outside_of_blocks,
+    verbs_of,
+)
+from processes_fixture import Process, free_port, program
+
+if TYPE_CHECKING:
+    from ilc_rt import CampaignResult
+
+pytestmark = pytest.mark.timeout(300)
+
+COMMANDS = list({one.text: one for one in [*commands_of_blocks(), *commands_of_help()]}.values())
+PYTHON = [
+    block for document in DOCUMENTS for block in blocks(document) if block.language == "python"
+]
+NETWORK_CELL = "examples/01_gantry.toml"
+
+#: Each option and what it becomes: as long as it must be to do what it does.
+SHORTER = (
+    (r"^ilc (run|demo)(?!.* --iterations)(.*)$", r"ilc \1\2 --iterations 2"),
+    (r"--iterations \d+", "--iterations 2"),
+    # The library has three runs by then.
+    (r"--iterations 2(.*) --resume|--resume(.*) --iterations 2", r"--resume\1\2 --iterations 5"),
+    (r"^ilc (run|demo|identify|repeatability)(?!.* --bus)(.*)$", r"ilc \1\2 --bus loopback:"),
+    (r"^ilc repeatability(.*) --runs \d+", r"ilc repeatability\1 --runs 2"),
+    (r"^ilc reproduce(?!.* --from)(.*)$", r"ilc reproduce\1 --reduced"),
+    (r"^ilc-rt latency(?!.* --seconds)(.*)$", r"ilc-rt latency\1 --seconds 1"),
+    (r"--seconds \d+", "--seconds 1"),
+    (r"^(ilc library (?:show|export) \S+) \d+", r"\1 1"),
+    # Whoever types these runs this very test, or everything that it needs.
+    (r"^make ([a-z-]+)", r"make --dry-run --directory {root} \1"),
+    (r"/var/lib/ilc/|/etc/bash_completion.d/|~/.zfunc/", "./"),
+)
+
+
+def shorter(text: str) -> str:
+    """Return the line that is run in place of one that a document has."""
+    for pattern, replacement in SHORTER:
+        text = re.sub(pattern, replacement, text)
+    return text.replace("{root}", str(ROOT))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, finished: CampaignResult) -> Path:
+    """Return a folder with what a reader has: the examples, a cell, a library of a few runs."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    gantry = (ROOT / NETWORK_CELL).read_text(encoding="utf-8")
+    # A cell that learns in this process, unless a line names a bus.
+    (tmp_path / "gantry.toml").write_text(
+        re.sub(r'^address = "udp:[^"]*"', 'address = "loopback:"', gantry, flags=re.MULTILINE),
+        encoding="utf-8",
+    )
+    for name in ("ilc-library.db", "gantry.db"):
+        (tmp_path / name).write_bytes(Path(finished.library).read_bytes())
+    figures = ROOT / "docs" / "gallery" / "figures.json"
+    (tmp_path / "figures.json").write_bytes(figures.read_bytes())
+    return tmp_path
+
+
+def environment() -> dict[str, str]:
+    """Return a reader's environment: the programs are on the path."""
+    return {**os.environ, "PATH": f"{program('ilc-rt').parent}:{os.environ['PATH']}"}
+
+
+def run(text: str, folder: Path) -> str:
+    """Run a line as a shell does, and return what it said; it must succeed."""
+    for name in ("ilc", "python"):
+        text = re.sub(
+            rf"^{name} ",
+            f"{shlex.join(launcher(name) if name == 'ilc' else [sys.executable])} ",
+            text,
+        )
+    done = subprocess.run(
+        ["bash", "-c", text], cwd=folder, env=environment(), capture_output=True, text=True,
+        timeout=280, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, f"{text}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def with_drives(text: str, folder: Path) -> None:
+    """Run a line of `ilc-rt` that finds drives on its bus: simulated ones, on this host."""
+    address = f"udp:239.74.163.2:{free_port()}"
+    text, found = re.subn(r"--bus \S+", f"--bus {address}", text)
+    if not found:
+        text = f"{text} --bus {address}"
+    if " run " in text and "--iterations" not in text:
+        text = f"{text} --iterations {5 if '--resume' in text else 2}"
+    cell = ROOT / NETWORK_CELL
+    drives = Process([program("ilc-sim"), "run", cell, "--bus", address, "--lockstep"], folder)
+    try:
+        drives.line_with("ready")
+        run(f"{text} --lockstep", folder)
+    finally:
+        drives.close()
+
+
+def drives_alone(text: str, folder: Path) -> None:
+    """Run the simulated drives, and end them as Ctrl-C does."""
+    text = re.sub(r"--bus \S+", "", text) + f" --bus udp:239.74.163.2:{free_port()}"
+    drives = Process([program("ilc-sim"), *shlex.split(text)[1:]], folder)
+    try:
+        drives.line_with("ready")
+        drives.signal(signal.SIGINT)
+        assert drives.end() == 0, drives.errors
+    finally:
+        drives.close()
+
+
+def watched(text: str, folder: Path) -> None:
+    """Run a line that watches a cell, and a campaign for it to see."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    name, *rest = shlex.split(text)
+    if name == "python":
+        argv = [sys.executable, rest[0], "2", endpoint]
+    else:
+        if "--connect" in rest:
+            del rest[rest.index("--connect") : rest.index("--connect") + 2]
+        argv = [
+            *launcher("ilc"),
+            *rest,
+            "--connect",
+            endpoint,
+            "--no-scouting",
+            "--iterations",
+            "2",
+        ]
+    cell = folder / "watched.toml"
+    listen = f'[telemetry]\nlisten = ["{endpoint}"]\nscouting = false\n'
+    cell.write_text(f"{(folder / 'gantry.toml').read_text(encoding='utf-8')}\n{listen}", "utf-8")
+    watcher = Process(argv, folder)
+    try:
+        # Runs are made until the watcher, which needs a moment to connect, has seen its two.
+        bus = f"udp:239.74.163.2:{free_port()}"
+        argv = [
+            *launcher("ilc"),
+            "run",
+            str(cell),
+            "--bus",
+            bus,
+            "--lockstep",
+            "--iterations",
+            "500",
+        ]
+        campaign = Process(argv, folder)
+        try:
+            assert watcher.end() == 0, watcher.errors
+        finally:
+            campaign.signal(signal.SIGINT)
+            campaign.end()
+            campaign.close()
+    finally:
+        watcher.close()
+    assert any(re.search(r"\d", line) for line in watcher.said)
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda one: f"{one.where}: {one.text}")
+def test_a_line_that_one_is_told_to_type_works(command: Command, folder: Path) -> None:
+    """As it stands, or shorter."""
+    text = shorter(command.text)
+    if re.match(r"ilc monitor|python examples/02_monitor", text):
+        watched(text, folder)
+    elif text.startswith("ilc-sim run"):
+        drives_alone(text, folder)
+    elif re.match(r"ilc-rt (run|identify)", text):
+        with_drives(text, folder)
+    else:
+        run(text, folder)
+
+
+@pytest.mark.parametrize(
+    "document", sorted({block.document for block in PYTHON}), ids=lambda path: path.name
+)
+def test_the_python_of_a_document_runs(
+    document: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its blocks one after the other, as somebody who reads on would type them."""
+    monkeypatch.chdir(folder)
+    known: dict[str, object] = {"__name__": "__main__"}
+    for block in blocks(document):
+        if block.language == "python" and not block.excuse:
+            # Blank lines before the block keep the document's line numbers in a traceback.
+            source = "\n" * (block.line - 1) + block.text
+            exec(compile(source, str(document), "exec"), known)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_every_block_says_what_it_is(document: Path) -> None:
+    """A fence names a language, and no command hides in an indented block."""
+    for block in blocks(document):
+        assert block.language in LANGUAGES, (
+            f"{document}:{block.line - 1}: ``` and one of {LANGUAGES}"
+        )
+    for number, line in outside_of_blocks(document):
+        hidden = re.match(rf"(?: {{4,}}|\t)({'|'.join(PROGRAMS)}) ", line)
+        assert hidden is None, f"{document}:{number}: a command belongs in a ```sh block"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_verbs_and_options_in_running_text_exist(document: Path) -> None:
+    """`ilc verb --option` in a sentence names what the program has."""
+    for number, line in outside_of_blocks(document):
+        for code in re.findall(r"`((?:ilc|ilc-rt|ilc-sim) [^`]+)`", line):
+            name, *rest = code.split()
+            verb = [word for word in rest if re.fullmatch(r"[a-z][a-z-]*", word)][:2]
+            said = help_of(name, *verb[: 2 if verb in verbs_of(name) else 1])
+            for option in (word.split("=")[0] for word in rest if word.startswith("--")):
+                assert re.search(rf"{option}\b", said), f"{document}:{number}: {code}"
+        for target in re.findall(r"`make ([a-z-]+)`", line):
+            run(shorter(f"make {target}"), ROOT)
+
+
+def test_there_is_something_to_run() -> None:
+    """The collector finds what is known to be there."""
+    texts = [command.text for command in COMMANDS]
+    assert "make demo" in texts
+    assert "ilc demo" in texts
+    assert "ilc-rt check gantry.toml" in texts
+    assert "ilc-sim run examples/01_gantry.toml --mute 1@5" in texts
+    assert len(texts) > 35
+    assert [block.document.name for block in PYTHON if not block.excuse].count("README.md") >= 2
+    assert all(isinstance(block, Block) for block in PYTHON)
