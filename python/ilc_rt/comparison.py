@@ -6,6 +6,7 @@ their tracking error. Lengths and angles are never put into one figure.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -76,6 +77,11 @@ class Comparison:
         contour_m = record.contour_inf_m if self.by_contour else None
         return record.tracking_inf_m if contour_m is None else contour_m
 
+    def size(self, of: Figure) -> float:
+        """Return the largest of an error over the runs: its unit suits it."""
+        errors = (of(record) for record in self.records)
+        return max((e for e in errors if e is not None and math.isfinite(e)), default=0.0)
+
     def errors(self, *, rms: bool = True) -> list[Column]:
         """Return the errors that are shown of every run.
 
@@ -85,9 +91,9 @@ class Comparison:
             Whether root mean squares are among them.
         """
         columns = self.tracking(rms=rms)
-        first = self.first
-        if first.contour_inf_m is not None:
-            unit = unit_for("m", max(first.contour_inf_m, first.tracking_inf_m))
+        if self.first.contour_inf_m is not None:
+            sizes = (lambda record: record.contour_inf_m), (lambda record: record.tracking_inf_m)
+            unit = unit_for("m", max(map(self.size, sizes)))
             columns.append(Column("max contour", unit, lambda record: record.contour_inf_m))
             if rms:
                 columns.append(Column("RMS contour", unit, lambda record: record.contour_rms_m))
@@ -97,7 +103,7 @@ class Comparison:
         """Return the tracking errors that are shown: of linear and rotary axes apart."""
         if not self.is_mixed:
             base = self.units[0] if self.units else "m"
-            unit = unit_for(base, self.first.tracking_inf_m)
+            unit = unit_for(base, self.size(lambda record: record.tracking_inf_m))
             columns = [Column("max tracking", unit, lambda record: record.tracking_inf_m)]
             if rms:
                 columns.append(Column("RMS tracking", unit, lambda record: record.tracking_rms_m))
@@ -105,7 +111,7 @@ class Comparison:
         columns = []
         for base in ("m", "rad"):
             axes = [axis for axis, unit in enumerate(self.units) if unit == base]
-            unit = unit_for(base, largest(self.first.axes_tracking_inf_m, axes))
+            unit = unit_for(base, self.size(_largest_of(axes)))
             columns.append(Column("max tracking", unit, _largest_of(axes)))
             if rms:
                 columns.append(Column("RMS tracking", unit, _rms_of(axes)))
@@ -114,7 +120,7 @@ class Comparison:
     def sentence(self) -> str:
         """Say in one plain sentence what was learned."""
         if self.by_contour:
-            unit = unit_for("m", self.first.contour_inf_m)
+            unit = unit_for("m", self.size(self.compared))
             return f"Contour error {self._course(Column('', unit, self.compared))}."
         if not self.is_mixed:
             return f"Tracking error {self._course(self.tracking(rms=False)[0])}."

@@ -79,7 +79,7 @@ class CampaignView:
         )
         self._task = self._bar.add_task("starting", total=1.0)
         self._runs = 0
-        self._named = False
+        self._names: tuple[str, ...] = ()
         self._remarked = 0
 
     def __enter__(self) -> Self:
@@ -130,14 +130,16 @@ class CampaignView:
             self._print_remarks(result)
 
     def _print_plain(self, result: CampaignResult) -> None:
-        if not self._named:
-            self._named = True
+        comparison = result.comparison
+        names = headings(comparison)
+        if not self._names:
             # What a resumed campaign has behind it was told when it was made.
             self._remarked = len(_remarks(result)) if len(result.records) > 1 else 0
-            names = headings(result.comparison)
+        if names != self._names:
+            # Once, and again if the errors have outgrown their unit.
+            self._names = names
             print(plain_line(names, names))
-        comparison = result.comparison
-        print(plain_line(run_cells(comparison, result.records[-1]), headings(comparison)))
+        print(plain_line(run_cells(comparison, result.records[-1]), names))
         self._print_remarks(result)
 
     def _print_remarks(self, result: CampaignResult) -> None:

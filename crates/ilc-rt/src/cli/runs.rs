@@ -11,6 +11,8 @@ const BEST_SHARE: f64 = 0.9;
 pub(super) struct Runs {
     kinds: Option<AxisKinds>,
     runs: Vec<(u32, Figures)>,
+    /// What stands above the rows.
+    heading: String,
     /// What was last remarked on a run; it is told once.
     remark: Option<String>,
 }
@@ -24,8 +26,11 @@ impl Runs {
     /// A row of the table, with the heading before the first one and a remark after it.
     pub(super) fn row(&mut self, index: u32, figures: &Figures) -> String {
         self.runs.push((index, figures.clone()));
-        let heading = if self.runs.len() == 1 { heading(&self.columns()) } else { String::new() };
-        let mut text = format!("{heading}{index:>4}");
+        let heading = heading(&self.columns());
+        // Once, and again if the errors have outgrown their unit.
+        let mut text = if heading == self.heading { String::new() } else { heading.clone() };
+        self.heading = heading;
+        text += &format!("{index:>4}");
         for column in self.columns() {
             let value = (column.of)(figures);
             text += &format!("{:>14}", value.map_or_else(|| "-".to_owned(), |v| column.unit.of(v)));
@@ -76,7 +81,7 @@ impl Runs {
         }
         let part = |rotary: bool| {
             let unit = if rotary { Unit::ANGLE } else { Unit::LENGTH };
-            let unit = unit.for_size(largest(first, kinds, rotary).unwrap_or(0.0));
+            let unit = unit.for_size(self.size(|figures| largest(figures, kinds, rotary)));
             let of = |figures| largest(figures, kinds, rotary).unwrap_or(0.0);
             let what = if rotary { "rotary" } else { "linear" };
             let (before, after) = (of(first), of(last));
@@ -87,11 +92,11 @@ impl Runs {
     }
 
     /// How a figure went from the first run to the last.
-    fn course(&self, of: impl Fn(&Figures) -> Option<f64>, unit: Unit) -> String {
+    fn course(&self, of: impl Fn(&Figures) -> Option<f64> + Copy, unit: Unit) -> String {
         let values: Vec<(u32, f64)> =
             self.runs.iter().map(|(index, f)| (*index, of(f).unwrap_or(0.0))).collect();
         let (before, after) = (values[0].1, values[values.len() - 1].1);
-        let unit = unit.for_size(before);
+        let unit = unit.for_size(self.size(of));
         if values.len() == 1 {
             return format!("{} at most in 1 run", unit.with(before));
         }
@@ -111,6 +116,12 @@ impl Runs {
             unit.with(after),
             values.len()
         )
+    }
+
+    /// The largest of an error over the runs: its unit suits it.
+    fn size(&self, of: impl Fn(&Figures) -> Option<f64>) -> f64 {
+        let errors = self.runs.iter().filter_map(|(_, figures)| of(figures));
+        errors.filter(|error| error.is_finite()).fold(0.0, f64::max)
     }
 
     /// Whether runs are compared by their contour error: where there is one from the first run on.
@@ -133,20 +144,21 @@ impl Runs {
                 let unit = if rotary { Unit::ANGLE } else { Unit::LENGTH };
                 columns.push(Column {
                     name: "max tracking",
-                    unit: unit.for_size(largest(first, kinds, rotary).unwrap_or(0.0)),
+                    unit: unit.for_size(self.size(|figures| largest(figures, kinds, rotary))),
                     of: Box::new(move |figures| largest(figures, kinds, rotary)),
                 });
             }
         } else {
             let unit = if kinds.all_rotary() { Unit::ANGLE } else { Unit::LENGTH };
-            let unit = unit.for_size(first.tracking_inf_m);
+            let unit = unit.for_size(self.size(|figures| Some(figures.tracking_inf_m)));
             let max = Box::new(|figures: &Figures| Some(figures.tracking_inf_m));
             let rms = Box::new(|figures: &Figures| Some(figures.tracking_rms_m));
             columns.push(Column { name: "max tracking", unit, of: max });
             columns.push(Column { name: "RMS tracking", unit, of: rms });
         }
-        if let Some(contour_m) = first.contour_inf_m {
-            let unit = Unit::LENGTH.for_size(first.tracking_inf_m.max(contour_m));
+        if first.contour_inf_m.is_some() {
+            let sizes = self.size(|f| f.contour_inf_m).max(self.size(|f| Some(f.tracking_inf_m)));
+            let unit = Unit::LENGTH.for_size(sizes);
             let of = Box::new(|figures: &Figures| figures.contour_inf_m);
             columns.push(Column { name: "max contour", unit, of });
         }
