@@ -44,7 +44,8 @@ impl Adjoint {
     /// - [`LearningError::Parameter`] for a gain that is not positive and finite, or a model that
     ///   answers to nothing or without bound.
     /// - [`LearningError::GainBound`] for a gain from the limit on and no filter.
-    /// - [`LearningError::Empty`] for no samples, inputs or outputs.
+    /// - [`LearningError::Empty`] for no samples, inputs or outputs; [`LearningError::TooMany`] for more
+    ///   than a million values.
     /// - [`LearningError::Model`] for a continuous model.
     /// - [`LearningError::Signal`] if the run is too short for the filter.
     pub fn new(
@@ -62,6 +63,11 @@ impl Adjoint {
             ("n_inputs", n_inputs),
             ("n_outputs", n_outputs),
         ])?;
+        // The norm takes a hundred products and keeps twenty signals.
+        let allowed = 1_000_000 / n_inputs.max(n_outputs);
+        if n_samples > allowed {
+            return Err(LearningError::TooMany { what: "n_samples", value: n_samples, allowed });
+        }
         if let Some(value) = gain.filter(|gain| !(gain.is_finite() && *gain > 0.0)) {
             let allowed = "a gain must be finite and greater than 0";
             return Err(LearningError::Parameter { what: "gain", value, allowed });
