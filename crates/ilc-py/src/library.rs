@@ -287,8 +287,10 @@ impl PyLibrary {
         };
         let n_axes = u.n_channels;
         if u.n_samples == 0 || n_axes == 0 {
-            let line =
-                format!("u has shape {}: at least one sample of one axis is needed", u.shape());
+            let line = format!(
+                "u has shape ({}, {n_axes}): at least one sample of one axis is needed",
+                u.n_samples
+            );
             return Err(PyValueError::new_err(line));
         }
         for (key, name) in [("cell", cell), ("campaign", campaign), ("law", law)] {

@@ -225,7 +225,7 @@ mod tests {
         assert!(!rows[1].contains('%'), "{}", rows[1]);
         assert_eq!(
             at_zero.sentence().unwrap(),
-            "Tracking error from 0.00 um to 95.0 um within 2 runs."
+            "Tracking error from 0.00 um to 95.0 um within 2 runs; best 0.00 um in run 0."
         );
         let (alone, _) = runs(&["m"], &[tracked(1e-3, None)]);
         assert_eq!(alone.sentence().unwrap(), "Tracking error 1000 um at most in 1 run.");

@@ -250,7 +250,8 @@ mod tests {
             let arc = Arc::new(from, to, [0, 1], center, clockwise).unwrap();
             let radius = (from[0] - center[0]).hypot(from[1] - center[1]);
             let (off, found) = walked(&arc, center, radius);
-            assert!(off < 1.01e-6, "{to:?}: {off}");
+            // The ends themselves are up to 1.5 um apart in their radius.
+            assert!(off < 1.51e-6, "{to:?}: {off}");
             assert!((found - length).abs() < 1e-5, "{to:?}: {found}");
         }
     }
