@@ -50,6 +50,11 @@ __all__ = [
     "Tuning",
     "VelocityLoopFit",
     "__version__",
+    "_made",
+    "_rational_fit",
+    "_second_order_fit",
+    "_trajectory",
+    "_velocity_loop_fit",
     "analyze",
     "butterfly",
     "butterworth",
@@ -1191,3 +1196,25 @@ def run_events(
     disturbance: Callable[[int], ArrayLike] | None = None,
     simulated: bool = False,
 ) -> EventStream: ...
+
+# Make objects again, for copies and pickles.
+def _made(cls: object, how: str | None, arguments: dict[str, Any], part: str | None) -> Any: ...
+def _second_order_fit(
+    model: tuple[float, float, float, float, float | None],
+    deviations: tuple[float, float, float, float],
+    residual_rms: float,
+) -> SecondOrderFit: ...
+def _velocity_loop_fit(
+    model: tuple[float, float, float, float, float],
+    deviations: tuple[float, float, float],
+    residual_rms: float,
+) -> VelocityLoopFit: ...
+def _rational_fit(
+    model: StateSpace, delay_s: float, reflected_poles: int, residual_rms: float
+) -> RationalFit: ...
+def _trajectory(
+    dt_s: float,
+    samples: Sequence[NDArray[np.float64]],
+    alphas: Sequence[Any],
+    computing_s: float,
+) -> Trajectory: ...
