@@ -58,7 +58,7 @@ CELLS = {
 #: What is added to `ilc-rt run cell.toml`, and what the refusal has to name.
 OPTIONS = {
     "no such file": (["nix.toml"], ["nix.toml", "cannot be read", "No such file"]),
-    "a folder for a file": (["."], ["cannot be read", "directory"]),
+    "a folder for a file": (["."], ["cannot be read", "not a regular file"]),
     "unknown option": (["cell.toml", "--fast"], ["--fast", "--help"]),
     "no runs": (["cell.toml", "--iterations", "0"], ["--iterations", "'0'", "1.."]),
     "no such measure": (["cell.toml", "--measure", "eye"], ["'eye'", "encoder, tcp"]),

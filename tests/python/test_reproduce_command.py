@@ -130,9 +130,9 @@ def test_help_has_examples(ilc: Ilc) -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--json", "nowhere/f.json"], "nowhere/f.json: no such folder: nowhere"),
-        (["--json", "."], ".: is a folder; a file is needed"),
-        (["--report", "file"], "file: is a file; a folder is needed"),
+        (["--json", "nowhere/f.json"], "--json nowhere/f.json: cannot be written: No such file or directory"),
+        (["--json", "."], "--json .: cannot be written: Is a directory"),
+        (["--report", "file"], "--report file: is a file; a folder"),
         (["--from", "nothing.json"], "nothing.json: cannot be read: No such file or directory"),
         (["--from", "file"], "file: no JSON: Expecting value: line 1 column 1 (char 0)"),
         (["--from", "list.json"], "list.json: holds no papers; `ilc reproduce all --json"),

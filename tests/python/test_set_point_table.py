@@ -71,7 +71,7 @@ def test_nine_axes_learn_their_table(tmp_path):
     rms = [record.tracking_rms_m for record in campaign.run(4)]
     assert rms[-1] < 0.1 * rms[0]
     assert [campaign.result.input_unit(axis) for axis in range(N_AXES)] == ["rad"] * N_AXES
-    assert learned_input(campaign.result).axes[0].get_ylabel() == "input in mrad"
+    assert learned_input(campaign.result).axes[0].get_ylabel() == "input in µrad"
     assert tracking(campaign.result).axes[0].get_ylabel() == "error in µrad"
 
 

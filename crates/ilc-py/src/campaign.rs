@@ -146,7 +146,11 @@ impl Drop for EventStream {
 #[pyfunction]
 #[pyo3(signature = (cell, iterations, library, bus=None, measure=None, lockstep=true, resume=false, law=None,
     learning=true, experiment=None, disturbance=None, simulated=false))]
-#[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
+#[expect(
+    clippy::too_many_arguments,
+    clippy::fn_params_excessive_bools,
+    reason = "keyword arguments in Python"
+)]
 fn run_events(
     cell: &Bound<'_, PyCell>,
     #[pyo3(from_py_with = whole::iterations)] iterations: u32,

@@ -61,7 +61,6 @@ enum Held {
 #[pymethods]
 impl PyLibrary {
     #[new]
-    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn new(path: PathBuf) -> PyResult<Self> {
         let made = made!(path);
         if path.as_os_str() == ":memory:" {

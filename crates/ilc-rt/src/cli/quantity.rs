@@ -48,7 +48,7 @@ pub(super) fn digits(value: f64) -> String {
         size if size >= 1e9 => format!("{value:.2e}"),
         size if size >= 100.0 => format!("{value:.0}"),
         size if size >= 10.0 => format!("{value:.1}"),
-        size if size >= 1.0 || size < 5e-5 => format!("{value:.2}"),
+        size if !(5e-5..1.0).contains(&size) => format!("{value:.2}"),
         size if size >= 0.1 => format!("{value:.3}"),
         _ => format!("{value:.4}"),
     }
@@ -88,7 +88,7 @@ mod tests {
             (45.678, "45.7"),
             (4.5678, "4.57"),
             (0.45678, "0.457"),
-            (0.045678, "0.0457"),
+            (0.045_678, "0.0457"),
             (1e-6, "0.00"),
             (f64::NAN, "-"),
             (f64::INFINITY, "-"),

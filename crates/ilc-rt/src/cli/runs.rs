@@ -1,5 +1,7 @@
 //! The table of runs, and what came of them in a sentence: the words and signs of `ilc`, in ASCII.
 
+use std::fmt::Write as _;
+
 use super::quantity::{Unit, change, digits, less};
 use crate::record::{AxisKinds, Figures};
 
@@ -10,7 +12,7 @@ const BEST_SHARE: f64 = 0.9;
 #[derive(Default)]
 pub(super) struct Runs {
     kinds: Option<AxisKinds>,
-    runs: Vec<(u32, Figures)>,
+    ended: Vec<(u32, Figures)>,
     /// What stands above the rows.
     heading: String,
     /// What was last remarked on a run; it is told once.
@@ -25,21 +27,23 @@ impl Runs {
 
     /// A row of the table, with the heading before the first one and a remark after it.
     pub(super) fn row(&mut self, index: u32, figures: &Figures) -> String {
-        self.runs.push((index, figures.clone()));
+        self.ended.push((index, figures.clone()));
         let heading = heading(&self.columns());
         // Once, and again if the errors have outgrown their unit.
         let mut text = if heading == self.heading { String::new() } else { heading.clone() };
         self.heading = heading;
-        text += &format!("{index:>4}");
+        let _ = write!(text, "{index:>4}");
         for column in self.columns() {
             let value = (column.of)(figures);
-            text += &format!("{:>14}", value.map_or_else(|| "-".to_owned(), |v| column.unit.of(v)));
+            let _ =
+                write!(text, "{:>14}", value.map_or_else(|| "-".to_owned(), |v| column.unit.of(v)));
         }
-        let (first_index, first) = &self.runs[0];
+        let (first_index, first) = &self.ended[0];
         let compared = (index != *first_index)
             .then(|| change(self.compared(first), self.compared(figures)))
             .flatten();
-        text += &format!(
+        let _ = write!(
+            text,
             "{:>11}{:>10}{:>10}",
             compared.unwrap_or_default(),
             figures.overruns,
@@ -48,7 +52,7 @@ impl Runs {
         if figures.remark != self.remark
             && let Some(remark) = &figures.remark
         {
-            text += &format!("\n     {remark}");
+            let _ = write!(text, "\n     {remark}");
         }
         self.remark.clone_from(&figures.remark);
         text
@@ -63,8 +67,8 @@ impl Runs {
 
     /// What was learned, in one sentence.
     pub(super) fn sentence(&self) -> Option<String> {
-        let (first, last) = (&self.runs.first()?.1, &self.runs.last()?.1);
-        let n = self.runs.len();
+        let (first, last) = (&self.ended.first()?.1, &self.ended.last()?.1);
+        let n = self.ended.len();
         if self.by_contour() {
             return Some(format!(
                 "Contour error {}.",
@@ -94,7 +98,7 @@ impl Runs {
     /// How a figure went from the first run to the last.
     fn course(&self, of: impl Fn(&Figures) -> Option<f64> + Copy, unit: Unit) -> String {
         let values: Vec<(u32, f64)> =
-            self.runs.iter().map(|(index, f)| (*index, of(f).unwrap_or(0.0))).collect();
+            self.ended.iter().map(|(index, f)| (*index, of(f).unwrap_or(0.0))).collect();
         let (before, after) = (values[0].1, values[values.len() - 1].1);
         let unit = unit.for_size(self.size(of));
         if values.len() == 1 {
@@ -120,14 +124,14 @@ impl Runs {
 
     /// The largest of an error over the runs: its unit suits it.
     fn size(&self, of: impl Fn(&Figures) -> Option<f64>) -> f64 {
-        let errors = self.runs.iter().filter_map(|(_, figures)| of(figures));
+        let errors = self.ended.iter().filter_map(|(_, figures)| of(figures));
         errors.filter(|error| error.is_finite()).fold(0.0, f64::max)
     }
 
     /// Whether runs are compared by their contour error: where there is one from the first run on.
     fn by_contour(&self) -> bool {
-        self.runs.iter().all(|(_, figures)| figures.contour_inf_m.is_some())
-            && self.runs.first().is_some_and(|(_, first)| first.contour_inf_m > Some(0.0))
+        self.ended.iter().all(|(_, figures)| figures.contour_inf_m.is_some())
+            && self.ended.first().is_some_and(|(_, first)| first.contour_inf_m > Some(0.0))
     }
 
     fn compared(&self, figures: &Figures) -> f64 {
@@ -136,7 +140,7 @@ impl Runs {
     }
 
     fn columns(&self) -> Vec<Column<'_>> {
-        let Some((_, first)) = self.runs.first() else { return Vec::new() };
+        let Some((_, first)) = self.ended.first() else { return Vec::new() };
         let Some(kinds) = &self.kinds else { return Vec::new() };
         let mut columns: Vec<Column<'_>> = Vec::new();
         if kinds.is_mixed() {
@@ -166,17 +170,22 @@ impl Runs {
     }
 }
 
+/// What a column shows of a run, if the run has it.
+type Shown<'a> = Box<dyn Fn(&Figures) -> Option<f64> + 'a>;
+
 struct Column<'a> {
     name: &'static str,
     unit: Unit,
-    of: Box<dyn Fn(&Figures) -> Option<f64> + 'a>,
+    of: Shown<'a>,
 }
 
 /// Two lines: a machine's console may have 80 columns.
 fn heading(columns: &[Column<'_>]) -> String {
-    let names: String = columns.iter().map(|column| format!("{:>14}", column.name)).collect();
-    let units: String =
-        columns.iter().map(|column| format!("{:>14}", column.unit.symbol)).collect();
+    let (mut names, mut units) = (String::new(), String::new());
+    for column in columns {
+        let _ = write!(names, "{:>14}", column.name);
+        let _ = write!(units, "{:>14}", column.unit.symbol);
+    }
     format!(
         "    {names}{:>11}{:>10}{:>10}\n run{units}{:>11}{:>10}{:>10}\n",
         "", "", "learning", "change", "overruns", "ms"

@@ -4,6 +4,7 @@
 //! its journal on. So it is looked at through a connection that cannot write, and only what has the mark
 //! and the table of this program is opened for more.
 
+use std::fmt::Write as _;
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -205,7 +206,9 @@ fn immutable(path: &Path) -> String {
             b'/' | b'.' | b'-' | b'_' | b'0'..=b'9' | b'A'..=b'Z' | b'a'..=b'z' => {
                 address.push(char::from(*byte));
             }
-            byte => address.push_str(&format!("%{byte:02X}")),
+            byte => {
+                let _ = write!(address, "%{byte:02X}");
+            }
         }
     }
     address.push_str("?immutable=1");

@@ -1,5 +1,7 @@
 //! Texts that came from elsewhere, as they may be shown: nothing in them does anything but being read.
 
+use std::fmt::Write as _;
+
 /// Most characters of a name.
 pub const NAME_MAX: usize = 64;
 /// Most characters of a text of somebody else's in a line for people.
@@ -64,7 +66,7 @@ pub fn printable_json(text: &str) -> String {
         if character != '\n' && is_hidden(character) {
             let mut units = [0; 2];
             for unit in character.encode_utf16(&mut units) {
-                seen.push_str(&format!("\\u{unit:04x}"));
+                let _ = write!(seen, "\\u{unit:04x}");
             }
         } else {
             seen.push(character);
@@ -78,11 +80,13 @@ fn show(character: char, seen: &mut String) {
         '\n' => seen.push_str("\\n"),
         '\t' => seen.push_str("\\t"),
         '\r' => seen.push_str("\\r"),
-        hidden if is_hidden(hidden) => match u32::from(hidden) {
-            code @ 0..0x100 => seen.push_str(&format!("\\x{code:02x}")),
-            code @ 0x100..0x1_0000 => seen.push_str(&format!("\\u{code:04x}")),
-            code => seen.push_str(&format!("\\U{code:08x}")),
-        },
+        hidden if is_hidden(hidden) => {
+            let _ = match u32::from(hidden) {
+                code @ 0..0x100 => write!(seen, "\\x{code:02x}"),
+                code @ 0x100..0x1_0000 => write!(seen, "\\u{code:04x}"),
+                code => write!(seen, "\\U{code:08x}"),
+            };
+        }
         other => seen.push(other),
     }
 }

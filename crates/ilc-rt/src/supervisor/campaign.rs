@@ -1,6 +1,7 @@
 //! One campaign from the first frame to the last: bring-up, runs, learning, library, end.
 
 use std::collections::VecDeque;
+use std::fmt::Write as _;
 use std::sync::Arc;
 
 use super::announce::Announcer;
@@ -423,7 +424,7 @@ impl Running<'_> {
     /// Tells of a run that is kept; the first one that is not stops the axes.
     fn heed(&mut self, told: Told) {
         let Kept { record, asked, result } = match told {
-            Told::Kept(kept) => kept,
+            Told::Kept(kept) => *kept,
             Told::Unjudged(error) => return self.fail(error.to_string()),
         };
         match result {
@@ -476,7 +477,7 @@ impl Running<'_> {
             n => format!("{n} runs are kept"),
         };
         if let Some(why) = &mut self.failure {
-            why.push_str(&format!("; run {first} {lost}, {kept}"));
+            let _ = write!(why, "; run {first} {lost}, {kept}");
         }
     }
 

@@ -28,7 +28,7 @@ pub(super) struct Kept {
 #[derive(Debug)]
 pub(super) enum Told {
     /// Of a run.
-    Kept(Kept),
+    Kept(Box<Kept>),
     /// What the law decided could not be added to a run.
     Unjudged(LibraryError),
 }
@@ -131,7 +131,7 @@ pub(super) struct Shelf {
 impl Shelf {
     fn carry_out(&mut self, job: Job) -> Option<Told> {
         match job {
-            Job::Keep(record, asked) => Some(Told::Kept(self.keep(*record, asked))),
+            Job::Keep(record, asked) => Some(Told::Kept(Box::new(self.keep(*record, asked)))),
             Job::Judge(..) if self.is_stuck => None,
             Job::Judge(id, figures) => self.library.judge(id, &figures).err().map(Told::Unjudged),
         }

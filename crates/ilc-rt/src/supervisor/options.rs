@@ -14,6 +14,7 @@ pub(super) const SIMULATED_PATIENCE_S: f64 = 1.0;
 
 /// What the caller chooses beyond the cell description.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "flags of a command line, each independent")]
 pub struct Options {
     /// Runs in the whole campaign; the first one is without learning.
     pub iterations: u32,

@@ -58,12 +58,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, options: &Options) -> St
             3 - pdo
         ),
         StopReason::WrongLength { node, pdo, n_bytes } => {
-            let is_tool = cell.tcp_encoder.is_some_and(|tool| tool.node == node);
-            let what = match pdo {
-                _ if is_tool => "position",
-                1 => "status",
-                _ => "following error",
-            };
+            let what = carried(cell, node, pdo);
             format!("no {what} of node {node}: its TPDO{pdo} has {n_bytes} bytes, 8 are needed")
         }
         StopReason::SilentTool { cycles } => format!(
@@ -104,11 +99,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, options: &Options) -> St
         StopReason::Overrun { cycles } => format!(
             "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late; {}",
             ms(cycles),
-            if options.simulated {
-                format!("with simulated drives {SIMULATED_PATIENCE_S} s are forgiven")
-            } else {
-                format!("safety.overrun_cycles_max allows {}", cell.safety.overrun_cycles_max)
-            }
+            forgiven(cell, options)
         ),
         StopReason::Stalled { axis: index, cycles } => format!(
             "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late, and the drive of \
@@ -129,6 +120,25 @@ fn asked(signal: i32) -> String {
         libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
         libc::SIGHUP => "stopped as its terminal is gone (SIGHUP)".to_owned(),
         other => format!("stopped by signal {other}"),
+    }
+}
+
+/// What a node's TPDO tells.
+fn carried(cell: &Cell, node: u8, pdo: u8) -> &'static str {
+    let is_tool = cell.tcp_encoder.is_some_and(|tool| tool.node == node);
+    match pdo {
+        _ if is_tool => "position",
+        1 => "status",
+        _ => "following error",
+    }
+}
+
+/// How long a stall of this computer may be.
+fn forgiven(cell: &Cell, options: &Options) -> String {
+    if options.simulated {
+        format!("with simulated drives {SIMULATED_PATIENCE_S} s are forgiven")
+    } else {
+        format!("safety.overrun_cycles_max allows {}", cell.safety.overrun_cycles_max)
     }
 }
 

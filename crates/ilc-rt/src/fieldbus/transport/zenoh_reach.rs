@@ -102,7 +102,8 @@ fn without_places(text: &str) -> String {
     for word in text.split_whitespace() {
         let is_place = word.rsplit_once(':').is_some_and(|(file, line)| {
             let line = line.trim_end_matches([')', ',', '.']);
-            file.ends_with(".rs") && !line.is_empty() && line.bytes().all(|b| b.is_ascii_digit())
+            let is_source = file.rsplit_once('.').is_some_and(|(_, kind)| kind == "rs");
+            is_source && !line.is_empty() && line.bytes().all(|b| b.is_ascii_digit())
         });
         if !is_place {
             words.push(word);

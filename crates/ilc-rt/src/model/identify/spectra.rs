@@ -44,8 +44,8 @@ impl Spectra {
     /// [`ModelError::Length`] or [`ModelError::Parameter`] if the signals hold no piece.
     pub(super) fn of(u: &[f64], y: &[f64], averaging: Averaging) -> Result<Self, ModelError> {
         let n = match averaging {
-            Averaging::Periods { period_samples: n } => n,
-            Averaging::Welch { segment_samples: n, .. } => n,
+            Averaging::Periods { period_samples: n }
+            | Averaging::Welch { segment_samples: n, .. } => n,
         };
         if n < 8 || n > u.len() {
             return Err(ModelError::Parameter {

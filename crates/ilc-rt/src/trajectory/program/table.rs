@@ -198,7 +198,7 @@ mod tests {
         let alphabet = b"0123456789.,-+eE#;\"xy \t\r\n\xb5\xff\0naif";
         for round in 0..20_000 {
             let text: Vec<u8> =
-                (0..1 + round % 40).map(|_| alphabet[random.below(alphabet.len())]).collect();
+                (0..=round % 40).map(|_| alphabet[random.below(alphabet.len())]).collect();
             if let Ok(table) = read_table(&text, &NAMES) {
                 assert_eq!(table.position_m.len(), 2 * table.lines.len());
                 assert!(table.position_m.iter().all(|value| value.is_finite()));
