@@ -245,8 +245,9 @@ def test_the_python_program_passes_it_on(
     """`ilc run` says the same line in its own name."""
     bench.cell()
     bench.cell(("to_m = [0.08, 0.04]", "to_m = [0.08, 0.4]"), name="wrong.toml")
+    bus = [] if "--bus" in arguments else ["--bus", bench.bus]
     done = subprocess.run(
-        [sys.executable, "-m", "ilc_rt.cli", "run", *arguments],
+        [sys.executable, "-m", "ilc_rt.cli", "run", *bus, *arguments],
         cwd=bench.folder,
         capture_output=True,
         text=True,

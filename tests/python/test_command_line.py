@@ -48,15 +48,18 @@ def test_shells_complete_both_programs(tmp_path: Path, shell: str) -> None:
     assert "no-telemetry" in script
     if shell == "bash":
         (tmp_path / "script").write_text(script)
+        # The function that the script itself names; then a verb, and an option of a verb.
         ask = (
-            "source ./script; COMP_WORDS=(ilc-rt r); COMP_CWORD=1; "
-            '_ilc-rt ilc-rt r ilc-rt; echo "${COMPREPLY[@]}"'
+            "source ./script; f=$(complete -p ilc-rt | grep -o '[^ ]*ilc__rt'); "
+            'COMP_WORDS=(ilc-rt ru); COMP_CWORD=1; $f ilc-rt ru ilc-rt; echo "${COMPREPLY[@]}"; '
+            "COMP_WORDS=(ilc-rt run --no-t); COMP_CWORD=2; $f ilc-rt --no-t run; "
+            'echo "${COMPREPLY[@]}"'
         )
         bash = shutil.which("bash")
         assert bash is not None
         found = subprocess.run([bash, "-c", ask], cwd=tmp_path, text=True, capture_output=True,
                                check=True)  # fmt: skip
-        assert found.stdout.split() == ["run"]
+        assert found.stdout.split() == ["run", "--no-telemetry"], found.stderr
 
 
 def test_a_tab_completes_verbs_of_ilc() -> None:

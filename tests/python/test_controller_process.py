@@ -20,7 +20,7 @@ RUNS = 4
 FIGURES = {
     "index", "tracking_inf_m", "tracking_rms_m", "contour_inf_m", "contour_rms_m",
     "encoder_tracking_inf_m", "tool_tracking_inf_m", "overruns", "missing_samples",
-    "late_updates", "update_ms", "rolled_back",
+    "late_updates", "update_ms", "rolled_back", "learning_off", "remark",
 }  # fmt: skip
 
 

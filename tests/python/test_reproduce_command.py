@@ -130,7 +130,10 @@ def test_help_has_examples(ilc: Ilc) -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--json", "nowhere/f.json"], "--json nowhere/f.json: cannot be written: No such file or directory"),
+        (
+            ["--json", "nowhere/f.json"],
+            "--json nowhere/f.json: cannot be written: No such file or directory",
+        ),
         (["--json", "."], "--json .: cannot be written: Is a directory"),
         (["--report", "file"], "--report file: is a file; a folder"),
         (["--from", "nothing.json"], "nothing.json: cannot be read: No such file or directory"),

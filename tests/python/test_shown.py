@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
+import sqlite3
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -272,7 +274,12 @@ def test_hidden_characters_are_seen(text: str) -> None:
 def test_a_library_with_any_names_is_shown(ilc, tmp_path: Path) -> None:
     library = Library(str(tmp_path / "l.db"))
     error = np.array([1e-3, 2e-3, 1e-3])
-    library.append(np.zeros(3), error, 0.01, cell="[/red]\x1b[2J", campaign="c\x07", law="[b]")
+    library.append(np.zeros(3), error, 0.01, cell="[/red]", campaign="c", law="[b]")
+    with pytest.raises(ValueError, match="without control characters"):
+        library.append(np.zeros(3), error, 0.01, cell="\x1b[2J")
+    # Such names are refused today; a library from elsewhere may hold them all the same.
+    with contextlib.closing(sqlite3.connect(tmp_path / "l.db")) as file, file:
+        file.execute("UPDATE iteration SET cell = ?, campaign = ?", ("[/red]\x1b[2J", "c\x07"))
     listed = ilc("library", "list", "l.db")
     assert listed.returncode == 0, listed.stderr
     assert "\x1b" not in listed.stdout

@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 # The last ones are shown if there is room for them; the campaign's name says when it began.
 COLUMNS = (
     "id", "campaign", "run", "cell", "law", "max tracking", "max contour",
-    "learned from", "note", "created (UTC)",
+    "note", "learned from", "created (UTC)",
 )  # fmt: skip
-N_NARROW = 7
+N_NARROW = 8
 RIGHT = ("id", "run", "max tracking", "max contour")
-SHORTENED = (COLUMNS.index("cell"), COLUMNS.index("law"))
-SHORTEST = 6
+# Columns that give way, and what is left of them at least.
+SHORTENED = {COLUMNS.index("note"): 11, COLUMNS.index("cell"): 6, COLUMNS.index("law"): 6}
 WIDE = 140
 
 app = Typer(
@@ -104,7 +104,7 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
         (
             str(row["id"]), printable(row["campaign"]), str(row["index"]), printable(row["cell"]),
             printable(row["law"]), error_text(row, "tracking_inf_m"),
-            error_text(row, "contour_inf_m"), printable(row["measure"]), note(row),
+            error_text(row, "contour_inf_m"), note(row), printable(row["measure"]),
             printable(row["created_utc"]),
         )
         for row in rows
@@ -119,7 +119,7 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
     # Names give way, the longest first; a column is followed by two blanks.
     excess = sum(wanted) + 2 * count - width
     for column in sorted(SHORTENED, key=lambda column: -wanted[column]):
-        cut = max(0, min(excess, wanted[column] - SHORTEST))
+        cut = max(0, min(excess, wanted[column] - SHORTENED[column]))
         wanted[column] -= cut
         excess -= cut
     for name, size in zip(names, wanted, strict=True):

@@ -17,6 +17,8 @@ const DAMPINGS: [f64; 4] = [0.05, 0.2, 0.7, 1.5];
 const FOLLOWED: usize = 10;
 /// Cost of each frequency's weight below which a start has led to the model itself.
 const EXACT: f64 = 1e-22;
+/// Fits whose cost is within this factor of the least, 5 % in the RMS of what they leave over, are as good.
+const AS_GOOD: f64 = 1.1;
 /// Delays tried to begin from, in periods of the highest frequency.
 const DELAYS: [f64; 5] = [0.0, 0.1, 0.25, 0.5, 1.0];
 /// Natural frequencies may lie outside the band by this factor.
@@ -114,22 +116,24 @@ pub fn fit_second_order(
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| starts[a].0.total_cmp(&starts[b].0));
     let all: f64 = fit.root_weight.iter().map(|weight| weight * weight).sum();
-    let mut best: Option<(Minimum, Sign)> = None;
+    let mut ends: Vec<(Minimum, Sign)> = Vec::new();
     for &i in order.iter().take(FOLLOWED) {
         let sign = starts[i].1;
-        let found = minimize(&points[i], &|x| fit.residuals(x, sign));
-        if best.as_ref().is_none_or(|(least, _)| found.cost < least.cost) {
-            best = Some((found, sign));
-        }
-        if best.as_ref().is_some_and(|(least, _)| least.cost <= EXACT * all) {
+        ends.push((minimize(&points[i], &|x| fit.residuals(x, sign)), sign));
+        if ends.last().is_some_and(|(end, _)| end.cost <= EXACT * all) {
             break;
         }
     }
-    let (minimum, sign) = best.ok_or(ModelError::Numerics {
+    let least = ends.iter().map(|(end, _)| end.cost).fold(f64::INFINITY, f64::min);
+    let delay_s = |(end, sign): &(Minimum, Sign)| fit.model(&end.parameters, *sign).delay_s.abs();
+    // Noisy data hardly tell a delay from more damping: of fits that are as good, the plainest.
+    let as_good = ends.iter().filter(|(end, _)| end.cost <= AS_GOOD * least);
+    let plainest = as_good.min_by(|a, b| delay_s(a).total_cmp(&delay_s(b)));
+    let (minimum, sign) = plainest.ok_or(ModelError::Numerics {
         what: "the second-order fit",
         reason: "no start gives a finite model",
     })?;
-    Ok(fit.result(&minimum, sign))
+    Ok(fit.result(minimum, *sign))
 }
 
 type Sign = f64;
