@@ -21,6 +21,7 @@ FIGURES = {
     "index", "tracking_inf_m", "tracking_rms_m", "contour_inf_m", "contour_rms_m",
     "encoder_tracking_inf_m", "tool_tracking_inf_m", "overruns", "missing_samples",
     "late_updates", "update_ms", "rolled_back", "learning_off", "remark",
+    "axes_tracking_inf_m", "axes_tracking_rms_m",
 }  # fmt: skip
 
 

@@ -24,7 +24,7 @@ const FALLBACK: Band = Band { from_hz: 1.0, to_hz: 50.0, period_s: 8.0 };
 #[derive(Args)]
 #[command(after_help = "Examples:
   ilc-rt identify gantry.toml --axis x
-  ilc-rt identify gantry.toml --axis x --amplitude 0.00015 --from-hz 1 --to-hz 40 --json x.json")]
+  ilc-rt identify gantry.toml --axis x --amplitude 0.001 --from-hz 1 --to-hz 12 --json x.json")]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(super) struct IdentifyArguments {
     /// Cell description.
