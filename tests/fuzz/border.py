@@ -29,11 +29,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ilc_rt.errors import CampaignError
+
 sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 
 MEMORY_MAX = 6 << 30
 SILENCE_MAX_S = 60.0
-ALLOWED = (ValueError, TypeError, MemoryError, OSError)
+ALLOWED = (ValueError, TypeError, MemoryError, OSError, CampaignError)
 # What runs machines or writes files where it is told to.
 SKIPPED = {"Campaign", "Law", "CampaignResult", "IterationRecord", "Experiment", "Identification",
            "swept_sine", "Library", "Cell"}  # fmt: skip
@@ -248,7 +250,11 @@ def follow(command: list[str], folder: str, number: int) -> tuple[int, list[str]
 
     broken: list[str] = []
     current = "before the first call"
-    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as worker:
+    # The same order of names in every process, so that a seed draws the same calls again.
+    environment = {**os.environ, "PYTHONHASHSEED": "0"}
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, bufsize=0, env=environment
+    ) as worker:
         assert worker.stdout is not None
         waiting = selectors.DefaultSelector()
         waiting.register(worker.stdout, selectors.EVENT_READ)

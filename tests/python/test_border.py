@@ -17,6 +17,7 @@ from ilc_rt import (
     discretize,
     from_transfer_function,
     identify,
+    repeatability,
     second_order,
     signal,
     weights,
@@ -138,3 +139,26 @@ def test_a_fraction_of_more_poles_than_there_are_fits_too(degrees):
     w = np.geomspace(1.0, 80.0, 200) * 2 * np.pi
     h = np.asarray(model.frequency_response(w)).reshape(-1)
     assert identify.fit_rational(w / 2 / np.pi, h, *degrees).residual_rms < 1e-3
+
+
+@pytest.mark.parametrize(("bandwidth_hz", "dt_s"), [(20.0, 5e-324), (5e-324, 0.002)])
+def test_a_bell_wider_than_any_number_is_refused(bandwidth_hz: float, dt_s: float) -> None:
+    with pytest.raises(SignalError, match=r"dt_s|bandwidth_hz"):
+        signal.gaussian(bandwidth_hz, dt_s)
+
+
+def test_a_loop_at_rest_answers_with_its_gain_alone() -> None:
+    """The open loop integrates, so that only the position loop is left at 0 Hz."""
+    frequency_hz = np.linspace(1.0, 40.0, 80)
+    z = np.exp(2j * np.pi * frequency_hz * 0.002)
+    fit = identify.fit_velocity_loop(
+        frequency_hz, 0.002 / (z - 1) / (1 + 20.0 / z * 0.002 / (z - 1)), dt_s=0.002,
+        position_gain_per_s=20.0,
+    )  # fmt: skip
+    assert fit.response(np.array([0.0]))[0] == pytest.approx(0.05)
+    assert abs(fit.response(np.array([0.01]))[0]) == pytest.approx(0.05, rel=1e-3)
+
+
+def test_errors_whose_squares_overflow_have_no_repeatability() -> None:
+    with pytest.raises(ValueError, match="must be finite"):
+        repeatability(np.full((3, 5), 1e199))

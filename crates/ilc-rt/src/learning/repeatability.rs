@@ -78,6 +78,11 @@ pub fn repeatability(
     }
 
     let (of_mean, of_spread) = (mean_square(&mean), mean_square(&spread));
+    let largest = runs().map(&mean_square).fold(of_mean.max(of_spread), f64::max);
+    if !largest.is_finite() {
+        let allowed = "squares of the errors must be finite";
+        return Err(LearningError::Parameter { what: "mean square", value: largest, allowed });
+    }
     let repeatable = (of_mean - of_spread / n_runs as f64).max(0.0);
     let whole = repeatable + of_spread;
     let figures = || runs().map(|run| mean_square(run).sqrt());

@@ -15,6 +15,8 @@ const FLUCTUATION: f64 = 1.05;
 const INPUT_START: f64 = 0.01;
 /// Safety factor of `s`.
 const SAFETY: f64 = 2.0;
+/// Most runs that are computed for a proposal: what is not learned by then never will be.
+const RUNS_MAX: usize = 10_000;
 
 /// What is known of the machine.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,6 +101,10 @@ pub fn tune(
 ) -> Result<Tuning, LearningError> {
     if knowledge.n_runs == 0 {
         return Err(LearningError::Empty { what: "n_runs" });
+    }
+    if knowledge.n_runs > RUNS_MAX {
+        let (what, value, allowed) = ("n_runs", knowledge.n_runs, RUNS_MAX);
+        return Err(LearningError::TooMany { what, value, allowed });
     }
     if let Some(uncertainty) = &knowledge.uncertainty {
         uncertainty.check()?;
@@ -388,6 +394,9 @@ mod tests {
             Knowledge { uncertainty: Some(Uncertainty::Scalar(0.1)), ..Knowledge::default() };
         let found = tune(&outside, 300, &sure).unwrap();
         assert!(found.r > 0.0 && found.steps[2].why.contains("not bounded"), "{:?}", found.steps);
+        let many = Knowledge { n_runs: 10_001, ..Knowledge::default() };
+        let refused = tune(&axis(), 200, &many);
+        assert!(matches!(refused, Err(LearningError::TooMany { what: "n_runs", .. })));
         let none = Knowledge { n_runs: 0, ..Knowledge::default() };
         assert!(matches!(tune(&axis(), 200, &none), Err(LearningError::Empty { what: "n_runs" })));
     }

@@ -18,8 +18,9 @@ pub(super) fn check_channel(
 
 /// Refuses a sample time that is not a positive number, and returns half the sampling rate in hertz.
 pub(super) fn check_sample_time(dt_s: f64) -> Result<f64, SignalError> {
-    if dt_s.is_finite() && dt_s > 0.0 {
-        Ok(0.5 / dt_s)
+    let limit_hz = 0.5 / dt_s;
+    if dt_s > 0.0 && limit_hz > 0.0 && limit_hz.is_finite() {
+        Ok(limit_hz)
     } else {
         Err(SignalError::SampleTime { dt_s })
     }

@@ -47,7 +47,13 @@ impl GaussianFilter {
     pub fn new(bandwidth_hz: f64, dt_s: f64) -> Result<Self, SignalError> {
         let limit_hz = check_sample_time(dt_s)?;
         check_frequency("bandwidth_hz", bandwidth_hz, limit_hz)?;
-        Ok(Self { bandwidth_hz, dt_s })
+        let filter = Self { bandwidth_hz, dt_s };
+        if filter.sigma_samples().is_finite() {
+            Ok(filter)
+        } else {
+            // So low that its bell is wider than any number.
+            Err(SignalError::Frequency { what: "bandwidth_hz", value_hz: bandwidth_hz, limit_hz })
+        }
     }
 
     /// Returns the bandwidth in hertz.

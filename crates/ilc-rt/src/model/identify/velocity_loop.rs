@@ -174,6 +174,10 @@ impl VelocityLoop {
 
     /// `Z{a / (s (s + a))} = T / (z - 1) - (1 - E) / (a (z - E))`, `E = exp(-a T)`
     fn at(&self, frequency_hz: f64) -> Complex<f64> {
+        // The open loop integrates: at rest the position loop alone is left.
+        if frequency_hz.abs() < f64::MIN_POSITIVE {
+            return Complex::new(self.position_gain_per_s.recip(), 0.0);
+        }
         let (a, w) = (TAU * self.bandwidth_hz, TAU * frequency_hz);
         let z = Complex::new(0.0, w * self.dt_s).exp();
         let decay = (-a * self.dt_s).exp();
