@@ -9,6 +9,7 @@ import pytest
 
 from ilc_rt import (
     Gate,
+    LearningError,
     ModelError,
     NormOptimalIlc,
     PdIlc,
@@ -162,3 +163,8 @@ def test_a_loop_at_rest_answers_with_its_gain_alone() -> None:
 def test_errors_whose_squares_overflow_have_no_repeatability() -> None:
     with pytest.raises(ValueError, match="must be finite"):
         repeatability(np.full((3, 5), 1e199))
+
+
+def test_weights_beyond_the_largest_number_are_refused() -> None:
+    with pytest.raises(LearningError, match="not finite"):
+        weights.coupled(np.full((2, 2), 1e199))

@@ -1,5 +1,6 @@
 //! Weights along the run: `ilc_rt.weights`, and how a weight comes from and goes to Python.
 
+use ilc_rt::learning::LearningError;
 use ilc_rt::learning::weights::{
     Contour, ContourTerms, Coupled, Formation, Gain, Objective, Schedule, Weight,
 };
@@ -96,6 +97,11 @@ fn give_blocks<'py>(
     for k in 0..n_samples {
         // Symmetric: by columns is by rows.
         values.extend_from_slice(weight.at(k, p).as_slice());
+    }
+    if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+        let (what, sample) = ("weight", at / (p * p));
+        let reason = "what it is made of is so large that it is not finite".to_owned();
+        return Err(LearningError::Weight { what, sample, reason }).or_raise();
     }
     Array3::from_shape_vec((n_samples, p, p), values)
         .map(|array| array.into_pyarray(py).into_any())
