@@ -100,7 +100,7 @@ def criterion_folder() -> Path:
 
 
 def criterion(folder: Path) -> list[tuple[str, float]]:
-    """Return the medians that the Rust benches left, by name; fail if there are none."""
+    """Return the medians of the Rust benches by name; fail if no bench has run."""
     found = []
     for about in folder.glob("**/new/benchmark.json"):
         estimates = json.loads((about.parent / "estimates.json").read_text())

@@ -66,7 +66,7 @@ def bode(
 
 
 def _decibels(response: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return the magnitude in dB; NaN, which is not drawn, where there is none."""
+    """Return the magnitude in dB; NaN, which is not drawn, where it is 0."""
     size = np.abs(response)
     found = 20.0 * np.log10(np.where(size > 0.0, size, 1.0))
     return np.where(size > 0.0, found, np.nan)

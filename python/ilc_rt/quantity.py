@@ -34,11 +34,11 @@ class Unit:
     scale: float
 
     def number(self, value: float | None) -> str:
-        """Return a quantity as a number in this unit; ``-`` if there is none."""
+        """Return a quantity as a number in this unit; ``-`` if it is None."""
         return "-" if value is None else digits(value * self.scale)
 
     def text(self, value: float | None) -> str:
-        """Return a quantity with its unit; ``-`` if there is none."""
+        """Return a quantity with its unit; ``-`` if it is None."""
         return "-" if value is None else f"{self.number(value)} {self.symbol}"
 
 
@@ -104,7 +104,7 @@ def percent(before: float | None, after: float | None) -> float | None:
 
 
 def signed(before: float | None, after: float | None) -> str:
-    """Return a change with its sign, ``""`` where there is none to tell.
+    """Return a signed relative change; an empty text if it is undefined.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def signed(before: float | None, after: float | None) -> str:
 
 
 def in_words(before: float | None, after: float | None) -> str:
-    """Return a change in words, ``""`` where there is none to tell.
+    """Return a relative change in words; an empty text if it is undefined.
 
     Examples
     --------

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 TUNED_LAWS = ("norm_optimal", "constrained")
 UNCERTAINTY = 0.3
-"""How far the axes may be from their model if nobody says: what friction leaves of a good fit."""
+"""Default relative model uncertainty: the residual of a good fit on an axis with friction."""
 GROWTH_MAX = 1.2
 """Growth of an error over the best one that a trial may show."""
 STEPS_PER_OCTAVE = 2

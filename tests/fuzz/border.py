@@ -49,7 +49,7 @@ UNBOUNDED = {"bandwidth_deviation_hz", "gain_deviation", "delay_deviation_s", "d
 
 
 def odd_values(rng: random.Random) -> list[object]:
-    """Return what nobody should give, and what somebody will."""
+    """Return invalid arguments of every kind."""
     from classes_fixture import axis
 
     shape = rng.choice([(0,), (1,), (3,), (60,), (60, 2), (2, 60), (0, 2), (3, 3), (2, 3, 2)])

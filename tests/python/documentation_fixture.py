@@ -56,7 +56,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Command:
-    """A command line that somebody is told to type.
+    """A command line in the documents or a help text.
 
     Attributes
     ----------

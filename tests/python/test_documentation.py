@@ -203,7 +203,7 @@ def test_a_line_that_one_is_told_to_type_works(command: Command, folder: Path) -
 def test_the_python_of_a_document_runs(
     document: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its blocks one after the other, as somebody who reads on would type them."""
+    """All blocks of a document run in order, in one namespace."""
     monkeypatch.chdir(folder)
     known: dict[str, object] = {"__name__": "__main__"}
     for block in blocks(document):

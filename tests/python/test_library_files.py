@@ -125,7 +125,7 @@ def test_a_campaign_does_not_write_into_a_foreign_database(
 
 
 def test_what_is_no_file_is_refused_without_waiting(ilc: Ilc, tmp_path: Path) -> None:
-    """A folder, a pipe that nobody writes to, a device."""
+    """A folder, a FIFO without a writer, a device."""
     (tmp_path / "folder").mkdir()
     os.mkfifo(tmp_path / "pipe")
     for name, found in [("folder", "a folder"), ("pipe", "no regular file"), ("/dev/zero", "no")]:
@@ -266,7 +266,7 @@ def test_a_library_locked_from_the_beginning_is_refused(bench: Bench) -> None:
 
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
 def test_a_deleted_library_stops_the_campaign(bench: Bench, pace: str) -> None:
-    """Runs that nobody would find again are not made."""
+    """A library that cannot keep runs is refused before anything moves."""
     cell = bench.cell(short=True)
     options = ["--lockstep"] if pace == "lockstep" else []
     bench.drives(cell, *options)
