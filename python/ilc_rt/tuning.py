@@ -29,7 +29,7 @@ GROWTH_MAX = 1.2
 STEPS_PER_OCTAVE = 2
 WORTH_WHILE = 0.98
 """Share of the expected error below which a weight of the change earns its place."""
-RUNS_MAX = 100
+TRIAL_RUNS_MAX = 100
 """Runs that a trial makes at most: what has not grown by then grows slowly enough to be seen."""
 ACROSS_TO_ALONG = 1.5
 """How much more an error across the path may weigh than one along it."""
@@ -206,7 +206,7 @@ def propose_weights(
     if n_runs < 1:
         message = f"n_runs = {n_runs}; at least 1 is needed"
         raise BadInputError(message)
-    n_runs = min(n_runs, RUNS_MAX)
+    n_runs = min(n_runs, TRIAL_RUNS_MAX)
     known_of = {axis.name: known or KNOWN_SHARE * axis.natural_frequency_hz for axis in axes}
     moving = [axis for axis in axes if np.any(axis.way != 0.0)]
     if not moving:

@@ -248,6 +248,48 @@ def test_a_subscriber_that_stops_reading_holds_nobody_up(bench: Bench) -> None:
     assert seen_s < 2.0 * unseen_s + 4.0
 
 
+ROUTER = """
+import json, signal, sys, zenoh
+config = zenoh.Config()
+config.insert_json5("mode", json.dumps("router"))
+config.insert_json5("listen/endpoints", json.dumps([sys.argv[1]]))
+config.insert_json5("scouting/multicast/enabled", "false")
+session = zenoh.open(config)
+subscriber = session.declare_subscriber("ilc/**", lambda sample: print("heard", flush=True))
+print("ready", flush=True)
+signal.pause()
+"""
+
+
+@pytest.mark.parametrize("last", [signal.SIGKILL, signal.SIGTERM, signal.SIGSTOP])
+def test_a_router_that_goes_takes_nothing_with_it(bench: Bench, last: signal.Signals) -> None:
+    """All telemetry goes through it, and the campaign needs none."""
+    runs = 20
+    ours = endpoint()
+    quiet = bench.cell(short=True, name="quiet.toml")
+    cell = bench.cell(short=True, more=telemetry(connect=[ours]))
+    drives = bench.drives(cell, "--lockstep")
+    assert bench.controller(quiet, "--lockstep", runs=runs).end() == 0
+    goodbye(drives)
+
+    bench.drives(cell, "--lockstep")
+    router = subprocess.Popen([sys.executable, "-c", ROUTER, ours], stdout=subprocess.PIPE, text=True)
+    assert router.stdout is not None
+    try:
+        assert router.stdout.readline() == "ready\n"
+        controller = start(bench, cell, "--lockstep", runs=runs)
+        assert router.stdout.readline() == "heard\n"
+        router.send_signal(last)
+        assert controller.end() == 0
+    finally:
+        router.kill()
+        router.wait()
+        router.stdout.close()
+    digests = [digest for _, _, digest in bench.kept()]
+    assert len(digests) == 2 * runs
+    assert digests[:runs] == digests[runs:]
+
+
 @pytest.mark.parametrize("wrong", ["tcp/203.0.113.7:7447", "tcp/127.0.0.1:1/nonsense", "nonsense"])
 def test_a_cell_runs_unseen_where_its_endpoint_cannot_be_opened(bench: Bench, wrong: str) -> None:
     """A warning, and no more than that."""

@@ -166,7 +166,7 @@ impl Cycle {
             sample.encoder_m[axis] = drive.encoder_m;
         }
         let last_of_run = at.is_some_and(|(_, k)| k as usize + 1 == self.interpolator.n_samples());
-        self.slots.send(sample, last_of_run);
+        self.slots.send(sample, self.commanded_position_m(), last_of_run);
         TickStatus::Running
     }
 
@@ -178,6 +178,17 @@ impl Cycle {
     /// Number of axes.
     pub(super) fn n_axes(&self) -> usize {
         self.spec.axes.len().min(MAX_AXES)
+    }
+
+    /// Position that each axis is commanded to, m: of a velocity axis, its reference.
+    pub(super) fn commanded_position_m(&self) -> [f64; MAX_AXES] {
+        let mut position_m = self.reference.position_m;
+        for (axis, spec) in self.spec.axes.iter().enumerate().take(MAX_AXES) {
+            if spec.mode == Mode::Csp {
+                position_m[axis] = self.commanded[0][axis];
+            }
+        }
+        position_m
     }
 
     /// Swaps in the newest input table, if one is waiting, and tells which one this run uses.

@@ -12,7 +12,7 @@ use super::slots::Part;
 use super::spec::Pace;
 use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
 use crate::fieldbus::cia402::pdo_map::{ENCODER_PDO, EXTRA_PDO, STATUS_PDO};
-use crate::fieldbus::cia402::{EncoderSample, Extra, Mode, State, Status};
+use crate::fieldbus::cia402::{EncoderSample, Extra, State, Status};
 use crate::fieldbus::{Bus, Frame};
 
 /// Most frames taken in one tick, so that a babbling bus cannot hold the loop.
@@ -190,16 +190,19 @@ impl Cycle {
         if let Some(step_m) = drive.jump_m {
             return Some(StopReason::Jump { axis, step_m });
         }
-        let wanted_m = match spec.mode {
-            Mode::Csp => self.commanded[0][axis],
-            Mode::Csv => self.reference.position_m[axis],
+        // A position that came late answers an earlier command; one that has not come for long is held
+        // against the newest.
+        let silence = self.slots.silence(Part::Status(axis));
+        let stale = silence > STALE_CYCLES;
+        let commanded_m = match self.slots.answered_command_m(axis) {
+            Some(commanded_m) if !stale => commanded_m,
+            _ => self.commanded_position_m()[axis],
         };
-        let error_m = wanted_m - drive.encoder_m;
+        let error_m = commanded_m - drive.encoder_m;
         if error_m.abs() <= spec.following_error_max_m {
             return None;
         }
-        let silence = self.slots.silence(Part::Status(axis));
-        Some(if silence > STALE_CYCLES {
+        Some(if stale {
             StopReason::SilentAxis { axis, cycles: saturate(silence) }
         } else {
             StopReason::FollowingError { axis, error_m }

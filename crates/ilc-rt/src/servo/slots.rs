@@ -35,6 +35,8 @@ pub(super) enum Part {
 #[derive(Clone, Copy, Debug, Default)]
 struct Slot {
     sample: Sample,
+    /// Position that each axis was commanded to, m.
+    commanded_m: [f64; MAX_AXES],
     last_of_run: bool,
     /// SYNCs sent when each part came; 0 if it has not.
     came: [u64; PARTS_MAX],
@@ -84,12 +86,19 @@ impl Slots {
         }
     }
 
-    /// Notes what goes out with the next SYNC. Its measurement fields hold the newest ones known,
-    /// which stand in should an answer never come.
-    pub(super) fn send(&mut self, mut sample: Sample, last_of_run: bool) {
+    /// Notes what goes out with the next SYNC: the sample, and the position that each axis is
+    /// commanded to, m. Its measurement fields hold the newest ones known, which stand in should an
+    /// answer never come.
+    pub(super) fn send(
+        &mut self,
+        mut sample: Sample,
+        commanded_m: [f64; MAX_AXES],
+        last_of_run: bool,
+    ) {
         sample.sync = self.sent;
         let spoiled = std::mem::take(&mut self.spoil_next);
-        self.ring[index(self.sent)] = Slot { sample, last_of_run, came: [0; PARTS_MAX], spoiled };
+        self.ring[index(self.sent)] =
+            Slot { sample, commanded_m, last_of_run, came: [0; PARTS_MAX], spoiled };
         self.sent += 1;
         for lag in &mut self.lags[..self.n_parts] {
             lag.silent += 1;
@@ -121,6 +130,13 @@ impl Slots {
             slot.came[number] = self.sent;
             write(&mut slot.sample, part, value);
         }
+    }
+
+    /// Position that an axis had been commanded to at the SYNC that its newest answer belongs to, m.
+    pub(super) fn answered_command_m(&self, axis: usize) -> Option<f64> {
+        let number = self.number(Part::Status(axis))?;
+        let sync = self.lags[number].answers.checked_sub(1)?;
+        Some(self.ring[index(sync)].commanded_m[axis])
     }
 
     /// SYNCs that a part has not answered.
@@ -293,11 +309,11 @@ mod tests {
     #[test]
     fn a_late_answer_lands_in_its_own_cycle() {
         let mut slots = Slots::new(2, false);
-        slots.send(Sample::default(), false);
+        slots.send(Sample::default(), [0.0; MAX_AXES], false);
         answer(&mut slots, 0, 10.0);
         slots.watch_lag();
         assert!(slots.take().is_none(), "node 1 has not answered");
-        slots.send(Sample::default(), true);
+        slots.send(Sample::default(), [0.0; MAX_AXES], true);
         answer(&mut slots, 1, 20.0);
         answer(&mut slots, 1, 21.0);
         answer(&mut slots, 0, 11.0);
@@ -315,7 +331,7 @@ mod tests {
         let mut out = Vec::new();
         let mut coming = Vec::new();
         for sync in 0..n {
-            slots.send(Sample::default(), false);
+            slots.send(Sample::default(), [0.0; MAX_AXES], false);
             deliver(sync, &mut coming);
             for of in coming.drain(..) {
                 slots.answer(Part::Status(0), [of as f64, 0.0]);
@@ -401,10 +417,29 @@ mod tests {
     }
 
     #[test]
+    fn a_late_position_belongs_to_the_command_that_it_answers() {
+        let mut slots = Slots::new(1, false);
+        assert_eq!(slots.answered_command_m(0), None);
+        for n in 0..4 {
+            slots.send(Sample::default(), [f64::from(n); MAX_AXES], false);
+        }
+        answer(&mut slots, 0, 0.0);
+        assert_eq!(slots.answered_command_m(0), Some(0.0));
+        for n in 1..4 {
+            answer(&mut slots, 0, f64::from(n));
+            assert_eq!(slots.answered_command_m(0), Some(f64::from(n)));
+        }
+    }
+
+    #[test]
     fn one_pdo_of_two_is_not_enough() {
         let mut slots = Slots::new(1, true);
         for _ in 0..60 {
-            slots.send(Sample { encoder_m: [7.0; MAX_AXES], ..Default::default() }, false);
+            slots.send(
+                Sample { encoder_m: [7.0; MAX_AXES], ..Default::default() },
+                [0.0; MAX_AXES],
+                false,
+            );
             slots.answer(Part::Extra(0), [0.0; 2]);
             slots.answer(Part::Tool, [1.0, 2.0]);
             slots.watch_lag();
