@@ -184,7 +184,7 @@ fn run_events(
     };
     let law = law.map(|law| PythonLaw::new(law, cell.n_axes())).transpose()?;
     let stop = Arc::new(AtomicI32::new(0));
-    let loopback = cell.bus.address.starts_with("loopback:");
+    let inside = transport::scheme_of(&cell.bus.address).is_some_and(|scheme| scheme.in_process);
     let options = Options {
         iterations,
         measure,
@@ -193,13 +193,14 @@ fn run_events(
         resume,
         library,
         disturbance: disturbance.map_or_else(Disturbance::default, ask),
-        telemetry: !loopback,
+        telemetry: !inside,
         stop: Arc::clone(&stop),
     };
-    if loopback && !lockstep {
-        return Err(PyValueError::new_err(
-            "bus = loopback: runs in lock-step only, as its drives have no clock of their own",
-        ));
+    if inside && !lockstep {
+        return Err(PyValueError::new_err(format!(
+            "bus = {} runs in lock-step only, as its drives have no clock of their own",
+            cell.bus.address
+        )));
     }
     let (sender, events) = sync_channel(EVENTS);
     let thread = std::thread::Builder::new().name("ilc-campaign".to_owned()).spawn(move || {
@@ -232,7 +233,7 @@ fn ask(measure: Py<PyAny>) -> Disturbance {
 
 fn open(cell: &Cell) -> Result<Box<dyn Bus>, SupervisorError> {
     let file = cell.file.display().to_string();
-    if !cell.bus.address.starts_with("loopback:") {
+    if transport::scheme_of(&cell.bus.address).is_none_or(|scheme| !scheme.in_process) {
         let place = format!("{file}: [bus] address");
         return transport::open(&cell.bus.address)
             .map_err(|source| SupervisorError::Bus { place, source });

@@ -10,6 +10,7 @@
 
 pub mod campaign;
 pub mod counting;
+pub mod derived;
 pub mod far_side;
 pub mod faulty;
 pub mod rig;
@@ -18,6 +19,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use ilc_rt::config::Cell;
+
+pub use derived::hold_derived;
 
 /// The path of an example, as `01_gantry.toml`.
 pub fn example_path(name: &str) -> PathBuf {

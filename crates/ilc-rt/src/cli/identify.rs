@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicI32;
 use clap::{Args, ValueEnum};
 
 use super::figures::FiguresFile;
-use super::run::{MeasureName, exit_status, open, say_event, stop_on_signals};
+use super::run::{MeasureName, bus_help, exit_status, open, say_event, stop_on_signals};
 use super::{EXIT_BAD_INPUT, show};
 use crate::config::{Cell, Measure};
 use crate::library::Library;
@@ -53,8 +53,7 @@ pub(super) struct IdentifyArguments {
     /// Where the axis is excited, instead of the program's start.
     #[arg(long, allow_negative_numbers = true)]
     at_m: Option<f64>,
-    /// Bus instead of the cell's: can:IFACE, udp:GROUP[:PORT], zenoh:KEY.
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, value_name = "ADDRESS", help = bus_help())]
     bus: Option<String>,
     /// Measurement to look at instead of the cell's.
     #[arg(long, value_enum)]

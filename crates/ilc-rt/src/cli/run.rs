@@ -24,8 +24,7 @@ use crate::supervisor::{self, Disturbance, Options, Outcome, SupervisorError};
 pub(super) struct RunArguments {
     /// Cell description.
     cell: PathBuf,
-    /// Bus instead of the cell's: can:IFACE, udp:GROUP[:PORT], zenoh:KEY.
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, value_name = "ADDRESS", help = bus_help())]
     bus: Option<String>,
     /// Runs in all; the first one is without learning.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
@@ -154,11 +153,16 @@ pub(super) fn open(
         None => format!("{}: [bus] address", cell.file.display()),
     };
     let address = &cell.bus.address;
-    if address.starts_with("loopback:") {
-        return Err(SupervisorError::Loopback { place });
+    if transport::scheme_of(address).is_some_and(|scheme| scheme.in_process) {
+        return Err(SupervisorError::NoDrivesInside { place, address: address.clone() });
     }
     let bus = transport::open(address).map_err(|source| SupervisorError::Bus { place, source })?;
     Ok((cell, bus))
+}
+
+/// The help text of `--bus`.
+pub(super) fn bus_help() -> String {
+    format!("Bus instead of the cell's: {}", transport::syntaxes(false))
 }
 
 /// A number that becomes a signal's when it comes: the loop reads it and brings the axes to rest.
