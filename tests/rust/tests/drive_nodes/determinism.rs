@@ -1,6 +1,5 @@
 //! In lock-step the same commands give the same frames, to the last bit, on the gantry with friction.
 
-use std::path::Path;
 use std::time::Duration;
 
 use ilc_rt::config::Cell;
@@ -12,7 +11,7 @@ use ilc_rt::supervisor::drive_setup;
 use ilc_sim::{ClockMode, Machine};
 
 fn run() -> Vec<Frame> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/01_gantry.toml");
+    let path = ilc_tests::example_path("01_gantry.toml");
     let cell = Cell::load(&path).unwrap();
     let mut bus = InProcess::new(Machine::from_cell(&cell, ClockMode::LockStep).unwrap(), 256);
     let nodes: Vec<NodeId> = cell.axes.iter().map(|a| NodeId::new(a.node).unwrap()).collect();
