@@ -3,12 +3,12 @@
 
 use std::time::Duration;
 
+use ilc_rt::campaign::drive_setup;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{Command, Controlword, DriveSetup, State, bring_up};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
-use ilc_rt::supervisor::drive_setup;
 use ilc_sim::{ClockMode, Machine};
 use ilc_tests::counting::{Counting, allocations};
 

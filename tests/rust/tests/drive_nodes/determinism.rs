@@ -2,12 +2,12 @@
 
 use std::time::Duration;
 
+use ilc_rt::campaign::drive_setup;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Status, bring_up, next_command};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
-use ilc_rt::supervisor::drive_setup;
 use ilc_sim::{ClockMode, Machine};
 
 fn run() -> Vec<Frame> {

@@ -3,7 +3,7 @@
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::error::SupervisorError;
+use super::error::CampaignError;
 use super::nodes;
 use crate::fieldbus::BusError;
 use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
@@ -35,7 +35,7 @@ impl Pacer {
     }
 
     /// Starts the loop's thread, and tells what the system granted it.
-    pub(super) fn on_clock(mut cycle: Cycle) -> Result<(Self, RtReport), SupervisorError> {
+    pub(super) fn on_clock(mut cycle: Cycle) -> Result<(Self, RtReport), CampaignError> {
         let (report, granted) = std::sync::mpsc::sync_channel(1);
         let thread = std::thread::Builder::new()
             .name("ilc-servo".to_owned())
@@ -48,7 +48,7 @@ impl Pacer {
                 // missed their commands, or be in somebody else's campaign.
                 Remains { released: release(cycle), timing: Some(timing) }
             })
-            .map_err(|source| SupervisorError::Thread { what: "servo", source })?;
+            .map_err(|source| CampaignError::Thread { what: "servo", source })?;
         let report = granted.recv().unwrap_or_default();
         Ok((Self::Clock { thread: Some(thread) }, report))
     }

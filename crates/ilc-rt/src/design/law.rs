@@ -2,7 +2,7 @@
 //!
 //! `plan` hands out what is made here.
 
-use super::error::SupervisorError;
+use super::error::DesignError;
 use super::forecast;
 use super::plan::model;
 use super::weights::norm_optimal_cost;
@@ -32,7 +32,7 @@ pub struct Prepared {
 }
 
 /// Makes the law that the cell names, with what goes round it, and asks the analysis.
-pub(super) fn prepare(cell: &Cell, reference_m: &[f64]) -> Result<Prepared, SupervisorError> {
+pub(super) fn prepare(cell: &Cell, reference_m: &[f64]) -> Result<Prepared, DesignError> {
     let n_samples = reference_m.len() / cell.n_axes();
     let Some(law) = named(cell, reference_m, n_samples)? else {
         return Ok(Prepared { law: None, verdict: String::new(), warnings: Vec::new() });
@@ -42,23 +42,21 @@ pub(super) fn prepare(cell: &Cell, reference_m: &[f64]) -> Result<Prepared, Supe
     Ok(Prepared { law: Some(law), verdict, warnings })
 }
 
-fn refused(cell: &Cell, source: LearningError) -> SupervisorError {
-    SupervisorError::Learning { file: cell.file.display().to_string(), source }
+fn refused(cell: &Cell, source: LearningError) -> DesignError {
+    DesignError::Learning { file: cell.file.display().to_string(), source }
 }
 
 fn named(
     cell: &Cell,
     reference_m: &[f64],
     n_samples: usize,
-) -> Result<Option<Box<dyn Law>>, SupervisorError> {
+) -> Result<Option<Box<dyn Law>>, DesignError> {
     let name = cell.learning.law;
     if name == LawName::None {
         return Ok(None);
     }
-    let believed = model(cell).map_err(|source| SupervisorError::Model {
-        file: cell.file.display().to_string(),
-        source,
-    })?;
+    let believed = model(cell)
+        .map_err(|source| DesignError::Model { file: cell.file.display().to_string(), source })?;
     let law = match name {
         LawName::None => return Ok(None),
         LawName::NormOptimal => {

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use super::error::SupervisorError;
+use super::error::CampaignError;
 use super::options::{Options, SIMULATED_PATIENCE_S};
-use super::plan;
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
+use crate::design;
 use crate::fieldbus::canopen::{NmtCommand, listen};
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
 use crate::fieldbus::cia402::{BringUpError, DriveSetup, bring_up, bring_up_encoder};
@@ -19,7 +19,7 @@ pub(super) fn start(
     cell: &Cell,
     bus: &mut dyn Bus,
     options: &Options,
-) -> Result<(), SupervisorError> {
+) -> Result<(), CampaignError> {
     let lockstep = options.lockstep;
     let file = cell.file.display().to_string();
     let stall_s = if options.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
@@ -27,7 +27,7 @@ pub(super) fn start(
     refuse_company(cell, bus)?;
     let refused = |key: String| {
         let file = file.clone();
-        move |source: BringUpError| SupervisorError::BringUp {
+        move |source: BringUpError| CampaignError::BringUp {
             file,
             key,
             address: cell.bus.address.clone(),
@@ -39,10 +39,10 @@ pub(super) fn start(
             .map_err(refused(format!("[[axis]] {} node = {}", axis.name, axis.node)))?;
     }
     if let Some(tool) = &cell.tcp_encoder {
-        bring_up_encoder(bus, plan::node(cell, tool.node)?, answer_timeout)
+        bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
             .map_err(refused(format!("[tcp_encoder] node = {}", tool.node)))?;
     }
-    command_all(bus, NmtCommand::Start).map_err(|source| SupervisorError::Start {
+    command_all(bus, NmtCommand::Start).map_err(|source| CampaignError::Start {
         file,
         address: cell.bus.address.clone(),
         source,
@@ -50,18 +50,16 @@ pub(super) fn start(
 }
 
 /// Listens before anything is sent: a bus that somebody else commands is left alone.
-fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), SupervisorError> {
+fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
     let numbers = cell.axes.iter().map(|axis| axis.node);
     let numbers = numbers.chain(cell.tcp_encoder.iter().map(|tool| tool.node));
-    let nodes = numbers.map(|number| plan::node(cell, number)).collect::<Result<Vec<_>, _>>()?;
+    let nodes = numbers.map(|number| design::node(cell, number)).collect::<Result<Vec<_>, _>>()?;
     let file = || cell.file.display().to_string();
     let address = || cell.bus.address.clone();
     match listen::other_master(bus, &nodes, listen::LISTEN) {
         Ok(None) => Ok(()),
-        Ok(Some(heard)) => {
-            Err(SupervisorError::Occupied { file: file(), address: address(), heard })
-        }
-        Err(source) => Err(SupervisorError::Start { file: file(), address: address(), source }),
+        Ok(Some(heard)) => Err(CampaignError::Occupied { file: file(), address: address(), heard }),
+        Err(source) => Err(CampaignError::Start { file: file(), address: address(), source }),
     }
 }
 
@@ -70,7 +68,7 @@ fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), SupervisorError>
 /// # Errors
 /// [`ConfigError`] for a node number or a scale that validation would have refused.
 pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetup, ConfigError> {
-    let scale = plan::scale(cell, axis.counts_per_m)?;
+    let scale = design::scale(cell, axis.counts_per_m)?;
     let unit = match axis.unit {
         AxisUnit::M => UNIT_METRE,
         AxisUnit::Rad => UNIT_RADIAN,
@@ -86,8 +84,8 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let deadline_ms = deadline_ms.ceil() as u16;
     Ok(DriveSetup {
-        node: plan::node(cell, axis.node)?,
-        mode: plan::mode(axis),
+        node: design::node(cell, axis.node)?,
+        mode: design::mode(axis),
         cycle_us: cell.cell.cycle_us,
         following_error_max_counts: unsigned(limits.following_error_max_m),
         position_min_counts: signed(limits.position_min_m),

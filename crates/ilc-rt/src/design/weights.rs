@@ -2,7 +2,7 @@
 //!
 //! `law` makes the law of them.
 
-use super::error::SupervisorError;
+use super::error::DesignError;
 use crate::config::{Cell, ConfigError, NormOptimalSection, PhaseSection};
 use crate::learning::LearningError;
 use crate::learning::law::norm_optimal::Cost;
@@ -12,7 +12,7 @@ use crate::learning::weights::{Contour, ContourTerms, Gain, Schedule, Weight};
 ///
 /// `Q_k = q_k I + c_k (I - t_k t_k') + along t_k t_k'`, `t_k` the direction of the path; `q`, `s`, `r`
 /// and `c` go over from phase to phase through a Gaussian filter.
-pub(super) fn norm_optimal_cost(cell: &Cell, reference_m: &[f64]) -> Result<Cost, SupervisorError> {
+pub(super) fn norm_optimal_cost(cell: &Cell, reference_m: &[f64]) -> Result<Cost, DesignError> {
     let section = &cell.learning.norm_optimal;
     let n_samples = reference_m.len() / cell.n_axes();
     let run = Run { cell, section, n_samples };
@@ -20,7 +20,7 @@ pub(super) fn norm_optimal_cost(cell: &Cell, reference_m: &[f64]) -> Result<Cost
     let weight = |base: f64, pick: fn(&PhaseSection) -> Option<f64>| {
         run.along(base, pick).map(|found| found.map_or(Weight::Scalar(base), Weight::PerSample))
     };
-    let refused = |source| SupervisorError::Learning { file: run.file(), source };
+    let refused = |source| DesignError::Learning { file: run.file(), source };
     let build = || -> Result<Cost, LearningError> {
         let mut q = weight(section.q, |phase| phase.q)?;
         if let Some(contour) = &section.contour {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
-use super::error::SupervisorError;
+use super::error::CampaignError;
 use crate::library::{Library, LibraryError};
 use crate::record::{Figures, IterationRecord, Meta};
 
@@ -54,7 +54,7 @@ impl Keeper {
         Self::InLine { shelf: Shelf { library, meta, is_stuck: false }, done: VecDeque::new() }
     }
 
-    pub(super) fn on_thread(library: Library, meta: Arc<Meta>) -> Result<Self, SupervisorError> {
+    pub(super) fn on_thread(library: Library, meta: Arc<Meta>) -> Result<Self, CampaignError> {
         let (jobs, todo) = channel();
         let (done, told) = channel();
         let mut shelf = Shelf { library, meta, is_stuck: false };
@@ -69,7 +69,7 @@ impl Keeper {
                 }
                 shelf
             })
-            .map_err(|source| SupervisorError::Thread { what: "library", source })?;
+            .map_err(|source| CampaignError::Thread { what: "library", source })?;
         Ok(Self::Thread { jobs: Some(jobs), told, thread: Some(thread) })
     }
 

@@ -2,14 +2,14 @@
 
 use serde_json::json;
 
-use super::error::SupervisorError;
-use super::plan::{Plan, input_unit};
+use super::error::IdentificationError;
 use crate::config::{Axis, Cell, Interface, Measure};
+use crate::design::{DesignError, Plan, input_unit};
 use crate::model::identify::{Excitation, ExcitationSignal};
 use crate::trajectory::Interpolator;
 
 /// Name of the law in the records of experiments.
-pub(super) const LAW_NAME: &str = "excitation";
+pub(crate) const LAW_NAME: &str = "excitation";
 /// Share of the largest amplitude that is used if none is asked for.
 const AMPLITUDE_SHARE: f64 = 0.5;
 
@@ -25,20 +25,20 @@ pub struct Experiment {
 }
 
 /// An experiment worked out: nothing in it can fail any more.
-pub(super) struct Planned {
+pub(crate) struct Planned {
     /// The plan whose program is a hold.
-    pub(super) plan: Plan,
+    pub(crate) plan: Plan,
     /// Input table, `n_samples * n_axes`.
-    pub(super) input: Vec<f64>,
+    pub(crate) input: Vec<f64>,
 }
 
 impl Experiment {
     /// Returns the experiment with half the largest amplitude that the limits of the axis allow.
     ///
     /// # Errors
-    /// [`SupervisorError::Experiment`] or [`SupervisorError::Model`] for an experiment that no
+    /// [`IdentificationError::Experiment`] or [`IdentificationError::Model`] for an experiment that no
     /// amplitude makes possible.
-    pub fn with_default_amplitude(mut self, cell: &Cell) -> Result<Self, SupervisorError> {
+    pub fn with_default_amplitude(mut self, cell: &Cell) -> Result<Self, IdentificationError> {
         // Everything that is limited grows with the amplitude, so one try tells how far it may go.
         self.excitation.amplitude = 1e-6;
         let (index, axis) = self.axis(cell)?;
@@ -56,12 +56,12 @@ impl Experiment {
     }
 
     /// Works the experiment out and holds it against the limits of the axis.
-    pub(super) fn plan(
+    pub(crate) fn plan(
         &self,
         cell: &Cell,
         measure: Option<Measure>,
         lockstep: bool,
-    ) -> Result<Planned, SupervisorError> {
+    ) -> Result<Planned, IdentificationError> {
         let (index, axis) = self.axis(cell)?;
         let signal = self.signal(cell)?;
         let demands = self.demands(cell, index, axis, &signal);
@@ -83,7 +83,7 @@ impl Experiment {
         cell.program.start_m[index] = self.center_m(&cell, index);
         let n_samples = signal.values.len();
         let hold = Interpolator::hold(&cell.program.start_m, n_samples, cell.cycle_s()).map_err(
-            |source| SupervisorError::Program {
+            |source| DesignError::Program {
                 file: cell.file.display().to_string(),
                 key: "[program] start_m".to_owned(),
                 source,
@@ -101,7 +101,10 @@ impl Experiment {
     }
 
     /// Returns the index and the description of the axis.
-    pub(super) fn axis<'a>(&self, cell: &'a Cell) -> Result<(usize, &'a Axis), SupervisorError> {
+    pub(crate) fn axis<'a>(
+        &self,
+        cell: &'a Cell,
+    ) -> Result<(usize, &'a Axis), IdentificationError> {
         let found = cell.axes.iter().enumerate().find(|(_, axis)| axis.name == self.axis);
         found.ok_or_else(|| {
             let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
@@ -110,7 +113,7 @@ impl Experiment {
     }
 
     /// Lays the excitation out on the servo cycle.
-    pub(super) fn signal(&self, cell: &Cell) -> Result<ExcitationSignal, SupervisorError> {
+    pub(crate) fn signal(&self, cell: &Cell) -> Result<ExcitationSignal, IdentificationError> {
         self.excitation.signal(cell.cycle_s()).map_err(|source| {
             let text = source.to_string();
             let (value, allowed) = text.split_once("; ").unwrap_or((text.as_str(), ""));
@@ -189,14 +192,14 @@ impl Experiment {
         parameters.to_string()
     }
 
-    pub(super) fn refused(
+    pub(crate) fn refused(
         &self,
         cell: &Cell,
         what: &str,
         value: &str,
         allowed: &str,
-    ) -> SupervisorError {
-        SupervisorError::Experiment {
+    ) -> IdentificationError {
+        IdentificationError::Experiment {
             file: cell.file.display().to_string(),
             axis: self.axis.clone(),
             what: what.to_owned(),

@@ -1,6 +1,6 @@
 //! What an experiment showed: the response of the axis, a model of it, and what the model leaves over.
 
-use super::error::SupervisorError;
+use super::error::IdentificationError;
 use super::experiment::Experiment;
 use crate::config::Cell;
 use crate::model::ModelError;
@@ -109,13 +109,13 @@ impl Identified {
     /// point, which rests
     ///
     /// # Errors
-    /// [`SupervisorError::Experiment`] or [`SupervisorError::Model`] if the record is of something
+    /// [`IdentificationError::Experiment`] or [`IdentificationError::Model`] if the record is of something
     /// else, or cannot be fitted.
     pub fn new(
         cell: &Cell,
         experiment: &Experiment,
         record: &IterationRecord,
-    ) -> Result<Self, SupervisorError> {
+    ) -> Result<Self, IdentificationError> {
         let (index, axis) = experiment.axis(cell)?;
         let signal = experiment.signal(cell)?;
         let n_axes = cell.n_axes();
@@ -163,7 +163,7 @@ impl Identified {
             let doubt = doubt(&measured, residual_rms).or_else(|| described.beyond_cell());
             Ok(Self { measured, fit, described, residual_rms, uncertainty, doubt })
         };
-        evaluate().map_err(|source| SupervisorError::Model {
+        evaluate().map_err(|source| IdentificationError::Model {
             file: cell.file.display().to_string(),
             source,
         })

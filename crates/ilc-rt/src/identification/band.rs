@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use super::error::SupervisorError;
+use super::error::IdentificationError;
 use super::experiment::Experiment;
 use super::identified::{Described, Identified};
 use crate::config::Cell;
@@ -51,8 +51,8 @@ impl BandSearch {
     /// Begins with a band up to 1.5 times the natural frequency that the cell names.
     ///
     /// # Errors
-    /// [`SupervisorError::Experiment`] for an axis that is not there.
-    pub fn new(cell: &Cell, experiment: &Experiment) -> Result<Self, SupervisorError> {
+    /// [`IdentificationError::Experiment`] for an axis that is not there.
+    pub fn new(cell: &Cell, experiment: &Experiment) -> Result<Self, IdentificationError> {
         let (_, axis) = experiment.axis(cell)?;
         let expected_hz = match axis.position_loop {
             None => axis.model.natural_frequency_hz.unwrap_or(1.0),

@@ -8,7 +8,7 @@ use std::os::unix::fs::MetadataExt;
 use std::os::unix::net::{SocketAddr, UnixListener};
 use std::path::Path;
 
-use super::error::SupervisorError;
+use super::error::CampaignError;
 use crate::record::fingerprint;
 
 /// Held for as long as the campaign goes on; without a socket if the system has none to give.
@@ -27,8 +27,8 @@ impl Claim {
 /// Claims a campaign of a library.
 ///
 /// # Errors
-/// [`SupervisorError::Resume`] if somebody else holds it.
-pub(super) fn claim(library: &Path, campaign: &str) -> Result<Claim, SupervisorError> {
+/// [`CampaignError::Resume`] if somebody else holds it.
+pub(super) fn claim(library: &Path, campaign: &str) -> Result<Claim, CampaignError> {
     // A library in memory has no file, and nobody else can know it.
     let Ok(file) = std::fs::metadata(library) else { return Ok(Claim::none()) };
     let name = fingerprint(&format!("{} {} {campaign}", file.dev(), file.ino()));
@@ -36,12 +36,9 @@ pub(super) fn claim(library: &Path, campaign: &str) -> Result<Claim, SupervisorE
     let socket =
         SocketAddr::from_abstract_name(name).and_then(|address| UnixListener::bind_addr(&address));
     match socket {
-        Err(error) if error.kind() == std::io::ErrorKind::AddrInUse => {
-            Err(SupervisorError::Resume(format!(
-                "campaign {campaign} of {} is going on in another program",
-                library.display()
-            )))
-        }
+        Err(error) if error.kind() == std::io::ErrorKind::AddrInUse => Err(CampaignError::Resume(
+            format!("campaign {campaign} of {} is going on in another program", library.display()),
+        )),
         // What cannot be had for another reason must not keep anybody from working.
         socket => Ok(Claim { _socket: socket.ok() }),
     }

@@ -1,7 +1,7 @@
 //! What the next run gets: a lesson, the best input so far, or the old input once more.
 
 use super::disturbance::Disturbance;
-use super::error::SupervisorError;
+use super::error::CampaignError;
 use super::learner::{learn, set_disturbance};
 use crate::learning::{Law, LearningError};
 use crate::library::Library;
@@ -166,9 +166,9 @@ impl Progress {
         meta: &mut Meta,
         mut law: Option<&mut (dyn Law + '_)>,
         disturbance: &Disturbance,
-    ) -> Result<Resumed, SupervisorError> {
+    ) -> Result<Resumed, CampaignError> {
         let Some(campaign) = library.newest_campaign(&meta.fingerprint)? else {
-            return Err(SupervisorError::Resume(
+            return Err(CampaignError::Resume(
                 "the library has no campaign of this cell, program, measurement and law".to_owned(),
             ));
         };
@@ -190,7 +190,7 @@ impl Progress {
             last = Some((decision, record));
         }
         let coming = last.as_ref().map_or(0, |(_, record)| record.index + 1);
-        let coming = disturbance.of(coming).map_err(SupervisorError::Disturbance)?;
+        let coming = disturbance.of(coming).map_err(CampaignError::Disturbance)?;
         if let Some(law) = law.as_deref_mut() {
             set_disturbance(law, &coming);
         }
@@ -228,8 +228,8 @@ fn growth_remark(growth: f64, off: bool) -> String {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
-fn refused(error: LearningError) -> SupervisorError {
-    SupervisorError::Resume(format!("the law refused a run: {error}"))
+fn refused(error: LearningError) -> CampaignError {
+    CampaignError::Resume(format!("the law refused a run: {error}"))
 }
 
 /// A campaign taken up again.

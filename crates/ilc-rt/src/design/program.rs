@@ -3,7 +3,7 @@
 use serde_json::json;
 use std::fmt::Write as _;
 
-use super::error::SupervisorError;
+use super::error::DesignError;
 use crate::config::{
     AxisUnit, Cell, Corner, GCODE_BYTES_MAX, PathKind, TABLE_BYTES_MAX, read_beside,
 };
@@ -26,16 +26,16 @@ const ROUNDING_M: f64 = 1e-12;
 /// they will be sent.
 ///
 /// # Errors
-/// [`SupervisorError::Program`] for a path beyond the limits, [`SupervisorError::PartProgram`] for
-/// a G-code file that is refused, [`SupervisorError::Table`] for a table of set points.
+/// [`DesignError::Program`] for a path beyond the limits, [`DesignError::PartProgram`] for
+/// a G-code file that is refused, [`DesignError::Table`] for a table of set points.
 pub(super) fn interpolator(
     cell: &Cell,
     limits: &[AxisLimits],
-) -> Result<Interpolator, SupervisorError> {
+) -> Result<Interpolator, DesignError> {
     planned(cell, limits)?.verified(limits).map_err(|source| refused(cell, source))
 }
 
-fn planned(cell: &Cell, limits: &[AxisLimits]) -> Result<Interpolator, SupervisorError> {
+fn planned(cell: &Cell, limits: &[AxisLimits]) -> Result<Interpolator, DesignError> {
     let program = &cell.program;
     let refused = |source| refused(cell, source);
     let dwells = (program.dwell_before_s, program.dwell_after_s);
@@ -113,7 +113,7 @@ fn planned(cell: &Cell, limits: &[AxisLimits]) -> Result<Interpolator, Superviso
 }
 
 /// Refuses set points outside the range of an axis, which a curve may reach between its points.
-pub(super) fn check_range(cell: &Cell, reference_m: &[f64]) -> Result<(), SupervisorError> {
+pub(super) fn check_range(cell: &Cell, reference_m: &[f64]) -> Result<(), DesignError> {
     for (i, axis) in cell.axes.iter().enumerate() {
         let (low_m, high_m) = (axis.limits.position_min_m, axis.limits.position_max_m);
         let beyond = |p: f64| (low_m - p).max(p - high_m);
@@ -121,7 +121,7 @@ pub(super) fn check_range(cell: &Cell, reference_m: &[f64]) -> Result<(), Superv
         let farthest =
             farthest.fold(low_m, |most, p| if beyond(p) > beyond(most) { p } else { most });
         if beyond(farthest) > ROUNDING_M {
-            return Err(SupervisorError::Range {
+            return Err(DesignError::Range {
                 file: cell.file.display().to_string(),
                 axis: axis.name.clone(),
                 unit: axis.unit.symbol(),
@@ -168,12 +168,12 @@ pub(super) fn program_json(cell: &Cell, reference_m: &[f64]) -> String {
     description.to_string()
 }
 
-fn refused(cell: &Cell, source: TrajectoryError) -> SupervisorError {
+fn refused(cell: &Cell, source: TrajectoryError) -> DesignError {
     let key = match source.axis().and_then(|i| Some((i, cell.axes.get(i)?))) {
         Some((i, axis)) => format!("[program] (axis {} is {})", i + 1, axis.name),
         None => "[program]".to_owned(),
     };
-    SupervisorError::Program { file: cell.file.display().to_string(), key, source }
+    DesignError::Program { file: cell.file.display().to_string(), key, source }
 }
 
 fn points(cell: &Cell) -> Vec<PathSegment> {
@@ -195,7 +195,7 @@ fn points(cell: &Cell) -> Vec<PathSegment> {
 }
 
 /// What the part program says.
-fn gcode(cell: &Cell) -> Result<GcodeProgram, SupervisorError> {
+fn gcode(cell: &Cell) -> Result<GcodeProgram, DesignError> {
     let program = &cell.program;
     let (file, text) = read_file(cell, "G-code", GCODE_BYTES_MAX)?;
     let rotary: Vec<bool> = cell.axes.iter().map(|axis| axis.unit == AxisUnit::Rad).collect();
@@ -207,14 +207,14 @@ fn gcode(cell: &Cell) -> Result<GcodeProgram, SupervisorError> {
         exact_corners: program.corner == Corner::ExactStop,
         block_delete: program.block_delete,
     };
-    read_gcode(&text, &setting).map_err(|source| SupervisorError::PartProgram { file, source })
+    read_gcode(&text, &setting).map_err(|source| DesignError::PartProgram { file, source })
 }
 
 /// The set points of the table; refused unless they begin where the axes rest before a run.
-fn table(cell: &Cell) -> Result<SetPointTable, SupervisorError> {
+fn table(cell: &Cell) -> Result<SetPointTable, DesignError> {
     let (file, text) = read_file(cell, "set points", TABLE_BYTES_MAX)?;
     let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
-    let refused = |source| SupervisorError::Table { file: file.clone(), source };
+    let refused = |source| DesignError::Table { file: file.clone(), source };
     let table = read_table(&text, &names).map_err(refused)?;
     for ((name, &found_m), &start_m) in
         names.iter().zip(&table.position_m).zip(&cell.program.start_m)
@@ -235,12 +235,12 @@ fn read_file(
     cell: &Cell,
     what: &'static str,
     bytes_max: u64,
-) -> Result<(String, Vec<u8>), SupervisorError> {
+) -> Result<(String, Vec<u8>), DesignError> {
     let name = cell.program.file.clone().unwrap_or_default();
     let file = cell.file.with_file_name(&name).display().to_string();
     match read_beside(&cell.file, &name, bytes_max) {
         Ok(text) => Ok((file, text)),
-        Err(reason) => Err(SupervisorError::ProgramFile { file, reason, what }),
+        Err(reason) => Err(DesignError::ProgramFile { file, reason, what }),
     }
 }
 
@@ -251,7 +251,7 @@ fn straight(
     segments: Vec<PathSegment>,
     rapid: &[bool],
     dwell_s: f64,
-) -> Result<Interpolator, SupervisorError> {
+) -> Result<Interpolator, DesignError> {
     let program = &cell.program;
     let spec = PathSpec {
         start_m: program.start_m.clone(),
@@ -273,7 +273,7 @@ fn along(
     cell: &Cell,
     limits: &[AxisLimits],
     curve: &impl Curve,
-) -> Result<SampledMotion, SupervisorError> {
+) -> Result<SampledMotion, DesignError> {
     let program = &cell.program;
     let limits = RunLimits {
         feed_m_s: program.feed_m_s,

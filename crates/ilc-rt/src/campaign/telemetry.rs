@@ -12,7 +12,7 @@ use zenoh::Wait;
 use zenoh::qos::CongestionControl;
 use zenoh::query::{ConsolidationMode, QueryTarget};
 
-use super::error::SupervisorError;
+use super::error::CampaignError;
 use crate::config::{Cell, Telemetry as Settings};
 use crate::fieldbus::transport::zenoh_reach::{self, Reach};
 
@@ -47,7 +47,7 @@ pub(super) struct Telemetry {
 
 impl Telemetry {
     /// Starts the thread; the session opens there. A network that is not there is logged, not fatal.
-    pub(super) fn start(cell: &Cell) -> Result<Self, SupervisorError> {
+    pub(super) fn start(cell: &Cell) -> Result<Self, CampaignError> {
         let (queue, messages) = sync_channel(QUEUE);
         let (end, ended) = sync_channel::<()>(0);
         let settings = cell.telemetry.clone();
@@ -61,7 +61,7 @@ impl Telemetry {
                     tracing::warn!("[telemetry]: {reason}; the cell runs unseen");
                 }
             })
-            .map_err(|source| SupervisorError::Thread { what: "telemetry", source })?;
+            .map_err(|source| CampaignError::Thread { what: "telemetry", source })?;
         Ok(Self { queue: Some(queue), thread: Some(thread), ended, dropped: 0 })
     }
 

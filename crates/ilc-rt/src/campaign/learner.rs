@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::error::SupervisorError;
+use super::error::CampaignError;
 use crate::learning::{Law, LearningError, Standing};
 use crate::record::Figures;
 
@@ -58,7 +58,7 @@ impl Learner {
         Self::InLine { law, done: None }
     }
 
-    pub(super) fn on_thread(mut law: Box<dyn Law>) -> Result<Self, SupervisorError> {
+    pub(super) fn on_thread(mut law: Box<dyn Law>) -> Result<Self, CampaignError> {
         let (jobs, todo) = channel::<Job>();
         let (done, lessons) = channel();
         let thread = std::thread::Builder::new()
@@ -77,7 +77,7 @@ impl Learner {
                     }
                 }
             })
-            .map_err(|source| SupervisorError::Thread { what: "learning", source })?;
+            .map_err(|source| CampaignError::Thread { what: "learning", source })?;
         Ok(Self::Thread { jobs: Some(jobs), lessons, thread: Some(thread) })
     }
 

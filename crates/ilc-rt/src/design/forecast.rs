@@ -1,7 +1,7 @@
 //! What is known before the first run: the model that learning believes in, the error of a run without
 //! learning, and whether the law will converge.
 
-use super::error::SupervisorError;
+use super::error::DesignError;
 use super::plan::model;
 use crate::config::{Cell, Interface};
 use crate::learning::analysis::{divergence, overreach};
@@ -11,9 +11,9 @@ use crate::model::StateSpace;
 /// Returns the model from the learned input of all axes to their positions.
 ///
 /// # Errors
-/// [`SupervisorError::Model`] if the cell's figures make none.
-pub fn learning_model(cell: &Cell) -> Result<StateSpace, SupervisorError> {
-    model(cell).map_err(|source| SupervisorError::Model { file: file(cell), source })
+/// [`DesignError::Model`] if the cell's figures make none.
+pub fn learning_model(cell: &Cell) -> Result<StateSpace, DesignError> {
+    model(cell).map_err(|source| DesignError::Model { file: file(cell), source })
 }
 
 /// Returns the error of a run without learning, by the model: set point minus response.
@@ -23,8 +23,8 @@ pub fn learning_model(cell: &Cell) -> Result<StateSpace, SupervisorError> {
 /// # Shapes
 /// - `reference_m` and the result: `n_samples` x `n_axes`, time first
 /// # Errors
-/// [`SupervisorError::Model`] if the cell's figures make no model.
-pub fn first_error(cell: &Cell, reference_m: &[f64]) -> Result<Vec<f64>, SupervisorError> {
+/// [`DesignError::Model`] if the cell's figures make no model.
+pub fn first_error(cell: &Cell, reference_m: &[f64]) -> Result<Vec<f64>, DesignError> {
     let n_axes = cell.n_axes();
     let way = |k: usize, axis: usize| reference_m[k * n_axes + axis] - reference_m[axis];
     let n_samples = reference_m.len() / n_axes.max(1);
@@ -44,7 +44,7 @@ pub fn first_error(cell: &Cell, reference_m: &[f64]) -> Result<Vec<f64>, Supervi
     }
     let response = learning_model(cell)?
         .simulate(&drive, None)
-        .map_err(|source| SupervisorError::Model { file: file(cell), source })?;
+        .map_err(|source| DesignError::Model { file: file(cell), source })?;
     Ok(response.iter().enumerate().map(|(i, y)| way(i / n_axes, i % n_axes) - y).collect())
 }
 
@@ -55,9 +55,9 @@ pub(super) fn judge(
     law: &mut dyn Law,
     cell: &Cell,
     n_samples: usize,
-) -> Result<(String, Vec<String>), SupervisorError> {
+) -> Result<(String, Vec<String>), DesignError> {
     let model = learning_model(cell)?;
-    let refused = |source| SupervisorError::Learning { file: file(cell), source };
+    let refused = |source| DesignError::Learning { file: file(cell), source };
     let verdict = divergence(law, &model, n_samples).map_err(refused)?;
     let mut warnings = Vec::new();
     if let Some(verdict) = &verdict {

@@ -8,18 +8,18 @@ use super::announce::Announcer;
 use super::claim::{Claim, claim};
 use super::collect::Collector;
 use super::disturbance::Disturbance;
-use super::error::SupervisorError;
-use super::experiment::Experiment;
+use super::error::CampaignError;
 use super::keeper::{Keeper, Kept, Told};
 use super::learner::{Learner, Lesson, set_disturbance};
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S};
 use super::pace::Pacer;
-use super::plan::Plan;
 use super::progress::{Decision, Progress, Resumed};
 use super::telemetry::Telemetry;
 use super::{nodes, reason};
 use crate::config::Cell;
+use crate::design::Plan;
 use crate::fieldbus::Bus;
+use crate::identification::Experiment;
 use crate::learning::Law;
 use crate::library::Library;
 use crate::record::{AxisKinds, EndStatus, Event, Figures, IterationRecord, StateName};
@@ -33,7 +33,7 @@ const PROGRESS_S: f64 = 0.1;
 /// Runs a campaign on a bus (`cell.bus.address`, open), with the cell's law or another one; `observe` hears every event.
 ///
 /// # Errors
-/// [`SupervisorError`] before anything has moved. Whatever happens later brings the axes to rest and
+/// [`CampaignError`] before anything has moved. Whatever happens later brings the axes to rest and
 /// is told by the [`Outcome`].
 pub fn run(
     cell: &Cell,
@@ -41,7 +41,7 @@ pub fn run(
     bus: Box<dyn Bus>,
     law: Option<Box<dyn Law>>,
     observe: &mut dyn FnMut(&Event),
-) -> Result<Outcome, SupervisorError> {
+) -> Result<Outcome, CampaignError> {
     let mut plan = Plan::new(cell, options.measure, options.lockstep)?;
     let (name, law) = if let Some(law) = law {
         ("user", Some(law))
@@ -67,14 +67,14 @@ pub fn run(
 /// records name the law `excitation`, with the experiment as its parameters.
 ///
 /// # Errors
-/// [`SupervisorError`] before anything has moved, as for an experiment beyond the limits of its axis.
+/// [`CampaignError`] before anything has moved, as for an experiment beyond the limits of its axis.
 pub fn identify(
     cell: &Cell,
     experiment: &Experiment,
     options: &Options,
     bus: Box<dyn Bus>,
     observe: &mut dyn FnMut(&Event),
-) -> Result<Outcome, SupervisorError> {
+) -> Result<Outcome, CampaignError> {
     let planned = experiment.plan(cell, options.measure, options.lockstep)?;
     let work = Work {
         plan: planned.plan,
@@ -103,12 +103,12 @@ fn carry_out(
     mut bus: Box<dyn Bus>,
     work: Work,
     observe: &mut dyn FnMut(&Event),
-) -> Result<Outcome, SupervisorError> {
+) -> Result<Outcome, CampaignError> {
     let Work { mut plan, mut law, input, growth_allowed } = work;
     if options.resume && !options.library.exists() {
         // Opening it would leave an empty file where a name was mistyped.
         let path = options.library.display();
-        return Err(SupervisorError::Resume(format!("there is no library {path} to go on with")));
+        return Err(CampaignError::Resume(format!("there is no library {path} to go on with")));
     }
     let library = Library::open(&options.library)?;
     let mut progress = Progress::new(growth_allowed).forgiving(options.forgives_stalls());
@@ -122,7 +122,7 @@ fn carry_out(
     } else {
         plan.meta.campaign = library.new_campaign()?;
         held = claim(&options.library, &plan.meta.campaign)?;
-        let coming = options.disturbance.of(0).map_err(SupervisorError::Disturbance)?;
+        let coming = options.disturbance.of(0).map_err(CampaignError::Disturbance)?;
         if let Some(law) = law.as_deref_mut() {
             set_disturbance(law, &coming);
         }
@@ -135,7 +135,7 @@ fn carry_out(
     };
     let first = resumed.runs.last().map_or(0, |(index, _)| index + 1);
     if first >= options.iterations {
-        return Err(SupervisorError::Resume(format!(
+        return Err(CampaignError::Resume(format!(
             "campaign {} has {first} of {} runs already; ask for more with --iterations",
             plan.meta.campaign, options.iterations
         )));

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::error::SupervisorError;
+use super::error::DesignError;
 use super::law::{self, Prepared};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, Measure};
 use crate::control::PositionLoop;
@@ -41,13 +41,9 @@ impl Plan {
     /// Works a cell description out, with the measurement to learn from if it is to be another one.
     ///
     /// # Errors
-    /// [`SupervisorError`] for a program beyond the limits, an overloaded bus, or a measurement that
+    /// [`DesignError`] for a program beyond the limits, an overloaded bus, or a measurement that
     /// is not there.
-    pub fn new(
-        cell: &Cell,
-        measure: Option<Measure>,
-        lockstep: bool,
-    ) -> Result<Self, SupervisorError> {
+    pub fn new(cell: &Cell, measure: Option<Measure>, lockstep: bool) -> Result<Self, DesignError> {
         crate::config::check(cell)?;
         let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
         let interpolator = super::program::interpolator(cell, &limits)?;
@@ -59,18 +55,18 @@ impl Plan {
 
     /// Works a cell description out with other set points than those of its program; `program` says
     /// which, as JSON.
-    pub(super) fn with(
+    pub(crate) fn with(
         cell: &Cell,
         measure: Option<Measure>,
         lockstep: bool,
         interpolator: Interpolator,
         program: String,
-    ) -> Result<Self, SupervisorError> {
+    ) -> Result<Self, DesignError> {
         let file = cell.file.display().to_string();
         let mut cell = cell.clone();
         cell.learning.measure = measure.unwrap_or(cell.learning.measure);
         crate::config::check(&cell)?;
-        let bus_load = bus_load(&cell).map_err(|source| SupervisorError::Load { file, source })?;
+        let bus_load = bus_load(&cell).map_err(|source| DesignError::Load { file, source })?;
         let reference_m = interpolator.reference();
         Ok(Self {
             servo: servo_spec(&cell, lockstep)?,
@@ -108,9 +104,9 @@ impl Plan {
     /// `allow_divergent`. What else the analysis has to say is in [`Prepared::warnings`].
     ///
     /// # Errors
-    /// [`SupervisorError::Model`] or [`SupervisorError::Learning`] if model or weights are unusable, or
+    /// [`DesignError::Model`] or [`DesignError::Learning`] if model or weights are unusable, or
     /// the law will not converge.
-    pub fn law(&self, cell: &Cell) -> Result<Prepared, SupervisorError> {
+    pub fn law(&self, cell: &Cell) -> Result<Prepared, DesignError> {
         law::prepare(cell, &self.reference_m)
     }
 
@@ -184,7 +180,7 @@ fn axis_limits(axis: &Axis) -> AxisLimits {
     }
 }
 
-pub(super) fn input_unit(axis: &Axis) -> &'static str {
+pub(crate) fn input_unit(axis: &Axis) -> &'static str {
     match (axis.interface, axis.unit) {
         (Interface::Csp, AxisUnit::M) => "m",
         (Interface::Csv, AxisUnit::M) => "m/s",
@@ -271,11 +267,11 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
 }
 
 /// The node of a number that validation has seen already.
-pub(super) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
+pub(crate) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
     NodeId::new(number).ok_or_else(|| refused(cell, "node", &number, "1 to 127"))
 }
 
-pub(super) fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
+pub(crate) fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
     Scale::new(counts_per_m).ok_or_else(|| refused(cell, "counts_per_m", &counts_per_m, "above 0"))
 }
 
@@ -289,7 +285,7 @@ fn refused(cell: &Cell, key: &str, value: &dyn std::fmt::Display, allowed: &str)
 }
 
 /// The command interface of an axis in the words of the drive profile.
-pub(super) fn mode(axis: &Axis) -> Mode {
+pub(crate) fn mode(axis: &Axis) -> Mode {
     match axis.interface {
         Interface::Csp => Mode::Csp,
         Interface::Csv => Mode::Csv,
