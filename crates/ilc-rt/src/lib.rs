@@ -9,6 +9,7 @@ pub mod cli;
 pub mod config;
 pub mod control;
 pub mod fieldbus;
+pub mod interpolate;
 pub mod kinematics;
 pub mod learning;
 pub mod library;

@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use super::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 
 /// What a limit is set on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,13 +6,15 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use super::MAX_AXES;
-use super::error::TrajectoryError;
-use super::limits::{AxisLimits, Line, PathLimits};
-use super::motion::MotionState;
-use super::path::{PathSegment, checked_lines};
-use super::profile::JerkLimited;
-use super::to_rest::{AxisState, ToRest};
+use crate::interpolate::MAX_AXES;
+use crate::trajectory::error::TrajectoryError;
+use crate::interpolate::limits::{AxisLimits, Line, PathLimits};
+use crate::trajectory::motion::MotionState;
+use crate::trajectory::path::{PathSegment, checked_lines};
+use crate::interpolate::profile::JerkLimited;
+mod to_rest;
+
+use self::to_rest::{AxisState, ToRest};
 
 /// When the next move begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +62,7 @@ impl Linear {
     /// to the target, all arriving together where that is possible.
     ///
     /// # Shapes
-    /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`](super::MAX_AXES)
+    /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`](crate::interpolate::MAX_AXES)
     /// # Real Time
     /// Cold: allocates.
     /// # Errors

@@ -5,13 +5,13 @@ use super::arc_length::ArcLength;
 use super::frame::{Frame, norm};
 use super::time_law::{Tick, TimeLaw};
 use super::turn::{Piece, pieces};
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::trajectory::limits::{AxisLimits, is_positive};
+use crate::interpolate::limits::{AxisLimits, is_positive};
 use crate::trajectory::motion::{MotionState, SampledMotion};
 use crate::trajectory::path::{CYCLE_S, check_limits, check_time};
-use crate::trajectory::proof;
-use crate::trajectory::verification::Verification;
+use crate::trajectory::path::blended;
+use crate::trajectory::verify::Verification;
 
 /// Places on the curve at which the speed limit is computed.
 const PLACES: usize = 4_000;
@@ -210,7 +210,7 @@ fn plan_piece<C: Curve>(
             window,
             dt_s,
         };
-        proof::n_ticks(law.swept_s() + 2.0 * window as f64 * dt_s, dt_s)?;
+        blended::n_ticks(law.swept_s() + 2.0 * window as f64 * dt_s, dt_s)?;
         let ticks = law.ticks();
         let near: Vec<Frame> = ticks.iter().map(|tick| between(&frames, tick.s / step_m)).collect();
         let mut found = judge(&ticks, &near, limits, SOUGHT);

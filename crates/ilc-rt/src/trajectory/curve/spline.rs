@@ -1,7 +1,7 @@
 //! The natural cubic spline through points: the smoothest curve of second order that passes them.
 
 use super::{Curve, Derivatives};
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::path::point;
 

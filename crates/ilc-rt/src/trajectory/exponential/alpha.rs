@@ -8,7 +8,7 @@
 use super::leg::{End, Leg};
 use super::peaks::peaks;
 use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::trajectory::limits::PathLimits;
+use crate::interpolate::limits::PathLimits;
 
 /// Scan points in a decade of α.
 const PER_DECADE: f64 = 12.0;

@@ -6,7 +6,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use super::jet::Jet;
+use crate::trajectory::jet::Jet;
 
 /// Start of a line, `x_L = (m t + b)(1 - e^{-α t³})`, and its velocity, acceleration and jerk.
 ///
@@ -68,7 +68,7 @@ pub fn blending_ratio(before_m_s: f64, after_m_s: f64) -> f64 {
 )]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     /// Compares each derivative with a central difference of the one before it.
     fn assert_consistent(function: impl Fn(f64) -> Jet, t: f64, scale_s: f64) {

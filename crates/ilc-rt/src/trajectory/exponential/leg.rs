@@ -7,7 +7,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::equations::weight_after;
-use super::jet::Jet;
+use crate::trajectory::jet::Jet;
 
 /// Where exponentials are taken as gone: `e^{-45}` is below the rounding of 1.
 pub(super) const GONE: f64 = 45.0;

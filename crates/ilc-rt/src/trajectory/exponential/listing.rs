@@ -4,10 +4,10 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::equations::{weight_after, weight_before};
-use super::jet::Jet;
-use crate::trajectory::MAX_AXES;
+use crate::trajectory::jet::Jet;
+use crate::interpolate::MAX_AXES;
 use crate::trajectory::error::TrajectoryError;
-use crate::trajectory::limits::is_positive;
+use crate::interpolate::limits::is_positive;
 use crate::trajectory::motion::{MotionState, SampledMotion};
 
 /// One leg of the listing.

@@ -9,7 +9,6 @@
 mod alpha;
 mod choice;
 pub mod equations;
-mod jet;
 mod leg;
 pub mod listing;
 mod peaks;
@@ -17,5 +16,4 @@ mod plan;
 
 pub use alpha::AlphaInterval;
 pub use choice::{AlphaChoice, AlphaMax};
-pub use jet::Jet;
 pub use plan::{ExponentialSigmoid, ModulatedSegment};

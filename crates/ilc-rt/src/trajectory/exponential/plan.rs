@@ -5,9 +5,9 @@
 use super::choice::{AlphaChoice, AlphaMax, MARGIN, choose};
 use super::equations::blending_ratio;
 use super::leg::{End, Leg};
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::trajectory::limits::{AxisLimits, Line, PathLimits};
+use crate::interpolate::limits::{AxisLimits, Line, PathLimits};
 use crate::trajectory::motion::MotionState;
 use crate::trajectory::path::{PathSegment, checked_lines};
 

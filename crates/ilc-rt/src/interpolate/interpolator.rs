@@ -4,15 +4,15 @@
 
 use super::MAX_AXES;
 use super::blend::Blend;
-use super::error::TrajectoryError;
+use crate::trajectory::error::TrajectoryError;
 use super::exact_stop::ExactStop;
 use super::limits::AxisLimits;
-use super::motion::SampledMotion;
-use super::path::{self, CornerRule, DWELL_MAX_S, PathSpec, check_time};
-use super::proof::{self, Proof};
+use crate::trajectory::motion::SampledMotion;
+use crate::trajectory::path::{self, CornerRule, DWELL_MAX_S, PathSpec, check_time};
+use crate::trajectory::path::blended::{self, Proof};
 use super::setpoint::Setpoint;
 use super::table::Table;
-use super::verification::Verification;
+use crate::trajectory::verify::Verification;
 
 /// How the corners of this run are taken.
 #[derive(Clone, Debug)]
@@ -57,7 +57,7 @@ impl Interpolator {
         let (motion, rest_tick) = match spec.corner {
             CornerRule::ExactStop => {
                 let moves = ExactStop::plan(spec, &elements, limits)?;
-                let rest_tick = proof::n_ticks_after(moves.end_s(), cycle_s)?;
+                let rest_tick = blended::n_ticks_after(moves.end_s(), cycle_s)?;
                 (Motion::ExactStop(moves), rest_tick)
             }
             CornerRule::Blend { window_s } => {
@@ -66,7 +66,7 @@ impl Interpolator {
                 (Motion::Blend(blend), rest_tick)
             }
         };
-        let n_samples = rest_tick + proof::n_ticks(spec.dwell_after_s, cycle_s)? + 1;
+        let n_samples = rest_tick + blended::n_ticks(spec.dwell_after_s, cycle_s)? + 1;
         let plan = Self { motion, n_axes: spec.start_m.len(), cycle_s, n_samples, tick: 0 };
         // A blended path has been through its proof already.
         if spec.corner == CornerRule::ExactStop { plan.verified(limits) } else { Ok(plan) }
@@ -110,8 +110,8 @@ impl Interpolator {
             return Err(TrajectoryError::Empty);
         }
         let cycle_s = motion.dt_s;
-        let table = Table::new(motion, proof::n_ticks(dwell_before_s, cycle_s)?);
-        let n_samples = table.rest_tick() + proof::n_ticks(dwell_after_s, cycle_s)? + 1;
+        let table = Table::new(motion, blended::n_ticks(dwell_before_s, cycle_s)?);
+        let n_samples = table.rest_tick() + blended::n_ticks(dwell_after_s, cycle_s)? + 1;
         let motion = Self {
             motion: Motion::Table(table),
             n_axes: motion.n_axes,

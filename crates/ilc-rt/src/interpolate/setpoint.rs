@@ -15,7 +15,7 @@ pub struct Setpoint {
 
 impl Setpoint {
     /// A set point at rest that is not the last one.
-    pub(super) fn at_rest(position_m: [f64; MAX_AXES]) -> Self {
+    pub(crate) fn at_rest(position_m: [f64; MAX_AXES]) -> Self {
         Self { position_m, velocity_m_s: [0.0; MAX_AXES], done: false }
     }
 }

@@ -2,9 +2,9 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use super::MAX_AXES;
-use super::limits::AxisLimits;
-use super::verification::Verification;
+use crate::interpolate::MAX_AXES;
+use crate::interpolate::limits::AxisLimits;
+use crate::trajectory::verify::Verification;
 
 /// Position and its derivatives at one time; axes beyond the motion's own stay at 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +54,7 @@ impl SampledMotion {
     /// # Real Time
     /// Cold: allocates.
     /// # Errors
-    /// [`TrajectoryError`](super::TrajectoryError) if `dt_s` is out of range or there would be too
+    /// [`TrajectoryError`](crate::trajectory::TrajectoryError) if `dt_s` is out of range or there would be too
     /// many samples.
     #[expect(clippy::disallowed_methods, reason = "cold: laid out once")]
     pub fn sample(
@@ -62,9 +62,9 @@ impl SampledMotion {
         dt_s: f64,
         n_axes: usize,
         mut at: impl FnMut(f64) -> (MotionState, [f64; MAX_AXES]),
-    ) -> Result<Self, super::TrajectoryError> {
-        super::path::check_time("sample time", dt_s, super::path::CYCLE_S)?;
-        let n_samples = super::proof::n_ticks_after(duration_s, dt_s)? + 1;
+    ) -> Result<Self, crate::trajectory::TrajectoryError> {
+        crate::trajectory::path::check_time("sample time", dt_s, crate::trajectory::path::CYCLE_S)?;
+        let n_samples = crate::trajectory::path::blended::n_ticks_after(duration_s, dt_s)? + 1;
         let mut motion = Self { dt_s, n_axes, ..Self::default() };
         for k in 0..n_samples {
             let (state, programmed_m) = at(k as f64 * dt_s);
@@ -84,12 +84,12 @@ impl SampledMotion {
     /// # Real Time
     /// Cold.
     /// # Errors
-    /// [`TrajectoryError::SetPoint`](super::TrajectoryError::SetPoint) for the first set point that
+    /// [`TrajectoryError::SetPoint`](crate::trajectory::TrajectoryError::SetPoint) for the first set point that
     /// breaks a limit.
-    pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, super::TrajectoryError> {
+    pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, crate::trajectory::TrajectoryError> {
         if limits.len() != self.n_axes {
             let (found, expected) = (limits.len(), self.n_axes);
-            return Err(super::TrajectoryError::LimitCount { found, expected });
+            return Err(crate::trajectory::TrajectoryError::LimitCount { found, expected });
         }
         Verification::of_motion(&self.position_m, limits, self.dt_s).accept(&self.position_m)?;
         Ok(self)

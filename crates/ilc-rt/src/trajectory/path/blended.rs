@@ -3,16 +3,16 @@
 //! The set points are generated once, as the loop will generate them, and their finite differences
 //! over the cycle are compared with the limits: nothing is estimated.
 
-use super::MAX_AXES;
-use super::blend::Blend;
-use super::element::Element;
-use super::error::{Quantity, TrajectoryError};
-use super::limits::AxisLimits;
-use super::path::{PathSpec, check_time};
-use super::verification::{Differences, ROWS_AFTER, TOLERANCE, rounding_noise};
+use crate::interpolate::MAX_AXES;
+use crate::interpolate::blend::Blend;
+use crate::interpolate::element::Element;
+use crate::trajectory::error::{Quantity, TrajectoryError};
+use crate::interpolate::limits::AxisLimits;
+use crate::trajectory::path::{PathSpec, check_time};
+use crate::trajectory::verify::{Differences, ROWS_AFTER, TOLERANCE, rounding_noise};
 
 /// Most samples of one run.
-pub(super) const N_SAMPLES_MAX: usize = 10_000_000;
+pub(crate) const N_SAMPLES_MAX: usize = 10_000_000;
 /// Longest blend window.
 const WINDOW_MAX_S: f64 = 10.0;
 /// Steps of each bracketing search for a remedy.
@@ -28,11 +28,11 @@ struct Excess {
 }
 
 /// A path with the things that its proof needs.
-pub(super) struct Proof<'a> {
-    pub(super) spec: &'a PathSpec,
-    pub(super) elements: &'a [Element],
-    pub(super) limits: &'a [AxisLimits],
-    pub(super) cycle_s: f64,
+pub(crate) struct Proof<'a> {
+    pub(crate) spec: &'a PathSpec,
+    pub(crate) elements: &'a [Element],
+    pub(crate) limits: &'a [AxisLimits],
+    pub(crate) cycle_s: f64,
 }
 
 impl Proof<'_> {
@@ -41,7 +41,7 @@ impl Proof<'_> {
     ///
     /// # Errors
     /// [`TrajectoryError::Exceeds`] with the worst excess and the feed and window that would do.
-    pub(super) fn plan(&self, window_s: f64) -> Result<(Blend, usize), TrajectoryError> {
+    pub(crate) fn plan(&self, window_s: f64) -> Result<(Blend, usize), TrajectoryError> {
         check_time("blend window", window_s, (self.cycle_s, WINDOW_MAX_S))?;
         let window = ticks(window_s, self.cycle_s);
         let mut broken = 0;
@@ -202,7 +202,7 @@ fn ticks(window_s: f64, cycle_s: f64) -> usize {
     clippy::cast_sign_loss,
     reason = "compared with the most samples before the cast; durations are not negative"
 )]
-pub(super) fn n_ticks(duration_s: f64, cycle_s: f64) -> Result<usize, TrajectoryError> {
+pub(crate) fn n_ticks(duration_s: f64, cycle_s: f64) -> Result<usize, TrajectoryError> {
     let n_samples = (duration_s / cycle_s - 1e-6).ceil().max(0.0);
     if n_samples <= N_SAMPLES_MAX as f64 {
         Ok(n_samples as usize)
@@ -215,7 +215,7 @@ pub(super) fn n_ticks(duration_s: f64, cycle_s: f64) -> Result<usize, Trajectory
 ///
 /// # Errors
 /// As [`n_ticks`].
-pub(super) fn n_ticks_after(time_s: f64, cycle_s: f64) -> Result<usize, TrajectoryError> {
+pub(crate) fn n_ticks_after(time_s: f64, cycle_s: f64) -> Result<usize, TrajectoryError> {
     let tick = n_ticks(time_s, cycle_s)?;
     Ok(if (tick as f64) * cycle_s < time_s { tick + 1 } else { tick })
 }

@@ -2,13 +2,13 @@
 //!
 //! For programs that come as a table instead of a path. The supervisor calls it.
 
-use super::MAX_AXES;
-use super::error::TrajectoryError;
-use super::limits::AxisLimits;
-use super::motion::SampledMotion;
-use super::path::{CYCLE_S, check_time};
-use super::proof::N_SAMPLES_MAX;
-use super::verification::{Excess, Verification};
+use crate::interpolate::MAX_AXES;
+use crate::trajectory::error::TrajectoryError;
+use crate::interpolate::limits::AxisLimits;
+use crate::trajectory::motion::SampledMotion;
+use crate::trajectory::path::{CYCLE_S, check_time};
+use crate::trajectory::path::blended::N_SAMPLES_MAX;
+use crate::trajectory::verify::{Excess, Verification};
 
 /// Makes a motion of its set points, one a cycle, from rest at the first to rest at the last.
 ///

@@ -1,6 +1,6 @@
 //! The index `J` by which interpolators are compared: tracking and acceleration, weighted. Cold.
 
-use super::error::TrajectoryError;
+use crate::trajectory::error::TrajectoryError;
 
 /// The two parts of the index, weighted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -5,7 +5,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use super::error::{Quantity, TrajectoryError};
+use crate::trajectory::error::{Quantity, TrajectoryError};
 use super::limits::{PathLimits, is_positive};
 
 /// Where a move along its path is at one time.
@@ -207,7 +207,7 @@ impl JerkLimited {
 )]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     #[test]
     fn hand_computed_move_reaches_every_limit() {

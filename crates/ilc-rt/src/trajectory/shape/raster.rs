@@ -1,8 +1,8 @@
 //! A raster: rows to and fro, and back to the start. Cold.
 
-use super::error::TrajectoryError;
-use super::limits::is_positive;
-use super::path::PathSegment;
+use crate::trajectory::error::TrajectoryError;
+use crate::interpolate::limits::is_positive;
+use crate::trajectory::path::PathSegment;
 
 /// Rows of `width_m` along the first axis, `pitch_m` apart along the second; with `there_and_back`
 /// the same way backwards to the start.

@@ -3,19 +3,19 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::MAX_AXES;
-use super::motion::SampledMotion;
+use crate::trajectory::motion::SampledMotion;
 use super::setpoint::Setpoint;
 
 /// Positions and velocities, with a rest before them; the last row is held.
 #[derive(Clone, Debug)]
-pub(super) struct Table {
+pub(crate) struct Table {
     rows: Box<[[[f64; MAX_AXES]; 2]]>,
     rest_ticks: usize,
 }
 
 impl Table {
     /// Copies a motion. Cold.
-    pub(super) fn new(motion: &SampledMotion, rest_ticks: usize) -> Self {
+    pub(crate) fn new(motion: &SampledMotion, rest_ticks: usize) -> Self {
         let n_axes = motion.n_axes.clamp(1, MAX_AXES);
         let row = |(position_m, velocity_m_s): (&[f64], &[f64])| {
             let mut row = [[0.0; MAX_AXES]; 2];
@@ -33,12 +33,12 @@ impl Table {
     }
 
     /// The tick from which it rests at its end.
-    pub(super) fn rest_tick(&self) -> usize {
+    pub(crate) fn rest_tick(&self) -> usize {
         self.rest_ticks + self.rows.len().saturating_sub(1)
     }
 
     /// The set point of a tick.
-    pub(super) fn at(&self, tick: usize) -> Setpoint {
+    pub(crate) fn at(&self, tick: usize) -> Setpoint {
         let last = self.rows.len().saturating_sub(1);
         let Some([position_m, velocity_m_s]) =
             self.rows.get(tick.saturating_sub(self.rest_ticks).min(last))

@@ -8,7 +8,7 @@
 
 use super::MAX_AXES;
 use super::element::Element;
-use super::path::PathSpec;
+use crate::trajectory::path::PathSpec;
 use super::setpoint::Setpoint;
 
 /// Fixed-point units in one metre; 2⁵⁰, so that 4096 m fit 63 bits.
@@ -58,7 +58,7 @@ impl MovingSum {
 
 /// The polyline, the filters of each axis, and three neighbouring set points.
 #[derive(Clone, Debug)]
-pub(super) struct Blend {
+pub(crate) struct Blend {
     legs: Box<[Leg]>,
     current: usize,
     filters: Box<[(MovingSum, MovingSum)]>,
@@ -71,14 +71,14 @@ pub(super) struct Blend {
 
 impl Blend {
     /// Lays the lines out in time and sizes the filters. Cold.
-    pub(super) fn plan(
+    pub(crate) fn plan(
         spec: &PathSpec,
         elements: &[Element],
         cycle_s: f64,
         (window, rounding): (usize, usize),
     ) -> Self {
         let mut start_s = spec.dwell_before_s;
-        let mut leg = |(element, segment): (&Element, &super::path::PathSegment)| {
+        let mut leg = |(element, segment): (&Element, &crate::trajectory::path::PathSegment)| {
             let end_s = start_s + element.length_m() / segment.feed_m_s;
             let leg = Leg { element: *element, feed_m_s: segment.feed_m_s, start_s, end_s };
             start_s = end_s + segment.dwell_s;
@@ -100,17 +100,17 @@ impl Blend {
     }
 
     /// When the unfiltered polyline ends.
-    pub(super) fn end_s(&self) -> f64 {
+    pub(crate) fn end_s(&self) -> f64 {
         self.legs.last().map_or(0.0, |last| last.end_s)
     }
 
     /// Ticks by which filters and slope are late: after `end_s` and these, the path is at rest.
-    pub(super) fn ticks_late(&self) -> usize {
+    pub(crate) fn ticks_late(&self) -> usize {
         self.filters.first().map_or(0, |(first, second)| first.ring.len() + second.ring.len())
     }
 
     /// Goes back to the start, at rest.
-    pub(super) fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.current = 0;
         self.ticks_ahead = 0;
         let start_m = self.legs.first().map_or([0.0; MAX_AXES], |leg| leg.element.start_m());
@@ -124,7 +124,7 @@ impl Blend {
     }
 
     /// The set point of this tick; then looks one tick further ahead.
-    pub(super) fn next(&mut self) -> Setpoint {
+    pub(crate) fn next(&mut self) -> Setpoint {
         let [before_m, now_m, after_m] = self.around_m;
         let mut setpoint = Setpoint::at_rest(now_m);
         for (axis, velocity_m_s) in setpoint.velocity_m_s.iter_mut().enumerate() {

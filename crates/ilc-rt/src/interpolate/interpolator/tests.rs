@@ -1,7 +1,7 @@
 //! What an interpolator promises: limits, end points, repeatability, refusals.
 
 use super::*;
-use crate::trajectory::random::Random;
+use crate::interpolate::random::Random;
 use crate::trajectory::{PathSegment, Quantity};
 
 const CYCLE_S: f64 = 0.002;
@@ -117,7 +117,7 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
             };
             assert_holds(&plan, &axes, &format!("round {round} {corner:?}"));
             let first = plan.next();
-            assert_eq!(first.velocity_m_s, [0.0; crate::trajectory::MAX_AXES]);
+            assert_eq!(first.velocity_m_s, [0.0; crate::interpolate::MAX_AXES]);
             for (position, start) in first.position_m.iter().zip(&spec.start_m) {
                 assert!((position - start).abs() <= 1e-12);
             }
@@ -127,7 +127,7 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
                 last = plan.next();
             }
             assert!(last.done);
-            assert_eq!(last.velocity_m_s, [0.0; crate::trajectory::MAX_AXES]);
+            assert_eq!(last.velocity_m_s, [0.0; crate::interpolate::MAX_AXES]);
             for (position, end) in last.position_m.iter().zip(&spec.segments[4].to_m) {
                 assert!((position - end).abs() <= 1e-12, "{position} {end}");
             }
@@ -202,7 +202,7 @@ fn a_long_run_does_not_drift() {
     while !last.done {
         last = plan.next();
     }
-    assert_eq!(last.position_m, [0.0; crate::trajectory::MAX_AXES]);
+    assert_eq!(last.position_m, [0.0; crate::interpolate::MAX_AXES]);
 }
 
 #[test]

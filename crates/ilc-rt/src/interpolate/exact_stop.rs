@@ -7,9 +7,9 @@
 
 use super::MAX_AXES;
 use super::element::Element;
-use super::error::TrajectoryError;
+use crate::trajectory::error::TrajectoryError;
 use super::limits::AxisLimits;
-use super::path::PathSpec;
+use crate::trajectory::path::PathSpec;
 use super::profile::JerkLimited;
 use super::setpoint::Setpoint;
 
@@ -24,20 +24,20 @@ struct Move {
 
 /// The segments of a run, and the one that the run is in.
 #[derive(Clone, Debug)]
-pub(super) struct ExactStop {
+pub(crate) struct ExactStop {
     moves: Box<[Move]>,
     current: usize,
 }
 
 impl ExactStop {
     /// Plans one move a segment. Cold.
-    pub(super) fn plan(
+    pub(crate) fn plan(
         spec: &PathSpec,
         elements: &[Element],
         limits: &[AxisLimits],
     ) -> Result<Self, TrajectoryError> {
         let mut start_s = spec.dwell_before_s;
-        let mut plan_move = |(element, segment): (&Element, &super::path::PathSegment)| {
+        let mut plan_move = |(element, segment): (&Element, &crate::trajectory::path::PathSegment)| {
             let along = element.limits(limits, segment.feed_m_s);
             let profile = JerkLimited::along(element.length_m(), &along)?;
             let end_s = start_s + profile.duration_s();
@@ -54,17 +54,17 @@ impl ExactStop {
     }
 
     /// When the last move ends.
-    pub(super) fn end_s(&self) -> f64 {
+    pub(crate) fn end_s(&self) -> f64 {
         self.moves.last().map_or(0.0, |last| last.end_s)
     }
 
     /// Goes back to the first move.
-    pub(super) fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.current = 0;
     }
 
     /// The set point at a time that is not before that of the last call.
-    pub(super) fn at(&mut self, t_s: f64) -> Setpoint {
+    pub(crate) fn at(&mut self, t_s: f64) -> Setpoint {
         while self.current + 1 < self.moves.len() && t_s >= self.moves[self.current].end_s {
             self.current += 1;
         }

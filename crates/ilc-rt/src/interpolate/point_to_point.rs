@@ -3,7 +3,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::MAX_AXES;
-use super::error::TrajectoryError;
+use crate::trajectory::error::TrajectoryError;
 use super::limits::{AxisLimits, Line, PathLimits};
 use super::profile::JerkLimited;
 use super::setpoint::Setpoint;
@@ -92,7 +92,7 @@ impl PointToPoint {
 )]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     const LIMITS: AxisLimits =
         AxisLimits { velocity_max_m_s: 0.5, acceleration_max_m_s2: 8.0, jerk_max_m_s3: 1000.0 };

@@ -1,9 +1,9 @@
 //! The promise of the whole folder: over more than a million random moves of every kind no limit is
 //! exceeded beyond 1e-9 of itself, nothing is not a number, and nothing lasts less than no time.
 
-use super::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
-use super::random::Random;
-use super::{
+use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
+use crate::interpolate::random::Random;
+use crate::trajectory::{
     AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, JerkLimited, Linear, LinearSetting,
     ModulatedSegment, MotionState, PathSegment, PathSpec, TrajectoryError,
 };
@@ -226,7 +226,7 @@ fn random_paths_of_lines_and_arcs_with_exact_stops() {
         let sweep = 0.1 + 6.0 * random.unit();
         let clockwise = random.unit() < 0.5;
         let angle = if clockwise { -sweep } else { sweep };
-        let arc = super::ArcSpec { plane: [0, 1], center_m: [0.0, 0.0], clockwise };
+        let arc = crate::trajectory::ArcSpec { plane: [0, 1], center_m: [0.0, 0.0], clockwise };
         let spec = PathSpec {
             start_m: vec![radius, 0.0],
             segments: vec![

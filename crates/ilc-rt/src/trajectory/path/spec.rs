@@ -1,18 +1,18 @@
 //! What a run shall do: a path of lines and arcs, how corners are taken, and rests. Cold.
 
-use super::MAX_AXES;
-use super::arc::Arc;
-use super::element::Element;
-use super::error::{Quantity, TrajectoryError};
-use super::limits::{AxisLimits, Line, is_positive};
-use super::verification::TOLERANCE;
+use crate::interpolate::MAX_AXES;
+use crate::interpolate::arc::Arc;
+use crate::interpolate::element::Element;
+use crate::trajectory::error::{Quantity, TrajectoryError};
+use crate::interpolate::limits::{AxisLimits, Line, is_positive};
+use crate::trajectory::verify::TOLERANCE;
 
 /// Farthest position of a plan; the blend's fixed-point numbers hold it with room to spare.
-pub(super) const POSITION_MAX_M: f64 = 4096.0;
+pub(crate) const POSITION_MAX_M: f64 = 4096.0;
 /// Servo cycles that a plan accepts.
-pub(super) const CYCLE_S: (f64, f64) = (1e-5, 1.0);
+pub(crate) const CYCLE_S: (f64, f64) = (1e-5, 1.0);
 /// Longest rest before or after the motion.
-pub(super) const DWELL_MAX_S: f64 = 3600.0;
+pub(crate) const DWELL_MAX_S: f64 = 3600.0;
 
 /// A move along a line or an arc.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +77,7 @@ impl PathSpec {
     ///
     /// # Errors
     /// [`TrajectoryError`] for the first value that is out of its range.
-    pub(super) fn elements(
+    pub(crate) fn elements(
         &self,
         limits: &[AxisLimits],
         cycle_s: f64,
@@ -129,7 +129,7 @@ impl PathSpec {
     }
 
     /// The same path with every feed times `factor`.
-    pub(super) fn with_feed_times(&self, factor: f64) -> Self {
+    pub(crate) fn with_feed_times(&self, factor: f64) -> Self {
         let mut slower = self.clone();
         for segment in &mut slower.segments {
             segment.feed_m_s *= factor;
@@ -138,7 +138,7 @@ impl PathSpec {
     }
 
     /// The feed of the fastest segment.
-    pub(super) fn feed_max_m_s(&self) -> f64 {
+    pub(crate) fn feed_max_m_s(&self) -> f64 {
         self.segments.iter().fold(0.0, |most, segment| most.max(segment.feed_m_s))
     }
 }
@@ -193,7 +193,7 @@ fn checked_elements(
 }
 
 /// As [`checked_elements`], for segments without arcs.
-pub(super) fn checked_lines(
+pub(crate) fn checked_lines(
     start_m: &[f64],
     segments: &[PathSegment],
     limits: &[AxisLimits],
@@ -210,7 +210,7 @@ pub(super) fn checked_lines(
 }
 
 /// Refuses a number of axes or limits that cannot be, and limits that are not positive.
-pub(super) fn check_limits(n_axes: usize, limits: &[AxisLimits]) -> Result<(), TrajectoryError> {
+pub(crate) fn check_limits(n_axes: usize, limits: &[AxisLimits]) -> Result<(), TrajectoryError> {
     if !(1..=MAX_AXES).contains(&n_axes) {
         return Err(TrajectoryError::Axes { n_axes });
     }
@@ -224,7 +224,7 @@ pub(super) fn check_limits(n_axes: usize, limits: &[AxisLimits]) -> Result<(), T
 }
 
 /// Refuses a time that is not finite or not in its range.
-pub(super) fn check_time(
+pub(crate) fn check_time(
     name: &'static str,
     value_s: f64,
     (low_s, high_s): (f64, f64),
@@ -237,7 +237,7 @@ pub(super) fn check_time(
 }
 
 /// A point in the array of the tick; unused axes are 0.
-pub(super) fn point(coordinates_m: &[f64]) -> Result<[f64; MAX_AXES], TrajectoryError> {
+pub(crate) fn point(coordinates_m: &[f64]) -> Result<[f64; MAX_AXES], TrajectoryError> {
     let mut point_m = [0.0; MAX_AXES];
     for (axis, (to, &position_m)) in point_m.iter_mut().zip(coordinates_m).enumerate() {
         if !(-POSITION_MAX_M..=POSITION_MAX_M).contains(&position_m) {

@@ -6,7 +6,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use super::limits::AxisLimits;
+use crate::interpolate::limits::AxisLimits;
 
 /// Bisections of the cruising velocity.
 const STEPS: usize = 100;

@@ -3,7 +3,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::MAX_AXES;
-use super::error::{Quantity, TrajectoryError};
+use crate::trajectory::error::{Quantity, TrajectoryError};
 
 /// What the set points of one axis never exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl AxisLimits {
     }
 
     /// The three limits, each with its name.
-    pub(super) fn named(&self) -> [(Quantity, f64); 3] {
+    pub(crate) fn named(&self) -> [(Quantity, f64); 3] {
         [
             (Quantity::Velocity, self.velocity_max_m_s),
             (Quantity::Acceleration, self.acceleration_max_m_s2),
@@ -88,16 +88,16 @@ impl PathLimits {
 
 /// A straight line from one point to another, its direction a unit vector.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Line {
-    pub(super) from_m: [f64; MAX_AXES],
-    pub(super) to_m: [f64; MAX_AXES],
-    pub(super) direction: [f64; MAX_AXES],
-    pub(super) length_m: f64,
+pub(crate) struct Line {
+    pub(crate) from_m: [f64; MAX_AXES],
+    pub(crate) to_m: [f64; MAX_AXES],
+    pub(crate) direction: [f64; MAX_AXES],
+    pub(crate) length_m: f64,
 }
 
 impl Line {
     /// Unused axes are 0 in both points; a line without length has no direction (all 0).
-    pub(super) fn new(from_m: [f64; MAX_AXES], to_m: [f64; MAX_AXES]) -> Self {
+    pub(crate) fn new(from_m: [f64; MAX_AXES], to_m: [f64; MAX_AXES]) -> Self {
         let mut direction = [0.0; MAX_AXES];
         for (axis, share) in direction.iter_mut().enumerate() {
             *share = to_m[axis] - from_m[axis];
@@ -116,7 +116,7 @@ impl Line {
     }
 
     /// The point at `s_m` from the start; exactly the end at the end.
-    pub(super) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
+    pub(crate) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
         if s_m >= self.length_m {
             return self.to_m;
         }
@@ -128,13 +128,13 @@ impl Line {
     }
 
     /// The direction times `scale`.
-    pub(super) fn along(&self, scale: f64) -> [f64; MAX_AXES] {
+    pub(crate) fn along(&self, scale: f64) -> [f64; MAX_AXES] {
         self.direction.map(|share| share * scale)
     }
 }
 
 /// Whether a value is finite and above 0.
-pub(super) fn is_positive(value: f64) -> bool {
+pub(crate) fn is_positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 

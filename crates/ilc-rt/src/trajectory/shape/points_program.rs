@@ -3,10 +3,10 @@
 //! A feed with an oscillation along it breaks chips. As a program it is a row of straight moves,
 //! usually six a period. Cold.
 
-use super::error::TrajectoryError;
-use super::exponential::ModulatedSegment;
-use super::limits::is_positive;
-use super::path::PathSegment;
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::exponential::ModulatedSegment;
+use crate::interpolate::limits::is_positive;
+use crate::trajectory::path::PathSegment;
 
 /// Points a period of the customary program.
 pub const POINTS_A_PERIOD: usize = 6;

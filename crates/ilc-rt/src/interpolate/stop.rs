@@ -149,7 +149,7 @@ impl ControlledStop {
 )]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     fn limits(acceleration: f64, jerk: f64) -> AxisLimits {
         AxisLimits {

@@ -27,9 +27,9 @@ const FULL_M: f64 = 1e-11;
 /// make them, are joined by a radius that grows in proportion to the angle: no point of the arc is
 /// farther from either circle than the two are apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Arc {
-    pub(super) from_m: [f64; MAX_AXES],
-    pub(super) to_m: [f64; MAX_AXES],
+pub(crate) struct Arc {
+    pub(crate) from_m: [f64; MAX_AXES],
+    pub(crate) to_m: [f64; MAX_AXES],
     plane: [usize; 2],
     center_m: [f64; 2],
     /// Radius at the start.
@@ -39,13 +39,13 @@ pub(super) struct Arc {
     from_rad: f64,
     /// Signed: anticlockwise is positive.
     sweep_rad: f64,
-    pub(super) length_m: f64,
+    pub(crate) length_m: f64,
     /// Largest share of the length that is in the plane.
     share: f64,
 }
 
 /// Whether both ends of an arc are as far from its centre as rounding explains.
-pub(super) fn ends_agree(start_radius_m: f64, end_radius_m: f64) -> bool {
+pub(crate) fn ends_agree(start_radius_m: f64, end_radius_m: f64) -> bool {
     let gap_m = (start_radius_m - end_radius_m).abs();
     let allowed_m =
         GAP_M.max(GAP_SHARE * start_radius_m).min(0.5 * start_radius_m.min(end_radius_m));
@@ -59,7 +59,7 @@ impl Arc {
     ///
     /// An arc that ends where it starts is a full circle; otherwise the direction alone decides how
     /// far round it goes, however near the ends are.
-    pub(super) fn new(
+    pub(crate) fn new(
         from_m: [f64; MAX_AXES],
         to_m: [f64; MAX_AXES],
         plane: [usize; 2],
@@ -106,7 +106,7 @@ impl Arc {
     }
 
     /// The point at `s_m` from the start; exactly the start and the end there.
-    pub(super) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
+    pub(crate) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
         if s_m >= self.length_m {
             return self.to_m;
         }
@@ -126,7 +126,7 @@ impl Arc {
     }
 
     /// The tangent at `s_m` from the start, times `scale`; its length is 1 where the radius is largest.
-    pub(super) fn along(&self, s_m: f64, scale: f64) -> [f64; MAX_AXES] {
+    pub(crate) fn along(&self, s_m: f64, scale: f64) -> [f64; MAX_AXES] {
         let part = (s_m / self.length_m).clamp(0.0, 1.0);
         let mut tangent = [0.0; MAX_AXES];
         for (axis, share) in tangent.iter_mut().enumerate() {
@@ -140,7 +140,7 @@ impl Arc {
     }
 
     /// The largest share of the path's speed that an axis has somewhere on the arc.
-    pub(super) fn share(&self, axis: usize) -> f64 {
+    pub(crate) fn share(&self, axis: usize) -> f64 {
         if !self.plane.contains(&axis) {
             return (self.to_m[axis] - self.from_m[axis]).abs() / self.length_m;
         }
@@ -162,7 +162,7 @@ impl Arc {
     /// the acceleration has the parts `c a` along and `k v²` across, the jerk `c j + w v³` along and
     /// `3 k v a` across; their sum stays within each limit in whichever direction the axes lie. Where
     /// the radius grows, along and across are not at right angles, and `lean` is the cosine.
-    pub(super) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
+    pub(crate) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
         let outside = self.outside();
         let mut path = PathLimits::along(&outside, limits, feed_m_s);
         let [mut v_max, mut a_max, mut j_max] = [f64::INFINITY; 3];
@@ -217,7 +217,7 @@ impl Arc {
 )]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     fn at(x: f64, y: f64) -> [f64; MAX_AXES] {
         let mut point = [0.0; MAX_AXES];

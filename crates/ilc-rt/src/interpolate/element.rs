@@ -8,27 +8,27 @@ use super::limits::{AxisLimits, Line, PathLimits};
 
 /// A line or an arc.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Element {
+pub(crate) enum Element {
     Line(Line),
     Arc(Arc),
 }
 
 impl Element {
-    pub(super) fn start_m(&self) -> [f64; MAX_AXES] {
+    pub(crate) fn start_m(&self) -> [f64; MAX_AXES] {
         match self {
             Self::Line(line) => line.from_m,
             Self::Arc(arc) => arc.from_m,
         }
     }
 
-    pub(super) fn end_m(&self) -> [f64; MAX_AXES] {
+    pub(crate) fn end_m(&self) -> [f64; MAX_AXES] {
         match self {
             Self::Line(line) => line.to_m,
             Self::Arc(arc) => arc.to_m,
         }
     }
 
-    pub(super) fn length_m(&self) -> f64 {
+    pub(crate) fn length_m(&self) -> f64 {
         match self {
             Self::Line(line) => line.length_m,
             Self::Arc(arc) => arc.length_m,
@@ -36,7 +36,7 @@ impl Element {
     }
 
     /// The point at `s_m` from the start; exactly the end at the end.
-    pub(super) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
+    pub(crate) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
         match self {
             Self::Line(line) => line.point_m(s_m),
             Self::Arc(arc) => arc.point_m(s_m),
@@ -44,7 +44,7 @@ impl Element {
     }
 
     /// The unit tangent at `s_m` from the start, times `scale`.
-    pub(super) fn along(&self, s_m: f64, scale: f64) -> [f64; MAX_AXES] {
+    pub(crate) fn along(&self, s_m: f64, scale: f64) -> [f64; MAX_AXES] {
         match self {
             Self::Line(line) => line.along(scale),
             Self::Arc(arc) => arc.along(s_m, scale),
@@ -52,7 +52,7 @@ impl Element {
     }
 
     /// The largest share of the path's speed that an axis has anywhere on it.
-    pub(super) fn share(&self, axis: usize) -> f64 {
+    pub(crate) fn share(&self, axis: usize) -> f64 {
         match self {
             Self::Line(line) => line.direction[axis].abs(),
             Self::Arc(arc) => arc.share(axis),
@@ -60,7 +60,7 @@ impl Element {
     }
 
     /// What the axes' limits and the feed leave for a jerk-limited move.
-    pub(super) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
+    pub(crate) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
         match self {
             Self::Line(line) => PathLimits::along(&line.direction, limits, feed_m_s),
             Self::Arc(arc) => arc.limits(limits, feed_m_s),
