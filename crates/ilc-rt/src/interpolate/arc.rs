@@ -1,7 +1,5 @@
 //! A circular arc, or a helix, and what the axes' limits leave for a move along it.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::MAX_AXES;

@@ -4,19 +4,16 @@
 //! ramp's ends (jerk). Positions are summed as integers of 2⁻⁵⁰ m, so that the running sums are
 //! exact however long the run is: no drift, and the end is the programmed end.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::MAX_AXES;
-use super::element::Element;
-use crate::trajectory::path::PathSpec;
+use super::element::{Element, Leg};
 use super::setpoint::Setpoint;
 
 /// Fixed-point units in one metre; 2⁵⁰, so that 4096 m fit 63 bits.
 const UNITS_PER_M: f64 = 1_125_899_906_842_624.0;
 
-/// A segment at constant speed.
+/// A leg at constant speed, laid out in time.
 #[derive(Clone, Debug)]
-struct Leg {
+struct TimedLeg {
     element: Element,
     feed_m_s: f64,
     start_s: f64,
@@ -59,7 +56,7 @@ impl MovingSum {
 /// The polyline, the filters of each axis, and three neighbouring set points.
 #[derive(Clone, Debug)]
 pub(crate) struct Blend {
-    legs: Box<[Leg]>,
+    legs: Box<[TimedLeg]>,
     current: usize,
     filters: Box<[(MovingSum, MovingSum)]>,
     units_per_m: f64,
@@ -70,26 +67,26 @@ pub(crate) struct Blend {
 }
 
 impl Blend {
-    /// Lays the lines out in time and sizes the filters. Cold.
+    /// Lays the legs out in time from `start_s` on, and sizes the filters. Cold.
     pub(crate) fn plan(
-        spec: &PathSpec,
-        elements: &[Element],
+        legs: &[Leg],
+        n_axes: usize,
+        mut start_s: f64,
         cycle_s: f64,
         (window, rounding): (usize, usize),
     ) -> Self {
-        let mut start_s = spec.dwell_before_s;
-        let mut leg = |(element, segment): (&Element, &crate::trajectory::path::PathSegment)| {
-            let end_s = start_s + element.length_m() / segment.feed_m_s;
-            let leg = Leg { element: *element, feed_m_s: segment.feed_m_s, start_s, end_s };
-            start_s = end_s + segment.dwell_s;
+        let mut timed = |&Leg { element, feed_m_s, dwell_s }: &Leg| {
+            let end_s = start_s + element.length_m() / feed_m_s;
+            let leg = TimedLeg { element, feed_m_s, start_s, end_s };
+            start_s = end_s + dwell_s;
             leg
         };
-        let legs = elements.iter().zip(&spec.segments).map(&mut leg).collect();
+        let legs = legs.iter().map(&mut timed).collect();
         let pair = (MovingSum::filled(window, 0), MovingSum::filled(rounding, 0));
         let mut plan = Self {
             legs,
             current: 0,
-            filters: std::iter::repeat_n(pair, spec.start_m.len()).collect(),
+            filters: std::iter::repeat_n(pair, n_axes).collect(),
             units_per_m: UNITS_PER_M * window.max(1) as f64 * rounding.max(1) as f64,
             cycle_s,
             around_m: [[0.0; MAX_AXES]; 3],

@@ -1,10 +1,9 @@
 //! A piece of a path, straight or round, as the ticks of exact stop and blend walk along it.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::MAX_AXES;
 use super::arc::Arc;
-use super::limits::{AxisLimits, Line, PathLimits};
+use super::limits::{AxisLimits, PathLimits};
+use super::line::Line;
 
 /// A line or an arc.
 #[derive(Clone, Copy, Debug)]
@@ -66,4 +65,12 @@ impl Element {
             Self::Arc(arc) => arc.limits(limits, feed_m_s),
         }
     }
+}
+
+/// An element with the speed along it, and the rest at its end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Leg {
+    pub(crate) element: Element,
+    pub(crate) feed_m_s: f64,
+    pub(crate) dwell_s: f64,
 }

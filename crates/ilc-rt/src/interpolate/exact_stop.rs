@@ -3,13 +3,10 @@
 //! Moves are not rounded to ticks: each is evaluated on the time of the whole run, so that a set
 //! point never waits for the grid and the limits hold between set points as well as on them.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::MAX_AXES;
-use super::element::Element;
-use crate::trajectory::error::TrajectoryError;
+use super::element::{Element, Leg};
+use super::error::MoveError;
 use super::limits::AxisLimits;
-use crate::trajectory::path::PathSpec;
 use super::profile::JerkLimited;
 use super::setpoint::Setpoint;
 
@@ -30,26 +27,21 @@ pub(crate) struct ExactStop {
 }
 
 impl ExactStop {
-    /// Plans one move a segment. Cold.
+    /// Plans one move a leg; the first begins at `start_s`. Cold.
     pub(crate) fn plan(
-        spec: &PathSpec,
-        elements: &[Element],
+        legs: &[Leg],
+        mut start_s: f64,
         limits: &[AxisLimits],
-    ) -> Result<Self, TrajectoryError> {
-        let mut start_s = spec.dwell_before_s;
-        let mut plan_move = |(element, segment): (&Element, &crate::trajectory::path::PathSegment)| {
-            let along = element.limits(limits, segment.feed_m_s);
+    ) -> Result<Self, MoveError> {
+        let mut plan_move = |&Leg { element, feed_m_s, dwell_s }: &Leg| {
+            let along = element.limits(limits, feed_m_s);
             let profile = JerkLimited::along(element.length_m(), &along)?;
             let end_s = start_s + profile.duration_s();
-            let planned = Move { element: *element, profile, start_s, end_s };
-            start_s = end_s + segment.dwell_s;
+            let planned = Move { element, profile, start_s, end_s };
+            start_s = end_s + dwell_s;
             Ok(planned)
         };
-        let moves = elements
-            .iter()
-            .zip(&spec.segments)
-            .map(&mut plan_move)
-            .collect::<Result<Box<[_]>, _>>()?;
+        let moves = legs.iter().map(&mut plan_move).collect::<Result<Box<[_]>, _>>()?;
         Ok(Self { moves, current: 0 })
     }
 

@@ -1,22 +1,13 @@
 //! The set points of a run, one a tick.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
-use super::MAX_AXES;
 use super::blend::Blend;
-use crate::trajectory::error::TrajectoryError;
 use super::exact_stop::ExactStop;
-use super::limits::AxisLimits;
-use crate::trajectory::motion::SampledMotion;
-use crate::trajectory::path::{self, CornerRule, DWELL_MAX_S, PathSpec, check_time};
-use crate::trajectory::path::blended::{self, Proof};
 use super::setpoint::Setpoint;
 use super::table::Table;
-use crate::trajectory::verify::Verification;
 
 /// How the corners of this run are taken.
 #[derive(Clone, Debug)]
-enum Motion {
+pub(crate) enum Motion {
     ExactStop(ExactStop),
     Blend(Blend),
     Hold(Setpoint),
@@ -34,111 +25,9 @@ pub struct Interpolator {
 }
 
 impl Interpolator {
-    /// Plans a run; every set point that it will give holds the limits of every axis.
-    ///
-    /// With exact stops each segment is a jerk-limited move, no faster than its feed. A blended path
-    /// keeps its feed, through an average of the window and a second, shorter one that planning
-    /// chooses for the jerk; its set points are generated here once and their finite differences
-    /// over the cycle compared with the limits.
-    ///
-    /// # Shapes
-    /// - `limits`: one entry for each coordinate of `spec.start_m`, 1 to [`MAX_AXES`]
-    /// # Real Time
-    /// Cold: allocates, and walks through a blended run several times.
-    /// # Errors
-    /// [`TrajectoryError`] for values out of range, and [`TrajectoryError::Exceeds`] for a blended
-    /// path that breaks a limit: it is refused with the feed that would do, never slowed down.
-    pub fn plan(
-        spec: &PathSpec,
-        limits: &[AxisLimits],
-        cycle_s: f64,
-    ) -> Result<Self, TrajectoryError> {
-        let elements = spec.elements(limits, cycle_s)?;
-        let (motion, rest_tick) = match spec.corner {
-            CornerRule::ExactStop => {
-                let moves = ExactStop::plan(spec, &elements, limits)?;
-                let rest_tick = blended::n_ticks_after(moves.end_s(), cycle_s)?;
-                (Motion::ExactStop(moves), rest_tick)
-            }
-            CornerRule::Blend { window_s } => {
-                let (blend, rest_tick) =
-                    Proof { spec, elements: &elements, limits, cycle_s }.plan(window_s)?;
-                (Motion::Blend(blend), rest_tick)
-            }
-        };
-        let n_samples = rest_tick + blended::n_ticks(spec.dwell_after_s, cycle_s)? + 1;
-        let plan = Self { motion, n_axes: spec.start_m.len(), cycle_s, n_samples, tick: 0 };
-        // A blended path has been through its proof already.
-        if spec.corner == CornerRule::ExactStop { plan.verified(limits) } else { Ok(plan) }
-    }
-
-    /// Rests at a point for some samples, as while an axis is identified.
-    ///
-    /// # Shapes
-    /// - `at_m`: one coordinate for each axis, 1 to [`MAX_AXES`]
-    /// # Real Time
-    /// Cold.
-    /// # Errors
-    /// [`TrajectoryError`] for another number of axes, a point or cycle out of range, or no samples.
-    pub fn hold(at_m: &[f64], n_samples: usize, cycle_s: f64) -> Result<Self, TrajectoryError> {
-        let n_axes = at_m.len();
-        if !(1..=MAX_AXES).contains(&n_axes) {
-            return Err(TrajectoryError::Axes { n_axes });
-        }
-        check_time("cycle", cycle_s, path::CYCLE_S)?;
-        if n_samples == 0 {
-            return Err(TrajectoryError::Empty);
-        }
-        let setpoint = Setpoint::at_rest(path::point(at_m)?);
-        Ok(Self { motion: Motion::Hold(setpoint), n_axes, cycle_s, n_samples, tick: 0 })
-    }
-
-    /// Plays a motion that was worked out beforehand, from rest to rest, with rests around it.
-    ///
-    /// # Real Time
-    /// Cold: copies the motion.
-    /// # Errors
-    /// [`TrajectoryError`] for a rest out of range, a motion of no samples, or too many.
-    pub fn play(
-        motion: &SampledMotion,
-        dwell_before_s: f64,
-        dwell_after_s: f64,
-    ) -> Result<Self, TrajectoryError> {
-        check_time("dwell before", dwell_before_s, (0.0, DWELL_MAX_S))?;
-        check_time("dwell after", dwell_after_s, (0.0, DWELL_MAX_S))?;
-        if motion.n_samples() == 0 {
-            return Err(TrajectoryError::Empty);
-        }
-        let cycle_s = motion.dt_s;
-        let table = Table::new(motion, blended::n_ticks(dwell_before_s, cycle_s)?);
-        let n_samples = table.rest_tick() + blended::n_ticks(dwell_after_s, cycle_s)? + 1;
-        let motion = Self {
-            motion: Motion::Table(table),
-            n_axes: motion.n_axes,
-            cycle_s,
-            n_samples,
-            tick: 0,
-        };
-        Ok(motion)
-    }
-
-    /// Verifies the set points of the run, whatever it was planned by: their finite differences over
-    /// the cycle, from rest to rest, are within the limits.
-    ///
-    /// # Shapes
-    /// - `limits`: one entry an axis
-    /// # Real Time
-    /// Cold: allocates, and walks through the run.
-    /// # Errors
-    /// [`TrajectoryError::SetPoint`] for the first set point that breaks a limit.
-    pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, TrajectoryError> {
-        if limits.len() != self.n_axes {
-            let (found, expected) = (limits.len(), self.n_axes);
-            return Err(TrajectoryError::LimitCount { found, expected });
-        }
-        let reference_m = self.reference();
-        Verification::of_motion(&reference_m, limits, self.cycle_s).accept(&reference_m)?;
-        Ok(self)
+    /// Starts a planned motion at its first tick.
+    pub(crate) fn new(motion: Motion, n_axes: usize, cycle_s: f64, n_samples: usize) -> Self {
+        Self { motion, n_axes, cycle_s, n_samples, tick: 0 }
     }
 
     /// Goes back to the first set point.
@@ -210,13 +99,3 @@ impl Interpolator {
         reference_m
     }
 }
-
-#[cfg(test)]
-#[allow(
-    clippy::disallowed_methods,
-    clippy::disallowed_types,
-    clippy::disallowed_macros,
-    clippy::float_cmp,
-    reason = "tests are cold, and exact where exactness is promised"
-)]
-mod tests;

@@ -9,21 +9,26 @@
 pub(crate) mod arc;
 pub(crate) mod blend;
 pub(crate) mod element;
+mod error;
 pub(crate) mod exact_stop;
 pub(crate) mod interpolator;
 pub(crate) mod limits;
+pub(crate) mod line;
 mod point_to_point;
-pub(crate) mod profile;
+mod profile;
+mod quantity;
 #[cfg(test)]
 pub(crate) mod random;
-pub(crate) mod setpoint;
+mod setpoint;
 mod stop;
 pub(crate) mod table;
 
+pub use error::MoveError;
 pub use interpolator::Interpolator;
 pub use limits::{AxisLimits, PathLimits};
 pub use point_to_point::PointToPoint;
 pub use profile::{JerkLimited, PathState};
+pub use quantity::{AxisUnit, Quantity};
 pub use setpoint::Setpoint;
 pub use stop::ControlledStop;
 

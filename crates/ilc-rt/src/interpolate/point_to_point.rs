@@ -1,10 +1,9 @@
 //! A straight, time-synchronised move of all axes from rest to rest, planned between two ticks.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::MAX_AXES;
-use crate::trajectory::error::TrajectoryError;
-use super::limits::{AxisLimits, Line, PathLimits};
+use super::error::MoveError;
+use super::limits::{AxisLimits, PathLimits};
+use super::line::Line;
 use super::profile::JerkLimited;
 use super::setpoint::Setpoint;
 
@@ -23,16 +22,16 @@ impl PointToPoint {
     /// # Real Time
     /// Hot: allocates nothing, a few roots.
     /// # Errors
-    /// [`TrajectoryError`] if a position is not finite, or a limit or the feed not positive.
+    /// [`MoveError`] if a position is not finite, or a limit or the feed not positive.
     pub fn new(
         from_m: &[f64; MAX_AXES],
         to_m: &[f64; MAX_AXES],
         n_axes: usize,
         limits: &[AxisLimits; MAX_AXES],
         feed_m_s: f64,
-    ) -> Result<Self, TrajectoryError> {
+    ) -> Result<Self, MoveError> {
         if !(1..=MAX_AXES).contains(&n_axes) {
-            return Err(TrajectoryError::Axes { n_axes });
+            return Err(MoveError::Axes { n_axes });
         }
         let (mut start_m, mut end_m) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
         for axis in 0..n_axes {
@@ -40,7 +39,11 @@ impl PointToPoint {
                 [(from_m[axis], &mut start_m[axis]), (to_m[axis], &mut end_m[axis])]
             {
                 if !position_m.is_finite() {
-                    return Err(TrajectoryError::Position { axis, position_m, limit_m: f64::MAX });
+                    return Err(MoveError::Position {
+                        axis,
+                        position: position_m,
+                        limit: f64::MAX,
+                    });
                 }
                 *copy = position_m;
             }

@@ -3,10 +3,9 @@
 //! Jerk is `+J 0 -J 0 -J 0 +J`: up to the acceleration limit, up to the velocity limit, cruise, and
 //! the mirror image. A short move drops the phases that it has no room for.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
-use crate::trajectory::error::{Quantity, TrajectoryError};
+use super::error::MoveError;
 use super::limits::{PathLimits, is_positive};
+use super::quantity::Quantity;
 
 /// Where a move along its path is at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,23 +46,23 @@ impl JerkLimited {
     /// # Real Time
     /// Allocates nothing; a few roots.
     /// # Errors
-    /// [`TrajectoryError::Length`] or [`TrajectoryError::Limit`] for what is not finite and above 0,
-    /// [`TrajectoryError::Duration`] if the numbers are too far apart to compute with.
+    /// [`MoveError::Length`] or [`MoveError::Limit`] for what is not finite and above 0,
+    /// [`MoveError::Duration`] if the numbers are too far apart to compute with.
     pub fn plan(
         length_m: f64,
         velocity_m_s: f64,
         acceleration_m_s2: f64,
         jerk_m_s3: f64,
-    ) -> Result<Self, TrajectoryError> {
+    ) -> Result<Self, MoveError> {
         let (v, a, j) = (velocity_m_s, acceleration_m_s2, jerk_m_s3);
         if !is_positive(length_m) {
-            return Err(TrajectoryError::Length { length_m });
+            return Err(MoveError::Length { length: length_m });
         }
         for (quantity, value) in
             [(Quantity::Velocity, v), (Quantity::Acceleration, a), (Quantity::Jerk, j)]
         {
             if !is_positive(value) {
-                return Err(TrajectoryError::Limit { quantity, value });
+                return Err(MoveError::Limit { quantity, value });
             }
         }
         let (full_jerk_s, full_hold_s) =
@@ -96,7 +95,7 @@ impl JerkLimited {
         if is_positive(duration_s) && is_positive(jerk_time_s) && is_positive(peak_velocity_m_s) {
             Ok(plan)
         } else {
-            Err(TrajectoryError::Duration { length_m, duration_s })
+            Err(MoveError::Duration { length: length_m, duration_s })
         }
     }
 
@@ -104,7 +103,7 @@ impl JerkLimited {
     ///
     /// # Errors
     /// As [`JerkLimited::plan`].
-    pub fn along(length_m: f64, limits: &PathLimits) -> Result<Self, TrajectoryError> {
+    pub fn along(length_m: f64, limits: &PathLimits) -> Result<Self, MoveError> {
         Self::plan(length_m, limits.velocity_m_s, limits.acceleration_m_s2, limits.jerk_m_s3)
     }
 
@@ -318,7 +317,7 @@ mod tests {
         }
         assert!(matches!(
             JerkLimited::plan(1e300, 1e-300, 1.0, 1.0),
-            Err(TrajectoryError::Duration { .. })
+            Err(MoveError::Duration { .. })
         ));
     }
 }

@@ -1,7 +1,5 @@
 //! A controlled stop: every axis to rest from whatever it is doing, within its limits.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::MAX_AXES;
 use super::limits::AxisLimits;
 use super::setpoint::Setpoint;

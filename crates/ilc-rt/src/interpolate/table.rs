@@ -1,9 +1,6 @@
 //! The tick of a motion that was worked out beforehand: one row of set points a tick.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::MAX_AXES;
-use crate::trajectory::motion::SampledMotion;
 use super::setpoint::Setpoint;
 
 /// Positions and velocities, with a rest before them; the last row is held.
@@ -14,22 +11,22 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Copies a motion. Cold.
-    pub(crate) fn new(motion: &SampledMotion, rest_ticks: usize) -> Self {
-        let n_axes = motion.n_axes.clamp(1, MAX_AXES);
+    /// Copies positions and velocities, `n_axes` a row. Cold.
+    pub(crate) fn new(
+        position_m: &[f64],
+        velocity_m_s: &[f64],
+        n_axes: usize,
+        rest_ticks: usize,
+    ) -> Self {
+        let n_axes = n_axes.clamp(1, MAX_AXES);
         let row = |(position_m, velocity_m_s): (&[f64], &[f64])| {
             let mut row = [[0.0; MAX_AXES]; 2];
             row[0][..position_m.len()].copy_from_slice(position_m);
             row[1][..velocity_m_s.len()].copy_from_slice(velocity_m_s);
             row
         };
-        let rows = motion
-            .position_m
-            .chunks_exact(n_axes)
-            .zip(motion.velocity_m_s.chunks_exact(n_axes))
-            .map(row)
-            .collect();
-        Self { rows, rest_ticks }
+        let rows = position_m.chunks_exact(n_axes).zip(velocity_m_s.chunks_exact(n_axes));
+        Self { rows: rows.map(row).collect(), rest_ticks }
     }
 
     /// The tick from which it rests at its end.

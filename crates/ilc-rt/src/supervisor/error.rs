@@ -7,8 +7,8 @@ use crate::fieldbus::transport::OpenError;
 use crate::learning::LearningError;
 use crate::library::LibraryError;
 use crate::model::ModelError;
-use crate::trajectory::TrajectoryError;
 use crate::trajectory::program::{GcodeError, TableError};
+use crate::trajectory::{AxisUnit, TrajectoryError};
 
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
@@ -71,14 +71,16 @@ pub enum SupervisorError {
         source: crate::fieldbus::BusError,
     },
     /// The program cannot be run within the limits.
-    #[error("{file}: {key}: {source}")]
+    #[error("{file}: {key}: {}", source.in_units(units))]
     Program {
         /// Cell description.
         file: String,
         /// `[program]`, and which axis the number in the reason stands for.
         key: String,
         /// Why.
-        source: TrajectoryError,
+        source: Box<TrajectoryError>,
+        /// Units of the axes.
+        units: Vec<AxisUnit>,
     },
     /// The file of the program cannot be read.
     #[error("{file}: cannot be read: {reason}; allowed: a text file of {what}")]

@@ -173,7 +173,12 @@ fn refused(cell: &Cell, source: TrajectoryError) -> SupervisorError {
         Some((i, axis)) => format!("[program] (axis {} is {})", i + 1, axis.name),
         None => "[program]".to_owned(),
     };
-    SupervisorError::Program { file: cell.file.display().to_string(), key, source }
+    SupervisorError::Program {
+        file: cell.file.display().to_string(),
+        key,
+        source: Box::new(source),
+        units: cell.units(),
+    }
 }
 
 fn points(cell: &Cell) -> Vec<PathSegment> {

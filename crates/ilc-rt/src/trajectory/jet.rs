@@ -1,8 +1,6 @@
 //! A function of time with its first three derivatives, so that velocity, acceleration and jerk are
 //! exact and are written once. Read by the other files of this folder.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// Value, first, second and third derivative.

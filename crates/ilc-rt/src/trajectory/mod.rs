@@ -6,26 +6,30 @@
 
 pub mod contour;
 pub mod curve;
-pub(crate) mod error;
+mod error;
 pub mod exponential;
+mod grid;
 mod jet;
 mod linear;
-pub(crate) mod motion;
-pub(crate) mod path;
+mod motion;
+mod path;
+mod plan;
 pub mod program;
+mod refusal;
 mod shape;
 #[cfg(test)]
 mod tests;
-pub(crate) mod verify;
+mod verify;
 
 pub use crate::interpolate::{
-    AxisLimits, ControlledStop, Interpolator, JerkLimited, MAX_AXES, PathLimits, PathState,
-    PointToPoint, Setpoint,
+    AxisLimits, AxisUnit, ControlledStop, Interpolator, JerkLimited, MAX_AXES, MoveError,
+    PathLimits, PathState, PointToPoint, Quantity, Setpoint,
 };
 pub use contour::{contour_error_m, path_tangents};
-pub use error::{Quantity, TrajectoryError};
+pub use error::TrajectoryError;
 pub use exponential::{ExponentialSigmoid, ModulatedSegment};
 pub use linear::{Linear, LinearSetting};
 pub use motion::{MotionState, SampledMotion, TrackingIndex, set_points};
 pub use path::{ArcSpec, CornerRule, PathSegment, PathSpec};
+pub use refusal::Refusal;
 pub use shape::{POINTS_A_PERIOD, points_program, raster};

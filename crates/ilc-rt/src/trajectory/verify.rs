@@ -1,22 +1,21 @@
-//! Whether set points hold the limits as they are sent: by their finite differences over the cycle.
+//! Verification of set points against the limits, by their finite differences over the cycle.
 //!
 //! A plan knows derivatives at places; a drive gets positions, one a cycle. Every path, whatever it was
 //! planned by, is accepted only after its own set points have been through here, with rest before the
-//! first and after the last. Cold.
+//! first and after the last.
 
-use crate::interpolate::MAX_AXES;
-use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::interpolate::limits::AxisLimits;
+use super::error::TrajectoryError;
+use crate::interpolate::{AxisLimits, MAX_AXES, Quantity};
 
 /// Relative excess that still counts as holding a limit.
-pub(crate) const TOLERANCE: f64 = 1e-9;
+pub(super) const TOLERANCE: f64 = 1e-9;
 /// Rows of rest after the last one that count too: the last jerk is felt when the acceleration is back
 /// at 0.
-pub(crate) const ROWS_AFTER: usize = 3;
+pub(super) const ROWS_AFTER: usize = 3;
 
 /// Velocity, acceleration and jerk over the cycle, row by row, from rest at the first.
 #[derive(Clone, Debug)]
-pub(crate) struct Differences {
+pub(super) struct Differences {
     dt_s: f64,
     /// Position, velocity and acceleration of the row before.
     before: [[f64; 3]; MAX_AXES],
@@ -24,7 +23,7 @@ pub(crate) struct Differences {
 
 impl Differences {
     /// Begins at rest at a point of up to [`MAX_AXES`] coordinates.
-    pub(crate) fn from_rest(first_m: &[f64], dt_s: f64) -> Self {
+    pub(super) fn from_rest(first_m: &[f64], dt_s: f64) -> Self {
         let mut before = [[0.0; 3]; MAX_AXES];
         for (axis, &position_m) in before.iter_mut().zip(first_m) {
             axis[0] = position_m;
@@ -33,7 +32,7 @@ impl Differences {
     }
 
     /// Velocity, acceleration and jerk of each axis on the way to the next row.
-    pub(crate) fn next(&mut self, row_m: &[f64]) -> [[f64; 3]; MAX_AXES] {
+    pub(super) fn next(&mut self, row_m: &[f64]) -> [[f64; 3]; MAX_AXES] {
         let mut found = [[0.0; 3]; MAX_AXES];
         for ((before, found), &position_m) in self.before.iter_mut().zip(&mut found).zip(row_m) {
             let velocity = (position_m - before[0]) / self.dt_s;
@@ -46,40 +45,40 @@ impl Differences {
 }
 
 /// What differences of rounded positions carry of their own, for velocity (0) to jerk (2).
-pub(crate) fn rounding_noise(farthest_m: f64, order: usize, dt_s: f64) -> f64 {
+pub(super) fn rounding_noise(farthest_m: f64, order: usize, dt_s: f64) -> f64 {
     let power = i32::try_from(order).unwrap_or(2) + 1;
     8.0 * f64::EPSILON * (2.0 + farthest_m) / dt_s.powi(power)
 }
 
 /// A row at which a limit is broken.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Excess {
-    pub(crate) row: usize,
-    pub(crate) axis: usize,
-    pub(crate) quantity: Quantity,
-    pub(crate) reached: f64,
-    pub(crate) limit: f64,
+pub(super) struct Excess {
+    pub(super) row: usize,
+    pub(super) axis: usize,
+    pub(super) quantity: Quantity,
+    pub(super) reached: f64,
+    pub(super) limit: f64,
 }
 
 /// Compares rows with limits, and notes each excess.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Verification<'a> {
-    pub(crate) limits: &'a [AxisLimits],
-    pub(crate) dt_s: f64,
+pub(super) struct Verification<'a> {
+    pub(super) limits: &'a [AxisLimits],
+    pub(super) dt_s: f64,
     /// Farthest position of an axis, and what its rounding may be that of: where a motion is computed
     /// from the time, the way that is gone meanwhile.
-    pub(crate) farthest_m: f64,
+    pub(super) farthest_m: f64,
 }
 
 impl<'a> Verification<'a> {
     /// For the rows of a table, whose positions are what they are.
-    pub(crate) fn of_rows(position_m: &[f64], limits: &'a [AxisLimits], dt_s: f64) -> Self {
+    pub(super) fn of_rows(position_m: &[f64], limits: &'a [AxisLimits], dt_s: f64) -> Self {
         let farthest_m = position_m.iter().fold(0.0_f64, |most, p| most.max(p.abs()));
         Self { limits, dt_s, farthest_m }
     }
 
     /// For rows that are computed from their time, which is rounded as well.
-    pub(crate) fn of_motion(position_m: &[f64], limits: &'a [AxisLimits], dt_s: f64) -> Self {
+    pub(super) fn of_motion(position_m: &[f64], limits: &'a [AxisLimits], dt_s: f64) -> Self {
         let table = Self::of_rows(position_m, limits, dt_s);
         let lasts_s = position_m.len() as f64 / limits.len().max(1) as f64 * dt_s;
         let gone_m = limits.iter().fold(0.0_f64, |most, l| most.max(l.velocity_max_m_s)) * lasts_s;
@@ -87,7 +86,7 @@ impl<'a> Verification<'a> {
     }
 
     /// The first excess; none if every limit holds at every row.
-    pub(crate) fn first_excess(&self, position_m: &[f64]) -> Option<Excess> {
+    pub(super) fn first_excess(&self, position_m: &[f64]) -> Option<Excess> {
         let mut first = None;
         self.each_excess(position_m, |excess| {
             first = Some(excess);
@@ -97,7 +96,7 @@ impl<'a> Verification<'a> {
     }
 
     /// Every excess in order, until `goes_on` does not want more.
-    pub(crate) fn each_excess(&self, position_m: &[f64], mut goes_on: impl FnMut(Excess) -> bool) {
+    pub(super) fn each_excess(&self, position_m: &[f64], mut goes_on: impl FnMut(Excess) -> bool) {
         let n_axes = self.limits.len();
         let Some(first_m) = position_m.get(..n_axes) else { return };
         let last_m = &position_m[position_m.len() - n_axes..];
@@ -129,7 +128,7 @@ impl<'a> Verification<'a> {
     ///
     /// # Errors
     /// [`TrajectoryError::SetPoint`] with the time, the value and the limit.
-    pub(crate) fn accept(&self, position_m: &[f64]) -> Result<(), TrajectoryError> {
+    pub(super) fn accept(&self, position_m: &[f64]) -> Result<(), TrajectoryError> {
         match self.first_excess(position_m) {
             None => Ok(()),
             Some(Excess { row, axis, quantity, reached, limit }) => {

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use super::run::flat;
 use super::{Curve, Derivatives};
+use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::jet::Jet;
-use crate::interpolate::limits::is_positive;
 
 /// `r = pitch θ/2π` around a centre.
 #[derive(Clone, Copy, Debug, PartialEq)]

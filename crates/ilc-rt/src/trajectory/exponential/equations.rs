@@ -4,8 +4,6 @@
 //! `6 α b`; the acceleration 2.10 has one minus; 2.11 is ½ at `c`; the exponents of 2.12 and 2.13
 //! have opposite signs.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use crate::trajectory::jet::Jet;
 
 /// Start of a line, `x_L = (m t + b)(1 - e^{-α t³})`, and its velocity, acceleration and jerk.
@@ -59,13 +57,7 @@ pub fn blending_ratio(before_m_s: f64, after_m_s: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(
-    clippy::disallowed_methods,
-    clippy::disallowed_types,
-    clippy::disallowed_macros,
-    clippy::float_cmp,
-    reason = "tests are cold, and exact where exactness is promised"
-)]
+#[allow(clippy::float_cmp, reason = "exact where exactness is promised")]
 mod tests {
     use super::*;
     use crate::interpolate::random::Random;

@@ -4,8 +4,6 @@
 //! on the oscillation. A deviation is gone at the other end, and a window is multiplied by one that
 //! is shut there: so the leg is at rest, or at its corner, exactly, whatever α each end has.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::equations::weight_after;
 use crate::trajectory::jet::Jet;
 

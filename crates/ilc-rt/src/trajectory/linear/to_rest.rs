@@ -4,9 +4,7 @@
 //! The axis goes to a cruising velocity and from it to rest. The distance of the two ramps grows with
 //! that velocity, so that one bisection finds the one which arrives.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
-use crate::interpolate::limits::AxisLimits;
+use crate::interpolate::AxisLimits;
 
 /// Bisections of the cruising velocity.
 const STEPS: usize = 100;

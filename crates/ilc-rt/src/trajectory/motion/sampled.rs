@@ -1,9 +1,8 @@
 //! The state of a motion at one time, and a whole motion as tables.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
-use crate::interpolate::MAX_AXES;
-use crate::interpolate::limits::AxisLimits;
+use crate::interpolate::{AxisLimits, MAX_AXES};
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::grid::{CYCLE_S, check_time, n_ticks_after};
 use crate::trajectory::verify::Verification;
 
 /// Position and its derivatives at one time; axes beyond the motion's own stay at 0.
@@ -54,17 +53,16 @@ impl SampledMotion {
     /// # Real Time
     /// Cold: allocates.
     /// # Errors
-    /// [`TrajectoryError`](crate::trajectory::TrajectoryError) if `dt_s` is out of range or there would be too
+    /// [`TrajectoryError`] if `dt_s` is out of range or there would be too
     /// many samples.
-    #[expect(clippy::disallowed_methods, reason = "cold: laid out once")]
     pub fn sample(
         duration_s: f64,
         dt_s: f64,
         n_axes: usize,
         mut at: impl FnMut(f64) -> (MotionState, [f64; MAX_AXES]),
-    ) -> Result<Self, crate::trajectory::TrajectoryError> {
-        crate::trajectory::path::check_time("sample time", dt_s, crate::trajectory::path::CYCLE_S)?;
-        let n_samples = crate::trajectory::path::blended::n_ticks_after(duration_s, dt_s)? + 1;
+    ) -> Result<Self, TrajectoryError> {
+        check_time("sample time", dt_s, CYCLE_S)?;
+        let n_samples = n_ticks_after(duration_s, dt_s)? + 1;
         let mut motion = Self { dt_s, n_axes, ..Self::default() };
         for k in 0..n_samples {
             let (state, programmed_m) = at(k as f64 * dt_s);
@@ -84,12 +82,12 @@ impl SampledMotion {
     /// # Real Time
     /// Cold.
     /// # Errors
-    /// [`TrajectoryError::SetPoint`](crate::trajectory::TrajectoryError::SetPoint) for the first set point that
+    /// [`TrajectoryError::SetPoint`] for the first set point that
     /// breaks a limit.
-    pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, crate::trajectory::TrajectoryError> {
+    pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, TrajectoryError> {
         if limits.len() != self.n_axes {
             let (found, expected) = (limits.len(), self.n_axes);
-            return Err(crate::trajectory::TrajectoryError::LimitCount { found, expected });
+            return Err(TrajectoryError::LimitCount { found, expected });
         }
         Verification::of_motion(&self.position_m, limits, self.dt_s).accept(&self.position_m)?;
         Ok(self)

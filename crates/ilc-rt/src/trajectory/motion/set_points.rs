@@ -2,12 +2,11 @@
 //!
 //! For programs that come as a table instead of a path. The supervisor calls it.
 
-use crate::interpolate::MAX_AXES;
+use crate::interpolate::AxisLimits;
+use crate::interpolate::{MAX_AXES, MoveError};
 use crate::trajectory::error::TrajectoryError;
-use crate::interpolate::limits::AxisLimits;
+use crate::trajectory::grid::{CYCLE_S, N_SAMPLES_MAX, check_time};
 use crate::trajectory::motion::SampledMotion;
-use crate::trajectory::path::{CYCLE_S, check_time};
-use crate::trajectory::path::blended::N_SAMPLES_MAX;
 use crate::trajectory::verify::{Excess, Verification};
 
 /// Makes a motion of its set points, one a cycle, from rest at the first to rest at the last.
@@ -20,7 +19,7 @@ use crate::trajectory::verify::{Excess, Verification};
 /// # Real Time
 /// Cold: allocates.
 /// # Errors
-/// - [`TrajectoryError::Axes`], [`TrajectoryError::Empty`] and [`TrajectoryError::TooLong`] for a table
+/// - [`MoveError::Axes`], [`TrajectoryError::Empty`] and [`TrajectoryError::TooLong`] for a table
 ///   of no or too many columns or rows.
 /// - [`TrajectoryError::Row`] for the first row at which velocity, acceleration or jerk over the cycle
 ///   break a limit.
@@ -31,7 +30,7 @@ pub fn set_points(
 ) -> Result<SampledMotion, TrajectoryError> {
     let n_axes = limits.len();
     if !(1..=MAX_AXES).contains(&n_axes) {
-        return Err(TrajectoryError::Axes { n_axes });
+        return Err(MoveError::Axes { n_axes }.into());
     }
     check_time("sample time", dt_s, CYCLE_S)?;
     for (axis, limit) in limits.iter().enumerate() {
@@ -77,7 +76,7 @@ pub fn set_points(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::error::Quantity;
+    use crate::interpolate::Quantity;
 
     const DT_S: f64 = 0.01;
     const LIMITS: AxisLimits =

@@ -1,4 +1,4 @@
-//! The index `J` by which interpolators are compared: tracking and acceleration, weighted. Cold.
+//! The index `J` by which interpolators are compared: tracking and acceleration, weighted.
 
 use crate::trajectory::error::TrajectoryError;
 

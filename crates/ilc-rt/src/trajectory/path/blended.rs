@@ -1,18 +1,16 @@
-//! Proof that a blended path holds the limits, and what to change if it does not. Cold.
+//! The windows of a blended path: verified against the limits, with a remedy where none holds.
 //!
 //! The set points are generated once, as the loop will generate them, and their finite differences
 //! over the cycle are compared with the limits: nothing is estimated.
 
-use crate::interpolate::MAX_AXES;
+use super::spec::feed_max_m_s;
 use crate::interpolate::blend::Blend;
-use crate::interpolate::element::Element;
-use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::interpolate::limits::AxisLimits;
-use crate::trajectory::path::{PathSpec, check_time};
+use crate::interpolate::element::Leg;
+use crate::interpolate::{AxisLimits, MAX_AXES, Quantity};
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::grid::{check_time, n_ticks_after};
 use crate::trajectory::verify::{Differences, ROWS_AFTER, TOLERANCE, rounding_noise};
 
-/// Most samples of one run.
-pub(crate) const N_SAMPLES_MAX: usize = 10_000_000;
 /// Longest blend window.
 const WINDOW_MAX_S: f64 = 10.0;
 /// Steps of each bracketing search for a remedy.
@@ -27,21 +25,24 @@ struct Excess {
     limit: f64,
 }
 
-/// A path with the things that its proof needs.
-pub(crate) struct Proof<'a> {
-    pub(crate) spec: &'a PathSpec,
-    pub(crate) elements: &'a [Element],
-    pub(crate) limits: &'a [AxisLimits],
-    pub(crate) cycle_s: f64,
+/// The legs of a path to blend, the time at which they begin, and their limits.
+pub(in crate::trajectory) struct BlendedPath<'a> {
+    pub(in crate::trajectory) legs: &'a [Leg],
+    pub(in crate::trajectory) start_s: f64,
+    pub(in crate::trajectory) limits: &'a [AxisLimits],
+    pub(in crate::trajectory) cycle_s: f64,
 }
 
-impl Proof<'_> {
+impl BlendedPath<'_> {
     /// Finds the second window for which every limit holds, as short as a bracketing search finds
     /// it, and gives the plan with the tick at which it is at rest at its end.
     ///
     /// # Errors
     /// [`TrajectoryError::Exceeds`] with the worst excess and the feed and window that would do.
-    pub(crate) fn plan(&self, window_s: f64) -> Result<(Blend, usize), TrajectoryError> {
+    pub(in crate::trajectory) fn plan(
+        &self,
+        window_s: f64,
+    ) -> Result<(Blend, usize), TrajectoryError> {
         check_time("blend window", window_s, (self.cycle_s, WINDOW_MAX_S))?;
         let window = ticks(window_s, self.cycle_s);
         let mut broken = 0;
@@ -61,7 +62,13 @@ impl Proof<'_> {
 
     /// The plan for a pair of windows, and the tick at which it is at rest at its end.
     fn candidate(&self, window: usize, rounding: usize) -> Result<(Blend, usize), TrajectoryError> {
-        let blend = Blend::plan(self.spec, self.elements, self.cycle_s, (window, rounding));
+        let blend = Blend::plan(
+            self.legs,
+            self.limits.len(),
+            self.start_s,
+            self.cycle_s,
+            (window, rounding),
+        );
         let rest_tick = n_ticks_after(blend.end_s(), self.cycle_s)? + blend.ticks_late();
         Ok((blend, rest_tick))
     }
@@ -96,7 +103,7 @@ impl Proof<'_> {
             reached,
             limit,
             feed_factor,
-            feed_admissible_m_s: feed_factor * self.spec.feed_max_m_s(),
+            feed_admissible: feed_factor * feed_max_m_s(self.legs),
             window_admissible_s: self
                 .window_ticks(window, reached / limit)
                 .map(|ticks| ticks as f64 * self.cycle_s),
@@ -104,9 +111,9 @@ impl Proof<'_> {
     }
 
     fn feed_holds(&self, factor: f64, window: usize) -> bool {
-        let slower = self.spec.with_feed_times(factor);
-        let proof = Proof { spec: &slower, ..*self };
-        matches!(proof.excess(window, window), Ok(None))
+        let slower = |leg: &Leg| Leg { feed_m_s: leg.feed_m_s * factor, ..*leg };
+        let legs: Vec<Leg> = self.legs.iter().map(slower).collect();
+        matches!(BlendedPath { legs: &legs, ..*self }.excess(window, window), Ok(None))
     }
 
     /// The largest factor on all feeds that holds every limit, from below; 0 if none is found.
@@ -134,9 +141,9 @@ impl Proof<'_> {
     /// A longer window that holds every limit; none up to the longest one allowed, and none if a
     /// segment by itself is too fast for an axis, as averaging does not slow a straight line down.
     fn window_ticks(&self, window: usize, ratio: f64) -> Option<usize> {
-        for (element, segment) in self.elements.iter().zip(&self.spec.segments) {
-            let path = element.limits(self.limits, segment.feed_m_s);
-            if path.velocity_m_s < segment.feed_m_s * (1.0 - TOLERANCE) {
+        for leg in self.legs {
+            let path = leg.element.limits(self.limits, leg.feed_m_s);
+            if path.velocity_m_s < leg.feed_m_s * (1.0 - TOLERANCE) {
                 return None;
             }
         }
@@ -191,31 +198,4 @@ fn peaks(blend: &mut Blend, n_axes: usize, rest_tick: usize, cycle_s: f64) -> Pe
 )]
 fn ticks(window_s: f64, cycle_s: f64) -> usize {
     ((window_s / cycle_s - 1e-6).ceil() as usize).max(1)
-}
-
-/// Whole cycles that cover a duration.
-///
-/// # Errors
-/// [`TrajectoryError::TooLong`] if a run may not have so many samples.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "compared with the most samples before the cast; durations are not negative"
-)]
-pub(crate) fn n_ticks(duration_s: f64, cycle_s: f64) -> Result<usize, TrajectoryError> {
-    let n_samples = (duration_s / cycle_s - 1e-6).ceil().max(0.0);
-    if n_samples <= N_SAMPLES_MAX as f64 {
-        Ok(n_samples as usize)
-    } else {
-        Err(TrajectoryError::TooLong { duration_s, n_samples, n_samples_max: N_SAMPLES_MAX })
-    }
-}
-
-/// The first tick at or after a time, on the grid as the tick computes it.
-///
-/// # Errors
-/// As [`n_ticks`].
-pub(crate) fn n_ticks_after(time_s: f64, cycle_s: f64) -> Result<usize, TrajectoryError> {
-    let tick = n_ticks(time_s, cycle_s)?;
-    Ok(if (tick as f64) * cycle_s < time_s { tick + 1 } else { tick })
 }

@@ -1,9 +1,8 @@
-//! Paths of lines and arcs: their description, and the plan that walks along them tick by tick.
+//! Paths of lines and arcs: their description, and the blend of their corners.
 
-pub(crate) mod blended;
-pub(crate) mod spec;
+mod blended;
+mod spec;
 
+pub(in crate::trajectory) use blended::BlendedPath;
 pub use spec::{ArcSpec, CornerRule, PathSegment, PathSpec};
-pub(crate) use spec::{
-    CYCLE_S, DWELL_MAX_S, POSITION_MAX_M, check_limits, check_time, checked_lines, point,
-};
+pub(in crate::trajectory) use spec::{POSITION_MAX_M, check_limits, checked_lines, point};

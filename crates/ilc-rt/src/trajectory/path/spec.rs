@@ -1,18 +1,16 @@
-//! What a run shall do: a path of lines and arcs, how corners are taken, and rests. Cold.
+//! What a run shall do: a path of lines and arcs, how corners are taken, and rests.
 
-use crate::interpolate::MAX_AXES;
 use crate::interpolate::arc::Arc;
-use crate::interpolate::element::Element;
-use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::interpolate::limits::{AxisLimits, Line, is_positive};
+use crate::interpolate::element::{Element, Leg};
+use crate::interpolate::limits::is_positive;
+use crate::interpolate::line::Line;
+use crate::interpolate::{AxisLimits, MAX_AXES, MoveError, Quantity};
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::grid::{CYCLE_S, DWELL_MAX_S, check_time};
 use crate::trajectory::verify::TOLERANCE;
 
 /// Farthest position of a plan; the blend's fixed-point numbers hold it with room to spare.
-pub(crate) const POSITION_MAX_M: f64 = 4096.0;
-/// Servo cycles that a plan accepts.
-pub(crate) const CYCLE_S: (f64, f64) = (1e-5, 1.0);
-/// Longest rest before or after the motion.
-pub(crate) const DWELL_MAX_S: f64 = 3600.0;
+pub(in crate::trajectory) const POSITION_MAX_M: f64 = 4096.0;
 
 /// A move along a line or an arc.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,22 +71,22 @@ pub struct PathSpec {
 }
 
 impl PathSpec {
-    /// Checks every value, and gives each segment as an element.
+    /// Checks every value, and returns each segment as a leg.
     ///
     /// # Errors
     /// [`TrajectoryError`] for the first value that is out of its range.
-    pub(crate) fn elements(
+    pub(in crate::trajectory) fn legs(
         &self,
         limits: &[AxisLimits],
         cycle_s: f64,
-    ) -> Result<Vec<Element>, TrajectoryError> {
+    ) -> Result<Vec<Leg>, TrajectoryError> {
         check_time("cycle", cycle_s, CYCLE_S)?;
         check_time("dwell before", self.dwell_before_s, (0.0, DWELL_MAX_S))?;
         check_time("dwell after", self.dwell_after_s, (0.0, DWELL_MAX_S))?;
         for segment in &self.segments {
             check_time("dwell", segment.dwell_s, (0.0, DWELL_MAX_S))?;
         }
-        checked_elements(&self.start_m, &self.segments, limits)
+        checked_legs(&self.start_m, &self.segments, limits)
     }
 
     /// Refuses feeds at which an axis would have to be faster than it may: a plan with exact stops
@@ -102,14 +100,14 @@ impl PathSpec {
         limits: &[AxisLimits],
         rapid: &[bool],
     ) -> Result<(), TrajectoryError> {
-        let elements = checked_elements(&self.start_m, &self.segments, limits)?;
+        let legs = checked_legs(&self.start_m, &self.segments, limits)?;
         let mut worst: Option<(f64, usize, f64)> = None;
-        for (index, (element, segment)) in elements.iter().zip(&self.segments).enumerate() {
+        for (index, leg) in legs.iter().enumerate() {
             if rapid.get(index).copied().unwrap_or(false) {
                 continue;
             }
             for (axis, limit) in limits.iter().enumerate() {
-                let reached = element.share(axis) * segment.feed_m_s;
+                let reached = leg.element.share(axis) * leg.feed_m_s;
                 let ratio = reached / limit.velocity_max_m_s;
                 if ratio > 1.0 + TOLERANCE && worst.is_none_or(|(most, ..)| ratio > most) {
                     worst = Some((ratio, axis, reached));
@@ -123,38 +121,24 @@ impl PathSpec {
             reached,
             limit: limits[axis].velocity_max_m_s,
             feed_factor: 1.0 / ratio,
-            feed_admissible_m_s: self.feed_max_m_s() / ratio,
+            feed_admissible: feed_max_m_s(&legs) / ratio,
             window_admissible_s: None,
         })
     }
-
-    /// The same path with every feed times `factor`.
-    pub(crate) fn with_feed_times(&self, factor: f64) -> Self {
-        let mut slower = self.clone();
-        for segment in &mut slower.segments {
-            segment.feed_m_s *= factor;
-        }
-        slower
-    }
-
-    /// The feed of the fastest segment.
-    pub(crate) fn feed_max_m_s(&self) -> f64 {
-        self.segments.iter().fold(0.0, |most, segment| most.max(segment.feed_m_s))
-    }
 }
 
-/// Checks points, feeds and limits, and gives each segment as an element.
-fn checked_elements(
+/// Checks points, feeds and limits, and returns each segment as a leg.
+fn checked_legs(
     start_m: &[f64],
     segments: &[PathSegment],
     limits: &[AxisLimits],
-) -> Result<Vec<Element>, TrajectoryError> {
+) -> Result<Vec<Leg>, TrajectoryError> {
     check_limits(start_m.len(), limits)?;
     if segments.is_empty() {
         return Err(TrajectoryError::Empty);
     }
     let mut from_m = point(start_m)?;
-    let mut elements = Vec::with_capacity(segments.len());
+    let mut legs = Vec::with_capacity(segments.len());
     for (index, segment) in segments.iter().enumerate() {
         if segment.to_m.len() != start_m.len() {
             return Err(TrajectoryError::Coordinates {
@@ -164,7 +148,7 @@ fn checked_elements(
             });
         }
         if !is_positive(segment.feed_m_s) {
-            return Err(TrajectoryError::Feed { segment: index, feed_m_s: segment.feed_m_s });
+            return Err(TrajectoryError::Feed { segment: index, feed: segment.feed_m_s });
         }
         let to_m = point(&segment.to_m)?;
         let element = match segment.arc {
@@ -177,8 +161,8 @@ fn checked_elements(
                 Element::Arc(Arc::new(from_m, to_m, plane, center_m, clockwise).ok_or_else(
                     || TrajectoryError::Arc {
                         segment: index,
-                        from_radius_m: (from_m[p] - center_m[0]).hypot(from_m[q] - center_m[1]),
-                        to_radius_m: (to_m[p] - center_m[0]).hypot(to_m[q] - center_m[1]),
+                        from_radius: (from_m[p] - center_m[0]).hypot(from_m[q] - center_m[1]),
+                        to_radius: (to_m[p] - center_m[0]).hypot(to_m[q] - center_m[1]),
                     },
                 )?)
             }
@@ -187,22 +171,26 @@ fn checked_elements(
             return Err(TrajectoryError::ZeroLength { segment: index });
         }
         from_m = to_m;
-        elements.push(element);
+        legs.push(Leg { element, feed_m_s: segment.feed_m_s, dwell_s: segment.dwell_s });
     }
-    Ok(elements)
+    Ok(legs)
 }
 
-/// As [`checked_elements`], for segments without arcs.
-pub(crate) fn checked_lines(
+/// The feed of the fastest leg.
+pub(super) fn feed_max_m_s(legs: &[Leg]) -> f64 {
+    legs.iter().fold(0.0, |highest, leg| highest.max(leg.feed_m_s))
+}
+
+/// As [`checked_legs`], for segments without arcs.
+pub(in crate::trajectory) fn checked_lines(
     start_m: &[f64],
     segments: &[PathSegment],
     limits: &[AxisLimits],
 ) -> Result<Vec<Line>, TrajectoryError> {
-    let elements = checked_elements(start_m, segments, limits)?;
-    elements
-        .into_iter()
+    let legs = checked_legs(start_m, segments, limits)?;
+    legs.into_iter()
         .enumerate()
-        .map(|(segment, element)| match element {
+        .map(|(segment, leg)| match leg.element {
             Element::Line(line) => Ok(line),
             Element::Arc(_) => Err(TrajectoryError::NotStraight { segment }),
         })
@@ -210,9 +198,12 @@ pub(crate) fn checked_lines(
 }
 
 /// Refuses a number of axes or limits that cannot be, and limits that are not positive.
-pub(crate) fn check_limits(n_axes: usize, limits: &[AxisLimits]) -> Result<(), TrajectoryError> {
+pub(in crate::trajectory) fn check_limits(
+    n_axes: usize,
+    limits: &[AxisLimits],
+) -> Result<(), TrajectoryError> {
     if !(1..=MAX_AXES).contains(&n_axes) {
-        return Err(TrajectoryError::Axes { n_axes });
+        return Err(MoveError::Axes { n_axes }.into());
     }
     if limits.len() != n_axes {
         return Err(TrajectoryError::LimitCount { found: limits.len(), expected: n_axes });
@@ -223,25 +214,16 @@ pub(crate) fn check_limits(n_axes: usize, limits: &[AxisLimits]) -> Result<(), T
     Ok(())
 }
 
-/// Refuses a time that is not finite or not in its range.
-pub(crate) fn check_time(
-    name: &'static str,
-    value_s: f64,
-    (low_s, high_s): (f64, f64),
-) -> Result<(), TrajectoryError> {
-    if (low_s..=high_s).contains(&value_s) {
-        Ok(())
-    } else {
-        Err(TrajectoryError::Time { name, value_s, low_s, high_s })
-    }
-}
-
 /// A point in the array of the tick; unused axes are 0.
-pub(crate) fn point(coordinates_m: &[f64]) -> Result<[f64; MAX_AXES], TrajectoryError> {
+pub(in crate::trajectory) fn point(
+    coordinates_m: &[f64],
+) -> Result<[f64; MAX_AXES], TrajectoryError> {
     let mut point_m = [0.0; MAX_AXES];
     for (axis, (to, &position_m)) in point_m.iter_mut().zip(coordinates_m).enumerate() {
         if !(-POSITION_MAX_M..=POSITION_MAX_M).contains(&position_m) {
-            return Err(TrajectoryError::Position { axis, position_m, limit_m: POSITION_MAX_M });
+            return Err(
+                MoveError::Position { axis, position: position_m, limit: POSITION_MAX_M }.into()
+            );
         }
         *to = position_m;
     }

@@ -4,7 +4,7 @@
 //! one it must name the axes in order, so that exchanged columns are refused instead of driven.
 
 use super::text::{shown, without_mark};
-use crate::trajectory::path::blended::N_SAMPLES_MAX;
+use crate::trajectory::grid::N_SAMPLES_MAX;
 
 /// A refused table: the line from 1, what is there, and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

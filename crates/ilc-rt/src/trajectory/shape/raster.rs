@@ -1,7 +1,7 @@
-//! A raster: rows to and fro, and back to the start. Cold.
+//! A raster: rows to and fro, and back to the start.
 
-use crate::trajectory::error::TrajectoryError;
 use crate::interpolate::limits::is_positive;
+use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::path::PathSegment;
 
 /// Rows of `width_m` along the first axis, `pitch_m` apart along the second; with `there_and_back`

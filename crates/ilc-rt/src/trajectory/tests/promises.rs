@@ -1,8 +1,8 @@
 //! The promise of the whole folder: over more than a million random moves of every kind no limit is
 //! exceeded beyond 1e-9 of itself, nothing is not a number, and nothing lasts less than no time.
 
-use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
 use crate::interpolate::random::Random;
+use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
 use crate::trajectory::{
     AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, JerkLimited, Linear, LinearSetting,
     ModulatedSegment, MotionState, PathSegment, PathSpec, TrajectoryError,

@@ -215,7 +215,7 @@ fn a_blend_beyond_the_limits_is_refused_with_what_would_do() {
         quantity,
         reached,
         limit,
-        feed_admissible_m_s,
+        feed_admissible,
         window_admissible_s,
         ..
     } = error
@@ -224,7 +224,7 @@ fn a_blend_beyond_the_limits_is_refused_with_what_would_do() {
     };
     assert_eq!((axis, quantity), (1, Quantity::Acceleration));
     assert!((reached - 2.5).abs() < 1e-6 && (limit - 1.0).abs() < 1e-15);
-    assert!((feed_admissible_m_s - 0.04).abs() < 1e-3, "1 m/s2 in 40 ms: {feed_admissible_m_s}");
+    assert!((feed_admissible - 0.04).abs() < 1e-3, "1 m/s2 in 40 ms: {feed_admissible}");
     let window_s = window_admissible_s.unwrap();
     assert!((window_s - 0.1).abs() < 3e-3, "0.1 m/s at 1 m/s2: {window_s}");
     let line = error.to_string();
@@ -232,7 +232,7 @@ fn a_blend_beyond_the_limits_is_refused_with_what_would_do() {
     assert!(line.starts_with("axis 2: acceleration reaches 2.5 m/s^2, limit 1 m/s^2"), "{line}");
     assert!(!line.contains('\n'));
 
-    let slower = contour(CornerRule::Blend { window_s: 0.04 }, feed_admissible_m_s);
+    let slower = contour(CornerRule::Blend { window_s: 0.04 }, feed_admissible);
     assert_holds(&Interpolator::plan(&slower, &weak, CYCLE_S).unwrap(), &weak, "slower");
     let wider = contour(CornerRule::Blend { window_s }, 0.1);
     assert_holds(&Interpolator::plan(&wider, &weak, CYCLE_S).unwrap(), &weak, "wider");
