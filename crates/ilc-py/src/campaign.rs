@@ -7,12 +7,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use ilc_rt::campaign::{self, CampaignError, Disturbance, Options};
 use ilc_rt::config::{Cell, LawName, Measure};
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport::{self, loopback::InProcess};
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
-use ilc_rt::supervisor::{self, Disturbance, Options, SupervisorError};
 use ilc_sim::machine::{ClockMode, Machine};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -38,7 +38,7 @@ const SIGTERM: i32 = 15;
 #[pyclass(name = "EventStream", module = "ilc_rt._native", frozen)]
 struct EventStream {
     events: Mutex<Receiver<String>>,
-    thread: Mutex<Option<JoinHandle<Result<(), SupervisorError>>>>,
+    thread: Mutex<Option<JoinHandle<Result<(), CampaignError>>>>,
     stop: Arc<AtomicI32>,
 }
 
@@ -212,8 +212,8 @@ fn run_events(
             }
         };
         match experiment {
-            None => supervisor::run(&cell, &options, bus, law, &mut send),
-            Some(experiment) => supervisor::identify(&cell, &experiment, &options, bus, &mut send),
+            None => campaign::run(&cell, &options, bus, law, &mut send),
+            Some(experiment) => campaign::identify(&cell, &experiment, &options, bus, &mut send),
         }
         .map(drop)
     })?;
@@ -231,16 +231,16 @@ fn ask(measure: Py<PyAny>) -> Disturbance {
     })
 }
 
-fn open(cell: &Cell) -> Result<Box<dyn Bus>, SupervisorError> {
+fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
     let file = cell.file.display().to_string();
     if transport::scheme_of(&cell.bus.address).is_none_or(|scheme| !scheme.in_process) {
         let place = format!("{file}: [bus] address");
         return transport::open(&cell.bus.address)
-            .map_err(|source| SupervisorError::Bus { place, source });
+            .map_err(|source| CampaignError::Bus { place, source });
     }
     match Machine::from_cell(cell, ClockMode::LockStep) {
         Ok(machine) => Ok(Box::new(InProcess::new(machine, LOOPBACK_FRAMES))),
-        Err(error) => Err(SupervisorError::Simulation { file, reason: error.to_string() }),
+        Err(error) => Err(CampaignError::Simulation { file, reason: error.to_string() }),
     }
 }
 

@@ -1,8 +1,8 @@
 //! An identification experiment as Python describes it.
 
 use ilc_rt::config::Cell;
+use ilc_rt::identification::Experiment;
 use ilc_rt::model::identify::{Excitation, Waveform};
-use ilc_rt::supervisor::Experiment;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

@@ -4,16 +4,16 @@
 #![expect(clippy::print_stdout, reason = "a benchmark tells what it measured")]
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use ilc_rt::campaign::{self, Disturbance, Options};
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::transport::loopback::InProcess;
 use ilc_rt::learning::Law;
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
 use ilc_rt::model::{Method, StateSpace, discretize, second_order};
-use ilc_rt::supervisor::{self, Disturbance, Options};
 use ilc_sim::{ClockMode, Machine};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -88,7 +88,7 @@ fn time_update(
 }
 
 fn lockstep_against_real_time(n_runs: u32) -> Result<(), Box<dyn Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = ilc_tests::root();
     let cell = Cell::load(&root.join("examples/01_gantry.toml"))?;
     let drives = Machine::from_cell(&cell, ClockMode::LockStep)?;
     let library = std::env::temp_dir().join(format!("ilc-bench-{}.db", std::process::id()));
@@ -106,7 +106,7 @@ fn lockstep_against_real_time(n_runs: u32) -> Result<(), Box<dyn Error>> {
     let bus = Box::new(InProcess::new(drives, 1024));
     let began = Instant::now();
     let mut n_samples = 0;
-    supervisor::run(&cell, &options, bus, None, &mut |event| {
+    campaign::run(&cell, &options, bus, None, &mut |event| {
         if let ilc_rt::record::Event::Start { n_samples: n, .. } = event {
             n_samples = *n;
         }

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicI32;
 
+use ilc_rt::campaign::{self, Disturbance, Options, Outcome};
 use ilc_rt::config::{Cell, Measure};
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::library::Library;
 use ilc_rt::record::Figures;
-use ilc_rt::supervisor::{self, Disturbance, Options, Outcome};
 use ilc_sim::{ClockMode, Machine};
 
 use crate::Scratch;
@@ -80,7 +80,7 @@ pub fn run_on(cell: &Cell, bus: Box<dyn Bus>, iterations: u32, measure: Option<M
     let library = scratch.file("library.db");
     let options = Options { measure, ..options(library.clone(), iterations) };
     let outcome =
-        supervisor::run(cell, &options, bus, None, &mut |_| {}).expect("the campaign begins");
+        campaign::run(cell, &options, bus, None, &mut |_| {}).expect("the campaign begins");
     let library = Library::open(&library).expect("the library opens");
     let rows = library.list(Some(&outcome.campaign)).expect("the library lists");
     // Loading checks each array against its digest.

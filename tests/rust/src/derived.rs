@@ -1,13 +1,11 @@
 //! Parts of documents that derive from the source: compared, or with `ILC_DERIVE=1` written again.
 
-use std::path::Path;
-
 /// Holds the part of a document between `<!-- derived: NAME -->` and `<!-- end -->` against `text`.
 ///
 /// # Panics
 /// If they differ, or the document has no such part.
 pub fn hold_derived(document: &str, name: &str, text: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(document);
+    let path = crate::root().join(document);
     let whole = std::fs::read_to_string(&path).expect("the document is there");
     let begin = format!("<!-- derived: {name} -->\n");
     let from =

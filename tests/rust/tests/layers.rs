@@ -64,7 +64,7 @@ struct Module {
 }
 
 fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+    ilc_tests::root().canonicalize().unwrap()
 }
 
 /// `| 3 | `servo` | hot | the cycle … |` of the table of layers.

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::config::Cell;
-use ilc_rt::supervisor::{Plan, Prepared};
+use ilc_rt::design::{Plan, Prepared};
 use ilc_tests::example_text;
 
 const FILE: &str = "cell.toml";

@@ -9,14 +9,14 @@ use clap::{Args, ValueEnum};
 use super::figures::FiguresFile;
 use super::run::{MeasureName, bus_help, exit_status, open, say_event, stop_on_signals};
 use super::{EXIT_BAD_INPUT, show};
+use crate::campaign::{self, CampaignError, Disturbance, Options, Outcome};
 use crate::config::{Cell, Measure};
+use crate::identification::{
+    Band, BandSearch, Described, Experiment, IdentificationError, Identified,
+};
 use crate::library::Library;
 use crate::model::identify::{Doubt, Excitation, Waveform};
 use crate::record::{EndStatus, Event};
-use crate::supervisor::{
-    self, Band, BandSearch, Described, Disturbance, Experiment, Identified, Options, Outcome,
-    SupervisorError,
-};
 
 /// Where an axis is excited if only the highest frequency is asked for.
 const FALLBACK: Band = Band { from_hz: 1.0, to_hz: 50.0, period_s: 8.0 };
@@ -130,7 +130,7 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
 
 fn experiment(
     arguments: &IdentifyArguments,
-) -> Result<(Outcome, Option<Identified>), SupervisorError> {
+) -> Result<(Outcome, Option<Identified>), CampaignError> {
     let cell = Cell::load(&arguments.cell)?;
     let stop = stop_on_signals(arguments.with_parent);
     let mut search = BandSearch::new(&cell, &laid_out(arguments, FALLBACK))?;
@@ -144,7 +144,7 @@ fn experiment(
     while let Some(band) = search.next_band() {
         let (outcome, found) = match excite(arguments, &laid_out(arguments, band), &stop) {
             // An amplitude that was asked for may fit into a narrower band only.
-            Err(SupervisorError::Experiment { .. })
+            Err(CampaignError::Identification(IdentificationError::Experiment { .. }))
                 if arguments.amplitude.is_some() && best.is_none() && search.is_open() =>
             {
                 continue;
@@ -208,7 +208,7 @@ fn excite(
     arguments: &IdentifyArguments,
     experiment: &Experiment,
     stop: &Arc<AtomicI32>,
-) -> Result<(Outcome, Option<(Experiment, Identified)>), SupervisorError> {
+) -> Result<(Outcome, Option<(Experiment, Identified)>), CampaignError> {
     let (cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
     let mut experiment = experiment.clone();
     if arguments.amplitude.is_none() {
@@ -236,7 +236,7 @@ fn excite(
             show::say(reason);
         }
     };
-    let outcome = supervisor::identify(&cell, &experiment, &options, bus, &mut observe)?;
+    let outcome = campaign::identify(&cell, &experiment, &options, bus, &mut observe)?;
     let (Some(id), EndStatus::Completed, false) = (kept, outcome.status, arguments.events) else {
         return Ok((outcome, None));
     };

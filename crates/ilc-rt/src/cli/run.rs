@@ -10,10 +10,10 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 use super::figures::FiguresFile;
 use super::runs::Runs;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show, when_parent_ends};
+use crate::campaign::{self, CampaignError, Disturbance, Options, Outcome};
 use crate::config::{Cell, LawName, Measure};
 use crate::fieldbus::{Bus, transport};
 use crate::record::{EndStatus, Event};
-use crate::supervisor::{self, Disturbance, Options, Outcome, SupervisorError};
 
 #[derive(Args)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &RunArguments) -> u8 {
     }
 }
 
-fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
+fn campaign(arguments: &RunArguments) -> Result<Outcome, CampaignError> {
     let (mut cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
     cell.learning.allow_divergent |= arguments.allow_divergent;
     if arguments.no_learning {
@@ -126,7 +126,7 @@ fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
             show::say(&text);
         }
     };
-    supervisor::run(&cell, &options, bus, None, &mut observe)
+    campaign::run(&cell, &options, bus, None, &mut observe)
 }
 
 /// Prints an event as one line of JSON.
@@ -140,10 +140,7 @@ pub(super) fn say_event(event: &Event, stop: &AtomicI32) {
 }
 
 /// Reads a cell description and opens its bus, or the one of the command line.
-pub(super) fn open(
-    file: &Path,
-    bus: Option<&str>,
-) -> Result<(Cell, Box<dyn Bus>), SupervisorError> {
+pub(super) fn open(file: &Path, bus: Option<&str>) -> Result<(Cell, Box<dyn Bus>), CampaignError> {
     let mut cell = Cell::load(file)?;
     if let Some(address) = bus {
         address.clone_into(&mut cell.bus.address);
@@ -154,9 +151,9 @@ pub(super) fn open(
     };
     let address = &cell.bus.address;
     if transport::scheme_of(address).is_some_and(|scheme| scheme.in_process) {
-        return Err(SupervisorError::NoDrivesInside { place, address: address.clone() });
+        return Err(CampaignError::NoDrivesInside { place, address: address.clone() });
     }
-    let bus = transport::open(address).map_err(|source| SupervisorError::Bus { place, source })?;
+    let bus = transport::open(address).map_err(|source| CampaignError::Bus { place, source })?;
     Ok((cell, bus))
 }
 

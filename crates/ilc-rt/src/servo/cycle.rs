@@ -12,8 +12,8 @@ use super::spec::ServoSpec;
 use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::Bus;
 use crate::fieldbus::cia402::Mode;
+use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
 use crate::rt::Nanos;
-use crate::trajectory::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
 
 /// Longest fade of the learned input after a run.
 const FADE_MAX_S: f64 = 0.2;

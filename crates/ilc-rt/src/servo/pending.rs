@@ -10,7 +10,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::mailbox::Sample;
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 
 /// Cycles that may wait for their answers.
 const DEPTH: usize = 64;

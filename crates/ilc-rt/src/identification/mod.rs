@@ -1,0 +1,13 @@
+//! Experiments that identify an axis: their design within its limits, and the evaluation of their records.
+//!
+//! `campaign` runs them; `cli` and the Python bindings may import it as well. Cold.
+
+mod band;
+mod error;
+mod experiment;
+mod identified;
+
+pub use band::{Band, BandSearch};
+pub use error::IdentificationError;
+pub use experiment::Experiment;
+pub use identified::{Described, Identified};
