@@ -6,8 +6,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::bring_up::{bring_up, bring_up_encoder};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, State, bring_up, bring_up_encoder};
+use ilc_rt::fieldbus::cia402::{Command, State};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};

@@ -5,8 +5,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::bring_up::{DriveSetup, bring_up};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, Controlword, DriveSetup, State, bring_up};
+use ilc_rt::fieldbus::cia402::{Command, Controlword, State};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_rt::supervisor::drive_setup;

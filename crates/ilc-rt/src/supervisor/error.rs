@@ -1,8 +1,8 @@
 //! Why a campaign could not begin; nothing has moved when one of these is returned.
 
 use crate::config::ConfigError;
-use crate::fieldbus::cia402::BringUpError;
-use crate::fieldbus::load::LoadError;
+use crate::fieldbus::bring_up::BringUpError;
+use crate::fieldbus::bring_up::load::LoadError;
 use crate::fieldbus::transport::OpenError;
 use crate::learning::LearningError;
 use crate::library::LibraryError;
@@ -58,7 +58,7 @@ pub enum SupervisorError {
         /// Bus address.
         address: String,
         /// What was heard of it.
-        heard: crate::fieldbus::canopen::listen::Command,
+        heard: crate::fieldbus::bring_up::listen::Command,
     },
     /// The bus failed while the nodes were started.
     #[error("{file}: [bus] address = {address}: {source}")]

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::bring_up::{DriveSetup, bring_up};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Status, bring_up, next_command};
+use ilc_rt::fieldbus::cia402::{Command, Status, next_command};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_rt::supervisor::drive_setup;

@@ -4,7 +4,7 @@
 //! lost drives, long after the mistake was made. The counts are the worst case of bit stuffing, so that
 //! a cell that passes here fits whatever the payloads are.
 
-use super::frame::PAYLOAD_MAX;
+use crate::fieldbus::frame::PAYLOAD_MAX;
 
 /// Bits of a frame without payload: 34 stuffable bits of header and CRC, at most 8 stuff bits, 13 bits
 /// of tail and interframe space.

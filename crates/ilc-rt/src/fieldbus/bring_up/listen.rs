@@ -2,11 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use super::cob_id;
-use super::nmt::NmtCommand;
-use super::node_id::NodeId;
-use super::pdo::PdoNumber;
-use super::sync;
+use crate::fieldbus::canopen::pdo::PdoNumber;
+use crate::fieldbus::canopen::{NmtCommand, NodeId, cob_id, sync};
 use crate::fieldbus::{Bus, BusError, Frame};
 
 /// How long a bus is listened to: several cycles of any servo loop, and two heartbeats of 100 ms.

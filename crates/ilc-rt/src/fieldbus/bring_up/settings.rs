@@ -4,10 +4,10 @@
 //! deceleration so low that a quick stop never ends. So each object that shapes motion is read at
 //! bring-up, put right where it is wrong and can be, and is a reason to refuse the drive otherwise.
 
-use super::bring_up::{DriveSetup, FOLLOWING_ERROR_TIME_MS};
-use super::objects;
+use super::drive::{DriveSetup, FOLLOWING_ERROR_TIME_MS};
 use super::setting::{Kind, Need, Setting};
 use crate::fieldbus::canopen::{NodeId, cob_id};
+use crate::fieldbus::cia402::objects;
 
 /// The maximum torque that is a drive's own, in thousandths of its rated torque.
 const RATED: i64 = 1000;

@@ -1,7 +1,7 @@
 //! One object of a node that must hold a certain value, and what is done to see to it.
 
-use super::objects;
 use crate::fieldbus::canopen::ObjectAddress;
+use crate::fieldbus::cia402::objects;
 
 /// Share by which a rate may differ from what was written: drives keep rates in units of their own.
 const RATE_TOLERANCE: f64 = 0.01;

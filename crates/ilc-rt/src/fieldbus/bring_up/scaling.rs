@@ -1,10 +1,10 @@
 //! The factors of a drive: one count of its bus must be one count of the cell description.
 
-use super::bring_up::DriveSetup;
-use super::bring_up_error::BringUpError;
-use super::objects;
+use super::drive::DriveSetup;
+use super::error::BringUpError;
 use super::remote::Remote;
 use super::setting::{Kind, Need, Setting};
+use crate::fieldbus::cia402::objects;
 
 /// A ratio that a node does not have.
 const UNITY: [u32; 2] = [1, 1];

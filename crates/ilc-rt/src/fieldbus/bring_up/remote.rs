@@ -1,9 +1,10 @@
 //! One node during its bring-up: reads, writes, and objects that must hold a value.
 
-use super::bring_up_error::BringUpError;
+use super::error::BringUpError;
+use super::sdo_client::{SdoClient, SdoError};
 use super::setting::{self, Absence, Kind, Need, Setting};
 use crate::fieldbus::Bus;
-use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress, SdoClient, SdoError};
+use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
 
 /// One node during its bring-up.
 pub(super) struct Remote<'a> {

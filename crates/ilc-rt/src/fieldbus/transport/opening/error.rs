@@ -80,7 +80,11 @@ pub enum OpenError {
 
 impl OpenError {
     /// Returns the system's error at an address, for hot files, which make no text themselves.
-    pub(super) fn os(address: fmt::Arguments<'_>, action: &'static str, source: io::Error) -> Self {
+    pub(in crate::fieldbus::transport) fn os(
+        address: fmt::Arguments<'_>,
+        action: &'static str,
+        source: io::Error,
+    ) -> Self {
         Self::Os { address: address.to_string(), action, source }
     }
 }

@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use super::bring_up_error::BringUpError;
-use super::mode::Mode;
+use super::error::BringUpError;
 use super::remote::Remote;
-use super::state::{Controlword, State, Statusword};
-use super::{objects, pdo_map, process_data, scaling, settings};
+use super::sdo_client::SdoClient;
+use super::{process_data, scaling, settings};
 use crate::fieldbus::Bus;
-use crate::fieldbus::canopen::{Heartbeat, NmtCommand, NmtState, NodeId, SdoClient};
+use crate::fieldbus::canopen::{Heartbeat, NmtCommand, NmtState, NodeId};
+use crate::fieldbus::cia402::{Controlword, Mode, State, Statusword, objects, pdo_map};
 
 /// How long the following error may exceed its window before the drive faults (object 0x6066), in ms.
 pub const FOLLOWING_ERROR_TIME_MS: u16 = 10;

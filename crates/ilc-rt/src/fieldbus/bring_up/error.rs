@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use super::mode::Mode;
+use super::sdo_client::SdoError;
 use crate::fieldbus::BusError;
-use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress, SdoError};
+use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
+use crate::fieldbus::cia402::Mode;
 
 /// Why a node could not be brought up: node, step, expected and found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Process data of a node: what others left switched on goes off, what the loop needs is mapped.
 
-use super::bring_up_error::BringUpError;
+use super::error::BringUpError;
 use super::remote::Remote;
 use super::setting::{Kind, Need, Setting};
 use crate::fieldbus::canopen::pdo::{

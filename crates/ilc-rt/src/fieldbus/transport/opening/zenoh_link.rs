@@ -1,6 +1,6 @@
 //! The Zenoh side of a `zenoh:` bus: session, publisher's thread and subscriber. Cold.
 //!
-//! Zenoh allocates and locks, so all of it stays behind the two ring buffers that [`super::zenoh`] holds
+//! Zenoh allocates and locks, so all of it stays behind the two ring buffers that `transport::zenoh` holds
 //! the other ends of.
 
 use std::sync::atomic::{AtomicBool, Ordering, fence};
@@ -14,11 +14,11 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::sample::{Locality, Sample};
 use zenoh::{Session, Wait};
 
-use super::super::frame::Frame;
-use super::doorbell::{Bell, Ringer, bell};
 use super::error::OpenError;
-use super::zenoh::{decode, encode};
 use super::zenoh_reach::{self, Reach};
+use crate::fieldbus::Frame;
+use crate::fieldbus::transport::doorbell::{Bell, Ringer, bell};
+use crate::fieldbus::transport::zenoh::{decode, encode};
 
 /// Frames that a ring buffer holds each way.
 const RING_FRAMES: usize = 4096;
@@ -55,15 +55,15 @@ impl Settings {
 }
 
 /// The caller's ends of an open link.
-pub(super) struct Ends {
-    pub(super) outgoing: Producer<Frame>,
-    pub(super) incoming: Consumer<Frame>,
-    pub(super) bell: Bell,
-    pub(super) link: Link,
+pub(in crate::fieldbus::transport) struct Ends {
+    pub(in crate::fieldbus::transport) outgoing: Producer<Frame>,
+    pub(in crate::fieldbus::transport) incoming: Consumer<Frame>,
+    pub(in crate::fieldbus::transport) bell: Bell,
+    pub(in crate::fieldbus::transport) link: Link,
 }
 
 /// An open session with its publisher's thread; closes both when dropped.
-pub(super) struct Link {
+pub(in crate::fieldbus::transport) struct Link {
     session: Session,
     publisher: Option<JoinHandle<()>>,
     shared: Arc<Shared>,
@@ -83,7 +83,7 @@ impl Link {
     ///
     /// # Errors
     /// [`OpenError::Zenoh`] with the step that Zenoh refused.
-    pub(super) fn open(settings: &Settings) -> Result<Ends, OpenError> {
+    pub(in crate::fieldbus::transport) fn open(settings: &Settings) -> Result<Ends, OpenError> {
         let refused = |action| {
             move |reason: zenoh::Error| OpenError::Zenoh {
                 key: settings.key.clone(),
@@ -119,7 +119,7 @@ impl Link {
     }
 
     /// Waits until another endpoint receives what is published; false if none did in time.
-    pub(super) fn wait_for_peer(&self, timeout: Duration) -> bool {
+    pub(in crate::fieldbus::transport) fn wait_for_peer(&self, timeout: Duration) -> bool {
         let end = Instant::now() + timeout;
         while !self.shared.matched.load(Ordering::Acquire) {
             if Instant::now() >= end {
@@ -132,7 +132,7 @@ impl Link {
 
     /// Wakes the publisher if it sleeps; call it after the outgoing buffer was filled. Hot: one fence,
     /// and a system call only if the publisher does sleep.
-    pub(super) fn wake_publisher(&self) {
+    pub(in crate::fieldbus::transport) fn wake_publisher(&self) {
         // Orders the filling before the look at `parked`, against the reverse order in `publish`.
         fence(Ordering::SeqCst);
         if self.shared.parked.load(Ordering::Relaxed)

@@ -4,9 +4,9 @@ use std::net::Ipv4Addr;
 use std::str::FromStr;
 
 use super::error::OpenError;
-use super::udp_multicast::{DEFAULT_PORT, DEFAULT_TTL};
 use super::zenoh_link::Settings;
 use super::zenoh_reach::stays_on_host;
+use crate::fieldbus::transport::udp_multicast::{DEFAULT_PORT, DEFAULT_TTL};
 
 /// Longest name of a network interface in Linux (`IFNAMSIZ` without its zero).
 const INTERFACE_NAME_MAX: usize = 15;
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn loopback_by_address_is_refused_with_the_reason() {
-        let line = super::super::open("loopback:").err().unwrap().to_string();
+        let line = crate::fieldbus::transport::open("loopback:").err().unwrap().to_string();
         assert!(line.contains("same process"), "{line}");
     }
 }

@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use super::cob_id;
-use super::node_id::NodeId;
-use super::sdo::{Expedited, ObjectAddress, SEGMENT_MAX, SdoRequest, SdoResponse, Segment};
-use super::sdo_abort::AbortCode;
+use crate::fieldbus::canopen::sdo::{
+    Expedited, ObjectAddress, SEGMENT_MAX, SdoRequest, SdoResponse, Segment,
+};
+use crate::fieldbus::canopen::{AbortCode, NodeId, cob_id};
 use crate::fieldbus::{Bus, BusError};
 
 /// How often a transfer is begun before the node counts as silent.
