@@ -10,7 +10,7 @@ use super::collect::Collector;
 use super::disturbance::Disturbance;
 use super::error::CampaignError;
 use super::keeper::{Keeper, Kept, Told};
-use super::learner::{Learner, Lesson, expect};
+use super::learner::{Learner, Lesson, set_disturbance};
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S};
 use super::pace::Pacer;
 use super::progress::{Decision, Progress, Resumed};
@@ -55,7 +55,7 @@ pub fn run(
     // Without a law there is nothing to take back. A gate decides by itself: it knows what is good
     // enough, and when the machine is not what it was.
     let growth_allowed = match &law {
-        Some(law) if !law.goes_back() => cell.learning.rollback(),
+        Some(law) if !law.handles_rollback() => cell.learning.rollback(),
         _ => f64::INFINITY,
     };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
@@ -124,7 +124,7 @@ fn carry_out(
         held = claim(&options.library, &plan.meta.campaign)?;
         let coming = options.disturbance.of(0).map_err(CampaignError::Disturbance)?;
         if let Some(law) = law.as_deref_mut() {
-            expect(law, &coming);
+            set_disturbance(law, &coming);
         }
         Resumed { coming, ..Resumed::default() }
     };

@@ -66,10 +66,10 @@ impl Learner {
             .spawn(move || {
                 for job in todo {
                     match job {
-                        Job::TakeBack => law.taken_back(),
-                        Job::Pass { coming } => expect(law.as_mut(), &coming),
+                        Job::TakeBack => law.on_rollback(),
+                        Job::Pass { coming } => set_disturbance(law.as_mut(), &coming),
                         Job::Learn { input, error, coming } => {
-                            expect(law.as_mut(), &coming);
+                            set_disturbance(law.as_mut(), &coming);
                             if done.send(learn(law.as_mut(), &input, &error)).is_err() {
                                 return;
                             }
@@ -90,7 +90,7 @@ impl Learner {
     pub(super) fn begin(&mut self, input: &[f64], error: &[f64], coming: &[f64]) {
         match self {
             Self::InLine { law, done } => {
-                expect(law.as_mut(), coming);
+                set_disturbance(law.as_mut(), coming);
                 *done = Some(learn(law.as_mut(), input, error));
             }
             Self::Thread { jobs: Some(jobs), .. } => {
@@ -105,7 +105,7 @@ impl Learner {
     /// Tells the law of the run to come when there is nothing to learn from the last one.
     pub(super) fn pass(&mut self, coming: &[f64]) {
         match self {
-            Self::InLine { law, .. } => expect(law.as_mut(), coming),
+            Self::InLine { law, .. } => set_disturbance(law.as_mut(), coming),
             Self::Thread { jobs: Some(jobs), .. } => {
                 let _ = jobs.send(Job::Pass { coming: coming.to_vec() });
             }
@@ -116,7 +116,7 @@ impl Learner {
     /// Tells the law that its last input is taken back, as the error grew with it.
     pub(super) fn take_back(&mut self) {
         match self {
-            Self::InLine { law, .. } => law.taken_back(),
+            Self::InLine { law, .. } => law.on_rollback(),
             Self::Thread { jobs: Some(jobs), .. } => {
                 let _ = jobs.send(Job::TakeBack);
             }
@@ -159,9 +159,9 @@ impl Drop for Learner {
 }
 
 /// Tells a law of the run to come, if there is something to tell.
-pub(super) fn expect(law: &mut dyn Law, coming: &[f64]) {
+pub(super) fn set_disturbance(law: &mut dyn Law, coming: &[f64]) {
     if !coming.is_empty() {
-        law.expect(coming);
+        law.set_disturbance(coming);
     }
 }
 
@@ -171,6 +171,6 @@ pub(super) fn learn(law: &mut dyn Law, input: &[f64], error: &[f64]) -> Lesson {
     let mut next = vec![0.0; input.len()];
     let result = law.update(input, error, &mut next);
     let update_ms = began.elapsed().as_secs_f64() * 1e3;
-    let (remark, standing) = (law.remark(), law.standing());
+    let (remark, standing) = (law.status(), law.standing());
     Lesson { input: result.map(|()| next), update_ms, remark, standing }
 }

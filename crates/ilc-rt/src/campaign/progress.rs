@@ -2,7 +2,7 @@
 
 use super::disturbance::Disturbance;
 use super::error::CampaignError;
-use super::learner::{expect, learn};
+use super::learner::{learn, set_disturbance};
 use crate::learning::{Law, LearningError};
 use crate::library::Library;
 use crate::record::{Figures, IterationRecord, Meta};
@@ -178,21 +178,21 @@ impl Progress {
         for row in &rows {
             let mut record = library.load(row.id)?.record;
             if let Some(law) = law.as_deref_mut() {
-                expect(law, &record.disturbance);
+                set_disturbance(law, &record.disturbance);
                 if let Some((Decision::Learn, before)) = last.take() {
                     learn(law, &before.input, &before.error_m).input.map_err(refused)?;
                 }
             }
             let decision = self.decide(&mut record);
             if let (Decision::RollBack(_), Some(law)) = (&decision, law.as_deref_mut()) {
-                law.taken_back();
+                law.on_rollback();
             }
             last = Some((decision, record));
         }
         let coming = last.as_ref().map_or(0, |(_, record)| record.index + 1);
         let coming = disturbance.of(coming).map_err(CampaignError::Disturbance)?;
         if let Some(law) = law.as_deref_mut() {
-            expect(law, &coming);
+            set_disturbance(law, &coming);
         }
         let next = match (last, law) {
             (Some((Decision::RollBack(input), _)), _) => Some(Ok((input, 0.0))),
