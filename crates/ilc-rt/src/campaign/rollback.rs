@@ -1,11 +1,6 @@
-//! What the next run gets: a lesson, the best input so far, or the old input once more.
+//! Decision on the input of the next run: learned, the best one so far, or the last one once more.
 
-use super::disturbance::Disturbance;
-use super::error::CampaignError;
-use super::learner::{learn, set_disturbance};
-use crate::learning::{Law, LearningError};
-use crate::library::Library;
-use crate::record::{Figures, IterationRecord, Meta};
+use crate::record::{Figures, IterationRecord};
 use crate::servo::Mailbox;
 
 /// Times that the best input is restored before learning is switched off for good.
@@ -13,14 +8,14 @@ const ROLLBACKS_MAX: u32 = 2;
 /// Why learning is off then.
 const GROWN: &str = "the error grew twice";
 
-/// What to do after a run.
+/// Decision after a run.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Decision {
     /// Learn from it.
     Learn,
-    /// Its error has grown too far: restore this input.
+    /// Restore this input, as the error has grown too far.
     RollBack(Vec<f64>),
-    /// Leave the input as it is.
+    /// Repeat the input.
     Hold,
 }
 
@@ -32,23 +27,23 @@ struct Best {
     disturbance: Vec<f64>,
 }
 
-/// The state of learning in a campaign.
+/// Rollback of the learned input when the error grows.
 #[derive(Debug)]
-pub(super) struct Progress {
+pub(super) struct RollbackPolicy {
     rollback_ratio: f64,
     best: Option<Best>,
     rollbacks: u32,
-    /// Number of the table that the next run shall use.
+    /// Number of the table that the next run is to use.
     promised: u32,
     late_updates: u32,
-    /// Time of the lesson in each table handed to the loop; table n at n - 1.
+    /// Computing time of each table handed to the loop; table n at n - 1.
     update_ms: Vec<f64>,
     table_in_use: u32,
-    /// Whether overruns are no disturbance, as the plant stood still as well.
+    /// Overruns are no disturbance, as the plant stood still as well.
     forgives_overruns: bool,
 }
 
-impl Progress {
+impl RollbackPolicy {
     pub(super) fn new(rollback_ratio: f64) -> Self {
         Self {
             rollback_ratio,
@@ -62,24 +57,24 @@ impl Progress {
         }
     }
 
-    /// The same, where a computer that stalls stalls the plant too: its time passes by SYNC, so that the
-    /// samples of a run with overruns are those of one without.
+    /// Sets whether overruns are forgiven, as where a computer that stalls stalls the plant too: its time
+    /// passes by SYNC, so that the samples of a run with overruns are those of one without.
     pub(super) fn forgiving(self, forgives_overruns: bool) -> Self {
         Self { forgives_overruns, ..self }
     }
 
-    /// Whether a run was disturbed by computer or bus, so that it is no evidence.
+    /// Returns whether computer or bus disturbed a run, so that it is no evidence.
     pub(super) fn is_disturbed(&self, figures: &Figures) -> bool {
         figures.missing_samples > 0 || figures.overruns > 0 && !self.forgives_overruns
     }
 
-    /// A run began with a table.
+    /// Notes that a run began with a table.
     pub(super) fn started(&mut self, table: u32) {
         self.table_in_use = table;
         self.late_updates += u32::from(table < self.promised);
     }
 
-    /// A lesson was asked for.
+    /// Notes that the law was asked for an update.
     pub(super) fn asked(&mut self) {
         self.promised = self.next_number();
     }
@@ -88,8 +83,8 @@ impl Progress {
         u32::try_from(self.update_ms.len() + 1).unwrap_or(u32::MAX)
     }
 
-    /// Writes into a record what belongs to its run.
-    pub(super) fn note(&self, record: &mut IterationRecord) {
+    /// Writes the learning figures of a run into its record.
+    pub(super) fn annotate(&self, record: &mut IterationRecord) {
         record.figures.late_updates = self.late_updates;
         record.figures.update_ms = (self.table_in_use as usize)
             .checked_sub(1)
@@ -155,58 +150,6 @@ impl Progress {
             self.update_ms.push(update_ms);
         }
     }
-
-    /// Takes up the newest campaign of the same fingerprint where it ended: its runs, and the input
-    /// of the next one with the time that it took to learn it.
-    ///
-    /// All runs pass through the law again, so that it knows what it would know without the break.
-    pub(super) fn resume(
-        &mut self,
-        library: &Library,
-        meta: &mut Meta,
-        mut law: Option<&mut (dyn Law + '_)>,
-        disturbance: &Disturbance,
-    ) -> Result<Resumed, CampaignError> {
-        let Some(campaign) = library.newest_campaign(&meta.fingerprint)? else {
-            return Err(CampaignError::Resume(
-                "the library has no campaign of this cell, program, measurement and law".to_owned(),
-            ));
-        };
-        let rows = library.list(Some(&campaign))?;
-        meta.campaign = campaign;
-        let mut last: Option<(Decision, IterationRecord)> = None;
-        for row in &rows {
-            let mut record = library.load(row.id)?.record;
-            if let Some(law) = law.as_deref_mut() {
-                set_disturbance(law, &record.disturbance);
-                if let Some((Decision::Learn, before)) = last.take() {
-                    learn(law, &before.input, &before.error_m).input.map_err(refused)?;
-                }
-            }
-            let decision = self.decide(&mut record);
-            if let (Decision::RollBack(_), Some(law)) = (&decision, law.as_deref_mut()) {
-                law.on_rollback();
-            }
-            last = Some((decision, record));
-        }
-        let coming = last.as_ref().map_or(0, |(_, record)| record.index + 1);
-        let coming = disturbance.of(coming).map_err(CampaignError::Disturbance)?;
-        if let Some(law) = law.as_deref_mut() {
-            set_disturbance(law, &coming);
-        }
-        let next = match (last, law) {
-            (Some((Decision::RollBack(input), _)), _) => Some(Ok((input, 0.0))),
-            (Some((Decision::Learn, record)), Some(law)) => {
-                let lesson = learn(law, &record.input, &record.error_m);
-                Some(lesson.input.map(|input| (input, lesson.update_ms)))
-            }
-            (Some((_, record)), _) => Some(Ok((record.input, 0.0))),
-            (None, _) => None,
-        };
-        let next = next.transpose().map_err(refused)?;
-        let runs = rows.into_iter().map(|row| (row.record.index, row.record.figures)).collect();
-        Ok(Resumed { runs, next, coming })
-    }
 }
 
 fn disturbance_remark(figures: &Figures) -> String {
@@ -216,7 +159,7 @@ fn disturbance_remark(figures: &Figures) -> String {
     )
 }
 
-/// What is told when the best input is restored; `growth` is the error over the best one.
+/// Remark on a restored input; `growth` is the error over the best one.
 fn growth_remark(growth: f64, off: bool) -> String {
     let how_far = if growth < 1e3 {
         format!("to {growth:.2} times the best one")
@@ -225,22 +168,6 @@ fn growth_remark(growth: f64, off: bool) -> String {
     };
     let then = if off { format!("; learning is off from here on: {GROWN}") } else { String::new() };
     format!("the RMS error grew {how_far}: the best input is restored{then}")
-}
-
-#[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
-fn refused(error: LearningError) -> CampaignError {
-    CampaignError::Resume(format!("the law refused a run: {error}"))
-}
-
-/// A campaign taken up again.
-#[derive(Debug, Default)]
-pub(super) struct Resumed {
-    /// Number and figures of the runs that are kept.
-    pub(super) runs: Vec<(u32, Figures)>,
-    /// Input of the next run, and how long it took to learn it.
-    pub(super) next: Option<(Vec<f64>, f64)>,
-    /// Disturbance of the next run.
-    pub(super) coming: Vec<f64>,
 }
 
 #[cfg(test)]
@@ -257,39 +184,39 @@ mod tests {
 
     #[test]
     fn growth_restores_the_best_input_twice_and_then_learning_is_off() {
-        let mut progress = Progress::new(1.5);
-        assert_eq!(progress.decide(&mut record(1.0)), Decision::Learn);
-        assert_eq!(progress.decide(&mut record(0.4)), Decision::Learn);
-        assert_eq!(progress.decide(&mut record(0.5)), Decision::Learn, "within the ratio");
+        let mut policy = RollbackPolicy::new(1.5);
+        assert_eq!(policy.decide(&mut record(1.0)), Decision::Learn);
+        assert_eq!(policy.decide(&mut record(0.4)), Decision::Learn);
+        assert_eq!(policy.decide(&mut record(0.5)), Decision::Learn, "within the ratio");
         let mut grown = record(0.7);
-        assert_eq!(progress.decide(&mut grown), Decision::RollBack(vec![0.4]));
+        assert_eq!(policy.decide(&mut grown), Decision::RollBack(vec![0.4]));
         assert!(grown.figures.rolled_back && !grown.figures.learning_off);
         let said = grown.figures.remark.unwrap();
         assert_eq!(
             said,
             "the RMS error grew to 1.75 times the best one: the best input is restored"
         );
-        assert_eq!(progress.decide(&mut record(0.4)), Decision::Learn);
+        assert_eq!(policy.decide(&mut record(0.4)), Decision::Learn);
         let mut burst = record(f64::INFINITY);
-        assert_eq!(progress.decide(&mut burst), Decision::RollBack(vec![0.4]));
+        assert_eq!(policy.decide(&mut burst), Decision::RollBack(vec![0.4]));
         assert!(burst.figures.learning_off);
         let said = burst.figures.remark.unwrap();
         assert!(said.contains("far beyond") && said.contains("off from here on"), "{said}");
         let mut after = record(0.4);
-        assert_eq!(progress.decide(&mut after), Decision::Hold);
+        assert_eq!(policy.decide(&mut after), Decision::Hold);
         assert!(after.figures.learning_off && !after.figures.rolled_back);
         assert_eq!(after.figures.remark.unwrap(), "learning is off: the error grew twice");
-        assert_eq!(progress.decide(&mut record(9.0)), Decision::Hold);
+        assert_eq!(policy.decide(&mut record(9.0)), Decision::Hold);
     }
 
     #[test]
     fn an_error_under_another_disturbance_is_not_held_against_the_law() {
         let under =
             |rms, disturbance| IterationRecord { disturbance: vec![disturbance], ..record(rms) };
-        let mut progress = Progress::new(1.5);
-        assert_eq!(progress.decide(&mut under(0.4, 20.0)), Decision::Learn);
-        assert_eq!(progress.decide(&mut under(9.0, 80.0)), Decision::Learn);
-        assert_eq!(progress.decide(&mut under(9.0, 20.0)), Decision::RollBack(vec![0.4]));
+        let mut policy = RollbackPolicy::new(1.5);
+        assert_eq!(policy.decide(&mut under(0.4, 20.0)), Decision::Learn);
+        assert_eq!(policy.decide(&mut under(9.0, 80.0)), Decision::Learn);
+        assert_eq!(policy.decide(&mut under(9.0, 20.0)), Decision::RollBack(vec![0.4]));
     }
 
     #[test]
@@ -299,38 +226,38 @@ mod tests {
             (record.figures.overruns, record.figures.missing_samples) = (overruns, missing_samples);
             record
         };
-        let mut progress = Progress::new(1.5);
+        let mut policy = RollbackPolicy::new(1.5);
         // The first one neither, nor one that seems to be the best.
-        assert_eq!(progress.decide(&mut disturbed(0.1, 0, 1)), Decision::Hold);
-        assert_eq!(progress.decide(&mut record(1.0)), Decision::Learn);
+        assert_eq!(policy.decide(&mut disturbed(0.1, 0, 1)), Decision::Hold);
+        assert_eq!(policy.decide(&mut record(1.0)), Decision::Learn);
         let mut worse = disturbed(9.0, 3, 0);
-        assert_eq!(progress.decide(&mut worse), Decision::Hold);
+        assert_eq!(policy.decide(&mut worse), Decision::Hold);
         assert!(!worse.figures.rolled_back);
         let said = worse.figures.remark.unwrap();
         assert!(said.ends_with("its input is repeated: 3 overruns, 0 samples missing"), "{said}");
-        assert_eq!(progress.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
-        assert_eq!(progress.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
-        assert_eq!(progress.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
+        assert_eq!(policy.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
+        assert_eq!(policy.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
+        assert_eq!(policy.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
     }
 
     #[test]
     fn a_stall_that_stalls_the_plant_as_well_disturbs_nothing() {
-        let mut progress = Progress::new(1.5).forgiving(true);
+        let mut policy = RollbackPolicy::new(1.5).forgiving(true);
         let mut stalled = record(1.0);
         stalled.figures.overruns = 50;
-        assert_eq!(progress.decide(&mut stalled), Decision::Learn);
+        assert_eq!(policy.decide(&mut stalled), Decision::Learn);
         stalled.figures.missing_samples = 1;
-        assert_eq!(progress.decide(&mut stalled), Decision::Hold);
+        assert_eq!(policy.decide(&mut stalled), Decision::Hold);
     }
 
     #[test]
     fn a_run_with_an_older_table_than_promised_is_late() {
-        let mut progress = Progress::new(1.5);
-        progress.started(0);
-        progress.asked();
-        progress.started(0);
+        let mut policy = RollbackPolicy::new(1.5);
+        policy.started(0);
+        policy.asked();
+        policy.started(0);
         let mut late = record(1.0);
-        progress.note(&mut late);
+        policy.annotate(&mut late);
         assert_eq!(late.figures.late_updates, 1);
     }
 }
