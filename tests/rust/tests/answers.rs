@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use ilc_rt::campaign::{self, Options, Outcome};
+use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::config::{AxisUnit, Cell};
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
@@ -300,7 +300,8 @@ fn disturbed(name: &str, distort: Distort) -> Vec<IterationRecord> {
     let tap = Tap::new(&cell);
     tap.line().distort(distort);
     let library = scratch.file("library.db");
-    let options = Options { lockstep: false, ..options(library.clone(), 3) };
+    let mut options = options(library.clone(), 3);
+    options.session.lockstep = false;
     let outcome = campaign::run(&cell, &options, Box::new(tap.clone()), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
     let library = Library::open(&library).unwrap();

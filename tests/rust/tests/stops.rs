@@ -374,7 +374,7 @@ fn a_signal_interrupts_and_is_no_fault() {
     let cell = short(CELLS[0]);
     let scratch = Scratch::new();
     let options = options(scratch.file("library.db"), 5);
-    let stop = Arc::clone(&options.stop);
+    let stop = Arc::clone(&options.session.stop);
     let bus = Box::new(Tap::new(&cell));
     let outcome = campaign::run(&cell, &options, bus, None, &mut |event| {
         if matches!(event, Event::State { state: StateName::Running, iteration: 2 }) {

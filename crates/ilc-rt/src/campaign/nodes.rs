@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::error::CampaignError;
-use super::options::{Options, SIMULATED_PATIENCE_S};
+use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::design;
 use crate::fieldbus::bring_up::{BringUpError, DriveSetup, bring_up, bring_up_encoder, listen};
@@ -18,11 +18,11 @@ const HEARTBEAT_MS: u16 = 100;
 pub(super) fn start(
     cell: &Cell,
     bus: &mut dyn Bus,
-    options: &Options,
+    session: &Session,
 ) -> Result<(), CampaignError> {
-    let lockstep = options.lockstep;
+    let lockstep = session.lockstep;
     let file = cell.file.display().to_string();
-    let stall_s = if options.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
+    let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
     let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
     refuse_company(cell, bus)?;
     let refused = |key: String| {
