@@ -65,7 +65,11 @@ impl<T> OrRaise<T> for Result<T, design::DesignError> {
 
 impl<T> OrRaise<T> for Result<T, identification::IdentificationError> {
     fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| PyValueError::new_err(error.to_string()))
+        use identification::IdentificationError::Model;
+        self.map_err(|error| match error {
+            Model { .. } => exceptions::ModelError::new_err(error.to_string()),
+            error => PyValueError::new_err(error.to_string()),
+        })
     }
 }
 

@@ -59,6 +59,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;
+    experiment::register(module)?;
     made::register(module)?;
     Ok(())
 }

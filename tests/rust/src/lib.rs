@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use ilc_rt::config::Cell;
 
-pub use derived::hold_derived;
+pub use derived::{hold_derived, hold_derived_file};
 
 /// The root of this checkout.
 ///

@@ -85,8 +85,8 @@ fn campaign(
     let bus = FaultyBus::new(Box::new(watched), faults, way, during, seed);
     let scratch = Scratch::new();
     let mut options = options(scratch.file("library.db"), RUNS);
-    options.lockstep = lockstep;
-    options.simulated = !lockstep;
+    options.session.lockstep = lockstep;
+    options.session.simulated = !lockstep;
     let ended = campaign::run(cell, &options, Box::new(bus), None, &mut |_| {});
     let said = match &ended {
         Ok(outcome) => outcome.reason.clone(),

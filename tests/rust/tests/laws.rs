@@ -51,7 +51,7 @@ fn run(cell: &Cell, iterations: u32) -> (Outcome, Vec<Row>) {
     let options = options(scratch.file("library.db"), iterations);
     let outcome = campaign::run(cell, &options, in_process(cell), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
-    let rows = rows(&options.library);
+    let rows = rows(&options.session.library);
     (outcome, rows)
 }
 
@@ -243,7 +243,7 @@ fn what_the_controller_takes_back_halves_the_steps_of_a_ladder() {
 fn broken_and_whole(cell: &Cell, broken: u32, iterations: u32) -> (Vec<Row>, Vec<Row>) {
     let scratch = Scratch::new();
     let first = options(scratch.file("library.db"), iterations);
-    let stop = Arc::clone(&first.stop);
+    let stop = Arc::clone(&first.session.stop);
     let outcome = campaign::run(cell, &first, in_process(cell), None, &mut |event| {
         if matches!(event, Event::State { state: StateName::Running, iteration } if *iteration == broken)
         {
@@ -252,10 +252,10 @@ fn broken_and_whole(cell: &Cell, broken: u32, iterations: u32) -> (Vec<Row>, Vec
     })
     .unwrap();
     assert_eq!((outcome.status, outcome.runs.len()), (EndStatus::Interrupted, broken as usize));
-    let again = Options { resume: true, ..options(first.library.clone(), iterations) };
+    let again = Options { resume: true, ..options(first.session.library.clone(), iterations) };
     let outcome = campaign::run(cell, &again, in_process(cell), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
-    (rows(&first.library), run(cell, iterations).1)
+    (rows(&first.session.library), run(cell, iterations).1)
 }
 
 #[test]
@@ -323,7 +323,7 @@ fn another_gate_ladder_or_weight_along_the_run_is_another_campaign() {
         let first = options(scratch.file("library.db"), 2);
         let cell = short(SERIES, &one);
         campaign::run(&cell, &first, in_process(&cell), None, &mut |_| {}).unwrap();
-        let again = Options { resume: true, ..options(first.library.clone(), 3) };
+        let again = Options { resume: true, ..options(first.session.library.clone(), 3) };
         let changed = short(SERIES, &other);
         let refused = campaign::run(&changed, &again, in_process(&changed), None, &mut |_| {});
         let line = refused.unwrap_err().to_string();

@@ -31,7 +31,7 @@ fn an_interrupted_campaign_goes_on_where_it_was() {
         let (cell, scratch) = (short(name), Scratch::new());
         let (library, other) = (scratch.file("a.db"), scratch.file("b.db"));
         let broken = options(library.clone(), 6);
-        let stop = Arc::clone(&broken.stop);
+        let stop = Arc::clone(&broken.session.stop);
         let outcome = campaign::run(&cell, &broken, in_process(&cell), None, &mut |event| {
             if matches!(event, Event::State { state: StateName::Running, iteration: 3 }) {
                 stop.store(libc::SIGTERM, Ordering::Relaxed);
@@ -76,7 +76,11 @@ fn another_law_measurement_or_program_cannot_go_on() {
     let changed: [(&str, Cell, Options); 6] = [
         ("law", change(|cell| cell.learning.law = LawName::Pd), resume(4)),
         ("weight", change(|cell| cell.learning.norm_optimal.rate = 7.0), resume(4)),
-        ("measure", cell.clone(), Options { measure: Some(Measure::Encoder), ..resume(4) }),
+        ("measure", cell.clone(), {
+            let mut options = resume(4);
+            options.session.measure = Some(Measure::Encoder);
+            options
+        }),
         ("program", example("01_gantry.toml"), resume(4)),
         ("feed", change(|cell| cell.program.feed_m_s = 0.09), resume(4)),
         ("limits", change(|cell| cell.axes[0].limits.acceleration_max_m_s2 = 7.9), resume(4)),
@@ -177,7 +181,7 @@ fn what_grows_is_rolled_back_twice_and_then_learning_is_off() {
     for index in [4, 6, 7, 8] {
         assert!(rms[index] < 1.05 * rms[2], "run {index}: {rms:?}");
     }
-    let rows = rows(&options.library);
+    let rows = rows(&options.session.library);
     for index in [4, 6, 7, 8] {
         assert_eq!(rows[index].record.input, rows[2].record.input, "run {index}");
     }
@@ -191,5 +195,5 @@ fn a_law_that_answers_nonsense_stops_the_axes() {
     let outcome = campaign::run(&cell, &options, in_process(&cell), law, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Fault);
     assert!(outcome.reason.contains("not a finite number"), "{}", outcome.reason);
-    assert_eq!(rows(&options.library).len(), 2, "the runs before are kept");
+    assert_eq!(rows(&options.session.library).len(), 2, "the runs before are kept");
 }

@@ -1,4 +1,4 @@
-//! Tells what happens: to the caller at once, and to the network through the telemetry thread.
+//! Publishing of events: to the caller at once, and to the network through the telemetry thread.
 
 use serde_json::json;
 
@@ -9,7 +9,7 @@ use crate::servo::Sample;
 /// Samples of a batch on the network.
 const BATCH_S: f64 = 0.05;
 
-/// Who is told.
+/// Receivers of the events: an observer, and the network.
 pub(super) struct Announcer<'a> {
     observe: &'a mut dyn FnMut(&Event),
     telemetry: Option<Telemetry>,
@@ -34,8 +34,8 @@ impl<'a> Announcer<'a> {
         Self { observe, telemetry, batch: Vec::with_capacity(batch_size), batch_size, n_axes }
     }
 
-    /// Tells of an event.
-    pub(super) fn tell(&mut self, event: &Event) {
+    /// Publishes an event.
+    pub(super) fn publish(&mut self, event: &Event) {
         (self.observe)(event);
         let Some(telemetry) = &mut self.telemetry else { return };
         let key = match event {
@@ -53,7 +53,7 @@ impl<'a> Announcer<'a> {
         }
     }
 
-    /// Tells of a servo cycle; they go out in batches.
+    /// Publishes a servo cycle; cycles go out in batches.
     pub(super) fn sample(&mut self, sample: &Sample) {
         let Some(telemetry) = &mut self.telemetry else { return };
         self.batch.push(*sample);

@@ -8,25 +8,25 @@ use super::error::CampaignError;
 use crate::learning::{Law, LearningError, Standing};
 use crate::record::Figures;
 
-/// How long the end of a campaign waits for what the law makes of the last run.
-const LAST_LESSON: Duration = Duration::from_millis(500);
+/// Time that the end of a campaign waits for the update from the last run.
+const LAST_UPDATE: Duration = Duration::from_millis(500);
 
-/// What a law made of a run.
+/// Update of a law from one run.
 #[derive(Debug)]
-pub(super) struct Lesson {
+pub(super) struct UpdateResult {
     /// Input of the next run.
     pub(super) input: Result<Vec<f64>, LearningError>,
-    /// How long it took.
+    /// Computing time.
     pub(super) update_ms: f64,
-    /// What a person should know of it.
+    /// Remark of the law, for people.
     pub(super) remark: Option<String>,
-    /// Whether the law goes on learning.
+    /// State of the law: learning, at rest, or rolling back.
     pub(super) standing: Standing,
 }
 
-impl Lesson {
-    /// Writes what the law decided into the figures of the run that it learned from.
-    pub(super) fn note(&self, figures: &mut Figures) {
+impl UpdateResult {
+    /// Writes the law's decision into the figures of the run that it learned from.
+    pub(super) fn annotate(&self, figures: &mut Figures) {
         figures.rolled_back |= self.standing == Standing::GoesBack;
         figures.learning_off |= matches!(self.standing, Standing::GoesBack | Standing::Rests);
         if figures.remark.is_none() {
@@ -35,22 +35,26 @@ impl Lesson {
     }
 }
 
-/// What a law is to do.
-pub(super) enum Job {
-    /// Learn from the input and the error of a run, for one with this disturbance.
-    Learn { input: Vec<f64>, error: Vec<f64>, coming: Vec<f64> },
-    /// Nothing is to be learned from the last run, but the one to come has this disturbance.
-    Pass { coming: Vec<f64> },
-    /// Its last input is taken back.
-    TakeBack,
+/// Request to the law.
+pub(super) enum LearningRequest {
+    /// Learn from the input and the error of a run; the next run has this disturbance.
+    Learn { input: Vec<f64>, error: Vec<f64>, next_disturbance: Vec<f64> },
+    /// Nothing is to be learned from the last run; the next one has this disturbance.
+    SetDisturbance { next_disturbance: Vec<f64> },
+    /// The last input is rolled back.
+    RollBack,
 }
 
-/// A law, and where it computes.
+/// A law, with the thread that it computes on.
 pub(super) enum Learner {
     /// In the caller's thread: the result is there at once, always at the same tick.
-    InLine { law: Box<dyn Law>, done: Option<Lesson> },
+    InLine { law: Box<dyn Law>, done: Option<UpdateResult> },
     /// On a thread of its own: the loop's thread and the caller's go on meanwhile.
-    Thread { jobs: Option<Sender<Job>>, lessons: Receiver<Lesson>, thread: Option<JoinHandle<()>> },
+    Thread {
+        requests: Option<Sender<LearningRequest>>,
+        results: Receiver<UpdateResult>,
+        thread: Option<JoinHandle<()>>,
+    },
 }
 
 impl Learner {
@@ -59,17 +63,19 @@ impl Learner {
     }
 
     pub(super) fn on_thread(mut law: Box<dyn Law>) -> Result<Self, CampaignError> {
-        let (jobs, todo) = channel::<Job>();
-        let (done, lessons) = channel();
+        let (requests, received) = channel::<LearningRequest>();
+        let (done, results) = channel();
         let thread = std::thread::Builder::new()
             .name("ilc-learn".to_owned())
             .spawn(move || {
-                for job in todo {
-                    match job {
-                        Job::TakeBack => law.on_rollback(),
-                        Job::Pass { coming } => set_disturbance(law.as_mut(), &coming),
-                        Job::Learn { input, error, coming } => {
-                            set_disturbance(law.as_mut(), &coming);
+                for request in received {
+                    match request {
+                        LearningRequest::RollBack => law.on_rollback(),
+                        LearningRequest::SetDisturbance { next_disturbance } => {
+                            set_disturbance(law.as_mut(), &next_disturbance)
+                        }
+                        LearningRequest::Learn { input, error, next_disturbance } => {
+                            set_disturbance(law.as_mut(), &next_disturbance);
                             if done.send(learn(law.as_mut(), &input, &error)).is_err() {
                                 return;
                             }
@@ -78,70 +84,72 @@ impl Learner {
                 }
             })
             .map_err(|source| CampaignError::Thread { what: "learning", source })?;
-        Ok(Self::Thread { jobs: Some(jobs), lessons, thread: Some(thread) })
+        Ok(Self::Thread { requests: Some(requests), results, thread: Some(thread) })
     }
 
-    /// Whether a lesson is there at once.
+    /// Returns whether updates are available at once.
     pub(super) fn is_in_line(&self) -> bool {
         matches!(self, Self::InLine { .. })
     }
 
-    /// Begins to learn from a run, for the one to come under this disturbance.
-    pub(super) fn begin(&mut self, input: &[f64], error: &[f64], coming: &[f64]) {
+    /// Begins to learn from a run; the next one has this disturbance.
+    pub(super) fn begin(&mut self, input: &[f64], error: &[f64], next_disturbance: &[f64]) {
         match self {
             Self::InLine { law, done } => {
-                set_disturbance(law.as_mut(), coming);
+                set_disturbance(law.as_mut(), next_disturbance);
                 *done = Some(learn(law.as_mut(), input, error));
             }
-            Self::Thread { jobs: Some(jobs), .. } => {
-                let (input, error, coming) = (input.to_vec(), error.to_vec(), coming.to_vec());
+            Self::Thread { requests: Some(requests), .. } => {
+                let (input, error, next_disturbance) =
+                    (input.to_vec(), error.to_vec(), next_disturbance.to_vec());
                 // A thread that is gone never answers; the old input is then repeated and counted.
-                let _ = jobs.send(Job::Learn { input, error, coming });
+                let _ = requests.send(LearningRequest::Learn { input, error, next_disturbance });
             }
             Self::Thread { .. } => {}
         }
     }
 
-    /// Tells the law of the run to come when there is nothing to learn from the last one.
-    pub(super) fn pass(&mut self, coming: &[f64]) {
+    /// Sets the disturbance of the next run, where there is nothing to learn from the last one.
+    pub(super) fn set_disturbance(&mut self, next_disturbance: &[f64]) {
         match self {
-            Self::InLine { law, .. } => set_disturbance(law.as_mut(), coming),
-            Self::Thread { jobs: Some(jobs), .. } => {
-                let _ = jobs.send(Job::Pass { coming: coming.to_vec() });
+            Self::InLine { law, .. } => set_disturbance(law.as_mut(), next_disturbance),
+            Self::Thread { requests: Some(requests), .. } => {
+                let _ = requests.send(LearningRequest::SetDisturbance {
+                    next_disturbance: next_disturbance.to_vec(),
+                });
             }
             Self::Thread { .. } => {}
         }
     }
 
-    /// Tells the law that its last input is taken back, as the error grew with it.
-    pub(super) fn take_back(&mut self) {
+    /// Notifies the law that its last input is rolled back, as the error grew with it.
+    pub(super) fn roll_back(&mut self) {
         match self {
             Self::InLine { law, .. } => law.on_rollback(),
-            Self::Thread { jobs: Some(jobs), .. } => {
-                let _ = jobs.send(Job::TakeBack);
+            Self::Thread { requests: Some(requests), .. } => {
+                let _ = requests.send(LearningRequest::RollBack);
             }
             Self::Thread { .. } => {}
         }
     }
 
-    /// What was learned, once it is there.
-    pub(super) fn take(&mut self) -> Option<Lesson> {
+    /// Returns the oldest finished update.
+    pub(super) fn take(&mut self) -> Option<UpdateResult> {
         match self {
             Self::InLine { done, .. } => done.take(),
-            Self::Thread { lessons, .. } => lessons.try_recv().ok(),
+            Self::Thread { results, .. } => results.try_recv().ok(),
         }
     }
 }
 
 impl Learner {
-    /// What a law that computes on a thread makes of the last run, if it is there in time: so that the
-    /// run's record says if it went back.
-    pub(super) fn take_last(&mut self) -> Option<Lesson> {
+    /// Waits for the update from the last run, so that the run's record says whether the law rolled back.
+    pub(super) fn take_last(&mut self) -> Option<UpdateResult> {
         match self {
             Self::InLine { done, .. } => done.take(),
-            Self::Thread { jobs, lessons, .. } => {
-                drop(jobs.take());
-                lessons.recv_timeout(LAST_LESSON).ok()
+            Self::Thread { requests, results, .. } => {
+                drop(requests.take());
+                results.recv_timeout(LAST_UPDATE).ok()
             }
         }
     }
@@ -149,8 +157,8 @@ impl Learner {
 
 impl Drop for Learner {
     fn drop(&mut self) {
-        if let Self::Thread { jobs, thread, .. } = self {
-            drop(jobs.take());
+        if let Self::Thread { requests, thread, .. } = self {
+            drop(requests.take());
             if let Some(thread) = thread.take() {
                 let _ = thread.join();
             }
@@ -158,19 +166,19 @@ impl Drop for Learner {
     }
 }
 
-/// Tells a law of the run to come, if there is something to tell.
-pub(super) fn set_disturbance(law: &mut dyn Law, coming: &[f64]) {
-    if !coming.is_empty() {
-        law.set_disturbance(coming);
+/// Sets the disturbance of the next run, if one is measured.
+pub(super) fn set_disturbance(law: &mut dyn Law, next_disturbance: &[f64]) {
+    if !next_disturbance.is_empty() {
+        law.set_disturbance(next_disturbance);
     }
 }
 
-/// Learns from a run, here and now.
-pub(super) fn learn(law: &mut dyn Law, input: &[f64], error: &[f64]) -> Lesson {
+/// Learns from a run on the calling thread.
+pub(super) fn learn(law: &mut dyn Law, input: &[f64], error: &[f64]) -> UpdateResult {
     let began = Instant::now();
     let mut next = vec![0.0; input.len()];
     let result = law.update(input, error, &mut next);
     let update_ms = began.elapsed().as_secs_f64() * 1e3;
     let (remark, standing) = (law.status(), law.standing());
-    Lesson { input: result.map(|()| next), update_ms, remark, standing }
+    UpdateResult { input: result.map(|()| next), update_ms, remark, standing }
 }

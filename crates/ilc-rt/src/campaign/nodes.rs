@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::error::CampaignError;
-use super::options::{Options, SIMULATED_PATIENCE_S};
+use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::design;
 use crate::fieldbus::bring_up::{BringUpError, DriveSetup, bring_up, bring_up_encoder, listen};
@@ -18,11 +18,11 @@ const HEARTBEAT_MS: u16 = 100;
 pub(super) fn start(
     cell: &Cell,
     bus: &mut dyn Bus,
-    options: &Options,
+    session: &Session,
 ) -> Result<(), CampaignError> {
-    let lockstep = options.lockstep;
+    let lockstep = session.lockstep;
     let file = cell.file.display().to_string();
-    let stall_s = if options.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
+    let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
     let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
     refuse_company(cell, bus)?;
     let refused = |key: String| {
@@ -85,7 +85,7 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
     let deadline_ms = deadline_ms.ceil() as u16;
     Ok(DriveSetup {
         node: design::node(cell, axis.node)?,
-        mode: design::mode(axis),
+        mode: axis.interface,
         cycle_us: cell.cell.cycle_us,
         following_error_max_counts: unsigned(limits.following_error_max_m),
         position_min_counts: signed(limits.position_min_m),

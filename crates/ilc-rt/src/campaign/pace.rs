@@ -9,21 +9,21 @@ use crate::fieldbus::BusError;
 use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
 use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
 
-/// How often the mailbox of a loop on its own thread is read.
+/// Period at which the mailbox of a loop on its own thread is read.
 const READ_EVERY: Duration = Duration::from_millis(2);
-/// How long before a tick the loop's thread stops sleeping and spins.
+/// Time before a tick at which the loop's thread stops sleeping and spins.
 const SPIN: Nanos = Nanos::from_micros(100);
 
-/// The loop, wherever it runs.
+/// The loop, on its own thread or in line.
 pub(super) enum Pacer {
     /// On a thread of its own.
-    Clock { thread: Option<JoinHandle<Remains>> },
+    Clock { thread: Option<JoinHandle<LoopResult>> },
     /// Here, a tick at a time.
     Answers { cycle: Option<Box<Cycle>> },
 }
 
-/// What remains of the loop.
-pub(super) struct Remains {
+/// Result of the loop.
+pub(super) struct LoopResult {
     /// Whether the nodes were taken out of operation.
     pub(super) released: Result<(), BusError>,
     pub(super) timing: Option<Timing>,
@@ -34,7 +34,7 @@ impl Pacer {
         Self::Answers { cycle: Some(Box::new(cycle)) }
     }
 
-    /// Starts the loop's thread, and tells what the system granted it.
+    /// Starts the loop's thread; returns the scheduling that the system granted it.
     pub(super) fn on_clock(mut cycle: Cycle) -> Result<(Self, RtReport), CampaignError> {
         let (report, granted) = std::sync::mpsc::sync_channel(1);
         let thread = std::thread::Builder::new()
@@ -46,15 +46,15 @@ impl Pacer {
                 run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
                 // At once, and not when the campaign has put its things away: by then the nodes may have
                 // missed their commands, or be in somebody else's campaign.
-                Remains { released: release(cycle), timing: Some(timing) }
+                LoopResult { released: release(cycle), timing: Some(timing) }
             })
             .map_err(|source| CampaignError::Thread { what: "servo", source })?;
         let report = granted.recv().unwrap_or_default();
         Ok((Self::Clock { thread: Some(thread) }, report))
     }
 
-    /// Lets the loop go on for a while; returns whether it is over.
-    pub(super) fn go_on(&mut self) -> bool {
+    /// Runs one tick in lock-step, or waits a while for the loop's thread; returns whether the loop has ended.
+    pub(super) fn poll(&mut self) -> bool {
         match self {
             Self::Clock { thread } => {
                 if thread.as_ref().is_none_or(JoinHandle::is_finished) {
@@ -69,11 +69,13 @@ impl Pacer {
         }
     }
 
-    /// Ends; `None` if the loop's thread has died.
-    pub(super) fn end(self) -> Option<Remains> {
+    /// Ends the loop; `None` if its thread has died.
+    pub(super) fn end(self) -> Option<LoopResult> {
         match self {
             Self::Clock { thread } => thread?.join().ok(),
-            Self::Answers { cycle } => Some(Remains { released: release(*cycle?), timing: None }),
+            Self::Answers { cycle } => {
+                Some(LoopResult { released: release(*cycle?), timing: None })
+            }
         }
     }
 }

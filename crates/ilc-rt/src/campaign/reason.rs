@@ -1,14 +1,13 @@
-//! Why the axes were stopped, in one sentence that names axis, node and numbers.
+//! Reason why the axes were stopped, as a sentence that names axis, node and numbers.
 
-use super::options::{Options, SIMULATED_PATIENCE_S};
+use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::config::{AxisUnit, Cell};
 use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
-use crate::record::EndStatus;
 use crate::servo::{StopReason, Stranger};
 
 /// The sentence for a reason to stop.
-pub(super) fn sentence(reason: StopReason, cell: &Cell, options: &Options) -> String {
+pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> String {
     let axis = |index: usize| {
         cell.axes.get(index).map_or_else(
             || format!("axis {index}"),
@@ -17,7 +16,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, options: &Options) -> St
     };
     // In lock-step the loop waits for every answer, so that the count of cycles says nothing.
     let unanswered = |cycles: u32| {
-        if options.lockstep {
+        if session.lockstep {
             format!("no answer in {} s", cell.safety.answer_timeout_s)
         } else {
             format!(
@@ -99,7 +98,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, options: &Options) -> St
         StopReason::Overrun { cycles } => format!(
             "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late; {}",
             ms(cycles),
-            forgiven(cell, options)
+            forgiven(cell, session)
         ),
         StopReason::Stalled { axis: index, cycles } => format!(
             "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late, and the drive of \
@@ -134,8 +133,8 @@ fn carried(cell: &Cell, node: u8, pdo: u8) -> &'static str {
 }
 
 /// How long a stall of this computer may be.
-fn forgiven(cell: &Cell, options: &Options) -> String {
-    if options.simulated {
+fn forgiven(cell: &Cell, session: &Session) -> String {
+    if session.simulated {
         format!("with simulated drives {SIMULATED_PATIENCE_S} s are forgiven")
     } else {
         format!("safety.overrun_cycles_max allows {}", cell.safety.overrun_cycles_max)
@@ -183,27 +182,4 @@ fn strange(stranger: Stranger) -> String {
 fn distance(cell: &Cell, axis: usize, distance: f64) -> String {
     let unit = cell.axes.get(axis).map_or(AxisUnit::M, |axis| axis.unit);
     format!("{:.3} m{}", distance * 1e3, unit.symbol())
-}
-
-/// Whether a reason is somebody's wish or a fault.
-pub(super) fn status(reason: StopReason) -> EndStatus {
-    match reason {
-        StopReason::Asked(_) => EndStatus::Interrupted,
-        StopReason::DriveFault { .. }
-        | StopReason::NotEnabled { .. }
-        | StopReason::SilentAxis { .. }
-        | StopReason::SilentPdo { .. }
-        | StopReason::WrongLength { .. }
-        | StopReason::SilentTool { .. }
-        | StopReason::NodeLeft { .. }
-        | StopReason::NodeStopped { .. }
-        | StopReason::OtherMaster(_)
-        | StopReason::FollowingError { .. }
-        | StopReason::OutsideLimits { .. }
-        | StopReason::Jump { .. }
-        | StopReason::NotFinite { .. }
-        | StopReason::Stalled { .. }
-        | StopReason::Overrun { .. }
-        | StopReason::Bus(_) => EndStatus::Fault,
-    }
 }

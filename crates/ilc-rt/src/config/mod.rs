@@ -8,6 +8,7 @@ mod error;
 mod file;
 mod law;
 mod learning;
+pub mod mode;
 mod norm_optimal;
 mod path;
 mod program;
@@ -15,8 +16,8 @@ mod simulation;
 mod validate;
 
 pub use cell::{
-    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Interface, Limits, PositionLoop,
-    Safety, TcpEncoder, Telemetry,
+    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Limits, Mode, PositionLoop, Safety,
+    TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};

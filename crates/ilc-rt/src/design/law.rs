@@ -6,7 +6,7 @@ use super::error::DesignError;
 use super::forecast;
 use super::plan::model;
 use super::weights::norm_optimal_cost;
-use crate::config::{Cell, GateMeasure, Interface, LawName};
+use crate::config::{Cell, GateMeasure, LawName, mode};
 use crate::learning::gate::{Gate, GateRule, Measure};
 use crate::learning::ladder::{Ladder, LadderRule};
 use crate::learning::law::adjoint::Adjoint;
@@ -121,7 +121,7 @@ fn constrained(cell: &Cell, believed: &StateSpace, reference_m: &[f64], n_sample
         upper: Limit::PerChannel((0..cell.n_axes()).map(upper).collect()),
     };
     let within = |most: &dyn Fn(usize) -> f64| sides(&|i| -most(i), most);
-    let is_csp = |i: usize| cell.axes[i].interface == Interface::Csp;
+    let is_csp = |i: usize| !mode::of(cell.axes[i].interface).closes_position_loop();
     let by_unit = |csp: f64, csv: f64| within(&|i| if is_csp(i) { csp } else { csv });
     let optional = |csp: Option<f64>, csv: Option<f64>| {
         let free = f64::INFINITY;

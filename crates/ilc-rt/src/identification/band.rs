@@ -1,18 +1,16 @@
-//! The bands in which an axis is excited, one after the other, until a model fits.
+//! Search for the frequency band in which a model fits.
 //!
 //! Friction and modes outside the model spoil the fit of a wide band: acceleration grows with the square
 //! of the frequency, so that a narrower one leaves room for a larger amplitude.
 
 use std::f64::consts::TAU;
 
-use super::error::IdentificationError;
-use super::experiment::Experiment;
 use super::identified::{Described, Identified};
-use crate::config::Cell;
+use crate::config::{Axis, Cell};
 
 /// Upper ends of the bands, relative to the natural frequency that the cell names.
 const SHARES: [f64; 4] = [1.5, 1.0, 0.75, 0.5];
-/// What a model may leave over before a narrower band is tried.
+/// Relative residual of a model up to which its band is good enough.
 const GOOD_RESIDUAL: f64 = 0.12;
 /// Lowest frequency, unless the axis is slow.
 const FROM_HZ: f64 = 1.0;
@@ -23,7 +21,7 @@ const CYCLES: f64 = 5.0;
 /// Upper end of the widest band, in cycles.
 const HIGHEST: f64 = 0.4;
 
-/// Where an axis is excited.
+/// Frequency band of an excitation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Band {
     /// Lowest frequency.
@@ -42,18 +40,14 @@ pub struct BandSearch {
     highest_hz: f64,
     /// Upper ends that are still to be tried, the next one last.
     to_try_hz: Vec<f64>,
-    /// Upper end of the narrowest band that did not do.
+    /// Upper end of the narrowest band without a good model.
     spoilt_hz: f64,
     widened: bool,
 }
 
 impl BandSearch {
     /// Begins with a band up to 1.5 times the natural frequency that the cell names.
-    ///
-    /// # Errors
-    /// [`IdentificationError::Experiment`] for an axis that is not there.
-    pub fn new(cell: &Cell, experiment: &Experiment) -> Result<Self, IdentificationError> {
-        let (_, axis) = experiment.axis(cell)?;
+    pub fn new(cell: &Cell, axis: &Axis) -> Self {
         let expected_hz = match axis.position_loop {
             None => axis.model.natural_frequency_hz.unwrap_or(1.0),
             // kv and the velocity loop make a second-order loop with w0^2 = kv 2 pi f.
@@ -74,7 +68,7 @@ impl BandSearch {
         if to_try_hz.is_empty() {
             to_try_hz.push((2.5 * from_hz).min(highest_hz));
         }
-        Ok(Self { from_hz, period_s, highest_hz, to_try_hz, spoilt_hz: highest_hz, widened: false })
+        Self { from_hz, period_s, highest_hz, to_try_hz, spoilt_hz: highest_hz, widened: false }
     }
 
     /// Returns the next band to excite the axis in; `None` if nothing better is to be found.
@@ -83,14 +77,14 @@ impl BandSearch {
         Some(Band { from_hz: self.from_hz, to_hz, period_s: self.period_s })
     }
 
-    /// Whether there is another band to try.
+    /// Returns whether there is another band to try.
     pub fn is_open(&self) -> bool {
         !self.to_try_hz.is_empty()
     }
 
-    /// Takes in what a band showed; returns whether it is the best one so far, `before` being that.
+    /// Notes the model found in a band; returns whether it is better than the best one so far, `before`.
     pub fn judge(&mut self, band: Band, found: &Identified, before: Option<&Identified>) -> bool {
-        let good = found.doubt.is_none() && found.residual_rms <= GOOD_RESIDUAL;
+        let good = found.doubt.is_none() && found.residual_rms() <= GOOD_RESIDUAL;
         if self.widened {
             return good;
         }
@@ -101,18 +95,18 @@ impl BandSearch {
         }
         if self.to_try_hz.is_empty()
             && found.doubt.is_none()
-            && let Described::Position(model) = found.described
+            && let Described::Position(fit) = found.described
         {
-            // A band that ends below the natural frequency tells it badly.
-            let wider_hz = (1.5 * model.natural_frequency_hz).min(self.highest_hz);
-            if band.to_hz < model.natural_frequency_hz && wider_hz < 0.99 * self.spoilt_hz {
+            // A band that ends below the natural frequency determines it badly.
+            let wider_hz = (1.5 * fit.model.natural_frequency_hz).min(self.highest_hz);
+            if band.to_hz < fit.model.natural_frequency_hz && wider_hz < 0.99 * self.spoilt_hz {
                 self.to_try_hz.push(wider_hz);
                 self.widened = true;
             }
         }
         let least = before.filter(|before| before.doubt.is_none());
         match (found.doubt, least) {
-            (None, Some(before)) => found.residual_rms < before.residual_rms,
+            (None, Some(before)) => found.residual_rms() < before.residual_rms(),
             (None, None) => true,
             (Some(_), least) => least.is_none(),
         }
@@ -122,26 +116,13 @@ impl BandSearch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::identify::{Excitation, Waveform};
 
     fn search(change: (&str, &str)) -> BandSearch {
         let text =
             include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/01_gantry.toml"));
         assert!(text.contains(change.0));
         let cell = Cell::parse(&text.replace(change.0, change.1), "cell.toml").unwrap();
-        let experiment = Experiment {
-            axis: "y".to_owned(),
-            excitation: Excitation {
-                waveform: Waveform::Multisine,
-                amplitude: 1.0,
-                from_hz: 1.0,
-                to_hz: 50.0,
-                period_s: 8.0,
-                periods: 5,
-            },
-            at_m: None,
-        };
-        BandSearch::new(&cell, &experiment).unwrap()
+        BandSearch::new(&cell, &cell.axes[1])
     }
 
     #[test]

@@ -1,10 +1,12 @@
-//! An identification experiment: one axis is excited around a point while all hold still.
+//! Experiment of an identification: one axis is excited around a point while all others hold still.
 
 use serde_json::json;
 
 use super::error::IdentificationError;
-use crate::config::{Axis, Cell, Interface, Measure};
+use crate::config::mode::{self, Demand, Peaks};
+use crate::config::{Axis, Cell, Measure};
 use crate::design::{DesignError, Plan, input_unit};
+use crate::model::ModelError;
 use crate::model::identify::{Excitation, ExcitationSignal};
 use crate::trajectory::Interpolator;
 
@@ -13,18 +15,30 @@ pub(crate) const LAW_NAME: &str = "excitation";
 /// Share of the largest amplitude that is used if none is asked for.
 const AMPLITUDE_SHARE: f64 = 0.5;
 
-/// What shall be done with which axis.
+/// An experiment with one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// Name of the axis.
     pub axis: String,
     /// The excitation, in m (csp) or m/s (csv).
     pub excitation: Excitation,
-    /// Where the axis is excited, if not at the program's start.
+    /// Position that the axis is excited around; the program's start if `None`.
     pub at_m: Option<f64>,
 }
 
-/// An experiment worked out: nothing in it can fail any more.
+/// Signals of a completed experiment.
+///
+/// # Shapes
+/// - both: `n_samples` x `n_axes`, time first
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signals {
+    /// Learned input.
+    pub input: Vec<f64>,
+    /// Error of the measurement; the set point rests.
+    pub error_m: Vec<f64>,
+}
+
+/// A planned experiment.
 pub(crate) struct Planned {
     /// The plan whose program is a hold.
     pub(crate) plan: Plan,
@@ -46,7 +60,7 @@ impl Experiment {
         let tightest = self
             .demands(cell, index, axis, &signal)
             .iter()
-            .map(Demand::room)
+            .map(Demand::margin)
             .fold(f64::INFINITY, f64::min);
         self.excitation.amplitude *= AMPLITUDE_SHARE * tightest;
         if self.excitation.amplitude.is_nan() || self.excitation.amplitude <= 0.0 {
@@ -55,30 +69,42 @@ impl Experiment {
         Ok(self)
     }
 
-    /// Works the experiment out and holds it against the limits of the axis.
-    pub(crate) fn plan(
-        &self,
-        cell: &Cell,
-        measure: Option<Measure>,
-        lockstep: bool,
-    ) -> Result<Planned, IdentificationError> {
+    /// Compares what the excitation demands with the limits of the axis.
+    ///
+    /// # Errors
+    /// [`IdentificationError::Experiment`] with the demand that exceeds its limit by most, and the largest
+    /// amplitude that is allowed.
+    pub fn check(&self, cell: &Cell) -> Result<(), IdentificationError> {
         let (index, axis) = self.axis(cell)?;
         let signal = self.signal(cell)?;
         let demands = self.demands(cell, index, axis, &signal);
-        let tightest = demands.iter().min_by(|a, b| a.room().total_cmp(&b.room()));
-        if let Some(demand) = tightest.filter(|demand| demand.room() < 1.0) {
+        let tightest = demands.iter().min_by(|a, b| a.margin().total_cmp(&b.margin()));
+        if let Some(demand) = tightest.filter(|demand| demand.margin() < 1.0) {
             let Demand { what, needed, allowed, unit } = demand;
-            let most = self.excitation.amplitude * demand.room();
+            let largest = self.excitation.amplitude * demand.margin();
             let input = input_unit(axis);
             return Err(self.refused(
                 cell,
                 &format!("amplitude {} {input}: {what}", self.excitation.amplitude),
                 &format!("{needed:.6} {unit}"),
                 &format!(
-                    "at most {allowed:.6} {unit}, which is an amplitude of {most:.6e} {input}"
+                    "at most {allowed:.6} {unit}, which is an amplitude of {largest:.6e} {input}"
                 ),
             ));
         }
+        Ok(())
+    }
+
+    /// Plans the experiment, within the limits of the axis.
+    pub(crate) fn plan(
+        &self,
+        cell: &Cell,
+        measure: Option<Measure>,
+        lockstep: bool,
+    ) -> Result<Planned, IdentificationError> {
+        self.check(cell)?;
+        let (index, _) = self.axis(cell)?;
+        let signal = self.signal(cell)?;
         let mut cell = cell.clone();
         cell.program.start_m[index] = self.center_m(&cell, index);
         let n_samples = signal.values.len();
@@ -116,10 +142,10 @@ impl Experiment {
     /// Lays the excitation out on the servo cycle.
     pub(crate) fn signal(&self, cell: &Cell) -> Result<ExcitationSignal, IdentificationError> {
         self.excitation.signal(cell.cycle_s()).map_err(|source| {
-            let text = source.to_string();
-            let (value, allowed) = text.split_once("; ").unwrap_or((text.as_str(), ""));
-            let (what, value) = value.split_once(" = ").unwrap_or(("excitation", value));
-            self.refused(cell, what, value, allowed)
+            if let ModelError::Parameter { what, value, allowed } = source {
+                return self.refused(cell, what, &value.to_string(), allowed);
+            }
+            IdentificationError::Model { file: cell.file.display().to_string(), source }
         })
     }
 
@@ -127,7 +153,7 @@ impl Experiment {
         self.at_m.unwrap_or_else(|| cell.program.start_m[index])
     }
 
-    /// What the excitation asks of the axis, and what is allowed.
+    /// Returns the demands of the excitation on the axis, with their limits.
     fn demands(
         &self,
         cell: &Cell,
@@ -136,55 +162,29 @@ impl Experiment {
         signal: &ExcitationSignal,
     ) -> Vec<Demand> {
         let (u, dt_s) = (&signal.values, cell.cycle_s());
-        let most =
+        let max =
             |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |m: f64, v| m.max(v.abs()));
-        let peak = most(&mut u.iter().copied());
-        let rate = most(&mut u.windows(2).map(|w| (w[1] - w[0]) / dt_s));
-        let curve = most(&mut u.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]) / (dt_s * dt_s)));
+        let peak = max(&mut u.iter().copied());
+        let rate = max(&mut u.windows(2).map(|w| (w[1] - w[0]) / dt_s));
+        let curve = max(&mut u.windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]) / (dt_s * dt_s)));
         let (limits, center_m) = (&axis.limits, self.center_m(cell, index));
-        let room_m =
+        let margin_m =
             (center_m - limits.position_min_m).min(limits.position_max_m - center_m).max(0.0);
+        let peaks = Peaks { value: peak, rate, curvature: curve };
+        let (travel_m, demands) = mode::of(axis.interface).demands(axis, &cell.learning, peaks);
         let demand = |what, needed, allowed, unit| Demand { what, needed, allowed, unit };
-        // A velocity input moves the axis by no more than it takes the position loop to hold against.
-        let (travel_m, mut demands) = match axis.interface {
-            Interface::Csp => (
-                peak,
-                vec![
-                    demand("learning.input_max_m", peak, cell.learning.input_max_m, "m"),
-                    demand("limits.velocity_max_m_s", rate, limits.velocity_max_m_s, "m/s"),
-                    demand(
-                        "limits.acceleration_max_m_s2",
-                        curve,
-                        limits.acceleration_max_m_s2,
-                        "m/s^2",
-                    ),
-                ],
-            ),
-            Interface::Csv => (
-                peak / axis.position_loop.map_or(1.0, |position_loop| position_loop.gain_per_s),
-                vec![
-                    demand("learning.input_max_m_s", peak, cell.learning.input_max_m_s, "m/s"),
-                    demand("limits.velocity_max_m_s", peak, limits.velocity_max_m_s, "m/s"),
-                    demand(
-                        "limits.acceleration_max_m_s2",
-                        rate,
-                        limits.acceleration_max_m_s2,
-                        "m/s^2",
-                    ),
-                ],
-            ),
-        };
+        let mut demands = demands.to_vec();
         demands.push(demand(
             "limits.following_error_max_m",
             travel_m,
             limits.following_error_max_m,
             "m",
         ));
-        demands.push(demand("way to the end of the axis", travel_m, room_m, "m"));
+        demands.push(demand("way to the end of the axis", travel_m, margin_m, "m"));
         demands
     }
 
-    /// The experiment as the record keeps it.
+    /// Returns the experiment as JSON, for its record.
     fn parameters(&self, signal: &ExcitationSignal) -> String {
         let mut parameters = json!(self.excitation);
         parameters["axis"] = json!(self.axis);
@@ -207,20 +207,5 @@ impl Experiment {
             value: value.to_owned(),
             allowed: allowed.to_owned(),
         }
-    }
-}
-
-/// One limit, and how much of it is needed.
-struct Demand {
-    what: &'static str,
-    needed: f64,
-    allowed: f64,
-    unit: &'static str,
-}
-
-impl Demand {
-    /// By what factor the amplitude could grow.
-    fn room(&self) -> f64 {
-        self.allowed / self.needed
     }
 }

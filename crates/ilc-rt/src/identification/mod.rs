@@ -6,8 +6,12 @@ mod band;
 mod error;
 mod experiment;
 mod identified;
+mod options;
+mod search;
 
 pub use band::{Band, BandSearch};
 pub use error::IdentificationError;
-pub use experiment::Experiment;
-pub use identified::{Described, Identified};
+pub use experiment::{Experiment, Signals};
+pub use identified::{Described, Form, Identified};
+pub use options::{ExperimentOptions, waveform, waveform_name};
+pub use search::identify;

@@ -12,7 +12,9 @@ use std::path::{Path, PathBuf};
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 
 use super::error::{LibraryError, told};
+use super::row::{ARRAYS, COLUMNS};
 use super::schema;
+use crate::record::figure_fields;
 
 /// The name that stands for a library in memory.
 pub(super) const IN_MEMORY: &str = ":memory:";
@@ -188,8 +190,13 @@ fn has_columns(connection: &Connection) -> rusqlite::Result<bool> {
     let mut statement = connection.prepare("SELECT name FROM pragma_table_info('iteration')")?;
     let names: Vec<String> =
         statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
-    let mut wanted = super::row::COLUMNS.split(',').chain(super::row::ARRAYS.split(','));
-    Ok(wanted.all(|column| names.iter().any(|name| name == column.trim())))
+    let figures = figure_fields().iter().filter(|field| field.is_required);
+    let mut wanted = COLUMNS
+        .iter()
+        .chain(&ARRAYS)
+        .map(|(name, _)| *name)
+        .chain(figures.map(|field| field.name.as_str()));
+    Ok(wanted.all(|column| names.iter().any(|name| name == column)))
 }
 
 /// A path that SQLite takes as it is: an absolute one is no address, whatever its letters.
@@ -218,7 +225,7 @@ fn immutable(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::Library;
-    use super::super::store::tests::{meta, record};
+    use super::super::tests::{meta, record};
     use super::*;
 
     /// A folder of its own, gone when dropped.
