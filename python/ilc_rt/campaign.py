@@ -336,7 +336,9 @@ def _simulated(transport: Transport, drives: str) -> bool:
         message = f"drives = {drives}: allowed auto, simulated or external"
         raise BadInputError(message)
     if transport.in_process and drives == "external":
-        message = f"drives = external: {transport.syntax} has no outside; its drives are always simulated"
+        message = (
+            f"drives = external: {transport.syntax} has no outside; its drives are always simulated"
+        )
         raise BadInputError(message)
     return drives == "simulated" or (drives == "auto" and not transport.has_bits)
 

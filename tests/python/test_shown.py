@@ -103,7 +103,8 @@ def record(index: int, tracking_m: float, contour_m: float | None = None, **more
     return IterationRecord(
         library="l.db", id=index + 1, index=index, tracking_inf_m=tracking_m,
         tracking_rms_m=tracking_m / 2, contour_inf_m=contour_m,
-        contour_rms_m=contour_m, axes_tracking_inf_m=(tracking_m, 0.5), axes_tracking_rms_m=(tracking_m, 0.5),
+        contour_rms_m=contour_m, axes_tracking_inf_m=(tracking_m, 0.5),
+        axes_tracking_rms_m=(tracking_m, 0.5),
         **more,
     )  # fmt: skip
 
