@@ -18,6 +18,7 @@ from ilc_rt.interruption import ControlledStop
 from ilc_rt.processes import start_simulated_drives
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
+from ilc_rt.transports import Transport, transport_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 DEFAULT_LIBRARY = "ilc-library.db"
 # Runs are counted in 32 bits.
 ITERATIONS_MAX = 2**32 - 1
-TRANSPORTS = ("can", "udp", "zenoh", "loopback")
 Drives = Literal["auto", "simulated", "external"]
 
 
@@ -59,8 +59,7 @@ class Campaign:
     library : path
         Where the runs are kept.
     bus : str or None
-        Bus address in place of the cell's: ``can:``, ``udp:``, ``zenoh:``
-        or ``loopback:``.
+        Bus address in place of the cell's; `ilc_rt.transports` lists the kinds.
     measure : {"encoder", "tcp"} or None
         Which measurement to learn from, in place of the cell's.
     lockstep : bool or None
@@ -148,7 +147,7 @@ class Campaign:
                 warnings.warn(f"{self.cell.path}: {line}", stacklevel=2)
         self.measure = measure
         self.transport = transport_of(self.bus)
-        self.lockstep = self.transport == "loopback" if lockstep is None else lockstep
+        self.lockstep = self.transport.in_process if lockstep is None else lockstep
         self.simulated = _simulated(self.transport, drives)
         self.resume = resume
         self.learning = learning
@@ -222,7 +221,7 @@ class Campaign:
 
     def _start(self, iterations: int, measure: Callable[[int], ArrayLike] | None) -> Controller:
         cell_file = str(self.cell.path)
-        if self.law is None and measure is None and self.transport != "loopback":
+        if self.law is None and measure is None and not self.transport.in_process:
             library = ["--library", self.library]
             if self.experiment is not None:
                 verb, arguments = "identify", library + self.experiment.arguments()
@@ -258,7 +257,7 @@ class Campaign:
             "disturbance": measure,
             "simulated": self.simulated,
         }
-        apart = self.simulated and self.transport != "loopback"
+        apart = self.simulated and not self.transport.in_process
         drives = None
         if apart:
             drives = start_simulated_drives(cell_file, self.bus, lockstep=self.lockstep)
@@ -299,26 +298,6 @@ def load_cell(path: str | Path, *, allow_divergent: bool = False) -> Cell:
         raise BadInputError(" ".join(str(error).split())) from error
 
 
-def transport_of(bus: str) -> str:
-    """Return the kind of a bus address.
-
-    Raises
-    ------
-    BadInputError
-        If it is not one of can, udp, zenoh, loopback.
-
-    Examples
-    --------
-    >>> transport_of("udp:239.74.163.2")
-    'udp'
-    """
-    kind, colon, _ = bus.partition(":")
-    if not colon or kind not in TRANSPORTS:
-        message = f"bus = {bus}: allowed can:INTERFACE, udp:ADDRESS[:PORT], zenoh:KEY or loopback:"
-        raise BadInputError(message)
-    return kind
-
-
 def _measure(
     disturbance: Callable[[int], ArrayLike] | ArrayLike | None, iterations: int
 ) -> Callable[[int], ArrayLike] | None:
@@ -347,14 +326,14 @@ def _refuse_divergent(law: Law, cell: Cell) -> None:
         raise BadInputError(message) from error
 
 
-def _simulated(transport: str, drives: str) -> bool:
+def _simulated(transport: Transport, drives: str) -> bool:
     if drives not in {"auto", "simulated", "external"}:
         message = f"drives = {drives}: allowed auto, simulated or external"
         raise BadInputError(message)
-    if transport == "loopback" and drives == "external":
-        message = "drives = external: loopback: has no outside; its drives are always simulated"
+    if transport.in_process and drives == "external":
+        message = f"drives = external: {transport.syntax} has no outside; its drives are always simulated"
         raise BadInputError(message)
-    return drives == "simulated" or (drives == "auto" and transport != "can")
+    return drives == "simulated" or (drives == "auto" and not transport.has_bits)
 
 
 __all__ = ["Campaign", "CampaignError", "EndEvent", "IterationRecord", "Law", "load_cell"]

@@ -10,6 +10,7 @@ import typer
 
 from ilc_rt.campaign import DEFAULT_LIBRARY, ITERATIONS_MAX
 from ilc_rt.commands.targets import json_target
+from ilc_rt.transports import SYNTAXES
 
 
 class Measure(str, Enum):
@@ -41,7 +42,7 @@ Bus = Annotated[
     str | None,
     typer.Option(
         metavar="ADDR",
-        help="Bus in place of the cell's: can:vcan0, udp:239.74.163.2, zenoh:KEY or loopback:",
+        help=f"Bus in place of the cell's: {SYNTAXES}",
     ),
 ]
 MeasureOption = Annotated[
