@@ -3,6 +3,8 @@
 //!
 //! The owner of loop, library and telemetry; only the binary and the Python bindings import it. Cold:
 //! it reads the loop's mailbox and never shares anything else with it.
+//!
+//! Family: `forecast`, `law` and `plan` work one cell description out together.
 
 mod announce;
 mod band;
