@@ -214,6 +214,21 @@ def test_a_bad_cell_names_file_and_key(
     assert said in done.stderr
 
 
+def test_without_the_papers_reproduce_says_how_to_get_them() -> None:
+    """The verb comes with a package of its own."""
+    without = (
+        "import importlib.metadata as metadata; metadata.entry_points = lambda **_: ();"
+        "from ilc_rt.cli import main;"
+        "raise SystemExit(main(['reproduce', 'haas2016', '--reduced']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", without], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "pip install 'ilc-rt[papers]'" in done.stderr
+
+
 def test_a_file_that_is_no_library_is_refused(ilc: Ilc, gantry: Path) -> None:
     """A text file is not taken for a library."""
     done = ilc("library", "list", gantry)

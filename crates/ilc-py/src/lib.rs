@@ -6,6 +6,8 @@
 //! Family: `laws`, `python_law` and `weights` read each other's arguments.
 //!
 //! Family: `model` and `model_argument` read each other's arguments.
+//!
+//! Family: `experiment` and `identify` read each other's arguments.
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
@@ -61,6 +63,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;
+    experiment::register(module)?;
     made::register(module)?;
     Ok(())
 }

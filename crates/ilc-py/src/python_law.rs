@@ -1,4 +1,4 @@
-//! A learning law that is a Python object, as the supervisor's own or as the core of another law.
+//! A learning law that is a Python object, as a campaign's own or as the core of another law.
 
 use ilc_rt::learning::{Law, LearningError, Standing};
 use pyo3::prelude::*;
@@ -75,7 +75,7 @@ impl Law for PythonLaw {
         Ok(())
     }
 
-    fn expect(&mut self, disturbance: &[f64]) {
+    fn set_disturbance(&mut self, disturbance: &[f64]) {
         if let Some(passed) = self.coming.replace(disturbance.to_vec()) {
             // A law that has no `expect` does not care; one that fails shows it in the update.
             let _ = Python::attach(|py| -> PyResult<()> {
@@ -85,16 +85,16 @@ impl Law for PythonLaw {
         }
     }
 
-    fn taken_back(&mut self) {
+    fn on_rollback(&mut self) {
         // A law that has no `taken_back` does not care.
         let _ = Python::attach(|py| self.law.bind(py).call_method0("taken_back").map(drop));
     }
 
-    fn goes_back(&self) -> bool {
-        Python::attach(|py| laws::goes_back(self.law.bind(py)))
+    fn handles_rollback(&self) -> bool {
+        Python::attach(|py| laws::handles_rollback(self.law.bind(py)))
     }
 
-    fn remark(&self) -> Option<String> {
+    fn status(&self) -> Option<String> {
         Python::attach(|py| laws::standing(self.law.bind(py)).1)
     }
 

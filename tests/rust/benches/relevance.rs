@@ -67,9 +67,9 @@ fn measure(n_runs: usize) -> Result<Duration, Box<dyn Error>> {
         let repeats = if top.is_some() { 201 } else { 7 };
         let mut next = vec![0.0; N_SAMPLES];
         let mut each = Vec::with_capacity(repeats);
-        law.expect(&[100.0 * random.signed()]);
+        law.set_disturbance(&[100.0 * random.signed()]);
         for _ in 0..repeats {
-            law.expect(&[100.0 * random.signed()]);
+            law.set_disturbance(&[100.0 * random.signed()]);
             let began = Instant::now();
             law.update(&input, &input, &mut next)?;
             each.push(began.elapsed());

@@ -7,17 +7,6 @@ use std::path::{Path, PathBuf};
 /// A module, as the names that lead to it from the crate's root.
 pub type ModulePath = Vec<String>;
 
-/// The root of the project.
-///
-/// # Panics
-/// If it is not there.
-pub fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../..")
-        .canonicalize()
-        .expect("the project is there")
-}
-
 /// The text of a file.
 ///
 /// # Panics

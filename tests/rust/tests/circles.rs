@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use ilc_tests::source::{Crate, paths, root};
+use ilc_tests::root;
+use ilc_tests::source::{Crate, paths};
 
 #[test]
 fn the_reader_of_paths_reads_what_rust_allows() {

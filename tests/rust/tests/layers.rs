@@ -7,7 +7,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use ilc_tests::source::{code, module_of, root, rust_files, test_modules};
+use ilc_tests::root;
+use ilc_tests::source::{code, module_of, rust_files, test_modules};
 
 /// First line of every hot file.
 const FENCE: &str =

@@ -172,7 +172,7 @@ fn recall_allocates_nothing_within_its_capacity() {
                 let error: Vec<f64> =
                     (0..2 * N_SAMPLES).map(|k| (phase + k as f64).cos()).collect();
                 let before = allocations();
-                law.expect(&[phase.sin(), 0.1 * phase]);
+                law.set_disturbance(&[phase.sin(), 0.1 * phase]);
                 law.update(&input, &error, &mut next).unwrap();
                 assert_eq!(allocations() - before, 0, "run {run} with {top:?}, {again}");
                 input.copy_from_slice(&next);

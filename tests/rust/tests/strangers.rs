@@ -8,13 +8,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{Command, Controlword};
 use ilc_rt::fieldbus::transport::{self, Address, Responder, ZenohBus, loopback};
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_rt::record::{EndStatus, Event, StateName};
 use ilc_rt::servo::{PhaseName, StopReason, Stranger};
-use ilc_rt::supervisor::{self, Outcome};
 use ilc_tests::campaign::{machine, options};
 use ilc_tests::rig::{Rig, node};
 use ilc_tests::{Scratch, short};
@@ -116,7 +116,7 @@ fn campaign(
             }
         });
         let options = options(scratch.file("library.db"), 40);
-        let outcome = supervisor::run(&cell, &options, near, None, &mut |event| {
+        let outcome = campaign::run(&cell, &options, near, None, &mut |event| {
             if matches!(event, Event::State { state: StateName::Running, iteration: 1 }) {
                 match &mut stranger {
                     Some(stranger) => stranger.send(&frame).unwrap(),

@@ -75,7 +75,7 @@ pub(super) struct PyGate {
 impl PyGate {
     /// Returns what the gate decided after the last update, and why.
     pub(super) fn standing(&self, py: Python<'_>) -> (Standing, Option<String>) {
-        look(py, &self.gate, |gate| (gate.standing(), gate.remark()))
+        look(py, &self.gate, |gate| (gate.standing(), gate.status()))
     }
 
     /// Returns the law inside.
@@ -181,7 +181,7 @@ impl PyGate {
     /// For whoever runs the law and restores an earlier input because the error
     /// grew; handed on to the law inside.
     fn taken_back(&self, py: Python<'_>) {
-        look(py, &self.gate, Law::taken_back);
+        look(py, &self.gate, Law::on_rollback);
     }
 
     /// Forget every run; the law inside too.

@@ -105,7 +105,7 @@ impl Law for InnerLaw {
         }
     }
 
-    fn taken_back(&mut self) {
+    fn on_rollback(&mut self) {
         // A law that has no `taken_back` does not care.
         let _ = Python::attach(|py| self.law.bind(py).call_method0("taken_back").map(drop));
     }

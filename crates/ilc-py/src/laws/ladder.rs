@@ -162,7 +162,7 @@ impl PyLadder {
     /// For whoever runs the law and restores an earlier input because the error
     /// grew: the gain is halved and the mean begins anew.
     fn taken_back(&self, py: Python<'_>) {
-        look(py, &self.ladder, Law::taken_back);
+        look(py, &self.ladder, Law::on_rollback);
     }
 
     /// Forget every run and the gain; the law inside too.

@@ -80,8 +80,9 @@ fn inside<'py>(object: &Bound<'py, PyAny>) -> Option<Bound<'py, PyAny>> {
 }
 
 /// Returns whether a law goes back to its best input by itself: a gate does, also inside a ladder.
-pub(crate) fn goes_back(object: &Bound<'_, PyAny>) -> bool {
-    object.is_instance_of::<gate::PyGate>() || inside(object).is_some_and(|law| goes_back(&law))
+pub(crate) fn handles_rollback(object: &Bound<'_, PyAny>) -> bool {
+    object.is_instance_of::<gate::PyGate>()
+        || inside(object).is_some_and(|law| handles_rollback(&law))
 }
 
 /// Returns what a gate, also one inside a ladder, decided after the last update, and why.

@@ -88,7 +88,7 @@ impl<L: Remember> Recalled<L> {
         detached(disturbance.py(), || {
             let mut state = held(&self.state);
             match &mut state.law {
-                Some((_, law)) => law.expect(&values),
+                Some((_, law)) => law.set_disturbance(&values),
                 None => state.announced.push(values),
             }
         });
@@ -117,7 +117,7 @@ impl<L: Remember> Recalled<L> {
                 return Err(LearningError::Empty { what: "law" });
             };
             if let Some(coming) = &coming {
-                law.expect(coming);
+                law.set_disturbance(coming);
             }
             next(law, &u, &e)
         });
@@ -187,7 +187,7 @@ impl<L: Remember> Recalled<L> {
                 law.remember(&run.input, &run.error_m, &run.disturbance)?;
             }
             for disturbance in &announced {
-                law.expect(disturbance);
+                law.set_disturbance(disturbance);
             }
             let mut state = held(&self.state);
             state.announced.clear();

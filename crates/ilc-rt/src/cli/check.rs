@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
 use crate::config::{AxisUnit, Cell, GateMeasure, LawName, PathKind};
+use crate::design::{DesignError, Plan, Prepared};
 use crate::record::AxisKinds;
-use crate::supervisor::{Plan, Prepared, SupervisorError};
 
 #[derive(Args)]
 #[command(after_help = "Example:
@@ -28,7 +28,7 @@ pub(super) fn check(arguments: &CheckArguments) -> u8 {
     }
 }
 
-fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
+fn describe(arguments: &CheckArguments) -> Result<(), DesignError> {
     let cell = Cell::load(&arguments.cell)?;
     let plan = Plan::new(&cell, None, false)?;
     let Prepared { law, verdict, warnings } = plan.law(&cell)?;

@@ -222,13 +222,30 @@ pub(crate) fn is_finite(signal: &[f64]) -> bool {
     poison.iter().chain(rest).all(|value| value.is_finite())
 }
 
-/// Checks the length of the place for a result.
-pub(crate) fn check_place(
+/// Checks the arguments of [`Law::update`](super::Law::update); `channels` are those of input and error.
+pub(crate) fn check_update(
+    input: &[f64],
+    error: &[f64],
     next: &[f64],
     n_samples: usize,
-    n_channels: usize,
+    [n_inputs, n_outputs]: [usize; 2],
 ) -> Result<(), LearningError> {
-    check_length("next", next, n_samples, n_channels)
+    check("input", input, n_samples, n_inputs)?;
+    check("error", error, n_samples, n_outputs)?;
+    check_length("next", next, n_samples, n_inputs)
+}
+
+/// Checks the arguments of [`Law::apply_adjoint`](super::Law::apply_adjoint).
+pub(crate) fn check_adjoint(
+    dual: &[f64],
+    to_input: &[f64],
+    to_error: &[f64],
+    n_samples: usize,
+    [n_inputs, n_outputs]: [usize; 2],
+) -> Result<(), LearningError> {
+    check("dual", dual, n_samples, n_inputs)?;
+    check_length("to_input", to_input, n_samples, n_inputs)?;
+    check_length("to_error", to_error, n_samples, n_outputs)
 }
 
 /// Checks the length of a signal.

@@ -1,6 +1,6 @@
 //! The switching mechanism: when any law is to learn, to rest, or to go back to what was best.
 
-use super::{Law, LearningError, StandIn, Standing};
+use super::{Law, LearningError, Standing, Surrogate};
 
 /// What a run is judged by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -193,7 +193,7 @@ impl<L: Law> Gate<L> {
             self.state = GateState::RolledBack;
             self.runs_grown = 0;
             self.went_back = true;
-            self.law.taken_back();
+            self.law.on_rollback();
         }
         if self.best_figure.is_none_or(|best| figure < best) {
             self.best_figure = Some(figure);
@@ -230,25 +230,25 @@ impl<L: Law> Law for Gate<L> {
         Ok(())
     }
 
-    fn expect(&mut self, disturbance: &[f64]) {
-        self.law.expect(disturbance);
+    fn set_disturbance(&mut self, disturbance: &[f64]) {
+        self.law.set_disturbance(disturbance);
     }
 
-    fn stand_in(&mut self) -> StandIn<'_> {
-        StandIn::Inside(&mut self.law)
+    fn linear_surrogate(&mut self) -> Surrogate<'_> {
+        Surrogate::Inside(&mut self.law)
     }
 
-    fn taken_back(&mut self) {
-        self.law.taken_back();
+    fn on_rollback(&mut self) {
+        self.law.on_rollback();
     }
 
-    fn goes_back(&self) -> bool {
+    fn handles_rollback(&self) -> bool {
         true
     }
 
-    fn remark(&self) -> Option<String> {
+    fn status(&self) -> Option<String> {
         match self.state {
-            GateState::Learning => self.law.remark(),
+            GateState::Learning => self.law.status(),
             GateState::Holding => Some(format!(
                 "the error is within the tolerance of {:.4e}: the input is kept until it exceeds {:.4e}",
                 self.rule.tolerance,
@@ -300,7 +300,7 @@ mod tests {
     struct Counter {
         expected: Vec<f64>,
         resets: usize,
-        n_taken_back: usize,
+        n_rollbacks: usize,
     }
 
     impl Law for Counter {
@@ -311,11 +311,11 @@ mod tests {
             }
             Ok(())
         }
-        fn expect(&mut self, disturbance: &[f64]) {
+        fn set_disturbance(&mut self, disturbance: &[f64]) {
             self.expected = disturbance.to_vec();
         }
-        fn taken_back(&mut self) {
-            self.n_taken_back += 1;
+        fn on_rollback(&mut self) {
+            self.n_rollbacks += 1;
         }
         fn reset(&mut self) {
             self.resets += 1;
@@ -349,17 +349,17 @@ mod tests {
     #[test]
     fn the_law_inside_hears_that_its_input_is_taken_back_and_people_hear_why() {
         let mut gate = gate(0.0);
-        assert!(gate.goes_back() && gate.remark().is_none());
+        assert!(gate.handles_rollback() && gate.status().is_none());
         play(&mut gate, &[5.0, 2.0, 3.1, 2.9, 3.1]);
-        assert_eq!((gate.law().n_taken_back, gate.remark()), (0, None));
+        assert_eq!((gate.law().n_rollbacks, gate.status()), (0, None));
         play(&mut gate, &[3.2]);
-        assert_eq!(gate.law().n_taken_back, 1);
-        assert!(gate.remark().unwrap().contains("best input is kept"));
+        assert_eq!(gate.law().n_rollbacks, 1);
+        assert!(gate.status().unwrap().contains("best input is kept"));
         assert_eq!(gate.standing(), Standing::GoesBack);
         play(&mut gate, &[2.0]);
         assert_eq!(gate.standing(), Standing::Rests, "once for each time");
-        gate.taken_back();
-        assert_eq!(gate.law().n_taken_back, 2);
+        gate.on_rollback();
+        assert_eq!(gate.law().n_rollbacks, 2);
     }
 
     #[test]
@@ -411,7 +411,7 @@ mod tests {
     #[test]
     fn what_is_expected_and_what_is_wrong_reach_the_law_inside() {
         let mut gate = gate(1.0);
-        gate.expect(&[21.5]);
+        gate.set_disturbance(&[21.5]);
         assert_eq!(gate.law().expected, [21.5]);
         assert!(gate.describe().contains(r#""inner":{"law":"counter"}"#));
         assert!(gate.update(&[0.0; 3], &[9.0; 3], &mut [0.0; 3]).is_err());

@@ -1,6 +1,6 @@
 //! The ladder mechanism: several runs with the same input before each step of learning.
 
-use super::{Law, LearningError, StandIn, Standing};
+use super::{Law, LearningError, Standing, Surrogate};
 
 /// How a [`Ladder`] averages and adapts.
 ///
@@ -43,7 +43,7 @@ impl LadderRule {
 /// - otherwise, or if `f_j` is less than twice the noise `s_j / sqrt(n)` of the mean, so that its
 ///   ratio says nothing: `g` stays.
 ///
-/// Where whoever runs the law takes an input back ([`Law::taken_back`]) the error grew too, though the
+/// Where whoever runs the law takes an input back ([`Law::on_rollback`]) the error grew too, though the
 /// law never learns from that run: `g` is halved, and the mean begins anew.
 ///
 /// # Shapes
@@ -217,26 +217,26 @@ impl<L: Law> Law for Ladder<L> {
         Ok(())
     }
 
-    fn expect(&mut self, disturbance: &[f64]) {
-        self.law.expect(disturbance);
+    fn set_disturbance(&mut self, disturbance: &[f64]) {
+        self.law.set_disturbance(disturbance);
     }
 
-    fn stand_in(&mut self) -> StandIn<'_> {
-        StandIn::Inside(&mut self.law)
+    fn linear_surrogate(&mut self) -> Surrogate<'_> {
+        Surrogate::Inside(&mut self.law)
     }
 
-    fn taken_back(&mut self) {
+    fn on_rollback(&mut self) {
         self.gain = (0.5 * self.gain).max(self.rule.lowest);
         self.runs = 0;
-        self.law.taken_back();
+        self.law.on_rollback();
     }
 
-    fn goes_back(&self) -> bool {
-        self.law.goes_back()
+    fn handles_rollback(&self) -> bool {
+        self.law.handles_rollback()
     }
 
-    fn remark(&self) -> Option<String> {
-        self.law.remark()
+    fn status(&self) -> Option<String> {
+        self.law.status()
     }
 
     fn standing(&self) -> Standing {
@@ -327,14 +327,14 @@ mod tests {
         let mut law = ladder(LadderRule::new(2), 1);
         let mut next = [0.0];
         law.update(&[1.0], &[8.0], &mut next).unwrap();
-        law.taken_back();
+        law.on_rollback();
         assert_eq!((law.runs(), law.gain().to_bits()), (0, 0.5_f64.to_bits()));
         // The same input again: what was seen of it before does not count.
         law.update(&[1.0], &[2.0], &mut next).unwrap();
         law.update(&[1.0], &[4.0], &mut next).unwrap();
         assert!((next[0] - 2.5).abs() < 1e-15);
         for _ in 0..9 {
-            law.taken_back();
+            law.on_rollback();
         }
         assert!((law.gain() - 0.0625).abs() < 1e-15);
     }

@@ -24,7 +24,7 @@ pub mod weights;
 
 pub use error::LearningError;
 pub use repeatability::{Repeatability, repeatability};
-pub use structure::{LowPass, StandIn, Structure};
+pub use structure::{LowPass, Structure, Surrogate};
 
 /// A rule that turns the error of one run into the input of the next.
 ///
@@ -50,7 +50,7 @@ pub trait Law: Send {
 
     /// Tells the law what is known of the coming run before [`Law::update`] computes its input: one
     /// number for each disturbance that is measured, as a temperature. Most laws have no use for it.
-    fn expect(&mut self, disturbance: &[f64]) {
+    fn set_disturbance(&mut self, disturbance: &[f64]) {
         let _ = disturbance;
     }
 
@@ -61,7 +61,7 @@ pub trait Law: Send {
     ///
     /// # Errors
     /// - as [`Law::update`].
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
@@ -77,8 +77,8 @@ pub trait Law: Send {
     }
 
     /// Returns the law that [`analysis`] looks at where this one is not linear itself.
-    fn stand_in(&mut self) -> StandIn<'_> {
-        StandIn::Itself
+    fn linear_surrogate(&mut self) -> Surrogate<'_> {
+        Surrogate::Itself
     }
 
     /// Returns the law's low-pass for a sample time, if it has one that can be told from the rest.
@@ -89,16 +89,16 @@ pub trait Law: Send {
 
     /// Tells the law that the input it made last is taken back, as the error grew with it: the run to
     /// come has an earlier input. Most laws look at one run only and have no use for it.
-    fn taken_back(&mut self) {}
+    fn on_rollback(&mut self) {}
 
     /// Returns whether the law goes back to an earlier input by itself where the error grows, so that
     /// nobody else should.
-    fn goes_back(&self) -> bool {
+    fn handles_rollback(&self) -> bool {
         false
     }
 
     /// Returns what a person should know of the last update, as a sentence; most have nothing to say.
-    fn remark(&self) -> Option<String> {
+    fn status(&self) -> Option<String> {
         None
     }
 
@@ -138,41 +138,41 @@ impl<L: Law + ?Sized> Law for Box<L> {
         (**self).update(input, error, next)
     }
 
-    fn expect(&mut self, disturbance: &[f64]) {
-        (**self).expect(disturbance);
+    fn set_disturbance(&mut self, disturbance: &[f64]) {
+        (**self).set_disturbance(disturbance);
     }
 
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
     ) -> Result<bool, LearningError> {
-        (**self).transposed(dual, to_input, to_error)
+        (**self).apply_adjoint(dual, to_input, to_error)
     }
 
     fn structure(&self) -> Structure<'_> {
         (**self).structure()
     }
 
-    fn stand_in(&mut self) -> StandIn<'_> {
-        (**self).stand_in()
+    fn linear_surrogate(&mut self) -> Surrogate<'_> {
+        (**self).linear_surrogate()
     }
 
     fn low_pass(&self, dt_s: f64) -> Option<LowPass> {
         (**self).low_pass(dt_s)
     }
 
-    fn taken_back(&mut self) {
-        (**self).taken_back();
+    fn on_rollback(&mut self) {
+        (**self).on_rollback();
     }
 
-    fn goes_back(&self) -> bool {
-        (**self).goes_back()
+    fn handles_rollback(&self) -> bool {
+        (**self).handles_rollback()
     }
 
-    fn remark(&self) -> Option<String> {
-        (**self).remark()
+    fn status(&self) -> Option<String> {
+        (**self).status()
     }
 
     fn standing(&self) -> Standing {

@@ -24,7 +24,7 @@ pub enum Structure<'a> {
 
 /// Which law analysis looks at in place of one that is not linear itself.
 #[expect(missing_debug_implementations, reason = "laws need not have one")]
-pub enum StandIn<'a> {
+pub enum Surrogate<'a> {
     /// The law itself.
     Itself,
     /// The law inside one that only says when to learn, or from which runs.

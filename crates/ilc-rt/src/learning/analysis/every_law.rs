@@ -51,7 +51,7 @@ fn transposes_are_those_of_the_update() {
         let mut next = vec![0.0; size];
         law.update(&u, &e, &mut next).unwrap();
         let (mut to_u, mut to_e) = (vec![0.0; size], vec![0.0; size]);
-        assert!(law.transposed(&dual, &mut to_u, &mut to_e).unwrap());
+        assert!(law.apply_adjoint(&dual, &mut to_u, &mut to_e).unwrap());
         let (forward, back) = (dot(&next, &dual), dot(&u, &to_u) + dot(&e, &to_e));
         let scale = dot(&next, &next).sqrt() * dot(&dual, &dual).sqrt();
         assert!((forward - back).abs() < 1e-11 * scale, "{}: {forward} {back}", law.describe());

@@ -96,7 +96,7 @@ impl<'a> Iteration<'a> {
         } else {
             let zero = vec![0.0; n_u];
             let Self { law, input, dual, .. } = &mut iteration;
-            if law.transposed(&zero, input, dual)? { Transpose::Law } else { Transpose::None }
+            if law.apply_adjoint(&zero, input, dual)? { Transpose::Law } else { Transpose::None }
         };
         iteration.leave_out(model)?;
         iteration.check_transpose()?;
@@ -225,7 +225,7 @@ impl<'a> Iteration<'a> {
         match &mut self.transpose {
             Transpose::Optimal(hessian) => hessian.transposed(&input, &self.plant, out)?,
             Transpose::Law => {
-                self.law.transposed(&input, out, &mut self.dual)?;
+                self.law.apply_adjoint(&input, out, &mut self.dual)?;
                 self.plant.apply_transposed(&self.dual, &mut self.input);
                 for (value, through) in out.iter_mut().zip(&self.input) {
                     *value -= through;

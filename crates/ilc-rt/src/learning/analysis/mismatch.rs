@@ -20,7 +20,7 @@ use crate::learning::law::pd::{Pd, PdGains};
 use crate::learning::law::q_filter::QFilter;
 use crate::learning::law::through_jacobian::ThroughJacobian;
 use crate::learning::weights::{Dynamic, Weight};
-use crate::learning::{Law, LearningError, StandIn};
+use crate::learning::{Law, LearningError, Surrogate};
 use crate::model::{Method as Hold, StateSpace, TimeVarying, discretize, second_order};
 use crate::signal::{FirFilter, GaussianFilter, Segment, SwitchedFilter, butterworth};
 
@@ -230,10 +230,10 @@ fn every_law_on_other_axes_has_the_norm_of_its_dense_matrix() {
 
 /// What the analysis looks at in place of the law.
 fn with_stand_in<T>(law: &mut dyn Law, look: &mut dyn FnMut(&mut dyn Law) -> T) -> T {
-    match law.stand_in() {
-        StandIn::Itself => {}
-        StandIn::Inside(inside) => return with_stand_in(inside, look),
-        StandIn::Unbounded(mut other) => return with_stand_in(other.as_mut(), look),
+    match law.linear_surrogate() {
+        Surrogate::Itself => {}
+        Surrogate::Inside(inside) => return with_stand_in(inside, look),
+        Surrogate::Unbounded(mut other) => return with_stand_in(other.as_mut(), look),
     }
     look(law)
 }

@@ -7,7 +7,7 @@ use std::fmt;
 
 use super::frequency::Spectrum;
 use super::iteration::Iteration;
-use crate::learning::{Law, LearningError, LowPass, StandIn};
+use crate::learning::{Law, LearningError, LowPass, Surrogate};
 use crate::model::StateSpace;
 
 /// A low-pass that begins above the critical frequency of its law.
@@ -45,7 +45,7 @@ pub fn overreach(
     model: &StateSpace,
     n_samples: usize,
 ) -> Result<Option<Overreach>, LearningError> {
-    if let StandIn::Inside(inside) = law.stand_in() {
+    if let Surrogate::Inside(inside) = law.linear_surrogate() {
         return overreach(inside, model, n_samples);
     }
     let low_pass = model.dt_s().and_then(|dt_s| law.low_pass(dt_s));

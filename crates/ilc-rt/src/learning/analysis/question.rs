@@ -12,7 +12,7 @@ use super::verdict;
 use crate::learning::error::check;
 use crate::learning::krylov::{Estimate, fixed_point, largest_symmetric, norm, spectral_radius};
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
-use crate::learning::{Law, LearningError, StandIn, Structure};
+use crate::learning::{Law, LearningError, Structure, Surrogate};
 use crate::model::StateSpace;
 
 /// Up to this many inputs (samples times channels) whole matrices are formed.
@@ -51,7 +51,7 @@ impl Default for Question {
 /// - `question.reference`: `n_samples` x `n_outputs`, time first
 /// # Real Time
 /// Cold path. `O(n^3)` in `n = n_samples n_inputs` up to [`DENSE_MAX`]; beyond, some hundred products
-/// of `O(n)`, and for a law without [transpose](Law::transposed) up to [`COLUMNS_MAX`] `n` of them.
+/// of `O(n)`, and for a law without [transpose](Law::apply_adjoint) up to [`COLUMNS_MAX`] `n` of them.
 /// # Errors
 /// - [`LearningError::NotLinear`] for a law that is not linear.
 /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Parameter`] for a
@@ -66,10 +66,10 @@ pub fn analyze(
     question: &Question,
 ) -> Result<Analysis, LearningError> {
     refuse_question(question, model, n_samples)?;
-    match law.stand_in() {
-        StandIn::Itself => {}
-        StandIn::Inside(inside) => return analyze(inside, model, n_samples, question),
-        StandIn::Unbounded(mut other) => {
+    match law.linear_surrogate() {
+        Surrogate::Itself => {}
+        Surrogate::Inside(inside) => return analyze(inside, model, n_samples, question),
+        Surrogate::Unbounded(mut other) => {
             let mut analysis = analyze(other.as_mut(), model, n_samples, question)?;
             analysis.why = verdict::with_bounds(&analysis.why);
             return Ok(analysis);

@@ -3,7 +3,7 @@
 use super::iteration::Iteration;
 use super::verdict::{GROWTH_MAX, converges, with_bounds};
 use crate::learning::krylov::{Estimate, noise, norm, spectral_radius};
-use crate::learning::{Law, LearningError, StandIn, Structure};
+use crate::learning::{Law, LearningError, Structure, Surrogate};
 use crate::model::StateSpace;
 
 /// Inputs (samples times channels) above which a run counts as long.
@@ -39,10 +39,10 @@ pub fn divergence(
     model: &StateSpace,
     n_samples: usize,
 ) -> Result<Option<Verdict>, LearningError> {
-    match law.stand_in() {
-        StandIn::Itself => {}
-        StandIn::Inside(inside) => return divergence(inside, model, n_samples),
-        StandIn::Unbounded(mut other) => {
+    match law.linear_surrogate() {
+        Surrogate::Itself => {}
+        Surrogate::Inside(inside) => return divergence(inside, model, n_samples),
+        Surrogate::Unbounded(mut other) => {
             let verdict = divergence(other.as_mut(), model, n_samples)?;
             return Ok(verdict.map(|found| Verdict { why: with_bounds(&found.why), ..found }));
         }

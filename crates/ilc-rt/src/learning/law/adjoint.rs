@@ -1,7 +1,7 @@
 //! Gradient learning: the error, run backward through the model.
 
 use super::q_filter::{QFilter, QRunner};
-use crate::learning::error::{check, check_counts, check_place};
+use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::operator::Operator;
 use crate::learning::{Law, LearningError, LowPass};
 use crate::model::{ModelError, StateSpace};
@@ -109,9 +109,7 @@ impl Law for Adjoint {
         next: &mut [f64],
     ) -> Result<(), LearningError> {
         let Self { n_samples, n_inputs, n_outputs, gain, .. } = *self;
-        check("input", input, n_samples, n_inputs)?;
-        check("error", error, n_samples, n_outputs)?;
-        check_place(next, n_samples, n_inputs)?;
+        check_update(input, error, next, n_samples, [n_inputs, n_outputs])?;
         self.operator.transposed(error, next);
         for (next, input) in next.iter_mut().zip(input) {
             *next = input + gain * *next;
@@ -120,16 +118,14 @@ impl Law for Adjoint {
         check("next", next, n_samples, n_inputs)
     }
 
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
     ) -> Result<bool, LearningError> {
         let Self { n_samples, n_inputs, n_outputs, gain, .. } = *self;
-        check("dual", dual, n_samples, n_inputs)?;
-        check("to_input", to_input, n_samples, n_inputs)?;
-        check("to_error", to_error, n_samples, n_outputs)?;
+        check_adjoint(dual, to_input, to_error, n_samples, [n_inputs, n_outputs])?;
         to_input.copy_from_slice(dual);
         if !self.runner.apply_transposed(to_input, n_inputs)? {
             return Ok(false);

@@ -1,6 +1,6 @@
 //! Norm-optimal learning that weighs the error through a filter.
 
-use crate::learning::error::check;
+use crate::learning::error::{check, check_length};
 use crate::learning::law::norm_optimal::{Cost, NormOptimal, Plant};
 use crate::learning::weights::{Dynamic, ErrorFilter};
 use crate::learning::{Law, LearningError};
@@ -78,14 +78,14 @@ impl Law for DynamicNormOptimal {
         self.inner.update(input, &self.filtered, next)
     }
 
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
     ) -> Result<bool, LearningError> {
-        check("to_error", to_error, self.n_samples, self.filter.n_inputs())?;
-        if !self.inner.transposed(dual, to_input, &mut self.filtered)? {
+        check_length("to_error", to_error, self.n_samples, self.filter.n_inputs())?;
+        if !self.inner.apply_adjoint(dual, to_input, &mut self.filtered)? {
             return Ok(false);
         }
         self.filter.run_transposed(&self.filtered, to_error);

@@ -1,8 +1,8 @@
 //! Feed-forward learned from the filtered error: the open-loop P-type law of the parallel structure.
 
 use super::q_filter::{QFilter, QRunner};
-use crate::learning::error::{check, check_counts, check_place};
-use crate::learning::{Law, LearningError, LowPass, StandIn};
+use crate::learning::error::{check, check_adjoint, check_counts, check_update};
+use crate::learning::{Law, LearningError, LowPass, Surrogate};
 
 /// The numbers of an [`ErrorFeedforward`] law.
 ///
@@ -93,9 +93,7 @@ impl Law for ErrorFeedforward {
         next: &mut [f64],
     ) -> Result<(), LearningError> {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
-        check("input", input, n_samples, n_channels)?;
-        check("error", error, n_samples, n_channels)?;
-        check_place(next, n_samples, n_channels)?;
+        check_update(input, error, next, n_samples, [n_channels; 2])?;
         self.filtered.copy_from_slice(error);
         self.runner.apply(&mut self.filtered, n_channels)?;
         let Feedforward { gain, lead, limit } = self.rule;
@@ -112,16 +110,14 @@ impl Law for ErrorFeedforward {
         check("next", next, n_samples, n_channels)
     }
 
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
     ) -> Result<bool, LearningError> {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
-        for (what, signal) in [("dual", dual), ("to_input", &*to_input), ("to_error", &*to_error)] {
-            check(what, signal, n_samples, n_channels)?;
-        }
+        check_adjoint(dual, to_input, to_error, n_samples, [n_channels; 2])?;
         to_input.copy_from_slice(dual);
         to_error.fill(0.0);
         let Feedforward { gain, lead, .. } = self.rule;
@@ -134,11 +130,11 @@ impl Law for ErrorFeedforward {
         Ok(self.runner.apply_transposed(to_error, n_channels)?)
     }
 
-    fn stand_in(&mut self) -> StandIn<'_> {
+    fn linear_surrogate(&mut self) -> Surrogate<'_> {
         if self.rule.limit.is_infinite() {
-            return StandIn::Itself;
+            return Surrogate::Itself;
         }
-        self.unlimited(self.q_filter.clone()).map_or(StandIn::Itself, StandIn::Unbounded)
+        self.unlimited(self.q_filter.clone()).map_or(Surrogate::Itself, Surrogate::Unbounded)
     }
 
     fn low_pass(&self, dt_s: f64) -> Option<LowPass> {

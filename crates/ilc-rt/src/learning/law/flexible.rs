@@ -196,9 +196,9 @@ impl Law for Flexible {
         check("next", next, n_samples, n_inputs)
     }
 
-    fn expect(&mut self, disturbance: &[f64]) {
+    fn set_disturbance(&mut self, disturbance: &[f64]) {
         self.told.announce(disturbance);
-        self.core.expect(disturbance);
+        self.core.set_disturbance(disturbance);
     }
 
     fn reset(&mut self) {
@@ -242,7 +242,7 @@ mod tests {
         // A run whose disturbance was not announced enters nothing.
         let mut next = [0.0];
         law.told.forget();
-        law.expect(coming);
+        law.set_disturbance(coming);
         law.update(&[99.0], &[0.0], &mut next).unwrap();
         next[0]
     }
@@ -289,17 +289,17 @@ mod tests {
     fn a_run_enters_under_its_own_disturbance() {
         let mut law = law(1, 0.0);
         let mut next = [0.0];
-        law.expect(&[20.0]);
-        law.expect(&[30.0]);
+        law.set_disturbance(&[20.0]);
+        law.set_disturbance(&[30.0]);
         law.update(&[1.0], &[1.0], &mut next).unwrap();
         assert_eq!(next.to_vec(), [2.0]);
-        law.expect(&[20.0]);
+        law.set_disturbance(&[20.0]);
         law.update(&[2.0], &[3.0], &mut next).unwrap();
         assert_eq!((law.len(), next[0]), (2, 2.0));
         assert_eq!(law.disturbances, [20.0, 30.0]);
         assert!(law.update(&[1.0], &[f64::NAN], &mut next).is_err());
         assert!(law.update(&[1.0], &[1.0], &mut []).is_err());
-        law.expect(&[1.0, 2.0]);
+        law.set_disturbance(&[1.0, 2.0]);
         assert!(law.update(&[1.0], &[1.0], &mut next).is_err());
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::q_filter::{QFilter, QRunner};
-use crate::learning::error::{check, check_counts, check_place};
+use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::operator::Operator;
 use crate::learning::{Law, LearningError, LowPass};
 use crate::model::{ModelError, StateSpace, relative_degrees};
@@ -125,9 +125,7 @@ impl Law for ModelInverse {
         next: &mut [f64],
     ) -> Result<(), LearningError> {
         let (n_samples, n_channels) = (self.n_samples, self.shifts.len());
-        check("input", input, n_samples, n_channels)?;
-        check("error", error, n_samples, n_channels)?;
-        check_place(next, n_samples, n_channels)?;
+        check_update(input, error, next, n_samples, [n_channels; 2])?;
         for (channel, shift) in self.shifts.iter().enumerate() {
             for k in 0..n_samples {
                 let answer = (k + shift).min(n_samples - 1);
@@ -142,16 +140,14 @@ impl Law for ModelInverse {
         check("next", next, n_samples, n_channels)
     }
 
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
     ) -> Result<bool, LearningError> {
         let (n_samples, n_channels) = (self.n_samples, self.shifts.len());
-        for (what, signal) in [("dual", dual), ("to_input", &*to_input), ("to_error", &*to_error)] {
-            check(what, signal, n_samples, n_channels)?;
-        }
+        check_adjoint(dual, to_input, to_error, n_samples, [n_channels; 2])?;
         to_input.copy_from_slice(dual);
         to_error.fill(0.0);
         if !self.runner.apply_transposed(to_input, n_channels)? {

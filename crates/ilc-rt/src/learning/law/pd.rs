@@ -1,7 +1,7 @@
 //! Proportional-derivative learning with a low-pass filter.
 
 use super::q_filter::{QFilter, QRunner};
-use crate::learning::error::{check, check_counts, check_place};
+use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::{Law, LearningError, LowPass, Structure};
 
 /// The numbers of a [`Pd`] law.
@@ -73,9 +73,7 @@ impl Law for Pd {
         next: &mut [f64],
     ) -> Result<(), LearningError> {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
-        check("input", input, n_samples, n_channels)?;
-        check("error", error, n_samples, n_channels)?;
-        check_place(next, n_samples, n_channels)?;
+        check_update(input, error, next, n_samples, [n_channels; 2])?;
         let PdGains { kp, kd, lead } = self.gains;
         let last = n_samples - 1;
         for channel in 0..n_channels {
@@ -90,16 +88,14 @@ impl Law for Pd {
         check("next", next, n_samples, n_channels)
     }
 
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
     ) -> Result<bool, LearningError> {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
-        for (what, signal) in [("dual", dual), ("to_input", &*to_input), ("to_error", &*to_error)] {
-            check(what, signal, n_samples, n_channels)?;
-        }
+        check_adjoint(dual, to_input, to_error, n_samples, [n_channels; 2])?;
         to_input.copy_from_slice(dual);
         to_error.fill(0.0);
         if !self.runner.apply_transposed(to_input, n_channels)? {

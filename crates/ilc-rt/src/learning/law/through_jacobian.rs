@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::learning::error::check;
+use crate::learning::error::{check, check_adjoint};
 use crate::learning::{Law, LearningError};
 
 /// Largest ratio of singular values of a Jacobian that may still be inverted.
@@ -138,11 +138,11 @@ impl<L: Law> Law for ThroughJacobian<L> {
         self.law.update(input, &self.joint_error, next)
     }
 
-    fn expect(&mut self, disturbance: &[f64]) {
-        self.law.expect(disturbance);
+    fn set_disturbance(&mut self, disturbance: &[f64]) {
+        self.law.set_disturbance(disturbance);
     }
 
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
@@ -150,10 +150,9 @@ impl<L: Law> Law for ThroughJacobian<L> {
     ) -> Result<bool, LearningError> {
         let (p, m) = (self.n_coordinates, self.n_joints);
         let n_samples = self.n_samples(dual);
-        check("dual", dual, n_samples, m)?;
-        check("to_error", to_error, n_samples, p)?;
+        check_adjoint(dual, to_input, to_error, n_samples, [m, p])?;
         self.joint_error.resize(n_samples * m, 0.0);
-        if !self.law.transposed(dual, to_input, &mut self.joint_error)? {
+        if !self.law.apply_adjoint(dual, to_input, &mut self.joint_error)? {
             return Ok(false);
         }
         let one_for_all = self.inverses.len() == m * p;
@@ -170,16 +169,16 @@ impl<L: Law> Law for ThroughJacobian<L> {
         Ok(true)
     }
 
-    fn taken_back(&mut self) {
-        self.law.taken_back();
+    fn on_rollback(&mut self) {
+        self.law.on_rollback();
     }
 
-    fn goes_back(&self) -> bool {
-        self.law.goes_back()
+    fn handles_rollback(&self) -> bool {
+        self.law.handles_rollback()
     }
 
-    fn remark(&self) -> Option<String> {
-        self.law.remark()
+    fn status(&self) -> Option<String> {
+        self.law.status()
     }
 
     fn reset(&mut self) {

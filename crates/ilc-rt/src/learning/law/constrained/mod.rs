@@ -22,7 +22,7 @@ use super::norm_optimal::decouple::parts;
 use super::norm_optimal::{Cost, NormOptimal, Plant};
 use crate::learning::error::check;
 use crate::learning::sweep::Run;
-use crate::learning::{Law, LearningError, StandIn};
+use crate::learning::{Law, LearningError, Surrogate};
 use crate::model::{ModelError, StateSpace};
 
 use bounds::Extent;
@@ -181,11 +181,11 @@ impl Law for Constrained {
         check("next", run.next, n_samples, n_inputs)
     }
 
-    fn stand_in(&mut self) -> StandIn<'_> {
-        self.unbounded().map_or(StandIn::Itself, |law| StandIn::Unbounded(Box::new(law)))
+    fn linear_surrogate(&mut self) -> Surrogate<'_> {
+        self.unbounded().map_or(Surrogate::Itself, |law| Surrogate::Unbounded(Box::new(law)))
     }
 
-    fn remark(&self) -> Option<String> {
+    fn status(&self) -> Option<String> {
         match self.status {
             Status::Untried | Status::Solved => None,
             Status::Infeasible(conflict) => {

@@ -12,7 +12,7 @@ pub use cost::{Cost, Weights};
 pub use pairing::Paired;
 pub use plant::Plant;
 
-use crate::learning::error::{check, check_counts, check_length, check_place, is_finite};
+use crate::learning::error::{check, check_adjoint, check_counts, check_length, is_finite};
 use crate::learning::sweep::{
     self, Channels, FactorError, Form, Gains, Inverse, Rate, Run, Stages, Sweep,
 };
@@ -273,7 +273,7 @@ impl Law for NormOptimal {
         let Self { n_samples, n_inputs, n_outputs, .. } = *self;
         check_length("input", input, n_samples, n_inputs)?;
         check_length("error", error, n_samples, n_outputs)?;
-        check_place(next, n_samples, n_inputs)?;
+        check_length("next", next, n_samples, n_inputs)?;
         let mut run = Run { input, error, next: &mut *next, n_inputs, n_outputs };
         for part in &mut self.parts {
             part.solve(&mut run);
@@ -289,16 +289,14 @@ impl Law for NormOptimal {
         check("next", next, n_samples, n_inputs)
     }
 
-    fn transposed(
+    fn apply_adjoint(
         &mut self,
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
     ) -> Result<bool, LearningError> {
         let Self { n_samples, n_inputs, n_outputs, .. } = *self;
-        check("dual", dual, n_samples, n_inputs)?;
-        check_length("to_input", to_input, n_samples, n_inputs)?;
-        check_length("to_error", to_error, n_samples, n_outputs)?;
+        check_adjoint(dual, to_input, to_error, n_samples, [n_inputs, n_outputs])?;
         let Some(inverses) = self.inverses() else { return Ok(false) };
         to_error.fill(0.0);
         for inverse in inverses {

@@ -44,7 +44,7 @@ pub struct RunShape {
 /// over the `top` most relevant runs only, exactly those that a search through all would give; of
 /// equally relevant ones the older.
 ///
-/// The disturbance of each run is announced before it ([`Law::expect`]), that of the first one too. A
+/// The disturbance of each run is announced before it ([`Law::set_disturbance`]), that of the first one too. A
 /// run whose disturbance was never announced is not kept; a single kept run has weight 1.
 ///
 /// # Shapes
@@ -323,9 +323,9 @@ impl Law for Relevance {
         check("next", next, n_samples, n_inputs)
     }
 
-    fn expect(&mut self, disturbance: &[f64]) {
+    fn set_disturbance(&mut self, disturbance: &[f64]) {
         self.told.announce(disturbance);
-        self.core.expect(disturbance);
+        self.core.set_disturbance(disturbance);
     }
 
     fn reset(&mut self) {

@@ -31,17 +31,17 @@ fn three_runs_by_hand() {
     };
     let mut law = Relevance::new(pd(1.0, 0.0, 1, 1), shape(1, 1, 1), weights, None).unwrap();
     let mut next = [0.0];
-    law.expect(&[0.0]);
-    law.expect(&[1.0]);
+    law.set_disturbance(&[0.0]);
+    law.set_disturbance(&[1.0]);
     law.update(&[0.0], &[1.0], &mut next).unwrap();
     // A single run has all weight: its proposal 0 + 1.
     assert_eq!(next.to_vec(), [1.0]);
-    law.expect(&[3.0]);
+    law.set_disturbance(&[3.0]);
     law.update(&[1.0], &[2.0], &mut next).unwrap();
     // Run 0: 1 + 9 + 1 = 11, proposal 1. Run 1 under 1: 4 + 4 + 1 = 9, proposal 3.
     let expected = (1.0 / 11.0 + 3.0 / 9.0) / (1.0 / 11.0 + 1.0 / 9.0);
     assert!((next[0] - expected).abs() < 1e-14, "{} {expected}", next[0]);
-    law.expect(&[1.0]);
+    law.set_disturbance(&[1.0]);
     law.update(&[5.0], &[0.0], &mut next).unwrap();
     // At 1: run 0 has 1 + 1 + 1 = 3, run 1 has 4 + 0 + 1 = 5, run 2 under 3 has 0 + 4 + 1 = 5.
     let expected = (1.0 / 3.0 + 3.0 / 5.0 + 5.0 / 5.0) / (1.0 / 3.0 + 2.0 / 5.0);
@@ -113,14 +113,14 @@ fn agrees_with_the_listing(runs: &[Past], weights: &RelevanceWeights) {
         Relevance::new(pd(kp, kd, 12, 1), shape(12, 1, n_disturbances), weights.clone(), Some(5))
             .unwrap();
     let mut next = vec![0.0; 12];
-    all.expect(&runs[0].d);
-    some.expect(&runs[0].d);
+    all.set_disturbance(&runs[0].d);
+    some.set_disturbance(&runs[0].d);
     for (n, pair) in runs.windows(2).enumerate() {
         let (run, coming) = (&pair[0], &pair[1].d);
-        all.expect(coming);
+        all.set_disturbance(coming);
         all.update(&run.u, &run.e, &mut next).unwrap();
         close(&next, &listing(&runs[..=n], coming, &all.weights, kp, kd));
-        some.expect(coming);
+        some.set_disturbance(coming);
         some.update(&run.u, &run.e, &mut next).unwrap();
         let nearest: Vec<Past> =
             some.relevant(coming).unwrap().iter().map(|(run, _)| runs[*run].clone()).collect();
@@ -170,7 +170,7 @@ proptest! {
         prop_assert_eq!(law.trim(keep, &at).unwrap(), best.clone());
         let left: Vec<Past> = best.iter().map(|&run| runs[run].clone()).collect();
         let mut next = vec![0.0; 12];
-        law.expect(&at);
+        law.set_disturbance(&at);
         law.weigh(&at, &mut next);
         close(&next, &listing(&left, &at, &law.weights.clone(), 1.0, 0.5));
         // For all that has been met: the sums of the weights decide.
@@ -212,9 +212,9 @@ fn runs_that_pass_through_again_are_counted_once() {
     for (u, d) in [(1.0, 20.0), (2.0, 30.0)] {
         law.remember(&[u; 2], &[0.1; 2], &[d]).unwrap();
     }
-    law.expect(&[20.0]);
+    law.set_disturbance(&[20.0]);
     for (u, coming, kept) in [(1.0, 30.0, 2), (2.0, 40.0, 2), (3.0, 20.0, 3), (1.0, 20.0, 4)] {
-        law.expect(&[coming]);
+        law.set_disturbance(&[coming]);
         law.update(&[u; 2], &[0.1; 2], &mut next).unwrap();
         assert_eq!(law.len(), kept);
     }
@@ -232,7 +232,7 @@ fn wrong_use_is_refused_one_thing_at_a_time() {
     let mut next = [0.0; 4];
     let line = law.update(&[0.0; 4], &[0.0; 4], &mut next).unwrap_err().to_string();
     assert_eq!(line, "the disturbance of a run holds 0 numbers; 1 needed");
-    law.expect(&[20.0]);
+    law.set_disturbance(&[20.0]);
     assert!(law.update(&[0.0; 3], &[0.0; 4], &mut next).is_err());
     assert!(law.update(&[0.0; 4], &[f64::NAN; 4], &mut next).is_err());
     assert!(law.update(&[0.0; 4], &[0.0; 4], &mut next[..3]).is_err());
@@ -300,7 +300,7 @@ fn campaign(law: &mut dyn Law, temperatures: &[f64]) -> Vec<f64> {
         .collect();
     let mut input = vec![0.0; N];
     let mut next = vec![0.0; N];
-    law.expect(&temperatures[..1]);
+    law.set_disturbance(&temperatures[..1]);
     temperatures
         .iter()
         .enumerate()
@@ -309,7 +309,7 @@ fn campaign(law: &mut dyn Law, temperatures: &[f64]) -> Vec<f64> {
             let measured = motor(temperature_c).simulate(&command, None).unwrap();
             let error: Vec<f64> = reference.iter().zip(&measured).map(|(r, y)| r - y).collect();
             if let Some(coming) = temperatures.get(run + 1..run + 2) {
-                law.expect(coming);
+                law.set_disturbance(coming);
                 law.update(&input, &error, &mut next).unwrap();
                 input.copy_from_slice(&next);
             }
