@@ -8,10 +8,10 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use ilc_rt::campaign::{self, Disturbance, Options};
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::transport::loopback::InProcess;
 use ilc_rt::record::Event;
-use ilc_rt::supervisor::{self, Disturbance, Options};
 use ilc_sim::{ClockMode, Machine};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         stop: Arc::default(),
     };
     println!("run  max tracking um  max contour um");
-    let outcome = supervisor::run(&cell, &options, bus, None, &mut |event| {
+    let outcome = campaign::run(&cell, &options, bus, None, &mut |event| {
         if let Event::Iteration { index, figures, .. } = event {
             let tracking = figures.tracking_inf_m * 1e6;
             // Absent where one axis moves alone.

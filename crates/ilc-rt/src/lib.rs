@@ -12,6 +12,7 @@ pub mod control;
 pub mod design;
 pub mod fieldbus;
 pub mod identification;
+pub mod interpolate;
 pub mod kinematics;
 pub mod learning;
 pub mod library;

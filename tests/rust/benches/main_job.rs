@@ -4,7 +4,6 @@
 #![expect(clippy::print_stdout, reason = "a benchmark tells what it measured")]
 
 use std::error::Error;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use ilc_rt::campaign::{self, Options};
@@ -88,7 +87,7 @@ fn time_update(
 }
 
 fn lockstep_against_real_time(n_runs: u32) -> Result<(), Box<dyn Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = ilc_tests::root();
     let cell = Cell::load(&root.join("examples/01_gantry.toml"))?;
     let drives = Machine::from_cell(&cell, ClockMode::LockStep)?;
     let library = std::env::temp_dir().join(format!("ilc-bench-{}.db", std::process::id()));

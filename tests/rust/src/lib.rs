@@ -19,9 +19,18 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use ilc_rt::config::Cell;
 
+/// The root of this checkout.
+///
+/// Asked of cargo when the test runs: one target folder may serve several checkouts, and a test that
+/// was built in another one must still look at its own.
+pub fn root() -> PathBuf {
+    let compiled = env!("CARGO_MANIFEST_DIR").into();
+    PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or(compiled)).join("../..")
+}
+
 /// The path of an example, as `01_gantry.toml`.
 pub fn example_path(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(name)
+    root().join("examples").join(name)
 }
 
 /// The text of an example.

@@ -2,7 +2,7 @@
 
 use crate::config::ConfigError;
 use crate::design::DesignError;
-use crate::fieldbus::cia402::BringUpError;
+use crate::fieldbus::bring_up::BringUpError;
 use crate::fieldbus::transport::OpenError;
 use crate::identification::IdentificationError;
 use crate::library::LibraryError;
@@ -50,7 +50,7 @@ pub enum CampaignError {
         /// Bus address.
         address: String,
         /// What was heard of it.
-        heard: crate::fieldbus::canopen::listen::Command,
+        heard: crate::fieldbus::bring_up::listen::Command,
     },
     /// The bus failed while the nodes were started.
     #[error("{file}: [bus] address = {address}: {source}")]

@@ -6,9 +6,9 @@ use super::error::CampaignError;
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::design;
-use crate::fieldbus::canopen::{NmtCommand, listen};
+use crate::fieldbus::bring_up::{BringUpError, DriveSetup, bring_up, bring_up_encoder, listen};
+use crate::fieldbus::canopen::NmtCommand;
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
-use crate::fieldbus::cia402::{BringUpError, DriveSetup, bring_up, bring_up_encoder};
 use crate::fieldbus::{Bus, BusError};
 
 /// Heartbeat of the nodes in real time.

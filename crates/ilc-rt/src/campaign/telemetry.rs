@@ -14,7 +14,7 @@ use zenoh::query::{ConsolidationMode, QueryTarget};
 
 use super::error::CampaignError;
 use crate::config::{Cell, Telemetry as Settings};
-use crate::fieldbus::transport::zenoh_reach::{self, Reach};
+use crate::fieldbus::transport::opening::zenoh_reach::{self, Reach};
 
 /// Messages that may wait for the network.
 const QUEUE: usize = 1024;

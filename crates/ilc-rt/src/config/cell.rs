@@ -9,6 +9,7 @@ use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
 use super::program::Program;
 use super::simulation::{AxisSimulation, Simulation};
+pub use crate::interpolate::AxisUnit;
 
 /// A whole cell description, validated.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -82,27 +83,6 @@ pub enum Interface {
     Csp,
     /// Cyclic synchronous velocity: the position loop is here (parallel learning, input in m/s).
     Csv,
-}
-
-/// What an axis is measured in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum AxisUnit {
-    /// Metres: a linear axis.
-    #[default]
-    M,
-    /// Radians: a rotary axis.
-    Rad,
-}
-
-impl AxisUnit {
-    /// The unit as it is written.
-    pub const fn symbol(self) -> &'static str {
-        match self {
-            Self::M => "m",
-            Self::Rad => "rad",
-        }
-    }
 }
 
 /// `[[axis]]`: one drive.
@@ -256,6 +236,11 @@ impl Cell {
     /// The servo cycle in seconds.
     pub fn cycle_s(&self) -> f64 {
         f64::from(self.cell.cycle_us) * 1e-6
+    }
+
+    /// Unit of each axis, in their order.
+    pub fn units(&self) -> Vec<AxisUnit> {
+        self.axes.iter().map(|axis| axis.unit).collect()
     }
 
     /// Number of axes.

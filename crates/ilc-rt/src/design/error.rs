@@ -1,11 +1,11 @@
 //! Refusals of a cell description that cannot be worked out.
 
 use crate::config::ConfigError;
-use crate::fieldbus::load::LoadError;
+use crate::fieldbus::bring_up::load::LoadError;
 use crate::learning::LearningError;
 use crate::model::ModelError;
-use crate::trajectory::TrajectoryError;
 use crate::trajectory::program::{GcodeError, TableError};
+use crate::trajectory::{AxisUnit, TrajectoryError};
 
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
@@ -22,14 +22,16 @@ pub enum DesignError {
         source: LoadError,
     },
     /// The program cannot be run within the limits.
-    #[error("{file}: {key}: {source}")]
+    #[error("{file}: {key}: {}", source.in_units(units))]
     Program {
         /// Cell description.
         file: String,
         /// `[program]`, and which axis the number in the reason stands for.
         key: String,
         /// Reason.
-        source: TrajectoryError,
+        source: Box<TrajectoryError>,
+        /// Units of the axes.
+        units: Vec<AxisUnit>,
     },
     /// The file of the program cannot be read.
     #[error("{file}: cannot be read: {reason}; allowed: a text file of {what}")]

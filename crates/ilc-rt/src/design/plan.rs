@@ -6,9 +6,9 @@ use super::error::DesignError;
 use super::law::{self, Prepared};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, Measure};
 use crate::control::PositionLoop;
+use crate::fieldbus::bring_up::load;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
-use crate::fieldbus::load;
 use crate::model::{
     Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
 };

@@ -173,7 +173,12 @@ fn refused(cell: &Cell, source: TrajectoryError) -> DesignError {
         Some((i, axis)) => format!("[program] (axis {} is {})", i + 1, axis.name),
         None => "[program]".to_owned(),
     };
-    DesignError::Program { file: cell.file.display().to_string(), key, source }
+    DesignError::Program {
+        file: cell.file.display().to_string(),
+        key,
+        source: Box::new(source),
+        units: cell.units(),
+    }
 }
 
 fn points(cell: &Cell) -> Vec<PathSegment> {

@@ -111,7 +111,8 @@ impl Experiment {
             |source| DesignError::Program {
                 file: cell.file.display().to_string(),
                 key: "[program] start_m".to_owned(),
-                source,
+                source: Box::new(source),
+                units: cell.units(),
             },
         )?;
         let program = json!({ "hold_m": cell.program.start_m, "n_samples": n_samples });

@@ -5,8 +5,8 @@ use std::time::Duration;
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
+use crate::interpolate::AxisLimits;
 use crate::rt::Nanos;
-use crate::trajectory::AxisLimits;
 
 /// One axis.
 #[derive(Clone, Copy, Debug)]

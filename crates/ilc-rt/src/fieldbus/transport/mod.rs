@@ -4,25 +4,20 @@
 //! [`open`] turns an address from a cell description into one. Used by `servo`, `supervisor`, the
 //! simulator and the tools, which know the address and nothing else of the carrier.
 
-mod address;
 mod doorbell;
-mod error;
 pub mod loopback;
+pub(crate) mod opening;
 pub mod socketcan;
 pub mod udp_codec;
 pub mod udp_multicast;
 mod wait;
 pub mod zenoh;
-mod zenoh_link;
-pub(crate) mod zenoh_reach;
 
-pub use address::Address;
-pub use error::OpenError;
 pub use loopback::{InProcess, Loopback, Responder};
+pub use opening::{Address, OpenError, ZenohSettings};
 pub use socketcan::SocketCan;
 pub use udp_multicast::UdpMulticast;
 pub use zenoh::ZenohBus;
-pub use zenoh_link::Settings as ZenohSettings;
 
 use super::bus::Bus;
 

@@ -15,9 +15,8 @@ use rtrb::{Consumer, Producer};
 use super::super::bus::{Bus, BusError};
 use super::super::frame::{Frame, PAYLOAD_MAX};
 use super::doorbell::Bell;
-use super::error::OpenError;
+use super::opening::{Ends, Link, OpenError, ZenohSettings as Settings};
 use super::wait::Deadline;
-use super::zenoh_link::{Ends, Link, Settings};
 
 /// Bytes of the identifier in front of the payload.
 const ID_BYTES: usize = 2;

@@ -1,4 +1,4 @@
-//! The largest α that honours every limit. Cold.
+//! The largest α that honours every limit.
 //!
 //! The peaks of velocity, acceleration and jerk are not monotone in α: an oscillation and a start can
 //! help or hurt each other. So α is scanned, every crossing bracketed and bisected, dips and humps
@@ -7,8 +7,9 @@
 
 use super::leg::{End, Leg};
 use super::peaks::peaks;
-use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::trajectory::limits::PathLimits;
+use crate::interpolate::PathLimits;
+use crate::interpolate::Quantity;
+use crate::trajectory::error::TrajectoryError;
 
 /// Scan points in a decade of α.
 const PER_DECADE: f64 = 12.0;
@@ -58,7 +59,7 @@ impl Place<'_> {
                 segment: self.segment,
                 place: self.name,
                 value: self.alpha_max,
-                least: smallest,
+                min: smallest,
             });
         }
         let largest = self.largest().max(1.001 * smallest).min(self.alpha_max);

@@ -3,8 +3,8 @@
 use super::alpha::{AlphaInterval, Place};
 use super::leg::{End, Leg};
 use super::plan::PlacedLeg;
+use crate::interpolate::{AxisLimits, PathLimits};
 use crate::trajectory::error::TrajectoryError;
-use crate::trajectory::limits::{AxisLimits, PathLimits};
 
 /// Distance kept from a limit, relative: far above the rounding of a peak.
 pub(super) const MARGIN: f64 = 1e-10;

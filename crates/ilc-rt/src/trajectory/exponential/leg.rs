@@ -4,10 +4,8 @@
 //! on the oscillation. A deviation is gone at the other end, and a window is multiplied by one that
 //! is shut there: so the leg is at rest, or at its corner, exactly, whatever α each end has.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::equations::weight_after;
-use super::jet::Jet;
+use crate::trajectory::jet::Jet;
 
 /// Where exponentials are taken as gone: `e^{-45}` is below the rounding of 1.
 pub(super) const GONE: f64 = 45.0;
