@@ -166,7 +166,8 @@ fn read_limits(
     jerk: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<AxisLimits>> {
     if !(1..=MAX_AXES).contains(&n_axes) {
-        return Err(TrajectoryError::Axes { n_axes }).or_raise();
+        return Err(TrajectoryError::Move(ilc_rt::interpolate::MoveError::Axes { n_axes }))
+            .or_raise();
     }
     let velocity = read_each("velocity_max_m_s", velocity, n_axes)?;
     let acceleration = read_each("acceleration_max_m_s2", acceleration, n_axes)?;

@@ -19,6 +19,7 @@ pub mod library;
 pub mod model;
 pub mod record;
 pub mod rt;
+pub mod schema;
 pub mod servo;
 pub mod signal;
 pub mod trajectory;
