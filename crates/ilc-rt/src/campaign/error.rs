@@ -1,4 +1,4 @@
-//! Why a campaign could not begin; nothing has moved when one of these is returned.
+//! Refusals of a campaign; nothing has moved when one of these is returned.
 
 use crate::config::ConfigError;
 use crate::design::DesignError;
@@ -22,9 +22,9 @@ pub enum CampaignError {
     /// The bus does not open.
     #[error("{place}: {source}")]
     Bus {
-        /// Where the address stands: file and key, or an option of the command line.
+        /// Origin of the address: file and key, or an option of the command line.
         place: String,
-        /// Why.
+        /// Reason.
         source: OpenError,
     },
     /// A node does not answer, or is not what the cell says.
@@ -36,10 +36,10 @@ pub enum CampaignError {
         key: String,
         /// Bus address.
         address: String,
-        /// Why.
+        /// Reason.
         source: Box<BringUpError>,
     },
-    /// Somebody else commands the bus.
+    /// Another master commands the bus.
     #[error(
         "{file}: [bus] address = {address}: another master is at work on this bus ({heard} heard); \
          nothing was sent; stop it, or choose another address"
@@ -49,7 +49,7 @@ pub enum CampaignError {
         file: String,
         /// Bus address.
         address: String,
-        /// What was heard of it.
+        /// Command that was heard from it.
         heard: crate::fieldbus::bring_up::listen::Command,
     },
     /// The bus failed while the nodes were started.
@@ -59,7 +59,7 @@ pub enum CampaignError {
         file: String,
         /// Bus address.
         address: String,
-        /// Why.
+        /// Reason.
         source: crate::fieldbus::BusError,
     },
     /// The library.
@@ -74,7 +74,7 @@ pub enum CampaignError {
          (`ilc run` in Python runs loopback: with simulated drives)"
     )]
     Loopback {
-        /// Where the address stands: file and key, or an option of the command line.
+        /// Origin of the address: file and key, or an option of the command line.
         place: String,
     },
     /// Simulated drives could not be made of the cell.
@@ -82,7 +82,7 @@ pub enum CampaignError {
     Simulation {
         /// Cell description.
         file: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// A thread could not be started.
@@ -90,7 +90,7 @@ pub enum CampaignError {
     Thread {
         /// Which one.
         what: &'static str,
-        /// What the system said.
+        /// Reason given by the system.
         source: std::io::Error,
     },
 }
