@@ -19,6 +19,7 @@ from ilc_rt.options import Verb, arguments, options
 from ilc_rt.processes import start_simulated_drives
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
+from ilc_rt.transports import Transport, transport_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from ilc_rt.experiment import Experiment
 
 DEFAULT_LIBRARY = str(options("run")["library"].default)
-TRANSPORTS = ("can", "udp", "zenoh", "loopback")
 Drives = Literal["auto", "simulated", "external"]
 
 
@@ -58,8 +58,7 @@ class Campaign:
     library : path
         Library file that every run is stored in.
     bus : str or None
-        Bus address in place of the cell's: ``can:``, ``udp:``, ``zenoh:``
-        or ``loopback:``.
+        Bus address in place of the cell's; `ilc_rt.transports` lists the kinds.
     measure : {"encoder", "tcp"} or None
         Measurement to learn from, in place of the cell's.
     lockstep : bool or None
@@ -150,7 +149,7 @@ class Campaign:
                 warnings.warn(f"{self.cell.path}: {line}", stacklevel=2)
         self.measure = measure
         self.transport = transport_of(self.bus)
-        self.lockstep = self.transport == "loopback" if lockstep is None else lockstep
+        self.lockstep = self.transport.in_process if lockstep is None else lockstep
         self.simulated = _simulated(self.transport, drives)
         self.resume = resume
         self.learning = learning
@@ -243,9 +242,9 @@ class Campaign:
     ) -> Controller:
         cell_file = str(self.cell.path)
         drives = None
-        if self.simulated and self.transport != "loopback":
+        if self.simulated and not self.transport.in_process:
             drives = start_simulated_drives(cell_file, self.bus, lockstep=self.lockstep)
-        if self.law is None and measure is None and self.transport != "loopback":
+        if self.law is None and measure is None and not self.transport.in_process:
             return ProcessController(cell_file, words, drives, verb=verb)
         return InProcessController(
             {
@@ -293,26 +292,6 @@ def load_cell(path: str | Path, *, allow_divergent: bool = False) -> Cell:
         raise BadInputError(" ".join(str(error).split())) from error
 
 
-def transport_of(bus: str) -> str:
-    """Return the kind of a bus address.
-
-    Raises
-    ------
-    BadInputError
-        If it is not one of can, udp, zenoh, loopback.
-
-    Examples
-    --------
-    >>> transport_of("udp:239.74.163.2")
-    'udp'
-    """
-    kind, colon, _ = bus.partition(":")
-    if not colon or kind not in TRANSPORTS:
-        message = f"bus = {bus}: allowed can:INTERFACE, udp:ADDRESS[:PORT], zenoh:KEY or loopback:"
-        raise BadInputError(message)
-    return kind
-
-
 def _measure(
     disturbance: Callable[[int], ArrayLike] | ArrayLike | None, iterations: int
 ) -> Callable[[int], ArrayLike] | None:
@@ -341,14 +320,16 @@ def _refuse_divergent(law: Law, cell: Cell) -> None:
         raise BadInputError(message) from error
 
 
-def _simulated(transport: str, drives: str) -> bool:
+def _simulated(transport: Transport, drives: str) -> bool:
     if drives not in {"auto", "simulated", "external"}:
         message = f"drives = {drives}: allowed auto, simulated or external"
         raise BadInputError(message)
-    if transport == "loopback" and drives == "external":
-        message = "drives = external: loopback: has no outside; its drives are always simulated"
+    if transport.in_process and drives == "external":
+        message = (
+            f"drives = external: {transport.syntax} has no outside; its drives are always simulated"
+        )
         raise BadInputError(message)
-    return drives == "simulated" or (drives == "auto" and transport != "can")
+    return drives == "simulated" or (drives == "auto" and not transport.has_bits)
 
 
 __all__ = ["Campaign", "CampaignError", "EndEvent", "IterationRecord", "Law", "load_cell"]

@@ -147,12 +147,12 @@ fn run_events(
         Work::Identify(options) => &mut options.session,
     };
     let address = session.bus.clone().unwrap_or_else(|| cell.bus.address.clone());
-    if address.starts_with("loopback:") {
+    if transport::scheme_of(&address).is_some_and(|scheme| scheme.in_process) {
         session.telemetry = false;
         if !session.lockstep {
-            return Err(PyValueError::new_err(
-                "bus = loopback: runs in lock-step only, as its drives have no clock of their own",
-            ));
+            return Err(PyValueError::new_err(format!(
+                "bus = {address} runs in lock-step only, as its drives have no clock of their own"
+            )));
         }
     }
     let stop = Arc::clone(&session.stop);
@@ -259,7 +259,7 @@ fn measured(ask: Py<PyAny>) -> Disturbance {
 
 fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
     let file = cell.file.display().to_string();
-    if !cell.bus.address.starts_with("loopback:") {
+    if transport::scheme_of(&cell.bus.address).is_none_or(|scheme| !scheme.in_process) {
         let place = format!("{file}: [bus] address");
         return transport::open(&cell.bus.address)
             .map_err(|source| CampaignError::Bus { place, source });

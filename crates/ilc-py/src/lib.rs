@@ -29,6 +29,7 @@ mod sigmoid_pair;
 mod signal;
 mod time_varying;
 mod trajectory;
+mod transport;
 mod tuning;
 mod weights;
 mod whole;
@@ -48,6 +49,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     contour::register(module)?;
     control::register(module)?;
     trajectory::register(module)?;
+    transport::register(module)?;
     sigmoid_pair::register(module)?;
     laws::register(module)?;
     weights::register(module)?;

@@ -13,6 +13,7 @@ from ilc_rt.campaign import DEFAULT_LIBRARY
 from ilc_rt.commands.targets import json_target
 from ilc_rt.errors import BadInputError
 from ilc_rt.options import Option, Verb, options
+from ilc_rt.transports import SYNTAXES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -82,7 +83,10 @@ def _parameter(option: Option) -> inspect.Parameter:
     how = typer.Option(
         *flags,
         metavar=option.placeholder,
-        help=option.help,
+        # Here, the simulated drives may be in this process.
+        help=f"Bus address in place of the cell's: {SYNTAXES}."
+        if option.name == "bus"
+        else option.help,
         hidden=option.kind == "renamed",
         callback=_refuse_renamed(option) if option.kind == "renamed" else None,
     )

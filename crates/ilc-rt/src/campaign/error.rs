@@ -3,7 +3,7 @@
 use crate::config::ConfigError;
 use crate::design::DesignError;
 use crate::fieldbus::bring_up::BringUpError;
-use crate::fieldbus::transport::OpenError;
+use crate::fieldbus::transport::{OpenError, syntaxes};
 use crate::identification::IdentificationError;
 use crate::library::LibraryError;
 
@@ -68,14 +68,17 @@ pub enum CampaignError {
     /// There is nothing to go on with.
     #[error("--resume: {0}")]
     Resume(String),
-    /// `loopback:` was asked of a program that has no drives in it.
+    /// A bus in one process was asked of a program that has no drives in it.
     #[error(
-        "{place}: `loopback:` has no drives in this program; allowed: can:, udp:, zenoh: \
-         (`ilc run` in Python runs loopback: with simulated drives)"
+        "{place}: `{address}` has no drives in this program; allowed: {} (`ilc run` in Python runs \
+         it with simulated drives)",
+        syntaxes(false)
     )]
-    Loopback {
+    NoDrivesInside {
         /// Origin of the address: file and key, or an option of the command line.
         place: String,
+        /// The address.
+        address: String,
     },
     /// Simulated drives could not be made of the cell.
     #[error("{file}: [simulation]: {reason}")]

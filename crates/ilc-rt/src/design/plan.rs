@@ -9,6 +9,7 @@ use crate::control::PositionLoop;
 use crate::fieldbus::bring_up::load;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
+use crate::fieldbus::transport::scheme_of;
 use crate::model::{
     Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
 };
@@ -196,7 +197,7 @@ fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
     payloads.extend(cell.axes.iter().flat_map(|_| [8, 8, 8]));
     payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
     // Only a real bus has bits; the others are as fast as the machine, and their load is stated for comparison.
-    if cell.bus.address.starts_with("can:") {
+    if scheme_of(&cell.bus.address).is_some_and(|scheme| scheme.has_bits) {
         return load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, cell.bus.load_max)
             .map(|found| found.ratio());
     }
