@@ -138,14 +138,7 @@ fn run_events(
     disturbance: Option<Py<PyAny>>,
 ) -> PyResult<EventStream> {
     let cell = cell.get().cell.clone();
-    let mut work = match verb {
-        "run" => Work::Run(parse(&arguments).map_err(PyValueError::new_err)?),
-        "identify" => Work::Identify(parse(&arguments).map_err(PyValueError::new_err)?),
-        _ => {
-            let line = format!("verb = '{verb}': 'run' or 'identify' is allowed");
-            return Err(PyValueError::new_err(line));
-        }
-    };
+    let mut work = Work::parse(verb, &arguments)?;
     if let (Work::Run(options), Some(ask)) = (&mut work, disturbance) {
         options.disturbance = measured(ask);
     }
@@ -193,6 +186,35 @@ fn run_events(
 enum Work {
     Run(Options),
     Identify(IdentifyOptions),
+}
+
+impl Work {
+    fn parse(verb: &str, arguments: &[String]) -> PyResult<Self> {
+        let parsed = match verb {
+            "run" => parse(arguments).map(Self::Run),
+            "identify" => parse(arguments).map(Self::Identify),
+            _ => Err(format!("verb = '{verb}': 'run' or 'identify' is allowed")),
+        };
+        parsed.map_err(PyValueError::new_err)
+    }
+}
+
+/// Check options as ``ilc-rt run`` or ``ilc-rt identify`` would.
+///
+/// Parameters
+/// ----------
+/// verb : {"run", "identify"}
+///     Which verb.
+/// arguments : list of str
+///     Options, as words of its command line.
+///
+/// Raises
+/// ------
+/// ValueError
+///     If an option cannot be used: its name, its value and what is allowed.
+#[pyfunction]
+fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
+    Work::parse(verb, &arguments).map(drop)
 }
 
 /// Describe the options of ``ilc-rt run`` or ``ilc-rt identify``.
@@ -250,6 +272,7 @@ fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<EventStream>()?;
+    module.add_function(wrap_pyfunction!(check_options, module)?)?;
     module.add_function(wrap_pyfunction!(described_options, module)?)?;
     module.add_function(wrap_pyfunction!(run_events, module)?)
 }

@@ -108,6 +108,30 @@ fn identify_axis<'py>(
     Ok(result)
 }
 
+/// Return the experiment of options, in the default band where they give none.
+///
+/// Parameters
+/// ----------
+/// arguments : list of str
+///     Options of the identification, as words of ``ilc-rt identify``.
+///
+/// Returns
+/// -------
+/// dict
+///     The figures of the experiment.
+///
+/// Raises
+/// ------
+/// ValueError
+///     If an option cannot be used.
+#[pyfunction]
+fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'_, PyDict>> {
+    let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
+    let axis = options.axis.clone().unwrap_or_default();
+    let at_m = options.at_m;
+    figures(py, &Experiment { axis, excitation: options.excitation(None), at_m })
+}
+
 /// Evaluate whole periods of input and output of any system.
 ///
 /// Parameters
@@ -174,6 +198,7 @@ fn describe(py: Python<'_>, found: Identified) -> PyResult<Bound<'_, PyDict>> {
     result.set_item("measured", PyFrequencyResponse(found.measured))?;
     let bound = (array(found.uncertainty.frequency_hz), array(found.uncertainty.bound));
     result.set_item("uncertainty", bound)?;
+    result.set_item("period_samples", found.period_samples)?;
     result.set_item("u", array(found.input))?;
     result.set_item("y", array(found.output))?;
     Ok(result)
@@ -181,5 +206,6 @@ fn describe(py: Python<'_>, found: Identified) -> PyResult<Bound<'_, PyDict>> {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(identify_axis, module)?)?;
+    module.add_function(wrap_pyfunction!(single_experiment, module)?)?;
     module.add_function(wrap_pyfunction!(evaluate_experiment, module)?)
 }

@@ -1,16 +1,14 @@
-//! Where the disturbance of each run comes from.
+//! Source of the measured disturbance of each run.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What a measurement of the surroundings looks like: the number of the coming run gives its
-/// disturbance, or why there is none.
+/// Function from the number of the next run to its disturbance, or to the reason why it has none.
 type Ask = dyn FnMut(u32) -> Result<Vec<f64>, String> + Send;
 
-/// What is measured of a run's surroundings before it begins: nothing, or one number for each
-/// disturbance, as a temperature.
+/// Measured disturbance of each run, one number for each quantity, e.g. a temperature; or nothing.
 ///
-/// It is asked once for each run, in order, while the axes return: never in the loop.
+/// Measured once before each run, in order, while the axes return: never in the loop.
 #[derive(Clone, Default)]
 pub struct Disturbance(Option<Arc<Mutex<Ask>>>);
 

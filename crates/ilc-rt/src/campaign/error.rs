@@ -1,4 +1,4 @@
-//! Why a campaign could not begin; nothing has moved when one of these is returned.
+//! Refusals of a campaign; nothing has moved when one of these is returned.
 
 use crate::config::ConfigError;
 use crate::design::DesignError;
@@ -22,9 +22,9 @@ pub enum CampaignError {
     /// The bus does not open.
     #[error("{place}: {source}")]
     Bus {
-        /// Where the address stands: file and key, or an option of the command line.
+        /// Origin of the address: file and key, or an option of the command line.
         place: String,
-        /// Why.
+        /// Reason.
         source: OpenError,
     },
     /// A node does not answer, or is not what the cell says.
@@ -36,10 +36,10 @@ pub enum CampaignError {
         key: String,
         /// Bus address.
         address: String,
-        /// Why.
+        /// Reason.
         source: Box<BringUpError>,
     },
-    /// Somebody else commands the bus.
+    /// Another master commands the bus.
     #[error(
         "{file}: [bus] address = {address}: another master is at work on this bus ({heard} heard); \
          nothing was sent; stop it, or choose another address"
@@ -49,7 +49,7 @@ pub enum CampaignError {
         file: String,
         /// Bus address.
         address: String,
-        /// What was heard of it.
+        /// Command that was heard from it.
         heard: crate::fieldbus::bring_up::listen::Command,
     },
     /// The bus failed while the nodes were started.
@@ -59,7 +59,7 @@ pub enum CampaignError {
         file: String,
         /// Bus address.
         address: String,
-        /// Why.
+        /// Reason.
         source: crate::fieldbus::BusError,
     },
     /// The library.
@@ -75,7 +75,7 @@ pub enum CampaignError {
         syntaxes(false)
     )]
     NoDrivesInside {
-        /// Where the address stands: file and key, or an option of the command line.
+        /// Origin of the address: file and key, or an option of the command line.
         place: String,
         /// The address.
         address: String,
@@ -85,7 +85,7 @@ pub enum CampaignError {
     Simulation {
         /// Cell description.
         file: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// A thread could not be started.
@@ -93,7 +93,7 @@ pub enum CampaignError {
     Thread {
         /// Which one.
         what: &'static str,
-        /// What the system said.
+        /// Reason given by the system.
         source: std::io::Error,
     },
 }

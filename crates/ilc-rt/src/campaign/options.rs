@@ -45,10 +45,6 @@ pub struct Session {
     pub stop: Arc<AtomicI32>,
 }
 
-fn bus_help() -> String {
-    format!("Bus address in place of the cell's: {}", syntaxes(false))
-}
-
 impl Session {
     /// Returns whether stalls are forgiven: in lock-step there is no clock that could show one.
     pub(super) fn forgives_stalls(&self) -> bool {
@@ -91,6 +87,11 @@ impl Options {
         }
         cell
     }
+}
+
+/// Returns the help text of `--bus`.
+fn bus_help() -> String {
+    format!("Bus address in place of the cell's: {}", syntaxes(false))
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "as the parser of arguments hands it on")]

@@ -79,7 +79,7 @@ fn describe(arguments: &CheckArguments) -> Result<(), DesignError> {
     Ok(())
 }
 
-/// What decides on the next input beside the law.
+/// Describes rollback, gate and ladder, which decide on the next input beside the law.
 fn learning(cell: &Cell) -> Vec<String> {
     let learning = &cell.learning;
     if learning.law == LawName::None {
@@ -115,7 +115,7 @@ fn learning(cell: &Cell) -> Vec<String> {
     lines
 }
 
-/// What kind of path it is, how long, and how fast at most.
+/// Describes the path: kind, length, and largest speed.
 fn path(cell: &Cell, plan: &Plan) -> String {
     let program = &cell.program;
     let file = program.file.as_deref().unwrap_or(Path::new("")).display();

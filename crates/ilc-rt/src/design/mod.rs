@@ -2,6 +2,8 @@
 //!
 //! Checks and refuses; touches neither a bus nor a library. `identification`, `campaign`, `cli` and the
 //! Python bindings may import it. Cold.
+//!
+//! Family: `forecast`, `law` and `plan` work one cell description out together.
 
 mod error;
 mod forecast;

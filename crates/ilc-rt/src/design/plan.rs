@@ -16,10 +16,10 @@ use crate::rt::Nanos;
 use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
 use crate::trajectory::{AxisLimits, Interpolator};
 
-/// How long drives may take to be switched on.
+/// Time that drives may take to be switched on.
 const ENABLE_S: f64 = 3.0;
 
-/// A cell description worked out: nothing in it can fail any more.
+/// Plan of a cell's runs: nothing in it can fail any more.
 #[derive(Debug)]
 pub struct Plan {
     /// The servo cycle's own description; runs are filled in by the campaign.
@@ -28,7 +28,7 @@ pub struct Plan {
     pub interpolator: Interpolator,
     /// Set points of a whole run, `n_samples * n_axes`.
     pub reference_m: Vec<f64>,
-    /// What was learned from.
+    /// Measurement that is learned from.
     pub measure: Measure,
     /// Provenance of the records; the campaign's name is filled in by the campaign.
     pub meta: Meta,
@@ -37,7 +37,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Works a cell description out, with the measurement to learn from if it is to be another one.
+    /// Plans the runs of a cell, with another measurement to learn from if one is given.
     ///
     /// # Errors
     /// [`DesignError`] for a program beyond the limits, an overloaded bus, or a measurement that
@@ -52,8 +52,8 @@ impl Plan {
         Self::with(cell, measure, lockstep, interpolator, program)
     }
 
-    /// Works a cell description out with other set points than those of its program; `program` says
-    /// which, as JSON.
+    /// Plans the runs of a cell with other set points than those of its program; `program` describes them
+    /// as JSON.
     pub(crate) fn with(
         cell: &Cell,
         measure: Option<Measure>,
@@ -165,7 +165,7 @@ fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
     let mut payloads = vec![0, 8];
     payloads.extend(cell.axes.iter().flat_map(|_| [8, 8, 8]));
     payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
-    // Only a real bus has bits; the others are as fast as the machine, and are told for comparison.
+    // Only a real bus has bits; the others are as fast as the machine, and their load is stated for comparison.
     if scheme_of(&cell.bus.address).is_some_and(|scheme| scheme.has_bits) {
         return load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, cell.bus.load_max)
             .map(|found| found.ratio());

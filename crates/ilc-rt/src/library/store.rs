@@ -8,15 +8,12 @@ use rusqlite::{Connection, OptionalExtension, params_from_iter};
 
 use super::error::{LibraryError, told};
 use super::figures;
-use super::file::{self, Found};
+use super::file::{self, BUSY_TIMEOUT, Found};
 use super::row::{
     ARRAYS, Row, as_integer, blob, is_old, json_list, json_numbers, read_row, refresh,
 };
 use super::schema;
 use crate::record::{Figures, IterationRecord, Meta};
-
-/// How long to wait for another process that is writing: a run that cannot be kept has to stop the axes.
-pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// How long to wait for it when there was a wait in vain before.
 const HURRIED: Duration = Duration::from_millis(200);

@@ -195,3 +195,109 @@ fn a_file_that_is_no_library_is_refused() {
     std::fs::remove_file(&path).unwrap();
     assert!(refused.unwrap_err().to_string().contains("not a database"));
 }
+
+/// The table as versions 1 and 3 of the schema made it.
+fn old_table(version: i64) -> String {
+    let contour = if version == 1 { " NOT NULL" } else { "" };
+    let later = if version == 1 {
+        ""
+    } else {
+        "axes_tracking_inf_m TEXT, axes_tracking_rms_m TEXT, learning_off INTEGER, remark TEXT,"
+    };
+    format!(
+        "CREATE TABLE iteration (
+            id              INTEGER PRIMARY KEY,
+            created_utc     TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
+            cell            TEXT NOT NULL,
+            campaign        TEXT NOT NULL,
+            fingerprint     TEXT NOT NULL,
+            iteration       INTEGER NOT NULL,
+            program         TEXT NOT NULL,
+            law             TEXT NOT NULL,
+            law_parameters  TEXT NOT NULL,
+            measure         TEXT NOT NULL,
+            cycle_s         REAL NOT NULL,
+            n_axes          INTEGER NOT NULL,
+            axis_names      TEXT NOT NULL,
+            input_units     TEXT NOT NULL,
+            n_samples       INTEGER NOT NULL,
+            reference_m     BLOB NOT NULL,
+            disturbance     TEXT,
+            input           BLOB NOT NULL,
+            encoder_m       BLOB NOT NULL,
+            tool_m          BLOB,
+            error_m         BLOB NOT NULL,
+            contour_m       BLOB NOT NULL,
+            digest          TEXT NOT NULL,
+            tracking_inf_m          REAL NOT NULL,
+            tracking_rms_m          REAL NOT NULL,
+            contour_inf_m           REAL{contour},
+            contour_rms_m           REAL{contour},
+            encoder_tracking_inf_m  REAL NOT NULL,
+            tool_tracking_inf_m     REAL,
+            overruns                INTEGER NOT NULL,
+            missing_samples         INTEGER NOT NULL,
+            late_updates            INTEGER NOT NULL,
+            update_ms               REAL NOT NULL,
+            rolled_back             INTEGER NOT NULL,
+            {later}
+            UNIQUE (campaign, iteration)
+        );
+        CREATE INDEX iteration_by_fingerprint ON iteration (fingerprint, id);
+        PRAGMA application_id = 0x494C434C; PRAGMA user_version = {version};"
+    )
+}
+
+#[test]
+fn files_of_older_programs_open_and_go_on() {
+    for version in [1, 3] {
+        let name = format!("ilc-library-by-sql-{version}-{}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        let old = IterationRecord { disturbance: Vec::new(), ..record(0) };
+        let connection = Connection::open(&path).unwrap();
+        connection.execute_batch(&old_table(version)).unwrap();
+        if version == 3 {
+            let index = "CREATE INDEX iteration_by_disturbance ON iteration (cell, disturbance)
+                WHERE disturbance IS NOT NULL";
+            connection.execute_batch(index).unwrap();
+        }
+        let blob = |values: &[f64]| -> Vec<u8> {
+            values.iter().flat_map(|value| value.to_le_bytes()).collect()
+        };
+        let insert = "INSERT INTO iteration (cell, campaign, fingerprint, iteration, program, law,
+            law_parameters, measure, cycle_s, n_axes, axis_names, input_units, n_samples,
+            reference_m, input, encoder_m, tool_m, error_m, contour_m, digest, tracking_inf_m,
+            tracking_rms_m, contour_inf_m, contour_rms_m, encoder_tracking_inf_m, overruns,
+            missing_samples, late_updates, update_ms, rolled_back) VALUES ('gantry', 'a', 'f', 0,
+            '[]', 'norm_optimal', '{}', 'tcp', 0.002, 2, '[\"x\",\"y\"]', '[\"m\",\"m/s\"]', 2,
+            ?1, ?2, ?3, ?4, ?5, ?6, ?7, 0.3, 0.3, 0.4, 0.4, 0.25, 3, 4, 5, 6.5, 1)";
+        let run = rusqlite::params![
+            blob(&old.reference_m),
+            blob(&old.input),
+            blob(&old.encoder_m),
+            blob(&old.tool_m),
+            blob(&old.error_m),
+            blob(&old.contour_m),
+            old.digest(),
+        ];
+        connection.execute(insert, run).unwrap();
+        drop(connection);
+        for library in [Library::read(&path).unwrap(), Library::open(&path).unwrap()] {
+            let loaded = library.load(1).unwrap();
+            assert_eq!((loaded.meta, loaded.record.digest()), (meta("a"), old.digest()));
+            let figures = &library.list(None).unwrap()[0].record.figures;
+            let counts = (figures.overruns, figures.missing_samples, figures.late_updates);
+            assert_eq!(counts, (3, 4, 5), "version {version}");
+            assert!((figures.update_ms - 6.5).abs() < 1e-15 && figures.rolled_back);
+            assert!(!figures.learning_off && figures.remark.is_none());
+            assert_eq!(figures.axes_tracking_inf_m, [0.3, 0.3], "worked out from the arrays");
+            assert_eq!(library.newest_campaign("f").unwrap().as_deref(), Some("a"));
+        }
+        let library = Library::open(&path).unwrap();
+        assert_eq!(library.next_index("a").unwrap(), 1);
+        let id = library.append(&meta("a"), &record(1)).unwrap();
+        assert_eq!(library.load(id).unwrap().record, record(1));
+        drop(library);
+        remove(&path);
+    }
+}
