@@ -20,8 +20,8 @@ use super::telemetry::Telemetry;
 use super::{nodes, reason};
 use crate::config::Cell;
 use crate::fieldbus::Bus;
-use crate::learning::Law;
-use crate::library::Library;
+use crate::learning::{Law, LearningError};
+use crate::library::{Library, Task};
 use crate::record::{AxisKinds, EndStatus, Event, Figures, IterationRecord, StateName};
 use crate::servo::{Cycle, Mailbox, Message, PhaseName, StopReason, mailbox};
 
@@ -96,6 +96,52 @@ struct Work {
     growth_allowed: f64,
 }
 
+/// Returns the newest campaign of the same fingerprint, also of libraries of older versions.
+fn campaign_to_resume(library: &Library, plan: &Plan) -> Result<String, SupervisorError> {
+    if let Some(campaign) = library.newest_campaign(&plan.meta.fingerprint)? {
+        return Ok(campaign);
+    }
+    if let Some(campaign) = library.newest_campaign(&plan.legacy_fingerprint)? {
+        tracing::info!("campaign {campaign} was begun by an older version; it goes on as it was");
+        return Ok(campaign);
+    }
+    Err(SupervisorError::Resume(
+        "the library has no campaign of this cell, program, measurement and law".to_owned(),
+    ))
+}
+
+/// Lets a law that weighs runs by their disturbance remember those that the library holds: all of this
+/// cell, program and measurement, made earlier than this campaign.
+fn recall(
+    library: &Library,
+    plan: &Plan,
+    progress: &Progress,
+    law: Option<&mut (dyn Law + '_)>,
+) -> Result<(), SupervisorError> {
+    let Some((law, n_disturbances)) = law.and_then(|law| law.n_disturbances().map(|n| (law, n)))
+    else {
+        return Ok(());
+    };
+    let meta = &plan.meta;
+    let task = Task { cell: Some(meta.cell.clone()) };
+    let (ids, _) = library.fitting(plan.n_samples(), meta.n_axes, n_disturbances, &task)?;
+    for id in ids {
+        let row = library.load(id)?;
+        if row.meta.campaign == meta.campaign {
+            break;
+        }
+        let alike = row.meta.program == meta.program
+            && row.meta.measure == meta.measure
+            && row.meta.cycle_s.to_bits() == meta.cycle_s.to_bits();
+        let record = &row.record;
+        if alike && !progress.is_disturbed(&record.figures) {
+            law.recall(&record.input, &record.error_m, &record.disturbance)
+                .map_err(|source| SupervisorError::Learning { file: meta.cell.clone(), source })?;
+        }
+    }
+    Ok(())
+}
+
 #[expect(clippy::too_many_lines, reason = "the course of a campaign, step by step")]
 fn carry_out(
     cell: &Cell,
@@ -105,6 +151,7 @@ fn carry_out(
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, SupervisorError> {
     let Work { mut plan, mut law, input, growth_allowed } = work;
+    let disturbance = options.disturbance.clone().or_file(cell);
     if options.resume && !options.library.exists() {
         // Opening it would leave an empty file where a name was mistyped.
         let path = options.library.display();
@@ -112,22 +159,32 @@ fn carry_out(
     }
     let library = Library::open(&options.library)?;
     let mut progress = Progress::new(growth_allowed).forgiving(options.forgives_stalls());
-    let mut held = Claim::none();
+    let held;
     let resumed = if options.resume {
         // Claimed before it is read: what another program adds to it meanwhile would be made twice.
-        if let Some(campaign) = library.newest_campaign(&plan.meta.fingerprint)? {
-            held = claim(&options.library, &campaign)?;
-        }
-        progress.resume(&library, &mut plan.meta, law.as_deref_mut(), &options.disturbance)?
+        let campaign = campaign_to_resume(&library, &plan)?;
+        held = claim(&options.library, &campaign)?;
+        plan.meta.campaign = campaign;
+        recall(&library, &plan, &progress, law.as_deref_mut())?;
+        progress.resume(&library, &plan.meta, law.as_deref_mut(), &disturbance)?
     } else {
         plan.meta.campaign = library.new_campaign()?;
         held = claim(&options.library, &plan.meta.campaign)?;
-        let coming = options.disturbance.of(0).map_err(SupervisorError::Disturbance)?;
+        recall(&library, &plan, &progress, law.as_deref_mut())?;
+        let coming = disturbance.of(0).map_err(SupervisorError::Disturbance)?;
         if let Some(law) = law.as_deref_mut() {
             set_disturbance(law, &coming);
         }
         Resumed { coming, ..Resumed::default() }
     };
+    if let Some(expected) = law.as_ref().and_then(|law| law.n_disturbances())
+        && expected != resumed.coming.len()
+    {
+        let found = resumed.coming.len();
+        let source = LearningError::Disturbance { found, expected };
+        let file = cell.file.display().to_string();
+        return Err(SupervisorError::Learning { file, source });
+    }
     let learner = match law {
         Some(law) if options.lockstep => Some(Learner::in_line(law)),
         Some(law) => Some(Learner::on_thread(law)?),
@@ -213,7 +270,7 @@ fn carry_out(
         progress,
         learner,
         runs: resumed.runs,
-        disturbance: options.disturbance.clone(),
+        disturbance,
         present: resumed.coming,
         first,
         iterations: options.iterations,

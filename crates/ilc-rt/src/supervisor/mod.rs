@@ -12,6 +12,7 @@ mod collect;
 mod disturbance;
 mod error;
 mod experiment;
+mod fingerprint;
 mod forecast;
 mod identified;
 mod keeper;
@@ -25,7 +26,6 @@ mod program;
 mod progress;
 mod reason;
 mod telemetry;
-mod weights;
 
 pub use band::{Band, BandSearch};
 pub use campaign::{identify, run};

@@ -156,24 +156,18 @@ impl Progress {
         }
     }
 
-    /// Takes up the newest campaign of the same fingerprint where it ended: its runs, and the input
-    /// of the next one with the time that it took to learn it.
+    /// Takes up the campaign of `meta` where it ended: its runs, and the input of the next one with the
+    /// time that it took to learn it.
     ///
     /// All runs pass through the law again, so that it knows what it would know without the break.
     pub(super) fn resume(
         &mut self,
         library: &Library,
-        meta: &mut Meta,
+        meta: &Meta,
         mut law: Option<&mut (dyn Law + '_)>,
         disturbance: &Disturbance,
     ) -> Result<Resumed, SupervisorError> {
-        let Some(campaign) = library.newest_campaign(&meta.fingerprint)? else {
-            return Err(SupervisorError::Resume(
-                "the library has no campaign of this cell, program, measurement and law".to_owned(),
-            ));
-        };
-        let rows = library.list(Some(&campaign))?;
-        meta.campaign = campaign;
+        let rows = library.list(Some(&meta.campaign))?;
         let mut last: Option<(Decision, IterationRecord)> = None;
         for row in &rows {
             let mut record = library.load(row.id)?.record;
