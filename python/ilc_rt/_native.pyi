@@ -58,12 +58,14 @@ __all__ = [
     "analyze",
     "butterfly",
     "butterworth",
+    "check_options",
     "contour_error",
     "contour_weights",
     "coupled_weights",
     "coupling_gains",
+    "described_options",
     "discretize",
-    "doubt",
+    "evaluate_experiment",
     "excitation",
     "exponential_sigmoid",
     "fir",
@@ -76,6 +78,7 @@ __all__ = [
     "from_transfer_function",
     "gaussian",
     "gcode",
+    "identify_axis",
     "instantaneous_frequency",
     "jerk_limited",
     "modulated",
@@ -87,6 +90,7 @@ __all__ = [
     "schedule",
     "second_order",
     "sigmoid_pair",
+    "single_experiment",
     "spiral",
     "spline",
     "tracking_index",
@@ -313,7 +317,16 @@ def fit_rational(
     delay_s: float = 0.0,
     dt_s: float | None = None,
 ) -> RationalFit: ...
-def doubt(measured: FrequencyResponse, residual_rms: float) -> str | None: ...
+def identify_axis(
+    cell: Cell,
+    arguments: list[str],
+    excite: Callable[[dict[str, Any]], tuple[ArrayLike, ArrayLike]],
+    report: Callable[[str], object],
+) -> dict[str, Any]: ...
+def single_experiment(arguments: list[str]) -> dict[str, Any]: ...
+def evaluate_experiment(
+    u: ArrayLike, y: ArrayLike, period_samples: int, from_hz: float, to_hz: float, dt_s: float
+) -> dict[str, Any]: ...
 def uncertainty(
     measured: FrequencyResponse, model: ArrayLike, deviations: float = 3.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
@@ -1182,19 +1195,15 @@ class EventStream:
     def __next__(self) -> str: ...
     def stop(self, signal: int = ...) -> None: ...
 
+def check_options(verb: str, arguments: list[str]) -> None: ...
+def described_options(verb: str) -> str: ...
+def transports() -> list[dict[str, Any]]: ...
 def run_events(
     cell: Cell,
-    iterations: int,
-    library: str | PathLike[str],
-    bus: str | None = None,
-    measure: str | None = None,
-    lockstep: bool = True,
-    resume: bool = False,
+    arguments: list[str],
+    verb: str = "run",
     law: object | None = None,
-    learning: bool = True,
-    experiment: object | None = None,
     disturbance: Callable[[int], ArrayLike] | None = None,
-    simulated: bool = False,
 ) -> EventStream: ...
 
 # Make objects again, for copies and pickles.

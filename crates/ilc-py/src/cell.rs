@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use ilc_rt::config::{Axis, Cell, Interface, Measure};
-use ilc_rt::supervisor::{self, Plan};
+use ilc_rt::design::{self, Plan};
 use pyo3::prelude::*;
 
 use crate::argument::give_signal;
@@ -178,7 +178,7 @@ impl PyCell {
     /// StateSpace
     ///     Inputs in the unit of each axis's interface, positions in metres.
     fn model(&self) -> PyResult<PyStateSpace> {
-        supervisor::learning_model(&self.cell).or_raise().map(PyStateSpace::from)
+        design::learning_model(&self.cell).or_raise().map(PyStateSpace::from)
     }
 
     /// Return the error of a run without learning, by the model.
@@ -188,7 +188,7 @@ impl PyCell {
     /// ndarray of float64, shape (n_samples, n_axes)
     ///     Set point minus response in metres.
     fn first_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let error = supervisor::first_error(&self.cell, &self.reference_m).or_raise()?;
+        let error = design::first_error(&self.cell, &self.reference_m).or_raise()?;
         give_signal(py, error, self.cell.n_axes(), false)
     }
 

@@ -43,7 +43,7 @@ use crate::whole;
 /// array([2.])
 #[pyclass(name = "FrequencyResponse", module = "ilc_rt._native", frozen)]
 #[derive(Debug)]
-pub(crate) struct PyFrequencyResponse(FrequencyResponse);
+pub(crate) struct PyFrequencyResponse(pub(crate) FrequencyResponse);
 
 #[pymethods]
 impl PyFrequencyResponse {
@@ -230,7 +230,7 @@ fn frequency_response(
 /// zero-order hold if sampled. What is known beforehand has the deviation 0.
 #[pyclass(name = "SecondOrderFit", module = "ilc_rt._native", frozen, get_all)]
 #[derive(Debug)]
-struct PySecondOrderFit {
+pub(crate) struct PySecondOrderFit {
     /// Static gain K.
     gain: f64,
     /// Natural frequency w0 / (2 pi) in Hz.
@@ -426,7 +426,7 @@ fn fit_second_order(
 /// ``K a / (s (s + a)) exp(-s tau)``. With a known delay the gain is 1.
 #[pyclass(name = "VelocityLoopFit", module = "ilc_rt._native", frozen)]
 #[derive(Debug)]
-struct PyVelocityLoopFit(VelocityLoopFit);
+pub(crate) struct PyVelocityLoopFit(pub(crate) VelocityLoopFit);
 
 #[pymethods]
 impl PyVelocityLoopFit {
@@ -759,26 +759,6 @@ fn uncertainty<'py>(
     Ok((give(py, found.frequency_hz), give(py, found.bound)))
 }
 
-/// Return why a model should not be used; None if nothing speaks against it.
-///
-/// A median coherence below 0.7, or a relative residual above 0.25.
-///
-/// Parameters
-/// ----------
-/// measured : FrequencyResponse
-///     What was measured in the band of the excitation.
-/// residual_rms : float
-///     What the fit of the model left over, relative to the response.
-///
-/// Returns
-/// -------
-/// str or None
-///     One line for people.
-#[pyfunction]
-fn doubt(measured: &Bound<'_, PyFrequencyResponse>, residual_rms: f64) -> Option<String> {
-    identify::doubt(&measured.get().0, residual_rms).map(|doubt| doubt.to_string())
-}
-
 /// Return an excitation from rest to rest.
 ///
 /// Parameters
@@ -933,7 +913,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit_velocity_loop, module)?)?;
     module.add_function(wrap_pyfunction!(fit_rational, module)?)?;
     module.add_function(wrap_pyfunction!(uncertainty, module)?)?;
-    module.add_function(wrap_pyfunction!(doubt, module)?)?;
     module.add_function(wrap_pyfunction!(_second_order_fit, module)?)?;
     module.add_function(wrap_pyfunction!(_velocity_loop_fit, module)?)?;
     module.add_function(wrap_pyfunction!(_rational_fit, module)?)?;

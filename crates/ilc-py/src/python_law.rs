@@ -1,4 +1,4 @@
-//! A learning law that is a Python object, as the supervisor's own or as the core of another law.
+//! A learning law that is a Python object, as a campaign's own or as the core of another law.
 
 use ilc_rt::learning::{Law, LearningError, Standing};
 use pyo3::prelude::*;

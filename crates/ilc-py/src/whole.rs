@@ -96,7 +96,7 @@ macro_rules! named_maybe {
 
 named! {
     blend, input, keep, lead, n, n_agents, n_axes, n_poles, n_runs, n_samples, n_zeros,
-    order, output, patience, periods, repeats, rows, top,
+    order, output, patience, period_samples, periods, repeats, rows, top,
 }
 
 /// Arguments that may be `None`.
@@ -163,16 +163,6 @@ pub(crate) fn segments(object: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>>
         })?;
         Ok((whole("segments", &start)?, value))
     })
-}
-
-/// Reads a number of runs to make.
-pub(crate) fn iterations(object: &Bound<'_, PyAny>) -> PyResult<u32> {
-    let range = format!("1 to {}", u32::MAX);
-    let number = number("iterations", object, &range)?;
-    match number.extract::<u32>() {
-        Ok(value) if value > 0 => Ok(value),
-        _ => Err(out_of_range("iterations", &number, &range)),
-    }
 }
 
 /// Reads the identity of a run.

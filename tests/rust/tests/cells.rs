@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::config::Cell;
+use ilc_rt::design::Plan;
 use ilc_rt::fieldbus::transport::Address;
-use ilc_rt::supervisor::Plan;
 use ilc_tests::example_text;
 use proptest::prelude::{any, prop, proptest};
 

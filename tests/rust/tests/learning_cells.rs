@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::config::{Cell, LawName, Learning};
+use ilc_rt::design::{Plan, Prepared};
 use ilc_rt::learning::law::LawTables;
-use ilc_rt::supervisor::{Plan, Prepared};
 use ilc_tests::example_text;
 
 const FILE: &str = "cell.toml";

@@ -3,9 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use ilc_rt::campaign::{self, CampaignError, Options};
 use ilc_rt::config::Cell;
 use ilc_rt::record::EndStatus;
-use ilc_rt::supervisor::{self, Options, SupervisorError};
+
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::{Scratch, example_text};
 use serde_json::Value;
@@ -32,7 +33,7 @@ fn campaigns_of_version_0_1_go_on() {
         let path = scratch.file("library.db");
         let run = |cell: &Cell, resume: bool, iterations: u32| {
             let options = Options { resume, ..options(path.clone(), iterations) };
-            supervisor::run(cell, &options, in_process(cell), None, &mut |_| {})
+            campaign::run(cell, &options, in_process(cell), None, &mut |_| {})
         };
         run(&whole, false, 2).unwrap();
         let connection = rusqlite::Connection::open(&path).unwrap();
@@ -47,7 +48,7 @@ fn campaigns_of_version_0_1_go_on() {
 
         let narrower = cell(campaign, &|cell| cell.axes[1].limits.following_error_max_m *= 0.5);
         let refused = run(&narrower, true, 3).unwrap_err();
-        assert!(matches!(refused, SupervisorError::Resume(_)), "{learning}: {refused}");
+        assert!(matches!(refused, CampaignError::Resume(_)), "{learning}: {refused}");
         let outcome = run(&whole, true, 3).unwrap();
         assert_eq!((outcome.status, outcome.runs.len()), (EndStatus::Completed, 3), "{learning}");
         assert_eq!(run(&whole, true, 4).unwrap().runs.len(), 4, "{learning}: once more");

@@ -10,6 +10,7 @@ use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
 use super::program::Program;
 use super::simulation::{AxisSimulation, Simulation};
+pub use crate::interpolate::AxisUnit;
 use crate::schema::field_order;
 
 /// A whole cell description, validated.
@@ -90,27 +91,6 @@ pub enum Interface {
     Csp,
     /// Cyclic synchronous velocity: the position loop is here (parallel learning, input in m/s).
     Csv,
-}
-
-/// What an axis is measured in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum AxisUnit {
-    /// Metres: a linear axis.
-    #[default]
-    M,
-    /// Radians: a rotary axis.
-    Rad,
-}
-
-impl AxisUnit {
-    /// The unit as it is written.
-    pub const fn symbol(self) -> &'static str {
-        match self {
-            Self::M => "m",
-            Self::Rad => "rad",
-        }
-    }
 }
 
 /// `[[axis]]`: one drive.
@@ -290,6 +270,11 @@ impl Cell {
     /// The servo cycle in seconds.
     pub fn cycle_s(&self) -> f64 {
         f64::from(self.cell.cycle_us) * 1e-6
+    }
+
+    /// Unit of each axis, in their order.
+    pub fn units(&self) -> Vec<AxisUnit> {
+        self.axes.iter().map(|axis| axis.unit).collect()
     }
 
     /// Number of axes.

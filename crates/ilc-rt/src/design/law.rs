@@ -1,0 +1,67 @@
+//! From `[learning]` to the law that a campaign uses; refuses what cannot learn before anything moves.
+//!
+//! `plan` hands out what is made here.
+
+use super::error::DesignError;
+use super::forecast;
+use super::plan::model;
+use crate::config::{Cell, ConfigError};
+use crate::learning::gate::Gate;
+use crate::learning::ladder::Ladder;
+use crate::learning::law::{BuildError, LawContext, LawTables};
+use crate::learning::{Law, LearningError};
+
+/// A law that may start.
+#[expect(missing_debug_implementations, reason = "laws need not have one")]
+pub struct Prepared {
+    /// The law; `None` if nothing shall be learned.
+    pub law: Option<Box<dyn Law>>,
+    /// What the analysis says of it, as a sentence; empty if it can say nothing.
+    pub verdict: String,
+    /// What does not keep it from starting and should be known all the same, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Makes the law that the cell names, with what goes round it, and asks the analysis.
+pub(super) fn prepare(cell: &Cell, reference_m: &[f64]) -> Result<Prepared, DesignError> {
+    let n_samples = reference_m.len() / cell.n_axes();
+    let Some(law) = build_law(cell, reference_m)? else {
+        return Ok(Prepared { law: None, verdict: String::new(), warnings: Vec::new() });
+    };
+    let mut law = wrap_law(law, cell).map_err(|source| refused(cell, source.into()))?;
+    let (verdict, warnings) = forecast::judge(law.as_mut(), cell, n_samples)?;
+    Ok(Prepared { law: Some(law), verdict, warnings })
+}
+
+fn refused(cell: &Cell, source: BuildError) -> DesignError {
+    let file = cell.file.display().to_string();
+    match source {
+        BuildError::Refused(violation) => ConfigError::value(&file, &violation).into(),
+        BuildError::Learning(source) => DesignError::Learning { file, source },
+    }
+}
+
+fn build_law(cell: &Cell, reference_m: &[f64]) -> Result<Option<Box<dyn Law>>, DesignError> {
+    let Some(parameters) = cell.learning.parameters(cell.learning.law) else {
+        return Ok(None);
+    };
+    let model = model(cell)
+        .map_err(|source| DesignError::Model { file: cell.file.display().to_string(), source })?;
+    let context = LawContext { cell: &cell.for_laws(), model: &model, reference_m };
+    parameters.build(&context).map(Some).map_err(|source| refused(cell, source))
+}
+
+/// Puts the ladder next to the law, the gate round both: the gate judges every run, and the input that
+/// it keeps or restores is not scaled by the ladder's gain.
+fn wrap_law(law: Box<dyn Law>, cell: &Cell) -> Result<Box<dyn Law>, LearningError> {
+    let mut law = law;
+    let mut runs_a_step = 1;
+    if let Some(ladder) = cell.learning.ladder {
+        law = Box::new(Ladder::new(law, ladder)?);
+        runs_a_step = ladder.repeats;
+    }
+    if let Some(gate) = cell.learning.gate {
+        law = Box::new(Gate::new(law, gate.rule(cell.n_axes(), runs_a_step))?);
+    }
+    Ok(law)
+}
