@@ -1,55 +1,41 @@
 import builtins
 from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, Protocol, TypeAlias, final
+from typing import Any, Literal, Protocol, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import Self, disjoint_base
 
 __all__ = [
-    "AdjointIlc",
-    "Analysis",
     "Arc",
-    "ButterworthFilter",
     "Cascade",
     "Cell",
-    "ConstrainedIlc",
     "ContourError",
     "CrossCoupled",
     "Delta",
-    "ErrorFeedforwardIlc",
     "EventStream",
-    "FirFilter",
-    "FlexibleIlc",
+    "Filter",
     "FrequencyResponse",
     "Gantry",
-    "Gate",
-    "GaussianFilter",
     "KinematicsError",
-    "Ladder",
+    "Law",
     "LearningError",
     "Library",
     "Line",
     "ModelError",
-    "ModelInverseIlc",
-    "NormOptimalIlc",
-    "PdIlc",
     "Pid",
     "RationalFit",
-    "RelevanceIlc",
-    "RelevanceWeights",
-    "Repeatability",
     "SecondOrderFit",
     "SignalError",
     "StateSpace",
-    "SwitchedFilter",
-    "ThroughJacobian",
     "TimeVarying",
     "Trajectory",
     "TrajectoryError",
-    "Tuning",
     "VelocityLoopFit",
     "__version__",
+    "_filter",
+    "_law",
     "_made",
     "_rational_fit",
     "_second_order_fit",
@@ -57,7 +43,7 @@ __all__ = [
     "_velocity_loop_fit",
     "analyze",
     "butterfly",
-    "butterworth",
+    "check_relevance_weights",
     "contour_error",
     "contour_weights",
     "coupled_weights",
@@ -66,7 +52,6 @@ __all__ = [
     "doubt",
     "excitation",
     "exponential_sigmoid",
-    "fir",
     "fit_rational",
     "fit_second_order",
     "fit_velocity_loop",
@@ -74,7 +59,6 @@ __all__ = [
     "formation_weights",
     "frequency_response",
     "from_transfer_function",
-    "gaussian",
     "gcode",
     "instantaneous_frequency",
     "jerk_limited",
@@ -327,89 +311,6 @@ def excitation(
     dt_s: float,
 ) -> tuple[NDArray[np.float64], int, int]: ...
 
-@final
-class ButterworthFilter:
-    def __new__(
-        cls, order: int, cutoff_hz: float, dt_s: float, causal: bool = False
-    ) -> ButterworthFilter: ...
-    @property
-    def order(self) -> int: ...
-    @property
-    def cutoff_hz(self) -> float: ...
-    @property
-    def dt_s(self) -> float: ...
-    @property
-    def causal(self) -> bool: ...
-    @property
-    def sos(self) -> NDArray[np.float64]: ...
-    def filter(self, x: ArrayLike) -> NDArray[np.float64]: ...
-    def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
-
-def butterworth(
-    order: int, cutoff_hz: float, dt_s: float, causal: bool = False
-) -> ButterworthFilter: ...
-
-@final
-class GaussianFilter:
-    def __new__(cls, bandwidth_hz: float, dt_s: float) -> GaussianFilter: ...
-    @property
-    def bandwidth_hz(self) -> float: ...
-    @property
-    def dt_s(self) -> float: ...
-    @property
-    def sigma_samples(self) -> float: ...
-    def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
-
-def gaussian(bandwidth_hz: float, dt_s: float) -> GaussianFilter: ...
-
-@final
-class FirFilter:
-    def __new__(cls, taps: ArrayLike, repeats: int = 1) -> FirFilter: ...
-    @property
-    def taps(self) -> NDArray[np.float64]: ...
-    def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
-
-def fir(taps: ArrayLike, repeats: int = 1) -> FirFilter: ...
-
-@final
-class SwitchedFilter:
-    def __new__(
-        cls,
-        cutoffs_hz: Sequence[float],
-        starts: Sequence[int],
-        dt_s: float,
-        order: int = 2,
-        blend: int = 0,
-    ) -> SwitchedFilter: ...
-    @staticmethod
-    def from_signal(
-        reference: ArrayLike,
-        dt_s: float,
-        low_hz: float,
-        high_hz: float,
-        threshold_hz: float,
-        order: int = 2,
-        window_s: float | None = None,
-        margin_s: float | None = None,
-        blend_s: float | None = None,
-    ) -> SwitchedFilter: ...
-    @property
-    def cutoffs_hz(self) -> list[float]: ...
-    @property
-    def starts(self) -> list[int]: ...
-    @property
-    def order(self) -> int: ...
-    @property
-    def blend(self) -> int: ...
-    @property
-    def dt_s(self) -> float: ...
-    def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
-
-_Filter: TypeAlias = ButterworthFilter | GaussianFilter | SwitchedFilter | FirFilter | ArrayLike
-
-def zero_phase(filter: _Filter, x: ArrayLike) -> NDArray[np.float64]: ...
-def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]: ...
-
 class TrajectoryError(ValueError): ...
 
 @final
@@ -549,344 +450,6 @@ def tracking_index(
 ) -> tuple[float, float]: ...
 
 @final
-class PdIlc:
-    def __new__(
-        cls,
-        kp: float,
-        kd: float,
-        q_filter: _Filter | None = None,
-        lead: int = 1,
-    ) -> PdIlc: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def reset(self) -> None: ...
-
-@final
-class ErrorFeedforwardIlc:
-    def __new__(
-        cls,
-        gain: float,
-        filter: _Filter | None = None,
-        lead: int = 1,
-        limit: float | None = None,
-    ) -> ErrorFeedforwardIlc: ...
-    @property
-    def n_limited(self) -> int: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def reset(self) -> None: ...
-
-@final
-class AdjointIlc:
-    def __new__(
-        cls,
-        model: StateSpace | _ForeignModel,
-        n_samples: int,
-        gain: float | None = None,
-        q_filter: _Filter | None = None,
-    ) -> AdjointIlc: ...
-    @property
-    def gain(self) -> float: ...
-    @property
-    def gain_limit(self) -> float: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def reset(self) -> None: ...
-
-class _Law(Protocol):
-    """Anything that learns."""
-
-    def update(
-        self,
-        u: NDArray[np.float64],
-        e: NDArray[np.float64],
-        disturbance: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.float64]: ...
-
-@final
-class RelevanceWeights:
-    def __new__(
-        cls,
-        e: float = 10.0,
-        er: float = 2.0,
-        d: ArrayLike | None = None,
-        epsilon: float = 1.0,
-        rate_filter_s: float = 0.1,
-        error_gain: float = 1.0,
-        input_gain: float = 1.0,
-    ) -> RelevanceWeights: ...
-    @property
-    def e(self) -> float: ...
-    @property
-    def er(self) -> float: ...
-    @property
-    def d(self) -> NDArray[np.float64]: ...
-    @property
-    def epsilon(self) -> float: ...
-    @property
-    def rate_filter_s(self) -> float: ...
-    @property
-    def error_gain(self) -> float: ...
-    @property
-    def input_gain(self) -> float: ...
-
-@final
-class RelevanceIlc:
-    def __new__(
-        cls,
-        library: Library | None,
-        core: _Law,
-        weights: RelevanceWeights | tuple[float, float, ArrayLike],
-        top: int | None = None,
-        *,
-        dt_s: float | None = None,
-        cell: str | None = None,
-    ) -> RelevanceIlc: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
-    ) -> NDArray[np.float64]: ...
-    def expect(self, disturbance: ArrayLike) -> None: ...
-    def remember(
-        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
-    ) -> None: ...
-    def relevant(
-        self, disturbance: ArrayLike | None = None
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
-    def trim(self, keep: int, disturbances: ArrayLike | None = None) -> NDArray[np.int64]: ...
-    def reset(self) -> None: ...
-    def __len__(self) -> int: ...
-
-@final
-class FlexibleIlc:
-    def __new__(
-        cls,
-        library: Library | None,
-        core: _Law,
-        tolerance: float = 0.0,
-        *,
-        cell: str | None = None,
-    ) -> FlexibleIlc: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
-    ) -> NDArray[np.float64]: ...
-    def expect(self, disturbance: ArrayLike) -> None: ...
-    def remember(
-        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
-    ) -> None: ...
-    def reset(self) -> None: ...
-    def __len__(self) -> int: ...
-
-@final
-class ModelInverseIlc:
-    def __new__(
-        cls,
-        model: StateSpace | _ForeignModel,
-        n_samples: int,
-        gain: float = 1.0,
-        q_filter: _Filter | None = None,
-    ) -> ModelInverseIlc: ...
-    @property
-    def gain(self) -> float: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def reset(self) -> None: ...
-
-@final
-class Gate:
-    def __new__(
-        cls,
-        law: _Law,
-        tolerance: float | None = None,
-        measure: Literal["rms", "max"] = "rms",
-        resume: float = 1.5,
-        growth: float = 1.5,
-        patience: int = 2,
-    ) -> Gate: ...
-    @property
-    def law(self) -> _Law: ...
-    @property
-    def state(self) -> Literal["learning", "holding", "rolled_back"]: ...
-    @property
-    def best_error(self) -> float | None: ...
-    @property
-    def best_input(self) -> NDArray[np.float64] | None: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def taken_back(self) -> None: ...
-    def reset(self) -> None: ...
-
-@final
-class Ladder:
-    def __new__(
-        cls,
-        law: _Law,
-        repeats: int,
-        slow: float = 0.8,
-        increase: float = 1.25,
-        lowest: float = 0.0625,
-        highest: float = 1.5,
-    ) -> Ladder: ...
-    @property
-    def law(self) -> _Law: ...
-    @property
-    def gain(self) -> float: ...
-    @property
-    def runs(self) -> int: ...
-    @property
-    def repeatable_rms(self) -> float | None: ...
-    @property
-    def noise_rms(self) -> float: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def taken_back(self) -> None: ...
-    def reset(self) -> None: ...
-
-@final
-class ThroughJacobian:
-    def __new__(cls, law: _Law, jacobian: ArrayLike) -> ThroughJacobian: ...
-    @property
-    def law(self) -> _Law: ...
-    @property
-    def n_joints(self) -> int: ...
-    @property
-    def n_coordinates(self) -> int: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def reset(self) -> None: ...
-
-@final
-class Repeatability:
-    @property
-    def mean(self) -> NDArray[np.float64]: ...
-    @property
-    def spread(self) -> NDArray[np.float64]: ...
-    @property
-    def mean_rms(self) -> float: ...
-    @property
-    def spread_rms(self) -> float: ...
-    @property
-    def ratio(self) -> float: ...
-    @property
-    def learnable(self) -> float: ...
-    @property
-    def least_rms(self) -> float: ...
-    @property
-    def largest_rms(self) -> float: ...
-
-def repeatability(errors: ArrayLike) -> Repeatability: ...
-
-@final
-class NormOptimalIlc:
-    def __new__(
-        cls,
-        model: StateSpace | TimeVarying | _ForeignModel,
-        n_samples: int,
-        q: ArrayLike = 1.0,
-        s: ArrayLike = 0.0,
-        r: ArrayLike = 0.0,
-        rate: float = 0.0,
-    ) -> NormOptimalIlc: ...
-    @staticmethod
-    def contour(
-        model: StateSpace | TimeVarying | _ForeignModel,
-        reference: ArrayLike,
-        q: ArrayLike = 1.0,
-        contour: ArrayLike = 1.0,
-        along: ArrayLike = 0.0,
-        s: ArrayLike = 0.0,
-        r: ArrayLike = 0.0,
-        rate: float = 0.0,
-        axes: Sequence[int] | None = None,
-    ) -> NormOptimalIlc: ...
-    @staticmethod
-    def formation(
-        models: Sequence[StateSpace | _ForeignModel],
-        n_samples: int,
-        tracking: ArrayLike = 1.0,
-        own: ArrayLike = 1.0,
-        centre: ArrayLike = 0.0,
-        sigma: ArrayLike = 1.0,
-        weight: ArrayLike = 1.0,
-        s: ArrayLike = 0.0,
-        r: ArrayLike = 0.0,
-        rate: float = 0.0,
-        leaders: Sequence[int] | None = None,
-        pairs: Sequence[tuple[int, int]] | None = None,
-        axes: Sequence[int] | None = None,
-    ) -> NormOptimalIlc: ...
-    @staticmethod
-    def dynamic(
-        model: StateSpace | TimeVarying | _ForeignModel,
-        n_samples: int,
-        filter: StateSpace | _ForeignModel,
-        q: ArrayLike = 1.0,
-        plain: ArrayLike | None = None,
-        coupling: ArrayLike | None = None,
-        s: ArrayLike = 0.0,
-        r: ArrayLike = 0.0,
-        rate: float = 0.0,
-    ) -> NormOptimalIlc: ...
-    @property
-    def n_samples(self) -> int: ...
-    @property
-    def q(self) -> float | NDArray[np.float64]: ...
-    @property
-    def s(self) -> float | NDArray[np.float64]: ...
-    @property
-    def r(self) -> float | NDArray[np.float64]: ...
-    @property
-    def rate(self) -> float: ...
-    @property
-    def conditioning(self) -> float: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def reset(self) -> None: ...
-
-def contour_weights(
-    reference: ArrayLike,
-    q: ArrayLike = 1.0,
-    contour: ArrayLike = 1.0,
-    along: ArrayLike = 0.0,
-    axes: Sequence[int] | None = None,
-) -> NDArray[np.float64]: ...
-def coupled_weights(
-    coupling: ArrayLike, sigma: ArrayLike = 1.0, gamma: ArrayLike = 0.0
-) -> NDArray[np.float64]: ...
-def schedule(
-    segments: Sequence[tuple[int, float]],
-    n_samples: int,
-    bandwidth_hz: float | None = None,
-    dt_s: float | None = None,
-) -> NDArray[np.float64]: ...
-def formation_weights(
-    n_agents: int,
-    n_axes: int,
-    n_samples: int,
-    tracking: ArrayLike = 1.0,
-    own: ArrayLike = 1.0,
-    centre: ArrayLike = 0.0,
-    sigma: ArrayLike = 1.0,
-    weight: ArrayLike = 1.0,
-    leaders: Sequence[int] | None = None,
-    pairs: Sequence[tuple[int, int]] | None = None,
-    axes: Sequence[int] | None = None,
-) -> NDArray[np.float64]: ...
-def formation_errors(
-    e: ArrayLike,
-    n_agents: int,
-    pairs: Sequence[tuple[int, int]] | None = None,
-    axes: Sequence[int] | None = None,
-) -> NDArray[np.float64]: ...
-
-@final
 class Delta:
     def __new__(cls, base_m: float = ..., crank_m: float = ..., rod_m: float = ...) -> Delta: ...
     @property
@@ -981,45 +544,6 @@ class CrossCoupled:
     ) -> tuple[NDArray[np.float64], float]: ...
     def reset(self) -> None: ...
 
-_Side: TypeAlias = ArrayLike | None
-_Bounds: TypeAlias = tuple[_Side, _Side] | None
-
-@final
-class ConstrainedIlc:
-    def __new__(
-        cls,
-        model: StateSpace | _ForeignModel,
-        n_samples: int,
-        q: ArrayLike = 1.0,
-        s: ArrayLike = 0.0,
-        r: ArrayLike = 0.0,
-        rate: float = 0.0,
-        *,
-        u_bounds: _Bounds = None,
-        v_bounds: _Bounds = None,
-        step_bounds: _Bounds = None,
-        reference: ArrayLike | None = None,
-        position_bounds: _Bounds = None,
-        velocity_bounds: _Bounds = None,
-        acceleration_bounds: _Bounds = None,
-        output_bounds: _Bounds = None,
-        output_reference: ArrayLike | None = None,
-    ) -> ConstrainedIlc: ...
-    @property
-    def n_samples(self) -> int: ...
-    @property
-    def status(self) -> Literal["untried", "solved", "infeasible", "max_iterations"]: ...
-    @property
-    def message(self) -> str: ...
-    @property
-    def iterations(self) -> int: ...
-    @property
-    def gap(self) -> float: ...
-    def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: object = None
-    ) -> NDArray[np.float64]: ...
-    def reset(self) -> None: ...
-
 @final
 class Cell:
     @staticmethod
@@ -1063,95 +587,6 @@ class Cell:
     def reference(self) -> NDArray[np.float64]: ...
     def model(self) -> StateSpace: ...
     def first_error(self) -> NDArray[np.float64]: ...
-
-@final
-class Analysis:
-    @property
-    def n_samples(self) -> int: ...
-    @property
-    def method(self) -> Literal["dense", "structured"]: ...
-    @property
-    def converges(self) -> bool: ...
-    @property
-    def monotonic(self) -> bool: ...
-    @property
-    def why(self) -> str: ...
-    @property
-    def spectral_radius(self) -> float: ...
-    @property
-    def spectral_radius_error(self) -> float: ...
-    @property
-    def monotonic_factor(self) -> float | None: ...
-    @property
-    def monotonic_factor_error(self) -> float | None: ...
-    @property
-    def transient_growth(self) -> float: ...
-    @property
-    def frequency_hz(self) -> NDArray[np.float64]: ...
-    @property
-    def contraction(self) -> NDArray[np.float64]: ...
-    @property
-    def critical_frequency_hz(self) -> float | None: ...
-    @property
-    def learnable_frequency_hz(self) -> float | None: ...
-    @property
-    def robust_factor(self) -> float | None: ...
-    @property
-    def robust_lifted(self) -> float | None: ...
-    @property
-    def uncertainty_allowed(self) -> float | None: ...
-    @property
-    def initial_error_rms(self) -> float | None: ...
-    @property
-    def converged_error_rms(self) -> float | None: ...
-    @property
-    def converged_input(self) -> NDArray[np.float64] | None: ...
-    @property
-    def converged_error(self) -> NDArray[np.float64] | None: ...
-    @property
-    def expected_rms(self) -> NDArray[np.float64]: ...
-    @property
-    def expected_rms_limit(self) -> float | None: ...
-    @property
-    def pd_factor(self) -> float | None: ...
-    @property
-    def pd_gain_range(self) -> tuple[float, float] | None: ...
-    def to_dict(self) -> dict[str, Any]: ...
-
-def analyze(
-    law: object,
-    model: StateSpace | _ForeignModel,
-    n_samples: int | None = None,
-    uncertainty: float | ArrayLike | None = None,
-    reference: ArrayLike | None = None,
-    noise_std: float | None = None,
-    n_runs: int = 20,
-) -> Analysis: ...
-def refuse_divergent(law: object, model: StateSpace | _ForeignModel, n_samples: int) -> None: ...
-
-@final
-class Tuning:
-    @property
-    def q(self) -> float: ...
-    @property
-    def s(self) -> float: ...
-    @property
-    def r(self) -> float: ...
-    @property
-    def smoothing_hz(self) -> float | None: ...
-    @property
-    def steps(self) -> list[dict[str, Any]]: ...
-    @property
-    def analysis(self) -> Analysis: ...
-
-def tune(
-    model: StateSpace | _ForeignModel,
-    n_samples: int,
-    uncertainty: float | ArrayLike | None = None,
-    noise_std: float | None = None,
-    reference: ArrayLike | None = None,
-    n_runs: int = 10,
-) -> Tuning: ...
 
 @final
 class Library:
@@ -1218,3 +653,47 @@ def _trajectory(
     alphas: Sequence[Any],
     computing_s: float,
 ) -> Trajectory: ...
+
+# What the typed classes and functions of the package stand on: arguments by name, checked here.
+@disjoint_base
+class Law:
+    def __new__(cls, kind: str, /, **arguments: Any) -> Self: ...  # noqa: ANN401
+    @property
+    def parameters(self) -> dict[str, Any]: ...
+    def update(
+        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
+    ) -> NDArray[np.float64]: ...
+    def expect(self, disturbance: ArrayLike) -> None: ...
+    def taken_back(self) -> None: ...
+    def reset(self) -> None: ...
+    def _figure(self, name: str) -> Any: ...  # noqa: ANN401
+    def _remember(
+        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
+    ) -> None: ...
+    def _relevant(self, disturbance: ArrayLike | None) -> tuple[list[int], list[float]]: ...
+    def _trim(self, keep: int, disturbances: ArrayLike | None) -> list[int]: ...
+
+@disjoint_base
+class Filter:
+    def __new__(cls, kind: str, /, **arguments: Any) -> Self: ...  # noqa: ANN401
+    def zero_phase(self, x: ArrayLike) -> NDArray[np.float64]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def _forward(self, x: ArrayLike) -> NDArray[np.float64]: ...
+    def _sos(self) -> NDArray[np.float64]: ...
+    def _figures(self) -> dict[str, Any]: ...
+
+def zero_phase(filter: Filter | ArrayLike, x: ArrayLike) -> NDArray[np.float64]: ...
+def instantaneous_frequency(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
+def check_relevance_weights(weights: object) -> None: ...
+def contour_weights(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
+def coupled_weights(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
+def formation_weights(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
+def formation_errors(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
+def schedule(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
+def analyze(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def refuse_divergent(**keywords: Any) -> None: ...  # noqa: ANN401
+def tune(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def repeatability(errors: ArrayLike) -> dict[str, Any]: ...
+def _law(cls: type, kind: str, arguments: dict[str, Any]) -> Law: ...
+def _filter(cls: type, kind: str, arguments: dict[str, Any]) -> Filter: ...

@@ -12,13 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tomlkit
 
-from ilc_rt._native import (
-    NormOptimalIlc,
-    StateSpace,
-    discretize,
-    from_transfer_function,
-    second_order,
-)
+from ilc_rt._native import StateSpace, discretize, from_transfer_function, second_order
+from ilc_rt.laws import NormOptimalIlc
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -273,7 +273,9 @@ def test_a_router_that_goes_takes_nothing_with_it(bench: Bench, last: signal.Sig
     goodbye(drives)
 
     bench.drives(cell, "--lockstep")
-    router = subprocess.Popen([sys.executable, "-c", ROUTER, ours], stdout=subprocess.PIPE, text=True)
+    router = subprocess.Popen(
+        [sys.executable, "-c", ROUTER, ours], stdout=subprocess.PIPE, text=True
+    )
     assert router.stdout is not None
     try:
         assert router.stdout.readline() == "ready\n"

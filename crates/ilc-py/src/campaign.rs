@@ -22,7 +22,7 @@ use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::experiment::read_experiment;
-use crate::python_law::PythonLaw;
+use crate::python_law::{Channels, Frame, PythonLaw};
 use crate::whole;
 
 /// Frames that may wait for the loop on the bus inside the process.
@@ -40,6 +40,8 @@ struct EventStream {
     events: Mutex<Receiver<String>>,
     thread: Mutex<Option<JoinHandle<Result<(), SupervisorError>>>>,
     stop: Arc<AtomicI32>,
+    /// Of the law that is written in Python.
+    frame: Arc<Frame>,
 }
 
 #[pymethods]
@@ -77,7 +79,12 @@ impl EventStream {
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         match thread.map(|thread| detached(py, || thread.join())) {
-            Some(Ok(ended)) => ended.or_raise(),
+            Some(Ok(ended)) => ended.or_raise().map_err(|error| {
+                if let Some(raised) = self.frame.take_raised() {
+                    error.set_cause(py, Some(raised));
+                }
+                error
+            }),
             Some(Err(_)) => Err(PyValueError::new_err("the campaign's thread died")),
             None => Ok(()),
         }
@@ -182,7 +189,11 @@ fn run_events(
             return Err(PyValueError::new_err(line));
         }
     };
-    let law = law.map(|law| PythonLaw::new(law, cell.n_axes())).transpose()?;
+    let frame = Arc::new(Frame::default());
+    let n_axes = cell.n_axes();
+    let channels = Channels { n_inputs: n_axes, n_outputs: n_axes };
+    let law =
+        law.map(|law| PythonLaw::new("law", law, channels, Arc::clone(&frame))).transpose()?;
     let stop = Arc::new(AtomicI32::new(0));
     let loopback = cell.bus.address.starts_with("loopback:");
     let options = Options {
@@ -216,7 +227,7 @@ fn run_events(
         }
         .map(drop)
     })?;
-    Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop })
+    Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop, frame })
 }
 
 /// Asks a Python function for the disturbance of each run.

@@ -6,8 +6,8 @@
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
 mod analysis;
-mod analyze;
 mod argument;
+mod arguments;
 mod campaign;
 mod cell;
 mod contour;
@@ -16,6 +16,7 @@ mod detached;
 mod error;
 mod exceptions;
 mod experiment;
+mod guard;
 mod held;
 mod identify;
 mod kinematics;
@@ -29,7 +30,6 @@ mod sigmoid_pair;
 mod signal;
 mod time_varying;
 mod trajectory;
-mod tuning;
 mod weights;
 mod whole;
 
@@ -52,8 +52,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     laws::register(module)?;
     weights::register(module)?;
     analysis::register(module)?;
-    analyze::register(module)?;
-    tuning::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

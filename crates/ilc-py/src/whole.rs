@@ -42,7 +42,7 @@ fn out_of_range(name: &str, number: &Bound<'_, PyAny>, range: &str) -> PyErr {
 }
 
 /// Returns how a value shows itself, on one line and not for ever.
-fn shown(object: &Bound<'_, PyAny>) -> String {
+pub(crate) fn shown(object: &Bound<'_, PyAny>) -> String {
     const LONGEST: usize = 60;
     // A number of thousands of digits has no text.
     let text = object.repr().map_or_else(|_| "a number".to_owned(), |text| text.to_string());
@@ -54,7 +54,7 @@ fn shown(object: &Bound<'_, PyAny>) -> String {
 }
 
 /// Reads the elements of a sequence.
-fn each<'py, T>(
+pub(crate) fn each<'py, T>(
     name: &str,
     object: &Bound<'py, PyAny>,
     needed: &str,
@@ -66,7 +66,7 @@ fn each<'py, T>(
 }
 
 /// Reads two things that belong together.
-fn pair<'py>(
+pub(crate) fn pair<'py>(
     name: &str,
     object: &Bound<'py, PyAny>,
     needed: &str,
