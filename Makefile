@@ -3,7 +3,7 @@
 VENV    := .venv
 BIN     := $(VENV)/bin
 TARGET  := $(or $(CARGO_TARGET_DIR),target)
-SOURCES := $(shell find crates sim python -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.toml') \
+SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.toml') \
            Cargo.toml Cargo.lock pyproject.toml README.md
 # Half of the Python tests wait for a process or for time to pass.
 JOBS    := $(shell expr 2 \* $$(nproc))
@@ -28,16 +28,17 @@ $(VENV)/.built: $(SOURCES) $(VENV)/.tools
 	rm -rf build/wheels build/data
 	install -D -m 755 -t build/data/scripts $(TARGET)/release/ilc-rt $(TARGET)/release/ilc-sim
 	$(BIN)/maturin build --quiet --release --out build/wheels
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir build/wheels ./papers
 	$(BIN)/pip install --quiet --force-reinstall --no-deps build/wheels/*.whl
 	$(BIN)/pip install --quiet build/wheels/*.whl
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.built
-	wheel=$$(ls build/wheels/*.whl) && $(BIN)/pip install --quiet "$$wheel[test]"
+	wheel=$$(ls build/wheels/ilc_rt-*.whl) && $(BIN)/pip install --quiet "$$wheel[test]"
 	@touch $@
 
 $(VENV)/.bench: $(VENV)/.built
-	wheel=$$(ls build/wheels/*.whl) && $(BIN)/pip install --quiet "$$wheel[bench]"
+	wheel=$$(ls build/wheels/ilc_rt-*.whl) && $(BIN)/pip install --quiet "$$wheel[bench]"
 	@touch $@
 
 build: $(VENV)/.built ## Build the binaries and the Python package into .venv
@@ -79,13 +80,13 @@ check: fmt lint test ## All that a change needs before review
 
 fmt: $(VENV)/.test ## Format
 	cargo fmt --all
-	$(BIN)/ruff format python tests examples
+	$(BIN)/ruff format python papers tests examples
 
 lint: $(VENV)/.test ## Formatting, lints, types, layers
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
-	$(BIN)/ruff format --check python tests examples
-	$(BIN)/ruff check python tests examples
+	$(BIN)/ruff format --check python papers tests examples
+	$(BIN)/ruff check python papers tests examples
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest ilc_rt._native
 	$(BIN)/lint-imports

@@ -5,13 +5,13 @@
 #![expect(clippy::print_stdout, reason = "an example tells what it did")]
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
+use ilc_rt::campaign::{self, Options};
+use ilc_rt::cli::parse;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::transport::loopback::InProcess;
 use ilc_rt::record::Event;
-use ilc_rt::supervisor::{self, Disturbance, Options};
 use ilc_sim::{ClockMode, Machine};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -20,19 +20,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The drives run in this thread, one cycle for every SYNC: no clock, the same numbers every time.
     let drives = Machine::from_cell(&cell, ClockMode::LockStep)?;
     let bus = Box::new(InProcess::new(drives, 1024));
-    let options = Options {
-        iterations: 10,
-        measure: None,
-        lockstep: true,
-        simulated: false,
-        resume: false,
-        library: PathBuf::from(":memory:"),
-        disturbance: Disturbance::default(),
-        telemetry: false,
-        stop: Arc::default(),
-    };
+    // Those of the command line.
+    let options: Options =
+        parse(&["--lockstep", "--library", ":memory:", "--no-telemetry"].map(str::to_owned))?;
     println!("run  max tracking um  max contour um");
-    let outcome = supervisor::run(&cell, &options, bus, None, &mut |event| {
+    let outcome = campaign::run(&cell, &options, bus, None, &mut |event| {
         if let Event::Iteration { index, figures, .. } = event {
             let tracking = figures.tracking_inf_m * 1e6;
             // Absent where one axis moves alone.

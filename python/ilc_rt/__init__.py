@@ -11,9 +11,6 @@ from ilc_rt._native import (
     TimeVarying,
     TrajectoryError,
     __version__,
-    discretize,
-    from_transfer_function,
-    second_order,
 )
 from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
 from ilc_rt.campaign import Campaign, Law
@@ -32,6 +29,7 @@ from ilc_rt.laws import (
     RelevanceWeights,
     ThroughJacobian,
 )
+from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 

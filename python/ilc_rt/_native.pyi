@@ -16,7 +16,6 @@ __all__ = [
     "Delta",
     "EventStream",
     "Filter",
-    "FrequencyResponse",
     "Gantry",
     "KinematicsError",
     "Law",
@@ -25,31 +24,28 @@ __all__ = [
     "Line",
     "ModelError",
     "Pid",
-    "RationalFit",
-    "SecondOrderFit",
     "SignalError",
     "StateSpace",
     "TimeVarying",
     "Trajectory",
     "TrajectoryError",
-    "VelocityLoopFit",
     "__version__",
     "_filter",
     "_law",
     "_made",
-    "_rational_fit",
-    "_second_order_fit",
     "_trajectory",
-    "_velocity_loop_fit",
     "analyze",
     "butterfly",
+    "check_options",
     "check_relevance_weights",
+    "check_response",
     "contour_error",
     "contour_weights",
     "coupled_weights",
     "coupling_gains",
+    "described_options",
     "discretize",
-    "doubt",
+    "evaluate_experiment",
     "excitation",
     "exponential_sigmoid",
     "fit_rational",
@@ -60,22 +56,28 @@ __all__ = [
     "frequency_response",
     "from_transfer_function",
     "gcode",
+    "identify_axis",
     "instantaneous_frequency",
     "jerk_limited",
     "modulated",
     "projection_across",
     "raster",
     "refuse_divergent",
+    "relative_deviation",
     "repeatability",
     "run_events",
     "schedule",
     "second_order",
+    "second_order_model",
+    "second_order_response",
     "sigmoid_pair",
+    "single_experiment",
     "spiral",
     "spline",
     "tracking_index",
     "tune",
     "uncertainty",
+    "velocity_loop_response",
     "zero_phase",
 ]
 
@@ -131,6 +133,8 @@ class StateSpace:
     def delayed(self, n_samples: int) -> StateSpace: ...
     def zeros(self) -> NDArray[np.complex128]: ...
     def dc_gain(self) -> NDArray[np.float64]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
     def frequency_response(self, w_rad_s: ArrayLike) -> NDArray[np.complex128]: ...
     def bode(
         self, w_rad_s: ArrayLike, output: int = 0, input: int = 0
@@ -174,142 +178,16 @@ class TimeVarying:
     def n_outputs(self) -> int: ...
     def simulate(self, u: ArrayLike, x0: ArrayLike | None = None) -> NDArray[np.float64]: ...
 
-def from_transfer_function(
-    num: ArrayLike, den: ArrayLike, dt_s: float | None = None
-) -> StateSpace: ...
-def second_order(natural_frequency_rad_s: float, damping: float) -> StateSpace: ...
-def discretize(
-    model: StateSpace | _ForeignModel, dt_s: float, method: Literal["zoh", "tustin"] = "zoh"
-) -> StateSpace: ...
-
-@final
-class FrequencyResponse:
-    def __new__(
-        cls,
-        frequency_hz: ArrayLike,
-        response: ArrayLike,
-        coherence: ArrayLike | None = None,
-        n_averages: float = 1.0,
-    ) -> FrequencyResponse: ...
-    @property
-    def frequency_hz(self) -> NDArray[np.float64]: ...
-    @property
-    def response(self) -> NDArray[np.complex128]: ...
-    @property
-    def coherence(self) -> NDArray[np.float64]: ...
-    @property
-    def n_averages(self) -> float: ...
-    def relative_deviation(self) -> NDArray[np.float64]: ...
-    def band(self, from_hz: float, to_hz: float) -> FrequencyResponse: ...
-
-@final
-class SecondOrderFit:
-    @property
-    def gain(self) -> float: ...
-    @property
-    def natural_frequency_hz(self) -> float: ...
-    @property
-    def damping(self) -> float: ...
-    @property
-    def delay_s(self) -> float: ...
-    @property
-    def delay_samples(self) -> int: ...
-    @property
-    def dt_s(self) -> float | None: ...
-    @property
-    def gain_deviation(self) -> float: ...
-    @property
-    def natural_frequency_deviation_hz(self) -> float: ...
-    @property
-    def damping_deviation(self) -> float: ...
-    @property
-    def delay_deviation_s(self) -> float: ...
-    @property
-    def residual_rms(self) -> float: ...
-    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]: ...
-    def state_space(self) -> StateSpace: ...
-
-@final
-class VelocityLoopFit:
-    @property
-    def gain(self) -> float: ...
-    @property
-    def bandwidth_hz(self) -> float: ...
-    @property
-    def delay_s(self) -> float: ...
-    @property
-    def delay_samples(self) -> int: ...
-    @property
-    def gain_deviation(self) -> float: ...
-    @property
-    def bandwidth_deviation_hz(self) -> float: ...
-    @property
-    def delay_deviation_s(self) -> float: ...
-    @property
-    def residual_rms(self) -> float: ...
-    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]: ...
-
-@final
-class RationalFit:
-    @property
-    def model(self) -> StateSpace: ...
-    @property
-    def delay_s(self) -> float: ...
-    @property
-    def reflected_poles(self) -> int: ...
-    @property
-    def residual_rms(self) -> float: ...
-    def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]: ...
-
-def frequency_response(
-    u: ArrayLike,
-    y: ArrayLike,
-    dt_s: float,
-    period_samples: int | None = None,
-    segment_samples: int | None = None,
-    overlap_samples: int | None = None,
-) -> FrequencyResponse: ...
-def fit_second_order(
-    frequency_hz: ArrayLike,
-    response: ArrayLike,
-    coherence: ArrayLike | None = None,
-    n_averages: float = 2.0,
-    dt_s: float | None = None,
-    gain: float | None = None,
-    delay_s: float | None = None,
-) -> SecondOrderFit: ...
-def fit_velocity_loop(
-    frequency_hz: ArrayLike,
-    response: ArrayLike,
-    position_gain_per_s: float,
-    dt_s: float,
-    coherence: ArrayLike | None = None,
-    n_averages: float = 2.0,
-    delay_s: float | None = None,
-) -> VelocityLoopFit: ...
-def fit_rational(
-    frequency_hz: ArrayLike,
-    response: ArrayLike,
-    n_zeros: int,
-    n_poles: int,
-    coherence: ArrayLike | None = None,
-    n_averages: float = 2.0,
-    delay_s: float = 0.0,
-    dt_s: float | None = None,
-) -> RationalFit: ...
-def doubt(measured: FrequencyResponse, residual_rms: float) -> str | None: ...
-def uncertainty(
-    measured: FrequencyResponse, model: ArrayLike, deviations: float = 3.0
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def excitation(
-    waveform: str,
-    amplitude: float,
-    from_hz: float,
-    to_hz: float,
-    period_s: float,
-    periods: int,
-    dt_s: float,
-) -> tuple[NDArray[np.float64], int, int]: ...
+def identify_axis(
+    cell: Cell,
+    arguments: list[str],
+    excite: Callable[[dict[str, Any]], tuple[ArrayLike, ArrayLike]],
+    report: Callable[[str], object],
+) -> dict[str, Any]: ...
+def single_experiment(arguments: list[str]) -> dict[str, Any]: ...
+def evaluate_experiment(
+    u: ArrayLike, y: ArrayLike, period_samples: int, from_hz: float, to_hz: float, dt_s: float
+) -> dict[str, Any]: ...
 
 class TrajectoryError(ValueError): ...
 
@@ -450,30 +328,6 @@ def tracking_index(
 ) -> tuple[float, float]: ...
 
 @final
-class Delta:
-    def __new__(cls, base_m: float = ..., crank_m: float = ..., rod_m: float = ...) -> Delta: ...
-    @property
-    def base_m(self) -> float: ...
-    @property
-    def crank_m(self) -> float: ...
-    @property
-    def rod_m(self) -> float: ...
-    def forward(self, theta_rad: ArrayLike) -> NDArray[np.float64]: ...
-    def inverse(self, p_m: ArrayLike) -> NDArray[np.float64]: ...
-    def jacobian(self, theta_rad: ArrayLike) -> NDArray[np.float64]: ...
-    def in_workspace(self, p_m: ArrayLike) -> bool: ...
-    def condition(self, theta_rad: ArrayLike) -> float: ...
-
-@final
-class Gantry:
-    def __new__(cls, orthogonality_rad: float = 0.0) -> Gantry: ...
-    @property
-    def orthogonality_rad(self) -> float: ...
-    def forward(self, axes_m: ArrayLike) -> NDArray[np.float64]: ...
-    def inverse(self, tool_m: ArrayLike) -> NDArray[np.float64]: ...
-    def jacobian(self) -> NDArray[np.float64]: ...
-
-@final
 class Line:
     def __new__(cls, from_m: ArrayLike, to_m: ArrayLike) -> Line: ...
 
@@ -492,57 +346,6 @@ def contour_error(
 ) -> NDArray[np.float64]: ...
 def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]: ...
-
-@final
-class Pid:
-    def __new__(
-        cls,
-        kp: float,
-        ki_per_s: float = 0.0,
-        kd_s: float = 0.0,
-        *,
-        dt_s: float,
-        derivative: Literal["difference", "delayed", "filtered"] = "difference",
-        filter_s: float = 0.01,
-        output_max: float | None = None,
-    ) -> Pid: ...
-    def step(self, error: float) -> float: ...
-    def run(self, error: ArrayLike) -> NDArray[np.float64]: ...
-    def model(self) -> StateSpace: ...
-    def reset(self) -> None: ...
-
-@final
-class Cascade:
-    def __new__(
-        cls,
-        position_gain_per_s: float,
-        velocity_gain_n_s_m: float,
-        integral_time_s: float | None = None,
-        *,
-        dt_s: float,
-        velocity_feedforward: float = 0.0,
-        acceleration_feedforward_kg: float = 0.0,
-        velocity_max_m_s: float | None = None,
-        force_max_n: float | None = None,
-    ) -> Cascade: ...
-    def step(
-        self,
-        position_m: float,
-        actual_m: float,
-        actual_m_s: float,
-        velocity_m_s: float = 0.0,
-        acceleration_m_s2: float = 0.0,
-        learned_n: float = 0.0,
-    ) -> float: ...
-    def reset(self) -> None: ...
-
-@final
-class CrossCoupled:
-    def __new__(cls, controller: Pid) -> CrossCoupled: ...
-    def step(
-        self, error_m: ArrayLike, gains: ArrayLike, curvature_per_m: float = 0.0
-    ) -> tuple[NDArray[np.float64], float]: ...
-    def reset(self) -> None: ...
 
 @final
 class Cell:
@@ -617,36 +420,18 @@ class EventStream:
     def __next__(self) -> str: ...
     def stop(self, signal: int = ...) -> None: ...
 
+def check_options(verb: str, arguments: list[str]) -> None: ...
+def described_options(verb: str) -> str: ...
+def transports() -> list[dict[str, Any]]: ...
 def run_events(
     cell: Cell,
-    iterations: int,
-    library: str | PathLike[str],
-    bus: str | None = None,
-    measure: str | None = None,
-    lockstep: bool = True,
-    resume: bool = False,
+    arguments: list[str],
+    verb: str = "run",
     law: object | None = None,
-    learning: bool = True,
-    experiment: object | None = None,
     disturbance: Callable[[int], ArrayLike] | None = None,
-    simulated: bool = False,
 ) -> EventStream: ...
 
 # Make objects again, for copies and pickles.
-def _made(cls: object, how: str | None, arguments: dict[str, Any], part: str | None) -> object: ...
-def _second_order_fit(
-    model: tuple[float, float, float, float, float | None],
-    deviations: tuple[float, float, float, float],
-    residual_rms: float,
-) -> SecondOrderFit: ...
-def _velocity_loop_fit(
-    model: tuple[float, float, float, float, float],
-    deviations: tuple[float, float, float],
-    residual_rms: float,
-) -> VelocityLoopFit: ...
-def _rational_fit(
-    model: StateSpace, delay_s: float, reflected_poles: int, residual_rms: float
-) -> RationalFit: ...
 def _trajectory(
     dt_s: float,
     samples: Sequence[NDArray[np.float64]],
@@ -697,3 +482,80 @@ def tune(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def repeatability(errors: ArrayLike) -> dict[str, Any]: ...
 def _law(cls: type, kind: str, arguments: dict[str, Any]) -> Law: ...
 def _filter(cls: type, kind: str, arguments: dict[str, Any]) -> Filter: ...
+def from_transfer_function(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
+def second_order(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
+def discretize(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
+def check_response(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def relative_deviation(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
+def frequency_response(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def fit_second_order(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def fit_velocity_loop(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def fit_rational(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def uncertainty(**keywords: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...  # noqa: ANN401
+def excitation(**keywords: Any) -> tuple[NDArray[np.float64], int, int]: ...  # noqa: ANN401
+def second_order_response(
+    frequency_hz: ArrayLike,
+    /,
+    **model: Any,  # noqa: ANN401
+) -> NDArray[np.complex128]: ...
+def velocity_loop_response(
+    frequency_hz: ArrayLike,
+    /,
+    **model: Any,  # noqa: ANN401
+) -> NDArray[np.complex128]: ...
+def second_order_model(**model: Any) -> StateSpace: ...  # noqa: ANN401
+def _made(cls: object, how: str | None, arguments: dict[str, Any]) -> object: ...
+
+@disjoint_base
+class Pid:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+    def step(self, error: float) -> float: ...
+    def run(self, error: ArrayLike) -> NDArray[np.float64]: ...
+    def model(self) -> StateSpace: ...
+    def reset(self) -> None: ...
+
+@disjoint_base
+class Cascade:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+    def step(
+        self,
+        position_m: float,
+        actual_m: float,
+        actual_m_s: float,
+        velocity_m_s: float = 0.0,
+        acceleration_m_s2: float = 0.0,
+        learned_n: float = 0.0,
+    ) -> float: ...
+    def reset(self) -> None: ...
+
+@disjoint_base
+class CrossCoupled:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+    def step(
+        self, error_m: ArrayLike, gains: ArrayLike, curvature_per_m: float = 0.0
+    ) -> tuple[NDArray[np.float64], float]: ...
+    def reset(self) -> None: ...
+
+@disjoint_base
+class Delta:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+    @property
+    def base_m(self) -> float: ...
+    @property
+    def crank_m(self) -> float: ...
+    @property
+    def rod_m(self) -> float: ...
+    def forward(self, theta_rad: ArrayLike) -> NDArray[np.float64]: ...
+    def inverse(self, p_m: ArrayLike) -> NDArray[np.float64]: ...
+    def jacobian(self, theta_rad: ArrayLike) -> NDArray[np.float64]: ...
+    def in_workspace(self, p_m: ArrayLike) -> bool: ...
+    def condition(self, theta_rad: ArrayLike) -> float: ...
+
+@disjoint_base
+class Gantry:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+    @property
+    def orthogonality_rad(self) -> float: ...
+    def forward(self, axes_m: ArrayLike) -> NDArray[np.float64]: ...
+    def inverse(self, tool_m: ArrayLike) -> NDArray[np.float64]: ...
+    def jacobian(self) -> NDArray[np.float64]: ...

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -68,11 +69,15 @@ app.command("demo")(demo.demo)
 app.command("run")(run.run)
 app.command("identify")(identify.identify)
 app.command("repeatability")(repeatability.repeatability)
-app.command("reproduce")(reproduce.reproduce)
 app.command("plot")(plot.plot)
 app.command("tune")(tune.tune)
 app.add_typer(library.app, name="library")
 app.command("monitor")(monitor.monitor)
+FURTHER = {entry.name: entry for entry in entry_points(group="ilc_rt.verbs")}
+for name, entry in FURTHER.items():
+    app.command(name)(entry.load())
+if "reproduce" not in FURTHER:
+    app.command("reproduce", context_settings=reproduce.ANY_ARGUMENTS)(reproduce.reproduce)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

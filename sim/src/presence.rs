@@ -6,8 +6,9 @@
 
 use std::time::{Duration, Instant};
 
+use ilc_rt::fieldbus::bring_up::listen;
 use ilc_rt::fieldbus::canopen::sdo::SdoRequest;
-use ilc_rt::fieldbus::canopen::{NodeId, ObjectAddress, cob_id, listen};
+use ilc_rt::fieldbus::canopen::{NodeId, ObjectAddress, cob_id};
 use ilc_rt::fieldbus::cia402::objects;
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 

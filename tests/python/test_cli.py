@@ -170,7 +170,10 @@ def bad_cell(gantry: Path, tmp_path: Path, old: str, new: str) -> Path:
         (["run", "nix.toml"], "nix.toml"),
         (["run"], "Missing argument 'CELL'"),
         (["run", "CELL", "--bus", "foo"], "bus = foo: allowed can:INTERFACE"),
-        (["run", "CELL", "--iterations", "0"], "iterations = 0: at least 1"),
+        (
+            ["run", "CELL", "--iterations", "0"],
+            "invalid value '0' for '--iterations <N>': allowed 1 to 4294967295",
+        ),
         (["run", "CELL", "--iterations", "many"], "--iterations"),
         (["run", "CELL", "--measure", "laser"], "--measure"),
         (["run", "CELL", "--library", "/no/folder/l.db"], "no such folder"),
@@ -212,6 +215,21 @@ def test_a_bad_cell_names_file_and_key(
     assert done.stderr.count("\n") == 1, done.stderr
     assert "bad.toml" in done.stderr
     assert said in done.stderr
+
+
+def test_without_the_papers_reproduce_says_how_to_get_them() -> None:
+    """The verb comes with a package of its own."""
+    without = (
+        "import importlib.metadata as metadata; metadata.entry_points = lambda **_: ();"
+        "from ilc_rt.cli import main;"
+        "raise SystemExit(main(['reproduce', 'haas2016', '--reduced']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", without], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "pip install 'ilc-rt[papers]'" in done.stderr
 
 
 def test_a_file_that_is_no_library_is_refused(ilc: Ilc, gantry: Path) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+import ilc_papers
 import ilc_rt
 
 if TYPE_CHECKING:
@@ -20,9 +21,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def modules() -> list[str]:
-    """Return the name of every module of the package."""
+    """Return the name of every module of the packages."""
     found = [ilc_rt.__name__]
-    found += [one.name for one in pkgutil.walk_packages(ilc_rt.__path__, "ilc_rt.")]
+    for package in (ilc_rt, ilc_papers):
+        inside = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+        found += [one.name for one in inside]
     return sorted(name for name in found if not name.endswith("__main__"))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -132,9 +131,7 @@ def test_drives_that_die_are_noticed(bench: Bench, pace: str) -> None:
     controller = bench.controller(cell, *options, runs=10_000)
     controller.event(event="state", state="running", iteration=1)
     drives.signal(signal.SIGKILL)
-    killed = time.monotonic()
     assert controller.end() == 3
-    assert time.monotonic() - killed < 10.0
     (line,) = controller.errors
     # Killed between two answers to one SYNC, those that are missing are named first.
     nodes = r"(drive of axis [xy] \(node [12]\)|tool measurement \(node 10\))"

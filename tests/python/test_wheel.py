@@ -49,6 +49,16 @@ def test_both_programs_are_in_the_wheel(wheel: Path) -> None:
     assert all(mode & 0o111 == 0o111 for mode in scripts.values())
 
 
+def test_the_papers_are_a_wheel_of_their_own(wheel: Path) -> None:
+    """The library's wheel is without them."""
+    with zipfile.ZipFile(wheel) as archive:
+        folders = {name.split("/")[0] for name in archive.namelist()}
+    assert "ilc_papers" not in folders
+    (papers,) = wheel.parent.glob("ilc_papers-*.whl")
+    with zipfile.ZipFile(papers) as archive:
+        assert "ilc_papers/haas2016/bench.toml" in archive.namelist()
+
+
 def test_the_wheel_is_small_and_stripped(wheel: Path) -> None:
     """No symbol table, no debug information."""
     assert wheel.stat().st_size <= LARGEST_WHEEL_BYTES

@@ -1,18 +1,18 @@
 //! A campaign inside this process: `run_events`.
 
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use ilc_rt::config::{Cell, LawName, Measure};
+use ilc_rt::campaign::{self, CampaignError, Disturbance, Options};
+use ilc_rt::cli::{IdentifyOptions, described, parse};
+use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport::{self, loopback::InProcess};
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
-use ilc_rt::supervisor::{self, Disturbance, Options, SupervisorError};
 use ilc_sim::machine::{ClockMode, Machine};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -21,9 +21,7 @@ use crate::argument::read_disturbance;
 use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::experiment::read_experiment;
 use crate::python_law::{Channels, Frame, PythonLaw};
-use crate::whole;
 
 /// Frames that may wait for the loop on the bus inside the process.
 const LOOPBACK_FRAMES: usize = 1024;
@@ -38,7 +36,7 @@ const SIGTERM: i32 = 15;
 #[pyclass(name = "EventStream", module = "ilc_rt._native", frozen)]
 struct EventStream {
     events: Mutex<Receiver<String>>,
-    thread: Mutex<Option<JoinHandle<Result<(), SupervisorError>>>>,
+    thread: Mutex<Option<JoinHandle<Result<(), CampaignError>>>>,
     stop: Arc<AtomicI32>,
     /// Of the law that is written in Python.
     frame: Arc<Frame>,
@@ -65,10 +63,7 @@ impl EventStream {
 
     /// Bring the axes to rest; the events go on until they are.
     ///
-    /// Parameters
-    /// ----------
-    /// signal : int
-    ///     Number of the signal that asked for it.
+    /// - signal : int: Number of the signal that asked for it.
     #[pyo3(signature = (signal=SIGTERM))]
     fn stop(&self, signal: i32) {
         self.stop.store(signal, Ordering::Relaxed);
@@ -112,149 +107,149 @@ impl Drop for EventStream {
 ///
 /// With ``loopback:`` the simulated drives are in this process too.
 ///
-/// Parameters
-/// ----------
-/// cell : Cell
-///     The cell.
-/// iterations : int
-///     Runs in all; the first one is without learning.
-/// library : str or os.PathLike
-///     Where the runs are kept.
-/// bus : str or None
-///     Bus address instead of the cell's.
-/// measure : str or None
-///     ``encoder`` or ``tcp`` instead of the cell's.
-/// lockstep : bool
-///     Whether the drives' answers set the pace instead of the clock.
-/// resume : bool
-///     Whether to go on with the newest campaign of the same kind.
-/// law : object or None
-///     A law with ``update(u, e, disturbance=None)`` instead of the cell's.
-/// learning : bool
-///     Whether to learn at all; if not, every run is like the first.
-/// experiment : object or None
-///     What to excite instead of running the program, as ``Experiment``.
-/// disturbance : callable or None
-///     Called with the number of each run before it begins; returns its
-///     disturbance, a number or an array of shape (n_disturbances,).
-/// simulated : bool
-///     Whether the drives are simulated on this computer, so that a stall of it
-///     stalls them as well and is forgiven for longer.
+/// - cell : Cell: The cell.
+/// - arguments : list of str: Options, as words of ``ilc-rt run`` or ``ilc-rt identify``; see
+///     `described_options`.
+/// - verb : {"run", "identify"}: Run the program and learn, or excite an axis once.
+/// - law : object or None: A law with ``update(u, e, disturbance=None)`` instead of the cell's.
+/// - disturbance : callable or None: Called with the number of each run before it begins; returns
+///     its disturbance, a number or an array of shape (n_disturbances,).
 ///
-/// Returns
-/// -------
-/// EventStream
-///     An iterator of JSON texts.
-///
-/// Raises
-/// ------
-/// ValueError
-///     From the iterator, before anything moves, if something cannot be used.
+/// Returns EventStream: An iterator of JSON texts.
+/// Raises ValueError if an option cannot be used; from the iterator, before anything moves, if
+///     something else cannot.
 #[pyfunction]
-#[pyo3(signature = (cell, iterations, library, bus=None, measure=None, lockstep=true, resume=false, law=None,
-    learning=true, experiment=None, disturbance=None, simulated=false))]
-#[expect(
-    clippy::too_many_arguments,
-    clippy::fn_params_excessive_bools,
-    reason = "keyword arguments in Python"
-)]
+#[pyo3(signature = (cell, arguments, verb="run", law=None, disturbance=None))]
 fn run_events(
     cell: &Bound<'_, PyCell>,
-    #[pyo3(from_py_with = whole::iterations)] iterations: u32,
-    library: PathBuf,
-    bus: Option<String>,
-    measure: Option<&str>,
-    lockstep: bool,
-    resume: bool,
+    arguments: Vec<String>,
+    verb: &str,
     law: Option<&Bound<'_, PyAny>>,
-    learning: bool,
-    experiment: Option<&Bound<'_, PyAny>>,
     disturbance: Option<Py<PyAny>>,
-    simulated: bool,
 ) -> PyResult<EventStream> {
-    let mut cell: Cell = cell.get().cell.clone();
-    if let Some(address) = bus {
-        cell.bus.address = address;
+    let cell = cell.get().cell.clone();
+    let mut work = Work::parse(verb, &arguments)?;
+    if let (Work::Run(options), Some(ask)) = (&mut work, disturbance) {
+        options.disturbance = measured(ask);
     }
-    if !learning {
-        cell.learning.law = LawName::None;
-    }
-    let experiment = experiment.map(|object| read_experiment(object, &cell)).transpose()?;
-    let measure = match measure {
-        None => None,
-        Some("encoder") => Some(Measure::Encoder),
-        Some("tcp") => Some(Measure::Tcp),
-        Some(other) => {
-            let line = format!("measure = {other:?}: \"encoder\" or \"tcp\" is allowed");
-            return Err(PyValueError::new_err(line));
-        }
+    let session = match &mut work {
+        Work::Run(options) => &mut options.session,
+        Work::Identify(options) => &mut options.session,
     };
+    let address = session.bus.clone().unwrap_or_else(|| cell.bus.address.clone());
+    if transport::scheme_of(&address).is_some_and(|scheme| scheme.in_process) {
+        session.telemetry = false;
+        if !session.lockstep {
+            return Err(PyValueError::new_err(format!(
+                "bus = {address} runs in lock-step only, as its drives have no clock of their own"
+            )));
+        }
+    }
+    let stop = Arc::clone(&session.stop);
     let frame = Arc::new(Frame::default());
     let n_axes = cell.n_axes();
     let channels = Channels { n_inputs: n_axes, n_outputs: n_axes };
     let law =
         law.map(|law| PythonLaw::new("law", law, channels, Arc::clone(&frame))).transpose()?;
-    let stop = Arc::new(AtomicI32::new(0));
-    let loopback = cell.bus.address.starts_with("loopback:");
-    let options = Options {
-        iterations,
-        measure,
-        lockstep,
-        simulated,
-        resume,
-        library,
-        disturbance: disturbance.map_or_else(Disturbance::default, ask),
-        telemetry: !loopback,
-        stop: Arc::clone(&stop),
-    };
-    if loopback && !lockstep {
-        return Err(PyValueError::new_err(
-            "bus = loopback: runs in lock-step only, as its drives have no clock of their own",
-        ));
-    }
     let (sender, events) = sync_channel(EVENTS);
     let thread = std::thread::Builder::new().name("ilc-campaign".to_owned()).spawn(move || {
+        let mut cell = cell;
+        cell.bus.address = address;
         let bus = open(&cell)?;
-        let law = law.map(|law| -> Box<dyn Law> { Box::new(law) });
         let mut send = |event: &Event| {
             if let Ok(text) = serde_json::to_string(event) {
                 let _ = sender.send(text);
             }
         };
-        match experiment {
-            None => supervisor::run(&cell, &options, bus, law, &mut send),
-            Some(experiment) => supervisor::identify(&cell, &experiment, &options, bus, &mut send),
+        match work {
+            Work::Run(options) => {
+                let law = law.map(|law| -> Box<dyn Law> { Box::new(law) });
+                campaign::run(&cell, &options, bus, law, &mut send)
+            }
+            Work::Identify(IdentifyOptions { experiment, session }) => {
+                let experiment = experiment.experiment(&cell, None)?;
+                campaign::identify(&cell, &experiment, &session, bus, &mut send)
+            }
         }
         .map(drop)
     })?;
     Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop, frame })
 }
 
-/// Asks a Python function for the disturbance of each run.
-fn ask(measure: Py<PyAny>) -> Disturbance {
+/// Options of what the campaign's thread does.
+enum Work {
+    Run(Options),
+    Identify(IdentifyOptions),
+}
+
+impl Work {
+    fn parse(verb: &str, arguments: &[String]) -> PyResult<Self> {
+        let parsed = match verb {
+            "run" => parse(arguments).map(Self::Run),
+            "identify" => parse(arguments).map(Self::Identify),
+            _ => Err(format!("verb = '{verb}': 'run' or 'identify' is allowed")),
+        };
+        parsed.map_err(PyValueError::new_err)
+    }
+}
+
+/// Check options as ``ilc-rt run`` or ``ilc-rt identify`` would.
+///
+/// - verb : {"run", "identify"}: Which verb.
+/// - arguments : list of str: Options, as words of its command line.
+///
+/// Raises ValueError if an option cannot be used: its name, its value and what is allowed.
+#[pyfunction]
+fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
+    Work::parse(verb, &arguments).map(drop)
+}
+
+/// Describe the options of ``ilc-rt run`` or ``ilc-rt identify``.
+///
+/// - verb : {"run", "identify"}: Which ones.
+///
+/// Returns str: A JSON list: name, flags, help, kind, default, choices, placeholder.
+/// Raises ValueError for another verb.
+#[pyfunction]
+fn described_options(verb: &str) -> PyResult<String> {
+    let options = match verb {
+        "run" => described::<Options>(),
+        "identify" => described::<IdentifyOptions>(),
+        _ => {
+            let line = format!("verb = '{verb}': 'run' or 'identify' is allowed");
+            return Err(PyValueError::new_err(line));
+        }
+    };
+    serde_json::to_string(&options).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+/// Returns a source of disturbances that calls a Python function.
+fn measured(ask: Py<PyAny>) -> Disturbance {
     Disturbance::measured(move |run| {
         Python::attach(|py| {
-            let told = measure.call1(py, (run,))?;
+            let told = ask.call1(py, (run,))?;
             read_disturbance("disturbance", told.bind(py))
         })
         .map_err(|error: PyErr| error.to_string().replace('\n', " "))
     })
 }
 
-fn open(cell: &Cell) -> Result<Box<dyn Bus>, SupervisorError> {
+fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
     let file = cell.file.display().to_string();
-    if !cell.bus.address.starts_with("loopback:") {
+    if transport::scheme_of(&cell.bus.address).is_none_or(|scheme| !scheme.in_process) {
         let place = format!("{file}: [bus] address");
         return transport::open(&cell.bus.address)
-            .map_err(|source| SupervisorError::Bus { place, source });
+            .map_err(|source| CampaignError::Bus { place, source });
     }
     match Machine::from_cell(cell, ClockMode::LockStep) {
         Ok(machine) => Ok(Box::new(InProcess::new(machine, LOOPBACK_FRAMES))),
-        Err(error) => Err(SupervisorError::Simulation { file, reason: error.to_string() }),
+        Err(error) => Err(CampaignError::Simulation { file, reason: error.to_string() }),
     }
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<EventStream>()?;
+    module.add_function(wrap_pyfunction!(check_options, module)?)?;
+    module.add_function(wrap_pyfunction!(described_options, module)?)?;
     module.add_function(wrap_pyfunction!(run_events, module)?)
 }

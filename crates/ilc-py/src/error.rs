@@ -1,7 +1,10 @@
 //! Which error of `ilc-rt` becomes which exception.
 
 use ilc_rt::trajectory::contour;
-use ilc_rt::{config, kinematics, learning, library, model, signal, supervisor, trajectory};
+use ilc_rt::{
+    campaign, config, design, identification, kinematics, learning, library, model, signal,
+    trajectory,
+};
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 
@@ -54,7 +57,23 @@ impl<T> OrRaise<T> for Result<T, library::LibraryError> {
     }
 }
 
-impl<T> OrRaise<T> for Result<T, supervisor::SupervisorError> {
+impl<T> OrRaise<T> for Result<T, design::DesignError> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, identification::IdentificationError> {
+    fn or_raise(self) -> PyResult<T> {
+        use identification::IdentificationError::Model;
+        self.map_err(|error| match error {
+            Model { .. } => exceptions::ModelError::new_err(error.to_string()),
+            error => PyValueError::new_err(error.to_string()),
+        })
+    }
+}
+
+impl<T> OrRaise<T> for Result<T, campaign::CampaignError> {
     fn or_raise(self) -> PyResult<T> {
         self.map_err(|error| PyValueError::new_err(error.to_string()))
     }

@@ -1,43 +1,174 @@
-//! An identification experiment as Python describes it.
+//! Identification of an axis from Python: the search of `ilc_rt::identification` over experiments that
+//! Python executes.
 
-use ilc_rt::config::Cell;
-use ilc_rt::model::identify::{Excitation, Waveform};
-use ilc_rt::supervisor::Experiment;
+use ilc_rt::cli::parse;
+use ilc_rt::identification::{
+    self, Described, Experiment, ExperimentOptions, Form, IdentificationError, Identified, Signals,
+    waveform_name,
+};
+use ilc_rt::model::identify::Waveform;
+use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
+use crate::argument::read_vector;
+use crate::cell::PyCell;
+use crate::detached::detached;
 use crate::error::OrRaise;
-
-/// Reads any object with the attributes of `ilc_rt.experiment.Experiment`.
-pub(crate) fn read_experiment(object: &Bound<'_, PyAny>, cell: &Cell) -> PyResult<Experiment> {
-    let waveform: String = object.getattr("waveform")?.extract()?;
-    let amplitude: Option<f64> = object.getattr("amplitude")?.extract()?;
-    let experiment = Experiment {
-        axis: object.getattr("axis")?.extract()?,
-        excitation: Excitation {
-            waveform: read_waveform(&waveform)?,
-            amplitude: amplitude.unwrap_or(1.0),
-            from_hz: object.getattr("from_hz")?.extract()?,
-            to_hz: object.getattr("to_hz")?.extract()?,
-            period_s: object.getattr("period_s")?.extract()?,
-            periods: object.getattr("periods")?.extract()?,
-        },
-        at_m: object.getattr("at_m")?.extract()?,
-    };
-    match amplitude {
-        Some(_) => Ok(experiment),
-        None => experiment.with_default_amplitude(cell).or_raise(),
-    }
-}
+use crate::identify::{give_measured, give_second_order, give_velocity_loop};
+use crate::whole;
 
 /// Reads the name of a waveform.
 pub(crate) fn read_waveform(name: &str) -> PyResult<Waveform> {
-    match name {
-        "sweep" => Ok(Waveform::LogarithmicSweep),
-        "linear-sweep" => Ok(Waveform::LinearSweep),
-        "multisine" => Ok(Waveform::Multisine),
-        _ => Err(PyValueError::new_err(format!(
+    identification::waveform(name).ok_or_else(|| {
+        PyValueError::new_err(format!(
             "waveform = '{name}'; 'sweep', 'linear-sweep' or 'multisine' is needed"
-        ))),
+        ))
+    })
+}
+
+/// Failure of an identification: refused, or raised by the function that executes the experiments.
+enum Failure {
+    Refused(IdentificationError),
+    Raised(PyErr),
+}
+
+impl From<IdentificationError> for Failure {
+    fn from(error: IdentificationError) -> Self {
+        Self::Refused(error)
     }
+}
+
+/// Identify an axis of a cell by experiments, in narrower bands until a model fits.
+///
+/// - cell : Cell: The cell.
+/// - arguments : list of str: Options of the identification, as words of ``ilc-rt identify``.
+/// - excite : callable: Called with a dict of the experiment's figures; returns learned input and
+///     error as two arrays of shape (n_samples * n_axes,).
+/// - report : callable: Called with a sentence on each band.
+///
+/// Returns dict: The experiment, its signals, response, models, uncertainty and doubt.
+/// Raises ModelError if the response cannot be fitted.
+/// Raises ValueError if an option cannot be used, or an amplitude is beyond a limit.
+#[pyfunction]
+fn identify_axis<'py>(
+    py: Python<'py>,
+    cell: &Bound<'py, PyCell>,
+    arguments: Vec<String>,
+    excite: &Bound<'py, PyAny>,
+    report: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let cell = &cell.get().cell;
+    let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
+    let mut raised = None;
+    let mut call = |experiment: &Experiment| {
+        let execute = || -> PyResult<Signals> {
+            let told = excite.call1((figures(py, experiment)?,))?;
+            let (input, error_m) = told.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
+            Ok(Signals {
+                input: read_vector("input", &input)?,
+                error_m: read_vector("error", &error_m)?,
+            })
+        };
+        execute().map(Some).map_err(Failure::Raised)
+    };
+    let mut tell = |line: &str| {
+        if let Err(error) = report.call1((line,)) {
+            raised.get_or_insert(error);
+        }
+    };
+    let found = identification::identify(cell, &options, &mut call, &mut tell);
+    if let Some(error) = raised {
+        return Err(error);
+    }
+    let found = match found {
+        Err(Failure::Raised(error)) => return Err(error),
+        Err(Failure::Refused(error)) => return Err(error).or_raise(),
+        Ok(found) => found,
+    };
+    let (experiment, identified) =
+        found.ok_or_else(|| PyValueError::new_err("no experiment was completed"))?;
+    let result = describe(py, identified)?;
+    result.set_item("experiment", figures(py, &experiment)?)?;
+    Ok(result)
+}
+
+/// Return the experiment of options, in the default band where they give none.
+///
+/// - arguments : list of str: Options of the identification, as words of ``ilc-rt identify``.
+///
+/// Returns dict: The figures of the experiment.
+/// Raises ValueError if an option cannot be used.
+#[pyfunction]
+fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'_, PyDict>> {
+    let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
+    let axis = options.axis.clone().unwrap_or_default();
+    let at_m = options.at_m;
+    figures(py, &Experiment { axis, excitation: options.excitation(None), at_m })
+}
+
+/// Evaluate whole periods of input and output of any system.
+///
+/// - u, y : shape (n_samples,): Input and output, whole periods.
+/// - period_samples : int: Samples in a period.
+/// - from_hz, to_hz : float: Band of the excitation in Hz.
+/// - dt_s : float: Sample time in seconds.
+///
+/// Returns dict: Signals, response, models, uncertainty and doubt.
+/// Raises ValueError, TypeError if the arrays cannot be used, or the response cannot be fitted.
+#[pyfunction]
+fn evaluate_experiment<'py>(
+    py: Python<'py>,
+    u: &Bound<'py, PyAny>,
+    y: &Bound<'py, PyAny>,
+    #[pyo3(from_py_with = whole::period_samples)] period_samples: usize,
+    from_hz: f64,
+    to_hz: f64,
+    dt_s: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (u, y) = (read_vector("u", u)?, read_vector("y", y)?);
+    let band_hz = (from_hz, to_hz);
+    let evaluate = || Identified::evaluate(u, y, period_samples, band_hz, dt_s, Form::Free);
+    describe(py, detached(py, evaluate).or_raise()?)
+}
+
+/// Returns the figures of an experiment, as the arguments of `ilc_rt.experiment.Experiment`.
+fn figures<'py>(py: Python<'py>, experiment: &Experiment) -> PyResult<Bound<'py, PyDict>> {
+    let (figures, excitation) = (PyDict::new(py), &experiment.excitation);
+    figures.set_item("axis", &experiment.axis)?;
+    figures.set_item("waveform", waveform_name(excitation.waveform))?;
+    figures.set_item("from_hz", excitation.from_hz)?;
+    figures.set_item("to_hz", excitation.to_hz)?;
+    figures.set_item("period_s", excitation.period_s)?;
+    figures.set_item("periods", excitation.periods)?;
+    figures.set_item("amplitude", excitation.amplitude)?;
+    figures.set_item("at_m", experiment.at_m)?;
+    Ok(figures)
+}
+
+/// Returns the result of an identification, as arguments of `ilc_rt.identification.Identification`.
+fn describe(py: Python<'_>, found: Identified) -> PyResult<Bound<'_, PyDict>> {
+    let array = |values: Vec<f64>| PyArray1::from_vec(py, values);
+    let result = PyDict::new(py);
+    result.set_item("axis_model", found.section())?;
+    result.set_item("doubt", found.doubt.map(|doubt| doubt.to_string()))?;
+    result.set_item("model", give_second_order(py, &found.fit)?)?;
+    match found.described {
+        Described::Position(fit) => result.set_item("described", give_second_order(py, &fit)?)?,
+        Described::Velocity(fit) => result.set_item("described", give_velocity_loop(py, &fit)?)?,
+    }
+    result.set_item("measured", give_measured(py, found.measured)?)?;
+    let bound = (array(found.uncertainty.frequency_hz), array(found.uncertainty.bound));
+    result.set_item("uncertainty", bound)?;
+    result.set_item("period_samples", found.period_samples)?;
+    result.set_item("u", array(found.input))?;
+    result.set_item("y", array(found.output))?;
+    Ok(result)
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(identify_axis, module)?)?;
+    module.add_function(wrap_pyfunction!(single_experiment, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluate_experiment, module)?)
 }

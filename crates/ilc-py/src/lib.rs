@@ -2,6 +2,12 @@
 //!
 //! One file per family of Python names, each with its `register`; `argument` checks what comes in,
 //! `exceptions` and `error` say what is raised, and `detached` lets the interpreter go.
+//!
+//! Family: `laws` and `python_law` call each other: a law inside another one may be written in Python.
+//!
+//! Family: `model` and `model_argument` read each other's arguments.
+//!
+//! Family: `experiment` and `identify` read each other's arguments.
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
@@ -30,6 +36,7 @@ mod sigmoid_pair;
 mod signal;
 mod time_varying;
 mod trajectory;
+mod transport;
 mod weights;
 mod whole;
 
@@ -48,6 +55,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     contour::register(module)?;
     control::register(module)?;
     trajectory::register(module)?;
+    transport::register(module)?;
     sigmoid_pair::register(module)?;
     laws::register(module)?;
     weights::register(module)?;
@@ -55,6 +63,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;
+    experiment::register(module)?;
     made::register(module)?;
     Ok(())
 }

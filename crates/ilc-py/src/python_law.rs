@@ -1,4 +1,4 @@
-//! The one adapter for laws that are Python objects: the supervisor's own, inside another law, or analysed.
+//! The one adapter for laws that are Python objects: a campaign's own, inside another law, or analysed.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

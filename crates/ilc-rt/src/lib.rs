@@ -5,17 +5,21 @@
 //! of the project tells how the modules fit; each module's head says what it is for and who may
 //! import it.
 
+pub mod campaign;
 pub mod cli;
 pub mod config;
 pub mod control;
+pub mod design;
 pub mod fieldbus;
+pub mod identification;
+pub mod interpolate;
 pub mod kinematics;
 pub mod learning;
 pub mod library;
 pub mod model;
 pub mod record;
 pub mod rt;
+pub mod schema;
 pub mod servo;
 pub mod signal;
-pub mod supervisor;
 pub mod trajectory;

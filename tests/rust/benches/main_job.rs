@@ -4,16 +4,15 @@
 #![expect(clippy::print_stdout, reason = "a benchmark tells what it measured")]
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use ilc_rt::campaign::{self, Options};
+use ilc_rt::cli::parse;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::transport::loopback::InProcess;
 use ilc_rt::learning::Law;
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
 use ilc_rt::model::{Method, StateSpace, discretize, second_order};
-use ilc_rt::supervisor::{self, Disturbance, Options};
 use ilc_sim::{ClockMode, Machine};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -88,25 +87,16 @@ fn time_update(
 }
 
 fn lockstep_against_real_time(n_runs: u32) -> Result<(), Box<dyn Error>> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = ilc_tests::root();
     let cell = Cell::load(&root.join("examples/01_gantry.toml"))?;
     let drives = Machine::from_cell(&cell, ClockMode::LockStep)?;
     let library = std::env::temp_dir().join(format!("ilc-bench-{}.db", std::process::id()));
-    let options = Options {
-        iterations: n_runs,
-        measure: None,
-        lockstep: true,
-        simulated: false,
-        resume: false,
-        library: PathBuf::from(&library),
-        disturbance: Disturbance::default(),
-        telemetry: false,
-        stop: Arc::default(),
-    };
+    let mut options: Options = parse(&["--lockstep".to_owned(), "--no-telemetry".to_owned()])?;
+    (options.iterations, options.session.library) = (n_runs, library.clone());
     let bus = Box::new(InProcess::new(drives, 1024));
     let began = Instant::now();
     let mut n_samples = 0;
-    supervisor::run(&cell, &options, bus, None, &mut |event| {
+    campaign::run(&cell, &options, bus, None, &mut |event| {
         if let ilc_rt::record::Event::Start { n_samples: n, .. } = event {
             n_samples = *n;
         }

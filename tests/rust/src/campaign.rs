@@ -1,15 +1,14 @@
-//! Whole campaigns: the supervisor, the loop, the law and the library, on simulated drives.
+//! Whole campaigns: the course, the loop, the law and the library, on simulated drives.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::AtomicI32;
 
+use ilc_rt::campaign::{self, Options, Outcome};
+use ilc_rt::cli::parse;
 use ilc_rt::config::{Cell, Measure};
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::library::Library;
 use ilc_rt::record::Figures;
-use ilc_rt::supervisor::{self, Disturbance, Options, Outcome};
 use ilc_sim::{ClockMode, Machine};
 
 use crate::Scratch;
@@ -32,23 +31,15 @@ pub fn in_process(cell: &Cell) -> Box<dyn Bus> {
 
 /// A campaign in lock-step, without telemetry.
 pub fn options(library: PathBuf, iterations: u32) -> Options {
-    Options {
-        iterations,
-        measure: None,
-        lockstep: true,
-        simulated: false,
-        resume: false,
-        library,
-        disturbance: Disturbance::default(),
-        telemetry: false,
-        stop: Arc::new(AtomicI32::new(0)),
-    }
+    let mut options: Options = parse(&["--lockstep".into(), "--no-telemetry".into()]).unwrap();
+    (options.iterations, options.session.library) = (iterations, library);
+    options
 }
 
 /// What a campaign left behind.
 #[derive(Clone, Debug)]
 pub struct Kept {
-    /// What the supervisor said.
+    /// What the campaign ended with.
     pub outcome: Outcome,
     /// Digest of each run, as the library has it and as its arrays give it.
     pub digests: Vec<String>,
@@ -78,9 +69,10 @@ impl Kept {
 pub fn run_on(cell: &Cell, bus: Box<dyn Bus>, iterations: u32, measure: Option<Measure>) -> Kept {
     let scratch = Scratch::new();
     let library = scratch.file("library.db");
-    let options = Options { measure, ..options(library.clone(), iterations) };
+    let mut options = options(library.clone(), iterations);
+    options.session.measure = measure;
     let outcome =
-        supervisor::run(cell, &options, bus, None, &mut |_| {}).expect("the campaign begins");
+        campaign::run(cell, &options, bus, None, &mut |_| {}).expect("the campaign begins");
     let library = Library::open(&library).expect("the library opens");
     let rows = library.list(Some(&outcome.campaign)).expect("the library lists");
     // Loading checks each array against its digest.

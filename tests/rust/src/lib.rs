@@ -4,24 +4,36 @@
 //! [`campaign`] runs the supervisor as a user does; [`far_side`] puts the simulated machine on a bus in
 //! a thread of its own; [`rig`] is the loop alone, on a bus that records every command and lets a test
 //! break things in the middle of a run; [`faulty`] is a bus that loses, delays and spoils frames by seed;
-//! [`counting`] is an allocator that counts.
+//! [`counting`] is an allocator that counts; [`source`] reads the project's own source.
 
 #![expect(clippy::expect_used, reason = "a test fails where its set-up does")]
 
 pub mod campaign;
 pub mod counting;
+pub mod derived;
 pub mod far_side;
 pub mod faulty;
 pub mod rig;
+pub mod source;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use ilc_rt::config::Cell;
 
+/// The root of this checkout.
+///
+/// Asked of cargo when the test runs: one target folder may serve several checkouts, and a test that
+/// was built in another one must still look at its own.
+pub fn root() -> PathBuf {
+    let compiled = env!("CARGO_MANIFEST_DIR").into();
+    PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or(compiled)).join("../..")
+}
+pub use derived::hold_derived;
+
 /// The path of an example, as `01_gantry.toml`.
 pub fn example_path(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples").join(name)
+    root().join("examples").join(name)
 }
 
 /// The text of an example.

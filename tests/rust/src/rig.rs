@@ -5,13 +5,15 @@ use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use ilc_rt::campaign::drive_setup;
 use ilc_rt::config::Cell;
+use ilc_rt::design::Plan;
+use ilc_rt::fieldbus::bring_up::{bring_up, bring_up_encoder};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, State, bring_up, bring_up_encoder};
+use ilc_rt::fieldbus::cia402::{Command, State};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};
-use ilc_rt::supervisor::{Plan, drive_setup};
 use ilc_sim::Machine;
 
 use crate::campaign::machine;

@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::config::{AxisUnit, Cell};
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
@@ -12,7 +13,6 @@ use ilc_rt::fieldbus::cia402::{Controlword, EncoderSample, Extra, State, Status}
 use ilc_rt::library::Library;
 use ilc_rt::record::{EndStatus, IterationRecord};
 use ilc_rt::servo::{PhaseName, Sample, StopReason};
-use ilc_rt::supervisor::{self, Options, Outcome};
 use ilc_tests::campaign::options;
 use ilc_tests::rig::{Distort, Rig, Tap, node, write_object};
 use ilc_tests::{Scratch, short};
@@ -163,7 +163,7 @@ fn campaign_with(cell: &Cell, distort: Distort) -> Outcome {
     let tap = Tap::new(cell);
     tap.line().distort(distort);
     let options = options(scratch.file("library.db"), 2);
-    supervisor::run(cell, &options, Box::new(tap.clone()), None, &mut |_| {}).unwrap()
+    campaign::run(cell, &options, Box::new(tap.clone()), None, &mut |_| {}).unwrap()
 }
 
 #[test]
@@ -230,7 +230,7 @@ fn a_fault_without_an_emergency_message_says_so() {
         tap.line().meddle_after(900, Box::new(|machine, _| write_object(X, 0x6065, 1000)(machine)));
         let options = options(scratch.file("library.db"), 3);
         let outcome =
-            supervisor::run(&cell, &options, Box::new(tap.clone()), None, &mut |_| {}).unwrap();
+            campaign::run(&cell, &options, Box::new(tap.clone()), None, &mut |_| {}).unwrap();
         assert_eq!(outcome.status, EndStatus::Fault);
         assert!(outcome.reason.contains(part), "{}", outcome.reason);
         assert!(!outcome.reason.contains("0x0000") && !outcome.reason.contains("3210"));
@@ -300,9 +300,9 @@ fn disturbed(name: &str, distort: Distort) -> Vec<IterationRecord> {
     let tap = Tap::new(&cell);
     tap.line().distort(distort);
     let library = scratch.file("library.db");
-    let options = Options { lockstep: false, ..options(library.clone(), 3) };
-    let outcome =
-        supervisor::run(&cell, &options, Box::new(tap.clone()), None, &mut |_| {}).unwrap();
+    let mut options = options(library.clone(), 3);
+    options.session.lockstep = false;
+    let outcome = campaign::run(&cell, &options, Box::new(tap.clone()), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
     let library = Library::open(&library).unwrap();
     let rows = library.list(None).unwrap();

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::config::Cell;
+use ilc_rt::design::Plan;
 use ilc_rt::fieldbus::transport::Address;
-use ilc_rt::supervisor::Plan;
 use ilc_tests::example_text;
 use proptest::prelude::{any, prop, proptest};
 
@@ -150,7 +150,7 @@ const CONTRADICTIONS: &[Edit] = &[
     (
         "interface = \"csp\"",
         "interface = \"csv\"",
-        &["[[axis]] x: model.velocity_bandwidth_hz = missing", "0.1 to 10000"],
+        &["[[axis]] x: model.velocity_bandwidth_hz = missing", "needed by this interface"],
     ),
     ("natural_frequency_hz = 15.0", "", &["[[axis]] x: model.natural_frequency_hz = missing"]),
     ("blend_s = 0.04", "blend_s = 0.001", &["[program] blend_s = 0.001", "allowed 0.002"]),

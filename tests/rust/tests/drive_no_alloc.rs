@@ -1,15 +1,15 @@
 //! Simulated drives allocate nothing once they are set up: in lock-step they run inside the
 //! controller's own tick.
 
-use std::path::Path;
 use std::time::Duration;
 
+use ilc_rt::campaign::drive_setup;
 use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::bring_up::{DriveSetup, bring_up};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, Controlword, DriveSetup, State, bring_up};
+use ilc_rt::fieldbus::cia402::{Command, Controlword, State};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
-use ilc_rt::supervisor::drive_setup;
 use ilc_sim::{ClockMode, Machine};
 use ilc_tests::counting::{Counting, allocations};
 
@@ -18,7 +18,7 @@ static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn cycles_faults_and_questions_allocate_nothing() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/01_gantry.toml");
+    let path = ilc_tests::example_path("01_gantry.toml");
     let cell = Cell::load(&path).unwrap();
     let node = NodeId::new(1).unwrap();
     let mut bus = InProcess::new(Machine::from_cell(&cell, ClockMode::LockStep).unwrap(), 256);

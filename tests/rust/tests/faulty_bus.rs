@@ -8,11 +8,11 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use ilc_rt::campaign::{self, CampaignError, Outcome};
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::sync;
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::record::{EndStatus, Figures};
-use ilc_rt::supervisor::{self, Outcome, SupervisorError};
 use ilc_tests::campaign::options;
 use ilc_tests::faulty::{Faults, FaultyBus, Way};
 use ilc_tests::rig::Tap;
@@ -80,14 +80,14 @@ fn campaign(
     way: Way,
     during: std::ops::Range<u32>,
     seed: u64,
-) -> Result<Outcome, SupervisorError> {
+) -> Result<Outcome, CampaignError> {
     let (watched, reach) = Watched::new(cell);
     let bus = FaultyBus::new(Box::new(watched), faults, way, during, seed);
     let scratch = Scratch::new();
     let mut options = options(scratch.file("library.db"), RUNS);
-    options.lockstep = lockstep;
-    options.simulated = !lockstep;
-    let ended = supervisor::run(cell, &options, Box::new(bus), None, &mut |_| {});
+    options.session.lockstep = lockstep;
+    options.session.simulated = !lockstep;
+    let ended = campaign::run(cell, &options, Box::new(bus), None, &mut |_| {});
     let said = match &ended {
         Ok(outcome) => outcome.reason.clone(),
         Err(error) => error.to_string(),

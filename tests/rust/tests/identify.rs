@@ -8,11 +8,12 @@
     reason = "a test may panic, and prints figures"
 )]
 
+use ilc_rt::campaign;
 use ilc_rt::config::Cell;
+use ilc_rt::identification::{Experiment, Identified, Signals};
 use ilc_rt::library::Library;
 use ilc_rt::model::identify::{Excitation, Waveform};
 use ilc_rt::record::EndStatus;
-use ilc_rt::supervisor::{self, Experiment, Identified};
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::{Scratch, example};
 
@@ -55,9 +56,14 @@ fn a_simulated_axis_is_found_again_within_two_percent() {
         let library = scratch.file("library.db");
         let experiment = experiment(waveform, 1.0).with_default_amplitude(&cell).unwrap();
         let options = options(library.clone(), 1);
-        let outcome =
-            supervisor::identify(&cell, &experiment, &options, in_process(&cell), &mut |_| {})
-                .unwrap();
+        let outcome = campaign::identify(
+            &cell,
+            &experiment,
+            &options.session,
+            in_process(&cell),
+            &mut |_| {},
+        )
+        .unwrap();
         assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
         let library = Library::open(&library).unwrap();
         let rows = library.list(Some(&outcome.campaign)).unwrap();
@@ -67,7 +73,9 @@ fn a_simulated_axis_is_found_again_within_two_percent() {
         let still = kept.record.encoder_m.iter().step_by(2);
         assert!(still.map(|x| (x - cell.program.start_m[0]).abs()).fold(0.0, f64::max) < 3e-6);
 
-        let found = Identified::new(&cell, &experiment, &kept.record).unwrap();
+        let record = kept.record;
+        let signals = Signals { input: record.input, error_m: record.error_m };
+        let found = Identified::new(&cell, &experiment, &signals).unwrap();
         let model = found.fit.model;
         println!("{waveform:?}: {:?}\n{}", found.fit, found.section());
         assert!((model.gain - 1.0).abs() < 0.02, "{model:?}");
@@ -94,7 +102,7 @@ fn what_is_beyond_a_limit_is_refused_with_the_amplitude_that_would_do() {
         let options = options(scratch.file("library.db"), 1);
         let mut heard = 0;
         let refusal =
-            supervisor::identify(&cell, experiment, &options, in_process(&cell), &mut |_| {
+            campaign::identify(&cell, experiment, &options.session, in_process(&cell), &mut |_| {
                 heard += 1;
             });
         assert_eq!(heard, 0, "nothing may begin");

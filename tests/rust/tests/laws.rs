@@ -11,10 +11,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use ilc_rt::campaign::{self, Options, Outcome};
 use ilc_rt::config::Cell;
 use ilc_rt::library::{Library, Row};
 use ilc_rt::record::{EndStatus, Event, StateName};
-use ilc_rt::supervisor::{self, Options, Outcome};
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::{Scratch, example_text};
 
@@ -49,9 +49,9 @@ fn rows(library: &Path) -> Vec<Row> {
 fn run(cell: &Cell, iterations: u32) -> (Outcome, Vec<Row>) {
     let scratch = Scratch::new();
     let options = options(scratch.file("library.db"), iterations);
-    let outcome = supervisor::run(cell, &options, in_process(cell), None, &mut |_| {}).unwrap();
+    let outcome = campaign::run(cell, &options, in_process(cell), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
-    let rows = rows(&options.library);
+    let rows = rows(&options.session.library);
     (outcome, rows)
 }
 
@@ -243,8 +243,8 @@ fn what_the_controller_takes_back_halves_the_steps_of_a_ladder() {
 fn broken_and_whole(cell: &Cell, broken: u32, iterations: u32) -> (Vec<Row>, Vec<Row>) {
     let scratch = Scratch::new();
     let first = options(scratch.file("library.db"), iterations);
-    let stop = Arc::clone(&first.stop);
-    let outcome = supervisor::run(cell, &first, in_process(cell), None, &mut |event| {
+    let stop = Arc::clone(&first.session.stop);
+    let outcome = campaign::run(cell, &first, in_process(cell), None, &mut |event| {
         if matches!(event, Event::State { state: StateName::Running, iteration } if *iteration == broken)
         {
             stop.store(libc::SIGTERM, Ordering::Relaxed);
@@ -252,10 +252,10 @@ fn broken_and_whole(cell: &Cell, broken: u32, iterations: u32) -> (Vec<Row>, Vec
     })
     .unwrap();
     assert_eq!((outcome.status, outcome.runs.len()), (EndStatus::Interrupted, broken as usize));
-    let again = Options { resume: true, ..options(first.library.clone(), iterations) };
-    let outcome = supervisor::run(cell, &again, in_process(cell), None, &mut |_| {}).unwrap();
+    let again = Options { resume: true, ..options(first.session.library.clone(), iterations) };
+    let outcome = campaign::run(cell, &again, in_process(cell), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
-    (rows(&first.library), run(cell, iterations).1)
+    (rows(&first.session.library), run(cell, iterations).1)
 }
 
 #[test]
@@ -322,12 +322,12 @@ fn another_gate_ladder_or_weight_along_the_run_is_another_campaign() {
         let scratch = Scratch::new();
         let first = options(scratch.file("library.db"), 2);
         let cell = short(SERIES, &one);
-        supervisor::run(&cell, &first, in_process(&cell), None, &mut |_| {}).unwrap();
-        let again = Options { resume: true, ..options(first.library.clone(), 3) };
+        campaign::run(&cell, &first, in_process(&cell), None, &mut |_| {}).unwrap();
+        let again = Options { resume: true, ..options(first.session.library.clone(), 3) };
         let changed = short(SERIES, &other);
-        let refused = supervisor::run(&changed, &again, in_process(&changed), None, &mut |_| {});
+        let refused = campaign::run(&changed, &again, in_process(&changed), None, &mut |_| {});
         let line = refused.unwrap_err().to_string();
         assert!(line.starts_with("--resume: ") && line.contains("no campaign of this"), "{line}");
-        assert!(supervisor::run(&cell, &again, in_process(&cell), None, &mut |_| {}).is_ok());
+        assert!(campaign::run(&cell, &again, in_process(&cell), None, &mut |_| {}).is_ok());
     }
 }

@@ -5,88 +5,24 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where a file is not there")]
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use ilc_tests::root;
+use ilc_tests::source::{code, module_of, rust_files, test_modules};
 
 /// First line of every hot file.
 const FENCE: &str =
     "#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]";
 
 /// Files in hot modules that only set up, describe or refuse; none of them is called in a tick.
-const COLD_FILES: [&str; 58] = [
-    // Bring-up: waits for answers, before the loop begins.
-    "fieldbus/cia402/bring_up.rs",
-    "fieldbus/cia402/bring_up_error.rs",
-    "fieldbus/cia402/process_data.rs",
-    "fieldbus/cia402/remote.rs",
-    "fieldbus/cia402/scaling.rs",
-    "fieldbus/cia402/setting.rs",
-    "fieldbus/cia402/settings.rs",
-    "fieldbus/canopen/listen.rs",
-    "fieldbus/canopen/sdo_client.rs",
-    // The bus-load check, the trait with its error type, and a frame that is two arrays.
-    "fieldbus/load.rs",
-    "fieldbus/bus.rs",
-    "fieldbus/frame.rs",
-    // Opening a transport; what it opens is fenced.
-    "fieldbus/transport/address.rs",
-    "fieldbus/transport/error.rs",
-    "fieldbus/transport/mod.rs",
-    "fieldbus/transport/zenoh_link.rs",
-    "fieldbus/transport/zenoh_reach.rs",
+const COLD_FILES: [&str; 1] = [
     // Sets the loop's thread up.
     "rt/thread.rs",
-    // Numbers that are handed to the loop once.
-    "servo/spec.rs",
-    // Planning: from a program to what the interpolator reads.
-    "trajectory/contour/mod.rs",
-    "trajectory/contour/coupling.rs",
-    "trajectory/contour/tangent.rs",
-    "trajectory/contour/error.rs",
-    "trajectory/contour/sampled.rs",
-    "trajectory/contour/shape.rs",
-    "trajectory/contour/windowed.rs",
-    "trajectory/error.rs",
-    "trajectory/curve/arc_length.rs",
-    "trajectory/curve/butterfly.rs",
-    "trajectory/curve/frame.rs",
-    "trajectory/curve/mod.rs",
-    "trajectory/curve/run.rs",
-    "trajectory/curve/spiral.rs",
-    "trajectory/curve/spline.rs",
-    "trajectory/curve/time_law.rs",
-    "trajectory/curve/turn.rs",
-    "trajectory/exponential/alpha.rs",
-    "trajectory/exponential/choice.rs",
-    "trajectory/exponential/peaks.rs",
-    "trajectory/exponential/mod.rs",
-    "trajectory/modulated.rs",
-    "trajectory/program/block.rs",
-    "trajectory/program/code.rs",
-    "trajectory/program/gcode.rs",
-    "trajectory/program/gcode/tests.rs",
-    "trajectory/program/modal.rs",
-    "trajectory/program/mod.rs",
-    "trajectory/program/table.rs",
-    "trajectory/program/text.rs",
-    "trajectory/program/token.rs",
-    "trajectory/raster.rs",
-    "trajectory/tracking_index.rs",
-    "trajectory/path.rs",
-    "trajectory/set_points.rs",
-    "trajectory/setpoint.rs",
-    "trajectory/verification.rs",
-    // Random numbers and promises of its tests.
-    "trajectory/promises.rs",
-    "trajectory/random.rs",
 ];
 
 struct Module {
     row: u32,
     is_hot: bool,
-}
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
 }
 
 /// `| 3 | `servo` | hot | the cycle … |` of the table of layers.
@@ -105,48 +41,6 @@ fn layers() -> BTreeMap<String, Module> {
     }
     assert!(modules.len() >= 10, "the table of layers is not where this test looks for it");
     modules
-}
-
-fn rust_files(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            files.extend(rust_files(&path));
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push(path);
-        }
-    }
-    files.sort();
-    files
-}
-
-/// The source without comments and without its test modules, which may import what they test with.
-fn code(text: &str) -> String {
-    let mut kept = String::new();
-    let mut is_for_tests = false;
-    let mut ends_with = None;
-    for line in text.lines() {
-        let code = line.split("//").next().unwrap_or("");
-        let indent = &line[..line.len() - line.trim_start().len()];
-        if let Some(end) = &ends_with {
-            // As it is formatted, a module ends with the first brace that is as far left as it is.
-            if line == end {
-                ends_with = None;
-            }
-        } else if code.trim_start().starts_with("#[cfg(test)]") {
-            is_for_tests = true;
-        } else if is_for_tests && code.trim_start().starts_with("mod ") {
-            is_for_tests = false;
-            if code.contains('{') && !code.contains('}') {
-                ends_with = Some(format!("{indent}}}"));
-            }
-        } else {
-            kept.push_str(code);
-            kept.push('\n');
-        }
-    }
-    kept
 }
 
 /// The top-level modules that `code` names after `crate::`, also in braces.
@@ -286,6 +180,7 @@ fn every_hot_file_is_fenced() {
         code.join("\n").trim_start().starts_with(FENCE)
     };
     let mut wrong = Vec::new();
+    let tests = test_modules(&source);
     let mut n_fenced = 0;
     for file in rust_files(&source) {
         let own = top_level(&file, &source);
@@ -298,13 +193,15 @@ fn every_hot_file_is_fenced() {
         let mut heads = covers.map(|folder| folder.join("mod.rs")).filter(|head| head.is_file());
         let is_fenced = fenced(&file) || heads.any(|head| fenced(&head));
         let is_listed = COLD_FILES.contains(&inside);
+        let is_cold = inside_of_cold_folder(&file, &source);
         let is_head = is_only_declarations(&std::fs::read_to_string(&file).unwrap());
-        let is_test = inside.ends_with("/tests.rs") || inside.ends_with("/proof.rs");
+        let module = module_of(&file, &source);
+        let is_test = tests.iter().any(|test| module.starts_with(test));
         n_fenced += u32::from(is_fenced);
         if is_fenced && is_listed {
             wrong.push(format!("{inside} is fenced: take it off the list of cold files"));
         }
-        if !is_fenced && !is_listed && !is_head && !is_test {
+        if !is_fenced && !is_listed && !is_cold && !is_head && !is_test {
             wrong.push(format!("{inside} is hot and does not start with the fence"));
         }
     }
@@ -312,6 +209,14 @@ fn every_hot_file_is_fenced() {
     wrong.extend(stale.map(|file| format!("{file} is on the list of cold files, but not there")));
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(n_fenced > 30, "only {n_fenced} fenced files were found");
+}
+
+/// Whether a file is in a folder whose head says in its first line that it is cold.
+fn inside_of_cold_folder(file: &Path, source: &Path) -> bool {
+    file.ancestors().skip(1).take_while(|folder| *folder != source).any(|folder| {
+        std::fs::read_to_string(folder.join("mod.rs"))
+            .is_ok_and(|text| text.starts_with("//! Cold:"))
+    })
 }
 
 /// Whether a file only declares modules, re-exports and constants.

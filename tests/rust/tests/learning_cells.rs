@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::config::Cell;
-use ilc_rt::supervisor::{Plan, Prepared};
+use ilc_rt::design::{Plan, Prepared};
 use ilc_tests::example_text;
 
 const FILE: &str = "cell.toml";
@@ -91,8 +91,8 @@ const RANGES: &[Refusal] = &[
         &["[[learning.norm_optimal.phase]] 1 from_s = 90", "as long as a run is"],
     ),
     (SERIES, "[learning.pd]\nkp = 2e3", &["[learning.pd] kp = 2000", "allowed -1000 to 1000"]),
-    (SERIES, "[learning.pd]\nlead_samples = 101", &["[learning.pd] lead_samples = 101"]),
-    (SERIES, "[learning.pd]\norder = 9", &["[learning.pd] order = 9", "allowed 1 to 8"]),
+    (SERIES, "[learning.pd]\nlead_samples = 1001", &["[learning.pd] lead_samples = 1001"]),
+    (SERIES, "[learning.pd]\norder = 13", &["[learning.pd] order = 13", "allowed 1 to 12"]),
     (SERIES, "[learning.pd]\ncutoff_hz = 240.0", &["[learning.pd] cutoff_hz = 240", "to 237.5"]),
     (SERIES, "[learning.constrained]\nq = -1.0", &["[learning.constrained] q = -1"]),
     (
@@ -114,14 +114,14 @@ const RANGES: &[Refusal] = &[
         &["[learning.constrained] acceleration_max_m_s2 = 9", "to 8"],
     ),
     (SERIES, "[learning.adjoint]\ngain = 0.0", &["[learning.adjoint] gain = 0", "allowed"]),
-    (SERIES, "[learning.adjoint]\norder = 0", &["[learning.adjoint] order = 0", "allowed 1 to 8"]),
+    (SERIES, "[learning.adjoint]\norder = 0", &["[learning.adjoint] order = 0", "allowed 1 to 12"]),
     (SERIES, "[learning.adjoint]\ncutoff_hz = 0.1", &["[learning.adjoint] cutoff_hz = 0.1"]),
     (
         SERIES,
         "[learning.model_inverse]\ngain = 2.0",
-        &["[learning.model_inverse] gain = 2", "1.999"],
+        &["[learning.model_inverse] gain = 2", "above 0 and below 2"],
     ),
-    (SERIES, "[learning.model_inverse]\norder = 9", &["[learning.model_inverse] order = 9"]),
+    (SERIES, "[learning.model_inverse]\norder = 13", &["[learning.model_inverse] order = 13"]),
     (
         SERIES,
         "[learning.model_inverse]\ncutoff_hz = inf",

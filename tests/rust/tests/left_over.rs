@@ -3,12 +3,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use ilc_rt::campaign;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::ObjectAddress;
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::library::Library;
-use ilc_rt::supervisor;
 use ilc_sim::Machine;
 use ilc_tests::campaign::{machine, options};
 use ilc_tests::{Scratch, short};
@@ -65,7 +65,7 @@ fn run(cell: &Cell, machine: Machine) -> Result<String, String> {
     let scratch = Scratch::new();
     let library = scratch.file("library.db");
     let bus = Box::new(InProcess::new(machine, 256));
-    let outcome = supervisor::run(cell, &options(library.clone(), 1), bus, None, &mut |_| {})
+    let outcome = campaign::run(cell, &options(library.clone(), 1), bus, None, &mut |_| {})
         .map_err(|error| error.to_string())?;
     let library = Library::open(&library).unwrap();
     let rows = library.list(Some(&outcome.campaign)).unwrap();

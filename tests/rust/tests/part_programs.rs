@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::config::Cell;
+use ilc_rt::design::Plan;
 use ilc_rt::record::EndStatus;
-use ilc_rt::supervisor::Plan;
 use ilc_tests::campaign::run;
 use ilc_tests::{Scratch, example, example_text};
 

@@ -16,8 +16,7 @@ const RATE: f64 = 6.0;
 const ITERATIONS: usize = 9;
 
 fn cell() -> Cell {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/01_gantry.toml");
-    Cell::load(std::path::Path::new(path)).expect("the example is valid")
+    Cell::load(&ilc_tests::example_path("01_gantry.toml")).expect("the example is valid")
 }
 
 fn plan(cell: &Cell) -> Interpolator {

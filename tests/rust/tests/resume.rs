@@ -7,16 +7,16 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use ilc_rt::campaign::{self, CampaignError, Options, Outcome};
 use ilc_rt::config::{Cell, LawName, Measure};
 use ilc_rt::learning::{Law, LearningError};
 use ilc_rt::library::{Library, Row};
 use ilc_rt::record::{EndStatus, Event, StateName};
-use ilc_rt::supervisor::{self, Options, Outcome, SupervisorError};
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::{Scratch, example, short};
 
-fn run(cell: &Cell, options: &Options) -> Result<Outcome, SupervisorError> {
-    supervisor::run(cell, options, in_process(cell), None, &mut |_| {})
+fn run(cell: &Cell, options: &Options) -> Result<Outcome, CampaignError> {
+    campaign::run(cell, options, in_process(cell), None, &mut |_| {})
 }
 
 fn rows(library: &Path) -> Vec<Row> {
@@ -31,8 +31,8 @@ fn an_interrupted_campaign_goes_on_where_it_was() {
         let (cell, scratch) = (short(name), Scratch::new());
         let (library, other) = (scratch.file("a.db"), scratch.file("b.db"));
         let broken = options(library.clone(), 6);
-        let stop = Arc::clone(&broken.stop);
-        let outcome = supervisor::run(&cell, &broken, in_process(&cell), None, &mut |event| {
+        let stop = Arc::clone(&broken.session.stop);
+        let outcome = campaign::run(&cell, &broken, in_process(&cell), None, &mut |event| {
             if matches!(event, Event::State { state: StateName::Running, iteration: 3 }) {
                 stop.store(libc::SIGTERM, Ordering::Relaxed);
             }
@@ -76,14 +76,18 @@ fn another_law_measurement_or_program_cannot_go_on() {
     let changed: [(&str, Cell, Options); 6] = [
         ("law", change(|cell| cell.learning.law = LawName::Pd), resume(4)),
         ("weight", change(|cell| cell.learning.norm_optimal.rate = 7.0), resume(4)),
-        ("measure", cell.clone(), Options { measure: Some(Measure::Encoder), ..resume(4) }),
+        ("measure", cell.clone(), {
+            let mut options = resume(4);
+            options.session.measure = Some(Measure::Encoder);
+            options
+        }),
         ("program", example("01_gantry.toml"), resume(4)),
         ("feed", change(|cell| cell.program.feed_m_s = 0.09), resume(4)),
         ("limits", change(|cell| cell.axes[0].limits.acceleration_max_m_s2 = 7.9), resume(4)),
     ];
     for (what, cell, options) in changed {
         let refused = run(&cell, &options).unwrap_err();
-        assert!(matches!(refused, SupervisorError::Resume(_)), "{what}: {refused:?}");
+        assert!(matches!(refused, CampaignError::Resume(_)), "{what}: {refused:?}");
         let line = refused.to_string();
         assert!(line.starts_with("--resume: ") && line.contains("no campaign of this"), "{line}");
         assert!(!line.contains('\n'), "{line}");
@@ -165,7 +169,7 @@ fn what_grows_is_rolled_back_twice_and_then_learning_is_off() {
     let (cell, scratch) = (short("01_gantry.toml"), Scratch::new());
     let options = options(scratch.file("library.db"), 9);
     let law = Some(fickle(2, -4.0));
-    let outcome = supervisor::run(&cell, &options, in_process(&cell), law, &mut |_| {}).unwrap();
+    let outcome = campaign::run(&cell, &options, in_process(&cell), law, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
     let rms: Vec<f64> = outcome.runs.iter().map(|(_, figures)| figures.tracking_rms_m).collect();
     let rolled_back: Vec<u32> =
@@ -177,7 +181,7 @@ fn what_grows_is_rolled_back_twice_and_then_learning_is_off() {
     for index in [4, 6, 7, 8] {
         assert!(rms[index] < 1.05 * rms[2], "run {index}: {rms:?}");
     }
-    let rows = rows(&options.library);
+    let rows = rows(&options.session.library);
     for index in [4, 6, 7, 8] {
         assert_eq!(rows[index].record.input, rows[2].record.input, "run {index}");
     }
@@ -188,8 +192,8 @@ fn a_law_that_answers_nonsense_stops_the_axes() {
     let (cell, scratch) = (short("01_gantry.toml"), Scratch::new());
     let options = options(scratch.file("library.db"), 9);
     let law = Some(fickle(1, f64::NAN));
-    let outcome = supervisor::run(&cell, &options, in_process(&cell), law, &mut |_| {}).unwrap();
+    let outcome = campaign::run(&cell, &options, in_process(&cell), law, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Fault);
     assert!(outcome.reason.contains("not a finite number"), "{}", outcome.reason);
-    assert_eq!(rows(&options.library).len(), 2, "the runs before are kept");
+    assert_eq!(rows(&options.session.library).len(), 2, "the runs before are kept");
 }

@@ -5,8 +5,8 @@
 use std::fmt::Write as _;
 
 use ilc_rt::config::Cell;
+use ilc_rt::design::Plan;
 use ilc_rt::record::EndStatus;
-use ilc_rt::supervisor::Plan;
 use ilc_tests::Scratch;
 use ilc_tests::campaign::run;
 

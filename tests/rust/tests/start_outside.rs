@@ -3,10 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use ilc_rt::campaign;
 use ilc_rt::config::{Cell, Interface};
 use ilc_rt::record::EndStatus;
 use ilc_rt::servo::{PhaseName, StopReason};
-use ilc_rt::supervisor;
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::rig::Rig;
 use ilc_tests::{Scratch, example_text, short};
@@ -67,8 +67,7 @@ fn the_refusal_is_one_sentence_with_place_and_limits() {
         }
         let scratch = Scratch::new();
         let options = options(scratch.file("library.db"), 2);
-        let outcome =
-            supervisor::run(&cell, &options, in_process(&cell), None, &mut |_| {}).unwrap();
+        let outcome = campaign::run(&cell, &options, in_process(&cell), None, &mut |_| {}).unwrap();
         assert_eq!(outcome.status, EndStatus::Fault);
         assert!(outcome.reason.starts_with(reason), "{}", outcome.reason);
         assert!(outcome.runs.is_empty());

@@ -7,13 +7,13 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::config::{Cell, Interface};
 use ilc_rt::fieldbus::canopen::{NmtCommand, emcy};
 use ilc_rt::fieldbus::cia402::State;
 use ilc_rt::fieldbus::transport::{Responder, loopback};
 use ilc_rt::record::{EndStatus, Event, StateName};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
-use ilc_rt::supervisor::{self, Outcome};
 use ilc_tests::campaign::{machine, options};
 use ilc_tests::far_side::FarSide;
 use ilc_tests::rig::{Rig, Tap, node, write_object};
@@ -323,7 +323,7 @@ fn campaign_with(
     let tap = Tap::new(cell);
     let mut meddle: Option<ilc_tests::rig::Meddle> = Some(Box::new(meddle));
     let mut events = Vec::new();
-    let outcome = supervisor::run(
+    let outcome = campaign::run(
         cell,
         &options(scratch.file("library.db"), 3),
         Box::new(tap.clone()),
@@ -374,9 +374,9 @@ fn a_signal_interrupts_and_is_no_fault() {
     let cell = short(CELLS[0]);
     let scratch = Scratch::new();
     let options = options(scratch.file("library.db"), 5);
-    let stop = Arc::clone(&options.stop);
+    let stop = Arc::clone(&options.session.stop);
     let bus = Box::new(Tap::new(&cell));
-    let outcome = supervisor::run(&cell, &options, bus, None, &mut |event| {
+    let outcome = campaign::run(&cell, &options, bus, None, &mut |event| {
         if matches!(event, Event::State { state: StateName::Running, iteration: 2 }) {
             stop.store(libc::SIGINT, Ordering::Relaxed);
         }
@@ -400,7 +400,7 @@ fn a_silent_drive_on_a_real_bus_is_waited_for_once() {
         }
     });
     let began = Instant::now();
-    let outcome = supervisor::run(
+    let outcome = campaign::run(
         &cell,
         &options(scratch.file("library.db"), 3),
         Box::new(near),

@@ -8,13 +8,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{Command, Controlword};
-use ilc_rt::fieldbus::transport::{self, Address, Responder, ZenohBus, loopback};
+use ilc_rt::fieldbus::transport::{self, Responder, ZenohBus, ZenohSettings, loopback};
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_rt::record::{EndStatus, Event, StateName};
 use ilc_rt::servo::{PhaseName, StopReason, Stranger};
-use ilc_rt::supervisor::{self, Outcome};
 use ilc_tests::campaign::{machine, options};
 use ilc_tests::rig::{Rig, node};
 use ilc_tests::{Scratch, short};
@@ -116,7 +116,7 @@ fn campaign(
             }
         });
         let options = options(scratch.file("library.db"), 40);
-        let outcome = supervisor::run(&cell, &options, near, None, &mut |event| {
+        let outcome = campaign::run(&cell, &options, near, None, &mut |event| {
             if matches!(event, Event::State { state: StateName::Running, iteration: 1 }) {
                 match &mut stranger {
                     Some(stranger) => stranger.send(&frame).unwrap(),
@@ -169,9 +169,7 @@ fn on_zenoh() {
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let open = |role: &str| {
             let address = format!("zenoh:test/strangers?{role}=tcp/127.0.0.1:{port}&scouting=off");
-            let Ok(Address::Zenoh(settings)) = address.parse() else {
-                panic!("{address} is a zenoh address");
-            };
+            let settings: ZenohSettings = address.parse().unwrap();
             ZenohBus::open(&settings)
         };
         let (Ok(near), Ok(far), Ok(third)) = (open("listen"), open("connect"), open("connect"))

@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
 use crate::config::{AxisUnit, Cell, GateMeasure, LawName, PathKind};
+use crate::design::{DesignError, Plan, Prepared};
 use crate::record::AxisKinds;
-use crate::supervisor::{Plan, Prepared, SupervisorError};
 
 #[derive(Args)]
 #[command(after_help = "Example:
@@ -28,7 +28,7 @@ pub(super) fn check(arguments: &CheckArguments) -> u8 {
     }
 }
 
-fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
+fn describe(arguments: &CheckArguments) -> Result<(), DesignError> {
     let cell = Cell::load(&arguments.cell)?;
     let plan = Plan::new(&cell, None, false)?;
     let Prepared { law, verdict, warnings } = plan.law(&cell)?;
@@ -79,7 +79,7 @@ fn describe(arguments: &CheckArguments) -> Result<(), SupervisorError> {
     Ok(())
 }
 
-/// What decides on the next input beside the law.
+/// Describes rollback, gate and ladder, which decide on the next input beside the law.
 fn learning(cell: &Cell) -> Vec<String> {
     let learning = &cell.learning;
     if learning.law == LawName::None {
@@ -115,7 +115,7 @@ fn learning(cell: &Cell) -> Vec<String> {
     lines
 }
 
-/// What kind of path it is, how long, and how fast at most.
+/// Describes the path: kind, length, and largest speed.
 fn path(cell: &Cell, plan: &Plan) -> String {
     let program = &cell.program;
     let file = program.file.as_deref().unwrap_or(Path::new("")).display();

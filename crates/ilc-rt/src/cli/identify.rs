@@ -1,110 +1,64 @@
-//! `ilc-rt identify`: an experiment with one axis, and the model that comes of it.
+//! `ilc-rt identify`: experiments with one axis, and the model fitted to its response.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::AtomicI32;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::figures::FiguresFile;
-use super::run::{MeasureName, exit_status, open, say_event, stop_on_signals};
-use super::{EXIT_BAD_INPUT, show};
-use crate::config::{Cell, Measure};
-use crate::library::Library;
-use crate::model::identify::{Doubt, Excitation, Waveform};
-use crate::record::{EndStatus, Event};
-use crate::supervisor::{
-    self, Band, BandSearch, Described, Disturbance, Experiment, Identified, Options, Outcome,
-    SupervisorError,
+use super::run::{Output, exit_status, open, say_event, stop_on_signals};
+use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
+use crate::campaign::{self, CampaignError, Outcome, Session};
+use crate::config::Cell;
+use crate::identification::{
+    self, Described, Experiment, ExperimentOptions, Identified, Signals, waveform_name,
 };
-
-/// Where an axis is excited if only the highest frequency is asked for.
-const FALLBACK: Band = Band { from_hz: 1.0, to_hz: 50.0, period_s: 8.0 };
+use crate::library::Library;
+use crate::model::identify::Doubt;
+use crate::record::{EndStatus, Event};
 
 #[derive(Args)]
 #[command(after_help = "Examples:
   ilc-rt identify gantry.toml --axis x
   ilc-rt identify gantry.toml --axis x --amplitude 0.001 --from-hz 1 --to-hz 12 --json x.json")]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub(super) struct IdentifyArguments {
     /// Cell description.
     cell: PathBuf,
-    /// Name of the axis.
-    #[arg(long)]
-    axis: String,
-    /// What the axis is excited with.
-    #[arg(long, visible_alias = "method", value_enum, default_value = "multisine")]
-    waveform: WaveformName,
-    /// Peak of the excitation, m (csp) or m/s (csv); half of what the limits allow if not given.
-    #[arg(long, visible_aliases = ["amplitude-m", "amplitude-m-s"])]
-    amplitude: Option<f64>,
-    /// Lowest frequency; 1 Hz, or less for a slow axis.
-    #[arg(long)]
-    from_hz: Option<f64>,
-    /// Highest frequency; tried out if not given.
-    #[arg(long)]
-    to_hz: Option<f64>,
-    /// Length of a period; 8 s, or more for a slow axis.
-    #[arg(long, visible_alias = "duration-s")]
-    period_s: Option<f64>,
-    /// Periods that are evaluated.
-    #[arg(long, default_value_t = 5)]
-    periods: usize,
-    /// Where the axis is excited, instead of the program's start.
-    #[arg(long, allow_negative_numbers = true)]
-    at_m: Option<f64>,
-    /// Bus instead of the cell's: can:IFACE, udp:GROUP[:PORT], zenoh:KEY.
-    #[arg(long, value_name = "ADDRESS")]
-    bus: Option<String>,
-    /// Measurement to look at instead of the cell's.
-    #[arg(long, value_enum)]
-    measure: Option<MeasureName>,
-    /// Pace the loop by the drives' answers instead of the clock.
-    #[arg(long)]
-    lockstep: bool,
-    /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
-    #[arg(long)]
-    simulated_drives: bool,
-    /// Stop the axes and end when standard input closes, as it does when the program that started this
-    /// one ends.
-    #[arg(long)]
-    with_parent: bool,
-    /// Where the experiment is kept.
-    #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
-    library: PathBuf,
-    /// Write response, coherence, model and uncertainty to a file; - for standard output.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Print one JSON object a line, and leave the evaluation to whoever reads them.
-    #[arg(long)]
-    events: bool,
-    /// Do not publish on Zenoh.
-    #[arg(long)]
-    no_telemetry: bool,
+    #[command(flatten)]
+    options: IdentifyOptions,
+    #[command(flatten)]
+    output: Output,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum WaveformName {
-    Sweep,
-    LinearSweep,
-    Multisine,
+/// Options of an identification, in what and how an axis is excited.
+#[derive(Args, Clone, Debug)]
+pub struct IdentifyOptions {
+    /// The experiment.
+    #[command(flatten)]
+    pub experiment: ExperimentOptions,
+    /// Bus, measurement, pace and library.
+    #[command(flatten)]
+    pub session: Session,
 }
 
-/// Makes the experiment; returns the exit status.
+/// An experiment, and the model found by it.
+type Found = (Experiment, Identified);
+
+/// Identifies an axis; returns the exit status.
 pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
-    let file = match &arguments.json {
+    let file = match &arguments.output.json {
         None => None,
-        Some(path) => match FiguresFile::reserve(path, arguments.events) {
+        Some(path) => match FiguresFile::reserve(path, arguments.output.events) {
             None => return EXIT_BAD_INPUT,
             reserved => reserved,
         },
     };
     match experiment(arguments) {
-        Ok((outcome, identified)) => {
-            let doubt = identified.as_ref().and_then(|found| found.doubt);
-            let written = match (&file, identified) {
-                // What was measured is written all the same: it shows what is wrong.
-                (Some(file), Some(found)) => file.write(&figures(&arguments.axis, &found)),
+        Ok((outcome, found)) => {
+            let doubt = found.as_ref().and_then(|(_, identified)| identified.doubt);
+            let axis = found.as_ref().map_or_else(String::new, |(made, _)| made.axis.clone());
+            let written = match (&file, &found) {
+                // The measurement is written all the same: it shows what is wrong.
+                (Some(file), Some((made, identified))) => file.write(&figures(made, identified)),
                 (Some(file), None) => {
                     file.give_up();
                     true
@@ -113,11 +67,10 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
             };
             if let Some(doubt) = doubt {
                 show::complain(&format_args!(
-                    "no model for axis {}: {doubt}; try a larger amplitude or another band",
-                    arguments.axis
+                    "no model for axis {axis}: {doubt}; try a larger amplitude or another band"
                 ));
             }
-            exit_status(&outcome, written && doubt.is_none())
+            outcome.map_or(EXIT_FAILURE, |end| exit_status(&end, written && doubt.is_none()))
         }
         Err(error) => {
             if let Some(file) = file {
@@ -129,124 +82,57 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
     }
 }
 
+/// Executes experiments until a model fits; returns the end of the last one, and the model.
 fn experiment(
     arguments: &IdentifyArguments,
-) -> Result<(Outcome, Option<Identified>), SupervisorError> {
+) -> Result<(Option<Outcome>, Option<Found>), CampaignError> {
+    let mut session = arguments.options.session.clone();
+    session.stop = stop_on_signals(arguments.output.with_parent);
     let cell = Cell::load(&arguments.cell)?;
-    let stop = stop_on_signals(arguments.with_parent);
-    let mut search = BandSearch::new(&cell, &laid_out(arguments, FALLBACK))?;
-    if let Some(to_hz) = arguments.to_hz {
-        let band = Band { to_hz, ..FALLBACK };
-        let (outcome, found) = excite(arguments, &laid_out(arguments, band), &stop)?;
-        return Ok((outcome, told(found)));
-    }
-    let mut best: Option<(Experiment, Identified)> = None;
     let mut last = None;
-    while let Some(band) = search.next_band() {
-        let (outcome, found) = match excite(arguments, &laid_out(arguments, band), &stop) {
-            // An amplitude that was asked for may fit into a narrower band only.
-            Err(SupervisorError::Experiment { .. })
-                if arguments.amplitude.is_some() && best.is_none() && search.is_open() =>
-            {
-                continue;
-            }
-            found => found?,
-        };
-        let completed = outcome.status == EndStatus::Completed;
+    let mut excite = |experiment: &Experiment| -> Result<Option<Signals>, CampaignError> {
+        let (outcome, signals) = excite(arguments, &session, experiment)?;
         last = Some(outcome);
-        let Some((experiment, found)) = found.filter(|_| completed) else { break };
-        let left = 100.0 * found.residual_rms;
-        let why = found.doubt.map_or(format!("the model leaves {left:.0} %"), |doubt| {
-            let text = doubt.to_string();
-            text.split(':').next().unwrap_or_default().to_owned()
-        });
-        show::say(&format_args!(
-            "{:.3} to {:.3} Hz, amplitude {:.3e}: {why}",
-            band.from_hz, band.to_hz, experiment.excitation.amplitude
-        ));
-        if search.judge(band, &found, best.as_ref().map(|(_, found)| found)) {
-            best = Some((experiment, found));
-        }
-    }
-    let Some(outcome) = last else {
-        let band = Band { to_hz: 50.0, ..FALLBACK };
-        let (outcome, found) = excite(arguments, &laid_out(arguments, band), &stop)?;
-        return Ok((outcome, told(found)));
+        Ok(signals)
     };
-    Ok((outcome, told(best)))
-}
-
-/// Prints what was found.
-fn told(found: Option<(Experiment, Identified)>) -> Option<Identified> {
-    found.map(|(experiment, identified)| {
-        show::say(&describe(&experiment, &identified));
-        identified
-    })
-}
-
-/// The experiment that the arguments ask for, in a band where they say nothing of it.
-fn laid_out(arguments: &IdentifyArguments, band: Band) -> Experiment {
-    Experiment {
-        axis: arguments.axis.clone(),
-        excitation: Excitation {
-            waveform: match arguments.waveform {
-                WaveformName::Sweep => Waveform::LogarithmicSweep,
-                WaveformName::LinearSweep => Waveform::LinearSweep,
-                WaveformName::Multisine => Waveform::Multisine,
-            },
-            amplitude: arguments.amplitude.unwrap_or(1.0),
-            from_hz: arguments.from_hz.unwrap_or(band.from_hz),
-            to_hz: arguments.to_hz.unwrap_or(band.to_hz),
-            period_s: arguments.period_s.unwrap_or(band.period_s),
-            periods: arguments.periods,
-        },
-        at_m: arguments.at_m,
+    let mut report = |line: &str| {
+        show::say(&line);
+    };
+    let found =
+        identification::identify(&cell, &arguments.options.experiment, &mut excite, &mut report)?;
+    if let Some((experiment, identified)) = &found {
+        show::say(&describe(experiment, identified));
     }
+    Ok((last, found))
 }
 
-/// Makes an experiment and evaluates it.
+/// Executes one experiment and returns its signals; with `--events` the reader of the events has them.
 fn excite(
     arguments: &IdentifyArguments,
+    session: &Session,
     experiment: &Experiment,
-    stop: &Arc<AtomicI32>,
-) -> Result<(Outcome, Option<(Experiment, Identified)>), SupervisorError> {
-    let (cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
-    let mut experiment = experiment.clone();
-    if arguments.amplitude.is_none() {
-        experiment = experiment.with_default_amplitude(&cell)?;
-    }
-    let options = Options {
-        iterations: 1,
-        measure: arguments.measure.map(Measure::from),
-        lockstep: arguments.lockstep,
-        simulated: arguments.simulated_drives,
-        resume: false,
-        library: arguments.library.clone(),
-        disturbance: Disturbance::default(),
-        telemetry: !arguments.no_telemetry,
-        stop: Arc::clone(stop),
-    };
-    let mut kept = None;
+) -> Result<(Outcome, Option<Signals>), CampaignError> {
+    let (cell, bus) = open(&arguments.cell, session.bus.as_deref())?;
+    let mut stored = None;
     let mut observe = |event: &Event| {
         if let Event::Iteration { id, .. } = event {
-            kept = Some(*id);
+            stored = Some(*id);
         }
-        if arguments.events {
-            say_event(event, &options.stop);
+        if arguments.output.events {
+            say_event(event, &session.stop);
         } else if let Event::Fault { reason } = event {
             show::say(reason);
         }
     };
-    let outcome = supervisor::identify(&cell, &experiment, &options, bus, &mut observe)?;
-    let (Some(id), EndStatus::Completed, false) = (kept, outcome.status, arguments.events) else {
-        return Ok((outcome, None));
-    };
-    let record = Library::read(&arguments.library)?.load(id)?.record;
-    let identified = Identified::new(&cell, &experiment, &record)?;
-    Ok((outcome, Some((experiment, identified))))
+    let outcome = campaign::identify(&cell, experiment, session, bus, &mut observe)?;
+    let is_evaluated = outcome.status == EndStatus::Completed && !arguments.output.events;
+    let Some(id) = stored.filter(|_| is_evaluated) else { return Ok((outcome, None)) };
+    let record = Library::read(&session.library)?.load(id)?.record;
+    let signals = Signals { input: record.input, error_m: record.error_m };
+    Ok((outcome, Some(signals)))
 }
 
-/// The figures of `[axis.model]`; of an output that does not follow its input there are none.
+/// Describes what was found; an output that does not follow its input has no figures of `[axis.model]`.
 fn describe(experiment: &Experiment, found: &Identified) -> String {
     let worst = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
     let head = format!(
@@ -262,15 +148,15 @@ fn describe(experiment: &Experiment, found: &Identified) -> String {
         return head;
     }
     let (figures, delay_s) = match found.described {
-        Described::Position(model) => (
+        Described::Position(fit) => (
             format!(
                 "natural frequency  {:>10.4} Hz\ndamping            {:>10.5}",
-                model.natural_frequency_hz, model.damping
+                fit.model.natural_frequency_hz, fit.model.damping
             ),
-            model.delay_s,
+            fit.model.delay_s,
         ),
-        Described::Velocity(model) => {
-            (format!("velocity bandwidth {:>10.4} Hz", model.bandwidth_hz), model.delay_s)
+        Described::Velocity(fit) => {
+            (format!("velocity bandwidth {:>10.4} Hz", fit.model.bandwidth_hz), fit.model.delay_s)
         }
     };
     format!(
@@ -282,15 +168,20 @@ fn describe(experiment: &Experiment, found: &Identified) -> String {
         found.fit.model.gain,
         found.fit.gain_deviation,
         delay_s * 1e3,
-        found.residual_rms * 100.0,
+        found.residual_rms() * 100.0,
         if found.doubt.is_none() { format!("\n\n{}", found.section()) } else { String::new() }
     )
 }
 
-fn figures(axis: &str, found: &Identified) -> serde_json::Value {
+/// Returns the content of the file of `--json`, with the keys of that of `ilc identify`.
+fn figures(made: &Experiment, found: &Identified) -> serde_json::Value {
     let (fit, measured) = (&found.fit, &found.measured);
     serde_json::json!({
-        "axis": axis,
+        "axis": made.axis,
+        "waveform": waveform_name(made.excitation.waveform),
+        "amplitude": made.excitation.amplitude,
+        "dt_s": fit.model.dt_s,
+        "periods": made.excitation.periods,
         "frequency_hz": measured.frequency_hz,
         "response_real": measured.response.iter().map(|h| h.re).collect::<Vec<_>>(),
         "response_imag": measured.response.iter().map(|h| h.im).collect::<Vec<_>>(),
@@ -298,9 +189,13 @@ fn figures(axis: &str, found: &Identified) -> serde_json::Value {
         "n_averages": measured.n_averages,
         "model": {
             "gain": fit.model.gain,
+            "gain_deviation": fit.gain_deviation,
             "natural_frequency_hz": fit.model.natural_frequency_hz,
+            "natural_frequency_deviation_hz": fit.natural_frequency_deviation_hz,
             "damping": fit.model.damping,
+            "damping_deviation": fit.damping_deviation,
             "delay_s": fit.model.delay_s,
+            "delay_deviation_s": fit.delay_deviation_s,
             "residual_rms": fit.residual_rms,
         },
         "uncertainty": {

@@ -7,12 +7,15 @@ mod completions;
 mod figures;
 mod identify;
 mod latency;
+mod option;
 mod parent;
 mod quantity;
 mod run;
 mod runs;
 mod show;
 
+pub use identify::IdentifyOptions;
+pub use option::{OptionSpec, described, parse};
 pub use parent::when_parent_ends;
 
 use std::process::ExitCode;
@@ -23,7 +26,7 @@ use tracing::Level;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 
-/// Done, but what was asked for beyond it could not be written, or no model could be found.
+/// Done, but a requested file could not be written, or no model could be found.
 pub const EXIT_FAILURE: u8 = 1;
 /// Bad input: nothing has moved.
 pub const EXIT_BAD_INPUT: u8 = 2;
@@ -44,9 +47,9 @@ struct Arguments {
 enum Verb {
     /// Run a cell: bring the drives up, repeat the program, learn after every run.
     Run(run::RunArguments),
-    /// Excite one axis while all hold still, and fit a model to what it does.
+    /// Excite one axis while all others hold still, and fit a model to its response.
     Identify(identify::IdentifyArguments),
-    /// Read a cell description and tell what it would do; touches no bus.
+    /// Check a cell description and print what it would do; touches no bus.
     Check(check::CheckArguments),
     /// Measure how late this machine wakes the loop's thread.
     Latency(latency::LatencyArguments),
@@ -87,14 +90,18 @@ pub fn main() -> ExitCode {
     ExitCode::from(status)
 }
 
-/// One line of what the parser of arguments says in several, without its usage.
+/// Returns the refusal of a command line as one line, with a hint to the help.
 pub fn refusal_line(refusal: &clap::Error) -> String {
+    format!("{}; --help tells what is allowed", refusal_text(refusal))
+}
+
+/// Returns the refusal of a command line as one line, without its usage.
+fn refusal_text(refusal: &clap::Error) -> String {
     let text = refusal.render().to_string();
     let lines = text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:"));
     let words: Vec<_> = lines
         .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
         .collect();
     let line = words.join("; ").replace(":; ", ": ");
-    let line = format!("{}; --help tells what is allowed", line.trim_start_matches("error: "));
-    printable_lines(&line)
+    printable_lines(line.trim_start_matches("error: "))
 }

@@ -4,19 +4,18 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 
 use super::figures::FiguresFile;
 use super::runs::Runs;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show, when_parent_ends};
-use crate::config::{Cell, LawName, Measure};
+use crate::campaign::{self, CampaignError, Options, Outcome};
+use crate::config::Cell;
 use crate::fieldbus::{Bus, transport};
 use crate::record::{EndStatus, Event};
-use crate::supervisor::{self, Disturbance, Options, Outcome, SupervisorError};
 
 #[derive(Args)]
-#[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 #[command(after_help = "Examples:
   ilc-rt run gantry.toml --iterations 10
   ilc-rt run gantry.toml --bus can:can0 --library /var/lib/ilc/gantry.db --resume
@@ -24,68 +23,32 @@ use crate::supervisor::{self, Disturbance, Options, Outcome, SupervisorError};
 pub(super) struct RunArguments {
     /// Cell description.
     cell: PathBuf,
-    /// Bus instead of the cell's: can:IFACE, udp:GROUP[:PORT], zenoh:KEY.
-    #[arg(long, value_name = "ADDRESS")]
-    bus: Option<String>,
-    /// Runs in all; the first one is without learning.
-    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
-    iterations: u32,
-    /// Measurement to learn from instead of the cell's.
-    #[arg(long, value_enum)]
-    measure: Option<MeasureName>,
-    /// Pace the loop by the drives' answers instead of the clock: exact repetition, no wall clock.
-    #[arg(long)]
-    lockstep: bool,
-    /// The drives are simulated on this computer: forgive stalls of up to a second, which stall both.
-    #[arg(long)]
-    simulated_drives: bool,
-    /// Stop the axes and end when standard input closes, as it does when the program that started this
-    /// one ends.
-    #[arg(long)]
-    with_parent: bool,
-    /// Repeat the program without learning, whatever the cell says.
-    #[arg(long)]
-    no_learning: bool,
-    /// Where every run is kept.
-    #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
-    library: PathBuf,
-    /// Go on with the newest campaign of this cell, program, measurement and law.
-    #[arg(long)]
-    resume: bool,
-    /// Write the figures of all runs to a file; - for standard output.
+    #[command(flatten)]
+    options: Options,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Options of this program alone: its output, and its end.
+#[derive(Args)]
+pub(super) struct Output {
+    /// Write the figures to a file; - for standard output.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Print one JSON object a line instead of a table.
+    pub(super) json: Option<PathBuf>,
+    /// Print one JSON object a line, for a program that evaluates them.
     #[arg(long)]
-    events: bool,
-    /// Start also if the analysis says that learning will not converge.
+    pub(super) events: bool,
+    /// Stop the axes and end when standard input closes, as it does when the program that started this one
+    /// ends.
     #[arg(long)]
-    allow_divergent: bool,
-    /// Do not publish on Zenoh.
-    #[arg(long)]
-    no_telemetry: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum MeasureName {
-    Encoder,
-    Tcp,
-}
-
-impl From<MeasureName> for Measure {
-    fn from(name: MeasureName) -> Self {
-        match name {
-            MeasureName::Encoder => Self::Encoder,
-            MeasureName::Tcp => Self::Tcp,
-        }
-    }
+    pub(super) with_parent: bool,
 }
 
 /// Runs a campaign; returns the exit status.
 pub(super) fn run(arguments: &RunArguments) -> u8 {
-    let figures_file = match &arguments.json {
+    let figures_file = match &arguments.output.json {
         None => None,
-        Some(path) => match FiguresFile::reserve(path, arguments.events) {
+        Some(path) => match FiguresFile::reserve(path, arguments.output.events) {
             None => return EXIT_BAD_INPUT,
             reserved => reserved,
         },
@@ -102,32 +65,19 @@ pub(super) fn run(arguments: &RunArguments) -> u8 {
     }
 }
 
-fn campaign(arguments: &RunArguments) -> Result<Outcome, SupervisorError> {
-    let (mut cell, bus) = open(&arguments.cell, arguments.bus.as_deref())?;
-    cell.learning.allow_divergent |= arguments.allow_divergent;
-    if arguments.no_learning {
-        cell.learning.law = LawName::None;
-    }
-    let options = Options {
-        iterations: arguments.iterations,
-        measure: arguments.measure.map(Measure::from),
-        lockstep: arguments.lockstep,
-        simulated: arguments.simulated_drives,
-        resume: arguments.resume,
-        library: arguments.library.clone(),
-        disturbance: Disturbance::default(),
-        telemetry: !arguments.no_telemetry,
-        stop: stop_on_signals(arguments.with_parent),
-    };
+fn campaign(arguments: &RunArguments) -> Result<Outcome, CampaignError> {
+    let mut options = arguments.options.clone();
+    options.session.stop = stop_on_signals(arguments.output.with_parent);
+    let (cell, bus) = open(&arguments.cell, options.session.bus.as_deref())?;
     let mut runs = Runs::default();
     let mut observe = |event: &Event| {
-        if arguments.events {
-            say_event(event, &options.stop);
+        if arguments.output.events {
+            say_event(event, &options.session.stop);
         } else if let Some(text) = show::sentence(event, &mut runs) {
             show::say(&text);
         }
     };
-    supervisor::run(&cell, &options, bus, None, &mut observe)
+    campaign::run(&cell, &options, bus, None, &mut observe)
 }
 
 /// Prints an event as one line of JSON.
@@ -135,16 +85,13 @@ pub(super) fn say_event(event: &Event, stop: &AtomicI32) {
     if let Ok(text) = serde_json::to_string(event)
         && !show::say_json(&text)
     {
-        // Whoever asked for the events is gone, and with it whoever would notice trouble.
+        // The reader of the events is gone, and with it the one who would notice trouble.
         stop.store(SIGPIPE, Ordering::Relaxed);
     }
 }
 
 /// Reads a cell description and opens its bus, or the one of the command line.
-pub(super) fn open(
-    file: &Path,
-    bus: Option<&str>,
-) -> Result<(Cell, Box<dyn Bus>), SupervisorError> {
+pub(super) fn open(file: &Path, bus: Option<&str>) -> Result<(Cell, Box<dyn Bus>), CampaignError> {
     let mut cell = Cell::load(file)?;
     if let Some(address) = bus {
         address.clone_into(&mut cell.bus.address);
@@ -154,15 +101,15 @@ pub(super) fn open(
         None => format!("{}: [bus] address", cell.file.display()),
     };
     let address = &cell.bus.address;
-    if address.starts_with("loopback:") {
-        return Err(SupervisorError::Loopback { place });
+    if transport::scheme_of(address).is_some_and(|scheme| scheme.in_process) {
+        return Err(CampaignError::NoDrivesInside { place, address: address.clone() });
     }
-    let bus = transport::open(address).map_err(|source| SupervisorError::Bus { place, source })?;
+    let bus = transport::open(address).map_err(|source| CampaignError::Bus { place, source })?;
     Ok((cell, bus))
 }
 
-/// A number that becomes a signal's when it comes: the loop reads it and brings the axes to rest.
-/// With a parent, its end is such a signal as well.
+/// Returns a number that signal handlers set: the loop reads it and brings the axes to rest. The end of a
+/// parent counts as a signal.
 pub(super) fn stop_on_signals(with_parent: bool) -> Arc<AtomicI32> {
     let stop = Arc::new(AtomicI32::new(0));
     if with_parent {
@@ -196,7 +143,7 @@ pub(super) fn stop_on_signals(with_parent: bool) -> Arc<AtomicI32> {
     stop
 }
 
-/// Whether a signal is ignored, as SIGHUP is by what `nohup` starts: then it stays so.
+/// Returns whether a signal is ignored, as SIGHUP is under `nohup`: then it stays so.
 fn is_ignored(signal: i32) -> bool {
     #[expect(unsafe_code, reason = "neither the standard library nor signal-hook can ask")]
     // SAFETY: zeros are a valid sigaction; with no new action the call only writes the present one.
@@ -223,6 +170,7 @@ fn finish(figures_file: Option<&FiguresFile>, outcome: &Outcome) -> u8 {
             "campaign": outcome.campaign,
             "status": outcome.status,
             "reason": outcome.reason,
+            "axis_units": outcome.axis_units,
             "iterations": iterations,
         });
         written = file.write(&text);

@@ -2,17 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::error::ConfigError;
 use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
 use super::program::Program;
 use super::simulation::{AxisSimulation, Simulation};
+pub use crate::interpolate::AxisUnit;
+use crate::schema::field_order;
 
 /// A whole cell description, validated.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Cell {
     /// Where it was read from; empty for a text.
     #[serde(skip)]
@@ -43,26 +47,31 @@ pub struct Cell {
 }
 
 /// `[cell]`: name and servo cycle.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct CellSection {
     /// Name, used in Zenoh keys and in the library: letters, digits, `-` and `_`.
     pub name: String,
     /// Servo cycle in microseconds; exact, as both clocks count in integers.
+    #[schemars(range(min = 100, max = 100_000))]
     pub cycle_us: u32,
 }
 
 /// `[bus]`: which bus and how much of it may be used.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct BusSection {
     /// `can:vcan0`, `udp:239.74.163.2[:port]`, `zenoh:KEY` or `loopback:`.
     pub address: String,
     /// Bit rate of a real CAN bus, for the load check.
     #[serde(default = "default_bitrate_bit_s")]
+    #[schemars(range(min = 10_000, max = 1_000_000))]
     pub bitrate_bit_s: u32,
     /// Largest share of the bus that cyclic traffic may take, 0 to 1.
     #[serde(default = "default_load_max")]
+    #[schemars(range(min = 0.05, max = 1.0))]
     pub load_max: f64,
 }
 
@@ -75,7 +84,7 @@ fn default_load_max() -> f64 {
 }
 
 /// How a drive is commanded, and where the learned input enters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Interface {
     /// Cyclic synchronous position: the drive closes the position loop (series learning, input in m).
@@ -84,34 +93,15 @@ pub enum Interface {
     Csv,
 }
 
-/// What an axis is measured in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum AxisUnit {
-    /// Metres: a linear axis.
-    #[default]
-    M,
-    /// Radians: a rotary axis.
-    Rad,
-}
-
-impl AxisUnit {
-    /// The unit as it is written.
-    pub const fn symbol(self) -> &'static str {
-        match self {
-            Self::M => "m",
-            Self::Rad => "rad",
-        }
-    }
-}
-
 /// `[[axis]]`: one drive.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Axis {
     /// Name, as `x`.
     pub name: String,
     /// CANopen node, 1 to 127.
+    #[schemars(range(min = 1, max = 127))]
     pub node: u8,
     /// Command interface.
     pub interface: Interface,
@@ -120,6 +110,7 @@ pub struct Axis {
     #[serde(default)]
     pub unit: AxisUnit,
     /// Position counts of the drive in one metre (or radian).
+    #[schemars(range(min = 1.0, max = 1e10))]
     pub counts_per_m: f64,
     /// `[axis.limits]`
     pub limits: Limits,
@@ -133,68 +124,90 @@ pub struct Axis {
 }
 
 /// `[axis.limits]`: what must never be exceeded.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Limits {
     /// Lowest position.
+    #[schemars(range(min = -1000.0, max = 1000.0))]
     pub position_min_m: f64,
     /// Highest position.
+    #[schemars(range(min = -1000.0, max = 1000.0))]
     pub position_max_m: f64,
     /// Highest speed.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub velocity_max_m_s: f64,
     /// Highest acceleration, also of a controlled stop.
+    #[schemars(range(min = 0.0001, max = 10000.0))]
     pub acceleration_max_m_s2: f64,
     /// Highest jerk.
+    #[schemars(range(min = 0.001, max = 1e7))]
     pub jerk_max_m_s3: f64,
     /// Distance between set point and encoder at which drive and controller fault.
+    #[schemars(range(min = 1e-7, max = 1.0))]
     pub following_error_max_m: f64,
 }
 
 /// `[axis.model]`: second-order position loop (csp) or first-order velocity loop (csv), and delay.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct AxisModel {
     /// Natural frequency of the drive's position loop; csp only.
+    #[schemars(range(min = 0.1, max = 1000.0))]
     pub natural_frequency_hz: Option<f64>,
     /// Damping ratio of the drive's position loop; csp only.
+    #[schemars(range(min = 0.05, max = 5.0))]
     pub damping: Option<f64>,
     /// Bandwidth of the drive's velocity loop; csv only.
+    #[schemars(range(min = 0.1, max = 10000.0))]
     pub velocity_bandwidth_hz: Option<f64>,
     /// Whole servo cycles from sending a command to its first effect, beyond the sampler's one.
     #[serde(default)]
+    #[schemars(range(min = 0, max = 20))]
     pub delay_samples: u32,
 }
 
 /// `[axis.position_loop]`: proportional position control in the controller.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct PositionLoop {
     /// Velocity per position error, kv.
+    #[schemars(range(min = 0.01, max = 1000.0))]
     pub gain_per_s: f64,
     /// Share of the reference velocity that is fed forward, 0 to 1.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub velocity_feedforward: f64,
 }
 
 /// `[tcp_encoder]`: a node that measures the tool centre point, one coordinate an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct TcpEncoder {
     /// CANopen node, 1 to 127.
+    #[schemars(range(min = 1, max = 127))]
     pub node: u8,
     /// Counts in one metre, both coordinates.
+    #[schemars(range(min = 1.0, max = 1e10))]
     pub counts_per_m: f64,
 }
 
 /// `[safety]`: when to stop without being told.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Safety {
     /// Consecutive cycles without an answer of a node before a controlled stop.
+    #[schemars(range(min = 1, max = 1000))]
     pub silent_cycles_max: u32,
     /// Consecutive overrun cycles before a controlled stop.
+    #[schemars(range(min = 1, max = 10_000))]
     pub overrun_cycles_max: u32,
     /// How long a node may take to boot and to answer.
+    #[schemars(range(min = 0.01, max = 60.0))]
     pub answer_timeout_s: f64,
 }
 
@@ -205,8 +218,9 @@ impl Default for Safety {
 }
 
 /// `[telemetry]`: what is seen from outside, on Zenoh.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Telemetry {
     /// Whether to publish at all.
     pub enabled: bool,
@@ -256,6 +270,11 @@ impl Cell {
     /// The servo cycle in seconds.
     pub fn cycle_s(&self) -> f64 {
         f64::from(self.cell.cycle_us) * 1e-6
+    }
+
+    /// Unit of each axis, in their order.
+    pub fn units(&self) -> Vec<AxisUnit> {
+        self.axes.iter().map(|axis| axis.unit).collect()
     }
 
     /// Number of axes.

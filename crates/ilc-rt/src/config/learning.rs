@@ -1,6 +1,9 @@
 //! `[learning]`: which law learns, from what, how far it may go, and what goes round it.
 
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::schema::field_order;
 
 use super::law::{
     AdjointSection, ConstrainedSection, ErrorFeedforwardSection, ModelInverseSection, PdSection,
@@ -11,18 +14,22 @@ use super::norm_optimal::NormOptimalSection;
 const ROLLBACK_RATIO: f64 = 1.5;
 
 /// `[learning]`: which law learns, from what, and how far it may go.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Learning {
     /// The law.
     pub law: LawName,
     /// The measurement whose error is learned from.
     pub measure: Measure,
     /// Largest learned input of a csp axis.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub input_max_m: f64,
     /// Largest learned input of a csv axis.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub input_max_m_s: f64,
     /// Growth of the RMS error over the best run at which the best input is restored; not with a gate.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub rollback_ratio: Option<f64>,
     /// Whether a law may start of which the analysis says that it will not converge.
     pub allow_divergent: bool,
@@ -89,7 +96,7 @@ impl Learning {
 }
 
 /// Which law learns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LawName {
     /// Norm-optimal; with `rate` it is CO-ILC.
@@ -124,7 +131,7 @@ impl LawName {
 }
 
 /// Which measurement is learned from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// The encoder in each drive.
@@ -134,18 +141,24 @@ pub enum Measure {
 }
 
 /// `[learning.ladder]`: several runs with the same input before each step of learning.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct LadderSection {
     /// Runs with the same input before each step.
+    #[schemars(range(min = 1, max = 1000))]
     pub repeats: usize,
     /// Ratio of the error to that before the last step above which it decays too slowly.
+    #[schemars(range(min = 0.001, max = 1.0))]
     pub slow: f64,
     /// By what factor the gain is then raised; 1 to leave it alone.
+    #[schemars(range(min = 1.0, max = 10.0))]
     pub increase: f64,
     /// Lowest gain.
+    #[schemars(range(min = 1e-6, max = 1.0))]
     pub lowest: f64,
     /// Highest gain.
+    #[schemars(range(min = 1.0, max = 10.0))]
     pub highest: f64,
 }
 
@@ -156,7 +169,7 @@ impl Default for LadderSection {
 }
 
 /// By what figure of a run's error a gate judges it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GateMeasure {
     /// Root of the mean over the samples of the squared length of the error: `tracking_rms_m`.
@@ -166,18 +179,23 @@ pub enum GateMeasure {
 }
 
 /// `[learning.gate]`: when the law is to learn, to rest, or to go back to what was best.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct GateSection {
     /// Error up to which the input is kept as it is; 0 to learn for ever.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub tolerance_m: f64,
     /// What a run is judged by.
     pub measure: GateMeasure,
     /// By what factor the error must leave the tolerance before learning resumes.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub resume: f64,
     /// By what factor the error may exceed the best one so far.
+    #[schemars(range(min = 1.0, max = 1000.0))]
     pub growth: f64,
     /// For how many runs in a row it may do so; with a ladder, for how many of its steps.
+    #[schemars(range(min = 1, max = 100))]
     pub patience: usize,
 }
 

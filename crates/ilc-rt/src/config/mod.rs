@@ -2,6 +2,8 @@
 //!
 //! Whoever starts a cell reads it through [`Cell::load`]: the supervisor, the binary, the simulator
 //! and Python. It knows the numbers and their ranges, and nothing of how they are used.
+//!
+//! Family: `cell` and `validate` call each other, as a cell is checked where it is loaded.
 
 mod cell;
 mod error;

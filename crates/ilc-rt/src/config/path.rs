@@ -1,9 +1,11 @@
 //! `[program] kind`: what kind of path the tool follows, and the numbers of each.
 
-use serde::Deserialize;
+use crate::schema::field_order;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// What kind of path it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PathKind {
     /// Straight moves and arcs, `[[program.segment]]`.
@@ -26,8 +28,9 @@ pub enum PathKind {
 }
 
 /// `[program.butterfly]`: `r = scale (e^{cos t} - 2 cos 4t - sin⁵(t/12))`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct ButterflySection {
     /// Size.
     pub scale_m: f64,
@@ -42,8 +45,9 @@ impl Default for ButterflySection {
 }
 
 /// `[program.spiral]`: from its centre, anticlockwise.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct SpiralSection {
     /// Distance of the turns.
     pub pitch_m: f64,
@@ -52,8 +56,9 @@ pub struct SpiralSection {
 }
 
 /// `[program.raster]`: rows along the first axis.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct RasterSection {
     /// Length of a row.
     pub width_m: f64,
@@ -67,8 +72,9 @@ pub struct RasterSection {
 }
 
 /// `[program.modulated]`: an oscillation along the legs.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct ModulatedSection {
     /// Amplitude.
     pub amplitude_m: f64,

@@ -2,17 +2,21 @@
 
 use std::path::PathBuf;
 
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
+use crate::schema::field_order;
 
 /// `[program]`: where the tool goes.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Program {
     /// Start and end of each run's return move, one coordinate an axis.
     pub start_m: Vec<f64>,
     /// Speed along the path where a segment names none.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub feed_m_s: f64,
     /// What kind of path it is.
     #[serde(default)]
@@ -21,11 +25,13 @@ pub struct Program {
     /// description, or below it.
     pub file: Option<PathBuf>,
     /// Speed of G0; `feed_m_s` if it is not given.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub rapid_m_s: Option<f64>,
     /// Whether blocks of the part program that begin with `/` are left out.
     #[serde(default)]
     pub block_delete: bool,
     /// Highest acceleration across a smooth curve; the axes' own limits if it is not given.
+    #[schemars(range(min = 1e-6, max = 10000.0))]
     pub curvature_acceleration_m_s2: Option<f64>,
     /// `[program.butterfly]`
     pub butterfly: Option<ButterflySection>,
@@ -40,15 +46,19 @@ pub struct Program {
     pub corner: Corner,
     /// Length of the averaging window of `corner = "blend"`.
     #[serde(default = "default_blend_s")]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub blend_s: f64,
     /// Rest at the start that belongs to the run, so that learning can prepare.
     #[serde(default = "default_dwell_before_s")]
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub dwell_before_s: f64,
     /// Rest at the end that belongs to the run.
     #[serde(default = "default_dwell_after_s")]
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub dwell_after_s: f64,
     /// Rest between the return to the start and the next run: the gap in which learning computes.
     #[serde(default = "default_settle_s")]
+    #[schemars(range(min = 0.0, max = 60.0))]
     pub settle_s: f64,
     /// `[[program.segment]]`, moves in order.
     #[serde(rename = "segment", default)]
@@ -76,12 +86,14 @@ fn default_settle_s() -> f64 {
 }
 
 /// `[[program.segment]]`: a straight move, or an arc if it has a centre.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Segment {
     /// End point, one coordinate an axis.
     pub to_m: Vec<f64>,
     /// Speed along this segment.
+    #[schemars(range(min = 1e-6, max = 100.0))]
     pub feed_m_s: Option<f64>,
     /// Centre of an arc, in the first two axes.
     pub center_m: Option<[f64; 2]>,
@@ -90,11 +102,12 @@ pub struct Segment {
     pub clockwise: bool,
     /// Rest at its end.
     #[serde(default)]
+    #[schemars(range(min = 0.0, max = 3600.0))]
     pub dwell_s: f64,
 }
 
 /// How corners are taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Corner {
     /// Come to rest at every corner.

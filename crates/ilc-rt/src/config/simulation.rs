@@ -1,16 +1,21 @@
 //! `[simulation]` and `[axis.simulation]`: what the simulated drives are; nobody else reads them.
 
-use serde::Deserialize;
+use crate::schema::field_order;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// `[simulation]`: the plant as a whole.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Simulation {
     /// Error of the right angle between the first two axes: `x_tcp += orthogonality_rad * y`.
+    #[schemars(range(min = -0.1, max = 0.1))]
     pub orthogonality_rad: f64,
     /// Step of the drives' own control loops and of the integration.
     pub step_us: u32,
     /// Standard deviation of white noise on the encoders; 0 for none.
+    #[schemars(range(min = 0.0, max = 0.001))]
     pub encoder_noise_m: f64,
     /// Seed of the noise.
     pub seed: u64,
@@ -24,30 +29,42 @@ impl Default for Simulation {
 
 /// `[axis.simulation]`: a mass in a cascade (P position, PI velocity), friction, and one mode that
 /// only the tool centre point sees.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct AxisSimulation {
     /// Moving mass, the mode's included.
+    #[schemars(range(min = 0.001, max = 100000.0))]
     pub mass_kg: f64,
     /// Natural frequency for which the cascade is tuned.
+    #[schemars(range(min = 0.1, max = 1000.0))]
     pub natural_frequency_hz: f64,
     /// Damping ratio for which the cascade is tuned.
+    #[schemars(range(min = 0.05, max = 5.0))]
     pub damping: f64,
     /// Integral time of the velocity controller.
+    #[schemars(range(min = 0.001, max = 1000.0))]
     pub integral_time_s: f64,
     /// Largest force of the motor.
+    #[schemars(range(min = 0.001, max = 1e7))]
     pub force_max_n: f64,
     /// Coulomb friction.
+    #[schemars(range(min = 0.0, max = 1e7))]
     pub coulomb_n: f64,
     /// Static friction.
+    #[schemars(range(min = 0.0, max = 1e7))]
     pub static_n: f64,
     /// Stribeck velocity.
+    #[schemars(range(min = 1e-6, max = 1.0))]
     pub stribeck_m_s: f64,
     /// Part of the mass that swings as the mode; 0 for none.
+    #[schemars(range(min = 0.0, max = 90000.0))]
     pub mode_mass_kg: f64,
     /// Natural frequency of the mode.
+    #[schemars(range(min = 0.1, max = 1000.0))]
     pub mode_frequency_hz: f64,
     /// Damping ratio of the mode.
+    #[schemars(range(min = 0.0, max = 2.0))]
     pub mode_damping: f64,
     /// Position at power-on.
     pub position_start_m: f64,

@@ -1,14 +1,14 @@
 //! The field bus: CAN frames, CANopen, CiA 402 drives and the transports that carry them.
 //!
-//! For the servo loop (hot: frames, PDOs, statusword) and for whoever brings drives up (cold: SDO,
-//! configuration). Imports nothing above row 0 of the layer table; `servo`, `supervisor` and the
+//! For the servo loop (hot: frames, PDOs, statusword) and for set-up (cold: `bring_up`,
+//! `transport::opening`). Imports nothing above row 0 of the layer table; `servo`, `supervisor` and the
 //! simulator import it.
 
+pub mod bring_up;
 pub mod bus;
 pub mod canopen;
 pub mod cia402;
 pub mod frame;
-pub mod load;
 pub mod transport;
 
 pub use bus::{Bus, BusError};

@@ -5,6 +5,9 @@
 //! how many runs to average ([`ladder`]); [`analysis`] says before the first run whether a law will
 //! converge, and [`tune`] proposes weights. It runs between iterations, never in the tick; `config`,
 //! `supervisor` and the Python bindings may import it.
+//!
+//! Family: `error`, `krylov`, `law`, `operator`, `structure` and `weights` share the error of the folder,
+//! which carries that of the bounds, and a law answers with the structure that the analysis asks for.
 
 pub mod analysis;
 mod error;

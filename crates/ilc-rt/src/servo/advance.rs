@@ -6,7 +6,7 @@ use super::cycle::Cycle;
 use super::mailbox::StopReason;
 use super::phase::Phase;
 use crate::fieldbus::cia402::{Mode, State};
-use crate::trajectory::PointToPoint;
+use crate::interpolate::PointToPoint;
 
 /// How long the axes shall rest after a stop before the drives are switched off.
 const REST_S: f64 = 0.1;

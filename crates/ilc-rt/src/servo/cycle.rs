@@ -6,14 +6,14 @@ use super::gate::Gate;
 use super::input::LearnedInput;
 use super::mailbox::{LoopSide, Message, Sample, StopReason, Table};
 use super::node::Drive;
+use super::pending::Slots;
 use super::phase::Phase;
-use super::slots::Slots;
 use super::spec::ServoSpec;
 use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::Bus;
 use crate::fieldbus::cia402::Mode;
+use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
 use crate::rt::Nanos;
-use crate::trajectory::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
 
 /// Longest fade of the learned input after a run.
 const FADE_MAX_S: f64 = 0.2;

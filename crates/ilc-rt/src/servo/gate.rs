@@ -8,7 +8,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use crate::trajectory::AxisLimits;
+use crate::interpolate::AxisLimits;
 
 /// How much faster than the axis' own limit a command may change while it keeps all other limits.
 ///

@@ -3,7 +3,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use crate::control::{SlewLimiter, clamp_finite};
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 
 /// The learned input of all axes.
 #[derive(Clone, Copy, Debug)]

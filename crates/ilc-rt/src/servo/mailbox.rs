@@ -10,7 +10,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use super::phase::PhaseName;
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::{NmtCommand, NmtState, NodeId};
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 
 /// One servo cycle as it was: what was asked and what was measured at the same SYNC.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,7 +2,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use crate::trajectory::{ControlledStop, PointToPoint};
+use crate::interpolate::{ControlledStop, PointToPoint};
 
 /// The phase of the cell, with what it needs to go on.
 #[derive(Clone, Copy, Debug)]

@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use super::cycle::Cycle;
 use super::mailbox::StopReason;
+use super::pending::Part;
 use super::phase::Phase;
 use super::silence::saturate;
-use super::slots::Part;
 use super::spec::Pace;
 use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
 use crate::fieldbus::cia402::pdo_map::{ENCODER_PDO, EXTRA_PDO, STATUS_PDO};

@@ -4,8 +4,8 @@
 
 use super::cycle::Cycle;
 use super::mailbox::StopReason;
+use super::pending::Part;
 use super::phase::Phase;
-use super::slots::Part;
 use super::spec::Pace;
 use crate::fieldbus::cia402::Mode;
 

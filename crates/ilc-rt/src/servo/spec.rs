@@ -1,12 +1,14 @@
 //! What the servo cycle is told once: its nodes, their limits, and its own patience.
 
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
 use std::time::Duration;
 
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
+use crate::interpolate::AxisLimits;
 use crate::rt::Nanos;
-use crate::trajectory::AxisLimits;
 
 /// One axis.
 #[derive(Clone, Copy, Debug)]

@@ -11,7 +11,7 @@ use super::cycle::Cycle;
 use super::mailbox::{Message, StopReason};
 use super::phase::Phase;
 use crate::fieldbus::cia402::Mode;
-use crate::trajectory::{ControlledStop, MAX_AXES};
+use crate::interpolate::{ControlledStop, MAX_AXES};
 
 impl Cycle {
     /// Begins a controlled stop of all axes, unless one is under way or nothing moves any more.

@@ -1,18 +1,18 @@
 //! Jerk-limited linear interpolation of a program of moves, in the two settings that machines have.
 //!
 //! A move takes longer than `length / feed`. Either every move is completed, and an oscillating
-//! program loses frequency; or the next one starts on time, and it loses amplitude. Planning is cold;
-//! [`Linear::at`] is hot.
+//! program loses frequency; or the next one starts on time, and it loses amplitude.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+use crate::interpolate::JerkLimited;
+use crate::interpolate::MAX_AXES;
+use crate::interpolate::line::Line;
+use crate::interpolate::{AxisLimits, MoveError, PathLimits};
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::motion::MotionState;
+use crate::trajectory::path::{PathSegment, checked_lines};
+mod to_rest;
 
-use super::MAX_AXES;
-use super::error::TrajectoryError;
-use super::limits::{AxisLimits, Line, PathLimits};
-use super::motion::MotionState;
-use super::path::{PathSegment, checked_lines};
-use super::profile::JerkLimited;
-use super::to_rest::{AxisState, ToRest};
+use self::to_rest::{AxisState, ToRest};
 
 /// When the next move begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,14 +60,13 @@ impl Linear {
     /// to the target, all arriving together where that is possible.
     ///
     /// # Shapes
-    /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`](super::MAX_AXES)
+    /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`](crate::interpolate::MAX_AXES)
     /// # Real Time
     /// Cold: allocates.
     /// # Errors
     /// [`TrajectoryError`] for values out of range.
     /// # Source
     /// - [dimarco2016], Chapter 2: both settings and what they cost
-    #[expect(clippy::disallowed_methods, reason = "cold: planned once")]
     pub fn plan(
         start_m: &[f64],
         segments: &[PathSegment],
@@ -101,10 +100,7 @@ impl Linear {
                     Course::Axes(axes) => axes.iter().map(ToRest::duration_s).fold(0.0, f64::max),
                 };
             if !end_s.is_finite() {
-                return Err(TrajectoryError::Duration {
-                    length_m: line.length_m,
-                    duration_s: end_s,
-                });
+                return Err(MoveError::Duration { length: line.length_m, duration_s: end_s }.into());
             }
             moves.push(Move { course, start_s });
             program.push((*line, nominal_s));
@@ -203,11 +199,5 @@ fn together(
 }
 
 #[cfg(test)]
-#[allow(
-    clippy::disallowed_methods,
-    clippy::disallowed_types,
-    clippy::disallowed_macros,
-    clippy::float_cmp,
-    reason = "tests are cold, and exact where exactness is promised"
-)]
+#[allow(clippy::float_cmp, reason = "exact where exactness is promised")]
 mod tests;

@@ -5,9 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::bring_up::{DriveSetup, SdoClient, bring_up};
 use ilc_rt::fieldbus::canopen::{Emergency, NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{
-    self, Command, Controlword, DriveSetup, Extra, Mode, State, Status, next_command,
+    self, Command, Controlword, Extra, Mode, State, Status, next_command,
 };
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
@@ -161,7 +162,7 @@ impl Bench {
     /// Drive 1 brought up and operational, not yet enabled.
     pub(crate) fn started(mode: Mode) -> Self {
         let mut bench = Self::new(ClockMode::LockStep);
-        cia402::bring_up(&mut bench.bus, &setup(mode)).unwrap();
+        bring_up(&mut bench.bus, &setup(mode)).unwrap();
         bench.bus.send(&NmtCommand::Start.frame(None)).unwrap();
         bench
     }
@@ -220,15 +221,11 @@ impl Bench {
     }
 
     pub(crate) fn write(&mut self, index: u16, sub: u8, bytes: &[u8]) {
-        ilc_rt::fieldbus::canopen::SdoClient::new(node(1), ANSWER)
-            .download(&mut self.bus, index, sub, bytes)
-            .unwrap();
+        SdoClient::new(node(1), ANSWER).download(&mut self.bus, index, sub, bytes).unwrap();
     }
 
     pub(crate) fn read(&mut self, index: u16, sub: u8) -> u32 {
-        ilc_rt::fieldbus::canopen::SdoClient::new(node(1), ANSWER)
-            .upload_u32(&mut self.bus, index, sub)
-            .unwrap()
+        SdoClient::new(node(1), ANSWER).upload_u32(&mut self.bus, index, sub).unwrap()
     }
 }
 

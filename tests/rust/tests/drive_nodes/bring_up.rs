@@ -2,12 +2,11 @@
 
 use std::time::Duration;
 
-use ilc_rt::fieldbus::canopen::{
-    AbortCode, Heartbeat, NmtState, NodeId, SdoClient, SdoError, sdo::ObjectAddress,
+use ilc_rt::fieldbus::bring_up::{
+    BringUpError, DriveSetup, SdoClient, SdoError, bring_up, bring_up_encoder,
 };
-use ilc_rt::fieldbus::cia402::{
-    BringUpError, DriveSetup, EncoderSample, Mode, bring_up, bring_up_encoder, pdo_map,
-};
+use ilc_rt::fieldbus::canopen::{AbortCode, Heartbeat, NmtState, NodeId, ObjectAddress};
+use ilc_rt::fieldbus::cia402::{EncoderSample, Mode, pdo_map};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_sim::{ClockMode, Machine};

@@ -1,18 +1,18 @@
 //! In lock-step the same commands give the same frames, to the last bit, on the gantry with friction.
 
-use std::path::Path;
 use std::time::Duration;
 
+use ilc_rt::campaign::drive_setup;
 use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::bring_up::{DriveSetup, bring_up};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, DriveSetup, Status, bring_up, next_command};
+use ilc_rt::fieldbus::cia402::{Command, Status, next_command};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
-use ilc_rt::supervisor::drive_setup;
 use ilc_sim::{ClockMode, Machine};
 
 fn run() -> Vec<Frame> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/01_gantry.toml");
+    let path = ilc_tests::example_path("01_gantry.toml");
     let cell = Cell::load(&path).unwrap();
     let mut bus = InProcess::new(Machine::from_cell(&cell, ClockMode::LockStep).unwrap(), 256);
     let nodes: Vec<NodeId> = cell.axes.iter().map(|a| NodeId::new(a.node).unwrap()).collect();

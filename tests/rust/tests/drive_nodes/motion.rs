@@ -1,8 +1,9 @@
 //! Motion of an enabled drive: timing of targets, limits, stops.
 
 use ilc_rt::fieldbus::Bus;
+use ilc_rt::fieldbus::bring_up::{DriveSetup, bring_up};
 use ilc_rt::fieldbus::canopen::NmtCommand;
-use ilc_rt::fieldbus::cia402::{Controlword, DriveSetup, Mode, State, Statusword, bring_up};
+use ilc_rt::fieldbus::cia402::{Controlword, Mode, State, Statusword};
 use ilc_sim::ClockMode;
 
 use crate::bench::{

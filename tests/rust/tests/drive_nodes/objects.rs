@@ -1,7 +1,8 @@
 //! The object dictionary of a drive: what it refuses, and that its data sheet tells the truth.
 
 use ilc_rt::fieldbus::Bus;
-use ilc_rt::fieldbus::canopen::{AbortCode, NmtCommand, SdoClient, SdoError};
+use ilc_rt::fieldbus::bring_up::{SdoClient, SdoError};
+use ilc_rt::fieldbus::canopen::{AbortCode, NmtCommand};
 use ilc_rt::fieldbus::cia402::Mode;
 use ilc_sim::node::dictionary::Access;
 use ilc_sim::{ClockMode, eds};

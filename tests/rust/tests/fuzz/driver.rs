@@ -5,7 +5,7 @@
 //! takes too long is written to the corpus, where it is tried first from then on.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -39,7 +39,7 @@ const NUMBERS: [&str; 16] = [
 ];
 
 fn corpus(target: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target)
+    ilc_tests::root().join("tests/fuzz/corpus").join(target)
 }
 
 fn kept(target: &str) -> Vec<(PathBuf, Vec<u8>)> {

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use ilc_rt::config::Cell;
+use ilc_rt::design::Plan;
 use ilc_rt::library::Library;
-use ilc_rt::supervisor::Plan;
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::{Scratch, example_path, example_text, short};
 
@@ -102,7 +102,7 @@ fn a_library_is_read_or_refused_in_one_line() {
     let scratch = Scratch::new();
     let file = scratch.file("library.db");
     let cell = short(EXAMPLES[0]);
-    let ran = ilc_rt::supervisor::run(
+    let ran = ilc_rt::campaign::run(
         &cell,
         &options(file.clone(), 2),
         in_process(&cell),

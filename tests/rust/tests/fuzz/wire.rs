@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use ilc_rt::campaign::drive_setup;
+use ilc_rt::fieldbus::bring_up::{SdoClient, bring_up};
 use ilc_rt::fieldbus::canopen::sdo::{SdoRequest, SdoResponse};
-use ilc_rt::fieldbus::canopen::{Emergency, Heartbeat, NmtCommand, SdoClient, sync};
-use ilc_rt::fieldbus::cia402::{Command, EncoderSample, Extra, Status, bring_up};
+use ilc_rt::fieldbus::canopen::{Emergency, Heartbeat, NmtCommand, sync};
+use ilc_rt::fieldbus::cia402::{Command, EncoderSample, Extra, Status};
 use ilc_rt::fieldbus::transport::{InProcess, Responder, udp_codec};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
-use ilc_rt::supervisor::drive_setup;
 use ilc_tests::campaign::machine;
 use ilc_tests::rig::node;
 use ilc_tests::short;

@@ -1,7 +1,8 @@
 //! The one way to refuse a value: file, key, value, and what is allowed.
 
-use crate::config::ConfigError;
+use crate::config::{Cell, ConfigError};
 use crate::record::{TEXT_MAX, printable};
+use crate::schema::{self, Violation};
 
 /// Most characters of a value that is refused.
 const VALUE_MAX: usize = 80;
@@ -34,6 +35,12 @@ impl Checker {
         allowed: &str,
     ) -> Result<(), ConfigError> {
         if holds { Ok(()) } else { Err(self.refuse(key, value, allowed)) }
+    }
+
+    /// Refuses the first number that is out of the range that its field states.
+    pub(super) fn ranges(&self, cell: &Cell) -> Result<(), ConfigError> {
+        schema::check(cell, "")
+            .map_err(|Violation { key, value, allowed }| self.refuse(&key, &value, &allowed))
     }
 
     /// Refuses what is not a finite number from `low` to `high`.

@@ -2,20 +2,13 @@
 
 use super::checker::Checker;
 use crate::config::{
-    Cell, ConfigError, ContourSection, GateSection, Interface, LadderSection, LawName, Measure,
-    NormOptimalSection,
+    Cell, ConfigError, ContourSection, Interface, LawName, Measure, NormOptimalSection,
 };
-
-/// Highest order of a low-pass.
-const ORDER_MAX: f64 = 8.0;
 
 /// Ranges of the learning; those of the other laws' tables too, so that a slip shows at once.
 pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let l = &cell.learning;
-    v.range("[learning] input_max_m", l.input_max_m, 0.0, 1.0)?;
-    v.range("[learning] input_max_m_s", l.input_max_m_s, 0.0, 10.0)?;
     if let Some(ratio) = l.rollback_ratio {
-        v.range("[learning] rollback_ratio", ratio, 1.0, 1e3)?;
         v.that(
             l.gate.is_none(),
             "[learning] rollback_ratio",
@@ -24,22 +17,11 @@ pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
         )?;
     }
     norm_optimal(cell, &l.norm_optimal, v)?;
-    v.range("[learning.pd] kp", l.pd.kp, -1e3, 1e3)?;
-    v.range("[learning.pd] kd", l.pd.kd, -1e3, 1e3)?;
-    v.range("[learning.pd] lead_samples", l.pd.lead_samples as f64, 0.0, 100.0)?;
-    low_pass(cell, v, "pd", l.pd.order, Some(l.pd.cutoff_hz))?;
+    low_pass(cell, v, "pd", Some(l.pd.cutoff_hz))?;
     constrained(cell, v)?;
-    v.range_if("[learning.adjoint] gain", l.adjoint.gain, 1e-12, 1e12)?;
-    low_pass(cell, v, "adjoint", l.adjoint.order, l.adjoint.cutoff_hz)?;
-    v.range("[learning.model_inverse] gain", l.model_inverse.gain, 1e-3, 1.999)?;
-    low_pass(cell, v, "model_inverse", l.model_inverse.order, Some(l.model_inverse.cutoff_hz))?;
+    low_pass(cell, v, "adjoint", l.adjoint.cutoff_hz)?;
+    low_pass(cell, v, "model_inverse", Some(l.model_inverse.cutoff_hz))?;
     error_feedforward(cell, v)?;
-    if let Some(ladder) = &l.ladder {
-        check_ladder(ladder, v)?;
-    }
-    if let Some(gate) = &l.gate {
-        check_gate(gate, v)?;
-    }
     v.that(
         l.law != LawName::None || (l.ladder.is_none() && l.gate.is_none()),
         "[learning] law",
@@ -54,33 +36,18 @@ pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     )
 }
 
-fn weights(v: &Checker, table: &str, values: [f64; 4]) -> Result<(), ConfigError> {
-    for (name, value, highest) in [
-        ("q", values[0], 1e12),
-        ("s", values[1], 1e12),
-        ("r", values[2], 1e12),
-        ("rate", values[3], 1e6),
-    ] {
-        v.range(&format!("[learning.{table}] {name}"), value, 0.0, highest)?;
-    }
-    Ok(())
-}
-
 fn low_pass(
     cell: &Cell,
     v: &Checker,
     table: &str,
-    order: usize,
     cutoff_hz: Option<f64>,
 ) -> Result<(), ConfigError> {
-    v.range(&format!("[learning.{table}] order"), order as f64, 1.0, ORDER_MAX)?;
     let nyquist_hz = 0.5 / cell.cycle_s();
     let key = format!("[learning.{table}] cutoff_hz");
     v.range_if(&key, cutoff_hz, 1e-3 * nyquist_hz, 0.95 * nyquist_hz)
 }
 
 fn norm_optimal(cell: &Cell, n: &NormOptimalSection, v: &Checker) -> Result<(), ConfigError> {
-    weights(v, "norm_optimal", [n.q, n.s, n.r, n.rate])?;
     let nyquist_hz = 0.5 / cell.cycle_s();
     let key = "[learning.norm_optimal] smoothing_hz";
     v.range(key, n.smoothing_hz, 1e-3 * nyquist_hz, 0.95 * nyquist_hz)?;
@@ -90,14 +57,12 @@ fn norm_optimal(cell: &Cell, n: &NormOptimalSection, v: &Checker) -> Result<(), 
     let mut before_s = 0.0;
     for (number, phase) in n.phases.iter().enumerate() {
         let key = |name: &str| format!("[[learning.norm_optimal.phase]] {} {name}", number + 1);
-        v.range(&key("from_s"), phase.from_s, 0.0, 1e5)?;
         v.that(
             phase.from_s >= before_s,
             &key("from_s"),
             &phase.from_s,
             &format!("at least {before_s}, where the phase before ends"),
         )?;
-        v.range(&key("to_s"), phase.to_s, 0.0, 1e5)?;
         v.that(
             phase.to_s >= phase.from_s + cell.cycle_s(),
             &key("to_s"),
@@ -105,11 +70,6 @@ fn norm_optimal(cell: &Cell, n: &NormOptimalSection, v: &Checker) -> Result<(), 
             &format!("at least one cycle after from_s = {}", phase.from_s),
         )?;
         before_s = phase.to_s;
-        for (name, weight) in
-            [("q", phase.q), ("s", phase.s), ("r", phase.r), ("contour", phase.contour)]
-        {
-            v.range_if(&key(name), weight, 0.0, 1e12)?;
-        }
         v.that(
             phase.contour.is_none() || n.contour.is_some(),
             &key("contour"),
@@ -121,8 +81,6 @@ fn norm_optimal(cell: &Cell, n: &NormOptimalSection, v: &Checker) -> Result<(), 
 }
 
 fn contour(cell: &Cell, c: &ContourSection, v: &Checker) -> Result<(), ConfigError> {
-    v.range("[learning.norm_optimal.contour] weight", c.weight, 0.0, 1e12)?;
-    v.range("[learning.norm_optimal.contour] along", c.along, 0.0, 1e12)?;
     let key = "[learning.norm_optimal.contour] axes";
     for (place, name) in c.axes.iter().enumerate() {
         v.that(
@@ -143,15 +101,6 @@ fn contour(cell: &Cell, c: &ContourSection, v: &Checker) -> Result<(), ConfigErr
 
 fn constrained(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let c = &cell.learning.constrained;
-    weights(v, "constrained", [c.q, c.s, c.r, c.rate])?;
-    for (name, bound, highest) in [
-        ("change_max_m", c.change_max_m, 1.0),
-        ("change_max_m_s", c.change_max_m_s, 10.0),
-        ("step_max_m", c.step_max_m, 1.0),
-        ("step_max_m_s", c.step_max_m_s, 10.0),
-    ] {
-        v.range_if(&format!("[learning.constrained] {name}"), bound, 1e-12, highest)?;
-    }
     // What the axes are allowed is the most that their set points are.
     let least = |limit: fn(&crate::config::Limits) -> f64| {
         let csp = cell.axes.iter().filter(|axis| axis.interface == Interface::Csp);
@@ -191,10 +140,7 @@ fn inputs_allowed(cell: &Cell) -> bool {
 
 fn error_feedforward(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let e = &cell.learning.error_feedforward;
-    v.range("[learning.error_feedforward] gain_per_s", e.gain_per_s, 1e-6, 1e4)?;
-    let lead = e.lead_samples as f64;
-    v.range("[learning.error_feedforward] lead_samples", lead, 0.0, 1000.0)?;
-    low_pass(cell, v, "error_feedforward", e.order, Some(e.cutoff_hz))?;
+    low_pass(cell, v, "error_feedforward", Some(e.cutoff_hz))?;
     if cell.learning.law != LawName::ErrorFeedforward {
         return Ok(());
     }
@@ -212,19 +158,4 @@ fn error_feedforward(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
         )?;
     }
     v.that(inputs_allowed(cell), "[learning] law", &"error_feedforward", INPUT_NEEDED)
-}
-
-fn check_ladder(ladder: &LadderSection, v: &Checker) -> Result<(), ConfigError> {
-    v.range("[learning.ladder] repeats", ladder.repeats as f64, 1.0, 1000.0)?;
-    v.range("[learning.ladder] slow", ladder.slow, 1e-3, 1.0)?;
-    v.range("[learning.ladder] increase", ladder.increase, 1.0, 10.0)?;
-    v.range("[learning.ladder] lowest", ladder.lowest, 1e-6, 1.0)?;
-    v.range("[learning.ladder] highest", ladder.highest, 1.0, 10.0)
-}
-
-fn check_gate(gate: &GateSection, v: &Checker) -> Result<(), ConfigError> {
-    v.range("[learning.gate] tolerance_m", gate.tolerance_m, 0.0, 1.0)?;
-    v.range("[learning.gate] resume", gate.resume, 1.0, 1e3)?;
-    v.range("[learning.gate] growth", gate.growth, 1.0, 1e3)?;
-    v.range("[learning.gate] patience", gate.patience as f64, 1.0, 100.0)
 }

@@ -52,9 +52,6 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
         name,
         &format!("1 to {NAME_MAX} letters, digits, '-' and '_'"),
     )?;
-    v.range("[cell] cycle_us", f64::from(cell.cell.cycle_us), 100.0, 1e5)?;
-    v.range("[bus] load_max", cell.bus.load_max, 0.05, 1.0)?;
-    v.range("[bus] bitrate_bit_s", f64::from(cell.bus.bitrate_bit_s), 1e4, 1e6)?;
     v.that(
         (1..=MAX_AXES).contains(&cell.axes.len()),
         "[[axis]] count",
@@ -63,11 +60,11 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     )?;
     axis::names(cell, &v)?;
     axis::nodes(cell, &v)?;
+    v.ranges(cell)?;
     for axis in &cell.axes {
         axis::check(axis, &v)?;
     }
     if let Some(tcp) = &cell.tcp_encoder {
-        v.range("[tcp_encoder] counts_per_m", tcp.counts_per_m, 1.0, 1e10)?;
         v.that(
             cell.axes.len() <= 2,
             "[tcp_encoder] node",
@@ -77,12 +74,7 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     }
     program::check(cell, &v)?;
     learning::check(cell, &v)?;
-    v.range("[safety] silent_cycles_max", f64::from(cell.safety.silent_cycles_max), 1.0, 1e3)?;
-    v.range("[safety] overrun_cycles_max", f64::from(cell.safety.overrun_cycles_max), 1.0, 1e4)?;
-    v.range("[safety] answer_timeout_s", cell.safety.answer_timeout_s, 0.01, 60.0)?;
     let simulation = &cell.simulation;
-    v.range("[simulation] orthogonality_rad", simulation.orthogonality_rad, -0.1, 0.1)?;
-    v.range("[simulation] encoder_noise_m", simulation.encoder_noise_m, 0.0, 1e-3)?;
     v.that(
         cell.cell.cycle_us.is_multiple_of(simulation.step_us),
         "[simulation] step_us",

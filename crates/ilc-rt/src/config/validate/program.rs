@@ -6,18 +6,11 @@ use crate::config::{Cell, ConfigError, PathKind};
 /// Ranges of the program, and what its kind of path needs.
 pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let program = &cell.program;
-    v.range("[program] feed_m_s", program.feed_m_s, 1e-6, 1e2)?;
     v.range("[program] blend_s", program.blend_s, cell.cycle_s(), 1.0)?;
-    v.range("[program] dwell_before_s", program.dwell_before_s, 0.0, 10.0)?;
-    v.range("[program] dwell_after_s", program.dwell_after_s, 0.0, 10.0)?;
-    v.range("[program] settle_s", program.settle_s, 0.0, 60.0)?;
     check_kind(cell, v)?;
     check_point(cell, v, "[program] start_m", &program.start_m)?;
     for (number, segment) in program.segments.iter().enumerate() {
         check_point(cell, v, &format!("[[program.segment]] {} to_m", number + 1), &segment.to_m)?;
-        if let Some(feed) = segment.feed_m_s {
-            v.range(&format!("[[program.segment]] {} feed_m_s", number + 1), feed, 1e-6, 1e2)?;
-        }
     }
     Ok(())
 }
@@ -73,15 +66,8 @@ fn check_kind(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
             "a name of 1 to 255 bytes without control characters",
         )?;
     }
-    if let Some(rapid_m_s) = program.rapid_m_s {
-        v.range("[program] rapid_m_s", rapid_m_s, 1e-6, 1e2)?;
-    }
-    if let Some(limit) = program.curvature_acceleration_m_s2 {
-        v.range("[program] curvature_acceleration_m_s2", limit, 1e-6, 1e4)?;
-    }
     for (number, segment) in program.segments.iter().enumerate() {
         let key = |name: &str| format!("[[program.segment]] {} {name}", number + 1);
-        v.range(&key("dwell_s"), segment.dwell_s, 0.0, 3600.0)?;
         let extra = segment.center_m.is_some() || segment.clockwise || segment.dwell_s > 0.0;
         v.that(
             kind == PathKind::Points || !extra,

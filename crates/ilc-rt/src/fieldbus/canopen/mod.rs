@@ -1,18 +1,16 @@
 //! CANopen services: NMT, SYNC, SDO, PDO, heartbeat and EMCY.
 //!
 //! Codecs shared by the controller and the simulated nodes, so that both sides name a byte the same
-//! way; imported by `cia402`, `servo`, `supervisor` and the simulator. All files are hot (values in,
-//! values out) except [`listen`] and [`sdo_client`], which wait and belong to set-up.
+//! way; imported by `cia402`, `servo`, `bring_up` and the simulator. All files are hot: values in, values
+//! out.
 
 pub mod cob_id;
 pub mod emcy;
-pub mod listen;
 pub mod nmt;
 pub mod node_id;
 pub mod pdo;
 pub mod sdo;
 pub mod sdo_abort;
-pub mod sdo_client;
 pub mod sync;
 
 pub use emcy::Emergency;
@@ -20,4 +18,3 @@ pub use nmt::{Heartbeat, NmtCommand, NmtState};
 pub use node_id::NodeId;
 pub use sdo::ObjectAddress;
 pub use sdo_abort::AbortCode;
-pub use sdo_client::{SdoClient, SdoError};

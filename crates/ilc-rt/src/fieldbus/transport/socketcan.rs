@@ -15,7 +15,7 @@ use socketcan::{CanDataFrame, CanFrame, CanSocket, EmbeddedFrame, Id, Socket, St
 
 use super::super::bus::{Bus, BusError};
 use super::super::frame::Frame;
-use super::error::OpenError;
+use super::opening::OpenError;
 use super::wait::Deadline;
 
 /// Room for about a thousand frames that arrive while the receiver is away.

@@ -16,7 +16,7 @@ use socket2::{Domain, Protocol, SockAddr, Socket, Type};
 
 use super::super::bus::{Bus, BusError};
 use super::super::frame::Frame;
-use super::error::OpenError;
+use super::opening::OpenError;
 use super::udp_codec::{decode, encode};
 use super::wait::Deadline;
 

@@ -50,7 +50,7 @@ pub fn across<const N: usize>(reference_m: &[[f64; N]]) -> Vec<[[f64; N]; N]> {
 #[allow(clippy::float_cmp, reason = "directions along an axis are exact")]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     #[test]
     fn a_line_at_45_degrees_is_hand_computed() {

@@ -133,7 +133,7 @@ fn distance_m<const N: usize>(one: &[f64; N], other: &[f64; N]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     fn exhaustive<const N: usize>(path: &SampledPath<N>, point_m: &[f64; N]) -> f64 {
         (0..path.samples_m.len() - 1)

@@ -163,7 +163,7 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     const Z: [f64; 3] = [0.0, 0.0, 1.0];
 

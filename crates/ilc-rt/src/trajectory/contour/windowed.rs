@@ -1,7 +1,7 @@
 //! Contour error near a point's own time: how far measured points are from where they should have
 //! been, give or take a window. Cold.
 
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 
 /// Distance of each measured point to the path near its own time.
 ///
@@ -136,7 +136,7 @@ fn distance_m<const N: usize>(one: &[f64; N], other: &[f64; N]) -> f64 {
 )]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     fn line(n_samples: u32) -> Vec<f64> {
         (0..n_samples).flat_map(|k| [f64::from(k) * 0.01, 0.0]).collect()

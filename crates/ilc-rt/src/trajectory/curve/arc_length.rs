@@ -57,7 +57,7 @@ impl ArcLength {
                     continue;
                 }
                 if !(halves.is_finite() && halves > 0.0) {
-                    return Err(TrajectoryError::Cusp { at_m: reached });
+                    return Err(TrajectoryError::Cusp { at: reached });
                 }
                 reached += halves;
                 knots.push((to, reached));

@@ -2,9 +2,9 @@
 
 use super::run::flat;
 use super::{Curve, Derivatives};
+use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;
-use crate::trajectory::exponential::Jet;
-use crate::trajectory::limits::is_positive;
+use crate::trajectory::jet::Jet;
 
 /// Turns after which the contour closes; `sin⁵(t/12)` has this period.
 const TURNS_MAX: f64 = 12.0;

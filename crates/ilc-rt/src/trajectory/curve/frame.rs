@@ -1,7 +1,7 @@
 //! Tangent, curvature and its change along the path, from derivatives by any parameter.
 
 use super::Derivatives;
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 
 /// Derivatives of the point by the distance along the curve.
 #[derive(Clone, Copy, Debug)]

@@ -17,7 +17,7 @@ pub use run::{Run, RunLimits};
 pub use spiral::Spiral;
 pub use spline::Spline;
 
-use super::MAX_AXES;
+use crate::interpolate::MAX_AXES;
 
 /// A point of a curve and its first three derivatives by the parameter.
 pub type Derivatives = [[f64; MAX_AXES]; 4];

@@ -5,13 +5,15 @@ use super::arc_length::ArcLength;
 use super::frame::{Frame, norm};
 use super::time_law::{Tick, TimeLaw};
 use super::turn::{Piece, pieces};
-use crate::trajectory::MAX_AXES;
-use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::trajectory::limits::{AxisLimits, is_positive};
+use crate::interpolate::AxisLimits;
+use crate::interpolate::MAX_AXES;
+use crate::interpolate::Quantity;
+use crate::interpolate::limits::is_positive;
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::grid::{CYCLE_S, check_time, n_ticks};
 use crate::trajectory::motion::{MotionState, SampledMotion};
-use crate::trajectory::path::{CYCLE_S, check_limits, check_time};
-use crate::trajectory::proof;
-use crate::trajectory::verification::Verification;
+use crate::trajectory::path::check_limits;
+use crate::trajectory::verify::Verification;
 
 /// Places on the curve at which the speed limit is computed.
 const PLACES: usize = 4_000;
@@ -182,7 +184,7 @@ fn plan_piece<C: Curve>(
     for (i, here) in frames.iter().enumerate() {
         let allowed = speed_limit(here, limits);
         if !is_positive(allowed) {
-            return Err(TrajectoryError::Cusp { at_m: before_m + i as f64 * step_m });
+            return Err(TrajectoryError::Cusp { at: before_m + i as f64 * step_m });
         }
         speed.push(allowed);
     }
@@ -210,7 +212,7 @@ fn plan_piece<C: Curve>(
             window,
             dt_s,
         };
-        proof::n_ticks(law.swept_s() + 2.0 * window as f64 * dt_s, dt_s)?;
+        n_ticks(law.swept_s() + 2.0 * window as f64 * dt_s, dt_s)?;
         let ticks = law.ticks();
         let near: Vec<Frame> = ticks.iter().map(|tick| between(&frames, tick.s / step_m)).collect();
         let mut found = judge(&ticks, &near, limits, SOUGHT);
@@ -247,7 +249,7 @@ fn plan_piece<C: Curve>(
     }
     Err(worst.map_or(TrajectoryError::Empty, |(worst, at_m)| TrajectoryError::Unproven {
         axis: worst.axis,
-        at_m,
+        at: at_m,
         quantity: worst.quantity,
         reached: worst.reached,
         limit: worst.limit,

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use super::run::flat;
 use super::{Curve, Derivatives};
+use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;
-use crate::trajectory::exponential::Jet;
-use crate::trajectory::limits::is_positive;
+use crate::trajectory::jet::Jet;
 
 /// `r = pitch θ/2π` around a centre.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! The natural cubic spline through points: the smoothest curve of second order that passes them.
 
 use super::{Curve, Derivatives};
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::{MAX_AXES, MoveError};
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::path::point;
 
@@ -29,7 +29,7 @@ impl Spline {
     pub fn through(points_m: &[Vec<f64>]) -> Result<Self, TrajectoryError> {
         let n_axes = points_m.first().map_or(0, Vec::len);
         if !(1..=MAX_AXES).contains(&n_axes) {
-            return Err(TrajectoryError::Axes { n_axes });
+            return Err(MoveError::Axes { n_axes }.into());
         }
         let n = points_m.len();
         if !(2..=POINTS_MAX).contains(&n) {

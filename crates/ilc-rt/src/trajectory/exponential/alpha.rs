@@ -1,4 +1,4 @@
-//! The largest α that honours every limit. Cold.
+//! The largest α that honours every limit.
 //!
 //! The peaks of velocity, acceleration and jerk are not monotone in α: an oscillation and a start can
 //! help or hurt each other. So α is scanned, every crossing bracketed and bisected, dips and humps
@@ -6,9 +6,10 @@
 //! with the other end of its leg wherever both are felt, on the motion that will be executed.
 
 use super::leg::{End, Leg};
-use super::peaks::peaks;
-use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::trajectory::limits::PathLimits;
+use super::peaks::{GOLDEN, peaks};
+use crate::interpolate::PathLimits;
+use crate::interpolate::Quantity;
+use crate::trajectory::error::TrajectoryError;
 
 /// Scan points in a decade of α.
 const PER_DECADE: f64 = 12.0;
@@ -18,8 +19,6 @@ const NEAR: f64 = 0.9;
 const SECTIONS: usize = 16;
 /// Bisections of a crossing.
 const STEPS: usize = 32;
-/// `(√5 - 1)/2`.
-pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// An interval of α in which every limit holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +57,7 @@ impl Place<'_> {
                 segment: self.segment,
                 place: self.name,
                 value: self.alpha_max,
-                least: smallest,
+                min: smallest,
             });
         }
         let largest = self.largest().max(1.001 * smallest).min(self.alpha_max);

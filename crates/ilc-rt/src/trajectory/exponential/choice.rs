@@ -1,10 +1,9 @@
 //! Which α each place of an E/S move gets. Cold; read by its plan.
 
 use super::alpha::{AlphaInterval, Place};
-use super::leg::{End, Leg};
-use super::plan::PlacedLeg;
+use super::leg::{End, Leg, PlacedLeg};
+use crate::interpolate::{AxisLimits, PathLimits};
 use crate::trajectory::error::TrajectoryError;
-use crate::trajectory::limits::{AxisLimits, PathLimits};
 
 /// Distance kept from a limit, relative: far above the rounding of a peak.
 pub(super) const MARGIN: f64 = 1e-10;

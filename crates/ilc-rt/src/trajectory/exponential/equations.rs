@@ -4,9 +4,7 @@
 //! `6 α b`; the acceleration 2.10 has one minus; 2.11 is ½ at `c`; the exponents of 2.12 and 2.13
 //! have opposite signs.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
-use super::jet::Jet;
+use crate::trajectory::jet::Jet;
 
 /// Start of a line, `x_L = (m t + b)(1 - e^{-α t³})`, and its velocity, acceleration and jerk.
 ///
@@ -59,16 +57,10 @@ pub fn blending_ratio(before_m_s: f64, after_m_s: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(
-    clippy::disallowed_methods,
-    clippy::disallowed_types,
-    clippy::disallowed_macros,
-    clippy::float_cmp,
-    reason = "tests are cold, and exact where exactness is promised"
-)]
+#[allow(clippy::float_cmp, reason = "exact where exactness is promised")]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     /// Compares each derivative with a central difference of the one before it.
     fn assert_consistent(function: impl Fn(f64) -> Jet, t: f64, scale_s: f64) {

@@ -1,13 +1,11 @@
 //! The program of the thesis's Appendix A: two legs on one axis, every α given. Nothing is limited:
 //! for a motion that is to be exactly what somebody else's was, read by the Python glue.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::equations::{weight_after, weight_before};
-use super::jet::Jet;
-use crate::trajectory::MAX_AXES;
+use crate::interpolate::MAX_AXES;
+use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;
-use crate::trajectory::limits::is_positive;
+use crate::trajectory::jet::Jet;
 use crate::trajectory::motion::{MotionState, SampledMotion};
 
 /// One leg of the listing.
@@ -153,12 +151,6 @@ impl Listing {
 }
 
 #[cfg(test)]
-#[allow(
-    clippy::disallowed_methods,
-    clippy::disallowed_types,
-    clippy::disallowed_macros,
-    reason = "tests are cold"
-)]
 mod tests {
     use super::*;
 

@@ -4,12 +4,11 @@
 //! A start is exponential, a transition between two legs of one line is a pair of sigmoids, an end is
 //! the mirror image of a start: with `v₂ = 0` the blending ratio would be 0 and no sigmoid comes to
 //! rest at its corner. Corners that are not on one line are an end and a start, as sigmoids would
-//! leave the path there. Planning is cold; [`ExponentialSigmoid::at`] is hot.
+//! leave the path there.
 
 mod alpha;
 mod choice;
 pub mod equations;
-mod jet;
 mod leg;
 pub mod listing;
 mod peaks;
@@ -17,5 +16,4 @@ mod plan;
 
 pub use alpha::AlphaInterval;
 pub use choice::{AlphaChoice, AlphaMax};
-pub use jet::Jet;
 pub use plan::{ExponentialSigmoid, ModulatedSegment};

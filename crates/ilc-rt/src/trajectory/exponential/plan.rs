@@ -1,13 +1,13 @@
 //! An E/S move of several legs: which end is what, its α, and the motion at any time.
 
-#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
-
 use super::choice::{AlphaChoice, AlphaMax, MARGIN, choose};
 use super::equations::blending_ratio;
-use super::leg::{End, Leg};
-use crate::trajectory::MAX_AXES;
-use crate::trajectory::error::{Quantity, TrajectoryError};
-use crate::trajectory::limits::{AxisLimits, Line, PathLimits};
+use super::leg::{End, Leg, PlacedLeg};
+use crate::interpolate::MAX_AXES;
+use crate::interpolate::limits::is_positive;
+use crate::interpolate::line::Line;
+use crate::interpolate::{AxisLimits, MoveError, PathLimits, Quantity};
+use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::motion::MotionState;
 use crate::trajectory::path::{PathSegment, checked_lines};
 
@@ -28,13 +28,6 @@ pub struct ModulatedSegment {
     pub amplitude_m: f64,
     /// Frequency of the oscillation; not read if the amplitude is 0.
     pub frequency_hz: f64,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PlacedLeg {
-    pub(super) leg: Leg,
-    pub(super) line: Line,
-    start_s: f64,
 }
 
 /// A planned E/S move from rest to rest.
@@ -189,7 +182,6 @@ impl ExponentialSigmoid {
 }
 
 /// Each leg in time, with what its ends are.
-#[expect(clippy::disallowed_methods, reason = "cold: planned once")]
 fn placed(
     segments: &[ModulatedSegment],
     lines: &[Line],
@@ -199,7 +191,7 @@ fn placed(
     for (index, (line, segment)) in lines.iter().zip(segments).enumerate() {
         let duration_s = line.length_m / segment.feed_m_s;
         if !(duration_s.is_finite() && duration_s > 0.0) {
-            return Err(TrajectoryError::Duration { length_m: line.length_m, duration_s });
+            return Err(MoveError::Duration { length: line.length_m, duration_s }.into());
         }
         let mut leg = Leg {
             feed_m_s: segment.feed_m_s,
@@ -233,14 +225,13 @@ fn placed(
 }
 
 fn check_oscillation(index: usize, segment: &ModulatedSegment) -> Result<(), TrajectoryError> {
-    let refuse =
-        |name, value, unit| Err(TrajectoryError::Oscillation { segment: index, name, value, unit });
     if !(segment.amplitude_m.is_finite() && segment.amplitude_m >= 0.0) {
-        return refuse("amplitude", segment.amplitude_m, "m: must be finite and not below 0");
+        let amplitude = segment.amplitude_m;
+        return Err(TrajectoryError::Amplitude { segment: index, amplitude });
     }
-    let is_turning = segment.frequency_hz.is_finite() && segment.frequency_hz > 0.0;
-    if segment.amplitude_m > 0.0 && !is_turning {
-        return refuse("frequency", segment.frequency_hz, "Hz: must be finite and above 0");
+    if segment.amplitude_m > 0.0 && !is_positive(segment.frequency_hz) {
+        let frequency_hz = segment.frequency_hz;
+        return Err(TrajectoryError::Frequency { segment: index, frequency_hz });
     }
     Ok(())
 }
@@ -269,11 +260,5 @@ fn check_programmed(
 }
 
 #[cfg(test)]
-#[allow(
-    clippy::disallowed_methods,
-    clippy::disallowed_types,
-    clippy::disallowed_macros,
-    clippy::float_cmp,
-    reason = "tests are cold, and exact where exactness is promised"
-)]
+#[allow(clippy::float_cmp, reason = "exact where exactness is promised")]
 mod tests;

@@ -4,7 +4,7 @@
 //! one it must name the axes in order, so that exchanged columns are refused instead of driven.
 
 use super::text::{shown, without_mark};
-use crate::trajectory::proof::N_SAMPLES_MAX;
+use crate::trajectory::grid::N_SAMPLES_MAX;
 
 /// A refused table: the line from 1, what is there, and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -130,7 +130,7 @@ fn columns(cells: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     const NAMES: [&str; 2] = ["x", "y"];
 

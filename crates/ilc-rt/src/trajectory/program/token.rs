@@ -126,7 +126,7 @@ fn count(text: &[u8], holds: impl Fn(u8) -> bool) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::random::Random;
+    use crate::interpolate::random::Random;
 
     fn words(text: &str) -> Vec<String> {
         Tokens::of(text.as_bytes())

@@ -43,7 +43,7 @@ fn a_plain_start_has_the_alpha_of_its_scaling() {
     assert!((by_jerk / (2.0 / 0.1 / j_peak).powf(1.5) - 1.0).abs() < 1e-6);
 }
 
-fn equations_start(u: f64) -> super::super::jet::Jet {
+fn equations_start(u: f64) -> crate::trajectory::jet::Jet {
     super::super::equations::startup_linear(u, 1.0, 0.0, 1.0)
 }
 

@@ -1,7 +1,8 @@
 //! What words mean, in every spelling, and what is refused, with its line.
 
 use super::*;
-use crate::trajectory::random::Random;
+use crate::interpolate::random::Random;
+use crate::trajectory::PathSegment;
 
 const SETTING: GcodeSetting = GcodeSetting {
     start_m: &[0.0, 0.0],

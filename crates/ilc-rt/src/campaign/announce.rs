@@ -1,0 +1,80 @@
+//! Publishing of events: to the caller at once, and to the network through the telemetry thread.
+
+use serde_json::json;
+
+use super::telemetry::Telemetry;
+use crate::record::Event;
+use crate::servo::Sample;
+
+/// Samples of a batch on the network.
+const BATCH_S: f64 = 0.05;
+
+/// Receivers of the events: an observer, and the network.
+pub(super) struct Announcer<'a> {
+    observe: &'a mut dyn FnMut(&Event),
+    telemetry: Option<Telemetry>,
+    batch: Vec<Sample>,
+    batch_size: usize,
+    n_axes: usize,
+}
+
+impl<'a> Announcer<'a> {
+    pub(super) fn new(
+        observe: &'a mut dyn FnMut(&Event),
+        telemetry: Option<Telemetry>,
+        cycle_s: f64,
+        n_axes: usize,
+    ) -> Self {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "small, positive"
+        )]
+        let batch_size = ((BATCH_S / cycle_s) as usize).max(1);
+        Self { observe, telemetry, batch: Vec::with_capacity(batch_size), batch_size, n_axes }
+    }
+
+    /// Publishes an event.
+    pub(super) fn publish(&mut self, event: &Event) {
+        (self.observe)(event);
+        let Some(telemetry) = &mut self.telemetry else { return };
+        let key = match event {
+            Event::Iteration { .. } | Event::Judged { .. } => "iteration",
+            Event::Fault { .. } => "fault",
+            Event::Latency { .. } => "latency",
+            Event::Start { .. }
+            | Event::State { .. }
+            | Event::Progress { .. }
+            | Event::End { .. } => "state",
+        };
+        if let Ok(text) = serde_json::to_string(event) {
+            // Progress is gone in a moment; a late joiner wants to know the state.
+            telemetry.send(key, text, key == "state" && !matches!(event, Event::Progress { .. }));
+        }
+    }
+
+    /// Publishes a servo cycle; cycles go out in batches.
+    pub(super) fn sample(&mut self, sample: &Sample) {
+        let Some(telemetry) = &mut self.telemetry else { return };
+        self.batch.push(*sample);
+        if self.batch.len() < self.batch_size {
+            return;
+        }
+        let rows = |of: fn(&Sample) -> &[f64; crate::trajectory::MAX_AXES]| -> Vec<&[f64]> {
+            self.batch.iter().map(|sample| &of(sample)[..self.n_axes]).collect()
+        };
+        let at: Vec<_> = self.batch.iter().map(|sample| sample.at).collect();
+        let text = json!({
+            "event": "servo",
+            "first_sync": self.batch.first().map(|sample| sample.sync),
+            "iteration_and_sample": at,
+            "reference_m": rows(|sample| &sample.reference_m),
+            "input": rows(|sample| &sample.input),
+            "encoder_m": rows(|sample| &sample.encoder_m),
+            "tool_m": rows(|sample| &sample.tool_m),
+        })
+        .to_string();
+        telemetry.send("servo", text, false);
+        self.batch.clear();
+    }
+}

@@ -1,0 +1,59 @@
+//! Source of the measured disturbance of each run.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Function from the number of the next run to its disturbance, or to the reason why it has none.
+type Ask = dyn FnMut(u32) -> Result<Vec<f64>, String> + Send;
+
+/// Measured disturbance of each run, one number for each quantity, e.g. a temperature; or nothing.
+///
+/// Measured once before each run, in order, while the axes return: never in the loop.
+#[derive(Clone, Default)]
+pub struct Disturbance(Option<Arc<Mutex<Ask>>>);
+
+impl Disturbance {
+    /// Asks a function.
+    pub fn measured(ask: impl FnMut(u32) -> Result<Vec<f64>, String> + Send + 'static) -> Self {
+        Self(Some(Arc::new(Mutex::new(ask))))
+    }
+
+    /// Returns the disturbance of a run that is about to begin; empty if none is measured.
+    pub(super) fn of(&self, run: u32) -> Result<Vec<f64>, String> {
+        let Some(ask) = &self.0 else {
+            return Ok(Vec::new());
+        };
+        let mut ask = ask.lock().unwrap_or_else(PoisonError::into_inner);
+        let disturbance =
+            (*ask)(run).map_err(|reason| format!("the disturbance of run {run}: {reason}"))?;
+        match disturbance.iter().find(|value| !value.is_finite()) {
+            None if disturbance.is_empty() => {
+                Err(format!("the disturbance of run {run} holds no number"))
+            }
+            None => Ok(disturbance),
+            Some(value) => Err(format!("the disturbance of run {run} holds {value}")),
+        }
+    }
+}
+
+impl fmt::Debug for Disturbance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "measured" } else { "not measured" })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_disturbance_is_refused() {
+        assert_eq!(Disturbance::default().of(3), Ok(Vec::new()));
+        let mut told = vec![vec![1.0, f64::NAN], Vec::new(), vec![21.5]];
+        let source = Disturbance::measured(move |_| told.pop().ok_or_else(|| "gone".to_owned()));
+        assert_eq!(source.of(0), Ok(vec![21.5]));
+        assert!(source.of(1).unwrap_err().contains("run 1 holds no number"));
+        assert!(source.of(2).unwrap_err().contains("run 2 holds NaN"));
+        assert_eq!(source.of(3).unwrap_err(), "the disturbance of run 3: gone");
+    }
+}

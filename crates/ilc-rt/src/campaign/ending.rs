@@ -1,0 +1,143 @@
+//! Storing the runs of a campaign, and its end.
+
+use std::fmt::Write as _;
+
+use super::keeper::{StoreEvent, Stored};
+use super::learner::Learner;
+use super::options::{Options, Outcome};
+use super::pace::Pacer;
+use super::reason;
+use super::running::Running;
+use crate::config::Cell;
+use crate::record::{EndStatus, Event, IterationRecord, StateName};
+use crate::servo::StopReason;
+
+impl Running<'_> {
+    pub(super) fn keep(&mut self, record: IterationRecord, asked: bool) {
+        self.keeper.append(record, asked);
+        self.poll_keeper();
+    }
+
+    /// Handles the outcomes of storing.
+    pub(super) fn poll_keeper(&mut self) {
+        while let Some(event) = self.keeper.poll() {
+            self.on_stored(event);
+        }
+    }
+
+    /// Publishes a stored run; the first one that cannot be stored stops the axes.
+    fn on_stored(&mut self, event: StoreEvent) {
+        let Stored { record, asked, result } = match event {
+            StoreEvent::Stored(stored) => *stored,
+            StoreEvent::NotAmended(error) => return self.fail(error.to_string()),
+        };
+        match result {
+            Some(Ok(id)) => {
+                self.publish_stored(id, &record);
+                if asked {
+                    self.unjudged.push_back((id, self.runs.len() - 1));
+                    self.amend_stored();
+                }
+            }
+            Some(Err(error)) => {
+                self.fail(error.to_string());
+                self.unkept.push(record);
+            }
+            None => self.unkept.push(record),
+        }
+    }
+
+    fn publish_stored(&mut self, id: i64, record: &IterationRecord) {
+        self.announcer.publish(&Event::Iteration {
+            id,
+            index: record.index,
+            digest: record.digest(),
+            figures: record.figures.clone(),
+        });
+        self.runs.push((record.index, record.figures.clone()));
+    }
+
+    /// Waits until all runs are stored, and tries once more to store those that could not be.
+    pub(super) fn flush(&mut self) {
+        for event in self.keeper.flush() {
+            self.on_stored(event);
+        }
+        self.poll_keeper();
+        if self.unkept.is_empty() {
+            return;
+        }
+        let first = self.unkept[0].index;
+        let mut is_saved = true;
+        for record in std::mem::take(&mut self.unkept) {
+            let Some(id) = self.keeper.retry(&record) else {
+                is_saved = false;
+                break;
+            };
+            self.publish_stored(id, &record);
+        }
+        let lost = if is_saved { "could not be kept at once" } else { "could not be kept" };
+        let kept = match self.runs.len() {
+            1 => "1 run is kept".to_owned(),
+            n => format!("{n} runs are kept"),
+        };
+        if let Some(why) = &mut self.failure {
+            let _ = write!(why, "; run {first} {lost}, {kept}");
+        }
+    }
+
+    pub(super) fn fail(&mut self, why: String) {
+        if self.failure.is_none() {
+            self.failure = Some(why);
+            self.mail.stop(libc::SIGABRT);
+        }
+    }
+
+    pub(super) fn end(mut self, pacer: Pacer, cell: &Cell, options: &Options) -> Outcome {
+        let result = pacer.end();
+        self.read_mail();
+        while self.awaited > 0
+            && let Some(update) = self.learner.as_mut().and_then(Learner::take_last)
+        {
+            self.awaited -= 1;
+            self.updates.push_back(update);
+        }
+        self.flush();
+        let (status, reason) = match (&self.failure, self.stopping, &result) {
+            (Some(why), _, _) => (EndStatus::Fault, why.clone()),
+            (None, Some(reason), _) => {
+                (reason::status(reason), reason::sentence(reason, cell, &options.session))
+            }
+            (None, None, None) => (
+                EndStatus::Fault,
+                "the loop's thread died; the drives stop by themselves".to_owned(),
+            ),
+            (None, None, Some(_)) => {
+                (EndStatus::Completed, format!("{} runs made and kept", options.iterations))
+            }
+        };
+        if status == EndStatus::Fault {
+            self.announcer.publish(&Event::Fault { reason: reason.clone() });
+        }
+        if let Some(result) = result {
+            if let Err(error) = result.released {
+                tracing::warn!("nodes could not be taken out of operation: {error}");
+            }
+            if let Some(timing) = result.timing {
+                self.announcer.publish(&Event::Latency {
+                    wake_late_us: timing.wake_late.figures(),
+                    execution_us: timing.execution.figures(),
+                });
+            }
+        }
+        let iterations = u32::try_from(self.runs.len()).unwrap_or(u32::MAX);
+        self.announcer
+            .publish(&Event::State { state: StateName::Stopped, iteration: self.phase_iteration });
+        self.announcer.publish(&Event::End { status, reason: reason.clone(), iterations });
+        let signal = match self.stopping {
+            Some(StopReason::Asked(signal)) if self.failure.is_none() => signal,
+            _ => 0,
+        };
+        let axis_units = cell.axes.iter().map(|axis| axis.unit.symbol()).collect();
+        Outcome { status, reason, signal, campaign: self.campaign, axis_units, runs: self.runs }
+    }
+}

@@ -1,0 +1,105 @@
+//! Refusals of a campaign; nothing has moved when one of these is returned.
+
+use crate::config::ConfigError;
+use crate::design::DesignError;
+use crate::fieldbus::bring_up::BringUpError;
+use crate::fieldbus::transport::{OpenError, syntaxes};
+use crate::identification::IdentificationError;
+use crate::library::LibraryError;
+
+/// A refusal, in one line.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError {
+    /// The cell description cannot be worked out.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// The experiment is refused.
+    #[error(transparent)]
+    Identification(#[from] IdentificationError),
+    /// The disturbance of the first run could not be had.
+    #[error("{0}")]
+    Disturbance(String),
+    /// The bus does not open.
+    #[error("{place}: {source}")]
+    Bus {
+        /// Origin of the address: file and key, or an option of the command line.
+        place: String,
+        /// Reason.
+        source: OpenError,
+    },
+    /// A node does not answer, or is not what the cell says.
+    #[error("{file}: {key} on {address}: {source}")]
+    BringUp {
+        /// Cell description.
+        file: String,
+        /// Which node, as `[[axis]] x node = 1`.
+        key: String,
+        /// Bus address.
+        address: String,
+        /// Reason.
+        source: Box<BringUpError>,
+    },
+    /// Another master commands the bus.
+    #[error(
+        "{file}: [bus] address = {address}: another master is at work on this bus ({heard} heard); \
+         nothing was sent; stop it, or choose another address"
+    )]
+    Occupied {
+        /// Cell description.
+        file: String,
+        /// Bus address.
+        address: String,
+        /// Command that was heard from it.
+        heard: crate::fieldbus::bring_up::listen::Command,
+    },
+    /// The bus failed while the nodes were started.
+    #[error("{file}: [bus] address = {address}: {source}")]
+    Start {
+        /// Cell description.
+        file: String,
+        /// Bus address.
+        address: String,
+        /// Reason.
+        source: crate::fieldbus::BusError,
+    },
+    /// The library.
+    #[error("{0}")]
+    Library(#[from] LibraryError),
+    /// There is nothing to go on with.
+    #[error("--resume: {0}")]
+    Resume(String),
+    /// A bus in one process was asked of a program that has no drives in it.
+    #[error(
+        "{place}: `{address}` has no drives in this program; allowed: {} (`ilc run` in Python runs \
+         it with simulated drives)",
+        syntaxes(false)
+    )]
+    NoDrivesInside {
+        /// Origin of the address: file and key, or an option of the command line.
+        place: String,
+        /// The address.
+        address: String,
+    },
+    /// Simulated drives could not be made of the cell.
+    #[error("{file}: [simulation]: {reason}")]
+    Simulation {
+        /// Cell description.
+        file: String,
+        /// Reason.
+        reason: String,
+    },
+    /// A thread could not be started.
+    #[error("the {what} thread could not be started: {source}")]
+    Thread {
+        /// Which one.
+        what: &'static str,
+        /// Reason given by the system.
+        source: std::io::Error,
+    },
+}
+
+impl From<ConfigError> for CampaignError {
+    fn from(source: ConfigError) -> Self {
+        Self::Design(source.into())
+    }
+}

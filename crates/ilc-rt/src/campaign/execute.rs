@@ -1,0 +1,242 @@
+//! Course of a campaign: bring-up, loop, end.
+
+use std::sync::Arc;
+
+use super::announce::Announcer;
+use super::claim::{Claim, claim};
+use super::error::CampaignError;
+use super::keeper::Keeper;
+use super::learner::{Learner, set_disturbance};
+use super::nodes;
+use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session};
+use super::pace::Pacer;
+use super::resume::Resumed;
+use super::rollback::RollbackPolicy;
+use super::running::{Parts, Running};
+use super::telemetry::Telemetry;
+use crate::config::Cell;
+use crate::design::Plan;
+use crate::fieldbus::Bus;
+use crate::identification::Experiment;
+use crate::learning::Law;
+use crate::library::Library;
+use crate::record::{Event, StateName};
+use crate::rt::RtReport;
+use crate::servo::{Cycle, mailbox};
+
+/// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
+const MAILBOX: usize = 8192;
+
+/// Runs a campaign on a bus (`cell.bus.address`, open), with the cell's law or another one; `observe` is
+/// called with every event.
+///
+/// # Errors
+/// [`CampaignError`] before anything has moved. Whatever happens later brings the axes to rest and is
+/// reported in the [`Outcome`].
+pub fn run(
+    cell: &Cell,
+    options: &Options,
+    bus: Box<dyn Bus>,
+    law: Option<Box<dyn Law>>,
+    observe: &mut dyn FnMut(&Event),
+) -> Result<Outcome, CampaignError> {
+    let cell = &options.apply(cell.clone());
+    let session = &options.session;
+    let mut plan = Plan::new(cell, session.measure, session.lockstep)?;
+    let (name, law) = if let Some(law) = law {
+        ("user", Some(law))
+    } else {
+        let prepared = plan.law(cell)?;
+        for warning in &prepared.warnings {
+            tracing::warn!("{warning}");
+        }
+        (cell.learning.law.as_str(), prepared.law)
+    };
+    // Without a law there is nothing to roll back. A gate decides on its own: it knows the tolerance, and
+    // when the machine has changed.
+    let growth_allowed = match &law {
+        Some(law) if !law.handles_rollback() => cell.learning.rollback(),
+        _ => f64::INFINITY,
+    };
+    let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
+    plan.name_law(cell, name, &parameters);
+    execute(cell, options, bus, Campaign { plan, law, input: None, growth_allowed }, observe)
+}
+
+/// Excites one axis in one run while all others hold still, and stores the run; its record names the law
+/// `excitation`, with the experiment as its parameters.
+///
+/// # Errors
+/// [`CampaignError`] before anything has moved, as for an experiment beyond the limits of its axis.
+pub fn identify(
+    cell: &Cell,
+    experiment: &Experiment,
+    session: &Session,
+    bus: Box<dyn Bus>,
+    observe: &mut dyn FnMut(&Event),
+) -> Result<Outcome, CampaignError> {
+    let planned = experiment.plan(cell, session.measure, session.lockstep)?;
+    let campaign = Campaign {
+        plan: planned.plan,
+        law: None,
+        input: Some(planned.input),
+        // Nothing is learned, so that there is nothing to roll back.
+        growth_allowed: f64::INFINITY,
+    };
+    let options = Options {
+        session: session.clone(),
+        iterations: 1,
+        learning: false,
+        resume: false,
+        allow_divergent: false,
+        disturbance: super::Disturbance::default(),
+    };
+    execute(cell, &options, bus, campaign, observe)
+}
+
+/// A planned campaign.
+struct Campaign {
+    plan: Plan,
+    law: Option<Box<dyn Law>>,
+    /// Input of the first run, if it is not to be zero.
+    input: Option<Vec<f64>>,
+    /// Growth of the error at which the best input is restored.
+    growth_allowed: f64,
+}
+
+fn execute(
+    cell: &Cell,
+    options: &Options,
+    mut bus: Box<dyn Bus>,
+    mut campaign: Campaign,
+    observe: &mut dyn FnMut(&Event),
+) -> Result<Outcome, CampaignError> {
+    let session = &options.session;
+    let library = open_library(options)?;
+    let mut policy =
+        RollbackPolicy::new(campaign.growth_allowed).forgiving(session.forgives_stalls());
+    let (claim, mut resumed) = begin_or_resume(&library, options, &mut campaign, &mut policy)?;
+    let Campaign { mut plan, law, input, .. } = campaign;
+    let learner = match law {
+        Some(law) if session.lockstep => Some(Learner::in_line(law)),
+        Some(law) => Some(Learner::on_thread(law)?),
+        None => None,
+    };
+    let first = resumed.next_index();
+    if first >= options.iterations {
+        return Err(CampaignError::Resume(format!(
+            "campaign {} has {first} of {} runs already; ask for more with --iterations",
+            plan.meta.campaign, options.iterations
+        )));
+    }
+    let telemetry = if session.telemetry && cell.telemetry.enabled {
+        Some(Telemetry::start(cell)?)
+    } else {
+        None
+    };
+    let mut announcer = Announcer::new(observe, telemetry, cell.cycle_s(), cell.n_axes());
+    announcer.publish(&Event::State { state: StateName::BringingUp, iteration: first });
+    nodes::start(cell, bus.as_mut(), session)?;
+
+    // Drives that were off do not begin where the last run left them. One run with the next input brings
+    // them there; it is not stored, as it says nothing about the law.
+    let warm_up = u32::from(!resumed.runs.is_empty());
+    plan.servo.runs = first - warm_up..options.iterations;
+    if session.forgives_stalls() {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
+        let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;
+        plan.servo.hold_cycles_max = patience;
+        plan.servo.overrun_cycles_max = plan.servo.overrun_cycles_max.max(patience);
+    }
+    let meta = Arc::new(plan.meta.clone());
+    let keeper = if session.lockstep {
+        Keeper::in_line(library, meta)
+    } else {
+        Keeper::on_thread(library, meta)?
+    };
+    let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
+    if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next.take()) {
+        policy.send(&mut mail, input, update_ms);
+    }
+    let cycle = Cycle::new(bus, plan.servo.clone(), plan.interpolator.clone(), loop_side);
+    let (mut pacer, granted) = if session.lockstep {
+        (Pacer::in_line(cycle), None)
+    } else {
+        let (pacer, report) = Pacer::on_clock(cycle)?;
+        (pacer, Some(report))
+    };
+    announcer.publish(&start_event(cell, options, &plan, first, granted));
+    // The loop reports changes only, and this is where it begins.
+    announcer.publish(&Event::State { state: StateName::Enabling, iteration: first });
+
+    let parts = Parts { announcer, keeper, claim, policy, learner, mail };
+    let mut running = Running::new(cell, options, plan, parts, resumed);
+    loop {
+        let has_ended = pacer.poll();
+        running.read_mail();
+        if has_ended {
+            break;
+        }
+    }
+    Ok(running.end(pacer, cell, options))
+}
+
+fn open_library(options: &Options) -> Result<Library, CampaignError> {
+    let path = &options.session.library;
+    if options.resume && !path.exists() {
+        // Opening it would leave an empty file where a name was mistyped.
+        let path = path.display();
+        return Err(CampaignError::Resume(format!("there is no library {path} to go on with")));
+    }
+    Ok(Library::open(path)?)
+}
+
+/// Claims a new campaign, or the newest one of the same kind with its runs and its next input.
+fn begin_or_resume(
+    library: &Library,
+    options: &Options,
+    campaign: &mut Campaign,
+    policy: &mut RollbackPolicy,
+) -> Result<(Claim, Resumed), CampaignError> {
+    let path = &options.session.library;
+    let meta = &mut campaign.plan.meta;
+    let law = campaign.law.as_deref_mut();
+    if options.resume {
+        // Claimed before it is read: what another program adds to it meanwhile would be made twice.
+        let newest = library.newest_campaign(&meta.fingerprint)?;
+        let held = newest.map_or_else(|| Ok(Claim::none()), |name| claim(path, &name))?;
+        return Ok((held, policy.resume(library, meta, law, &options.disturbance)?));
+    }
+    meta.campaign = library.new_campaign()?;
+    let held = claim(path, &meta.campaign)?;
+    let next_disturbance = options.disturbance.of(0).map_err(CampaignError::Disturbance)?;
+    if let Some(law) = law {
+        set_disturbance(law, &next_disturbance);
+    }
+    Ok((held, Resumed { next_disturbance, ..Resumed::default() }))
+}
+
+fn start_event(
+    cell: &Cell,
+    options: &Options,
+    plan: &Plan,
+    first: u32,
+    granted: Option<RtReport>,
+) -> Event {
+    Event::Start {
+        cell: cell.cell.name.clone(),
+        campaign: plan.meta.campaign.clone(),
+        n_samples: plan.n_samples(),
+        n_axes: cell.n_axes(),
+        axis_names: plan.meta.axis_names.clone(),
+        input_units: plan.meta.input_units.clone(),
+        cycle_s: cell.cycle_s(),
+        first_index: first,
+        iterations: options.iterations,
+        measure: plan.meta.measure.clone(),
+        law: plan.meta.law.clone(),
+        bus: cell.bus.address.clone(),
+        mode: if options.session.lockstep { "lockstep" } else { "realtime" },
+        rt: granted,
+    }
+}

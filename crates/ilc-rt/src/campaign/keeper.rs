@@ -1,0 +1,160 @@
+//! Storage of the runs: on a thread of its own in real time, in line in lock-step.
+//!
+//! Writing to a disk can take seconds when others write too. Meanwhile the loop's mailbox must be read and
+//! the next input handed over. A run that cannot be kept ends the campaign; those that come after it wait,
+//! so that the library never has a gap.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+use super::error::CampaignError;
+use crate::library::{Library, LibraryError};
+use crate::record::{Figures, IterationRecord, Meta};
+
+/// Outcome of storing a run.
+#[derive(Debug)]
+pub(super) struct Stored {
+    /// The run.
+    pub(super) record: IterationRecord,
+    /// The law was asked about it, and its decision is to be added.
+    pub(super) asked: bool,
+    /// Its key, or the reason why it is not stored; `None` if an earlier one could not be stored.
+    pub(super) result: Option<Result<i64, LibraryError>>,
+}
+
+/// Outcome of a request.
+#[derive(Debug)]
+pub(super) enum StoreEvent {
+    /// A run was stored, or not.
+    Stored(Box<Stored>),
+    /// The law's decision could not be added to a run.
+    NotAmended(LibraryError),
+}
+
+/// Request to the library.
+pub(super) enum StoreRequest {
+    /// Append a run; whether the law was asked about it.
+    Append(Box<IterationRecord>, bool),
+    /// Add the law's decision to a stored run.
+    Amend(i64, Figures),
+}
+
+/// The library, with the thread that writes to it.
+pub(super) enum Keeper {
+    /// In the caller's thread: the result is there at once.
+    InLine { store: Store, done: VecDeque<StoreEvent> },
+    /// On a thread of its own.
+    Thread {
+        requests: Option<Sender<StoreRequest>>,
+        events: Receiver<StoreEvent>,
+        thread: Option<JoinHandle<Store>>,
+    },
+}
+
+impl Keeper {
+    pub(super) fn in_line(library: Library, meta: Arc<Meta>) -> Self {
+        Self::InLine { store: Store { library, meta, is_stuck: false }, done: VecDeque::new() }
+    }
+
+    pub(super) fn on_thread(library: Library, meta: Arc<Meta>) -> Result<Self, CampaignError> {
+        let (requests, received) = channel();
+        let (done, events) = channel();
+        let mut store = Store { library, meta, is_stuck: false };
+        let thread = std::thread::Builder::new()
+            .name("ilc-library".to_owned())
+            .spawn(move || {
+                for request in received {
+                    if let Some(came) = store.execute(request) {
+                        // Nobody listens after a panic of the campaign; the run is kept all the same.
+                        let _ = done.send(came);
+                    }
+                }
+                store
+            })
+            .map_err(|source| CampaignError::Thread { what: "library", source })?;
+        Ok(Self::Thread { requests: Some(requests), events, thread: Some(thread) })
+    }
+
+    /// Begins to store a run.
+    pub(super) fn append(&mut self, record: IterationRecord, asked: bool) {
+        self.send(StoreRequest::Append(Box::new(record), asked));
+    }
+
+    /// Begins to add the law's decision to a stored run.
+    pub(super) fn amend(&mut self, id: i64, figures: Figures) {
+        self.send(StoreRequest::Amend(id, figures));
+    }
+
+    fn send(&mut self, request: StoreRequest) {
+        match self {
+            Self::InLine { store, done } => done.extend(store.execute(request)),
+            Self::Thread { requests: Some(requests), .. } => {
+                let _ = requests.send(request);
+            }
+            Self::Thread { .. } => {}
+        }
+    }
+
+    /// Returns the oldest outcome.
+    pub(super) fn poll(&mut self) -> Option<StoreEvent> {
+        match self {
+            Self::InLine { done, .. } => done.pop_front(),
+            Self::Thread { events, .. } => events.try_recv().ok(),
+        }
+    }
+
+    /// Waits until every request is done and returns the outcomes not taken by [`poll`](Self::poll); from
+    /// then on requests are executed in line.
+    pub(super) fn flush(&mut self) -> Vec<StoreEvent> {
+        let Self::Thread { requests, events, thread } = self else { return Vec::new() };
+        drop(requests.take());
+        let rest: Vec<StoreEvent> = events.iter().collect();
+        if let Some(store) = thread.take().and_then(|thread| thread.join().ok()) {
+            *self = Self::InLine { store, done: VecDeque::new() };
+        }
+        rest
+    }
+
+    /// Tries once more to store a run, now that the axes are at rest.
+    pub(super) fn retry(&mut self, record: &IterationRecord) -> Option<i64> {
+        match self {
+            Self::InLine { store, .. } => store.library.append(&store.meta, record).ok(),
+            Self::Thread { .. } => None,
+        }
+    }
+}
+
+/// A library, and the provenance of the runs written into it.
+pub(super) struct Store {
+    library: Library,
+    meta: Arc<Meta>,
+    is_stuck: bool,
+}
+
+impl Store {
+    fn execute(&mut self, request: StoreRequest) -> Option<StoreEvent> {
+        match request {
+            StoreRequest::Append(record, asked) => {
+                Some(StoreEvent::Stored(Box::new(self.keep(*record, asked))))
+            }
+            StoreRequest::Amend(..) if self.is_stuck => None,
+            StoreRequest::Amend(id, figures) => {
+                self.library.judge(id, &figures).err().map(StoreEvent::NotAmended)
+            }
+        }
+    }
+
+    fn keep(&mut self, record: IterationRecord, asked: bool) -> Stored {
+        if self.is_stuck {
+            return Stored { record, asked, result: None };
+        }
+        let result = self.library.append(&self.meta, &record);
+        if result.is_err() {
+            self.is_stuck = true;
+            self.library.hurry();
+        }
+        Stored { record, asked, result: Some(result) }
+    }
+}

@@ -1,0 +1,29 @@
+//! The campaign: brings the nodes up, paces the loop, learns between runs, keeps every run, and publishes
+//! what happens.
+//!
+//! The owner of loop, library and telemetry; only `cli` and the Python bindings import it. Cold: it reads
+//! the loop's mailbox and never shares anything else with it.
+
+mod announce;
+mod claim;
+mod collect;
+mod disturbance;
+mod ending;
+mod error;
+mod execute;
+mod keeper;
+mod learner;
+mod nodes;
+mod options;
+mod pace;
+mod reason;
+mod resume;
+mod rollback;
+mod running;
+mod telemetry;
+
+pub use disturbance::Disturbance;
+pub use error::CampaignError;
+pub use execute::{identify, run};
+pub use nodes::drive_setup;
+pub use options::{Options, Outcome, Session};

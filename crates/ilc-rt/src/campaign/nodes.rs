@@ -1,0 +1,110 @@
+//! Brings every node of the cell up, with errors that name the key of the cell description.
+
+use std::time::Duration;
+
+use super::error::CampaignError;
+use super::options::{SIMULATED_PATIENCE_S, Session};
+use crate::config::{Axis, AxisUnit, Cell, ConfigError};
+use crate::design;
+use crate::fieldbus::bring_up::{BringUpError, DriveSetup, bring_up, bring_up_encoder, listen};
+use crate::fieldbus::canopen::NmtCommand;
+use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
+use crate::fieldbus::{Bus, BusError};
+
+/// Heartbeat of the nodes in real time.
+const HEARTBEAT_MS: u16 = 100;
+
+/// Resets, checks and configures all nodes, then starts them together. No axis moves.
+pub(super) fn start(
+    cell: &Cell,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<(), CampaignError> {
+    let lockstep = session.lockstep;
+    let file = cell.file.display().to_string();
+    let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
+    let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
+    refuse_company(cell, bus)?;
+    let refused = |key: String| {
+        let file = file.clone();
+        move |source: BringUpError| CampaignError::BringUp {
+            file,
+            key,
+            address: cell.bus.address.clone(),
+            source: Box::new(source),
+        }
+    };
+    for axis in &cell.axes {
+        bring_up(bus, &drive_setup(cell, axis, lockstep)?)
+            .map_err(refused(format!("[[axis]] {} node = {}", axis.name, axis.node)))?;
+    }
+    if let Some(tool) = &cell.tcp_encoder {
+        bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
+            .map_err(refused(format!("[tcp_encoder] node = {}", tool.node)))?;
+    }
+    command_all(bus, NmtCommand::Start).map_err(|source| CampaignError::Start {
+        file,
+        address: cell.bus.address.clone(),
+        source,
+    })
+}
+
+/// Listens before anything is sent: a bus with another master is left alone.
+fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
+    let numbers = cell.axes.iter().map(|axis| axis.node);
+    let numbers = numbers.chain(cell.tcp_encoder.iter().map(|tool| tool.node));
+    let nodes = numbers.map(|number| design::node(cell, number)).collect::<Result<Vec<_>, _>>()?;
+    let file = || cell.file.display().to_string();
+    let address = || cell.bus.address.clone();
+    match listen::other_master(bus, &nodes, listen::LISTEN) {
+        Ok(None) => Ok(()),
+        Ok(Some(heard)) => Err(CampaignError::Occupied { file: file(), address: address(), heard }),
+        Err(source) => Err(CampaignError::Start { file: file(), address: address(), source }),
+    }
+}
+
+/// Returns what the drive of an axis is set up to.
+///
+/// # Errors
+/// [`ConfigError`] for a node number or a scale that validation would have refused.
+pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetup, ConfigError> {
+    let scale = design::scale(cell, axis.counts_per_m)?;
+    let unit = match axis.unit {
+        AxisUnit::M => UNIT_METRE,
+        AxisUnit::Rad => UNIT_RADIAN,
+    };
+    let units = scale.si_units(unit);
+    let limits = &axis.limits;
+    // Positions and velocities of a valid cell fit; what an acceleration cannot hold is its highest.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let unsigned = |value_si: f64| (value_si * axis.counts_per_m).round() as u32;
+    let signed = |value_si: f64| scale.to_counts(value_si).unwrap_or(0);
+    // A drive brakes by itself when commands stop coming for as long as the loop waits for answers.
+    let deadline_ms = f64::from(cell.safety.silent_cycles_max) * cell.cycle_s() * 1e3;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let deadline_ms = deadline_ms.ceil() as u16;
+    Ok(DriveSetup {
+        node: design::node(cell, axis.node)?,
+        mode: design::mode(axis),
+        cycle_us: cell.cell.cycle_us,
+        following_error_max_counts: unsigned(limits.following_error_max_m),
+        position_min_counts: signed(limits.position_min_m),
+        position_max_counts: signed(limits.position_max_m),
+        velocity_max_counts_s: unsigned(limits.velocity_max_m_s),
+        acceleration_max_counts_s2: unsigned(limits.acceleration_max_m_s2),
+        position_unit: units.map(|(position, _)| position),
+        velocity_unit: units.map(|(_, velocity)| velocity),
+        heartbeat_ms: if lockstep { 0 } else { HEARTBEAT_MS },
+        rpdo_deadline_ms: if lockstep { 0 } else { deadline_ms },
+        answer_timeout: Duration::from_secs_f64(cell.safety.answer_timeout_s),
+    })
+}
+
+/// Takes all nodes out of operation again.
+pub(super) fn release(bus: &mut dyn Bus) -> Result<(), BusError> {
+    command_all(bus, NmtCommand::PreOperational)
+}
+
+fn command_all(bus: &mut dyn Bus, command: NmtCommand) -> Result<(), BusError> {
+    bus.send(&command.frame(None))
+}

@@ -1,0 +1,122 @@
+//! Options of a campaign: the one description of their names, ranges, defaults and help.
+//!
+//! `ilc-rt` parses its command line with it, `ilc` and the Python class `Campaign` read it through
+//! [`crate::cli::described`] and hand their options over as such a command line. A field of this file is an
+//! option everywhere.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicI32;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{ArgAction, Args};
+
+use super::disturbance::Disturbance;
+use crate::config::{Cell, LawName, Measure};
+use crate::fieldbus::transport::syntaxes;
+use crate::record::{EndStatus, Figures};
+
+/// Time for which a stall of controller and simulated drives is forgiven, as it stalls both.
+pub(super) const SIMULATED_PATIENCE_S: f64 = 1.0;
+
+/// Options of everything that moves axes: a campaign or an experiment.
+#[derive(Clone, Debug, Args)]
+pub struct Session {
+    /// Bus address in place of the cell's.
+    #[arg(long, value_name = "ADDRESS", help = bus_help())]
+    pub bus: Option<String>,
+    /// Measurement to use in place of the cell's.
+    #[arg(long, value_parser = PossibleValuesParser::new(["encoder", "tcp"]).map(measure))]
+    pub measure: Option<Measure>,
+    /// Pace the loop by the drives' answers, without a wall clock: campaigns repeat bit for bit.
+    #[arg(long)]
+    pub lockstep: bool,
+    /// The drives are simulated on this computer: forgive a stall of up to 1 s, which stalls them as well.
+    #[arg(long = "simulated-drives")]
+    pub simulated: bool,
+    /// Library file that every run is stored in.
+    #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
+    pub library: PathBuf,
+    /// Do not publish on Zenoh.
+    #[arg(long = "no-telemetry", action = ArgAction::SetFalse)]
+    pub telemetry: bool,
+    /// Number of a signal, set to bring the axes to rest.
+    #[arg(skip)]
+    pub stop: Arc<AtomicI32>,
+}
+
+impl Session {
+    /// Returns whether stalls are forgiven: in lock-step there is no clock that could show one.
+    pub(super) fn forgives_stalls(&self) -> bool {
+        self.simulated && !self.lockstep
+    }
+}
+
+/// Options of a campaign.
+#[derive(Clone, Debug, Args)]
+pub struct Options {
+    /// Bus, measurement, pace and library.
+    #[command(flatten)]
+    pub session: Session,
+    /// Runs in the whole campaign, resumed ones included; the first is without learning.
+    #[arg(long, short = 'n', value_name = "N", default_value_t = 10, value_parser = iterations)]
+    pub iterations: u32,
+    /// Repeat the program without learning.
+    #[arg(long = "no-learning", action = ArgAction::SetFalse)]
+    pub learning: bool,
+    /// Resume the newest campaign of this cell, program, measurement and law.
+    #[arg(long)]
+    pub resume: bool,
+    /// Start the law even if the analysis predicts divergence.
+    #[arg(long)]
+    pub allow_divergent: bool,
+    /// Measured disturbance before each run: stored with the run, and given to the law.
+    #[arg(skip)]
+    pub disturbance: Disturbance,
+}
+
+impl Options {
+    /// Returns the cell with what the options put in the place of its own keys.
+    pub fn apply(&self, mut cell: Cell) -> Cell {
+        cell.learning.allow_divergent |= self.allow_divergent;
+        if !self.learning {
+            cell.learning.law = LawName::None;
+        }
+        if let Some(address) = &self.session.bus {
+            address.clone_into(&mut cell.bus.address);
+        }
+        cell
+    }
+}
+
+/// Returns the help text of `--bus`.
+fn bus_help() -> String {
+    format!("Bus address in place of the cell's: {}", syntaxes(false))
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "as the parser of arguments hands it on")]
+fn measure(name: String) -> Measure {
+    if name == "tcp" { Measure::Tcp } else { Measure::Encoder }
+}
+
+/// Parses the number of runs, which are counted in 32 bits.
+fn iterations(text: &str) -> Result<u32, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| format!("allowed 1 to {}", u32::MAX))
+}
+
+/// End of a campaign.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// How it ended.
+    pub status: EndStatus,
+    /// Reason, one sentence.
+    pub reason: String,
+    /// Signal that asked to stop, or 0.
+    pub signal: i32,
+    /// Name of the campaign in the library.
+    pub campaign: String,
+    /// Units of the axes, in their order.
+    pub axis_units: Vec<&'static str>,
+    /// Number and figures of every run of the campaign, resumed ones included.
+    pub runs: Vec<(u32, Figures)>,
+}

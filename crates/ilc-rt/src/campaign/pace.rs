@@ -1,0 +1,85 @@
+//! Runs the loop: on a real-time thread, or in line in lock-step.
+
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::error::CampaignError;
+use super::nodes;
+use crate::fieldbus::BusError;
+use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
+use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
+
+/// Period at which the mailbox of a loop on its own thread is read.
+const READ_EVERY: Duration = Duration::from_millis(2);
+/// Time before a tick at which the loop's thread stops sleeping and spins.
+const SPIN: Nanos = Nanos::from_micros(100);
+
+/// The loop, on its own thread or in line.
+pub(super) enum Pacer {
+    /// On a thread of its own.
+    Clock { thread: Option<JoinHandle<LoopResult>> },
+    /// Here, a tick at a time.
+    Answers { cycle: Option<Box<Cycle>> },
+}
+
+/// Result of the loop.
+pub(super) struct LoopResult {
+    /// Outcome of taking the nodes out of operation.
+    pub(super) released: Result<(), BusError>,
+    pub(super) timing: Option<Timing>,
+}
+
+impl Pacer {
+    pub(super) fn in_line(cycle: Cycle) -> Self {
+        Self::Answers { cycle: Some(Box::new(cycle)) }
+    }
+
+    /// Starts the loop's thread; returns the scheduling that the system granted it.
+    pub(super) fn on_clock(mut cycle: Cycle) -> Result<(Self, RtReport), CampaignError> {
+        let (report, granted) = std::sync::mpsc::sync_channel(1);
+        let thread = std::thread::Builder::new()
+            .name("ilc-servo".to_owned())
+            .spawn(move || {
+                let mut timing = Timing::default();
+                // Set-up of the thread is over before the first tick; nobody waits for the report.
+                let _ = report.send(thread::enter(RtRequest::default()));
+                run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
+                // At once, and not when the campaign has put its things away: by then the nodes may have
+                // missed their commands, or be in another campaign.
+                LoopResult { released: release(cycle), timing: Some(timing) }
+            })
+            .map_err(|source| CampaignError::Thread { what: "servo", source })?;
+        let report = granted.recv().unwrap_or_default();
+        Ok((Self::Clock { thread: Some(thread) }, report))
+    }
+
+    /// Runs one tick in lock-step, or waits a while for the loop's thread; returns whether the loop has ended.
+    pub(super) fn poll(&mut self) -> bool {
+        match self {
+            Self::Clock { thread } => {
+                if thread.as_ref().is_none_or(JoinHandle::is_finished) {
+                    return true;
+                }
+                std::thread::sleep(READ_EVERY);
+                false
+            }
+            Self::Answers { cycle } => {
+                cycle.as_mut().is_none_or(|cycle| cycle.tick(0) == TickStatus::Stopped)
+            }
+        }
+    }
+
+    /// Ends the loop; `None` if its thread has died.
+    pub(super) fn end(self) -> Option<LoopResult> {
+        match self {
+            Self::Clock { thread } => thread?.join().ok(),
+            Self::Answers { cycle } => {
+                Some(LoopResult { released: release(*cycle?), timing: None })
+            }
+        }
+    }
+}
+
+fn release(cycle: Cycle) -> Result<(), BusError> {
+    nodes::release(cycle.into_bus().as_mut())
+}

@@ -1,0 +1,209 @@
+//! Reason why the axes were stopped, as a sentence that names axis, node and numbers.
+
+use super::options::{SIMULATED_PATIENCE_S, Session};
+use crate::config::{AxisUnit, Cell};
+use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
+use crate::fieldbus::cia402::Statusword;
+use crate::record::EndStatus;
+use crate::servo::{StopReason, Stranger};
+
+/// The sentence for a reason to stop.
+pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> String {
+    let axis = |index: usize| {
+        cell.axes.get(index).map_or_else(
+            || format!("axis {index}"),
+            |axis| format!("axis {} (node {})", axis.name, axis.node),
+        )
+    };
+    // In lock-step the loop waits for every answer, so that the count of cycles says nothing.
+    let unanswered = |cycles: u32| {
+        if session.lockstep {
+            format!("no answer in {} s", cell.safety.answer_timeout_s)
+        } else {
+            format!(
+                "no answer in {cycles} cycles ({:.0} ms)",
+                f64::from(cycles) * cell.cycle_s() * 1e3
+            )
+        }
+    };
+    let ms = |cycles: u32| f64::from(cycles) * cell.cycle_s() * 1e3;
+    match reason {
+        StopReason::Asked(signal) => asked(signal),
+        StopReason::DriveFault { axis: index, code, following_error_m } => format!(
+            "drive of {} faulted: {}; its following error was {}",
+            axis(index),
+            if code == emcy::CODE_RESET {
+                "no emergency message says why".to_owned()
+            } else {
+                format!("0x{code:04X} {}", emcy::meaning(code))
+            },
+            distance(cell, index, following_error_m)
+        ),
+        StopReason::NotEnabled { axis: index, statusword } => {
+            let state = Statusword(statusword)
+                .state()
+                .map_or_else(|| "no known state".to_owned(), |state| state.to_string());
+            format!(
+                "drive of {} is not enabled: statusword 0x{statusword:04X}, {state}",
+                axis(index)
+            )
+        }
+        StopReason::SilentAxis { axis: index, cycles } => {
+            format!("drive of {} is silent: {}", axis(index), unanswered(cycles))
+        }
+        StopReason::SilentPdo { axis: index, pdo, cycles } => format!(
+            "TPDO{pdo} of the drive of {} is silent: {}, while TPDO{} comes",
+            axis(index),
+            unanswered(cycles),
+            3 - pdo
+        ),
+        StopReason::WrongLength { node, pdo, n_bytes } => {
+            let what = carried(cell, node, pdo);
+            format!("no {what} of node {node}: its TPDO{pdo} has {n_bytes} bytes, 8 are needed")
+        }
+        StopReason::SilentTool { cycles } => format!(
+            "tool measurement (node {}) is silent: {}",
+            cell.tcp_encoder.map_or(0, |tool| tool.node),
+            unanswered(cycles)
+        ),
+        StopReason::NodeLeft { node } => format!("node {node} restarted"),
+        StopReason::NodeStopped { node, state: NmtState::Stopped } => {
+            format!("node {node} was stopped by NMT")
+        }
+        StopReason::NodeStopped { node, state } => {
+            format!("node {node} was taken out of operation by NMT: it is {state}")
+        }
+        StopReason::OtherMaster(stranger) => format!(
+            "another master is on the bus: {} seen that this controller did not send",
+            strange(stranger)
+        ),
+        StopReason::FollowingError { axis: index, error_m } => format!(
+            "{}: following error {}, limits.following_error_max_m allows {}",
+            axis(index),
+            distance(cell, index, error_m.abs()),
+            distance(
+                cell,
+                index,
+                cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m)
+            )
+        ),
+        StopReason::OutsideLimits { axis, position_m } => outside(cell, axis, position_m),
+        StopReason::Jump { axis: index, step_m } => format!(
+            "{}: its position jumped by {} from one answer to the next, farther than it can move",
+            axis(index),
+            distance(cell, index, step_m)
+        ),
+        StopReason::NotFinite { axis: index } => {
+            format!("{}: the command was not a finite number", axis(index))
+        }
+        StopReason::Overrun { cycles } => format!(
+            "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late; {}",
+            ms(cycles),
+            forgiven(cell, session)
+        ),
+        StopReason::Stalled { axis: index, cycles } => format!(
+            "this computer stalled for {:.0} ms: the loop woke {cycles} cycles late, and the drive of \
+             {} stopped by itself, as no command came in time (0x{:04X})",
+            ms(cycles),
+            axis(index),
+            emcy::CODE_RPDO_TIMEOUT
+        ),
+        StopReason::Bus(error) => format!("{error}"),
+    }
+}
+
+/// Names the origin of a stop request.
+fn asked(signal: i32) -> String {
+    match signal {
+        libc::SIGINT => "stopped by Ctrl-C".to_owned(),
+        libc::SIGTERM => "stopped by SIGTERM".to_owned(),
+        libc::SIGPIPE => "stopped as nobody reads the events any more".to_owned(),
+        libc::SIGHUP => "stopped as its terminal is gone (SIGHUP)".to_owned(),
+        other => format!("stopped by signal {other}"),
+    }
+}
+
+/// Names the content of a node's TPDO.
+fn carried(cell: &Cell, node: u8, pdo: u8) -> &'static str {
+    let is_tool = cell.tcp_encoder.is_some_and(|tool| tool.node == node);
+    match pdo {
+        _ if is_tool => "position",
+        1 => "status",
+        _ => "following error",
+    }
+}
+
+/// Longest stall of this computer.
+fn forgiven(cell: &Cell, session: &Session) -> String {
+    if session.simulated {
+        format!("with simulated drives {SIMULATED_PATIENCE_S} s are forgiven")
+    } else {
+        format!("safety.overrun_cycles_max allows {}", cell.safety.overrun_cycles_max)
+    }
+}
+
+/// Describes the position of an axis that may not be switched on there.
+fn outside(cell: &Cell, axis: usize, position_m: f64) -> String {
+    let Some(axis) = cell.axes.get(axis) else {
+        return format!("axis {axis} is at {position_m}, outside its limits");
+    };
+    let unit = axis.unit.symbol();
+    let (low, high) = (axis.limits.position_min_m, axis.limits.position_max_m);
+    // As the counts have it, without the digits that are only rounding.
+    let resolution = 10_f64.powf(axis.counts_per_m.log10().ceil());
+    let position = (position_m * resolution).round() / resolution;
+    format!(
+        "axis {} is at {position} {unit}, outside {low} to {high} {unit}: bring it back by other \
+         means; nothing has moved",
+        axis.name
+    )
+}
+
+/// Names the message of another master.
+fn strange(stranger: Stranger) -> String {
+    match stranger {
+        Stranger::Sync => "SYNC".to_owned(),
+        Stranger::Nmt(command, node) => {
+            let what = match command {
+                NmtCommand::Start => "start",
+                NmtCommand::Stop => "stop",
+                NmtCommand::PreOperational => "pre-operational",
+                NmtCommand::ResetNode => "reset",
+                NmtCommand::ResetCommunication => "communication reset",
+            };
+            let whom = node.map_or_else(|| "all nodes".to_owned(), |node| format!("node {node}"));
+            format!("NMT {what} of {whom}")
+        }
+        Stranger::Command(node) => format!("a command (RPDO) to node {node}"),
+        Stranger::Request(node) => format!("an SDO request to node {node}"),
+    }
+}
+
+/// A distance of an axis in thousandths of its unit.
+fn distance(cell: &Cell, axis: usize, distance: f64) -> String {
+    let unit = cell.axes.get(axis).map_or(AxisUnit::M, |axis| axis.unit);
+    format!("{:.3} m{}", distance * 1e3, unit.symbol())
+}
+
+/// Returns whether a reason is a request or a fault.
+pub(super) fn status(reason: StopReason) -> EndStatus {
+    match reason {
+        StopReason::Asked(_) => EndStatus::Interrupted,
+        StopReason::DriveFault { .. }
+        | StopReason::NotEnabled { .. }
+        | StopReason::SilentAxis { .. }
+        | StopReason::SilentPdo { .. }
+        | StopReason::WrongLength { .. }
+        | StopReason::SilentTool { .. }
+        | StopReason::NodeLeft { .. }
+        | StopReason::NodeStopped { .. }
+        | StopReason::OtherMaster(_)
+        | StopReason::FollowingError { .. }
+        | StopReason::OutsideLimits { .. }
+        | StopReason::Jump { .. }
+        | StopReason::NotFinite { .. }
+        | StopReason::Stalled { .. }
+        | StopReason::Overrun { .. }
+        | StopReason::Bus(_) => EndStatus::Fault,
+    }
+}

@@ -1,0 +1,86 @@
+//! Resuming a campaign from the library.
+
+use super::disturbance::Disturbance;
+use super::error::CampaignError;
+use super::learner::{learn, set_disturbance};
+use super::rollback::{Decision, RollbackPolicy};
+use crate::learning::{Law, LearningError};
+use crate::library::Library;
+use crate::record::{Figures, IterationRecord, Meta};
+
+/// A resumed campaign.
+#[derive(Debug, Default)]
+pub(super) struct Resumed {
+    /// Number and figures of the stored runs.
+    pub(super) runs: Vec<(u32, Figures)>,
+    /// Input of the next run, and the time that it took to learn it.
+    pub(super) next: Option<(Vec<f64>, f64)>,
+    /// Disturbance of the next run.
+    pub(super) next_disturbance: Vec<f64>,
+}
+
+impl Resumed {
+    /// Returns the number of the first run to come.
+    pub(super) fn next_index(&self) -> u32 {
+        self.runs.last().map_or(0, |(index, _)| index + 1)
+    }
+}
+
+impl RollbackPolicy {
+    /// Resumes the newest campaign of the same fingerprint: its runs, and the input of the next one with
+    /// the time that it took to learn it.
+    ///
+    /// All runs pass through the law again, which then has the state of an unbroken campaign.
+    pub(super) fn resume(
+        &mut self,
+        library: &Library,
+        meta: &mut Meta,
+        mut law: Option<&mut (dyn Law + '_)>,
+        disturbance: &Disturbance,
+    ) -> Result<Resumed, CampaignError> {
+        let Some(campaign) = library.newest_campaign(&meta.fingerprint)? else {
+            return Err(CampaignError::Resume(
+                "the library has no campaign of this cell, program, measurement and law".to_owned(),
+            ));
+        };
+        let rows = library.list(Some(&campaign))?;
+        meta.campaign = campaign;
+        let mut last: Option<(Decision, IterationRecord)> = None;
+        for row in &rows {
+            let mut record = library.load(row.id)?.record;
+            if let Some(law) = law.as_deref_mut() {
+                set_disturbance(law, &record.disturbance);
+                if let Some((Decision::Learn, before)) = last.take() {
+                    learn(law, &before.input, &before.error_m).input.map_err(refused)?;
+                }
+            }
+            let decision = self.decide(&mut record);
+            if let (Decision::RollBack(_), Some(law)) = (&decision, law.as_deref_mut()) {
+                law.on_rollback();
+            }
+            last = Some((decision, record));
+        }
+        let index = last.as_ref().map_or(0, |(_, record)| record.index + 1);
+        let next_disturbance = disturbance.of(index).map_err(CampaignError::Disturbance)?;
+        if let Some(law) = law.as_deref_mut() {
+            set_disturbance(law, &next_disturbance);
+        }
+        let next = match (last, law) {
+            (Some((Decision::RollBack(input), _)), _) => Some(Ok((input, 0.0))),
+            (Some((Decision::Learn, record)), Some(law)) => {
+                let update = learn(law, &record.input, &record.error_m);
+                Some(update.input.map(|input| (input, update.update_ms)))
+            }
+            (Some((_, record)), _) => Some(Ok((record.input, 0.0))),
+            (None, _) => None,
+        };
+        let next = next.transpose().map_err(refused)?;
+        let runs = rows.into_iter().map(|row| (row.record.index, row.record.figures)).collect();
+        Ok(Resumed { runs, next, next_disturbance })
+    }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
+fn refused(error: LearningError) -> CampaignError {
+    CampaignError::Resume(format!("the law refused a run: {error}"))
+}

@@ -1,0 +1,263 @@
+//! Decision on the input of the next run: learned, the best one so far, or the last one once more.
+
+use crate::record::{Figures, IterationRecord};
+use crate::servo::Mailbox;
+
+/// Times that the best input is restored before learning is switched off for good.
+const ROLLBACKS_MAX: u32 = 2;
+/// Reason why learning is off then.
+const GROWN: &str = "the error grew twice";
+
+/// Decision after a run.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Decision {
+    /// Learn from it.
+    Learn,
+    /// Restore this input, as the error has grown too far.
+    RollBack(Vec<f64>),
+    /// Repeat the input.
+    Hold,
+}
+
+/// The best run so far.
+#[derive(Debug)]
+struct Best {
+    rms: f64,
+    input: Vec<f64>,
+    disturbance: Vec<f64>,
+}
+
+/// Rollback of the learned input when the error grows.
+#[derive(Debug)]
+pub(super) struct RollbackPolicy {
+    rollback_ratio: f64,
+    best: Option<Best>,
+    rollbacks: u32,
+    /// Number of the table that the next run is to use.
+    promised: u32,
+    late_updates: u32,
+    /// Computing time of each table handed to the loop; table n at n - 1.
+    update_ms: Vec<f64>,
+    table_in_use: u32,
+    /// Overruns are no disturbance, as the plant stood still as well.
+    forgives_overruns: bool,
+}
+
+impl RollbackPolicy {
+    pub(super) fn new(rollback_ratio: f64) -> Self {
+        Self {
+            rollback_ratio,
+            best: None,
+            rollbacks: 0,
+            promised: 0,
+            late_updates: 0,
+            update_ms: Vec::new(),
+            table_in_use: 0,
+            forgives_overruns: false,
+        }
+    }
+
+    /// Sets whether overruns are forgiven, as where a computer that stalls stalls the plant too: its time
+    /// passes by SYNC, so that the samples of a run with overruns are those of one without.
+    pub(super) fn forgiving(self, forgives_overruns: bool) -> Self {
+        Self { forgives_overruns, ..self }
+    }
+
+    /// Returns whether computer or bus disturbed a run, so that it is no evidence.
+    pub(super) fn is_disturbed(&self, figures: &Figures) -> bool {
+        figures.missing_samples > 0 || figures.overruns > 0 && !self.forgives_overruns
+    }
+
+    /// Notes that a run began with a table.
+    pub(super) fn started(&mut self, table: u32) {
+        self.table_in_use = table;
+        self.late_updates += u32::from(table < self.promised);
+    }
+
+    /// Notes that the law was asked for an update.
+    pub(super) fn asked(&mut self) {
+        self.promised = self.next_number();
+    }
+
+    fn next_number(&self) -> u32 {
+        u32::try_from(self.update_ms.len() + 1).unwrap_or(u32::MAX)
+    }
+
+    /// Writes the learning figures of a run into its record.
+    pub(super) fn annotate(&self, record: &mut IterationRecord) {
+        record.figures.late_updates = self.late_updates;
+        record.figures.update_ms = (self.table_in_use as usize)
+            .checked_sub(1)
+            .and_then(|table| self.update_ms.get(table))
+            .copied()
+            .unwrap_or(0.0);
+    }
+
+    /// Decides what follows a run, and marks it if the best input is restored because of it.
+    ///
+    /// Growth is measured in the RMS error over the best run so far. After two restorations the law
+    /// has shown that it does not converge here, and learning stays off. A run that computer or bus
+    /// disturbed (overruns, missing samples) is no evidence, for the law or against it, be it the first
+    /// or seemingly the best: its input is repeated. Nor is a larger error under another disturbance than
+    /// the best run's evidence against the law: it goes on learning.
+    pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
+        let rms = record.figures.judged_by();
+        let off = self.rollbacks >= ROLLBACKS_MAX;
+        if off {
+            record.figures.learning_off = true;
+            record.figures.remark = Some(format!("learning is off: {GROWN}"));
+        }
+        if self.is_disturbed(&record.figures) {
+            if !off {
+                record.figures.remark = Some(disturbance_remark(&record.figures));
+            }
+            return Decision::Hold;
+        }
+        match &self.best {
+            Some(best)
+                if rms > best.rms * self.rollback_ratio
+                    && !off
+                    && record.disturbance == best.disturbance =>
+            {
+                self.rollbacks += 1;
+                record.figures.rolled_back = true;
+                record.figures.learning_off = self.rollbacks >= ROLLBACKS_MAX;
+                record.figures.remark =
+                    Some(growth_remark(rms / best.rms, record.figures.learning_off));
+                Decision::RollBack(best.input.clone())
+            }
+            Some(best) if rms >= best.rms => {
+                if off {
+                    Decision::Hold
+                } else {
+                    Decision::Learn
+                }
+            }
+            _ => {
+                let (input, disturbance) = (record.input.clone(), record.disturbance.clone());
+                self.best = Some(Best { rms, input, disturbance });
+                if off { Decision::Hold } else { Decision::Learn }
+            }
+        }
+    }
+
+    /// Hands the loop the input of its next run.
+    pub(super) fn send(&mut self, mail: &mut Mailbox, input: Vec<f64>, update_ms: f64) {
+        let number = self.next_number();
+        // Refused only if two tables wait already; the run then repeats an input and is counted late.
+        self.promised = number;
+        if mail.send_table(number, input.into_boxed_slice()).is_ok() {
+            self.update_ms.push(update_ms);
+        }
+    }
+}
+
+fn disturbance_remark(figures: &Figures) -> String {
+    format!(
+        "nothing is learned from it, its input is repeated: {} overruns, {} samples missing",
+        figures.overruns, figures.missing_samples
+    )
+}
+
+/// Remark on a restored input; `growth` is the error over the best one.
+fn growth_remark(growth: f64, off: bool) -> String {
+    let how_far = if growth < 1e3 {
+        format!("to {growth:.2} times the best one")
+    } else {
+        "far beyond the best one".to_owned()
+    };
+    let then = if off { format!("; learning is off from here on: {GROWN}") } else { String::new() };
+    format!("the RMS error grew {how_far}: the best input is restored{then}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(rms: f64) -> IterationRecord {
+        IterationRecord {
+            input: vec![rms],
+            figures: Figures { tracking_rms_m: rms, ..Figures::default() },
+            ..IterationRecord::default()
+        }
+    }
+
+    #[test]
+    fn growth_restores_the_best_input_twice_and_then_learning_is_off() {
+        let mut policy = RollbackPolicy::new(1.5);
+        assert_eq!(policy.decide(&mut record(1.0)), Decision::Learn);
+        assert_eq!(policy.decide(&mut record(0.4)), Decision::Learn);
+        assert_eq!(policy.decide(&mut record(0.5)), Decision::Learn, "within the ratio");
+        let mut grown = record(0.7);
+        assert_eq!(policy.decide(&mut grown), Decision::RollBack(vec![0.4]));
+        assert!(grown.figures.rolled_back && !grown.figures.learning_off);
+        let said = grown.figures.remark.unwrap();
+        assert_eq!(
+            said,
+            "the RMS error grew to 1.75 times the best one: the best input is restored"
+        );
+        assert_eq!(policy.decide(&mut record(0.4)), Decision::Learn);
+        let mut burst = record(f64::INFINITY);
+        assert_eq!(policy.decide(&mut burst), Decision::RollBack(vec![0.4]));
+        assert!(burst.figures.learning_off);
+        let said = burst.figures.remark.unwrap();
+        assert!(said.contains("far beyond") && said.contains("off from here on"), "{said}");
+        let mut after = record(0.4);
+        assert_eq!(policy.decide(&mut after), Decision::Hold);
+        assert!(after.figures.learning_off && !after.figures.rolled_back);
+        assert_eq!(after.figures.remark.unwrap(), "learning is off: the error grew twice");
+        assert_eq!(policy.decide(&mut record(9.0)), Decision::Hold);
+    }
+
+    #[test]
+    fn an_error_under_another_disturbance_is_not_held_against_the_law() {
+        let under =
+            |rms, disturbance| IterationRecord { disturbance: vec![disturbance], ..record(rms) };
+        let mut policy = RollbackPolicy::new(1.5);
+        assert_eq!(policy.decide(&mut under(0.4, 20.0)), Decision::Learn);
+        assert_eq!(policy.decide(&mut under(9.0, 80.0)), Decision::Learn);
+        assert_eq!(policy.decide(&mut under(9.0, 20.0)), Decision::RollBack(vec![0.4]));
+    }
+
+    #[test]
+    fn a_disturbed_run_is_neither_learned_from_nor_held_against_the_law() {
+        let disturbed = |rms, overruns, missing_samples| {
+            let mut record = record(rms);
+            (record.figures.overruns, record.figures.missing_samples) = (overruns, missing_samples);
+            record
+        };
+        let mut policy = RollbackPolicy::new(1.5);
+        // The first one neither, nor one that seems to be the best.
+        assert_eq!(policy.decide(&mut disturbed(0.1, 0, 1)), Decision::Hold);
+        assert_eq!(policy.decide(&mut record(1.0)), Decision::Learn);
+        let mut worse = disturbed(9.0, 3, 0);
+        assert_eq!(policy.decide(&mut worse), Decision::Hold);
+        assert!(!worse.figures.rolled_back);
+        let said = worse.figures.remark.unwrap();
+        assert!(said.ends_with("its input is repeated: 3 overruns, 0 samples missing"), "{said}");
+        assert_eq!(policy.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
+        assert_eq!(policy.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
+        assert_eq!(policy.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
+    }
+
+    #[test]
+    fn a_stall_that_stalls_the_plant_as_well_disturbs_nothing() {
+        let mut policy = RollbackPolicy::new(1.5).forgiving(true);
+        let mut stalled = record(1.0);
+        stalled.figures.overruns = 50;
+        assert_eq!(policy.decide(&mut stalled), Decision::Learn);
+        stalled.figures.missing_samples = 1;
+        assert_eq!(policy.decide(&mut stalled), Decision::Hold);
+    }
+
+    #[test]
+    fn a_run_with_an_older_table_than_promised_is_late() {
+        let mut policy = RollbackPolicy::new(1.5);
+        policy.started(0);
+        policy.asked();
+        policy.started(0);
+        let mut late = record(1.0);
+        policy.annotate(&mut late);
+        assert_eq!(late.figures.late_updates, 1);
+    }
+}

@@ -1,0 +1,84 @@
+//! Predictions before the first run: the nominal model of learning, the error of a run without
+//! learning, and whether the law will converge.
+
+use super::error::DesignError;
+use super::plan::model;
+use crate::config::{Cell, Interface};
+use crate::learning::analysis::{divergence, overreach};
+use crate::learning::{Law, LearningError};
+use crate::model::StateSpace;
+
+/// Returns the model from the learned input of all axes to their positions.
+///
+/// # Errors
+/// [`DesignError::Model`] if the cell's figures make none.
+pub fn learning_model(cell: &Cell) -> Result<StateSpace, DesignError> {
+    model(cell).map_err(|source| DesignError::Model { file: file(cell), source })
+}
+
+/// Returns the error of a run without learning, by the model: set point minus response.
+///
+/// csp: `e = d - P d`, `d` being the way from the start. csv: `e = d - P (kv d + kf d/dt d)`.
+///
+/// # Shapes
+/// - `reference_m` and the result: `n_samples` x `n_axes`, time first
+/// # Errors
+/// [`DesignError::Model`] if the cell's figures make no model.
+pub fn first_error(cell: &Cell, reference_m: &[f64]) -> Result<Vec<f64>, DesignError> {
+    let n_axes = cell.n_axes();
+    let way = |k: usize, axis: usize| reference_m[k * n_axes + axis] - reference_m[axis];
+    let n_samples = reference_m.len() / n_axes.max(1);
+    let mut drive = vec![0.0; reference_m.len()];
+    for (i, axis) in cell.axes.iter().enumerate() {
+        for k in 0..n_samples {
+            let ahead = way((k + 1).min(n_samples - 1), i);
+            drive[k * n_axes + i] = match (axis.interface, axis.position_loop) {
+                (Interface::Csv, Some(position_loop)) => {
+                    let velocity_m_s = (ahead - way(k, i)) / cell.cycle_s();
+                    position_loop.gain_per_s * way(k, i)
+                        + position_loop.velocity_feedforward * velocity_m_s
+                }
+                _ => way(k, i),
+            };
+        }
+    }
+    let response = learning_model(cell)?
+        .simulate(&drive, None)
+        .map_err(|source| DesignError::Model { file: file(cell), source })?;
+    Ok(response.iter().enumerate().map(|(i, y)| way(i / n_axes, i % n_axes) - y).collect())
+}
+
+/// Refuses a law that will not converge with the cell's model, unless the cell allows it; returns the
+/// verdict as a sentence, and warnings: of one whose error will rise before it falls, and of a low-pass
+/// that lets through what the law cannot learn.
+pub(super) fn judge(
+    law: &mut dyn Law,
+    cell: &Cell,
+    n_samples: usize,
+) -> Result<(String, Vec<String>), DesignError> {
+    let model = learning_model(cell)?;
+    let refused = |source| DesignError::Learning { file: file(cell), source };
+    let verdict = divergence(law, &model, n_samples).map_err(refused)?;
+    let mut warnings = Vec::new();
+    if let Some(verdict) = &verdict {
+        if !verdict.converges && !cell.learning.allow_divergent {
+            let why = verdict.why.clone();
+            return Err(refused(LearningError::Divergent { why }));
+        }
+        if !verdict.converges || verdict.rises {
+            warnings.push(format!(
+                "[learning]: the error will not fall in every run: {}, growth up to {:.3}",
+                verdict.why, verdict.transient_growth
+            ));
+        }
+    }
+    if let Some(found) = overreach(law, &model, n_samples).map_err(refused)? {
+        warnings.push(format!("[learning]: {found}"));
+    }
+    law.reset();
+    Ok((verdict.map_or_else(String::new, |verdict| verdict.why), warnings))
+}
+
+fn file(cell: &Cell) -> String {
+    cell.file.display().to_string()
+}

@@ -1,0 +1,19 @@
+//! From a cell description to laws, programs and forecasts, before anything moves.
+//!
+//! Checks and refuses; touches neither a bus nor a library. `identification`, `campaign`, `cli` and the
+//! Python bindings may import it. Cold.
+//!
+//! Family: `forecast`, `law` and `plan` work one cell description out together.
+
+mod error;
+mod forecast;
+mod law;
+mod plan;
+mod program;
+mod weights;
+
+pub use error::DesignError;
+pub use forecast::{first_error, learning_model};
+pub use law::Prepared;
+pub use plan::Plan;
+pub(crate) use plan::{input_unit, mode, node, scale};

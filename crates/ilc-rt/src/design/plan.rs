@@ -1,0 +1,294 @@
+//! From a cell description to what the loop and the law are made of; refuses before anything moves.
+
+use std::time::Duration;
+
+use super::error::DesignError;
+use super::law::{self, Prepared};
+use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, Measure};
+use crate::control::PositionLoop;
+use crate::fieldbus::bring_up::load;
+use crate::fieldbus::canopen::NodeId;
+use crate::fieldbus::cia402::{Mode, Scale};
+use crate::fieldbus::transport::scheme_of;
+use crate::model::{
+    Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
+};
+use crate::record::{Meta, fingerprint};
+use crate::rt::Nanos;
+use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
+use crate::trajectory::{AxisLimits, Interpolator};
+
+/// Time that drives may take to be switched on.
+const ENABLE_S: f64 = 3.0;
+
+/// Plan of a cell's runs: nothing in it can fail any more.
+#[derive(Debug)]
+pub struct Plan {
+    /// The servo cycle's own description; runs are filled in by the campaign.
+    pub servo: ServoSpec,
+    /// Set points.
+    pub interpolator: Interpolator,
+    /// Set points of a whole run, `n_samples * n_axes`.
+    pub reference_m: Vec<f64>,
+    /// Measurement that is learned from.
+    pub measure: Measure,
+    /// Provenance of the records; the campaign's name is filled in by the campaign.
+    pub meta: Meta,
+    /// Worst-case share of the bus taken by cyclic traffic.
+    pub bus_load: f64,
+}
+
+impl Plan {
+    /// Plans the runs of a cell, with another measurement to learn from if one is given.
+    ///
+    /// # Errors
+    /// [`DesignError`] for a program beyond the limits, an overloaded bus, or a measurement that
+    /// is not there.
+    pub fn new(cell: &Cell, measure: Option<Measure>, lockstep: bool) -> Result<Self, DesignError> {
+        crate::config::check(cell)?;
+        let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
+        let interpolator = super::program::interpolator(cell, &limits)?;
+        let reference_m = interpolator.reference();
+        super::program::check_range(cell, &reference_m)?;
+        let program = super::program::program_json(cell, &reference_m);
+        Self::with(cell, measure, lockstep, interpolator, program)
+    }
+
+    /// Plans the runs of a cell with other set points than those of its program; `program` describes them
+    /// as JSON.
+    pub(crate) fn with(
+        cell: &Cell,
+        measure: Option<Measure>,
+        lockstep: bool,
+        interpolator: Interpolator,
+        program: String,
+    ) -> Result<Self, DesignError> {
+        let file = cell.file.display().to_string();
+        let mut cell = cell.clone();
+        cell.learning.measure = measure.unwrap_or(cell.learning.measure);
+        crate::config::check(&cell)?;
+        let bus_load = bus_load(&cell).map_err(|source| DesignError::Load { file, source })?;
+        let reference_m = interpolator.reference();
+        Ok(Self {
+            servo: servo_spec(&cell, lockstep)?,
+            interpolator,
+            reference_m,
+            measure: cell.learning.measure,
+            meta: Meta {
+                cell: cell.cell.name.clone(),
+                campaign: String::new(),
+                fingerprint: String::new(),
+                law: String::new(),
+                law_parameters: String::new(),
+                measure: match cell.learning.measure {
+                    Measure::Encoder => "encoder".to_owned(),
+                    Measure::Tcp => "tcp".to_owned(),
+                },
+                program,
+                cycle_s: cell.cycle_s(),
+                n_axes: cell.n_axes(),
+                axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
+                input_units: cell.axes.iter().map(|axis| input_unit(axis).to_owned()).collect(),
+            },
+            bus_load,
+        })
+    }
+
+    /// Samples in a run.
+    pub fn n_samples(&self) -> usize {
+        self.interpolator.n_samples()
+    }
+
+    /// Makes the law that the cell names, with its ladder and its gate.
+    ///
+    /// A law that will not converge with the cell's own model is refused, unless the cell says
+    /// `allow_divergent`. What else the analysis has to say is in [`Prepared::warnings`].
+    ///
+    /// # Errors
+    /// [`DesignError::Model`] or [`DesignError::Learning`] if model or weights are unusable, or
+    /// the law will not converge.
+    pub fn law(&self, cell: &Cell) -> Result<Prepared, DesignError> {
+        law::prepare(cell, &self.reference_m)
+    }
+
+    /// Completes the provenance with the law that will be used.
+    pub fn name_law(&mut self, cell: &Cell, name: &str, parameters: &str) {
+        name.clone_into(&mut self.meta.law);
+        parameters.clone_into(&mut self.meta.law_parameters);
+        let axes: Vec<_> = cell
+            .axes
+            .iter()
+            .map(|a| format!("{:?}", (&a.name, a.interface, a.limits, a.model, a.position_loop)))
+            .collect();
+        let whole = format!(
+            "{:?}",
+            (
+                &self.meta.cell,
+                axes,
+                &self.meta.program,
+                cell.cell.cycle_us,
+                &self.meta.measure,
+                name,
+                parameters,
+                cell.learning.input_max_m,
+                cell.learning.input_max_m_s,
+                // Of weights that vary along the run the parameters do not tell every number.
+                (name == cell.learning.law.as_str()).then(|| cell.learning.law_text()),
+            )
+        );
+        self.meta.fingerprint = fingerprint(&whole);
+    }
+}
+
+/// The model that learning uses: the axes' closed loops side by side.
+pub(super) fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
+    let mut models = cell.axes.iter().map(|axis| axis_model(axis, cell.cycle_s()));
+    let first =
+        models.next().unwrap_or_else(|| StateSpace::static_gain(nalgebra::dmatrix![1.0], None))?;
+    models.try_fold(first, |all, next| all.append(&next?))
+}
+
+/// The closed loop of one axis from learned input to position.
+///
+/// csp: `w^2 / (s^2 + 2 d w s + w^2)`. csv: `G / (1 + kv z^-1 G)` with `G = a / (s (s + a))`, as the
+/// position that the loop here sees is one cycle old. Both sampled with a zero-order hold.
+fn axis_model(axis: &Axis, cycle_s: f64) -> Result<StateSpace, ModelError> {
+    let turn = std::f64::consts::TAU;
+    let hold = |model: &StateSpace| discretize(model, cycle_s, Method::ZeroOrderHold);
+    let n_delay = axis.model.delay_samples as usize;
+    match axis.interface {
+        Interface::Csp => {
+            let frequency_hz = axis.model.natural_frequency_hz.unwrap_or(1.0);
+            let damping = axis.model.damping.unwrap_or(1.0);
+            hold(&second_order(turn * frequency_hz, damping)?)?.delayed(n_delay)
+        }
+        Interface::Csv => {
+            let bandwidth = turn * axis.model.velocity_bandwidth_hz.unwrap_or(1.0);
+            let velocity = from_transfer_function(&[bandwidth], &[1.0, bandwidth, 0.0], None)?;
+            let gain = axis.position_loop.map_or(1.0, |position_loop| position_loop.gain_per_s);
+            let controller =
+                StateSpace::static_gain(nalgebra::dmatrix![gain], Some(cycle_s))?.delayed(1)?;
+            hold(&velocity)?.delayed(n_delay)?.feedback(&controller)
+        }
+    }
+}
+
+fn axis_limits(axis: &Axis) -> AxisLimits {
+    AxisLimits {
+        velocity_max_m_s: axis.limits.velocity_max_m_s,
+        acceleration_max_m_s2: axis.limits.acceleration_max_m_s2,
+        jerk_max_m_s3: axis.limits.jerk_max_m_s3,
+    }
+}
+
+pub(crate) fn input_unit(axis: &Axis) -> &'static str {
+    match (axis.interface, axis.unit) {
+        (Interface::Csp, AxisUnit::M) => "m",
+        (Interface::Csv, AxisUnit::M) => "m/s",
+        (Interface::Csp, AxisUnit::Rad) => "rad",
+        (Interface::Csv, AxisUnit::Rad) => "rad/s",
+    }
+}
+
+/// Cyclic frames: a command and two answers a drive, one answer of the tool, SYNC, and room for one
+/// frame of something else.
+fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
+    let mut payloads = vec![0, 8];
+    payloads.extend(cell.axes.iter().flat_map(|_| [8, 8, 8]));
+    payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
+    // Only a real bus has bits; the others are as fast as the machine, and their load is stated for comparison.
+    if scheme_of(&cell.bus.address).is_some_and(|scheme| scheme.has_bits) {
+        return load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, cell.bus.load_max)
+            .map(|found| found.ratio());
+    }
+    let bits: u64 = payloads.iter().map(|&n_bytes| load::frame_bits(n_bytes)).sum();
+    Ok(bits as f64 / (f64::from(cell.bus.bitrate_bit_s) * cell.cycle_s()))
+}
+
+fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
+    let ticks = |span_s: f64| -> u32 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "checked spans"
+        )]
+        let ticks = (span_s / cell.cycle_s()).ceil() as u32;
+        ticks
+    };
+    Ok(ServoSpec {
+        axes: cell
+            .axes
+            .iter()
+            .map(|axis| {
+                Ok(AxisSpec {
+                    node: node(cell, axis.node)?,
+                    mode: mode(axis),
+                    scale: scale(cell, axis.counts_per_m)?,
+                    limits: axis_limits(axis),
+                    position_min_m: axis.limits.position_min_m,
+                    position_max_m: axis.limits.position_max_m,
+                    following_error_max_m: axis.limits.following_error_max_m,
+                    position_loop: PositionLoop {
+                        gain_per_s: axis.position_loop.map_or(0.0, |p| p.gain_per_s),
+                        velocity_feedforward: axis
+                            .position_loop
+                            .map_or(0.0, |p| p.velocity_feedforward),
+                    },
+                    input_max: match axis.interface {
+                        Interface::Csp => cell.learning.input_max_m,
+                        Interface::Csv => cell.learning.input_max_m_s,
+                    },
+                })
+            })
+            .collect::<Result<_, ConfigError>>()?,
+        tool: cell
+            .tcp_encoder
+            .map(|tool| -> Result<_, ConfigError> {
+                Ok(ToolSpec {
+                    node: node(cell, tool.node)?,
+                    scale: scale(cell, tool.counts_per_m)?,
+                })
+            })
+            .transpose()?,
+        cycle: Nanos::from_micros(cell.cell.cycle_us),
+        pace: if lockstep {
+            Pace::Answers(Duration::from_secs_f64(cell.safety.answer_timeout_s))
+        } else {
+            Pace::Clock
+        },
+        runs: 0..0,
+        start_m: cell.program.start_m.clone(),
+        return_feed_m_s: cell.program.feed_m_s,
+        settle_ticks: ticks(cell.program.settle_s),
+        enable_ticks: ticks(ENABLE_S),
+        silent_cycles_max: cell.safety.silent_cycles_max,
+        overrun_cycles_max: cell.safety.overrun_cycles_max,
+        hold_cycles_max: 0,
+    })
+}
+
+/// The node of a number that validation has seen already.
+pub(crate) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
+    NodeId::new(number).ok_or_else(|| refused(cell, "node", &number, "1 to 127"))
+}
+
+pub(crate) fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
+    Scale::new(counts_per_m).ok_or_else(|| refused(cell, "counts_per_m", &counts_per_m, "above 0"))
+}
+
+fn refused(cell: &Cell, key: &str, value: &dyn std::fmt::Display, allowed: &str) -> ConfigError {
+    ConfigError::Value {
+        file: cell.file.display().to_string(),
+        key: key.to_owned(),
+        value: value.to_string(),
+        allowed: allowed.to_owned(),
+    }
+}
+
+/// The command interface of an axis in the words of the drive profile.
+pub(crate) fn mode(axis: &Axis) -> Mode {
+    match axis.interface {
+        Interface::Csp => Mode::Csp,
+        Interface::Csv => Mode::Csv,
+    }
+}

@@ -1,0 +1,315 @@
+//! Bring-up: from an unknown node to a drive that waits for NMT start. Cold: it waits for answers.
+
+use std::time::{Duration, Instant};
+
+use super::error::BringUpError;
+use super::remote::Remote;
+use super::sdo_client::SdoClient;
+use super::{process_data, scaling, settings};
+use crate::fieldbus::Bus;
+use crate::fieldbus::canopen::{Heartbeat, NmtCommand, NmtState, NodeId};
+use crate::fieldbus::cia402::{Controlword, Mode, State, Statusword, objects, pdo_map};
+
+/// How long the following error may exceed its window before the drive faults (object 0x6066), in ms.
+pub const FOLLOWING_ERROR_TIME_MS: u16 = 10;
+
+/// How long a drive that was left moving may take to come to rest before its power is taken.
+const REST: Duration = Duration::from_millis(500);
+/// How often a question is asked again whose answer takes time.
+const ASK_EVERY: Duration = Duration::from_millis(1);
+
+/// How often a question must be answered twice until two nodes are the reason.
+const TWIN_QUESTIONS: u32 = 4;
+/// How long after an answer a second one is waited for.
+const TWIN_WAIT: Duration = Duration::from_millis(20);
+
+/// What a drive is set up to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriveSetup {
+    /// The drive.
+    pub node: NodeId,
+    /// Mode of operation.
+    pub mode: Mode,
+    /// Servo cycle, in microseconds: the period between two SYNCs.
+    pub cycle_us: u32,
+    /// Following error at which the drive faults, in counts.
+    pub following_error_max_counts: u32,
+    /// Lowest position, in counts.
+    pub position_min_counts: i32,
+    /// Highest position, in counts.
+    pub position_max_counts: i32,
+    /// Highest speed, in counts/s.
+    pub velocity_max_counts_s: u32,
+    /// Highest acceleration, in counts/s²: the deceleration of every stop.
+    pub acceleration_max_counts_s2: u32,
+    /// The SI unit, coded as in object 0x60A8, that one count is, if it is one.
+    pub position_unit: Option<u32>,
+    /// The SI unit, coded as in object 0x60A9, that one count per second is, if it is one.
+    pub velocity_unit: Option<u32>,
+    /// Period of the drive's heartbeat, in milliseconds; 0: none (lock-step).
+    pub heartbeat_ms: u16,
+    /// How long the drive goes on without a command before it stops, in milliseconds; 0: for ever
+    /// (lock-step).
+    pub rpdo_deadline_ms: u16,
+    /// How long the drive may take to boot, and to answer each question.
+    pub answer_timeout: Duration,
+}
+
+/// Who a drive says it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriveIdentity {
+    /// Device type, object 0x1000.
+    pub device_type: u32,
+    /// Supported drive modes, object 0x6502.
+    pub supported_modes: u32,
+    /// Vendor, product, revision and serial number, object 0x1018; 0 where the node gives none.
+    pub identity: [u32; 4],
+}
+
+/// Who an encoder node says it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncoderIdentity {
+    /// Device type, object 0x1000.
+    pub device_type: u32,
+    /// Vendor, product, revision and serial number, object 0x1018; 0 where the node gives none.
+    pub identity: [u32; 4],
+}
+
+/// Resets a drive, checks what it is and configures it; it is left pre-operational and without power.
+///
+/// Reset communication, boot-up, identity (0x1000 profile 402, 0x6502), power off, PDOs (all switched
+/// off, then those of the loop mapped), and every object that shapes motion or the stop after a fault:
+/// read, put right where it is wrong, read again. NMT start is the caller's, for all nodes at once.
+/// Frames of others that arrive meanwhile are discarded.
+///
+/// # Errors
+/// [`BringUpError`] names node, object or step, what was found and what was needed.
+pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, BringUpError> {
+    let node = setup.node;
+    let period = interpolation_period(setup.cycle_us)
+        .ok_or(BringUpError::Cycle { node, cycle_us: setup.cycle_us })?;
+    reset(bus, node, setup.answer_timeout)?;
+    let mut remote = Remote { bus, client: SdoClient::new(node, setup.answer_timeout), node };
+    let device_type = remote.check_profile(objects::PROFILE_DRIVE)?;
+    remote.refuse_twins(setup.answer_timeout)?;
+    let identity = remote.identity()?;
+    let supported_modes = remote.read("supported modes", objects::SUPPORTED_MODES, 0)?;
+    if supported_modes & setup.mode.supported_bit() == 0 {
+        let (mode, supported) = (setup.mode, supported_modes);
+        return Err(BringUpError::ModeNotSupported { node, mode, supported });
+    }
+    remote.take_power(setup)?;
+
+    process_data::close_all(&mut remote)?;
+    remote.ensure_all(&settings::communication(node, setup.heartbeat_ms, setup.cycle_us))?;
+    remote.forget_heartbeats()?;
+    process_data::open(
+        &mut remote,
+        pdo_map::COMMAND_PDO,
+        &pdo_map::command_map(setup.mode),
+        setup.rpdo_deadline_ms,
+    )?;
+    process_data::open(&mut remote, pdo_map::STATUS_PDO, &pdo_map::STATUS_MAP, 0)?;
+    process_data::open(&mut remote, pdo_map::EXTRA_PDO, &pdo_map::EXTRA_MAP, 0)?;
+
+    scaling::check(&mut remote, setup)?;
+    remote.ensure_all(&settings::interpolation(period))?;
+    remote.ensure_all(&settings::reactions(setup))?;
+    remote.ensure_all(&settings::motion(setup))?;
+    remote.set_mode(setup.mode, setup.answer_timeout)?;
+    remote.ensure_all(&settings::offsets())?;
+    Ok(DriveIdentity { device_type, supported_modes, identity })
+}
+
+/// Resets an encoder node, checks what it is and maps its two positions; it is left pre-operational.
+///
+/// # Errors
+/// [`BringUpError`] names node, step, what was expected and what was found.
+pub fn bring_up_encoder(
+    bus: &mut dyn Bus,
+    node: NodeId,
+    timeout: Duration,
+) -> Result<EncoderIdentity, BringUpError> {
+    reset(bus, node, timeout)?;
+    let mut remote = Remote { bus, client: SdoClient::new(node, timeout), node };
+    let device_type = remote.check_profile(objects::PROFILE_ENCODER)?;
+    remote.refuse_twins(timeout)?;
+    let identity = remote.identity()?;
+    process_data::close_all(&mut remote)?;
+    remote.ensure_all(&settings::communication(node, 0, 0))?;
+    remote.forget_heartbeats()?;
+    process_data::open(&mut remote, pdo_map::ENCODER_PDO, &pdo_map::ENCODER_MAP, 0)?;
+    Ok(EncoderIdentity { device_type, identity })
+}
+
+/// Sends reset communication and waits for the boot-up that follows it, not one from before.
+fn reset(bus: &mut dyn Bus, node: NodeId, timeout: Duration) -> Result<(), BringUpError> {
+    let failed = |source| BringUpError::Bus { node, step: "reset", source };
+    while bus.recv(Duration::ZERO).map_err(failed)?.is_some() {}
+    bus.send(&NmtCommand::ResetCommunication.frame(Some(node))).map_err(failed)?;
+    let deadline = Instant::now() + timeout;
+    loop {
+        let left = deadline.saturating_duration_since(Instant::now());
+        let Some(frame) = bus.recv(left).map_err(failed)? else {
+            return Err(BringUpError::NoBootUp { node, timeout });
+        };
+        if Heartbeat::decode(&frame) == Some(Heartbeat { node, state: NmtState::BootUp }) {
+            return Ok(());
+        }
+        if left.is_zero() {
+            return Err(BringUpError::NoBootUp { node, timeout });
+        }
+    }
+}
+
+/// Returns `(value, exponent)` with `value * 10^exponent` seconds equal to the cycle, if there is one.
+fn interpolation_period(cycle_us: u32) -> Option<(u8, i8)> {
+    [(-3_i8, 1000_u32), (-4, 100), (-5, 10), (-6, 1)].into_iter().find_map(|(exponent, unit_us)| {
+        let value = u8::try_from(cycle_us / unit_us).ok()?;
+        (value > 0 && cycle_us.is_multiple_of(unit_us)).then_some((value, exponent))
+    })
+}
+
+impl Remote<'_> {
+    fn check_profile(&mut self, expected: u16) -> Result<u32, BringUpError> {
+        let device_type = self.read("device type", objects::DEVICE_TYPE, 0)?;
+        let [low, high, ..] = device_type.to_le_bytes();
+        let found = u16::from_le_bytes([low, high]);
+        if found == expected {
+            Ok(device_type)
+        } else {
+            Err(BringUpError::Profile { node: self.node, expected, found, device_type })
+        }
+    }
+
+    /// Asks a question a few times and refuses a node that answers it twice each time: it is two. Once
+    /// would not do, as a bus may well carry a frame twice.
+    fn refuse_twins(&mut self, timeout: Duration) -> Result<(), BringUpError> {
+        for _ in 0..TWIN_QUESTIONS {
+            if self.client.count_answers(self.bus, objects::DEVICE_TYPE, timeout, TWIN_WAIT) < 2 {
+                return Ok(());
+            }
+        }
+        Err(BringUpError::TwoNodes { node: self.node })
+    }
+
+    /// Reads the identity; all but the vendor are optional in CiA 301.
+    fn identity(&mut self) -> Result<[u32; 4], BringUpError> {
+        let mut identity = [0; 4];
+        for (value, sub) in identity.iter_mut().zip(1..) {
+            *value = self.find("identity", objects::IDENTITY, sub)?.unwrap_or(0);
+        }
+        Ok(identity)
+    }
+
+    /// Clears every heartbeat that the node watches: the one of a master that is gone would stop it.
+    fn forget_heartbeats(&mut self) -> Result<(), BringUpError> {
+        let step = "watched heartbeats";
+        let n_watched = self.find(step, objects::CONSUMER_HEARTBEAT, 0)?.unwrap_or(0);
+        for sub in 1..=u8::try_from(n_watched).unwrap_or(u8::MAX) {
+            self.ensure(&settings::watched_heartbeat(sub))?;
+        }
+        Ok(())
+    }
+
+    /// Brings a drive that an earlier master left under power to rest, and takes its power.
+    fn take_power(&mut self, setup: &DriveSetup) -> Result<(), BringUpError> {
+        if !has_power(self.state()?.1) {
+            return Ok(());
+        }
+        // How to brake may have been left wrong as well. What is refused now is told later, when the
+        // whole list is gone through.
+        for setting in settings::reactions(setup) {
+            match self.ensure(&setting) {
+                Ok(_) | Err(BringUpError::Value { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        self.command(Controlword::QUICK_STOP, REST)?;
+        let (word, state) = self.command(Controlword::DISABLE_VOLTAGE, setup.answer_timeout)?;
+        if !has_power(state) {
+            return Ok(());
+        }
+        Err(BringUpError::UnderPower {
+            node: self.node,
+            statusword: word.0,
+            state: state.map_or_else(|| "no known state".to_owned(), |state| state.to_string()),
+        })
+    }
+
+    /// Writes a controlword and waits until the drive has no power any more, or the time is over.
+    fn command(
+        &mut self,
+        controlword: Controlword,
+        timeout: Duration,
+    ) -> Result<(Statusword, Option<State>), BringUpError> {
+        self.write("taking power", objects::CONTROLWORD, 0, &controlword.0.to_le_bytes())?;
+        let deadline = Instant::now() + timeout;
+        loop {
+            let (word, state) = self.state()?;
+            if !has_power(state) || Instant::now() >= deadline {
+                return Ok((word, state));
+            }
+            std::thread::sleep(ASK_EVERY);
+        }
+    }
+
+    fn state(&mut self) -> Result<(Statusword, Option<State>), BringUpError> {
+        let [low, high, ..] = self.read("state", objects::STATUSWORD, 0)?.to_le_bytes();
+        let word = Statusword(u16::from_le_bytes([low, high]));
+        Ok((word, word.state()))
+    }
+
+    /// Sets the mode and waits until the drive shows it.
+    fn set_mode(&mut self, mode: Mode, timeout: Duration) -> Result<(), BringUpError> {
+        let step = "mode of operation";
+        self.write(step, objects::MODE_OF_OPERATION, 0, &mode.code().to_le_bytes())?;
+        let deadline = Instant::now() + timeout;
+        loop {
+            let [byte, ..] = self.read(step, objects::MODE_DISPLAY, 0)?.to_le_bytes();
+            let found = byte.cast_signed();
+            if found == mode.code() {
+                return Ok(());
+            }
+            if Instant::now() >= deadline {
+                return Err(BringUpError::ModeNotShown { node: self.node, mode, found, timeout });
+            }
+            std::thread::sleep(ASK_EVERY);
+        }
+    }
+}
+
+/// Whether a drive in this state may move its axis.
+fn has_power(state: Option<State>) -> bool {
+    match state {
+        Some(
+            State::SwitchedOn
+            | State::OperationEnabled
+            | State::QuickStopActive
+            | State::FaultReactionActive,
+        )
+        | None => true,
+        Some(
+            State::NotReadyToSwitchOn
+            | State::SwitchOnDisabled
+            | State::ReadyToSwitchOn
+            | State::Fault,
+        ) => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cycles_become_value_and_exponent() {
+        assert_eq!(interpolation_period(1000), Some((1, -3)));
+        assert_eq!(interpolation_period(2000), Some((2, -3)));
+        assert_eq!(interpolation_period(1250), Some((125, -5)));
+        assert_eq!(interpolation_period(500), Some((5, -4)));
+        assert_eq!(interpolation_period(125), Some((125, -6)));
+        assert_eq!(interpolation_period(1001), None);
+        assert_eq!(interpolation_period(0), None);
+    }
+}

@@ -1,0 +1,173 @@
+//! Why a node could not be brought up, in one line.
+
+use std::time::Duration;
+
+use super::sdo_client::SdoError;
+use crate::fieldbus::BusError;
+use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
+use crate::fieldbus::cia402::Mode;
+
+/// Why a node could not be brought up: node, step, expected and found.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BringUpError {
+    /// Nothing came after the reset.
+    #[error(
+        "node {node}: no boot-up within {timeout:?} after reset; is it powered, on this bus and set to this number?"
+    )]
+    NoBootUp {
+        /// The node.
+        node: NodeId,
+        /// How long was waited.
+        timeout: Duration,
+    },
+    /// Two nodes have the same number.
+    #[error(
+        "two nodes answer as node {node}: each question is answered twice; give one of them another \
+         number, or stop the second simulator"
+    )]
+    TwoNodes {
+        /// The number.
+        node: NodeId,
+    },
+    /// The node is of another kind.
+    #[error(
+        "node {node}: device type: expected profile {expected}, found {found} (0x1000 = 0x{device_type:08X})"
+    )]
+    Profile {
+        /// The node.
+        node: NodeId,
+        /// Profile number that was expected.
+        expected: u16,
+        /// Profile number that was found.
+        found: u16,
+        /// The whole object.
+        device_type: u32,
+    },
+    /// The drive lacks the mode.
+    #[error(
+        "node {node}: supported modes: expected {mode}, found 0x6502 = 0x{supported:08X}, which lacks it"
+    )]
+    ModeNotSupported {
+        /// The node.
+        node: NodeId,
+        /// The mode that was asked for.
+        mode: Mode,
+        /// Object 0x6502.
+        supported: u32,
+    },
+    /// The drive does not show the mode it was set to.
+    #[error(
+        "node {node}: mode of operation: expected {mode}, found 0x6061 = {found} after {timeout:?}"
+    )]
+    ModeNotShown {
+        /// The node.
+        node: NodeId,
+        /// The mode that was asked for.
+        mode: Mode,
+        /// Object 0x6061.
+        found: i8,
+        /// How long was waited.
+        timeout: Duration,
+    },
+    /// 0x60C2 cannot hold the cycle.
+    #[error(
+        "node {node}: interpolation period: a cycle of {cycle_us} us is not 1 to 255 times a power of ten; choose one that is, as 2000"
+    )]
+    Cycle {
+        /// The node.
+        node: NodeId,
+        /// The cycle that was asked for.
+        cycle_us: u32,
+    },
+    /// An object has a value with which the drive must not run, and cannot be given another one.
+    #[error("node {node}: object {object} ({name}): found {found}, needed {needed}{}", because(*refusal))]
+    Value {
+        /// The node.
+        node: NodeId,
+        /// The object.
+        object: ObjectAddress,
+        /// Its name.
+        name: &'static str,
+        /// What it holds.
+        found: String,
+        /// What it must hold.
+        needed: String,
+        /// Why the node did not take another value, if it was asked to and said why.
+        refusal: Option<AbortCode>,
+    },
+    /// An object that is needed is not there.
+    #[error("node {node}: object {object} ({name}): the node has none, and needs it {purpose}")]
+    Missing {
+        /// The node.
+        node: NodeId,
+        /// The object.
+        object: ObjectAddress,
+        /// Its name.
+        name: &'static str,
+        /// What for.
+        purpose: &'static str,
+    },
+    /// The drive keeps its power.
+    #[error(
+        "node {node}: the drive was left under power and does not let go: found {state} \
+         (0x6041 = 0x{statusword:04X}), needed switch on disabled; switch it off and on again"
+    )]
+    UnderPower {
+        /// The node.
+        node: NodeId,
+        /// Object 0x6041.
+        statusword: u16,
+        /// Its state in words.
+        state: String,
+    },
+    /// A question to the node failed.
+    #[error("{source} (step: {step})")]
+    Sdo {
+        /// What was being done.
+        step: &'static str,
+        /// What went wrong, with node and object.
+        source: SdoError,
+    },
+    /// The bus failed.
+    #[error("node {node}: {step}: {source}")]
+    Bus {
+        /// The node.
+        node: NodeId,
+        /// What was being done.
+        step: &'static str,
+        /// What went wrong.
+        source: BusError,
+    },
+}
+
+fn because(refusal: Option<AbortCode>) -> String {
+    refusal.map_or_else(String::new, |code| format!("; the node refuses it with {code}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_one_line_that_names_the_node() {
+        let node = NodeId::new(1).unwrap();
+        let error = BringUpError::NoBootUp { node, timeout: Duration::from_secs(2) };
+        assert_eq!(
+            error.to_string(),
+            "node 1: no boot-up within 2s after reset; is it powered, on this bus and set to this number?"
+        );
+        let error = BringUpError::Value {
+            node,
+            object: ObjectAddress::new(0x60B0, 0),
+            name: "Position offset",
+            found: "5000".to_owned(),
+            needed: "0".to_owned(),
+            refusal: Some(AbortCode::ReadOnly),
+        };
+        assert_eq!(
+            error.to_string(),
+            "node 1: object 0x60B0:00 (Position offset): found 5000, needed 0; the node refuses it \
+             with 0x06010002 (object is read-only)"
+        );
+    }
+}

@@ -1,0 +1,23 @@
+//! Cold: the bring-up of nodes over SDO, and the checks of a bus before the loop begins.
+//!
+//! For `supervisor`, the simulator and tests; nothing here is called in a tick. Imports the codecs of
+//! `canopen` and `cia402`, and the bus.
+//!
+//! Family: `drive`, `scaling` and `settings`: a drive is brought up from its own set-up.
+
+mod drive;
+mod error;
+pub mod listen;
+pub mod load;
+mod process_data;
+mod remote;
+mod scaling;
+mod sdo_client;
+mod setting;
+mod settings;
+
+pub use drive::{
+    DriveIdentity, DriveSetup, EncoderIdentity, FOLLOWING_ERROR_TIME_MS, bring_up, bring_up_encoder,
+};
+pub use error::BringUpError;
+pub use sdo_client::{SdoClient, SdoError, Stray, TRIES};

@@ -1,0 +1,162 @@
+//! One node during its bring-up: reads, writes, and objects that must hold a value.
+
+use super::error::BringUpError;
+use super::sdo_client::{SdoClient, SdoError};
+use super::setting::{self, Absence, Kind, Need, Setting};
+use crate::fieldbus::Bus;
+use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
+
+/// One node during its bring-up.
+pub(super) struct Remote<'a> {
+    pub(super) bus: &'a mut dyn Bus,
+    pub(super) client: SdoClient,
+    pub(super) node: NodeId,
+}
+
+impl Remote<'_> {
+    pub(super) fn read(
+        &mut self,
+        step: &'static str,
+        index: u16,
+        sub: u8,
+    ) -> Result<u32, BringUpError> {
+        self.client
+            .upload_u32(self.bus, index, sub)
+            .map_err(|source| BringUpError::Sdo { step, source })
+    }
+
+    /// Reads an object that the node need not have.
+    pub(super) fn find(
+        &mut self,
+        step: &'static str,
+        index: u16,
+        sub: u8,
+    ) -> Result<Option<u32>, BringUpError> {
+        match self.client.upload_u32(self.bus, index, sub) {
+            Ok(value) => Ok(Some(value)),
+            Err(SdoError::Aborted { code, .. }) if is_absent(code) => Ok(None),
+            Err(source) => Err(BringUpError::Sdo { step, source }),
+        }
+    }
+
+    pub(super) fn write(
+        &mut self,
+        step: &'static str,
+        index: u16,
+        sub: u8,
+        bytes: &[u8],
+    ) -> Result<(), BringUpError> {
+        self.client
+            .download(self.bus, index, sub, bytes)
+            .map_err(|source| BringUpError::Sdo { step, source })
+    }
+
+    /// Writes an object, and returns why the node did not take it, if it said why.
+    fn try_write(&mut self, setting: &Setting) -> Result<Option<AbortCode>, BringUpError> {
+        let ObjectAddress { index, sub } = setting.address;
+        let bytes = setting.kind.encode(setting.need.value());
+        match self.client.download(self.bus, index, sub, &bytes) {
+            Ok(()) => Ok(None),
+            Err(SdoError::Aborted { code, .. }) => Ok(Some(code)),
+            Err(source) => Err(BringUpError::Sdo { step: setting.name(), source }),
+        }
+    }
+
+    /// Sees to it that an object holds what is needed, and returns what it holds; `None` if the node
+    /// has no such object and needs none.
+    ///
+    /// What is right is not written again: some drives wear their memory by every write.
+    ///
+    /// # Errors
+    /// [`BringUpError::Value`] if it holds something else and keeps it, [`BringUpError::Missing`] if it
+    /// is needed and not there.
+    pub(super) fn ensure(&mut self, setting: &Setting) -> Result<Option<i64>, BringUpError> {
+        let mut refusal = None;
+        for is_written in [false, true] {
+            if is_written {
+                refusal = self.try_write(setting)?;
+            }
+            let ObjectAddress { index, sub } = setting.address;
+            let found = match self.client.upload(self.bus, index, sub) {
+                Ok(bytes) => setting.kind.decode(&bytes),
+                Err(SdoError::Aborted { code, .. }) if is_absent(code) => {
+                    return self.absent(setting);
+                }
+                // Nothing can be read back, so that the node's word has to do.
+                Err(SdoError::Aborted { code: AbortCode::WriteOnly, .. }) => {
+                    return match self.try_write(setting)? {
+                        None => Ok(Some(setting.need.value())),
+                        refusal => Err(self.unfit(setting, "no value to be read", refusal)),
+                    };
+                }
+                Err(source) => return Err(BringUpError::Sdo { step: setting.name(), source }),
+            };
+            let is_fit =
+                if is_written { setting.need.bears(found) } else { setting.need.admits(found) };
+            if is_fit {
+                return Ok(Some(found));
+            }
+            if is_written {
+                return Err(self.unfit(setting, &setting.shown(found), refusal));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Sees to a whole list, in its order.
+    pub(super) fn ensure_all(&mut self, settings: &[Setting]) -> Result<(), BringUpError> {
+        settings.iter().try_for_each(|setting| self.ensure(setting).map(|_| ()))
+    }
+
+    /// Reads a ratio of two numbers; `None` if the node has none.
+    pub(super) fn ratio(&mut self, index: u16) -> Result<Option<[u32; 2]>, BringUpError> {
+        let step = setting::name(ObjectAddress::new(index, 0));
+        let Some(numerator) = self.find(step, index, 1)? else { return Ok(None) };
+        let denominator = self.find(step, index, 2)?.unwrap_or(1);
+        let ratio = [numerator, denominator];
+        if ratio.contains(&0) {
+            let found = format!("{numerator}/{denominator}");
+            let setting = Setting::new(index, 0, Kind::U32, Need::Exactly(1));
+            return Err(self.unfit_words(&setting, found, "a ratio without 0".to_owned(), None));
+        }
+        Ok(Some(ratio))
+    }
+
+    fn absent(&self, setting: &Setting) -> Result<Option<i64>, BringUpError> {
+        match setting.absence {
+            Absence::Harmless => Ok(None),
+            Absence::Refused(purpose) => Err(BringUpError::Missing {
+                node: self.node,
+                object: setting.address,
+                name: setting.name(),
+                purpose,
+            }),
+        }
+    }
+
+    fn unfit(&self, setting: &Setting, found: &str, refusal: Option<AbortCode>) -> BringUpError {
+        self.unfit_words(setting, found.to_owned(), setting.needed_words(), refusal)
+    }
+
+    pub(super) fn unfit_words(
+        &self,
+        setting: &Setting,
+        found: String,
+        needed: String,
+        refusal: Option<AbortCode>,
+    ) -> BringUpError {
+        BringUpError::Value {
+            node: self.node,
+            object: setting.address,
+            name: setting.name(),
+            found,
+            needed,
+            refusal,
+        }
+    }
+}
+
+/// Whether the node said that it has no such object.
+pub(super) fn is_absent(code: AbortCode) -> bool {
+    matches!(code, AbortCode::NoObject | AbortCode::NoSubIndex)
+}

@@ -1,0 +1,239 @@
+//! One object of a node that must hold a certain value, and what is done to see to it.
+
+use crate::fieldbus::canopen::ObjectAddress;
+use crate::fieldbus::cia402::objects;
+
+/// Share by which a rate may differ from what was written: drives keep rates in units of their own.
+const RATE_TOLERANCE: f64 = 0.01;
+
+/// The type of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+}
+
+impl Kind {
+    /// Bytes on the wire.
+    pub(super) const fn len(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 => 4,
+        }
+    }
+
+    /// The number that `bytes` encode; a node that sends more than the type holds did not say how
+    /// many of them count.
+    pub(super) fn decode(self, bytes: &[u8]) -> i64 {
+        let n_bytes = bytes.len().min(self.len());
+        let bits = 64 - 8 * n_bytes.max(1);
+        let raw =
+            bytes[..n_bytes].iter().rev().fold(0_u64, |all, byte| all << 8 | u64::from(*byte));
+        match self {
+            Self::U8 | Self::U16 | Self::U32 => raw.cast_signed(),
+            Self::I8 | Self::I16 | Self::I32 => (raw << bits).cast_signed() >> bits,
+        }
+    }
+
+    /// The bytes of `number`, little endian.
+    pub(super) fn encode(self, number: i64) -> Vec<u8> {
+        number.to_le_bytes()[..self.len()].to_vec()
+    }
+}
+
+/// Which values an object may hold, and which one it is given if it holds another.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Need {
+    /// This one.
+    Exactly(i64),
+    /// This rate, as nearly as the drive can keep it.
+    Near(i64),
+    /// This one or a higher one.
+    AtLeast(i64),
+    /// So much that it never matters; if the node does not take that, at least the other one.
+    Ample(i64, i64),
+    /// This one or a lower one.
+    AtMost(i64),
+    /// One of these; the first one is written.
+    OneOf(Vec<i64>),
+}
+
+impl Need {
+    /// The value to write.
+    pub(super) fn value(&self) -> i64 {
+        match self {
+            Self::Exactly(value)
+            | Self::Near(value)
+            | Self::AtLeast(value)
+            | Self::Ample(value, _)
+            | Self::AtMost(value) => *value,
+            Self::OneOf(values) => values.first().copied().unwrap_or(0),
+        }
+    }
+
+    /// Whether the object may stay as it is.
+    pub(super) fn admits(&self, found: i64) -> bool {
+        match self {
+            Self::Exactly(value) => found == *value,
+            Self::Near(value) => {
+                let allowed = (*value as f64).abs() * RATE_TOLERANCE;
+                (found.saturating_sub(*value) as f64).abs() <= allowed.max(1.0)
+                    && found.signum() == value.signum()
+            }
+            Self::AtLeast(value) | Self::Ample(value, _) => found >= *value,
+            Self::AtMost(value) => found <= *value,
+            Self::OneOf(values) => values.contains(&found),
+        }
+    }
+
+    /// Whether the node may run with what it holds after it was asked to hold the best.
+    pub(super) fn bears(&self, found: i64) -> bool {
+        match self {
+            Self::Ample(_, least) => found >= *least,
+            _ => self.admits(found),
+        }
+    }
+}
+
+/// What is done if the node does not have the object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Absence {
+    /// It has no such feature, so that there is nothing to be set.
+    Harmless,
+    /// The node is refused; it needs the object for this.
+    Refused(&'static str),
+}
+
+/// An object and what it must hold.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Setting {
+    pub(super) address: ObjectAddress,
+    pub(super) kind: Kind,
+    pub(super) need: Need,
+    pub(super) absence: Absence,
+}
+
+impl Setting {
+    /// A setting that a node need not have.
+    pub(super) fn new(index: u16, sub: u8, kind: Kind, need: Need) -> Self {
+        let address = ObjectAddress::new(index, sub);
+        Self { address, kind, need, absence: Absence::Harmless }
+    }
+
+    /// The same, refusing a node without it.
+    #[must_use]
+    pub(super) fn needed(self, purpose: &'static str) -> Self {
+        Self { absence: Absence::Refused(purpose), ..self }
+    }
+
+    /// The object's name.
+    pub(super) fn name(&self) -> &'static str {
+        name(self.address)
+    }
+
+    /// A value as this object's are written.
+    pub(super) fn shown(&self, value: i64) -> String {
+        shown(self.address, self.kind, value)
+    }
+
+    /// What is needed, in words.
+    pub(super) fn needed_words(&self) -> String {
+        match &self.need {
+            Need::Exactly(value) | Need::Near(value) => self.shown(*value),
+            Need::AtLeast(value) | Need::Ample(_, value) => {
+                format!("at least {}", self.shown(*value))
+            }
+            Need::AtMost(value) => format!("at most {}", self.shown(*value)),
+            Need::OneOf(values) => {
+                let words: Vec<String> = values.iter().map(|value| self.shown(*value)).collect();
+                words.join(" or ")
+            }
+        }
+    }
+}
+
+/// The name of an object, or of the record it belongs to.
+pub(super) fn name(address: ObjectAddress) -> &'static str {
+    let of_record = match address.index {
+        0x1400..=0x15FF => objects::name(objects::RPDO_COMMUNICATION),
+        0x1600..=0x17FF => objects::name(objects::RPDO_MAPPING),
+        0x1800..=0x19FF => objects::name(objects::TPDO_COMMUNICATION),
+        0x1A00..=0x1BFF => objects::name(objects::TPDO_MAPPING),
+        index => objects::name(index),
+    };
+    of_record.unwrap_or("an object of the cell description")
+}
+
+/// A number as people read it: bits and identifiers in hexadecimal.
+pub(super) fn shown(address: ObjectAddress, kind: Kind, value: i64) -> String {
+    let is_code = matches!(
+        (address.index, address.sub),
+        (
+            objects::COB_ID_SYNC
+            | objects::COB_ID_EMCY
+            | objects::CONSUMER_HEARTBEAT
+            | objects::POLARITY
+            | objects::POSITION_UNIT
+            | objects::VELOCITY_UNIT,
+            _
+        )
+            | (0x1400..=0x15FF | 0x1800..=0x19FF, 1)
+            | (0x1600..=0x17FF | 0x1A00..=0x1BFF, 1..)
+    );
+    if is_code && value >= 0 {
+        format!("0x{value:0width$X}", width = 2 * kind.len())
+    } else {
+        value.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_round_trip_in_their_type() {
+        for (kind, numbers) in [
+            (Kind::U8, [0, 1, 255]),
+            (Kind::I8, [-128, -1, 127]),
+            (Kind::U16, [0, 256, 65_535]),
+            (Kind::I16, [-32_768, -2, 32_767]),
+            (Kind::U32, [0, 70_000, 4_294_967_295]),
+            (Kind::I32, [-2_147_483_648, -70_000, 2_147_483_647]),
+        ] {
+            for number in numbers {
+                assert_eq!(kind.decode(&kind.encode(number)), number, "{kind:?}");
+            }
+        }
+        // Four bytes whose count was not told.
+        assert_eq!(Kind::I16.decode(&[0xFE, 0xFF, 0, 0]), -2);
+        assert_eq!(Kind::U32.decode(&[7]), 7);
+        assert_eq!(Kind::I32.decode(&[]), 0);
+    }
+
+    #[test]
+    fn needs_admit_what_they_say() {
+        assert!(Need::Near(1000).admits(1010) && !Need::Near(1000).admits(1011));
+        assert!(Need::Near(1).admits(2) && !Need::Near(1).admits(0) && !Need::Near(1).admits(-1));
+        assert!(Need::AtLeast(5).admits(5) && !Need::AtLeast(5).admits(4));
+        assert!(!Need::Ample(9, 5).admits(5) && Need::Ample(9, 5).bears(5));
+        assert!(!Need::Ample(9, 5).bears(4) && Need::Ample(9, 5).admits(9));
+        assert!(Need::AtMost(5).admits(5) && !Need::AtMost(5).admits(6));
+        assert!(Need::OneOf(vec![2, 6]).admits(6) && !Need::OneOf(vec![2, 6]).admits(1));
+        assert_eq!(Need::OneOf(vec![2, 6]).value(), 2);
+    }
+
+    #[test]
+    fn codes_are_shown_in_hexadecimal() {
+        let setting = |index, sub, kind, need| Setting::new(index, sub, kind, need).needed_words();
+        assert_eq!(setting(0x1005, 0, Kind::U32, Need::Exactly(0x80)), "0x00000080");
+        assert_eq!(setting(0x607E, 0, Kind::U8, Need::Exactly(0)), "0x00");
+        assert_eq!(setting(0x605A, 0, Kind::I16, Need::OneOf(vec![2, 6])), "2 or 6");
+        assert_eq!(setting(0x6072, 0, Kind::U16, Need::AtLeast(1000)), "at least 1000");
+    }
+}

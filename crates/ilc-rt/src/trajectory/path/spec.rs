@@ -1,0 +1,231 @@
+//! What a run shall do: a path of lines and arcs, how corners are taken, and rests.
+
+use crate::interpolate::arc::Arc;
+use crate::interpolate::element::{Element, Leg};
+use crate::interpolate::limits::is_positive;
+use crate::interpolate::line::Line;
+use crate::interpolate::{AxisLimits, MAX_AXES, MoveError, Quantity};
+use crate::trajectory::error::TrajectoryError;
+use crate::trajectory::grid::{CYCLE_S, DWELL_MAX_S, check_time};
+use crate::trajectory::verify::TOLERANCE;
+
+/// Farthest position of a plan; the blend's fixed-point numbers hold it with room to spare.
+pub(in crate::trajectory) const POSITION_MAX_M: f64 = 4096.0;
+
+/// A move along a line or an arc.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathSegment {
+    /// End point, one coordinate an axis.
+    pub to_m: Vec<f64>,
+    /// Speed along the segment.
+    pub feed_m_s: f64,
+    /// What makes it an arc; none for a line.
+    pub arc: Option<ArcSpec>,
+    /// Rest at its end.
+    pub dwell_s: f64,
+}
+
+impl PathSegment {
+    /// A straight move without rest.
+    pub fn line(to_m: Vec<f64>, feed_m_s: f64) -> Self {
+        Self { to_m, feed_m_s, arc: None, dwell_s: 0.0 }
+    }
+}
+
+/// An arc in the plane of two axes; the others go along in proportion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArcSpec {
+    /// The two axes; anticlockwise is from the first to the second.
+    pub plane: [usize; 2],
+    /// Centre, in the two axes.
+    pub center_m: [f64; 2],
+    /// Which way round.
+    pub clockwise: bool,
+}
+
+/// How corners are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CornerRule {
+    /// Come to rest at every corner; the feed is an upper bound.
+    ExactStop,
+    /// Keep the feed and round each corner within an averaging window.
+    Blend {
+        /// Length of the window, rounded up to whole cycles.
+        window_s: f64,
+    },
+}
+
+/// A run from rest to rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathSpec {
+    /// Start, one coordinate an axis.
+    pub start_m: Vec<f64>,
+    /// Moves in order.
+    pub segments: Vec<PathSegment>,
+    /// How corners are taken.
+    pub corner: CornerRule,
+    /// Rest at the start that belongs to the run.
+    pub dwell_before_s: f64,
+    /// Rest at the end that belongs to the run.
+    pub dwell_after_s: f64,
+}
+
+impl PathSpec {
+    /// Checks every value, and returns each segment as a leg.
+    ///
+    /// # Errors
+    /// [`TrajectoryError`] for the first value that is out of its range.
+    pub(in crate::trajectory) fn legs(
+        &self,
+        limits: &[AxisLimits],
+        cycle_s: f64,
+    ) -> Result<Vec<Leg>, TrajectoryError> {
+        check_time("cycle", cycle_s, CYCLE_S)?;
+        check_time("dwell before", self.dwell_before_s, (0.0, DWELL_MAX_S))?;
+        check_time("dwell after", self.dwell_after_s, (0.0, DWELL_MAX_S))?;
+        for segment in &self.segments {
+            check_time("dwell", segment.dwell_s, (0.0, DWELL_MAX_S))?;
+        }
+        checked_legs(&self.start_m, &self.segments, limits)
+    }
+
+    /// Refuses feeds at which an axis would have to be faster than it may: a plan with exact stops
+    /// would be slower instead. Segments that are `rapid` are not looked at.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::Exceeds`] for the axis that a feed is most too high for, with the factor on
+    /// every feed that would do; others for values out of range.
+    pub fn check_feeds(
+        &self,
+        limits: &[AxisLimits],
+        rapid: &[bool],
+    ) -> Result<(), TrajectoryError> {
+        let legs = checked_legs(&self.start_m, &self.segments, limits)?;
+        let mut worst: Option<(f64, usize, f64)> = None;
+        for (index, leg) in legs.iter().enumerate() {
+            if rapid.get(index).copied().unwrap_or(false) {
+                continue;
+            }
+            for (axis, limit) in limits.iter().enumerate() {
+                let reached = leg.element.share(axis) * leg.feed_m_s;
+                let ratio = reached / limit.velocity_max_m_s;
+                if ratio > 1.0 + TOLERANCE && worst.is_none_or(|(most, ..)| ratio > most) {
+                    worst = Some((ratio, axis, reached));
+                }
+            }
+        }
+        let Some((ratio, axis, reached)) = worst else { return Ok(()) };
+        Err(TrajectoryError::Exceeds {
+            axis,
+            quantity: Quantity::Velocity,
+            reached,
+            limit: limits[axis].velocity_max_m_s,
+            feed_factor: 1.0 / ratio,
+            feed_admissible: feed_max_m_s(&legs) / ratio,
+            window_admissible_s: None,
+        })
+    }
+}
+
+/// Checks points, feeds and limits, and returns each segment as a leg.
+fn checked_legs(
+    start_m: &[f64],
+    segments: &[PathSegment],
+    limits: &[AxisLimits],
+) -> Result<Vec<Leg>, TrajectoryError> {
+    check_limits(start_m.len(), limits)?;
+    if segments.is_empty() {
+        return Err(TrajectoryError::Empty);
+    }
+    let mut from_m = point(start_m)?;
+    let mut legs = Vec::with_capacity(segments.len());
+    for (index, segment) in segments.iter().enumerate() {
+        if segment.to_m.len() != start_m.len() {
+            return Err(TrajectoryError::Coordinates {
+                segment: index,
+                found: segment.to_m.len(),
+                expected: start_m.len(),
+            });
+        }
+        if !is_positive(segment.feed_m_s) {
+            return Err(TrajectoryError::Feed { segment: index, feed: segment.feed_m_s });
+        }
+        let to_m = point(&segment.to_m)?;
+        let element = match segment.arc {
+            None => Element::Line(Line::new(from_m, to_m)),
+            Some(ArcSpec { plane, center_m, clockwise }) => {
+                let [p, q] = plane;
+                if p == q || p.max(q) >= start_m.len() {
+                    return Err(TrajectoryError::Plane { segment: index, plane });
+                }
+                Element::Arc(Arc::new(from_m, to_m, plane, center_m, clockwise).ok_or_else(
+                    || TrajectoryError::Arc {
+                        segment: index,
+                        from_radius: (from_m[p] - center_m[0]).hypot(from_m[q] - center_m[1]),
+                        to_radius: (to_m[p] - center_m[0]).hypot(to_m[q] - center_m[1]),
+                    },
+                )?)
+            }
+        };
+        if element.length_m() == 0.0 {
+            return Err(TrajectoryError::ZeroLength { segment: index });
+        }
+        from_m = to_m;
+        legs.push(Leg { element, feed_m_s: segment.feed_m_s, dwell_s: segment.dwell_s });
+    }
+    Ok(legs)
+}
+
+/// The feed of the fastest leg.
+pub(super) fn feed_max_m_s(legs: &[Leg]) -> f64 {
+    legs.iter().fold(0.0, |highest, leg| highest.max(leg.feed_m_s))
+}
+
+/// As [`checked_legs`], for segments without arcs.
+pub(in crate::trajectory) fn checked_lines(
+    start_m: &[f64],
+    segments: &[PathSegment],
+    limits: &[AxisLimits],
+) -> Result<Vec<Line>, TrajectoryError> {
+    let legs = checked_legs(start_m, segments, limits)?;
+    legs.into_iter()
+        .enumerate()
+        .map(|(segment, leg)| match leg.element {
+            Element::Line(line) => Ok(line),
+            Element::Arc(_) => Err(TrajectoryError::NotStraight { segment }),
+        })
+        .collect()
+}
+
+/// Refuses a number of axes or limits that cannot be, and limits that are not positive.
+pub(in crate::trajectory) fn check_limits(
+    n_axes: usize,
+    limits: &[AxisLimits],
+) -> Result<(), TrajectoryError> {
+    if !(1..=MAX_AXES).contains(&n_axes) {
+        return Err(MoveError::Axes { n_axes }.into());
+    }
+    if limits.len() != n_axes {
+        return Err(TrajectoryError::LimitCount { found: limits.len(), expected: n_axes });
+    }
+    for (axis, limit) in limits.iter().enumerate() {
+        limit.check(axis)?;
+    }
+    Ok(())
+}
+
+/// A point in the array of the tick; unused axes are 0.
+pub(in crate::trajectory) fn point(
+    coordinates_m: &[f64],
+) -> Result<[f64; MAX_AXES], TrajectoryError> {
+    let mut point_m = [0.0; MAX_AXES];
+    for (axis, (to, &position_m)) in point_m.iter_mut().zip(coordinates_m).enumerate() {
+        if !(-POSITION_MAX_M..=POSITION_MAX_M).contains(&position_m) {
+            return Err(
+                MoveError::Position { axis, position: position_m, limit: POSITION_MAX_M }.into()
+            );
+        }
+        *to = position_m;
+    }
+    Ok(point_m)
+}

@@ -1,0 +1,122 @@
+//! From a path, a rest or a sampled motion to the [`Interpolator`] that plays it.
+//!
+//! `design` and the Python glue plan here; the loop only plays. Whatever a run was planned by, its set
+//! points are verified before they are played.
+
+use super::error::TrajectoryError;
+use super::grid::{CYCLE_S, DWELL_MAX_S, check_time, n_ticks, n_ticks_after};
+use super::motion::SampledMotion;
+use super::path::{BlendedPath, CornerRule, PathSpec, point};
+use super::verify::Verification;
+use crate::interpolate::exact_stop::ExactStop;
+use crate::interpolate::interpolator::Motion;
+use crate::interpolate::table::Table;
+use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, MoveError, Setpoint};
+
+impl Interpolator {
+    /// Plans a run; every set point that it will give holds the limits of every axis.
+    ///
+    /// With exact stops each segment is a jerk-limited move, no faster than its feed. A blended path
+    /// keeps its feed, through an average of the window and a second, shorter one that planning
+    /// chooses for the jerk; its set points are generated here once and their finite differences
+    /// over the cycle compared with the limits.
+    ///
+    /// # Shapes
+    /// - `limits`: one entry for each coordinate of `spec.start_m`, 1 to [`MAX_AXES`]
+    /// # Real Time
+    /// Cold: allocates, and walks through a blended run several times.
+    /// # Errors
+    /// [`TrajectoryError`] for values out of range, and [`TrajectoryError::Exceeds`] for a blended
+    /// path that breaks a limit: it is refused with the feed that would do, never slowed down.
+    pub fn plan(
+        spec: &PathSpec,
+        limits: &[AxisLimits],
+        cycle_s: f64,
+    ) -> Result<Self, TrajectoryError> {
+        let legs = spec.legs(limits, cycle_s)?;
+        let (start_s, n_axes) = (spec.dwell_before_s, spec.start_m.len());
+        let (motion, rest_tick) = match spec.corner {
+            CornerRule::ExactStop => {
+                let moves = ExactStop::plan(&legs, start_s, limits)?;
+                let rest_tick = n_ticks_after(moves.end_s(), cycle_s)?;
+                (Motion::ExactStop(moves), rest_tick)
+            }
+            CornerRule::Blend { window_s } => {
+                let path = BlendedPath { legs: &legs, start_s, limits, cycle_s };
+                let (blend, rest_tick) = path.plan(window_s)?;
+                (Motion::Blend(blend), rest_tick)
+            }
+        };
+        let n_samples = rest_tick + n_ticks(spec.dwell_after_s, cycle_s)? + 1;
+        let plan = Self::new(motion, n_axes, cycle_s, n_samples);
+        // A blended path has been through its proof already.
+        if spec.corner == CornerRule::ExactStop { plan.verified(limits) } else { Ok(plan) }
+    }
+
+    /// Rests at a point for some samples, as while an axis is identified.
+    ///
+    /// # Shapes
+    /// - `at_m`: one coordinate for each axis, 1 to [`MAX_AXES`]
+    /// # Real Time
+    /// Cold.
+    /// # Errors
+    /// [`TrajectoryError`] for another number of axes, a point or cycle out of range, or no samples.
+    pub fn hold(at_m: &[f64], n_samples: usize, cycle_s: f64) -> Result<Self, TrajectoryError> {
+        let n_axes = at_m.len();
+        if !(1..=MAX_AXES).contains(&n_axes) {
+            return Err(MoveError::Axes { n_axes }.into());
+        }
+        check_time("cycle", cycle_s, CYCLE_S)?;
+        if n_samples == 0 {
+            return Err(TrajectoryError::Empty);
+        }
+        let setpoint = Setpoint::at_rest(point(at_m)?);
+        Ok(Self::new(Motion::Hold(setpoint), n_axes, cycle_s, n_samples))
+    }
+
+    /// Plays a motion that was worked out beforehand, from rest to rest, with rests around it.
+    ///
+    /// # Real Time
+    /// Cold: copies the motion.
+    /// # Errors
+    /// [`TrajectoryError`] for a rest out of range, a motion of no samples, or too many.
+    pub fn play(
+        motion: &SampledMotion,
+        dwell_before_s: f64,
+        dwell_after_s: f64,
+    ) -> Result<Self, TrajectoryError> {
+        check_time("dwell before", dwell_before_s, (0.0, DWELL_MAX_S))?;
+        check_time("dwell after", dwell_after_s, (0.0, DWELL_MAX_S))?;
+        if motion.n_samples() == 0 {
+            return Err(TrajectoryError::Empty);
+        }
+        let (cycle_s, n_axes) = (motion.dt_s, motion.n_axes);
+        let rest_ticks = n_ticks(dwell_before_s, cycle_s)?;
+        let table = Table::new(&motion.position_m, &motion.velocity_m_s, n_axes, rest_ticks);
+        let n_samples = table.rest_tick() + n_ticks(dwell_after_s, cycle_s)? + 1;
+        Ok(Self::new(Motion::Table(table), n_axes, cycle_s, n_samples))
+    }
+
+    /// Verifies the set points of the run, whatever it was planned by: their finite differences over
+    /// the cycle, from rest to rest, are within the limits.
+    ///
+    /// # Shapes
+    /// - `limits`: one entry an axis
+    /// # Real Time
+    /// Cold: allocates, and walks through the run.
+    /// # Errors
+    /// [`TrajectoryError::SetPoint`] for the first set point that breaks a limit.
+    pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, TrajectoryError> {
+        if limits.len() != self.n_axes() {
+            let (found, expected) = (limits.len(), self.n_axes());
+            return Err(TrajectoryError::LimitCount { found, expected });
+        }
+        let reference_m = self.reference();
+        Verification::of_motion(&reference_m, limits, self.cycle_s()).accept(&reference_m)?;
+        Ok(self)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact where exactness is promised")]
+mod tests;

@@ -1,0 +1,3 @@
+//! Promises that every kind of trajectory keeps.
+
+mod promises;

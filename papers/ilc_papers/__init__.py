@@ -1,0 +1,1 @@
+"""Papers on iterative learning control, run through ilc-rt: one package a paper."""

@@ -1,1 +1,0 @@
-"""Papers on iterative learning control, run through the product: one package a paper."""
