@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from ilc_rt._native import Cell, check_options, refuse_divergent
+from ilc_rt._native import Cell, check_options
+from ilc_rt.analysis import refuse_divergent
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
 from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError, FaultError
 from ilc_rt.events import EndEvent, Event, IterationEvent, parse_event
@@ -266,11 +267,12 @@ class Campaign:
             code = failure.exit_code if failure else EXIT_FAULT
             if failure is not None and failure.reason not in reason:
                 reason = failure.reason if reason in failure.reason else reason
+            cause = failure.__cause__ if failure else None
             fault = self.result.fault
             if fault is not None:
                 named = {field.name: getattr(fault, field.name) for field in fields(fault)}
-                raise FaultError(exit_code=code, **{**named, "reason": reason})
-            raise CampaignError(reason, code)
+                raise FaultError(exit_code=code, **{**named, "reason": reason}) from cause
+            raise CampaignError(reason, code) from cause
         if status == "running":
             message = "the controller ended without saying so"
             raise CampaignError(message)

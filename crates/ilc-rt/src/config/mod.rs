@@ -8,10 +8,8 @@
 mod cell;
 mod error;
 mod file;
-mod law;
 mod learning;
 pub mod mode;
-mod norm_optimal;
 mod path;
 mod program;
 mod simulation;
@@ -23,12 +21,10 @@ pub use cell::{
 };
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};
-pub use law::{
-    AdjointSection, ConstrainedSection, ErrorFeedforwardSection, ModelInverseSection, PdSection,
-};
-pub use learning::{GateMeasure, GateSection, LadderSection, LawName, Learning, Measure};
-pub use norm_optimal::{ContourSection, NormOptimalSection, PhaseSection};
+pub use learning::{Learning, Measure};
 pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
 pub use program::{Corner, Program, Segment};
 pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;
+
+pub use crate::learning::law::catalogue::LawName;
