@@ -178,7 +178,6 @@ impl StopReason {
 }
 
 /// What the loop reports.
-#[expect(clippy::large_enum_variant, reason = "a box would be allocated in the tick")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message {
     /// A cycle.
