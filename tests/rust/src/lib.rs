@@ -21,6 +21,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use ilc_rt::config::Cell;
 
+pub use derived::{hold_derived, hold_derived_file};
+
 /// The root of this checkout.
 ///
 /// Asked of cargo when the test runs: one target folder may serve several checkouts, and a test that
@@ -29,7 +31,6 @@ pub fn root() -> PathBuf {
     let compiled = env!("CARGO_MANIFEST_DIR").into();
     PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or(compiled)).join("../..")
 }
-pub use derived::hold_derived;
 
 /// The path of an example, as `01_gantry.toml`.
 pub fn example_path(name: &str) -> PathBuf {

@@ -120,7 +120,7 @@ fn excite(
         }
         if arguments.output.events {
             say_event(event, &session.stop);
-        } else if let Event::Fault { reason } = event {
+        } else if let Event::Fault { reason, .. } = event {
             show::say(reason);
         }
     };

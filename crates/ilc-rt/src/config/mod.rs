@@ -9,14 +9,15 @@ mod cell;
 mod error;
 mod file;
 mod learning;
+pub mod mode;
 mod path;
 mod program;
 mod simulation;
 mod validate;
 
 pub use cell::{
-    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Interface, Limits, PositionLoop,
-    Safety, TcpEncoder, Telemetry,
+    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Limits, Mode, PositionLoop, Safety,
+    TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};

@@ -4,11 +4,14 @@
 //! several processes may share a file (write-ahead log); a killed process loses nothing it appended.
 
 mod error;
+mod figures;
 mod file;
 mod recall;
 mod row;
 mod schema;
 mod store;
+#[cfg(test)]
+mod tests;
 mod trim;
 
 pub use error::LibraryError;

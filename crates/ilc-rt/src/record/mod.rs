@@ -5,12 +5,16 @@
 
 mod axes;
 mod event;
+mod fault;
+mod fields;
 mod figures;
 mod iteration;
 mod text;
 
 pub use axes::AxisKinds;
 pub use event::{EndStatus, Event, StateName};
+pub use fault::{Fault, FaultKind, LastCycles};
+pub use fields::{Field, FieldKind, figure_fields};
 pub use figures::{Figures, distances_m, infinity_norm, rms};
 pub use iteration::{IterationRecord, Meta, fingerprint};
 pub use text::{NAME_MAX, TEXT_MAX, is_hidden, printable, printable_json, printable_lines};

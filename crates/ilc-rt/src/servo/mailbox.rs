@@ -199,6 +199,8 @@ pub enum Message {
         /// Cycles in it that began a whole cycle late.
         overruns: u32,
     },
+    /// A cycle before a stop, complete or not; they come oldest first, and then the stop.
+    Before(Sample),
     /// The axes are being stopped.
     Stopping(StopReason),
 }

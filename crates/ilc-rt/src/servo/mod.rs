@@ -9,6 +9,7 @@ mod cycle;
 mod gate;
 mod input;
 mod mailbox;
+mod mode;
 mod node;
 mod pending;
 mod phase;

@@ -2,7 +2,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use crate::fieldbus::cia402::{Command, Controlword, State, Status, Statusword};
+use crate::fieldbus::cia402::{CommandRpdo1, Controlword, State, StatusTpdo1, Statusword};
 
 /// One drive as last heard.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +51,7 @@ impl Default for Drive {
 
 impl Drive {
     /// Takes over a status, its position already in metres.
-    pub(super) fn status(&mut self, status: Status, encoder_m: f64) {
+    pub(super) fn status(&mut self, status: StatusTpdo1, encoder_m: f64) {
         let was_enabled = self.enabled();
         self.heard = true;
         self.statusword = status.statusword.0;
@@ -78,7 +78,7 @@ impl Drive {
     }
 
     /// The command with this controlword and the last target.
-    pub(super) fn command(&self, controlword: Controlword) -> Command {
-        Command { controlword, target_counts: self.target_counts, torque_offset: 0 }
+    pub(super) fn command(&self, controlword: Controlword) -> CommandRpdo1 {
+        CommandRpdo1 { controlword, target_counts: self.target_counts, torque_offset: 0 }
     }
 }

@@ -9,6 +9,6 @@ pub mod state;
 pub mod units;
 
 pub use mode::Mode;
-pub use pdo_map::{Command, EncoderSample, Extra, Status};
+pub use pdo_map::{CommandRpdo1, DriveMotionTpdo2, EncoderSample, StatusTpdo1};
 pub use state::{Controlword, State, Statusword, next_command};
 pub use units::Scale;
