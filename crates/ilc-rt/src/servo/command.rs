@@ -18,21 +18,21 @@ impl Cycle {
         let mut newest = self.commanded[0];
         let mut fault = None;
         for axis in 0..self.n_axes() {
-            let scale = self.spec.axes[axis].scale;
+            let mode = mode::of(self.spec.axes[axis].mode);
             let mut target = self.target(axis);
             if !target.is_finite() {
                 fault = fault.or(Some(StopReason::NotFinite { axis }));
                 // The stop begins from there.
                 let last = self.commanded.map(|command| command[axis]);
-                target = mode::of(self.spec.axes[axis].mode).extrapolate(last);
+                target = mode.extrapolate(last);
             }
             newest[axis] = target;
-            if let Some(counts) = scale.to_counts(target) {
-                self.drives[axis].target_counts = counts;
-            }
             let controlword = self.controlword(axis);
-            self.drives[axis].controlword = controlword;
-            let frame = self.drives[axis].command(controlword).encode(self.spec.axes[axis].node);
+            let spec = &self.spec.axes[axis];
+            let sent = &mut self.drives[axis].sent;
+            sent.controlword = controlword;
+            mode.write(target, spec.scale, sent);
+            let frame = sent.encode(spec.node);
             let _ = self.bus.send(&frame);
         }
         self.commanded = [newest, self.commanded[0], self.commanded[1]];
@@ -79,7 +79,7 @@ impl Cycle {
             // No drive is switched on before all are known to stand where they may.
             Phase::Enabling { .. } if !self.all_heard() => Controlword::DISABLE_VOLTAGE,
             Phase::Enabling { .. } if state == State::Fault => {
-                Controlword::fault_reset_after(drive.controlword)
+                Controlword::fault_reset_after(drive.sent.controlword)
             }
             Phase::Enabling { .. }
             | Phase::Returning(_)

@@ -30,12 +30,13 @@ impl Mode {
         }
     }
 
-    /// The object that takes the target.
-    pub const fn target(self) -> u16 {
-        match self {
+    /// The objects of a command, of 16, 32 and 16 bits.
+    pub const fn command_objects(self) -> [u16; 3] {
+        let target = match self {
             Self::Csp => objects::TARGET_POSITION,
             Self::Csv => objects::TARGET_VELOCITY,
-        }
+        };
+        [objects::CONTROLWORD, target, objects::TORQUE_OFFSET]
     }
 
     /// The value of objects 0x6060 and 0x6061.

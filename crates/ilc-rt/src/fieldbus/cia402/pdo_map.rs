@@ -42,11 +42,8 @@ pub const ENCODER_MAP: [MappedObject; 2] =
 
 /// Returns the mapping of [`COMMAND_PDO`] in `mode`.
 pub const fn command_map(mode: Mode) -> [MappedObject; 3] {
-    [
-        mapped(objects::CONTROLWORD, 0, 16),
-        mapped(mode.target(), 0, 32),
-        mapped(objects::TORQUE_OFFSET, 0, 16),
-    ]
+    let [word, long, last] = mode.command_objects();
+    [mapped(word, 0, 16), mapped(long, 0, 32), mapped(last, 0, 16)]
 }
 
 const fn mapped(index: u16, sub: u8, bits: u8) -> MappedObject {

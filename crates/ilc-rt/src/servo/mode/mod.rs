@@ -11,7 +11,7 @@ mod csv;
 use super::gate::{Bounds, Gate};
 use super::phase::Phase;
 use super::spec::AxisSpec;
-use crate::fieldbus::cia402::Mode;
+use crate::fieldbus::cia402::{CommandRpdo1, Mode, Scale};
 use crate::interpolate::AxisLimits;
 
 /// An axis in a tick.
@@ -43,6 +43,13 @@ pub(super) trait AxisMode: Sync {
 
     /// Command of a tick without a finite one: on as before. `last` are the last three, newest first.
     fn extrapolate(&self, last: [f64; 3]) -> f64;
+
+    /// Writes a command into the frame of the drive; what is not a number leaves the last one there.
+    fn write(&self, command: f64, scale: Scale, frame: &mut CommandRpdo1) {
+        if let Some(counts) = scale.to_counts(command) {
+            frame.target_counts = counts;
+        }
+    }
 
     /// Position that an axis is commanded to.
     fn position_m(&self, command: f64, reference_m: f64) -> f64;
