@@ -274,8 +274,9 @@ def identify(
     experiment = Experiment(**found.pop("experiment"))
     index = list(cell.axis_names).index(experiment.axis)
     return Identification(
-        **found, dt_s=cell.cycle_s, experiment=experiment, interface=cell.interfaces[index]
-    )
+        **found, dt_s=cell.cycle_s, experiment=experiment, interface=cell.interfaces[index],
+        input_unit=campaign.result.input_unit(index),
+    )  # fmt: skip
 
 
 def _excite_function(
