@@ -2,6 +2,12 @@
 //!
 //! One file per family of Python names, each with its `register`; `argument` checks what comes in,
 //! `exceptions` and `error` say what is raised, and `detached` lets the interpreter go.
+//!
+//! Family: `laws`, `python_law` and `weights` read each other's arguments.
+//!
+//! Family: `model` and `model_argument` read each other's arguments.
+//!
+//! Family: `experiment` and `identify` read each other's arguments.
 
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 

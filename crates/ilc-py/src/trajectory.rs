@@ -8,8 +8,8 @@ use ilc_rt::trajectory::exponential::AlphaMax;
 use ilc_rt::trajectory::program::{GcodeSetting, read_gcode};
 use ilc_rt::trajectory::{
     AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
-    ModulatedSegment, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion, TrackingIndex,
-    TrajectoryError, points_program, raster as raster_program,
+    ModulatedSegment, MoveError, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion,
+    TrackingIndex, TrajectoryError, points_program, raster as raster_program,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -166,8 +166,7 @@ fn read_limits(
     jerk: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<AxisLimits>> {
     if !(1..=MAX_AXES).contains(&n_axes) {
-        return Err(TrajectoryError::Move(ilc_rt::interpolate::MoveError::Axes { n_axes }))
-            .or_raise();
+        return Err(TrajectoryError::from(MoveError::Axes { n_axes })).or_raise();
     }
     let velocity = read_each("velocity_max_m_s", velocity, n_axes)?;
     let acceleration = read_each("acceleration_max_m_s2", acceleration, n_axes)?;

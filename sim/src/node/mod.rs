@@ -2,6 +2,8 @@
 //!
 //! Nodes talk frames on one side and demands and measurements on the other; they know no plant and no
 //! clock, and after they are built they allocate nothing. Imported by `machine` and `eds`.
+//!
+//! Family: `drive`, `drive_objects` and `units`: the dictionary of a drive holds its parameters.
 
 pub mod communication;
 pub mod dictionary;

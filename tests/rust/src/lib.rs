@@ -4,7 +4,7 @@
 //! [`campaign`] runs the supervisor as a user does; [`far_side`] puts the simulated machine on a bus in
 //! a thread of its own; [`rig`] is the loop alone, on a bus that records every command and lets a test
 //! break things in the middle of a run; [`faulty`] is a bus that loses, delays and spoils frames by seed;
-//! [`counting`] is an allocator that counts.
+//! [`counting`] is an allocator that counts; [`source`] reads the project's own source.
 
 #![expect(clippy::expect_used, reason = "a test fails where its set-up does")]
 
@@ -14,6 +14,7 @@ pub mod derived;
 pub mod far_side;
 pub mod faulty;
 pub mod rig;
+pub mod source;
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -5,66 +5,24 @@
 #![allow(clippy::unwrap_used, reason = "a test fails where a file is not there")]
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use ilc_tests::root;
+use ilc_tests::source::{code, module_of, rust_files, test_modules};
 
 /// First line of every hot file.
 const FENCE: &str =
     "#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]";
 
 /// Files in hot modules that only set up, describe or refuse; none of them is called in a tick.
-const COLD_FILES: [&str; 40] = [
+const COLD_FILES: [&str; 1] = [
     // Sets the loop's thread up.
     "rt/thread.rs",
-    // Planning: from a program to what the interpolator reads.
-    "trajectory/contour/mod.rs",
-    "trajectory/contour/coupling.rs",
-    "trajectory/contour/tangent.rs",
-    "trajectory/contour/error.rs",
-    "trajectory/contour/sampled.rs",
-    "trajectory/contour/shape.rs",
-    "trajectory/contour/windowed.rs",
-    "trajectory/error.rs",
-    "trajectory/curve/arc_length.rs",
-    "trajectory/curve/butterfly.rs",
-    "trajectory/curve/frame.rs",
-    "trajectory/curve/mod.rs",
-    "trajectory/curve/run.rs",
-    "trajectory/curve/spiral.rs",
-    "trajectory/curve/spline.rs",
-    "trajectory/curve/time_law.rs",
-    "trajectory/curve/turn.rs",
-    "trajectory/exponential/alpha.rs",
-    "trajectory/exponential/choice.rs",
-    "trajectory/exponential/peaks.rs",
-    "trajectory/exponential/mod.rs",
-    "trajectory/modulated.rs",
-    "trajectory/program/block.rs",
-    "trajectory/program/code.rs",
-    "trajectory/program/gcode.rs",
-    "trajectory/program/gcode/tests.rs",
-    "trajectory/program/modal.rs",
-    "trajectory/program/mod.rs",
-    "trajectory/program/table.rs",
-    "trajectory/program/text.rs",
-    "trajectory/program/token.rs",
-    "trajectory/raster.rs",
-    "trajectory/tracking_index.rs",
-    "trajectory/path.rs",
-    "trajectory/set_points.rs",
-    "trajectory/setpoint.rs",
-    "trajectory/verification.rs",
-    // Random numbers and promises of its tests.
-    "trajectory/promises.rs",
-    "trajectory/random.rs",
 ];
 
 struct Module {
     row: u32,
     is_hot: bool,
-}
-
-fn root() -> PathBuf {
-    ilc_tests::root().canonicalize().unwrap()
 }
 
 /// `| 3 | `servo` | hot | the cycle … |` of the table of layers.
@@ -83,48 +41,6 @@ fn layers() -> BTreeMap<String, Module> {
     }
     assert!(modules.len() >= 10, "the table of layers is not where this test looks for it");
     modules
-}
-
-fn rust_files(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            files.extend(rust_files(&path));
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            files.push(path);
-        }
-    }
-    files.sort();
-    files
-}
-
-/// The source without comments and without its test modules, which may import what they test with.
-fn code(text: &str) -> String {
-    let mut kept = String::new();
-    let mut is_for_tests = false;
-    let mut ends_with = None;
-    for line in text.lines() {
-        let code = line.split("//").next().unwrap_or("");
-        let indent = &line[..line.len() - line.trim_start().len()];
-        if let Some(end) = &ends_with {
-            // As it is formatted, a module ends with the first brace that is as far left as it is.
-            if line == end {
-                ends_with = None;
-            }
-        } else if code.trim_start().starts_with("#[cfg(test)]") {
-            is_for_tests = true;
-        } else if is_for_tests && code.trim_start().starts_with("mod ") {
-            is_for_tests = false;
-            if code.contains('{') && !code.contains('}') {
-                ends_with = Some(format!("{indent}}}"));
-            }
-        } else {
-            kept.push_str(code);
-            kept.push('\n');
-        }
-    }
-    kept
 }
 
 /// The top-level modules that `code` names after `crate::`, also in braces.
@@ -264,6 +180,7 @@ fn every_hot_file_is_fenced() {
         code.join("\n").trim_start().starts_with(FENCE)
     };
     let mut wrong = Vec::new();
+    let tests = test_modules(&source);
     let mut n_fenced = 0;
     for file in rust_files(&source) {
         let own = top_level(&file, &source);
@@ -278,7 +195,8 @@ fn every_hot_file_is_fenced() {
         let is_listed = COLD_FILES.contains(&inside);
         let is_cold = inside_of_cold_folder(&file, &source);
         let is_head = is_only_declarations(&std::fs::read_to_string(&file).unwrap());
-        let is_test = inside.ends_with("/tests.rs") || inside.ends_with("/proof.rs");
+        let module = module_of(&file, &source);
+        let is_test = tests.iter().any(|test| module.starts_with(test));
         n_fenced += u32::from(is_fenced);
         if is_fenced && is_listed {
             wrong.push(format!("{inside} is fenced: take it off the list of cold files"));

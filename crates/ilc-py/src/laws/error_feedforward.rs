@@ -81,7 +81,11 @@ impl PyErrorFeedforwardIlc {
         limit: Option<f64>,
     ) -> PyResult<Self> {
         let made = made!(gain, filter, lead, limit);
-        let rule = Feedforward { gain, lead, limit: limit.unwrap_or(f64::INFINITY) };
+        let rule = Feedforward {
+            gain_per_s: gain,
+            lead_samples: lead,
+            input_max: limit.unwrap_or(f64::INFINITY),
+        };
         // Made once for nothing, so that a wrong gain shows here and not after the first run.
         ErrorFeedforward::new(rule, 1, 1, QFilter::None).or_raise()?;
         Ok(Self { made, rule, filter: read_filter("filter", filter)?, law: AnySize::new() })
@@ -140,7 +144,7 @@ impl PyErrorFeedforwardIlc {
     }
 
     fn __repr__(&self) -> String {
-        let Feedforward { gain, lead, limit } = self.rule;
+        let Feedforward { gain_per_s: gain, lead_samples: lead, input_max: limit } = self.rule;
         let limit = if limit.is_finite() { limit.to_string() } else { "None".to_owned() };
         format!(
             "ErrorFeedforwardIlc(gain={gain}, filter={}, lead={lead}, limit={limit})",

@@ -81,7 +81,7 @@ impl PyPdIlc {
         #[pyo3(from_py_with = whole::lead)] lead: usize,
     ) -> PyResult<Self> {
         let made = made!(kp, kd, q_filter, lead);
-        let gains = PdGains { kp, kd, lead };
+        let gains = PdGains { kp, kd, lead_samples: lead };
         // Made once for nothing, so that a wrong gain shows here and not after the first run.
         Pd::new(gains, 1, 1, QFilter::None).or_raise()?;
         Ok(Self { made, gains, q_filter: read_filter("q_filter", q_filter)?, law: AnySize::new() })
@@ -134,7 +134,7 @@ impl PyPdIlc {
     }
 
     fn __repr__(&self) -> String {
-        let PdGains { kp, kd, lead } = self.gains;
+        let PdGains { kp, kd, lead_samples: lead } = self.gains;
         let filter = kind(&self.q_filter);
         format!("PdIlc(kp={kp}, kd={kd}, q_filter={filter}, lead={lead})")
     }

@@ -2,13 +2,13 @@
 //!
 //! Whoever starts a cell reads it through [`Cell::load`]: the supervisor, the binary, the simulator
 //! and Python. It knows the numbers and their ranges, and nothing of how they are used.
+//!
+//! Family: `cell` and `validate` call each other, as a cell is checked where it is loaded.
 
 mod cell;
 mod error;
 mod file;
-mod law;
 mod learning;
-mod norm_optimal;
 mod path;
 mod program;
 mod simulation;
@@ -20,12 +20,10 @@ pub use cell::{
 };
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};
-pub use law::{
-    AdjointSection, ConstrainedSection, ErrorFeedforwardSection, ModelInverseSection, PdSection,
-};
-pub use learning::{GateMeasure, GateSection, LadderSection, LawName, Learning, Measure};
-pub use norm_optimal::{ContourSection, NormOptimalSection, PhaseSection};
+pub use learning::{Learning, Measure};
 pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
 pub use program::{Corner, Program, Segment};
 pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;
+
+pub use crate::learning::law::catalogue::LawName;

@@ -2,13 +2,15 @@
 //!
 //! Checks and refuses; touches neither a bus nor a library. `identification`, `campaign`, `cli` and the
 //! Python bindings may import it. Cold.
+//!
+//! Family: `forecast`, `law` and `plan` work one cell description out together.
 
 mod error;
+mod fingerprint;
 mod forecast;
 mod law;
 mod plan;
 mod program;
-mod weights;
 
 pub use error::DesignError;
 pub use forecast::{first_error, learning_model};

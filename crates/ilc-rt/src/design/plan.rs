@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::error::DesignError;
+use super::fingerprint;
 use super::law::{self, Prepared};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, Measure};
 use crate::control::PositionLoop;
@@ -13,7 +14,7 @@ use crate::fieldbus::transport::scheme_of;
 use crate::model::{
     Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
 };
-use crate::record::{Meta, fingerprint};
+use crate::record::Meta;
 use crate::rt::Nanos;
 use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
 use crate::trajectory::{AxisLimits, Interpolator};
@@ -34,6 +35,8 @@ pub struct Plan {
     pub measure: Measure,
     /// Provenance of the records; the campaign's name is filled in by the campaign.
     pub meta: Meta,
+    /// Fingerprint under which versions up to 0.1 kept the same campaign.
+    pub(crate) legacy_fingerprint: String,
     /// Worst-case share of the bus taken by cyclic traffic.
     pub bus_load: f64,
 }
@@ -73,6 +76,7 @@ impl Plan {
             servo: servo_spec(&cell, lockstep)?,
             interpolator,
             reference_m,
+            legacy_fingerprint: String::new(),
             measure: cell.learning.measure,
             meta: Meta {
                 cell: cell.cell.name.clone(),
@@ -115,28 +119,8 @@ impl Plan {
     pub fn name_law(&mut self, cell: &Cell, name: &str, parameters: &str) {
         name.clone_into(&mut self.meta.law);
         parameters.clone_into(&mut self.meta.law_parameters);
-        let axes: Vec<_> = cell
-            .axes
-            .iter()
-            .map(|a| format!("{:?}", (&a.name, a.interface, a.limits, a.model, a.position_loop)))
-            .collect();
-        let whole = format!(
-            "{:?}",
-            (
-                &self.meta.cell,
-                axes,
-                &self.meta.program,
-                cell.cell.cycle_us,
-                &self.meta.measure,
-                name,
-                parameters,
-                cell.learning.input_max_m,
-                cell.learning.input_max_m_s,
-                // Of weights that vary along the run the parameters do not tell every number.
-                (name == cell.learning.law.as_str()).then(|| cell.learning.law_text()),
-            )
-        );
-        self.meta.fingerprint = fingerprint(&whole);
+        self.legacy_fingerprint = fingerprint::legacy(cell, &self.meta, name, parameters);
+        self.meta.fingerprint = fingerprint::of(cell, &self.meta, name, parameters);
     }
 }
 

@@ -50,6 +50,7 @@ impl Line {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp, reason = "exact where exactness is promised")]
 mod tests {
     use super::*;
 

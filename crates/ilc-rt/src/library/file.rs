@@ -8,11 +8,15 @@ use std::fmt::Write as _;
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 
 use super::error::{LibraryError, told};
 use super::schema;
+
+/// How long to wait for another process that is writing: a run that cannot be kept has to stop the axes.
+pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// The name that stands for a library in memory.
 pub(super) const IN_MEMORY: &str = ":memory:";
@@ -141,7 +145,7 @@ fn connect(path: &Path, at_rest: bool) -> Result<Connection, LibraryError> {
         Connection::open_with_flags(plain(path), flags)
     };
     let connection = connection.map_err(fail)?;
-    connection.busy_timeout(super::store::BUSY_TIMEOUT).map_err(fail)?;
+    connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
     // The first look at the file: until now nothing was read.
     connection.query_row("SELECT count(*) FROM sqlite_master", [], |_| Ok(())).map_err(fail)?;
     Ok(connection)

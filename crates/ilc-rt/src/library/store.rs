@@ -6,15 +6,12 @@ use std::time::Duration;
 use rusqlite::{Connection, OptionalExtension, params};
 
 use super::error::{LibraryError, told};
-use super::file::{self, Found};
+use super::file::{self, BUSY_TIMEOUT, Found};
 use super::row::{
     ARRAYS, Row, as_integer, blob, is_old, json_list, json_numbers, read_row, refresh,
 };
 use super::schema;
 use crate::record::{Figures, IterationRecord, Meta};
-
-/// How long to wait for another process that is writing: a run that cannot be kept has to stop the axes.
-pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// How long to wait for it when there was a wait in vain before.
 const HURRIED: Duration = Duration::from_millis(200);

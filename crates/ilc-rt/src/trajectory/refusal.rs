@@ -1,7 +1,7 @@
 //! The sentence of a refusal: the value, its unit and what is allowed.
 //!
-//! A rotary axis is measured in radians, and only the cell knows which one is: whoever shows a refusal
-//! gives the units of the axes with [`TrajectoryError::in_units`]; without them they are metres.
+//! A rotary axis is measured in radians, and only the cell knows which one is rotary: where a refusal is
+//! shown, [`TrajectoryError::in_units`] takes the units of the axes; without them they are metres.
 
 use std::fmt;
 
@@ -31,6 +31,7 @@ impl fmt::Display for TrajectoryError {
 }
 
 impl fmt::Display for Refusal<'_> {
+    #[expect(clippy::too_many_lines, reason = "one sentence a variant")]
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         use TrajectoryError as E;
         let path = AxisUnit::along(self.units);

@@ -2,6 +2,8 @@
 //!
 //! For `supervisor`, the simulator and tests; nothing here is called in a tick. Imports the codecs of
 //! `canopen` and `cia402`, and the bus.
+//!
+//! Family: `drive`, `scaling` and `settings`: a drive is brought up from its own set-up.
 
 mod drive;
 mod error;

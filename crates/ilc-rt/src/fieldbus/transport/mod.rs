@@ -3,6 +3,8 @@
 //! Each file is one carrier behind the [`Bus`](super::Bus) trait, hot in `send` and `recv`; `opening`,
 //! which is cold, turns an address of a cell description into one. Used by `servo`, `supervisor`, the
 //! simulator and the tools, which know the address and nothing else of the carrier.
+//!
+//! Family: `opening`, `udp_multicast` and `zenoh`: each carrier is opened cold, by what it is made of.
 
 mod doorbell;
 pub mod loopback;

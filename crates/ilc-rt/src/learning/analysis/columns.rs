@@ -3,6 +3,9 @@
 use super::iteration::Iteration;
 use crate::learning::LearningError;
 
+/// Up to this many inputs a law without transpose is looked at column by column.
+pub const COLUMNS_MAX: usize = 3000;
+
 /// `T` as columns, for products with it and with its transpose.
 pub(super) struct Columns {
     n: usize,

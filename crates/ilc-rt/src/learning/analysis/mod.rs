@@ -27,10 +27,11 @@ mod mismatch;
 mod oracle;
 
 pub use crate::learning::krylov::Estimate;
+pub use columns::COLUMNS_MAX;
 pub use condition::PdCondition;
 pub use figures::{Analysis, Method};
 pub(in crate::learning) use frequency::Spectrum;
 pub use overreach::{Overreach, overreach};
-pub use question::{COLUMNS_MAX, DENSE_MAX, Question, analyze};
+pub use question::{DENSE_MAX, Question, analyze};
 pub use refuse::{Verdict, divergence, refuse_divergent};
 pub use uncertainty::Uncertainty;

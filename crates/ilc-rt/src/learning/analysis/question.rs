@@ -1,6 +1,6 @@
 //! The analysis of a law: which figure is found how.
 
-use super::columns::Columns;
+use super::columns::{COLUMNS_MAX, Columns};
 use super::condition::PdCondition;
 use super::dense::Dense;
 use super::figures::{Analysis, Method};
@@ -17,8 +17,6 @@ use crate::model::StateSpace;
 
 /// Up to this many inputs (samples times channels) whole matrices are formed.
 pub const DENSE_MAX: usize = 640;
-/// Up to this many inputs a law without transpose is looked at column by column.
-pub const COLUMNS_MAX: usize = 3000;
 
 /// What else is known, and asked.
 #[derive(Debug, Clone, PartialEq)]

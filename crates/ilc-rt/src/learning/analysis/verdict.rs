@@ -1,7 +1,7 @@
 //! From figures to a verdict, in words.
 
+use super::columns::COLUMNS_MAX;
 use super::figures::{Analysis, Method};
-use super::question::COLUMNS_MAX;
 use crate::learning::krylov::Estimate;
 
 /// Growth of an error beyond which no machine waits for it to fall again.

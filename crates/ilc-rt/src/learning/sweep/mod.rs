@@ -13,6 +13,10 @@
 //! [`Stages`] says what the matrices are at each sample, [`Gains`] are the result of the backward
 //! Riccati recursion (they depend on model and weights alone), and [`Sweep`] applies them to one
 //! run's input and error without allocating.
+//!
+//! Family: `factor`, `recursion` and `square_root` are one backward sweep in its two forms.
+//!
+//! Family: `lanes` and `single` are one forward sweep, over several problems or one.
 
 mod cholesky;
 mod factor;

@@ -2,6 +2,8 @@
 //!
 //! A [`Weight`] says what one term of the cost is at each sample; the other files build such weights
 //! from what they mean (contour, formation, dynamic filters). Laws, analysis and tuning import it.
+//!
+//! Family: `formation` and `objective` convert into each other.
 
 mod contour;
 mod coupled;

@@ -4,6 +4,8 @@
 //! input and says how far it can be trusted, [`fit_second_order`] and [`fit_rational`] find a model,
 //! and [`uncertainty`] bounds what the model does not explain. Cold, for set-up only; `identification`,
 //! `cli` and the Python bindings may import it.
+//!
+//! Family: `excitation` is a `multisine` or a `swept_sine`, which share its checks.
 
 mod doubt;
 mod excitation;

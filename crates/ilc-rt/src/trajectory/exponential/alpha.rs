@@ -6,7 +6,7 @@
 //! with the other end of its leg wherever both are felt, on the motion that will be executed.
 
 use super::leg::{End, Leg};
-use super::peaks::peaks;
+use super::peaks::{GOLDEN, peaks};
 use crate::interpolate::PathLimits;
 use crate::interpolate::Quantity;
 use crate::trajectory::error::TrajectoryError;
@@ -19,8 +19,6 @@ const NEAR: f64 = 0.9;
 const SECTIONS: usize = 16;
 /// Bisections of a crossing.
 const STEPS: usize = 32;
-/// `(√5 - 1)/2`.
-pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// An interval of α in which every limit holds.
 #[derive(Clone, Copy, Debug, PartialEq)]

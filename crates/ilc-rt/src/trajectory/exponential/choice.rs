@@ -1,8 +1,7 @@
 //! Which α each place of an E/S move gets. Cold; read by its plan.
 
 use super::alpha::{AlphaInterval, Place};
-use super::leg::{End, Leg};
-use super::plan::PlacedLeg;
+use super::leg::{End, Leg, PlacedLeg};
 use crate::interpolate::{AxisLimits, PathLimits};
 use crate::trajectory::error::TrajectoryError;
 

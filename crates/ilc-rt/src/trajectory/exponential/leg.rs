@@ -5,6 +5,7 @@
 //! is shut there: so the leg is at rest, or at its corner, exactly, whatever α each end has.
 
 use super::equations::weight_after;
+use crate::interpolate::line::Line;
 use crate::trajectory::jet::Jet;
 
 /// Where exponentials are taken as gone: `e^{-45}` is below the rounding of 1.
@@ -39,6 +40,14 @@ pub(super) struct Leg {
     pub(super) ends: [End; 2],
     /// α of the first and of the last end; an end without one is not there yet.
     pub(super) alpha: [Option<f64>; 2],
+}
+
+/// A leg with its line, and the time at which it starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlacedLeg {
+    pub(super) leg: Leg,
+    pub(super) line: Line,
+    pub(super) start_s: f64,
 }
 
 impl Leg {

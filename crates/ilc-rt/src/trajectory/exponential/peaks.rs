@@ -3,9 +3,10 @@
 //! The end is sampled in pieces between the times at which something begins, and the largest samples
 //! are refined: so that a limit is held between two samples too.
 
-use super::alpha::GOLDEN;
 use super::leg::Leg;
 
+/// `(√5 - 1)/2`.
+pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Least samples of a piece.
 const SAMPLES: f64 = 160.0;
 /// Samples of one period of an oscillation.

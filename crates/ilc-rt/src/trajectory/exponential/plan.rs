@@ -2,7 +2,7 @@
 
 use super::choice::{AlphaChoice, AlphaMax, MARGIN, choose};
 use super::equations::blending_ratio;
-use super::leg::{End, Leg};
+use super::leg::{End, Leg, PlacedLeg};
 use crate::interpolate::MAX_AXES;
 use crate::interpolate::limits::is_positive;
 use crate::interpolate::line::Line;
@@ -28,13 +28,6 @@ pub struct ModulatedSegment {
     pub amplitude_m: f64,
     /// Frequency of the oscillation; not read if the amplitude is 0.
     pub frequency_hz: f64,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PlacedLeg {
-    pub(super) leg: Leg,
-    pub(super) line: Line,
-    start_s: f64,
 }
 
 /// A planned E/S move from rest to rest.

@@ -1,7 +1,7 @@
 //! One block of a part program: its words, each at most once, and of each modal group one.
 
 use super::code::{CODES, Code, Motion, code, tenths};
-use super::gcode::GcodeError;
+use super::error::GcodeError;
 use super::text::shown;
 use super::token::Token;
 

@@ -2,52 +2,11 @@
 //! absolute and incremental. What is not understood is refused where it stands.
 
 use super::block::Block;
+use super::error::GcodeError;
 use super::modal::Modal;
+use super::part_program::{GcodeProgram, GcodeSetting};
 use super::text::{shown, without_mark};
 use super::token::{Kind, Token, Tokens};
-use crate::trajectory::path::PathSegment;
-
-/// A refused program: the line from 1, the word, and what is allowed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {word}: {allowed}")]
-pub struct GcodeError {
-    /// Line of the text, from 1.
-    pub line: usize,
-    /// The word, as written.
-    pub word: String,
-    /// What is wrong and what is allowed.
-    pub allowed: String,
-}
-
-/// What a program is read with.
-#[derive(Clone, Copy, Debug)]
-pub struct GcodeSetting<'a> {
-    /// Where it begins, one coordinate an axis: X Y Z A B C are the first six.
-    pub start_m: &'a [f64],
-    /// Speed along the path until the first F.
-    pub feed_m_s: f64,
-    /// Speed of G0.
-    pub rapid_m_s: f64,
-    /// Which axes are rotary: their numbers are degrees. Those beyond its end are not.
-    pub rotary: &'a [bool],
-    /// Whether the path comes to rest at its corners (G61, G61.1) or rounds them (G64).
-    pub exact_corners: bool,
-    /// Whether blocks that begin with `/` are left out: LinuxCNC's switch is off at first.
-    pub block_delete: bool,
-}
-
-/// What a program says.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GcodeProgram {
-    /// Moves in order.
-    pub segments: Vec<PathSegment>,
-    /// The line of each move, from 1.
-    pub lines: Vec<usize>,
-    /// Whether each move is rapid (G0).
-    pub rapid: Vec<bool>,
-    /// Rest before the first move.
-    pub dwell_before_s: f64,
-}
 
 /// Reads a program: UTF-8 or any encoding that continues ASCII, as comments may hold any bytes.
 ///

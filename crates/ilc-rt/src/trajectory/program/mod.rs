@@ -4,11 +4,15 @@
 
 mod block;
 mod code;
+mod error;
 mod gcode;
 mod modal;
+mod part_program;
 mod table;
 mod text;
 mod token;
 
-pub use gcode::{GcodeError, GcodeProgram, GcodeSetting, read_gcode};
+pub use error::GcodeError;
+pub use gcode::read_gcode;
+pub use part_program::{GcodeProgram, GcodeSetting};
 pub use table::{SetPointTable, TableError, read_table};

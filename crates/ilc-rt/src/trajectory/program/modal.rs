@@ -3,7 +3,8 @@
 
 use super::block::{AXES, Block};
 use super::code::Motion;
-use super::gcode::{GcodeError, GcodeProgram, GcodeSetting};
+use super::error::GcodeError;
+use super::part_program::{GcodeProgram, GcodeSetting};
 use crate::interpolate::arc::{Arc, ends_agree};
 use crate::trajectory::path::{ArcSpec, POSITION_MAX_M, PathSegment, point};
 

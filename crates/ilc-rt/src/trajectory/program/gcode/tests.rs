@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::interpolate::random::Random;
+use crate::trajectory::PathSegment;
 
 const SETTING: GcodeSetting = GcodeSetting {
     start_m: &[0.0, 0.0],

@@ -1,0 +1,33 @@
+//! A part program as it is read: the setting that it is read with, and the moves that come out.
+
+use crate::trajectory::path::PathSegment;
+
+/// The setting that a program is read with.
+#[derive(Clone, Copy, Debug)]
+pub struct GcodeSetting<'a> {
+    /// Where it begins, one coordinate an axis: X Y Z A B C are the first six.
+    pub start_m: &'a [f64],
+    /// Speed along the path until the first F.
+    pub feed_m_s: f64,
+    /// Speed of G0.
+    pub rapid_m_s: f64,
+    /// Which axes are rotary: their numbers are degrees. Those beyond its end are not.
+    pub rotary: &'a [bool],
+    /// True if the path comes to rest at its corners (G61, G61.1), false if it rounds them (G64).
+    pub exact_corners: bool,
+    /// Leaves out blocks that begin with `/`; LinuxCNC's switch is off at first.
+    pub block_delete: bool,
+}
+
+/// The moves of a program.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GcodeProgram {
+    /// Moves in order.
+    pub segments: Vec<PathSegment>,
+    /// The line of each move, from 1.
+    pub lines: Vec<usize>,
+    /// Whether each move is rapid (G0).
+    pub rapid: Vec<bool>,
+    /// Rest before the first move.
+    pub dwell_before_s: f64,
+}
