@@ -1,6 +1,6 @@
 //! The cell description (TOML): typed, validated, and refused in one clear line.
 //!
-//! Whoever starts a cell reads it through [`Cell::load`]: the supervisor, the binary, the simulator
+//! Whoever starts a cell reads it through [`Cell::load`]: design, the binary, the simulator
 //! and Python. It knows the numbers and their ranges, and nothing of how they are used.
 //!
 //! Family: `cell` and `validate` call each other, as a cell is checked where it is loaded.

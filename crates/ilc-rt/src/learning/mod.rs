@@ -4,7 +4,7 @@
 //! ([`sweep`]) that the optimal ones share, and what goes round any law: when to stop ([`gate`]) and
 //! how many runs to average ([`ladder`]); [`analysis`] says before the first run whether a law will
 //! converge, and [`tune`] proposes weights. It runs between iterations, never in the tick; `config`,
-//! `supervisor` and the Python bindings may import it.
+//! `design` and the Python bindings may import it.
 //!
 //! Family: `error`, `krylov`, `law`, `operator`, `structure` and `weights` share the error of the folder,
 //! which carries that of the bounds, and a law answers with the structure that the analysis asks for.

@@ -1,6 +1,6 @@
 //! What a law is built from besides its parameters, and what its parameters may ask of a cell.
 //!
-//! `config` and `supervisor` fill it in from a cell description; the laws read it.
+//! `config` and `design` fill it in from a cell description; the laws read it.
 
 use std::fmt::Debug;
 

@@ -1,5 +1,5 @@
 //! The laws, one a file: a [`Law`](super::Law) and the parameters that a cell description gives it,
-//! listed in [`catalogue`]. `config`, `supervisor` and the Python bindings import them.
+//! listed in [`catalogue`]. `config`, `design` and the Python bindings import them.
 
 pub mod adjoint;
 pub mod catalogue;
