@@ -10,7 +10,7 @@ JOBS    := $(shell expr 2 \* $$(nproc))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
+.PHONY: help build derived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -42,6 +42,11 @@ $(VENV)/.bench: $(VENV)/.built
 	@touch $@
 
 build: $(VENV)/.built ## Build the binaries and the Python package into .venv
+
+derived: build ## Write docs/cell.schema.json and the tables of docs/cell.md from the schema of the cell
+	$(BIN)/ilc-rt schema > docs/cell.schema.json
+	$(BIN)/ilc-rt schema --document docs/cell.md > build/cell.md
+	mv build/cell.md docs/cell.md
 
 demo: build ## Ten runs on simulated drives, the error falling, and a report
 	$(BIN)/ilc demo
@@ -90,6 +95,8 @@ lint: $(VENV)/.test ## Formatting, lints, types, layers
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest ilc_rt._native
 	$(BIN)/lint-imports
+	$(BIN)/ilc-rt schema | cmp - docs/cell.schema.json || { echo "stale: run make derived"; exit 1; }
+	$(BIN)/ilc-rt schema --document docs/cell.md | cmp - docs/cell.md || { echo "stale: run make derived"; exit 1; }
 
 docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
