@@ -18,7 +18,7 @@ use crate::schema::field_order;
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Cell {
-    /// Where it was read from; empty for a text.
+    /// File it was read from; empty for a text.
     #[serde(skip)]
     pub file: PathBuf,
     /// `[cell]`
@@ -83,7 +83,7 @@ fn default_load_max() -> f64 {
     0.8
 }
 
-/// How a drive is commanded, and where the learned input enters.
+/// Command interface of a drive, and the point where the learned input enters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Interface {
@@ -108,7 +108,7 @@ pub struct Axis {
     /// the set point. `csv`: the position loop is in the controller, the learned input (m/s) is added to
     /// the velocity command.
     pub interface: Interface,
-    /// What its coordinate is measured in; every quantity of a rotary axis whose name ends in `_m`,
+    /// Unit of its coordinate; every quantity of a rotary axis whose name ends in `_m`,
     /// `_m_s`, … is in rad, rad/s, …
     #[serde(default)]
     pub unit: AxisUnit,
@@ -212,7 +212,7 @@ pub struct Safety {
     /// Cycles missed in a row before a controlled stop.
     #[schemars(range(min = 1, max = 10_000))]
     pub overrun_cycles_max: u32,
-    /// How long a node may take to boot and to answer.
+    /// Longest time that a node may take to boot and to answer.
     #[schemars(range(min = 0.01, max = 60.0))]
     pub answer_timeout_s: f64,
 }
