@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from ilc_rt._native import Cell, check_options, refuse_divergent
+from ilc_rt._native import Cell, check_options
+from ilc_rt.analysis import refuse_divergent
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
 from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
 from ilc_rt.events import EndEvent, Event, IterationEvent, parse_event
@@ -265,7 +266,7 @@ class Campaign:
             code = failure.exit_code if failure else EXIT_FAULT
             if failure is not None and failure.reason not in reason:
                 reason = failure.reason if reason in failure.reason else reason
-            raise CampaignError(reason, code)
+            raise CampaignError(reason, code) from (failure.__cause__ if failure else None)
         if status == "running":
             message = "the controller ended without saying so"
             raise CampaignError(message)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ilc_rt._native import VelocityLoopFit
+from ilc_rt.fits import VelocityLoopFit
 from ilc_rt.result import json_text, write_text
 from ilc_rt.text import label
 
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from ilc_rt._native import FrequencyResponse, SecondOrderFit
     from ilc_rt.experiment import Experiment
+    from ilc_rt.fits import SecondOrderFit
+    from ilc_rt.response import FrequencyResponse
 
     Array = NDArray[np.float64]
 
