@@ -17,7 +17,7 @@ pub const TABLE_BYTES_MAX: u64 = 64 << 20;
 /// Pipes and devices are refused without waiting for them.
 ///
 /// # Errors
-/// Why not, in a few words.
+/// The reason in a few words.
 pub fn read_file(path: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
     // Without this the opening of a pipe waits for the one who writes to it.
     let file = OpenOptions::new()
@@ -45,7 +45,7 @@ pub fn read_file(path: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
 /// Reads a file that stands in the folder of a cell description, or below it.
 ///
 /// # Errors
-/// Why not, in a few words: a name or a link that leads out of the folder, or as [`read_file`].
+/// The reason in a few words: a name or a link that leads out of the folder, or as [`read_file`].
 pub fn read_beside(cell_file: &Path, name: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
     let inside = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
     if !name.components().all(inside) {
