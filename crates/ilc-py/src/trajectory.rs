@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use ilc_rt::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
 use ilc_rt::trajectory::exponential::AlphaMax;
+use ilc_rt::trajectory::kind::RasterSection;
 use ilc_rt::trajectory::program::{GcodeSetting, read_gcode};
 use ilc_rt::trajectory::{
-    AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
+    AxisLimits, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
     ModulatedSegment, MoveError, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion,
-    TrackingIndex, TrajectoryError, points_program, raster as raster_program,
+    TrackingIndex, TrajectoryError, points_program,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -607,8 +608,7 @@ fn spline(
     let points = read_points("points_m", points_m)?;
     let axes =
         read_limits(points[0].len(), velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
-    let limits =
-        RunLimits { feed_m_s, curvature_acceleration_m_s2: curvature_acceleration_max_m_s2, axes };
+    let limits = RunLimits { feed_m_s, curvature_acceleration_max_m_s2, axes };
     planned(py, || sample_run(&Spline::through(&points)?, &limits, dt_s))
 }
 
@@ -672,8 +672,7 @@ fn butterfly(
     center_m: (f64, f64),
 ) -> PyResult<PyTrajectory> {
     let axes = read_limits(2, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
-    let limits =
-        RunLimits { feed_m_s, curvature_acceleration_m_s2: curvature_acceleration_max_m_s2, axes };
+    let limits = RunLimits { feed_m_s, curvature_acceleration_max_m_s2, axes };
     let center = finite_pair("center_m", center_m)?;
     planned(py, || sample_run(&Butterfly::new(scale_m, turns, center)?, &limits, dt_s))
 }
@@ -749,8 +748,7 @@ fn spiral(
     center_m: (f64, f64),
 ) -> PyResult<PyTrajectory> {
     let axes = read_limits(2, velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)?;
-    let limits =
-        RunLimits { feed_m_s, curvature_acceleration_m_s2: curvature_acceleration_max_m_s2, axes };
+    let limits = RunLimits { feed_m_s, curvature_acceleration_max_m_s2, axes };
     let center = finite_pair("center_m", center_m)?;
     planned(py, || sample_run(&Spiral::new(pitch_m, turns, center)?, &limits, dt_s))
 }
@@ -826,7 +824,8 @@ fn raster(
     let start = finite_pair("start_m", start_m)?;
     let setting = read_setting(setting)?;
     planned(py, || {
-        let program = raster_program(start, width_m, pitch_m, rows, feed_m_s, there_and_back)?;
+        let raster = RasterSection { width_m, pitch_m, rows, there_and_back };
+        let program = raster.segments(start, feed_m_s)?;
         sample_linear(&start, &program, &limits, setting, dt_s)
     })
 }
@@ -916,7 +915,7 @@ fn gcode(
     let spec = PathSpec {
         start_m: start,
         segments: program.segments,
-        corner: blend_s.map_or(CornerRule::ExactStop, |window_s| CornerRule::Blend { window_s }),
+        blend_s,
         dwell_before_s: program.dwell_before_s,
         dwell_after_s: 0.0,
     };

@@ -11,23 +11,20 @@ mod file;
 mod law;
 mod learning;
 mod norm_optimal;
-mod path;
-mod program;
 mod simulation;
 mod validate;
 
+pub use crate::trajectory::kind::{Corner, PathKind, Program, Segment};
 pub use cell::{
     Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Interface, Limits, PositionLoop,
     Safety, TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
-pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};
+pub use file::{CELL_BYTES_MAX, read_beside, read_file};
 pub use law::{
     AdjointSection, ConstrainedSection, ErrorFeedforwardSection, ModelInverseSection, PdSection,
 };
 pub use learning::{GateMeasure, GateSection, LadderSection, LawName, Learning, Measure};
 pub use norm_optimal::{ContourSection, NormOptimalSection, PhaseSection};
-pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
-pub use program::{Corner, Program, Segment};
 pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;
