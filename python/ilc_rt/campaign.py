@@ -6,18 +6,21 @@ import signal
 import warnings
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from ilc_rt._native import Cell, refuse_divergent
+from ilc_rt._native import Cell, check_options
+from ilc_rt.analysis import refuse_divergent
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
 from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
 from ilc_rt.events import EndEvent, Event, IterationEvent, parse_event
 from ilc_rt.interruption import ControlledStop
+from ilc_rt.options import Verb, arguments, options
 from ilc_rt.processes import start_simulated_drives
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
+from ilc_rt.transports import Transport, transport_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -26,10 +29,7 @@ if TYPE_CHECKING:
 
     from ilc_rt.experiment import Experiment
 
-DEFAULT_LIBRARY = "ilc-library.db"
-# Runs are counted in 32 bits.
-ITERATIONS_MAX = 2**32 - 1
-TRANSPORTS = ("can", "udp", "zenoh", "loopback")
+DEFAULT_LIBRARY = str(options("run")["library"].default)
 Drives = Literal["auto", "simulated", "external"]
 
 
@@ -57,32 +57,33 @@ class Campaign:
         law that the cell names. A law written in Python makes the controller
         run inside this process; it is called between runs, never in the loop.
     library : path
-        Where the runs are kept.
+        Library file that every run is stored in.
     bus : str or None
-        Bus address in place of the cell's: ``can:``, ``udp:``, ``zenoh:``
-        or ``loopback:``.
+        Bus address in place of the cell's; `ilc_rt.transports` lists the kinds.
     measure : {"encoder", "tcp"} or None
-        Which measurement to learn from, in place of the cell's.
+        Measurement to learn from, in place of the cell's.
     lockstep : bool or None
-        Whether drives and loop advance on each other's answer, with no wall
-        clock. None means yes for ``loopback:``, no for every other bus.
+        Pace the loop by the drives' answers, without a wall clock. None means
+        yes for ``loopback:``, no for every other bus.
     drives : {"auto", "simulated", "external"}
         Whether to start simulated drives. "auto" never does so on a CAN bus,
         where real ones may be listening.
     resume : bool
-        Whether to go on from the last campaign of this cell in the library.
+        Resume the newest campaign of this cell, program, measurement and law.
     learning : bool
-        Whether to learn at all; if not, every run is like the first.
+        Learn; if not, every run is like the first.
     disturbance : callable, array_like of float64 or None
-        What is measured of each run's surroundings before it, as a temperature:
-        kept with the run in the library, and given to the law for the coming
-        run. Either one row a run, shape (n_runs,) or (n_runs, n_disturbances),
-        or a function of the run's number (from 0) that is asked while the axes
-        return. The controller then runs inside this process.
+        Measured disturbance before each run, e.g. a temperature: stored with
+        the run, and given to the law for the next run. Either one row a run,
+        shape (n_runs,) or (n_runs, n_disturbances), or a function of the run's
+        number (from 0) that is called while the axes return. The controller
+        then runs inside this process.
     allow_divergent : bool
-        Whether to start a law of which the analysis says that it will not
-        converge. A law written in Python is not analysed: it always starts.
-        Of a `Gate` or a `Ladder` the law inside is analysed.
+        Start the law even if the analysis predicts divergence. A law written
+        in Python is not analysed: it always starts. Of a `Gate` or a `Ladder`
+        the law inside is analysed.
+    telemetry : bool
+        Publish on Zenoh; never with ``loopback:``.
 
     Raises
     ------
@@ -128,6 +129,7 @@ class Campaign:
         learning: bool = True,
         disturbance: Callable[[int], ArrayLike] | ArrayLike | None = None,
         allow_divergent: bool = False,
+        telemetry: bool = True,
     ) -> None:
         if isinstance(cell, Cell):
             self.cell = cell
@@ -148,11 +150,12 @@ class Campaign:
                 warnings.warn(f"{self.cell.path}: {line}", stacklevel=2)
         self.measure = measure
         self.transport = transport_of(self.bus)
-        self.lockstep = self.transport == "loopback" if lockstep is None else lockstep
+        self.lockstep = self.transport.in_process if lockstep is None else lockstep
         self.simulated = _simulated(self.transport, drives)
         self.resume = resume
         self.learning = learning
-        # What is run in place of the program, if an axis is to be identified.
+        self.telemetry = telemetry
+        # Excitation in place of the program, if an axis is to be identified.
         self.experiment: Experiment | None = None
         self.disturbance = disturbance
         self.result = CampaignResult(self.library)
@@ -189,14 +192,15 @@ class Campaign:
         Leaving the loop early stops the axes in a controlled way before this
         iterator is closed. Parameters and errors are those of `run`.
         """
-        if not 1 <= iterations <= ITERATIONS_MAX:
-            allowed = "at least 1" if iterations < 1 else f"at most {ITERATIONS_MAX}"
-            message = f"iterations = {iterations}: {allowed}"
-            raise BadInputError(message)
+        verb, words = self._command(iterations)
+        try:
+            check_options(verb, words)
+        except ValueError as error:
+            raise BadInputError(str(error)) from error
         measure = _measure(self.disturbance, iterations)
         self.result = CampaignResult(self.library)
         with ControlledStop(self.interrupt) as stop:
-            controller = self._controller = self._start(iterations, measure)
+            controller = self._controller = self._start(verb, words, measure)
             try:
                 if stop.received is not None:
                     controller.interrupt(stop.received)
@@ -220,49 +224,39 @@ class Campaign:
         if self._controller is not None:
             self._controller.interrupt(number)
 
-    def _start(self, iterations: int, measure: Callable[[int], ArrayLike] | None) -> Controller:
+    def _command(self, iterations: int) -> tuple[Verb, list[str]]:
+        """Return verb and options of ``ilc-rt``."""
+        values: dict[str, object] = {
+            "bus": self.bus, "measure": self.measure, "lockstep": self.lockstep,
+            "simulated": self.simulated, "library": self.library, "telemetry": self.telemetry,
+        }  # fmt: skip
+        if self.experiment is not None:
+            return "identify", arguments("identify", values) + self.experiment.arguments()
+        values |= {
+            "iterations": iterations, "learning": self.learning, "resume": self.resume,
+            "allow_divergent": self.allow_divergent,
+        }  # fmt: skip
+        return "run", arguments("run", values)
+
+    def _start(
+        self, verb: Verb, words: list[str], measure: Callable[[int], ArrayLike] | None
+    ) -> Controller:
         cell_file = str(self.cell.path)
-        if self.law is None and measure is None and self.transport != "loopback":
-            library = ["--library", self.library]
-            if self.experiment is not None:
-                verb, arguments = "identify", library + self.experiment.arguments()
-            else:
-                verb, arguments = "run", ["--iterations", str(iterations), *library]
-                if not self.learning:
-                    arguments.append("--no-learning")
-            if self.measure is not None:
-                arguments += ["--measure", self.measure]
-            if self.resume:
-                arguments.append("--resume")
-            if self.allow_divergent:
-                arguments.append("--allow-divergent")
-            return ProcessController(
-                cell_file,
-                arguments,
-                verb=verb,
-                bus=self.bus,
-                lockstep=self.lockstep,
-                simulated=self.simulated,
-            )
-        options: dict[str, Any] = {
-            "cell": self.cell,
-            "iterations": iterations,
-            "library": self.library,
-            "bus": self.bus,
-            "measure": self.measure,
-            "lockstep": self.lockstep,
-            "resume": self.resume,
-            "law": self.law,
-            "learning": self.learning,
-            "experiment": self.experiment,
-            "disturbance": measure,
-            "simulated": self.simulated,
-        }
-        apart = self.simulated and self.transport != "loopback"
         drives = None
-        if apart:
+        if self.simulated and not self.transport.in_process:
             drives = start_simulated_drives(cell_file, self.bus, lockstep=self.lockstep)
-        return InProcessController(options, drives)
+        if self.law is None and measure is None and not self.transport.in_process:
+            return ProcessController(cell_file, words, drives, verb=verb)
+        return InProcessController(
+            {
+                "cell": self.cell,
+                "arguments": words,
+                "verb": verb,
+                "law": self.law,
+                "disturbance": measure,
+            },
+            drives,
+        )
 
     def _check_end(self, controller: Controller) -> None:
         failure = controller.failure()
@@ -272,7 +266,7 @@ class Campaign:
             code = failure.exit_code if failure else EXIT_FAULT
             if failure is not None and failure.reason not in reason:
                 reason = failure.reason if reason in failure.reason else reason
-            raise CampaignError(reason, code)
+            raise CampaignError(reason, code) from (failure.__cause__ if failure else None)
         if status == "running":
             message = "the controller ended without saying so"
             raise CampaignError(message)
@@ -297,26 +291,6 @@ def load_cell(path: str | Path, *, allow_divergent: bool = False) -> Cell:
         return Cell.load(path, allow_divergent=allow_divergent)
     except (ValueError, OSError, RuntimeError) as error:
         raise BadInputError(" ".join(str(error).split())) from error
-
-
-def transport_of(bus: str) -> str:
-    """Return the kind of a bus address.
-
-    Raises
-    ------
-    BadInputError
-        If it is not one of can, udp, zenoh, loopback.
-
-    Examples
-    --------
-    >>> transport_of("udp:239.74.163.2")
-    'udp'
-    """
-    kind, colon, _ = bus.partition(":")
-    if not colon or kind not in TRANSPORTS:
-        message = f"bus = {bus}: allowed can:INTERFACE, udp:ADDRESS[:PORT], zenoh:KEY or loopback:"
-        raise BadInputError(message)
-    return kind
 
 
 def _measure(
@@ -347,14 +321,16 @@ def _refuse_divergent(law: Law, cell: Cell) -> None:
         raise BadInputError(message) from error
 
 
-def _simulated(transport: str, drives: str) -> bool:
+def _simulated(transport: Transport, drives: str) -> bool:
     if drives not in {"auto", "simulated", "external"}:
         message = f"drives = {drives}: allowed auto, simulated or external"
         raise BadInputError(message)
-    if transport == "loopback" and drives == "external":
-        message = "drives = external: loopback: has no outside; its drives are always simulated"
+    if transport.in_process and drives == "external":
+        message = (
+            f"drives = external: {transport.syntax} has no outside; its drives are always simulated"
+        )
         raise BadInputError(message)
-    return drives == "simulated" or (drives == "auto" and transport != "can")
+    return drives == "simulated" or (drives == "auto" and not transport.has_bits)
 
 
 __all__ = ["Campaign", "CampaignError", "EndEvent", "IterationRecord", "Law", "load_cell"]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ilc_rt._native import run_events
 from ilc_rt.errors import EXIT_BAD_INPUT, CampaignError
-from ilc_rt.processes import Program, find_program, start_simulated_drives
+from ilc_rt.processes import Program, find_program
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,47 +43,28 @@ class Controller(Protocol):
 
 
 class ProcessController:
-    """`ilc-rt run --events`, or another verb, in a process, with or without simulated drives.
+    """`ilc-rt run --events`, or another verb, in a process.
 
     Parameters
     ----------
     cell_file : str
         The cell description.
     arguments : list of str
-        Further arguments of the verb.
+        Options of the verb.
+    drives : Program or None
+        Simulated drives, which end with the controller.
     verb : str
         ``"run"`` or ``"identify"``.
-    bus : str or None
-        Bus address in place of the cell's.
-    lockstep : bool
-        Whether drives and loop advance on each other's answer.
-    simulated : bool
-        Whether to start `ilc-sim` first.
     """
 
     def __init__(
-        self,
-        cell_file: str,
-        arguments: list[str],
-        *,
-        bus: str | None,
-        lockstep: bool,
-        simulated: bool,
-        verb: str = "run",
+        self, cell_file: str, arguments: list[str], drives: Program | None, *, verb: str = "run"
     ) -> None:
-        controller = find_program("ilc-rt")
-        self._drives: Program | None = None
+        self._drives = drives
         self._stop_by: float | None = None
-        if simulated:
-            self._drives = start_simulated_drives(cell_file, bus, lockstep=lockstep)
-        argv = [str(controller), verb, cell_file, "--events", "--with-parent", *arguments]
-        if bus is not None:
-            argv += ["--bus", bus]
-        if lockstep:
-            argv.append("--lockstep")
-        elif simulated:
-            argv.append("--simulated-drives")
         try:
+            controller = str(find_program("ilc-rt"))
+            argv = [controller, verb, cell_file, "--events", "--with-parent", *arguments]
             self._controller = Program(argv)
         except BaseException:
             self._close_drives()
@@ -181,6 +162,8 @@ class InProcessController:
             yield from self._stream
         except (ValueError, OSError) as error:
             self._error = CampaignError(str(error), EXIT_BAD_INPUT)
+            # The exception of a law that is written in Python, with its traceback.
+            self._error.__cause__ = error.__cause__
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
         """Ask for a controlled stop; `lines` goes on until it has happened."""

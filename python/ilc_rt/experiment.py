@@ -1,10 +1,10 @@
-"""What an identification asks of the controller: which axis, excited how."""
+"""Experiment of an identification: one axis, and its excitation."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
-WAVEFORMS = ("sweep", "linear-sweep", "multisine")
+from ilc_rt.options import arguments
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +22,11 @@ class Experiment:
     period_s : float
         Length of a period in seconds.
     periods : int
-        Periods that are evaluated.
+        Evaluated periods.
     amplitude : float or None
-        Peak in m (csp) or m/s (csv); half of what the limits allow if None.
+        Peak in the unit of the input; half of what the limits allow if None.
     at_m : float or None
-        Where the axis is excited; at the program's start if None.
+        Position that the axis is excited around; the program's start if None.
 
     Examples
     --------
@@ -44,12 +44,5 @@ class Experiment:
     at_m: float | None = None
 
     def arguments(self) -> list[str]:
-        """Return the experiment as arguments of ``ilc-rt identify``."""
-        arguments = ["--axis", self.axis, "--waveform", self.waveform]
-        arguments += ["--from-hz", repr(self.from_hz), "--to-hz", repr(self.to_hz)]
-        arguments += ["--period-s", repr(self.period_s), "--periods", str(self.periods)]
-        if self.amplitude is not None:
-            arguments += ["--amplitude", repr(self.amplitude)]
-        if self.at_m is not None:
-            arguments += ["--at-m", repr(self.at_m)]
-        return arguments
+        """Return the experiment as options of ``ilc-rt identify``."""
+        return arguments("identify", asdict(self))

@@ -1,4 +1,4 @@
-"""What an identification showed: response, model, what the model leaves over, and their picture.
+"""Result of an identification: response, model, residual, and their picture.
 
 `identify` makes it; the command `ilc identify` prints and writes it.
 """
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ilc_rt._native import FrequencyResponse, SecondOrderFit, VelocityLoopFit, doubt
+from ilc_rt.fits import VelocityLoopFit
 from ilc_rt.result import json_text, write_text
 from ilc_rt.text import label
 
@@ -21,29 +21,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ilc_rt.experiment import Experiment
+    from ilc_rt.fits import SecondOrderFit
+    from ilc_rt.response import FrequencyResponse
 
     Array = NDArray[np.float64]
 
 
-def beyond_cell(fit: SecondOrderFit | VelocityLoopFit) -> str | None:
-    """Return what of a fit a cell description does not take; None if it takes all of it."""
-    if isinstance(fit, VelocityLoopFit):
-        figures = [("velocity bandwidth in Hz", fit.bandwidth_hz, 0.1, 10_000.0)]
-    else:
-        figures = [
-            ("natural frequency in Hz", fit.natural_frequency_hz, 0.1, 1000.0),
-            ("damping", fit.damping, 0.05, 5.0),
-        ]
-    figures.append(("delay in cycles", float(fit.delay_samples), 0.0, 20.0))
-    for what, value, low, high in figures:
-        if not low <= value <= high:
-            return f"the fit has {what} {value:.4g}, a cell takes {low:g} to {high:g}"
-    return None
-
-
 @dataclass(frozen=True, repr=False)
 class Identification:
-    """What an experiment showed.
+    """Result of an experiment.
 
     Attributes
     ----------
@@ -52,21 +38,25 @@ class Identification:
     model : SecondOrderFit
         Fitted gain, natural frequency, damping and delay.
     described : SecondOrderFit or VelocityLoopFit
-        What ``[axis.model]`` can say of it: unit gain and whole samples of
-        delay; the velocity loop alone of a csv axis.
+        Model that ``[axis.model]`` can express: unit gain and whole samples of
+        delay; the velocity loop alone for a csv axis.
     uncertainty : tuple of two arrays
-        Frequencies in Hz, and the bound there of what `described` leaves over:
+        Frequencies in Hz, and the bound there of the residual of `described`:
         ``|H/G - 1|`` and three standard deviations of the measurement.
     u, y : ndarray of float64, shape (n_samples,)
-        Input and output of the periods that were evaluated.
+        Input and output of the evaluated periods.
     period_samples : int
         Samples in a period.
     dt_s : float
         Sample time in seconds.
     experiment : Experiment
-        What was done; with the amplitude that was used.
+        The experiment, with the amplitude that was used.
     interface : {"csp", "csv"} or None
         How the axis is commanded; None if it is not an axis of a cell.
+    doubt : str or None
+        Reason not to use the model, if there is one.
+    axis_model : str
+        The section ``[axis.model]`` with the described model.
     """
 
     measured: FrequencyResponse
@@ -79,9 +69,11 @@ class Identification:
     dt_s: float
     experiment: Experiment
     interface: Literal["csp", "csv"] | None = None
+    doubt: str | None = None
+    axis_model: str = ""
 
     def __repr__(self) -> str:
-        """Return what was found on one line, without the signals."""
+        """Return the result on one line, without the signals."""
         return (
             f"Identification({self.experiment.waveform!r}, n_frequencies={len(self.frequency_hz)}, "
             f"model={self.model!r}, doubt={self.doubt!r})"
@@ -101,12 +93,6 @@ class Identification:
     def coherence(self) -> Array:
         """Coherence of input and output, shape (n_frequencies,)."""
         return self.measured.coherence
-
-    @property
-    def doubt(self) -> str | None:
-        """Why the model should not be used; None if nothing speaks against it."""
-        found = doubt(self.measured, self.described.residual_rms)
-        return found if found or self.interface is None else beyond_cell(self.described)
 
     def uncertainty_on_grid(self, count: int = 257) -> Array:
         """Return the bound at equally spaced frequencies from 0 to Nyquist.
@@ -137,16 +123,8 @@ class Identification:
         return np.where(grid_hz > frequency_hz[-1], np.maximum(found, 1.0), found)
 
     def section(self) -> str:
-        """Return the section ``[axis.model]`` that says what was found."""
-        model = self.described
-        lines = ["[axis.model]"]
-        if isinstance(model, VelocityLoopFit):
-            lines.append(f"velocity_bandwidth_hz = {model.bandwidth_hz:.3f}")
-        else:
-            lines.append(f"natural_frequency_hz = {model.natural_frequency_hz:.3f}")
-            lines.append(f"damping = {model.damping:.4f}")
-        lines.append(f"delay_samples = {model.delay_samples}")
-        return "\n".join(lines) + "\n"
+        """Return the section ``[axis.model]`` with the described model."""
+        return self.axis_model
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return name, value and standard deviation of every figure, as text.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ilc_rt._native import repeatability
+from ilc_rt.analysis import repeatability
 from ilc_rt.campaign import Campaign, Drives, load_cell
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import json_text, write_text
@@ -41,12 +41,15 @@ class AxisRepeatability:
         RMS of what differs from run to run: what it cannot.
     ratio : float
         First over second; None if nothing differs at all.
+    unit : {"m", "rad"}
+        Unit of the axis, and of both figures.
     """
 
     axis: str
     repeatable_rms_m: float
     non_repeatable_rms_m: float
     ratio: float | None
+    unit: str = "m"
 
     @property
     def verdict(self) -> Literal["yes", "a little", "no"]:
@@ -94,7 +97,9 @@ class RepeatabilityCheck:
         write_text(path, json_text(self.to_json()))
 
 
-def compare_runs(errors: ArrayLike, axis_names: tuple[str, ...] = ()) -> RepeatabilityCheck:
+def compare_runs(
+    errors: ArrayLike, axis_names: tuple[str, ...] = (), axis_units: tuple[str, ...] = ()
+) -> RepeatabilityCheck:
     """Split the errors of equal runs into what repeats and what does not.
 
     ``s^2[k] = sum_j (e_j[k] - m[k])^2 / (n - 1)`` with m the mean over the
@@ -107,6 +112,8 @@ def compare_runs(errors: ArrayLike, axis_names: tuple[str, ...] = ()) -> Repeata
         Error of each run, all with the same input.
     axis_names : tuple of str
         Names of the axes; numbers if empty.
+    axis_units : tuple of str
+        Their units; all m if empty.
 
     Returns
     -------
@@ -136,15 +143,19 @@ def compare_runs(errors: ArrayLike, axis_names: tuple[str, ...] = ()) -> Repeata
     if len(names) != values.shape[2]:
         message = f"axis_names has {len(names)} names; {values.shape[2]} are needed"
         raise ValueError(message)
-    axes = tuple(_axis(str(name), values[:, :, column]) for column, name in enumerate(names))
+    units = axis_units or ("m",) * len(names)
+    axes = tuple(
+        _axis(str(name), values[:, :, column], unit)
+        for column, (name, unit) in enumerate(zip(names, units, strict=True))
+    )
     return RepeatabilityCheck(n_runs, axes)
 
 
-def _axis(name: str, errors: NDArray[np.float64]) -> AxisRepeatability:
+def _axis(name: str, errors: NDArray[np.float64], unit: str) -> AxisRepeatability:
     found = repeatability(np.ascontiguousarray(errors))
     other = found.spread_rms
     same = float(np.sqrt(max(found.mean_rms**2 - other**2 / len(errors), 0.0)))
-    return AxisRepeatability(name, same, other, same / other if other > 0.0 else None)
+    return AxisRepeatability(name, same, other, same / other if other > 0.0 else None, unit)
 
 
 def check_repeatability(
@@ -156,6 +167,7 @@ def check_repeatability(
     lockstep: bool | None = None,
     drives: Drives = "auto",
     library: str | Path | None = None,
+    telemetry: bool = True,
     observe: Callable[[Event], None] | None = None,
 ) -> RepeatabilityCheck:
     """Run a cell's program without learning and compare the runs.
@@ -166,12 +178,12 @@ def check_repeatability(
         The cell.
     runs : int
         How many, at least 2.
-    bus, measure, lockstep, drives
+    bus, measure, lockstep, drives, telemetry
         As for `Campaign`.
     library : path or None
-        Where the runs are kept; nowhere if None.
+        Library that the runs are stored in; none if None.
     observe : callable or None
-        Is given every event of the controller.
+        Called with every event of the controller.
 
     Returns
     -------
@@ -197,7 +209,7 @@ def check_repeatability(
             library = Path(folder) / "runs.db"
         campaign = Campaign(
             described, library=library, bus=bus, measure=measure, lockstep=lockstep,
-            drives=drives, learning=False,
+            drives=drives, telemetry=telemetry, learning=False,
         )  # fmt: skip
         with closing(campaign.events(runs)) as events:
             for event in events:
@@ -207,4 +219,5 @@ def check_repeatability(
     if len(errors) < 2:
         message = "the runs were stopped before two of them were over"
         raise BadInputError(message)
-    return compare_runs(np.stack(errors), tuple(described.axis_names))
+    names, units = tuple(described.axis_names), campaign.result.axis_units
+    return compare_runs(np.stack(errors), names, units)

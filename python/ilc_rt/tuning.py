@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from ilc_rt._native import Cell
 from ilc_rt.cell_file import write_values
 from ilc_rt.errors import BadInputError
 from ilc_rt.trials import KNOWN_SHARE, BelievedAxis, Bench, Trial, Weights, believed_axes
+from ilc_rt.weight_search import WeightSearch, rounded
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,22 +20,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-    _Found = tuple[float, Weights, list[Trial]]
 
 TUNED_LAWS = ("norm_optimal", "constrained")
 UNCERTAINTY = 0.3
 """Default relative model uncertainty: the residual of a good fit on an axis with friction."""
 GROWTH_MAX = 1.2
 """Growth of an error over the best one that a trial may show."""
-STEPS_PER_OCTAVE = 2
-WORTH_WHILE = 0.98
-"""Share of the expected error below which a weight of the change earns its place."""
 TRIAL_RUNS_MAX = 100
 """Runs that a trial makes at most: what has not grown by then grows slowly enough to be seen."""
 ACROSS_TO_ALONG = 1.5
 """How much more an error across the path may weigh than one along it."""
-BISECTIONS = 2
-"""Halvings, in octaves, of the step between the best rate and the first that grows."""
 SAMPLES_MAX = 20_000
 """Samples of a run that a trial looks at."""
 
@@ -220,7 +215,7 @@ def propose_weights(
     varies = bool(table.get("contour") or table.get("phase")) and law not in {"constrained"}
     q = float(table.get("q", 1.0)) if varies else 1.0
     levels = _error_weights(table) if varies else [q]
-    search = _Search(benches, q, levels, _growth_max(written), n_runs)
+    search = WeightSearch(benches, q, levels, _growth_max(written), n_runs)
     weights, trials = search.weights()
     return Proposal(
         cell=described.name, law=law, section=section, weights=weights,
@@ -298,107 +293,11 @@ def _along(table: dict[str, Any]) -> float | None:
     across = q + float(contour.get("weight", 1.0))
     if across <= 2.0 * (q + along):
         return None
-    return _rounded(across / ACROSS_TO_ALONG - q)
-
-
-class _Search:
-    """The rates in question, and what the trials say of them."""
-
-    def __init__(
-        self, benches: list[Bench], q: float, levels: list[float], growth_max: float, n_runs: int
-    ) -> None:
-        self.q = q
-        self.benches, self.levels = benches, levels
-        self.growth_max, self.n_runs = growth_max, n_runs
-        self.refused: float | None = None
-        self.held = True
-        bases = [
-            abs(float(bench.model.dc_gain()[0, 0]))
-            / (bench.axis.dt_s * 2.0 * np.pi * bench.axis.natural_frequency_hz)
-            for bench in benches
-        ]
-        low, high = 0.25 * min(bases) * levels[0] ** 0.5, 32.0 * max(bases) * levels[-1] ** 0.5
-        count = int(np.ceil(STEPS_PER_OCTAVE * np.log2(high / low))) + 1
-        self.rates = [_rounded(rate) for rate in np.geomspace(high, low, count)]
-
-    def weights(self) -> tuple[Weights, list[Trial]]:
-        """Return the best weights, with their trials."""
-        best: _Found | None = None
-        for rate in self.rates:
-            weights = Weights(self.q, 0.0, 0.0, rate)
-            trials = self._trials(weights, self.growth_max)
-            if trials is None:
-                # Below a rate with which an error grows it grows all the more.
-                self.refused = rate
-                break
-            best = self._better(best, weights, trials)
-        for _ in range(BISECTIONS if best is not None and self.refused is not None else 0):
-            assert best is not None
-            assert self.refused is not None
-            if best[1].rate > 2.0 * self.refused:
-                break
-            weights = replace(best[1], rate=_rounded((best[1].rate * self.refused) ** 0.5))
-            trials = self._trials(weights, self.growth_max)
-            if trials is None:
-                self.refused = weights.rate
-            else:
-                best = self._better(best, weights, trials)
-        if best is None:
-            self.held = False
-            weights = Weights(self.q, 0.0, 0.0, self.rates[0])
-            trials = self._trials(weights, np.inf)
-            assert trials is not None
-            best = (self._score(trials), weights, trials)
-        score, weights, trials = best
-        for r in self._changes():
-            slower = Weights(weights.q, 0.0, r, weights.rate)
-            tried = self._trials(slower, self.growth_max)
-            if tried is not None and self._score(tried) < WORTH_WHILE * score:
-                score, weights, trials = self._score(tried), slower, tried
-        return weights, trials
-
-    def _better(self, best: _Found | None, weights: Weights, trials: list[Trial]) -> _Found:
-        score = self._score(trials)
-        return (score, weights, trials) if best is None or score < best[0] else best
-
-    def _changes(self) -> list[float]:
-        """Return weights of the change that may pay: only against noise."""
-        if all(bench.noise == 0.0 for bench in self.benches):
-            return []
-        square = max(float(bench.model.dc_gain()[0, 0]) ** 2 for bench in self.benches)
-        return [_rounded(self.levels[0] * square * share) for share in (0.3, 1.0, 3.0, 10.0)]
-
-    def _trials(self, weights: Weights, growth_max: float) -> list[Trial] | None:
-        """Return the trials of all axes; None if an error grows by more than allowed.
-
-        Of several weights of the error the larger, with which learning is bolder, may forbid a
-        rate; what is left is told of the smallest.
-        """
-        found: list[Trial] = []
-        for bench in self.benches:
-            for level in self.levels[::-1]:
-                trials = bench.try_weights(replace(weights, q=level), growth_max)
-                if trials is None:
-                    return None
-                if level == self.levels[0]:
-                    found += trials
-        return found
-
-    def _score(self, trials: list[Trial]) -> float:
-        """Return the mean of the trials' last errors, of all axes together."""
-        by_axis: dict[str, list[float]] = {}
-        for trial in trials:
-            by_axis.setdefault(trial.axis, []).append(float(trial.rms[-1]))
-        return float(np.sqrt(sum(np.mean(last) ** 2 for last in by_axis.values())))
-
-
-def _rounded(value: float) -> float:
-    """Return a value to three digits, as a person would write it."""
-    return float(f"{value:.3g}")
+    return rounded(across / ACROSS_TO_ALONG - q)
 
 
 def _reasons(
-    search: _Search,
+    search: WeightSearch,
     weights: Weights,
     trials: list[Trial],
     uncertainty: float,

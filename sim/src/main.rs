@@ -9,6 +9,7 @@ use clap::{Parser, Subcommand};
 use ilc_rt::cli::refusal_line;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::NodeId;
+use ilc_rt::fieldbus::transport;
 use ilc_rt::record::printable_lines;
 use ilc_sim::{ClockMode, Machine, eds};
 
@@ -40,8 +41,7 @@ enum Verb {
     Run {
         /// Cell description: nodes, counts, limits and physics.
         cell: PathBuf,
-        /// Bus to be on, instead of the cell's: can:IFACE, udp:GROUP[:PORT], zenoh:KEY.
-        #[arg(long, value_name = "ADDRESS")]
+        #[arg(long, value_name = "ADDRESS", help = bus_help())]
         bus: Option<String>,
         /// Let time pass by SYNC only, one cycle each, instead of by the wall clock.
         #[arg(long)]
@@ -102,13 +102,17 @@ fn carry_out(verb: Verb) -> Result<(), Failure> {
     }
 }
 
+fn bus_help() -> String {
+    format!("Bus to be on instead of the cell's: {}", transport::syntaxes(false))
+}
+
 fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Result<(), Failure> {
     let cell = load(path)?;
     let address = bus.unwrap_or_else(|| cell.bus.address.clone());
-    if address.starts_with("loopback:") {
+    if transport::scheme_of(&address).is_some_and(|scheme| scheme.in_process) {
         return Err(Failure::Input(format!(
-            "{address} is for drives in the controller's own process (`ilc run`, tests): give \
-             --bus udp:239.74.163.2, can:IFACE or zenoh:KEY"
+            "{address} is for drives in the controller's own process (`ilc run`, tests): give --bus {}",
+            transport::syntaxes(false)
         )));
     }
     let clock = if lockstep { ClockMode::LockStep } else { ClockMode::RealTime };
@@ -116,8 +120,7 @@ fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Res
     for mute in &habits.mutes {
         require_node(&machine, mute.node, "--mute")?;
     }
-    let bus = ilc_rt::fieldbus::transport::open(&address)
-        .map_err(|error| Failure::Input(error.to_string()))?;
+    let bus = transport::open(&address).map_err(|error| Failure::Input(error.to_string()))?;
     run::run(&cell, machine, bus, &address, clock, habits).map_err(|error| match error {
         run::RunError::Taken { .. } => Failure::Input(error.to_string()),
         error => Failure::Broken(error.to_string()),

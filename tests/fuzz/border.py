@@ -96,7 +96,7 @@ def right_values() -> dict[str, object]:
         "den": [1.0, 2.0], "frequency_hz": f, "response": h, "coherence": np.ones(f.size),
         "measured": identify.FrequencyResponse(f, h), "position_gain_per_s": 20.0, "n_zeros": 1,
         "n_poles": 2, "amplitude": 1e-3, "from_hz": 1.0, "to_hz": 40.0, "period_s": 2.0,
-        "periods": 2, "waveform": "multisine", "system": axis().simulate, "duration_s": 2.0,
+        "periods": 2, "waveform": "multisine", "system": axis().simulate,
         "residual_rms": 0.1, "errors": np.stack([ERROR, U]), "points_m": line()[:5],
         "feed_m_s": 0.1, "velocity_max_m_s": 0.5, "acceleration_max_m_s2": 2.0,
         "jerk_max_m_s3": 50.0, "pitch_m": 0.01, "turns": 2.0, "width_m": 0.05, "rows": 3,

@@ -170,7 +170,10 @@ def bad_cell(gantry: Path, tmp_path: Path, old: str, new: str) -> Path:
         (["run", "nix.toml"], "nix.toml"),
         (["run"], "Missing argument 'CELL'"),
         (["run", "CELL", "--bus", "foo"], "bus = foo: allowed can:INTERFACE"),
-        (["run", "CELL", "--iterations", "0"], "iterations = 0: at least 1"),
+        (
+            ["run", "CELL", "--iterations", "0"],
+            "invalid value '0' for '--iterations <N>': allowed 1 to 4294967295",
+        ),
         (["run", "CELL", "--iterations", "many"], "--iterations"),
         (["run", "CELL", "--measure", "laser"], "--measure"),
         (["run", "CELL", "--library", "/no/folder/l.db"], "no such folder"),

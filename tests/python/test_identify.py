@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from tuning_fixture import learn
 from ilc_rt import Cell, ModelError, discretize, identify, second_order
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import StartEvent
-from ilc_rt.identification import beyond_cell
+from ilc_rt.processes import find_program
 from ilc_rt.repeatable import check_repeatability, compare_runs
 from ilc_rt.tuning import propose_weights
 
@@ -97,6 +98,9 @@ to_m = [0.02, 0.02]
 law = "norm_optimal"
 measure = "encoder"
 input_max_m = 0.005
+
+[learning.norm_optimal]
+rate = 3.0
 """
 
 
@@ -180,7 +184,7 @@ def test_uncertainty_covers_a_mode_that_the_model_leaves_out():
 def test_a_simulated_axis_is_identified_within_two_percent_through_the_loop(bench, experiment):
     events = []
     found = experiment(
-        bench, axis="x", amplitude=1e-3, from_hz=1.0, to_hz=20.0, duration_s=6.0, periods=3,
+        bench, axis="x", amplitude=1e-3, from_hz=1.0, to_hz=20.0, period_s=6.0, periods=3,
         observe=events.append,
     )  # fmt: skip
     start = next(event for event in events if isinstance(event, StartEvent))
@@ -197,7 +201,7 @@ def test_a_simulated_axis_is_identified_within_two_percent_through_the_loop(benc
 
 def test_a_velocity_loop_is_identified_through_its_position_loop(bench):
     found = identify.multisine(
-        bench, axis="y", from_hz=1.0, to_hz=25.0, duration_s=5.0, periods=3, at_m=0.01
+        bench, axis="y", from_hz=1.0, to_hz=25.0, period_s=5.0, periods=3, at_m=0.01
     )
     assert found.interface == "csv"
     assert found.model.gain == pytest.approx(1 / 40.0, rel=0.02)
@@ -228,7 +232,7 @@ def test_nothing_moves_beyond_a_limit(bench, options, said):
 
 
 def test_a_refusal_names_the_amplitude_that_would_do(bench):
-    options = {"axis": "x", "to_hz": 30.0, "duration_s": 5.0, "periods": 2}
+    options = {"axis": "x", "to_hz": 30.0, "period_s": 5.0, "periods": 2}
     with pytest.raises(CampaignError) as refusal:
         identify.multisine(bench, amplitude=4.9e-3, **options)
     most = float(str(refusal.value).split("an amplitude of ")[1].split()[0])
@@ -245,7 +249,7 @@ def test_wrong_arguments_are_named_one_at_a_time():
         return u
 
     good = {"dt_s": DT_S, "amplitude": 1.0}
-    with pytest.raises(ValueError, match="periods = 1"):
+    with pytest.raises(ValueError, match="--periods"):
         identify.multisine(axis, periods=1, **good)
     with pytest.raises(ValueError, match="dt_s and amplitude"):
         identify.multisine(axis)
@@ -280,8 +284,8 @@ def test_wrong_arguments_are_named_one_at_a_time():
 
 def test_the_command_writes_figures_picture_and_section(ilc, bench, tmp_path):
     done = ilc(
-        "identify", bench, "--axis", "x", "--method", "sweep", "--amplitude-m", "0.001",
-        "--to-hz", "20", "--duration-s", "5", "--periods", "2",
+        "identify", bench, "--axis", "x", "--waveform", "sweep", "--amplitude", "0.001",
+        "--to-hz", "20", "--period-s", "5", "--periods", "2",
         "--json", "x.json", "--report", "pictures",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -290,18 +294,34 @@ def test_the_command_writes_figures_picture_and_section(ilc, bench, tmp_path):
     assert figures["model"]["natural_frequency_hz"] == pytest.approx(12.0, rel=0.02)
     assert len(figures["coherence"]) == len(figures["uncertainty"]["bound"]) == 96
     assert (tmp_path / "pictures" / "identify-x.png").read_bytes()[:4] == b"\x89PNG"
-    wrong = ilc("identify", bench, "--axis", "x", "--amplitude-m-s", "0.1")
-    assert wrong.returncode == 2
-    assert wrong.stderr.count("\n") == 1
-    assert "--amplitude-m" in wrong.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("--method", "--waveform"),
+        ("--duration-s", "--period-s"),
+        ("--amplitude-m", "--amplitude"),
+        ("--amplitude-m-s", "--amplitude"),
+    ],
+)
+def test_an_option_of_an_older_version_is_refused_with_its_new_name(ilc, bench, old, new):
+    by_rust = subprocess.run(
+        [find_program("ilc-rt"), "identify", bench, "--axis", "x", old, "5"],
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    for done in (ilc("identify", bench, "--axis", "x", old, "5"), by_rust):
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert f"this option is now {new}" in done.stderr, done.stderr
 
 
 def test_an_axis_that_sticks_gets_no_model(ilc, bench, tmp_path):
     friction = "mass_kg = 20.0\ncoulomb_n = 60.0\nstatic_n = 90.0"
     bench.write_text(CELL.replace("mass_kg = 20.0", friction))
     done = ilc(
-        "identify", bench, "--axis", "x", "--amplitude-m", "0.00002", "--to-hz", "20",
-        "--duration-s", "5", "--periods", "2", "--json", "x.json",
+        "identify", bench, "--axis", "x", "--amplitude", "0.00002", "--to-hz", "20",
+        "--period-s", "5", "--periods", "2", "--json", "x.json",
     )  # fmt: skip
     assert done.returncode == 1
     assert "no model for axis x" in done.stderr
@@ -310,7 +330,7 @@ def test_an_axis_that_sticks_gets_no_model(ilc, bench, tmp_path):
 
 
 def test_what_was_identified_can_be_pasted_back(bench):
-    found = identify.multisine(bench, axis="x", from_hz=1.0, to_hz=20.0, duration_s=5.0, periods=2)
+    found = identify.multisine(bench, axis="x", from_hz=1.0, to_hz=20.0, period_s=5.0, periods=2)
     old = "[axis.model]\nnatural_frequency_hz = 5.0\ndamping = 1.0\n"
     assert old in CELL
     bench.write_text(CELL.replace(old, found.section()))
@@ -397,7 +417,7 @@ def test_an_axis_that_stands_still_is_doubted_in_one_line(cell, ilc, tmp_path):
     (tmp_path / "stuck.toml").write_text(text, encoding="utf-8")
     done = ilc(
         "identify", "stuck.toml", "--axis", "y", "--bus", "loopback:", "--measure", "encoder",
-        "--duration-s", "5", "--periods", "2", "--json", "y.json",
+        "--period-s", "5", "--periods", "2", "--json", "y.json",
     )  # fmt: skip
     assert done.returncode == 1, done.stderr
     assert done.stderr.count("\n") == 1
@@ -413,11 +433,9 @@ def test_a_function_that_does_nothing_is_doubted():
     assert "does not answer" in found.doubt
 
 
-def test_a_model_that_no_cell_takes_is_doubted():
-    fit = identify.fit_second_order(
-        np.linspace(1.0, 10.0, 40), 1 / (1 + 2j * np.pi * np.linspace(1.0, 10.0, 40) * 0.02)
-    )
-    assert "a cell takes" in beyond_cell(fit)
+def test_the_former_name_of_a_keyword_is_refused_with_the_new_one():
+    with pytest.raises(ValueError, match="now period_s"):
+        identify.swept_sine(lambda u: u, dt_s=DT_S, amplitude=1.0, duration_s=5.0)
 
 
 def test_what_was_identified_is_tuned_and_learns(tmp_path):

@@ -21,7 +21,7 @@ use crate::argument::read_disturbance;
 use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::python_law::PythonLaw;
+use crate::python_law::{Channels, Frame, PythonLaw};
 
 /// Frames that may wait for the loop on the bus inside the process.
 const LOOPBACK_FRAMES: usize = 1024;
@@ -38,6 +38,8 @@ struct EventStream {
     events: Mutex<Receiver<String>>,
     thread: Mutex<Option<JoinHandle<Result<(), CampaignError>>>>,
     stop: Arc<AtomicI32>,
+    /// Of the law that is written in Python.
+    frame: Arc<Frame>,
 }
 
 #[pymethods]
@@ -61,10 +63,7 @@ impl EventStream {
 
     /// Bring the axes to rest; the events go on until they are.
     ///
-    /// Parameters
-    /// ----------
-    /// signal : int
-    ///     Number of the signal that asked for it.
+    /// - signal : int: Number of the signal that asked for it.
     #[pyo3(signature = (signal=SIGTERM))]
     fn stop(&self, signal: i32) {
         self.stop.store(signal, Ordering::Relaxed);
@@ -75,7 +74,12 @@ impl EventStream {
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         match thread.map(|thread| detached(py, || thread.join())) {
-            Some(Ok(ended)) => ended.or_raise(),
+            Some(Ok(ended)) => ended.or_raise().map_err(|error| {
+                if let Some(raised) = self.frame.take_raised() {
+                    error.set_cause(py, Some(raised));
+                }
+                error
+            }),
             Some(Err(_)) => Err(PyValueError::new_err("the campaign's thread died")),
             None => Ok(()),
         }
@@ -103,31 +107,17 @@ impl Drop for EventStream {
 ///
 /// With ``loopback:`` the simulated drives are in this process too.
 ///
-/// Parameters
-/// ----------
-/// cell : Cell
-///     The cell.
-/// arguments : list of str
-///     Options, as words of ``ilc-rt run`` or ``ilc-rt identify``; see
+/// - cell : Cell: The cell.
+/// - arguments : list of str: Options, as words of ``ilc-rt run`` or ``ilc-rt identify``; see
 ///     `described_options`.
-/// verb : {"run", "identify"}
-///     Run the program and learn, or excite an axis once.
-/// law : object or None
-///     A law with ``update(u, e, disturbance=None)`` instead of the cell's.
-/// disturbance : callable or None
-///     Called with the number of each run before it begins; returns its
-///     disturbance, a number or an array of shape (n_disturbances,).
+/// - verb : {"run", "identify"}: Run the program and learn, or excite an axis once.
+/// - law : object or None: A law with ``update(u, e, disturbance=None)`` instead of the cell's.
+/// - disturbance : callable or None: Called with the number of each run before it begins; returns
+///     its disturbance, a number or an array of shape (n_disturbances,).
 ///
-/// Returns
-/// -------
-/// EventStream
-///     An iterator of JSON texts.
-///
-/// Raises
-/// ------
-/// ValueError
-///     If an option cannot be used; from the iterator, before anything moves,
-///     if something else cannot.
+/// Returns EventStream: An iterator of JSON texts.
+/// Raises ValueError if an option cannot be used; from the iterator, before anything moves, if
+///     something else cannot.
 #[pyfunction]
 #[pyo3(signature = (cell, arguments, verb="run", law=None, disturbance=None))]
 fn run_events(
@@ -138,14 +128,7 @@ fn run_events(
     disturbance: Option<Py<PyAny>>,
 ) -> PyResult<EventStream> {
     let cell = cell.get().cell.clone();
-    let mut work = match verb {
-        "run" => Work::Run(parse(&arguments).map_err(PyValueError::new_err)?),
-        "identify" => Work::Identify(parse(&arguments).map_err(PyValueError::new_err)?),
-        _ => {
-            let line = format!("verb = '{verb}': 'run' or 'identify' is allowed");
-            return Err(PyValueError::new_err(line));
-        }
-    };
+    let mut work = Work::parse(verb, &arguments)?;
     if let (Work::Run(options), Some(ask)) = (&mut work, disturbance) {
         options.disturbance = measured(ask);
     }
@@ -154,16 +137,20 @@ fn run_events(
         Work::Identify(options) => &mut options.session,
     };
     let address = session.bus.clone().unwrap_or_else(|| cell.bus.address.clone());
-    if address.starts_with("loopback:") {
+    if transport::scheme_of(&address).is_some_and(|scheme| scheme.in_process) {
         session.telemetry = false;
         if !session.lockstep {
-            return Err(PyValueError::new_err(
-                "bus = loopback: runs in lock-step only, as its drives have no clock of their own",
-            ));
+            return Err(PyValueError::new_err(format!(
+                "bus = {address} runs in lock-step only, as its drives have no clock of their own"
+            )));
         }
     }
     let stop = Arc::clone(&session.stop);
-    let law = law.map(|law| PythonLaw::new(law, cell.n_axes())).transpose()?;
+    let frame = Arc::new(Frame::default());
+    let n_axes = cell.n_axes();
+    let channels = Channels { n_inputs: n_axes, n_outputs: n_axes };
+    let law =
+        law.map(|law| PythonLaw::new("law", law, channels, Arc::clone(&frame))).transpose()?;
     let (sender, events) = sync_channel(EVENTS);
     let thread = std::thread::Builder::new().name("ilc-campaign".to_owned()).spawn(move || {
         let mut cell = cell;
@@ -186,7 +173,7 @@ fn run_events(
         }
         .map(drop)
     })?;
-    Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop })
+    Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop, frame })
 }
 
 /// Options of what the campaign's thread does.
@@ -195,22 +182,34 @@ enum Work {
     Identify(IdentifyOptions),
 }
 
+impl Work {
+    fn parse(verb: &str, arguments: &[String]) -> PyResult<Self> {
+        let parsed = match verb {
+            "run" => parse(arguments).map(Self::Run),
+            "identify" => parse(arguments).map(Self::Identify),
+            _ => Err(format!("verb = '{verb}': 'run' or 'identify' is allowed")),
+        };
+        parsed.map_err(PyValueError::new_err)
+    }
+}
+
+/// Check options as ``ilc-rt run`` or ``ilc-rt identify`` would.
+///
+/// - verb : {"run", "identify"}: Which verb.
+/// - arguments : list of str: Options, as words of its command line.
+///
+/// Raises ValueError if an option cannot be used: its name, its value and what is allowed.
+#[pyfunction]
+fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
+    Work::parse(verb, &arguments).map(drop)
+}
+
 /// Describe the options of ``ilc-rt run`` or ``ilc-rt identify``.
 ///
-/// Parameters
-/// ----------
-/// verb : {"run", "identify"}
-///     Which ones.
+/// - verb : {"run", "identify"}: Which ones.
 ///
-/// Returns
-/// -------
-/// str
-///     A JSON list: name, flags, help, kind, default, choices, placeholder.
-///
-/// Raises
-/// ------
-/// ValueError
-///     For another verb.
+/// Returns str: A JSON list: name, flags, help, kind, default, choices, placeholder.
+/// Raises ValueError for another verb.
 #[pyfunction]
 fn described_options(verb: &str) -> PyResult<String> {
     let options = match verb {
@@ -237,7 +236,7 @@ fn measured(ask: Py<PyAny>) -> Disturbance {
 
 fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
     let file = cell.file.display().to_string();
-    if !cell.bus.address.starts_with("loopback:") {
+    if transport::scheme_of(&cell.bus.address).is_none_or(|scheme| !scheme.in_process) {
         let place = format!("{file}: [bus] address");
         return transport::open(&cell.bus.address)
             .map_err(|source| CampaignError::Bus { place, source });
@@ -250,6 +249,7 @@ fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<EventStream>()?;
+    module.add_function(wrap_pyfunction!(check_options, module)?)?;
     module.add_function(wrap_pyfunction!(described_options, module)?)?;
     module.add_function(wrap_pyfunction!(run_events, module)?)
 }

@@ -3,7 +3,7 @@
 //! One file per family of Python names, each with its `register`; `argument` checks what comes in,
 //! `exceptions` and `error` say what is raised, and `detached` lets the interpreter go.
 //!
-//! Family: `laws`, `python_law` and `weights` read each other's arguments.
+//! Family: `laws` and `python_law` call each other: a law inside another one may be written in Python.
 //!
 //! Family: `model` and `model_argument` read each other's arguments.
 //!
@@ -12,8 +12,8 @@
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
 mod analysis;
-mod analyze;
 mod argument;
+mod arguments;
 mod campaign;
 mod cell;
 mod contour;
@@ -22,6 +22,7 @@ mod detached;
 mod error;
 mod exceptions;
 mod experiment;
+mod guard;
 mod held;
 mod identify;
 mod kinematics;
@@ -30,12 +31,13 @@ mod library;
 mod made;
 mod model;
 mod model_argument;
+mod plans;
 mod python_law;
 mod sigmoid_pair;
 mod signal;
 mod time_varying;
 mod trajectory;
-mod tuning;
+mod transport;
 mod weights;
 mod whole;
 
@@ -54,12 +56,12 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     contour::register(module)?;
     control::register(module)?;
     trajectory::register(module)?;
+    plans::register(module)?;
+    transport::register(module)?;
     sigmoid_pair::register(module)?;
     laws::register(module)?;
     weights::register(module)?;
     analysis::register(module)?;
-    analyze::register(module)?;
-    tuning::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

@@ -100,7 +100,7 @@ def pendulum(resolution_rad: float) -> Callable[[Array], Array]:
 def excite(system: Callable[[Array], Array], amplitude: float, *, reduced: bool) -> Identification:
     """Identify a leg with a sine of rising frequency, 0.2 to 10 Hz (section 7.3.3)."""
     return swept_sine(
-        system, dt_s=DT_S, amplitude=amplitude, from_hz=0.2, to_hz=10.0, duration_s=25.0,
+        system, dt_s=DT_S, amplitude=amplitude, from_hz=0.2, to_hz=10.0, period_s=25.0,
         periods=2 if reduced else 3,
     )  # fmt: skip
 

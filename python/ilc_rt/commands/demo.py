@@ -4,21 +4,13 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ilc_rt.campaign import Campaign
-from ilc_rt.commands.options import (
-    DEFAULT_LIBRARY_FILE,
-    REPORT_NAME,
-    Bus,
-    Iterations,
-    JsonFile,
-    LibraryFile,
-    Lockstep,
-)
-from ilc_rt.commands.run import carry_out
+from ilc_rt.commands.options import REPORT_NAME, JsonFile, Lockstep, declared, given
+from ilc_rt.commands.run import execute
 from ilc_rt.commands.targets import report_target
 
 RESTARTS = 3
@@ -29,19 +21,19 @@ ReportFile = Annotated[
 ]
 
 
+@declared("run", "iterations", "bus", "library", "telemetry")
 def demo(
-    iterations: Iterations = 10,
-    bus: Bus = None,
     lockstep: Lockstep = None,
-    library: LibraryFile = DEFAULT_LIBRARY_FILE,
     json_file: JsonFile = None,
     report: ReportFile = Path(REPORT_NAME),
+    **options: Any,  # noqa: ANN401 (those of `ilc-rt run`)
 ) -> None:
     """Let a simulated two-axis gantry learn its contour, and write a report.
 
     Example: ilc demo
     """
     with resources.as_file(resources.files("ilc_rt").joinpath("data/gantry.toml")) as cell:
-        campaign = Campaign(cell, library=library, bus=bus, lockstep=lockstep, drives="simulated")
+        iterations = options.pop("iterations")
+        campaign = Campaign(cell, lockstep=lockstep, drives="simulated", **given(options))
         # Nothing real moves here: what stops the axes is this computer, and it may recover.
-        carry_out(campaign, iterations, json_file, report, restarts=RESTARTS)
+        execute(campaign, iterations, json_file, report, restarts=RESTARTS)

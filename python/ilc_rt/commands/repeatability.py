@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from ilc_rt.campaign import ITERATIONS_MAX
 from ilc_rt.commands.options import (
-    Bus,
     CellFile,
     DriveChoice,
     DriveOption,
     JsonFile,
     KeepIn,
     Lockstep,
-    MeasureOption,
+    declared,
+    given,
 )
 from ilc_rt.comparison import Comparison
 from ilc_rt.events import Event, IterationEvent, StartEvent
@@ -25,17 +24,15 @@ from ilc_rt.repeatable import check_repeatability
 from ilc_rt.text import NAME_MAX, printable
 
 
+@declared("run", "measure", "bus", "telemetry")
 def repeatability(
     cell: CellFile,
-    runs: Annotated[
-        int, typer.Option("--runs", "-n", max=ITERATIONS_MAX, help="Runs without learning.")
-    ] = 5,
-    measure: MeasureOption = None,
-    bus: Bus = None,
+    runs: Annotated[int, typer.Option("--runs", "-n", help="Runs without learning.")] = 5,
     lockstep: Lockstep = None,
     library: KeepIn = None,
     json_file: JsonFile = None,
     drives: DriveOption = DriveChoice.auto,
+    **options: Any,  # noqa: ANN401 (those of `ilc-rt run`)
 ) -> None:
     """Run a program without learning and tell what of its error repeats.
 
@@ -53,8 +50,8 @@ def repeatability(
             typer.echo(f"run {event.index}: RMS error {said}")
 
     found = check_repeatability(
-        cell, runs, bus=bus, measure=measure.value if measure else None, lockstep=lockstep,
-        drives=drives.value, library=library, observe=tell,
+        cell, runs, lockstep=lockstep, drives=drives.value, library=library, observe=tell,
+        **given(options),
     )  # fmt: skip
     names = [printable(axis.axis, NAME_MAX) for axis in found.axes]
     width = max(8, *map(len, names))

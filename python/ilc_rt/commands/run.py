@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ilc_rt.campaign import Campaign
 from ilc_rt.commands.options import (
-    DEFAULT_LIBRARY_FILE,
-    Bus,
     CellFile,
     DriveChoice,
-    Iterations,
+    DriveOption,
     JsonFile,
-    LibraryFile,
     Lockstep,
-    MeasureOption,
+    declared,
+    given,
 )
 from ilc_rt.commands.targets import make_folder, report_target
 from ilc_rt.errors import EXIT_FAULT, CampaignError
@@ -33,49 +31,27 @@ ReportFile = Annotated[
         help="Write an HTML report: a .html file, or a folder in one that exists.",
     ),
 ]
-Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on from the last campaign of this cell.")
-]
-AllowDivergent = Annotated[
-    bool, typer.Option("--allow-divergent", help="Start also a law that will not converge.")
-]
-DriveOption = Annotated[
-    DriveChoice,
-    typer.Option(help="Start simulated drives; auto never does on a can: bus."),
-]
 
 
+@declared("run")
 def run(
     cell: CellFile,
-    iterations: Iterations = 10,
-    bus: Bus = None,
-    measure: MeasureOption = None,
     lockstep: Lockstep = None,
-    library: LibraryFile = DEFAULT_LIBRARY_FILE,
-    resume: Resume = False,
+    drives: DriveOption = DriveChoice.auto,
     json_file: JsonFile = None,
     report: ReportFile = None,
-    drives: DriveOption = DriveChoice.auto,
-    allow_divergent: AllowDivergent = False,
+    **options: Any,  # noqa: ANN401 (those of `ilc-rt run`)
 ) -> None:
     """Run a cell's program again and again, each run better than the last.
 
     Example: ilc run examples/01_gantry.toml --iterations 10 --report report.html
     """
-    campaign = Campaign(
-        cell,
-        library=library,
-        bus=bus,
-        measure=measure.value if measure else None,
-        lockstep=lockstep,
-        drives=drives.value,
-        resume=resume,
-        allow_divergent=allow_divergent,
-    )
-    carry_out(campaign, iterations, json_file, report)
+    iterations = options.pop("iterations")
+    campaign = Campaign(cell, lockstep=lockstep, drives=drives.value, **given(options))
+    execute(campaign, iterations, json_file, report)
 
 
-def carry_out(
+def execute(
     campaign: Campaign,
     iterations: int,
     json_file: Path | None,

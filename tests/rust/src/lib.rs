@@ -10,6 +10,7 @@
 
 pub mod campaign;
 pub mod counting;
+pub mod derived;
 pub mod far_side;
 pub mod faulty;
 pub mod rig;
@@ -28,6 +29,7 @@ pub fn root() -> PathBuf {
     let compiled = env!("CARGO_MANIFEST_DIR").into();
     PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or(compiled)).join("../..")
 }
+pub use derived::hold_derived;
 
 /// The path of an example, as `01_gantry.toml`.
 pub fn example_path(name: &str) -> PathBuf {

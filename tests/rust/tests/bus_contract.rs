@@ -12,11 +12,14 @@
 )]
 
 use std::cell::Cell;
+use std::fmt::Write as _;
 use std::fs::File;
 use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};
 
-use ilc_rt::fieldbus::transport::{self, InProcess, Responder, ZenohBus, loopback, udp_codec};
+use ilc_rt::fieldbus::transport::{
+    self, InProcess, Responder, ZenohBus, ZenohSettings, loopback, udp_codec,
+};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_tests::counting::{Counting, allocations};
 
@@ -206,9 +209,7 @@ fn zenoh_ends() -> (ZenohBus, ZenohBus) {
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let open = |role: &str| {
             let address = format!("zenoh:test/bus?{role}=tcp/127.0.0.1:{port}&scouting=off");
-            let Ok(transport::Address::Zenoh(settings)) = address.parse() else {
-                panic!("{address} is a zenoh address");
-            };
+            let settings: ZenohSettings = address.parse().unwrap();
             ZenohBus::open(&settings)
         };
         let Ok(a) = open("listen") else { continue };
@@ -299,7 +300,7 @@ fn zenoh_skips_what_is_no_frame() {
     let (mut a, b) = zenoh_ends();
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let address = format!("zenoh:test/strangers?listen=tcp/127.0.0.1:{port}&scouting=off");
-    let Ok(transport::Address::Zenoh(settings)) = address.parse() else { panic!("{address}") };
+    let settings: ZenohSettings = address.parse().unwrap();
     let mut bus = ZenohBus::open(&settings).unwrap();
     let mut config = zenoh::Config::default();
     for (key, value) in [
@@ -487,4 +488,13 @@ fn round_trip_times() {
     assert_eq!(n_answers, n_ticks * (0x81 + 0x82));
     let ticks_per_s = f64::from(u32::try_from(n_ticks).unwrap()) / start.elapsed().as_secs_f64();
     println!("in process: {ticks_per_s:.0} ticks/s with 2 frames out and 2 in");
+}
+
+#[test]
+fn the_readme_names_every_kind_of_bus() {
+    let mut table = "| address | carrier |\n|---|---|\n".to_owned();
+    for scheme in transport::SCHEMES {
+        let _ = writeln!(table, "| `{}` | {} |", scheme.syntax, scheme.summary);
+    }
+    ilc_tests::hold_derived("README.md", "buses", &table);
 }

@@ -15,14 +15,9 @@ const FENCE: &str =
     "#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]";
 
 /// Files in hot modules that only set up, describe or refuse; none of them is called in a tick.
-const COLD_FILES: [&str; 4] = [
-    // The trait with its error type, and a frame that is two arrays.
-    "fieldbus/bus.rs",
-    "fieldbus/frame.rs",
+const COLD_FILES: [&str; 1] = [
     // Sets the loop's thread up.
     "rt/thread.rs",
-    // Numbers that are handed to the loop once.
-    "servo/spec.rs",
 ];
 
 struct Module {

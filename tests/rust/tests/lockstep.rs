@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use ilc_rt::config::{Cell, Measure};
 use ilc_rt::fieldbus::Bus;
-use ilc_rt::fieldbus::transport::{self, Address, ZenohBus, loopback};
+use ilc_rt::fieldbus::transport::{self, ZenohBus, ZenohSettings, loopback};
 use ilc_rt::record::EndStatus;
 use ilc_tests::campaign::{self, Kept, machine, run, run_on};
 use ilc_tests::far_side::FarSide;
@@ -162,9 +162,7 @@ fn the_same_over_zenoh() {
             let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
             let open = |role: &str| {
                 let address = format!("zenoh:test/cell?{role}=tcp/127.0.0.1:{port}&scouting=off");
-                let Ok(Address::Zenoh(settings)) = address.parse() else {
-                    panic!("{address} is a zenoh address");
-                };
+                let settings: ZenohSettings = address.parse().unwrap();
                 ZenohBus::open(&settings)
             };
             let (Ok(near), Ok(far)) = (open("listen"), open("connect")) else { continue };

@@ -11,7 +11,7 @@ use std::time::Duration;
 use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{Command, Controlword};
-use ilc_rt::fieldbus::transport::{self, Address, Responder, ZenohBus, loopback};
+use ilc_rt::fieldbus::transport::{self, Responder, ZenohBus, ZenohSettings, loopback};
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_rt::record::{EndStatus, Event, StateName};
 use ilc_rt::servo::{PhaseName, StopReason, Stranger};
@@ -169,9 +169,7 @@ fn on_zenoh() {
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let open = |role: &str| {
             let address = format!("zenoh:test/strangers?{role}=tcp/127.0.0.1:{port}&scouting=off");
-            let Ok(Address::Zenoh(settings)) = address.parse() else {
-                panic!("{address} is a zenoh address");
-            };
+            let settings: ZenohSettings = address.parse().unwrap();
             ZenohBus::open(&settings)
         };
         let (Ok(near), Ok(far), Ok(third)) = (open("listen"), open("connect"), open("connect"))

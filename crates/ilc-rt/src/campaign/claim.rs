@@ -27,9 +27,9 @@ impl Claim {
 /// Claims a campaign of a library.
 ///
 /// # Errors
-/// [`CampaignError::Resume`] if somebody else holds it.
+/// [`CampaignError::Resume`] if another program holds it.
 pub(super) fn claim(library: &Path, campaign: &str) -> Result<Claim, CampaignError> {
-    // A library in memory has no file, and nobody else can know it.
+    // A library in memory has no file, and no other program can open it.
     let Ok(file) = std::fs::metadata(library) else { return Ok(Claim::none()) };
     let name = fingerprint(&format!("{} {} {campaign}", file.dev(), file.ino()));
     let name = format!("ilc-rt/campaign/{}", name.get(..32).unwrap_or(&name));

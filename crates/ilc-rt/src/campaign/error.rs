@@ -1,9 +1,9 @@
-//! Why a campaign could not begin; nothing has moved when one of these is returned.
+//! Refusals of a campaign; nothing has moved when one of these is returned.
 
 use crate::config::ConfigError;
 use crate::design::DesignError;
 use crate::fieldbus::bring_up::BringUpError;
-use crate::fieldbus::transport::OpenError;
+use crate::fieldbus::transport::{OpenError, syntaxes};
 use crate::identification::IdentificationError;
 use crate::library::LibraryError;
 
@@ -22,9 +22,9 @@ pub enum CampaignError {
     /// The bus does not open.
     #[error("{place}: {source}")]
     Bus {
-        /// Where the address stands: file and key, or an option of the command line.
+        /// Origin of the address: file and key, or an option of the command line.
         place: String,
-        /// Why.
+        /// Reason.
         source: OpenError,
     },
     /// A node does not answer, or is not what the cell says.
@@ -36,10 +36,10 @@ pub enum CampaignError {
         key: String,
         /// Bus address.
         address: String,
-        /// Why.
+        /// Reason.
         source: Box<BringUpError>,
     },
-    /// Somebody else commands the bus.
+    /// Another master commands the bus.
     #[error(
         "{file}: [bus] address = {address}: another master is at work on this bus ({heard} heard); \
          nothing was sent; stop it, or choose another address"
@@ -49,7 +49,7 @@ pub enum CampaignError {
         file: String,
         /// Bus address.
         address: String,
-        /// What was heard of it.
+        /// Command that was heard from it.
         heard: crate::fieldbus::bring_up::listen::Command,
     },
     /// The bus failed while the nodes were started.
@@ -59,7 +59,7 @@ pub enum CampaignError {
         file: String,
         /// Bus address.
         address: String,
-        /// Why.
+        /// Reason.
         source: crate::fieldbus::BusError,
     },
     /// The library.
@@ -68,21 +68,24 @@ pub enum CampaignError {
     /// There is nothing to go on with.
     #[error("--resume: {0}")]
     Resume(String),
-    /// `loopback:` was asked of a program that has no drives in it.
+    /// A bus in one process was asked of a program that has no drives in it.
     #[error(
-        "{place}: `loopback:` has no drives in this program; allowed: can:, udp:, zenoh: \
-         (`ilc run` in Python runs loopback: with simulated drives)"
+        "{place}: `{address}` has no drives in this program; allowed: {} (`ilc run` in Python runs \
+         it with simulated drives)",
+        syntaxes(false)
     )]
-    Loopback {
-        /// Where the address stands: file and key, or an option of the command line.
+    NoDrivesInside {
+        /// Origin of the address: file and key, or an option of the command line.
         place: String,
+        /// The address.
+        address: String,
     },
     /// Simulated drives could not be made of the cell.
     #[error("{file}: [simulation]: {reason}")]
     Simulation {
         /// Cell description.
         file: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// A thread could not be started.
@@ -90,7 +93,7 @@ pub enum CampaignError {
     Thread {
         /// Which one.
         what: &'static str,
-        /// What the system said.
+        /// Reason given by the system.
         source: std::io::Error,
     },
 }

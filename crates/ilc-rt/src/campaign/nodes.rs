@@ -49,7 +49,7 @@ pub(super) fn start(
     })
 }
 
-/// Listens before anything is sent: a bus that somebody else commands is left alone.
+/// Listens before anything is sent: a bus with another master is left alone.
 fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
     let numbers = cell.axes.iter().map(|axis| axis.node);
     let numbers = numbers.chain(cell.tcp_encoder.iter().map(|tool| tool.node));

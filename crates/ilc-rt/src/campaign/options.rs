@@ -13,6 +13,7 @@ use clap::{ArgAction, Args};
 
 use super::disturbance::Disturbance;
 use crate::config::{Cell, LawName, Measure};
+use crate::fieldbus::transport::syntaxes;
 use crate::record::{EndStatus, Figures};
 
 /// Time for which a stall of controller and simulated drives is forgiven, as it stalls both.
@@ -21,8 +22,8 @@ pub(super) const SIMULATED_PATIENCE_S: f64 = 1.0;
 /// Options of everything that moves axes: a campaign or an experiment.
 #[derive(Clone, Debug, Args)]
 pub struct Session {
-    /// Bus address in place of the cell's: can:INTERFACE, udp:GROUP[:PORT] or zenoh:KEY.
-    #[arg(long, value_name = "ADDRESS")]
+    /// Bus address in place of the cell's.
+    #[arg(long, value_name = "ADDRESS", help = bus_help())]
     pub bus: Option<String>,
     /// Measurement to use in place of the cell's.
     #[arg(long, value_parser = PossibleValuesParser::new(["encoder", "tcp"]).map(measure))]
@@ -86,6 +87,11 @@ impl Options {
         }
         cell
     }
+}
+
+/// Returns the help text of `--bus`.
+fn bus_help() -> String {
+    format!("Bus address in place of the cell's: {}", syntaxes(false))
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "as the parser of arguments hands it on")]

@@ -24,7 +24,7 @@ pub(super) enum Pacer {
 
 /// Result of the loop.
 pub(super) struct LoopResult {
-    /// Whether the nodes were taken out of operation.
+    /// Outcome of taking the nodes out of operation.
     pub(super) released: Result<(), BusError>,
     pub(super) timing: Option<Timing>,
 }
@@ -45,7 +45,7 @@ impl Pacer {
                 let _ = report.send(thread::enter(RtRequest::default()));
                 run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
                 // At once, and not when the campaign has put its things away: by then the nodes may have
-                // missed their commands, or be in somebody else's campaign.
+                // missed their commands, or be in another campaign.
                 LoopResult { released: release(cycle), timing: Some(timing) }
             })
             .map_err(|source| CampaignError::Thread { what: "servo", source })?;

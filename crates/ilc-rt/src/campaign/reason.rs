@@ -112,7 +112,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
     }
 }
 
-/// Who asked for the stop.
+/// Names the origin of a stop request.
 fn asked(signal: i32) -> String {
     match signal {
         libc::SIGINT => "stopped by Ctrl-C".to_owned(),
@@ -123,7 +123,7 @@ fn asked(signal: i32) -> String {
     }
 }
 
-/// What a node's TPDO tells.
+/// Names the content of a node's TPDO.
 fn carried(cell: &Cell, node: u8, pdo: u8) -> &'static str {
     let is_tool = cell.tcp_encoder.is_some_and(|tool| tool.node == node);
     match pdo {
@@ -133,7 +133,7 @@ fn carried(cell: &Cell, node: u8, pdo: u8) -> &'static str {
     }
 }
 
-/// How long a stall of this computer may be.
+/// Longest stall of this computer.
 fn forgiven(cell: &Cell, session: &Session) -> String {
     if session.simulated {
         format!("with simulated drives {SIMULATED_PATIENCE_S} s are forgiven")
@@ -142,7 +142,7 @@ fn forgiven(cell: &Cell, session: &Session) -> String {
     }
 }
 
-/// Where an axis stands that may not be switched on there.
+/// Describes the position of an axis that may not be switched on there.
 fn outside(cell: &Cell, axis: usize, position_m: f64) -> String {
     let Some(axis) = cell.axes.get(axis) else {
         return format!("axis {axis} is at {position_m}, outside its limits");
@@ -159,7 +159,7 @@ fn outside(cell: &Cell, axis: usize, position_m: f64) -> String {
     )
 }
 
-/// What another master was seen to send.
+/// Names the message of another master.
 fn strange(stranger: Stranger) -> String {
     match stranger {
         Stranger::Sync => "SYNC".to_owned(),
@@ -185,7 +185,7 @@ fn distance(cell: &Cell, axis: usize, distance: f64) -> String {
     format!("{:.3} m{}", distance * 1e3, unit.symbol())
 }
 
-/// Whether a reason is somebody's wish or a fault.
+/// Returns whether a reason is a request or a fault.
 pub(super) fn status(reason: StopReason) -> EndStatus {
     match reason {
         StopReason::Asked(_) => EndStatus::Interrupted,

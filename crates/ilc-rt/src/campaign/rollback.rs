@@ -5,7 +5,7 @@ use crate::servo::Mailbox;
 
 /// Times that the best input is restored before learning is switched off for good.
 const ROLLBACKS_MAX: u32 = 2;
-/// Why learning is off then.
+/// Reason why learning is off then.
 const GROWN: &str = "the error grew twice";
 
 /// Decision after a run.

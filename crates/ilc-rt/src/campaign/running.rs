@@ -97,7 +97,7 @@ impl<'a> Running<'a> {
             policy: parts.policy,
             learner: parts.learner,
             runs: resumed.runs,
-            disturbance: options.disturbance.clone(),
+            disturbance: options.disturbance.clone().or_file(cell),
             current_disturbance: resumed.next_disturbance,
             first,
             iterations: options.iterations,

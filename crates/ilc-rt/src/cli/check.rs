@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
-use crate::config::{AxisUnit, Cell, GateMeasure, LawName};
+use crate::config::{AxisUnit, Cell, LawName};
 use crate::design::{DesignError, Plan, Prepared};
+use crate::learning::gate::GateMeasure;
 use crate::record::AxisKinds;
 
 #[derive(Args)]
@@ -79,7 +80,7 @@ fn describe(arguments: &CheckArguments) -> Result<(), DesignError> {
     Ok(())
 }
 
-/// What decides on the next input beside the law.
+/// Describes rollback, gate and ladder, which decide on the next input beside the law.
 fn learning(cell: &Cell) -> Vec<String> {
     let learning = &cell.learning;
     if learning.law == LawName::None {
@@ -115,7 +116,7 @@ fn learning(cell: &Cell) -> Vec<String> {
     lines
 }
 
-/// The kind of path, its length, and its highest speed.
+/// Describes the path: kind, length, and largest speed.
 fn path(cell: &Cell, plan: &Plan) -> String {
     let kind = (cell.program.kind.entry().describe)(&cell.program);
     let units: Vec<String> = plan.meta.input_units.clone();

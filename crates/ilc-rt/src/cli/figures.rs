@@ -1,5 +1,4 @@
-//! What `--json` names, a file or standard output: looked at before anything moves, written when all is
-//! over.
+//! Target of `--json`, a file or standard output: checked before anything moves, written at the end.
 
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -7,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::show;
 use crate::record::{TEXT_MAX, printable, printable_json};
 
-/// What stands for standard output in the place of a file.
+/// Name of standard output in the place of a file.
 const STANDARD_OUTPUT: &str = "-";
 
 /// A place for figures that can be written, as far as the system can tell.

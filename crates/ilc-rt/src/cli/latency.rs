@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::figures::FiguresFile;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
-use crate::rt::{Clock, Latency, MonotonicClock, Nanos, RtRequest, thread};
+use crate::rt::{Latency, MonotonicClock, Nanos, RtRequest, thread};
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -16,7 +16,7 @@ pub(super) struct LatencyArguments {
     /// Cycle to keep.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(50..=100_000))]
     cycle_us: u32,
-    /// How long to measure.
+    /// Duration of the measurement.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=86_400))]
     seconds: u32,
     /// Spin the last microseconds before each deadline.

@@ -20,7 +20,8 @@ pub struct OptionSpec {
     pub flags: Vec<String>,
     /// Help text, one sentence.
     pub help: String,
-    /// Kind of its value: `flag`, `inverse_flag`, `integer`, `number`, `choice`, `path` or `text`.
+    /// Kind of its value: `flag`, `inverse_flag`, `integer`, `number`, `choice`, `path`, `text`,
+    /// or `renamed`: refused with the new name, which is its help.
     pub kind: &'static str,
     /// Default, as on a command line.
     pub default: Option<String>,
@@ -32,7 +33,7 @@ pub struct OptionSpec {
 
 /// Returns the description of every option of a kind.
 pub fn described<T: Args>() -> Vec<OptionSpec> {
-    command::<T>().get_arguments().filter(|argument| !argument.is_hide_set()).map(spec).collect()
+    command::<T>().get_arguments().map(spec).collect()
 }
 
 /// Parses options from the words of a command line.
@@ -55,6 +56,7 @@ fn spec(argument: &Arg) -> OptionSpec {
     let choices = argument.get_possible_values();
     let value = argument.get_value_parser().type_id();
     let kind = match argument.get_action() {
+        _ if argument.is_hide_set() => "renamed",
         ArgAction::SetTrue => "flag",
         ArgAction::SetFalse => "inverse_flag",
         _ if !choices.is_empty() => "choice",
@@ -69,7 +71,9 @@ fn spec(argument: &Arg) -> OptionSpec {
     OptionSpec {
         name: argument.get_id().to_string(),
         flags: long.into_iter().chain(short).collect(),
-        help: argument.get_help().map_or_else(String::new, |help| format!("{help}.")),
+        help: argument.get_help().map_or_else(String::new, |help| {
+            if kind == "renamed" { help.to_string() } else { format!("{help}.") }
+        }),
         kind,
         default: default.map(|text| text.to_string_lossy().into_owned()),
         choices: if has_value {

@@ -19,7 +19,7 @@ impl Unit {
     /// Microradians.
     pub(super) const ANGLE: Self = Self { symbol: "urad", scale: 1e6, milli: "mrad", nano: "nrad" };
 
-    /// The same unit with the prefix that suits a quantity of this size.
+    /// Returns this unit with the prefix that suits a quantity of this size.
     pub(super) fn for_size(self, value: f64) -> Self {
         match value.abs() {
             size if size >= 1e-2 && size.is_finite() => {

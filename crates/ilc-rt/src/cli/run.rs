@@ -101,8 +101,8 @@ pub(super) fn open(file: &Path, bus: Option<&str>) -> Result<(Cell, Box<dyn Bus>
         None => format!("{}: [bus] address", cell.file.display()),
     };
     let address = &cell.bus.address;
-    if address.starts_with("loopback:") {
-        return Err(CampaignError::Loopback { place });
+    if transport::scheme_of(address).is_some_and(|scheme| scheme.in_process) {
+        return Err(CampaignError::NoDrivesInside { place, address: address.clone() });
     }
     let bus = transport::open(address).map_err(|source| CampaignError::Bus { place, source })?;
     Ok((cell, bus))

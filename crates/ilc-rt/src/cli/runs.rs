@@ -13,9 +13,9 @@ const BEST_SHARE: f64 = 0.9;
 pub(super) struct Runs {
     kinds: Option<AxisKinds>,
     ended: Vec<(u32, Figures)>,
-    /// What stands above the rows.
+    /// Head of the table.
     heading: String,
-    /// What was last remarked on a run; it is told once.
+    /// Latest remark, printed once.
     remark: Option<String>,
 }
 
@@ -58,14 +58,14 @@ impl Runs {
         text
     }
 
-    /// What a law remarks on a run whose row is there already.
+    /// Returns the line for a remark on a run whose row is printed already.
     pub(super) fn judged(&mut self, index: u32, remark: Option<&str>) -> Option<String> {
         let is_new = remark != self.remark.as_deref();
         self.remark = remark.map(str::to_owned);
         remark.filter(|_| is_new).map(|remark| format!("     run {index}: {remark}"))
     }
 
-    /// What was learned, in one sentence.
+    /// Returns the result of learning as a sentence.
     pub(super) fn sentence(&self) -> Option<String> {
         let (first, last) = (&self.ended.first()?.1, &self.ended.last()?.1);
         let n = self.ended.len();
@@ -95,7 +95,7 @@ impl Runs {
         Some(format!("Tracking error {}, {} within {n} runs.", part(false), part(true)))
     }
 
-    /// How a figure went from the first run to the last.
+    /// Describes a figure from the first run to the last.
     fn course(&self, of: impl Fn(&Figures) -> Option<f64> + Copy, unit: Unit) -> String {
         let values: Vec<(u32, f64)> =
             self.ended.iter().map(|(index, f)| (*index, of(f).unwrap_or(0.0))).collect();
@@ -128,7 +128,7 @@ impl Runs {
         errors.filter(|error| error.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Whether runs are compared by their contour error: where there is one from the first run on.
+    /// Returns whether runs are compared by their contour error, as where every run has one.
     fn by_contour(&self) -> bool {
         self.ended.iter().all(|(_, figures)| figures.contour_inf_m.is_some())
             && self.ended.first().is_some_and(|(_, first)| first.contour_inf_m > Some(0.0))
@@ -170,7 +170,7 @@ impl Runs {
     }
 }
 
-/// What a column shows of a run, if the run has it.
+/// Value of a column for a run, if the run has it.
 type Shown<'a> = Box<dyn Fn(&Figures) -> Option<f64> + 'a>;
 
 struct Column<'a> {

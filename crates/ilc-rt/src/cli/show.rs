@@ -12,7 +12,7 @@ pub(super) fn complain(line: &dyn std::fmt::Display) {
     let _ = writeln!(std::io::stderr(), "ilc-rt: {line}");
 }
 
-/// Prints one line on standard output, and tells whether somebody can read it. A reader who has gone
+/// Prints one line on standard output; returns whether it could be written. A reader who has gone
 /// must not end the program while axes move.
 pub(super) fn say(line: &dyn std::fmt::Display) -> bool {
     let line = printable_lines(&line.to_string());
@@ -22,7 +22,7 @@ pub(super) fn say(line: &dyn std::fmt::Display) -> bool {
     writeln!(std::io::stdout(), "{line}").is_ok()
 }
 
-/// Whether lines for people go to standard error, as figures go to standard output.
+/// Set where lines for people go to standard error, as figures go to standard output.
 static ASIDE: AtomicBool = AtomicBool::new(false);
 
 /// Lets lines for people go to standard error from now on.
@@ -30,18 +30,18 @@ pub(super) fn leave_standard_output() {
     ASIDE.store(true, Ordering::Relaxed);
 }
 
-/// Prints a text on standard output as it is, and tells whether somebody can read it.
+/// Prints a text on standard output as it is; returns whether it could be written.
 pub(super) fn print(text: &str) -> bool {
     let mut out = std::io::stdout();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).is_ok()
 }
 
-/// Prints JSON in one line, and tells whether somebody can read it.
+/// Prints JSON in one line; returns whether it could be written.
 pub(super) fn say_json(text: &str) -> bool {
     writeln!(std::io::stdout(), "{}", printable_json(text)).is_ok()
 }
 
-/// What an event says to a person, if anything; `runs` remembers what came before.
+/// Returns an event as text for people, if it has one; `runs` has the runs before.
 pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
     match event {
         Event::Start {

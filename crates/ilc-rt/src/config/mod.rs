@@ -8,9 +8,7 @@
 mod cell;
 mod error;
 mod file;
-mod law;
 mod learning;
-mod norm_optimal;
 mod simulation;
 mod validate;
 
@@ -21,10 +19,8 @@ pub use cell::{
 };
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, read_beside, read_file};
-pub use law::{
-    AdjointSection, ConstrainedSection, ErrorFeedforwardSection, ModelInverseSection, PdSection,
-};
-pub use learning::{GateMeasure, GateSection, LadderSection, LawName, Learning, Measure};
-pub use norm_optimal::{ContourSection, NormOptimalSection, PhaseSection};
+pub use learning::{Learning, Measure};
 pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;
+
+pub use crate::learning::law::catalogue::LawName;

@@ -99,30 +99,6 @@ impl Cascade {
 mod tests {
     use super::*;
 
-    /// Returns the gains that make a mass follow as `omega^2 / (s^2 + 2 delta omega s + omega^2)`, but for
-    /// the integral part; without feed-forward and limits.
-    ///
-    /// `k_v = omega / (2 delta)`, `k_p = 2 delta omega m`
-    ///
-    /// # Source
-    /// - \[haas2016\], Sect. 3: the model of the closed loop.
-    fn for_second_order(
-        natural_frequency_rad_s: f64,
-        damping: f64,
-        mass_kg: f64,
-        integral_time_s: f64,
-    ) -> CascadeGains {
-        CascadeGains {
-            position_gain_per_s: natural_frequency_rad_s / (2.0 * damping),
-            velocity_gain_n_s_m: 2.0 * damping * natural_frequency_rad_s * mass_kg,
-            integral_time_s,
-            velocity_feedforward: 0.0,
-            acceleration_feedforward_kg: 0.0,
-            velocity_max_m_s: f64::INFINITY,
-            force_max_n: f64::INFINITY,
-        }
-    }
-
     #[test]
     fn hand_computed_force() {
         let gains = CascadeGains {
@@ -145,10 +121,24 @@ mod tests {
         assert!(!cascade.step(reference, f64::NAN, 0.0, 0.0).finite);
     }
 
+    /// Gains that make a mass follow as `omega^2 / (s^2 + 2 delta omega s + omega^2)`, but for the integral
+    /// part \[haas2016\]: `k_v = omega / (2 delta)`, `k_p = 2 delta omega m`.
+    fn second_order(omega: f64, damping: f64, mass_kg: f64, integral_time_s: f64) -> CascadeGains {
+        CascadeGains {
+            position_gain_per_s: omega / (2.0 * damping),
+            velocity_gain_n_s_m: 2.0 * damping * omega * mass_kg,
+            integral_time_s,
+            velocity_feedforward: 0.0,
+            acceleration_feedforward_kg: 0.0,
+            velocity_max_m_s: f64::INFINITY,
+            force_max_n: f64::INFINITY,
+        }
+    }
+
     #[test]
     fn a_mass_follows_a_step_as_the_second_order_it_was_tuned_for() {
         let (omega, damping, mass): (f64, f64, f64) = (94.0, 0.6, 20.0);
-        let gains = for_second_order(omega, damping, mass, f64::INFINITY);
+        let gains = second_order(omega, damping, mass, f64::INFINITY);
         let dt = 1e-5;
         let mut cascade = Cascade::new(gains, dt);
         let reference = CascadeReference { position_m: 1.0, ..CascadeReference::default() };
@@ -168,7 +158,7 @@ mod tests {
 
     #[test]
     fn after_saturation_it_does_not_overshoot_for_long() {
-        let mut gains = for_second_order(94.0, 1.0, 20.0, 0.1);
+        let mut gains = second_order(94.0, 1.0, 20.0, 0.1);
         gains.force_max_n = 10.0;
         let mut cascade = Cascade::new(gains, 1e-3);
         let ahead = CascadeReference { position_m: 1.0, ..CascadeReference::default() };

@@ -1,4 +1,4 @@
-//! What is known before the first run: the model that learning believes in, the error of a run without
+//! Predictions before the first run: the nominal model of learning, the error of a run without
 //! learning, and whether the law will converge.
 
 use super::error::DesignError;

@@ -6,11 +6,11 @@
 //! Family: `forecast`, `law` and `plan` work one cell description out together.
 
 mod error;
+mod fingerprint;
 mod forecast;
 mod law;
 mod plan;
 mod program;
-mod weights;
 
 pub use error::DesignError;
 pub use forecast::{first_error, learning_model};

@@ -3,24 +3,26 @@
 use std::time::Duration;
 
 use super::error::DesignError;
+use super::fingerprint;
 use super::law::{self, Prepared};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, Measure};
 use crate::control::PositionLoop;
 use crate::fieldbus::bring_up::load;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
+use crate::fieldbus::transport::scheme_of;
 use crate::model::{
     Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
 };
-use crate::record::{Meta, fingerprint};
+use crate::record::Meta;
 use crate::rt::Nanos;
 use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
 use crate::trajectory::{AxisLimits, Interpolator};
 
-/// How long drives may take to be switched on.
+/// Time that drives may take to be switched on.
 const ENABLE_S: f64 = 3.0;
 
-/// A cell description worked out: nothing in it can fail any more.
+/// Plan of a cell's runs: nothing in it can fail any more.
 #[derive(Debug)]
 pub struct Plan {
     /// The servo cycle's own description; runs are filled in by the campaign.
@@ -29,16 +31,18 @@ pub struct Plan {
     pub interpolator: Interpolator,
     /// Set points of a whole run, `n_samples * n_axes`.
     pub reference_m: Vec<f64>,
-    /// What was learned from.
+    /// Measurement that is learned from.
     pub measure: Measure,
     /// Provenance of the records; the campaign's name is filled in by the campaign.
     pub meta: Meta,
+    /// Fingerprint under which versions up to 0.1 kept the same campaign.
+    pub(crate) legacy_fingerprint: String,
     /// Worst-case share of the bus taken by cyclic traffic.
     pub bus_load: f64,
 }
 
 impl Plan {
-    /// Works a cell description out, with the measurement to learn from if it is to be another one.
+    /// Plans the runs of a cell, with another measurement to learn from if one is given.
     ///
     /// # Errors
     /// [`DesignError`] for a program beyond the limits, an overloaded bus, or a measurement that
@@ -53,8 +57,8 @@ impl Plan {
         Self::with(cell, measure, lockstep, interpolator, program)
     }
 
-    /// Works a cell description out with other set points than those of its program; `program` says
-    /// which, as JSON.
+    /// Plans the runs of a cell with other set points than those of its program; `program` describes them
+    /// as JSON.
     pub(crate) fn with(
         cell: &Cell,
         measure: Option<Measure>,
@@ -72,6 +76,7 @@ impl Plan {
             servo: servo_spec(&cell, lockstep)?,
             interpolator,
             reference_m,
+            legacy_fingerprint: String::new(),
             measure: cell.learning.measure,
             meta: Meta {
                 cell: cell.cell.name.clone(),
@@ -114,28 +119,8 @@ impl Plan {
     pub fn name_law(&mut self, cell: &Cell, name: &str, parameters: &str) {
         name.clone_into(&mut self.meta.law);
         parameters.clone_into(&mut self.meta.law_parameters);
-        let axes: Vec<_> = cell
-            .axes
-            .iter()
-            .map(|a| format!("{:?}", (&a.name, a.interface, a.limits, a.model, a.position_loop)))
-            .collect();
-        let whole = format!(
-            "{:?}",
-            (
-                &self.meta.cell,
-                axes,
-                &self.meta.program,
-                cell.cell.cycle_us,
-                &self.meta.measure,
-                name,
-                parameters,
-                cell.learning.input_max_m,
-                cell.learning.input_max_m_s,
-                // Of weights that vary along the run the parameters do not tell every number.
-                (name == cell.learning.law.as_str()).then(|| cell.learning.law_text()),
-            )
-        );
-        self.meta.fingerprint = fingerprint(&whole);
+        self.legacy_fingerprint = fingerprint::legacy(cell, &self.meta, name, parameters);
+        self.meta.fingerprint = fingerprint::of(cell, &self.meta, name, parameters);
     }
 }
 
@@ -195,8 +180,8 @@ fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
     let mut payloads = vec![0, 8];
     payloads.extend(cell.axes.iter().flat_map(|_| [8, 8, 8]));
     payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
-    // Only a real bus has bits; the others are as fast as the machine, and are told for comparison.
-    if cell.bus.address.starts_with("can:") {
+    // Only a real bus has bits; the others are as fast as the machine, and their load is stated for comparison.
+    if scheme_of(&cell.bus.address).is_some_and(|scheme| scheme.has_bits) {
         return load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, cell.bus.load_max)
             .map(|found| found.ratio());
     }

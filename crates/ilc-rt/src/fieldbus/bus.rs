@@ -1,5 +1,7 @@
 //! What every transport promises: frames out, frames in, never blocking longer than asked.
 
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
 use std::time::Duration;
 
 use super::frame::Frame;

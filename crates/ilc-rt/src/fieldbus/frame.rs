@@ -1,5 +1,7 @@
 //! One classical CAN data frame with an 11-bit identifier: all that CANopen uses.
 
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
 /// Largest payload of a classical CAN frame, in bytes.
 pub const PAYLOAD_MAX: usize = 8;
 

@@ -46,6 +46,8 @@ pub struct Identified {
     pub uncertainty: Uncertainty,
     /// Reason not to use the model, if there is one.
     pub doubt: Option<Doubt>,
+    /// Samples in a period.
+    pub period_samples: usize,
     /// Input of the evaluated periods.
     pub input: Vec<f64>,
     /// Output of the evaluated periods.
@@ -184,7 +186,16 @@ impl Identified {
         let uncertainty = uncertainty(&measured, &model, DEVIATIONS)?;
         let beyond = || described.beyond_cell().filter(|_| form != Form::Free);
         let doubt = doubt(&measured, described.residual_rms()).or_else(beyond);
-        Ok(Self { measured, fit, described, uncertainty, doubt, input: u, output: y })
+        Ok(Self {
+            measured,
+            fit,
+            described,
+            uncertainty,
+            doubt,
+            period_samples,
+            input: u,
+            output: y,
+        })
     }
 
     /// Evaluates the signals of an experiment, over the periods that count.

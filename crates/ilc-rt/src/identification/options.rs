@@ -42,13 +42,13 @@ pub struct ExperimentOptions {
     /// Position that the axis is excited around; the program's start if not given.
     #[arg(long, value_name = "POSITION", allow_negative_numbers = true)]
     pub at_m: Option<f64>,
-    #[arg(long, hide = true, value_parser = renamed("--waveform"))]
+    #[arg(long, hide = true, help = "--waveform", value_parser = renamed("--waveform"))]
     method: Option<String>,
-    #[arg(long, hide = true, value_parser = renamed("--period-s"))]
+    #[arg(long, hide = true, help = "--period-s", value_parser = renamed("--period-s"))]
     duration_s: Option<String>,
-    #[arg(long, hide = true, value_parser = renamed("--amplitude"))]
+    #[arg(long, hide = true, help = "--amplitude", value_parser = renamed("--amplitude"))]
     amplitude_m: Option<String>,
-    #[arg(long, hide = true, value_parser = renamed("--amplitude"))]
+    #[arg(long, hide = true, help = "--amplitude", value_parser = renamed("--amplitude"))]
     amplitude_m_s: Option<String>,
 }
 
@@ -85,17 +85,9 @@ impl ExperimentOptions {
         cell: &Cell,
         band: Option<Band>,
     ) -> Result<Experiment, IdentificationError> {
-        let band = band.unwrap_or(DEFAULT_BAND);
         let experiment = Experiment {
             axis: self.axis(cell)?.name.clone(),
-            excitation: Excitation {
-                waveform: self.waveform,
-                amplitude: self.amplitude.unwrap_or(1.0),
-                from_hz: self.from_hz.unwrap_or(band.from_hz),
-                to_hz: self.to_hz.unwrap_or(band.to_hz),
-                period_s: self.period_s.unwrap_or(band.period_s),
-                periods: self.periods,
-            },
+            excitation: self.excitation(band),
             at_m: self.at_m,
         };
         let experiment = match self.amplitude {
@@ -104,6 +96,19 @@ impl ExperimentOptions {
         };
         experiment.check(cell)?;
         Ok(experiment)
+    }
+
+    /// Returns the excitation in a band, or in a default one; given options replace the band's own values.
+    pub fn excitation(&self, band: Option<Band>) -> Excitation {
+        let band = band.unwrap_or(DEFAULT_BAND);
+        Excitation {
+            waveform: self.waveform,
+            amplitude: self.amplitude.unwrap_or(1.0),
+            from_hz: self.from_hz.unwrap_or(band.from_hz),
+            to_hz: self.to_hz.unwrap_or(band.to_hz),
+            period_s: self.period_s.unwrap_or(band.period_s),
+            periods: self.periods,
+        }
     }
 }
 

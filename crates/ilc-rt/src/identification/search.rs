@@ -44,10 +44,8 @@ pub fn identify<E: From<IdentificationError>>(
         };
         let Some((experiment, found)) = identified(experiment)? else { break };
         let left = 100.0 * found.residual_rms();
-        let verdict = found.doubt.map_or(format!("the model leaves {left:.0} %"), |doubt| {
-            let text = doubt.to_string();
-            text.split(':').next().unwrap_or_default().to_owned()
-        });
+        let verdict =
+            found.doubt.map_or(format!("the model leaves {left:.0} %"), |doubt| doubt.to_string());
         let Experiment { excitation, .. } = &experiment;
         report(&format!(
             "{:.3} to {:.3} Hz, amplitude {:.3e}: {verdict}",

@@ -54,6 +54,27 @@ pub trait Law: Send {
         let _ = disturbance;
     }
 
+    /// Returns how many numbers describe the disturbance of a run, for a law that must be told;
+    /// `None` for one that has no use for it.
+    fn n_disturbances(&self) -> Option<usize> {
+        None
+    }
+
+    /// Learns from a run that was made earlier, under a disturbance like those announced; returns
+    /// whether the law has use for it.
+    ///
+    /// # Errors
+    /// - as [`Law::update`], or [`LearningError::Disturbance`].
+    fn recall(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        disturbance: &[f64],
+    ) -> Result<bool, LearningError> {
+        let _ = (input, error, disturbance);
+        Ok(false)
+    }
+
     /// Applies the transpose of the update's linear part: `to_input = L_u' dual`,
     /// `to_error = L_e' dual`, where the update is `next = L_u input + L_e error`.
     ///
@@ -140,6 +161,19 @@ impl<L: Law + ?Sized> Law for Box<L> {
 
     fn set_disturbance(&mut self, disturbance: &[f64]) {
         (**self).set_disturbance(disturbance);
+    }
+
+    fn n_disturbances(&self) -> Option<usize> {
+        (**self).n_disturbances()
+    }
+
+    fn recall(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        disturbance: &[f64],
+    ) -> Result<bool, LearningError> {
+        (**self).recall(input, error, disturbance)
     }
 
     fn apply_adjoint(

@@ -38,16 +38,8 @@ impl From<Duration> for Nanos {
     }
 }
 
-/// Where time comes from. Logic takes a clock as an argument and never asks the system itself.
-pub trait Clock {
-    /// The time now.
-    fn now(&self) -> Nanos;
-
-    /// Waits until `deadline`; returns at once if it has passed.
-    fn sleep_until(&self, deadline: Nanos);
-}
-
-/// `CLOCK_MONOTONIC`, sleeping on its absolute grid and spinning the last stretch.
+/// `CLOCK_MONOTONIC`, sleeping on its absolute grid and spinning the last stretch. Logic takes it as an
+/// argument and never asks the system itself.
 ///
 /// # Real Time
 /// The kernel wakes a thread tens of microseconds late; spinning the last `spin` of each wait
@@ -62,19 +54,19 @@ impl MonotonicClock {
     pub const fn new(spin: Nanos) -> Self {
         Self { spin }
     }
-}
 
-impl Clock for MonotonicClock {
+    /// Returns the time now.
     #[expect(unsafe_code, reason = "clock_gettime has no safe wrapper in the standard library")]
-    fn now(&self) -> Nanos {
+    pub fn now(&self) -> Nanos {
         let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
         // SAFETY: `now` is a valid, exclusively borrowed timespec for the whole call.
         unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &raw mut now) };
         Nanos(now.tv_sec.unsigned_abs() * 1_000_000_000 + now.tv_nsec.unsigned_abs())
     }
 
+    /// Waits until `deadline`; returns at once if it has passed.
     #[expect(unsafe_code, reason = "clock_nanosleep has no safe wrapper in the standard library")]
-    fn sleep_until(&self, deadline: Nanos) {
+    pub fn sleep_until(&self, deadline: Nanos) {
         let wake = deadline.0.saturating_sub(self.spin.0);
         if wake > self.now().0 {
             let until = libc::timespec {

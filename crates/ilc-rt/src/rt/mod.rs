@@ -7,6 +7,6 @@ pub mod clock;
 pub mod latency;
 pub mod thread;
 
-pub use clock::{Clock, MonotonicClock, Nanos};
+pub use clock::{MonotonicClock, Nanos};
 pub use latency::{Latency, LatencyFigures};
 pub use thread::{RtReport, RtRequest};

@@ -3,7 +3,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::cycle::{Cycle, TickStatus};
-use crate::rt::{Clock, Latency, Nanos};
+use crate::rt::{Latency, MonotonicClock, Nanos};
 
 /// How punctual the loop was.
 #[derive(Clone, Debug, Default)]
@@ -21,7 +21,7 @@ pub struct Timing {
 ///
 /// # Real Time
 /// Hot: call it in a thread of its own, made ready with [`crate::rt::thread::enter`].
-pub fn run_on_clock(cycle: &mut Cycle, clock: &impl Clock, timing: &mut Timing) {
+pub fn run_on_clock(cycle: &mut Cycle, clock: &MonotonicClock, timing: &mut Timing) {
     let period = cycle.period();
     let mut due = clock.now().plus(period);
     loop {

@@ -1,5 +1,7 @@
 //! What the servo cycle is told once: its nodes, their limits, and its own patience.
 
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
 use std::time::Duration;
 
 use crate::control::PositionLoop;

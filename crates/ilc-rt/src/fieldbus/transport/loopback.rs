@@ -13,21 +13,19 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::super::bus::{Bus, BusError};
-use super::super::frame::Frame;
-use super::doorbell::{Bell, Ringer, bell};
-use super::wait::Deadline;
+use super::doorbell::{Ringer, bell};
+use super::queue::{Inbox, Outbox};
+use crate::fieldbus::{Bus, BusError, Frame};
 
 /// One end of a bus between two threads.
 ///
-/// The fields are dropped in this order: the buffers are given up before the bell falls silent, so that a
-/// peer that the bell wakes finds them given up.
+/// The fields are dropped in this order: the queues are given up before the bell of the peer falls
+/// silent, so that a peer that it wakes finds them given up.
 #[derive(Debug)]
 pub struct Loopback {
-    outgoing: Producer<Frame>,
-    incoming: Consumer<Frame>,
+    outgoing: Outbox,
+    incoming: Inbox,
     peer: Ringer,
-    bell: Bell,
 }
 
 /// Returns the two ends of a bus that holds up to `capacity` frames each way.
@@ -41,37 +39,26 @@ pub fn pair(capacity: usize) -> io::Result<(Loopback, Loopback)> {
     let (to_left, from_right) = RingBuffer::new(capacity);
     let (right_ringer, right_bell) = bell()?;
     let (left_ringer, left_bell) = bell()?;
+    let end = |outgoing, incoming, bell, peer| Loopback {
+        outgoing: Outbox::new(outgoing),
+        incoming: Inbox::new(incoming, bell),
+        peer,
+    };
     Ok((
-        Loopback { outgoing: to_right, incoming: from_right, peer: right_ringer, bell: left_bell },
-        Loopback { outgoing: to_left, incoming: from_left, peer: left_ringer, bell: right_bell },
+        end(to_right, from_right, left_bell, right_ringer),
+        end(to_left, from_left, right_bell, left_ringer),
     ))
 }
 
 impl Bus for Loopback {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        if self.outgoing.is_abandoned() {
-            return Err(BusError::Closed);
-        }
-        self.outgoing.push(*frame).map_err(|_| BusError::Full)?;
+        self.outgoing.put(frame)?;
         self.peer.ring();
         Ok(())
     }
 
     fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
-        let incoming = &mut self.incoming;
-        let mut take = || {
-            // Asked before the buffer is looked at: the peer may send its last frame and go in between.
-            let abandoned = incoming.is_abandoned();
-            match incoming.pop() {
-                Ok(frame) => Ok(Some(frame)),
-                Err(_) if abandoned => Err(BusError::Closed),
-                Err(_) => Ok(None),
-            }
-        };
-        match take() {
-            Ok(None) if !timeout.is_zero() => self.bell.wait(Deadline::after(timeout), take),
-            taken => taken,
-        }
+        self.incoming.take(timeout)
     }
 }
 
@@ -86,7 +73,8 @@ pub trait Responder: Send {
 /// `recv` never waits, whatever its time-out: nothing can arrive unless something is sent.
 pub struct InProcess<R> {
     responder: R,
-    replies: Replies,
+    /// Both ends of the queue of answers.
+    replies: (Producer<Frame>, Consumer<Frame>),
 }
 
 impl<R: Responder> InProcess<R> {
@@ -95,7 +83,7 @@ impl<R: Responder> InProcess<R> {
     /// # Real Time
     /// Cold: allocates the answers' queue.
     pub fn new(responder: R, capacity: usize) -> Self {
-        Self { responder, replies: Replies::new(capacity) }
+        Self { responder, replies: RingBuffer::new(capacity) }
     }
 
     /// The far side, to look at.
@@ -115,14 +103,14 @@ impl<R: Responder> Bus for InProcess<R> {
     /// # Errors
     /// [`BusError::Full`] if an answer did not fit: the frame was received, that answer is lost.
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        let replies = &mut self.replies;
+        let replies = &mut self.replies.0;
         let mut fits = true;
-        self.responder.receive(frame, &mut |reply| fits &= replies.push(reply));
+        self.responder.receive(frame, &mut |reply| fits &= replies.push(reply).is_ok());
         if fits { Ok(()) } else { Err(BusError::Full) }
     }
 
     fn recv(&mut self, _timeout: Duration) -> Result<Option<Frame>, BusError> {
-        Ok(self.replies.pop())
+        Ok(self.replies.1.pop().ok())
     }
 }
 
@@ -130,46 +118,7 @@ impl<R: fmt::Debug> fmt::Debug for InProcess<R> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("InProcess")
             .field("responder", &self.responder)
-            .field("queued", &self.replies.len)
+            .field("queued", &self.replies.1.slots())
             .finish()
-    }
-}
-
-/// A queue of fixed capacity. Not a `rtrb` ring: both ends are in one thread and need no atomics.
-struct Replies {
-    slots: Box<[Frame]>,
-    head: usize,
-    len: usize,
-}
-
-impl Replies {
-    #[expect(clippy::disallowed_macros, reason = "cold: set-up")]
-    fn new(capacity: usize) -> Self {
-        Self { slots: vec![Frame::default(); capacity].into_boxed_slice(), head: 0, len: 0 }
-    }
-
-    fn push(&mut self, frame: Frame) -> bool {
-        if self.len == self.slots.len() {
-            return false;
-        }
-        let tail = self.wrap(self.head + self.len);
-        self.slots[tail] = frame;
-        self.len += 1;
-        true
-    }
-
-    fn pop(&mut self) -> Option<Frame> {
-        if self.len == 0 {
-            return None;
-        }
-        let frame = self.slots[self.head];
-        self.head = self.wrap(self.head + 1);
-        self.len -= 1;
-        Some(frame)
-    }
-
-    /// Brings an index below twice the capacity back into the slots, without a division.
-    fn wrap(&self, index: usize) -> usize {
-        if index < self.slots.len() { index } else { index - self.slots.len() }
     }
 }

@@ -10,13 +10,10 @@
 use std::fmt;
 use std::time::Duration;
 
-use rtrb::{Consumer, Producer};
-
 use super::super::bus::{Bus, BusError};
 use super::super::frame::{Frame, PAYLOAD_MAX};
-use super::doorbell::Bell;
-use super::opening::{Ends, Link, OpenError, ZenohSettings as Settings};
-use super::wait::Deadline;
+use super::opening::{Ends, Link, OpenError, ZenohSettings};
+use super::queue::{Inbox, Outbox};
 
 /// Bytes of the identifier in front of the payload.
 const ID_BYTES: usize = 2;
@@ -26,9 +23,8 @@ const CONNECT_WAIT: Duration = Duration::from_secs(3);
 
 /// An endpoint on a Zenoh key expression.
 pub struct ZenohBus {
-    outgoing: Producer<Frame>,
-    incoming: Consumer<Frame>,
-    bell: Bell,
+    outgoing: Outbox,
+    incoming: Inbox,
     link: Link,
 }
 
@@ -43,9 +39,9 @@ impl ZenohBus {
     /// # Errors
     /// [`OpenError::Zenoh`] with the step that Zenoh refused, such as listening on an endpoint that is
     /// taken.
-    pub fn open(settings: &Settings) -> Result<Self, OpenError> {
-        let Ends { outgoing, incoming, bell, link } = Link::open(settings)?;
-        let bus = Self { outgoing, incoming, bell, link };
+    pub fn open(settings: &ZenohSettings) -> Result<Self, OpenError> {
+        let Ends { outgoing, incoming, link } = Link::open(settings)?;
+        let bus = Self { outgoing, incoming, link };
         if !settings.connect.is_empty() {
             bus.wait_for_peer(CONNECT_WAIT);
         }
@@ -63,28 +59,13 @@ impl ZenohBus {
 
 impl Bus for ZenohBus {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        if self.outgoing.is_abandoned() {
-            return Err(BusError::Closed);
-        }
-        self.outgoing.push(*frame).map_err(|_| BusError::Full)?;
+        self.outgoing.put(frame)?;
         self.link.wake_publisher();
         Ok(())
     }
 
     fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
-        let incoming = &mut self.incoming;
-        let mut take = || {
-            let abandoned = incoming.is_abandoned();
-            match incoming.pop() {
-                Ok(frame) => Ok(Some(frame)),
-                Err(_) if abandoned => Err(BusError::Closed),
-                Err(_) => Ok(None),
-            }
-        };
-        match take() {
-            Ok(None) if !timeout.is_zero() => self.bell.wait(Deadline::after(timeout), take),
-            taken => taken,
-        }
+        self.incoming.take(timeout)
     }
 }
 

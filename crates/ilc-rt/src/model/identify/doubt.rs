@@ -1,6 +1,6 @@
-//! Why an identified model should not be used.
+//! Reasons not to use an identified model.
 //!
-//! `supervisor` and the Python bindings ask it before they offer a model to a cell description.
+//! `identification` asks it before it offers a model to a cell description.
 
 use super::FrequencyResponse;
 
@@ -9,7 +9,7 @@ const COHERENCE_MIN: f64 = 0.7;
 /// Relative residual above which a model does not describe the response.
 const RESIDUAL_MAX: f64 = 0.25;
 
-/// What speaks against a model.
+/// Reason not to use a model.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Doubt {
     /// There is no output.
@@ -42,9 +42,9 @@ pub enum Doubt {
         what: &'static str,
         /// The figure.
         value: f64,
-        /// The least that a cell takes.
+        /// Smallest value that a cell takes.
         low: f64,
-        /// The most.
+        /// Largest value that a cell takes.
         high: f64,
     },
 }

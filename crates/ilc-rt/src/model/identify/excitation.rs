@@ -14,7 +14,7 @@ const NYQUIST_SHARE: f64 = 0.9;
 /// Part of a sweep's period in which the axis comes to rest again.
 const REST: f64 = 0.2;
 
-/// What one period looks like.
+/// Waveform of one period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Waveform {
@@ -32,7 +32,7 @@ pub enum Waveform {
 /// - `amplitude` (the peak) in the unit of the input: m or m/s; the rest as named
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Excitation {
-    /// What one period looks like.
+    /// Waveform of one period.
     pub waveform: Waveform,
     /// Peak of the input.
     pub amplitude: f64,

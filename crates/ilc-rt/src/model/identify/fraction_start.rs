@@ -1,4 +1,4 @@
-//! Where the fit of a second-order model begins: linear fits, one for each delay there may be.
+//! Starts for the fit of a second-order model: linear fits, one for each possible delay.
 
 use std::f64::consts::{PI, TAU};
 

@@ -2,7 +2,7 @@
 //!
 //! One file a step: [`Excitation`] lays out the input, [`frequency_response`] compares output with
 //! input and says how far it can be trusted, [`fit_second_order`] and [`fit_rational`] find a model,
-//! and [`uncertainty`] bounds what the model does not explain. Cold, for set-up only; `supervisor`,
+//! and [`uncertainty`] bounds what the model does not explain. Cold, for set-up only; `identification`,
 //! `cli` and the Python bindings may import it.
 //!
 //! Family: `excitation` is a `multisine` or a `swept_sine`, which share its checks.

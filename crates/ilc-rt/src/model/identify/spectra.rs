@@ -7,7 +7,7 @@ use rustfft::num_complex::Complex;
 
 use crate::model::ModelError;
 
-/// How two signals are cut into pieces that are averaged over.
+/// Division of two signals into segments that are averaged over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Averaging {
     /// Whole periods of a periodic excitation, as they are: exact, without leakage.
@@ -105,7 +105,7 @@ impl Spectra {
     }
 }
 
-/// How many independent pieces overlapping ones are worth.
+/// Returns the equivalent number of independent segments.
 ///
 /// `K / (1 + 2 sum_j (1 - j/K) rho_j^2)` with `rho_j` the correlation of windows `j` steps apart.
 fn independent(window: &[f64], step: usize, count: usize) -> f64 {

@@ -8,7 +8,7 @@ use crate::model::ModelError;
 /// Share of the sweep that either end fades in and out, at constant frequency.
 const RAMP: f64 = 0.1;
 
-/// How the frequency rises.
+/// Rise of the frequency over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spacing {
     /// By the same number of hertz in the same time.

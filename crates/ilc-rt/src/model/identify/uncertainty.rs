@@ -1,4 +1,4 @@
-//! What a model does not explain, as a bound that a robust-convergence test takes.
+//! Bound of the model error, for a robust-convergence test.
 
 use nalgebra::Complex;
 

@@ -3,14 +3,13 @@
 use std::fmt;
 use std::io;
 
+use super::address::syntaxes;
+
 /// Why a bus could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// Not the address of any carrier.
-    #[error(
-        "`{address}` is not a bus address: `can:INTERFACE`, `udp:GROUP[:PORT][?ttl=N]`, \
-         `zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off][&insecure=1]` and `loopback:` are allowed"
-    )]
+    /// Not the address of any kind of bus.
+    #[error("`{address}` is not a bus address: allowed are {}", syntaxes(true))]
     Scheme {
         /// The address as given.
         address: String,
@@ -27,7 +26,7 @@ pub enum OpenError {
         /// What the part may be.
         allowed: &'static str,
     },
-    /// `loopback:` by address.
+    /// A bus in one process, by its address.
     #[error(
         "`{address}` cannot be opened by its address alone: its other end lives in the same process, \
          which makes both ends with `loopback::pair` or `loopback::InProcess`"

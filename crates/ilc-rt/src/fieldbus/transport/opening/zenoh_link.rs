@@ -15,9 +15,11 @@ use zenoh::sample::{Locality, Sample};
 use zenoh::{Session, Wait};
 
 use super::error::OpenError;
+use super::zenoh::ZenohSettings;
 use super::zenoh_reach::{self, Reach};
 use crate::fieldbus::Frame;
 use crate::fieldbus::transport::doorbell::{Bell, Ringer, bell};
+use crate::fieldbus::transport::queue::{Inbox, Outbox};
 use crate::fieldbus::transport::zenoh::{decode, encode};
 
 /// Frames that a ring buffer holds each way.
@@ -33,32 +35,10 @@ const STALL_US: u32 = 100_000;
 /// bus shall not be found by what merely watches, and be carried off the host by it.
 const GROUP: &str = "224.0.0.224:7448";
 
-/// What a `zenoh:` address says.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Settings {
-    /// Key expression of the bus, without wildcards.
-    pub key: String,
-    /// Zenoh endpoints to listen on, such as `tcp/127.0.0.1:7447`; if empty, a free port of the
-    /// host's own address.
-    pub listen: Vec<String>,
-    /// Zenoh endpoints to connect to.
-    pub connect: Vec<String>,
-    /// Whether to look for other endpoints on this host by multicast.
-    pub scouting: bool,
-}
-
-impl Settings {
-    /// Returns the settings of a bus without endpoints, found by scouting.
-    pub fn new(key: &str) -> Self {
-        Self { key: key.to_owned(), listen: Vec::new(), connect: Vec::new(), scouting: true }
-    }
-}
-
 /// The caller's ends of an open link.
 pub(in crate::fieldbus::transport) struct Ends {
-    pub(in crate::fieldbus::transport) outgoing: Producer<Frame>,
-    pub(in crate::fieldbus::transport) incoming: Consumer<Frame>,
-    pub(in crate::fieldbus::transport) bell: Bell,
+    pub(in crate::fieldbus::transport) outgoing: Outbox,
+    pub(in crate::fieldbus::transport) incoming: Inbox,
     pub(in crate::fieldbus::transport) link: Link,
 }
 
@@ -83,7 +63,9 @@ impl Link {
     ///
     /// # Errors
     /// [`OpenError::Zenoh`] with the step that Zenoh refused.
-    pub(in crate::fieldbus::transport) fn open(settings: &Settings) -> Result<Ends, OpenError> {
+    pub(in crate::fieldbus::transport) fn open(
+        settings: &ZenohSettings,
+    ) -> Result<Ends, OpenError> {
         let refused = |action| {
             move |reason: zenoh::Error| OpenError::Zenoh {
                 key: settings.key.clone(),
@@ -115,7 +97,7 @@ impl Link {
             })
             .map_err(|error| refused("starting the publisher's thread")(error.into()))?;
         let link = Self { session, publisher: Some(publisher), shared };
-        Ok(Ends { outgoing, incoming, bell, link })
+        Ok(Ends { outgoing: Outbox::new(outgoing), incoming: Inbox::new(incoming, bell), link })
     }
 
     /// Waits until another endpoint receives what is published; false if none did in time.
@@ -155,7 +137,7 @@ impl Drop for Link {
     }
 }
 
-fn config(settings: &Settings) -> zenoh::Result<zenoh::Config> {
+fn config(settings: &ZenohSettings) -> zenoh::Result<zenoh::Config> {
     let reach = Reach {
         listen: &settings.listen,
         connect: &settings.connect,

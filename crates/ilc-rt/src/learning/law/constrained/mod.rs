@@ -10,6 +10,7 @@ mod bounds;
 mod group;
 mod interior;
 mod load;
+mod parameters;
 #[cfg(test)]
 mod proof;
 mod reach;
@@ -27,6 +28,7 @@ use crate::model::{ModelError, StateSpace};
 
 use bounds::Extent;
 pub use bounds::{Bound, Bounds, BoundsError, Limit};
+pub use parameters::ConstrainedParameters;
 use solver::Solver;
 
 /// How the last update ended.

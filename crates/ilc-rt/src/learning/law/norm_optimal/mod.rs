@@ -5,11 +5,13 @@ pub(super) mod decouple;
 #[cfg(test)]
 mod oracle;
 mod pairing;
+mod parameters;
 pub(super) mod plant;
 pub(super) mod relative_degree;
 
 pub use cost::{Cost, Weights};
 pub use pairing::Paired;
+pub use parameters::{ContourParameters, NormOptimalParameters, PhaseParameters};
 pub use plant::Plant;
 
 use crate::learning::error::{check, check_adjoint, check_counts, check_length, is_finite};

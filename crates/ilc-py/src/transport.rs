@@ -1,0 +1,40 @@
+//! The kinds of bus: `transports`.
+
+use ilc_rt::fieldbus::transport::SCHEMES;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Return what is known of each kind of bus.
+///
+/// Returns
+/// -------
+/// list of dict
+///     ``name`` in front of the colon of an address, ``syntax`` and ``example`` of
+///     one, ``summary``, ``has_bits`` (a real bus, whose load is checked), and
+///     ``in_process`` (the simulated drives run inside this process).
+///
+/// Examples
+/// --------
+/// >>> from ilc_rt._native import transports
+/// >>> [kind["name"] for kind in transports()]
+/// ['can', 'udp', 'zenoh', 'loopback']
+#[pyfunction]
+fn transports(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    SCHEMES
+        .iter()
+        .map(|scheme| {
+            let kind = PyDict::new(py);
+            kind.set_item("name", scheme.name)?;
+            kind.set_item("syntax", scheme.syntax)?;
+            kind.set_item("example", scheme.example)?;
+            kind.set_item("summary", scheme.summary)?;
+            kind.set_item("has_bits", scheme.has_bits)?;
+            kind.set_item("in_process", scheme.in_process)?;
+            Ok(kind)
+        })
+        .collect()
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(transports, module)?)
+}

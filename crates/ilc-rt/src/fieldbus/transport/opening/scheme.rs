@@ -1,0 +1,74 @@
+//! One kind of bus, described once: help texts, errors, documents and Python read it.
+
+use std::fmt;
+
+use super::error::OpenError;
+use crate::fieldbus::Bus;
+
+/// One kind of bus.
+pub struct Scheme {
+    /// Name in front of the colon of an address.
+    pub name: &'static str,
+    /// Syntax of an address, its parts in capitals.
+    pub syntax: &'static str,
+    /// An address that is allowed.
+    pub example: &'static str,
+    /// What carries the frames, in a few words of Markdown.
+    pub summary: &'static str,
+    /// Whether the bus carries a number of bits in a cycle: its load is checked, and its drives are taken
+    /// for real ones.
+    pub has_bits: bool,
+    /// Whether both ends are in one process, so that an address alone opens nothing.
+    pub in_process: bool,
+    /// Reads an address of this kind.
+    pub(super) parse: fn(&Parts<'_>) -> Result<Box<dyn Place>, OpenError>,
+}
+
+impl fmt::Debug for Scheme {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Scheme").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+/// The place that an address names, checked.
+pub(super) trait Place: fmt::Debug {
+    /// Opens the bus.
+    fn open(&self) -> Result<Box<dyn Bus>, OpenError>;
+
+    /// Whether no frame leaves this host.
+    fn stays_on_host(&self) -> bool;
+}
+
+/// An address in its parts: `SCHEME:PLACE?OPTION=VALUE&…`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parts<'a> {
+    pub(super) address: &'a str,
+    pub(super) place: &'a str,
+    options: &'a str,
+}
+
+impl<'a> Parts<'a> {
+    /// Splits what follows the colon of an address.
+    pub(super) fn new(address: &'a str, rest: &'a str) -> Self {
+        let (place, options) = rest.split_once('?').unwrap_or((rest, ""));
+        Self { address, place, options }
+    }
+
+    /// The options; an endpoint may itself contain `=`, so that only the first one separates.
+    pub(super) fn options(self) -> impl Iterator<Item = Result<(&'a str, &'a str), OpenError>> {
+        self.options.split('&').filter(|option| !option.is_empty()).map(move |option| {
+            option.split_once('=').ok_or_else(|| self.refuse("option", option, "write NAME=VALUE"))
+        })
+    }
+
+    /// The error for a part with a value that is not allowed.
+    pub(super) fn refuse(
+        &self,
+        part: &'static str,
+        value: &str,
+        allowed: &'static str,
+    ) -> OpenError {
+        let (address, value) = (self.address.to_owned(), value.to_owned());
+        OpenError::Part { address, part, value, allowed }
+    }
+}

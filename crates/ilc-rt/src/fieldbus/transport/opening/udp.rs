@@ -1,0 +1,85 @@
+//! `udp:` addresses.
+
+use std::net::Ipv4Addr;
+
+use super::error::OpenError;
+use super::scheme::{Parts, Place, Scheme};
+use crate::fieldbus::Bus;
+use crate::fieldbus::transport::UdpMulticast;
+use crate::fieldbus::transport::udp_multicast::{DEFAULT_PORT, DEFAULT_TTL};
+
+/// A group of UDP multicast.
+pub(super) static SCHEME: Scheme = Scheme {
+    name: "udp",
+    syntax: "udp:GROUP[:PORT][?ttl=N]",
+    example: "udp:239.74.163.2",
+    summary: "CAN over UDP multicast in python-can's format; stays on this host unless `ttl` says otherwise",
+    has_bits: false,
+    in_process: false,
+    parse,
+};
+
+#[derive(Debug, PartialEq, Eq)]
+struct Group {
+    group: Ipv4Addr,
+    port: u16,
+    /// Routers that the frames may cross, plus one; 0 keeps them on this host.
+    ttl: u8,
+}
+
+impl Place for Group {
+    fn open(&self) -> Result<Box<dyn Bus>, OpenError> {
+        Ok(Box::new(UdpMulticast::open(self.group, self.port, self.ttl)?))
+    }
+
+    fn stays_on_host(&self) -> bool {
+        self.ttl == 0
+    }
+}
+
+fn parse(parts: &Parts<'_>) -> Result<Box<dyn Place>, OpenError> {
+    Ok(Box::new(read(parts)?))
+}
+
+fn read(parts: &Parts<'_>) -> Result<Group, OpenError> {
+    let place = parts.place;
+    // In brackets or without, with a port or without: only IPv6 has two colons.
+    if place.starts_with('[') || place.matches(':').count() > 1 {
+        return Err(parts.refuse("group", place, "an IPv4 group, 224.0.0.0 to 239.255.255.255"));
+    }
+    let (group, port) = match place.split_once(':') {
+        None => (place, DEFAULT_PORT),
+        Some((group, port)) => match port.parse() {
+            Ok(number) if number != 0 => (group, number),
+            _ => return Err(parts.refuse("port", port, "1 to 65535")),
+        },
+    };
+    let group = group
+        .parse()
+        .ok()
+        .filter(Ipv4Addr::is_multicast)
+        .ok_or_else(|| parts.refuse("group", group, "224.0.0.0 to 239.255.255.255"))?;
+    let mut ttl = DEFAULT_TTL;
+    for option in parts.options() {
+        let (name, value) = option?;
+        if name != "ttl" {
+            return Err(parts.refuse("option", name, "`ttl` is"));
+        }
+        let allowed = "0 (this host only) to 255, 1 for the local network";
+        ttl = value.parse().map_err(|_| parts.refuse("ttl", value, allowed))?;
+    }
+    Ok(Group { group, port, ttl })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn port_and_ttl_have_defaults() {
+        let group = Ipv4Addr::new(239, 74, 163, 2);
+        let of = |rest: &str| read(&Parts::new(rest, rest)).unwrap();
+        assert_eq!(of("239.74.163.2"), Group { group, port: 43113, ttl: 0 });
+        assert_eq!(of("239.74.163.2:5000?ttl=1"), Group { group, port: 5000, ttl: 1 });
+    }
+}

@@ -1,0 +1,129 @@
+"""Search for the weights of norm-optimal learning over trials of each axis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ilc_rt.trials import Bench, Trial, Weights
+
+if TYPE_CHECKING:
+    _Found = tuple[float, Weights, list[Trial]]
+
+STEPS_PER_OCTAVE = 2
+WORTH_WHILE = 0.98
+"""Share of the expected error below which a weight of the change earns its place."""
+BISECTIONS = 2
+"""Halvings, in octaves, of the step between the best rate and the first that grows."""
+
+
+class WeightSearch:
+    """Search for the rate of learning with the least error that no trial's growth forbids.
+
+    Parameters
+    ----------
+    benches : list of Bench
+        One for each axis that moves.
+    q : float
+        Weight of the error.
+    levels : list of float
+        Least and largest weight of the error along the run.
+    growth_max : float
+        Growth of an error over the best one that a trial may show.
+    n_runs : int
+        Runs of a trial.
+    """
+
+    def __init__(
+        self, benches: list[Bench], q: float, levels: list[float], growth_max: float, n_runs: int
+    ) -> None:
+        self.q = q
+        self.benches, self.levels = benches, levels
+        self.growth_max, self.n_runs = growth_max, n_runs
+        self.refused: float | None = None
+        self.held = True
+        bases = [
+            abs(float(bench.model.dc_gain()[0, 0]))
+            / (bench.axis.dt_s * 2.0 * np.pi * bench.axis.natural_frequency_hz)
+            for bench in benches
+        ]
+        low, high = 0.25 * min(bases) * levels[0] ** 0.5, 32.0 * max(bases) * levels[-1] ** 0.5
+        count = int(np.ceil(STEPS_PER_OCTAVE * np.log2(high / low))) + 1
+        self.rates = [rounded(rate) for rate in np.geomspace(high, low, count)]
+
+    def weights(self) -> tuple[Weights, list[Trial]]:
+        """Return the best weights, with their trials."""
+        best: _Found | None = None
+        for rate in self.rates:
+            weights = Weights(self.q, 0.0, 0.0, rate)
+            trials = self._trials(weights, self.growth_max)
+            if trials is None:
+                # Below a rate with which an error grows it grows all the more.
+                self.refused = rate
+                break
+            best = self._better(best, weights, trials)
+        for _ in range(BISECTIONS if best is not None and self.refused is not None else 0):
+            assert best is not None
+            assert self.refused is not None
+            if best[1].rate > 2.0 * self.refused:
+                break
+            weights = replace(best[1], rate=rounded((best[1].rate * self.refused) ** 0.5))
+            trials = self._trials(weights, self.growth_max)
+            if trials is None:
+                self.refused = weights.rate
+            else:
+                best = self._better(best, weights, trials)
+        if best is None:
+            self.held = False
+            weights = Weights(self.q, 0.0, 0.0, self.rates[0])
+            trials = self._trials(weights, np.inf)
+            assert trials is not None
+            best = (self._score(trials), weights, trials)
+        score, weights, trials = best
+        for r in self._changes():
+            slower = Weights(weights.q, 0.0, r, weights.rate)
+            tried = self._trials(slower, self.growth_max)
+            if tried is not None and self._score(tried) < WORTH_WHILE * score:
+                score, weights, trials = self._score(tried), slower, tried
+        return weights, trials
+
+    def _better(self, best: _Found | None, weights: Weights, trials: list[Trial]) -> _Found:
+        score = self._score(trials)
+        return (score, weights, trials) if best is None or score < best[0] else best
+
+    def _changes(self) -> list[float]:
+        """Return weights of the change that may pay: only against noise."""
+        if all(bench.noise == 0.0 for bench in self.benches):
+            return []
+        square = max(float(bench.model.dc_gain()[0, 0]) ** 2 for bench in self.benches)
+        return [rounded(self.levels[0] * square * share) for share in (0.3, 1.0, 3.0, 10.0)]
+
+    def _trials(self, weights: Weights, growth_max: float) -> list[Trial] | None:
+        """Return the trials of all axes; None if an error grows by more than allowed.
+
+        Of several weights of the error the larger, with which learning is bolder, may forbid a
+        rate; what is left is told of the smallest.
+        """
+        found: list[Trial] = []
+        for bench in self.benches:
+            for level in self.levels[::-1]:
+                trials = bench.try_weights(replace(weights, q=level), growth_max)
+                if trials is None:
+                    return None
+                if level == self.levels[0]:
+                    found += trials
+        return found
+
+    def _score(self, trials: list[Trial]) -> float:
+        """Return the mean of the trials' last errors, of all axes together."""
+        by_axis: dict[str, list[float]] = {}
+        for trial in trials:
+            by_axis.setdefault(trial.axis, []).append(float(trial.rms[-1]))
+        return float(np.sqrt(sum(np.mean(last) ** 2 for last in by_axis.values())))
+
+
+def rounded(value: float) -> float:
+    """Return a value to three digits, as a person would write it."""
+    return float(f"{value:.3g}")

@@ -1,0 +1,25 @@
+//! Parts of documents that derive from the source: compared, or with `ILC_DERIVE=1` written again.
+
+use std::path::Path;
+
+/// Holds the part of a document between `<!-- derived: NAME -->` and `<!-- end -->` against `text`.
+///
+/// # Panics
+/// If they differ, or the document has no such part.
+pub fn hold_derived(document: &str, name: &str, text: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(document);
+    let whole = std::fs::read_to_string(&path).expect("the document is there");
+    let begin = format!("<!-- derived: {name} -->\n");
+    let from =
+        whole.find(&begin).unwrap_or_else(|| panic!("{document} has no {begin}")) + begin.len();
+    let len = whole[from..].find("<!-- end -->").expect("a derived part ends");
+    if &whole[from..from + len] == text {
+        return;
+    }
+    assert!(
+        std::env::var_os("ILC_DERIVE").is_some(),
+        "{document}: {name} is not what the source says; `ILC_DERIVE=1 cargo test` writes it"
+    );
+    let written = format!("{}{text}{}", &whole[..from], &whole[from + len..]);
+    std::fs::write(&path, written).expect("the document can be written");
+}
