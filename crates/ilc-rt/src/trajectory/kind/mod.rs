@@ -4,8 +4,8 @@
 //! `config` composes the cell description of it, `design` plans by it, and documents and the tests that
 //! go over all kinds read it.
 //!
-//! Family: `butterfly`, `job`, `modulated`, `program`, `raster` and `spiral`: `[program]` is composed of
-//! the tables of its kinds, and a kind plans from the whole of it.
+//! Family: every file here, as the program is composed of the tables of its kinds, and a kind plans from
+//! the whole of it.
 
 mod butterfly;
 mod gcode;
