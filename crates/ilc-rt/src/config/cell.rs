@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 use super::error::ConfigError;
 use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
-use super::program::Program;
 use super::simulation::{AxisSimulation, Simulation};
 pub use crate::fieldbus::cia402::Mode;
 pub use crate::interpolate::AxisUnit;
 use crate::schema::field_order;
+use crate::trajectory::kind::Program;
 
 /// A whole cell description, validated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
