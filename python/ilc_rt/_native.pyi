@@ -214,27 +214,71 @@ class Trajectory:
     @property
     def alphas(self) -> list[tuple[int, str, float, list[tuple[float, float]]]]: ...
 
-def jerk_limited(
+_Limits: TypeAlias = tuple[float | ArrayLike, float | ArrayLike, float | ArrayLike]
+
+def plan_linear(
     points_m: ArrayLike,
-    *,
     feed_m_s: float | ArrayLike,
     dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    setting: str = "complete",
+    limits: _Limits,
+    setting: str,
 ) -> Trajectory: ...
-def exponential_sigmoid(
+def plan_exponential(
     points_m: ArrayLike,
-    *,
     feed_m_s: float | ArrayLike,
     dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    amplitude_m: float | ArrayLike | None = None,
-    frequency_hz: float | ArrayLike | None = None,
-    alpha_max: float | dict[str, float] | None = None,
+    limits: _Limits,
+    oscillation: tuple[float | ArrayLike | None, float | ArrayLike | None],
+    alpha_max: float | dict[str, float] | None,
+) -> Trajectory: ...
+def plan_modulated(
+    points_m: ArrayLike,
+    feed_m_s: float,
+    amplitude_m: float,
+    frequency_hz: float,
+    dt_s: float,
+    limits: _Limits,
+    interpolation: str,
+) -> Trajectory: ...
+def plan_spline(
+    points_m: ArrayLike, speed: tuple[float, float], dt_s: float, limits: _Limits
+) -> Trajectory: ...
+def plan_butterfly(
+    scale_m: float,
+    turns: float,
+    center_m: tuple[float, float],
+    speed: tuple[float, float],
+    dt_s: float,
+    limits: _Limits,
+) -> Trajectory: ...
+def plan_spiral(
+    pitch_m: float,
+    turns: float,
+    center_m: tuple[float, float],
+    speed: tuple[float, float],
+    dt_s: float,
+    limits: _Limits,
+) -> Trajectory: ...
+def plan_raster(
+    width_m: float,
+    pitch_m: float,
+    rows: int,
+    feed_m_s: float,
+    dt_s: float,
+    limits: _Limits,
+    start_m: tuple[float, float],
+    there_and_back: bool,
+    setting: str,
+) -> Trajectory: ...
+def plan_gcode(
+    text: str | bytes,
+    start_m: ArrayLike,
+    feed_m_s: float,
+    dt_s: float,
+    limits: _Limits,
+    rapid_m_s: float | None,
+    blend_s: float | None,
+    block_delete: bool,
 ) -> Trajectory: ...
 def sigmoid_pair(
     *,
@@ -249,79 +293,6 @@ def sigmoid_pair(
     sine_alpha: float,
     sine_offset_s: float,
     dt_s: float,
-) -> Trajectory: ...
-def modulated(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float,
-    amplitude_m: float,
-    frequency_hz: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    interpolation: str = "exponential_sigmoid",
-) -> Trajectory: ...
-def spline(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    curvature_acceleration_max_m_s2: float = ...,
-) -> Trajectory: ...
-def butterfly(
-    *,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    feed_m_s: float = 0.004,
-    curvature_acceleration_max_m_s2: float = 0.02,
-    scale_m: float = 0.00185,
-    turns: float = 1.0,
-    center_m: tuple[float, float] = ...,
-) -> Trajectory: ...
-def spiral(
-    *,
-    pitch_m: float,
-    turns: float,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    curvature_acceleration_max_m_s2: float = ...,
-    center_m: tuple[float, float] = ...,
-) -> Trajectory: ...
-def raster(
-    *,
-    width_m: float,
-    pitch_m: float,
-    rows: int,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    start_m: tuple[float, float] = ...,
-    there_and_back: bool = False,
-    setting: str = "complete",
-) -> Trajectory: ...
-def gcode(
-    text: str | bytes,
-    *,
-    start_m: ArrayLike,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    rapid_m_s: float | None = None,
-    blend_s: float | None = None,
-    block_delete: bool = False,
 ) -> Trajectory: ...
 def tracking_index(
     trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0

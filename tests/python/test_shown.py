@@ -195,12 +195,12 @@ def test_what_a_law_decides_later_is_put_with_its_run():
         ('law = "pd"\nallow_divergent = true\n[learning.pd]\nkp = -0.4\n'
          "[learning.gate]\ntolerance_m = 0.0\ngrowth = 1.05\npatience = 1\n", 1),
     ],
-    ids=["supervisor", "gate"],
+    ids=["campaign", "gate"],
 )  # fmt: skip
 def test_a_law_that_makes_it_worse_is_told_everywhere(
     ilc: Callable[..., Any], tmp_path: Path, learning: str, off: int
 ) -> None:
-    """Whoever takes the input back, the supervisor or a gate."""
+    """The campaign and a gate restore the best input alike."""
     (tmp_path / "cell.toml").write_text(cell_text(["m"], [0.02], learning=learning))
     done = ilc("run", "cell.toml", "--iterations", 8, "--json", "f.json", "--report", "r.html")
     assert done.returncode == 0, done.stderr

@@ -5,7 +5,7 @@
 //!
 //! Family: `laws` and `python_law` call each other: a law inside another one may be written in Python.
 //!
-//! Family: `model` and `model_argument` read each other's arguments.
+//! Family: `arguments`, `model` and `model_argument` read each other's arguments.
 //!
 //! Family: `experiment` and `identify` read each other's arguments.
 
@@ -31,6 +31,7 @@ mod library;
 mod made;
 mod model;
 mod model_argument;
+mod plans;
 mod python_law;
 mod sigmoid_pair;
 mod signal;
@@ -55,6 +56,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     contour::register(module)?;
     control::register(module)?;
     trajectory::register(module)?;
+    plans::register(module)?;
     transport::register(module)?;
     sigmoid_pair::register(module)?;
     laws::register(module)?;

@@ -1,7 +1,7 @@
 //! Shared set-up of the integration tests: the example cells, whole campaigns on simulated drives, and
 //! a servo cycle that is ticked by hand.
 //!
-//! [`campaign`] runs the supervisor as a user does; [`far_side`] puts the simulated machine on a bus in
+//! [`campaign`] runs a campaign as a user does; [`far_side`] puts the simulated machine on a bus in
 //! a thread of its own; [`rig`] is the loop alone, on a bus that records every command and lets a test
 //! break things in the middle of a run; [`faulty`] is a bus that loses, delays and spoils frames by seed;
 //! [`counting`] is an allocator that counts; [`source`] reads the project's own source.

@@ -210,7 +210,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Brings the nodes up as the supervisor does in lock-step, and makes the loop for some runs.
+    /// Brings the nodes up as a campaign does in lock-step, and makes the loop for some runs.
     ///
     /// # Panics
     /// If a node cannot be brought up.

@@ -76,7 +76,7 @@ macro_rules! learning {
 every_law!(learning);
 
 impl Learning {
-    /// Returns the growth of the RMS error over the best run at which the supervisor restores the best
+    /// Returns the growth of the RMS error over the best run at which the campaign restores the best
     /// input, if no gate decides instead.
     pub fn rollback(&self) -> f64 {
         self.rollback_ratio.unwrap_or(ROLLBACK_RATIO)
@@ -102,7 +102,7 @@ impl Learning {
     }
 }
 
-/// Which measurement is learned from.
+/// Measurement that is learned from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {

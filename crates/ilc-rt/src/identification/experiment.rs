@@ -139,6 +139,11 @@ impl Experiment {
         })
     }
 
+    /// Returns the unit of the input, which is that of the amplitude.
+    pub fn input_unit(&self, cell: &Cell) -> &'static str {
+        self.axis(cell).map_or("", |(_, axis)| input_unit(axis))
+    }
+
     /// Lays the excitation out on the servo cycle.
     pub(crate) fn signal(&self, cell: &Cell) -> Result<ExcitationSignal, IdentificationError> {
         self.excitation.signal(cell.cycle_s()).map_err(|source| {

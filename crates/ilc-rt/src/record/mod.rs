@@ -1,6 +1,6 @@
 //! What remains of an iteration: its arrays, its figures, and the events that tell of it.
 //!
-//! The supervisor fills it, the library keeps it, telemetry and Python read it. Imports signal,
+//! The campaign fills it, the library keeps it, telemetry and Python read it. Imports signal,
 //! trajectory and models at most; never the loop, the library or the bus.
 
 mod axes;

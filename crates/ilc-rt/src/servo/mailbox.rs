@@ -211,7 +211,7 @@ pub(super) struct Table {
     pub(super) input: Box<[f64]>,
 }
 
-/// The supervisor's side.
+/// The campaign's side.
 #[derive(Debug)]
 pub struct Mailbox {
     messages: Consumer<Message>,

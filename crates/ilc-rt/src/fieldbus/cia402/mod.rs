@@ -1,6 +1,6 @@
 //! CiA 402 drive profile: states, objects, modes, process data and units.
 //!
-//! Imported by `servo`, `bring_up`, `supervisor` and the simulator. Imports `canopen` and the frame only.
+//! Imported by `servo`, `bring_up`, `campaign` and the simulator. Imports `canopen` and the frame only.
 
 pub mod mode;
 pub mod objects;

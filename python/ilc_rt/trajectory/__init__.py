@@ -5,20 +5,15 @@ from ilc_rt._native import (
     ContourError,
     Line,
     Trajectory,
-    butterfly,
     contour_error,
     coupling_gains,
-    exponential_sigmoid,
-    gcode,
-    jerk_limited,
-    modulated,
     projection_across,
-    raster,
     sigmoid_pair,
-    spiral,
-    spline,
     tracking_index,
 )
+from ilc_rt.trajectory.curves import butterfly, spiral, spline
+from ilc_rt.trajectory.moves import exponential_sigmoid, jerk_limited, modulated
+from ilc_rt.trajectory.programs import gcode, raster
 
 __all__ = [
     "Arc",
