@@ -49,7 +49,7 @@ pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
 
 /// Makes the tables of a new file, or gives those of an older version what they lack: all or nothing.
 ///
-/// No run is rewritten: what older runs lack is worked out when they are read.
+/// No run is rewritten: what older runs lack is computed when they are read.
 pub(super) fn bring_up_to_date(connection: &Connection) -> rusqlite::Result<()> {
     let transaction =
         rusqlite::Transaction::new_unchecked(connection, rusqlite::TransactionBehavior::Immediate)?;
