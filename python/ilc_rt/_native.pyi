@@ -27,13 +27,11 @@ __all__ = [
     "SignalError",
     "StateSpace",
     "TimeVarying",
-    "Trajectory",
     "TrajectoryError",
     "__version__",
     "_filter",
     "_law",
     "_made",
-    "_trajectory",
     "analyze",
     "butterfly",
     "check_options",
@@ -75,6 +73,7 @@ __all__ = [
     "spiral",
     "spline",
     "tracking_index",
+    "transports",
     "tune",
     "uncertainty",
     "velocity_loop_response",
@@ -191,159 +190,6 @@ def evaluate_experiment(
 
 class TrajectoryError(ValueError): ...
 
-@final
-class Trajectory:
-    @property
-    def dt_s(self) -> float: ...
-    @property
-    def n_samples(self) -> int: ...
-    @property
-    def n_axes(self) -> int: ...
-    @property
-    def computing_s(self) -> float: ...
-    @property
-    def t_s(self) -> NDArray[np.float64]: ...
-    @property
-    def position_m(self) -> NDArray[np.float64]: ...
-    @property
-    def velocity_m_s(self) -> NDArray[np.float64]: ...
-    @property
-    def acceleration_m_s2(self) -> NDArray[np.float64]: ...
-    @property
-    def programmed_m(self) -> NDArray[np.float64]: ...
-    @property
-    def alphas(self) -> list[tuple[int, str, float, list[tuple[float, float]]]]: ...
-
-def jerk_limited(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float | ArrayLike,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    setting: str = "complete",
-) -> Trajectory: ...
-def exponential_sigmoid(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float | ArrayLike,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    amplitude_m: float | ArrayLike | None = None,
-    frequency_hz: float | ArrayLike | None = None,
-    alpha_max: float | dict[str, float] | None = None,
-) -> Trajectory: ...
-def sigmoid_pair(
-    *,
-    velocity_m_s: ArrayLike,
-    amplitude_m: ArrayLike,
-    omega_rad_s: ArrayLike,
-    phase_zero_s: ArrayLike,
-    corner_s: float,
-    duration_s: float,
-    start_alpha: float,
-    transition_alpha: float,
-    sine_alpha: float,
-    sine_offset_s: float,
-    dt_s: float,
-) -> Trajectory: ...
-def modulated(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float,
-    amplitude_m: float,
-    frequency_hz: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    interpolation: str = "exponential_sigmoid",
-) -> Trajectory: ...
-def spline(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    curvature_acceleration_max_m_s2: float = ...,
-) -> Trajectory: ...
-def butterfly(
-    *,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    feed_m_s: float = 0.004,
-    curvature_acceleration_max_m_s2: float = 0.02,
-    scale_m: float = 0.00185,
-    turns: float = 1.0,
-    center_m: tuple[float, float] = ...,
-) -> Trajectory: ...
-def spiral(
-    *,
-    pitch_m: float,
-    turns: float,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    curvature_acceleration_max_m_s2: float = ...,
-    center_m: tuple[float, float] = ...,
-) -> Trajectory: ...
-def raster(
-    *,
-    width_m: float,
-    pitch_m: float,
-    rows: int,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    start_m: tuple[float, float] = ...,
-    there_and_back: bool = False,
-    setting: str = "complete",
-) -> Trajectory: ...
-def gcode(
-    text: str | bytes,
-    *,
-    start_m: ArrayLike,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    rapid_m_s: float | None = None,
-    blend_s: float | None = None,
-    block_delete: bool = False,
-) -> Trajectory: ...
-def tracking_index(
-    trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0
-) -> tuple[float, float]: ...
-
-@final
-class Line:
-    def __new__(cls, from_m: ArrayLike, to_m: ArrayLike) -> Line: ...
-
-@final
-class Arc:
-    def __new__(
-        cls,
-        from_m: ArrayLike,
-        centre_m: ArrayLike,
-        sweep_rad: float,
-        axis: ArrayLike | None = None,
-    ) -> Arc: ...
-
-def contour_error(
-    reference_m: ArrayLike | list[Line | Arc], actual_m: ArrayLike, window: int | None = None
-) -> NDArray[np.float64]: ...
 def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 
@@ -432,13 +278,6 @@ def run_events(
 ) -> EventStream: ...
 
 # Make objects again, for copies and pickles.
-def _trajectory(
-    dt_s: float,
-    samples: Sequence[NDArray[np.float64]],
-    alphas: Sequence[Any],
-    computing_s: float,
-) -> Trajectory: ...
-
 # What the typed classes and functions of the package stand on: arguments by name, checked here.
 @disjoint_base
 class Law:
@@ -559,3 +398,25 @@ class Gantry:
     def forward(self, axes_m: ArrayLike) -> NDArray[np.float64]: ...
     def inverse(self, tool_m: ArrayLike) -> NDArray[np.float64]: ...
     def jacobian(self) -> NDArray[np.float64]: ...
+
+def jerk_limited(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def exponential_sigmoid(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def modulated(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def sigmoid_pair(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def spline(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def butterfly(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def spiral(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def raster(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def gcode(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def tracking_index(**keywords: Any) -> tuple[float, float]: ...  # noqa: ANN401
+def contour_error(
+    reference_m: ArrayLike | Sequence[Line | Arc], actual_m: ArrayLike, window: int | None = None
+) -> NDArray[np.float64]: ...
+
+@disjoint_base
+class Line:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+
+@disjoint_base
+class Arc:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401

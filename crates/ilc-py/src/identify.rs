@@ -66,18 +66,14 @@ fn check_response<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<
 
 #[pyfunction]
 #[pyo3(signature = (**keywords))]
-fn relative_deviation<'py>(
-    keywords: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Bound<'py, PyAny>> {
+fn relative_deviation<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
     let a = Arguments::of(keywords)?;
     Ok(give(a.py(), read_measured(a)?.relative_deviation()))
 }
 
 #[pyfunction]
 #[pyo3(signature = (**keywords))]
-fn frequency_response<'py>(
-    keywords: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Bound<'py, PyDict>> {
+fn frequency_response<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
     let a = Arguments::of(keywords)?;
     let (u, y, dt_s) = (a.vector("u")?, a.vector("y")?, a.number("dt_s")?);
     let overlap_samples = a.maybe_whole("overlap_samples")?;

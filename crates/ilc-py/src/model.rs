@@ -6,8 +6,8 @@ use numpy::ndarray::{Array1, Array3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arguments::Arguments;
 use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
@@ -380,7 +380,8 @@ impl PyStateSpace {
 
     fn __hash__(&self) -> u64 {
         let numbers = [self.0.a(), self.0.b(), self.0.c(), self.0.d()];
-        let bits = numbers.into_iter().flat_map(|matrix| matrix.iter()).map(|x| (x + 0.0).to_bits());
+        let bits =
+            numbers.into_iter().flat_map(|matrix| matrix.iter()).map(|x| (x + 0.0).to_bits());
         bits.fold(0, |hash: u64, bits| hash.rotate_left(5).wrapping_add(bits))
     }
 

@@ -95,7 +95,7 @@ macro_rules! named_maybe {
 }
 
 named! {
-    input, keep, n, n_samples, output, period_samples, rows, top,
+    input, keep, n, n_samples, output, period_samples, top,
 }
 
 /// Arguments that may be `None`.

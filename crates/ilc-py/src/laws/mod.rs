@@ -27,8 +27,8 @@ use crate::error::OrRaise;
 use crate::guard::{Borrowed, Guarded};
 use crate::python_law::{Channels, Frame, PythonLaw};
 use crate::signal::read_filter;
-use exchange::{Given, exchange};
 pub(crate) use apart::{apart, is_python, samples_of};
+use exchange::{Given, exchange};
 pub(crate) use figure::Readable;
 
 /// A function that builds a law from its arguments.
