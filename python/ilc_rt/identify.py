@@ -277,6 +277,7 @@ def identify(
         dt_s=cell.cycle_s,
         experiment=experiment,
         interface=cell.interfaces[index],
+        input_unit=campaign.result.input_unit(index),
     )
 
 

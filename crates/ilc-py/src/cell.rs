@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Axis, Cell, Interface, Measure};
+use ilc_rt::config::{Axis, Cell, Measure};
 use ilc_rt::design::{self, Plan};
 use pyo3::prelude::*;
 
@@ -104,10 +104,7 @@ impl PyCell {
     /// Command interface of each axis: `csp` (input in m) or `csv` (in m/s).
     #[getter]
     fn interfaces(&self) -> Vec<&'static str> {
-        let name = |axis: &Axis| match axis.interface {
-            Interface::Csp => "csp",
-            Interface::Csv => "csv",
-        };
+        let name = |axis: &Axis| axis.interface.name();
         self.cell.axes.iter().map(name).collect()
     }
 

@@ -6,7 +6,7 @@ use ilc_rt::identification::{
     self, Described, Experiment, ExperimentOptions, Form, IdentificationError, Identified, Signals,
     waveform_name,
 };
-use ilc_rt::model::identify::Waveform;
+use ilc_rt::model::identify::{Doubt, Waveform};
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -152,6 +152,8 @@ fn describe(py: Python<'_>, found: Identified) -> PyResult<Bound<'_, PyDict>> {
     let array = |values: Vec<f64>| PyArray1::from_vec(py, values);
     let result = PyDict::new(py);
     result.set_item("axis_model", found.section())?;
+    let is_lost = matches!(found.doubt, Some(Doubt::Incoherent { .. } | Doubt::Silent));
+    result.set_item("followed", !is_lost)?;
     result.set_item("doubt", found.doubt.map(|doubt| doubt.to_string()))?;
     result.set_item("model", give_second_order(py, &found.fit)?)?;
     match found.described {

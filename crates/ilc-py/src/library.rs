@@ -354,7 +354,6 @@ impl PyLibrary {
 
 fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     let run = PyDict::new(py);
-    let figures = &row.record.figures;
     run.set_item("id", row.id)?;
     run.set_item("created_utc", &row.created_utc)?;
     run.set_item("cell", &row.meta.cell)?;
@@ -369,21 +368,9 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     run.set_item("input_units", &row.meta.input_units)?;
     let disturbance = &row.record.disturbance;
     run.set_item("disturbance", (!disturbance.is_empty()).then_some(disturbance))?;
-    run.set_item("tracking_inf_m", figures.tracking_inf_m)?;
-    run.set_item("tracking_rms_m", figures.tracking_rms_m)?;
-    run.set_item("contour_inf_m", figures.contour_inf_m)?;
-    run.set_item("contour_rms_m", figures.contour_rms_m)?;
-    run.set_item("encoder_tracking_inf_m", figures.encoder_tracking_inf_m)?;
-    run.set_item("tool_tracking_inf_m", figures.tool_tracking_inf_m)?;
-    run.set_item("overruns", figures.overruns)?;
-    run.set_item("missing_samples", figures.missing_samples)?;
-    run.set_item("late_updates", figures.late_updates)?;
-    run.set_item("update_ms", figures.update_ms)?;
-    run.set_item("rolled_back", figures.rolled_back)?;
-    run.set_item("learning_off", figures.learning_off)?;
-    run.set_item("remark", &figures.remark)?;
-    run.set_item("axes_tracking_inf_m", &figures.axes_tracking_inf_m)?;
-    run.set_item("axes_tracking_rms_m", &figures.axes_tracking_rms_m)?;
+    let described = serde_json::to_string(&row.record.figures)
+        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    run.update(py.import("json")?.call_method1("loads", (described,))?.cast()?)?;
     run.set_item("digest", &row.digest)?;
     Ok(run)
 }

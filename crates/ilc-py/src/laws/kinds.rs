@@ -16,8 +16,11 @@ use crate::signal::read_filter;
 
 pub(super) fn pd(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;
-    let gains =
-        PdGains { kp: a.number("kp")?, kd: a.number("kd")?, lead: a.whole("lead_samples")? };
+    let gains = PdGains {
+        kp: a.number("kp")?,
+        kd: a.number("kd")?,
+        lead_samples: a.whole("lead_samples")?,
+    };
     let Size { n_samples, channels, .. } = call.size();
     let law = Pd::new(gains, n_samples, channels.n_inputs, call.filter("q_filter")?).or_raise()?;
     Ok(Built { law: Box::new(law), fits: Fits::Alike })
@@ -28,9 +31,9 @@ impl Readable for Pd {}
 pub(super) fn error_feedforward(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;
     let rule = Feedforward {
-        gain: a.number("gain_per_s")?,
-        lead: a.whole("lead_samples")?,
-        limit: a.maybe_number("input_max")?.unwrap_or(f64::INFINITY),
+        gain_per_s: a.number("gain_per_s")?,
+        lead_samples: a.whole("lead_samples")?,
+        input_max: a.maybe_number("input_max")?.unwrap_or(f64::INFINITY),
     };
     let Size { n_samples, channels, .. } = call.size();
     let filter = call.filter("filter")?;

@@ -1,7 +1,7 @@
 //! Whether a law's low-pass lets through what the law cannot learn.
 //!
 //! A filter keeps out the frequencies at which each update would make the error grow; this file says
-//! whether it begins to do so early enough. `supervisor` and the Python bindings warn with it.
+//! whether it begins to do so early enough. `design` and the Python bindings warn with it.
 
 use std::fmt;
 
