@@ -29,9 +29,8 @@ __all__ = [
     "TimeVarying",
     "TrajectoryError",
     "__version__",
-    "_filter",
-    "_law",
     "_made",
+    "_made_of_kind",
     "analyze",
     "butterfly",
     "check_options",
@@ -237,28 +236,16 @@ class Cell:
     def model(self) -> StateSpace: ...
     def first_error(self) -> NDArray[np.float64]: ...
 
-@final
+@disjoint_base
 class Library:
-    def __new__(cls, path: str | PathLike[str]) -> Library: ...
-    def list(self, cell: str | None = None) -> list[dict[str, Any]]: ...
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+    def list(self, cell: str | None) -> list[dict[str, Any]]: ...
     def load(self, id: int) -> dict[str, Any]: ...
     def recall(
-        self, disturbance: ArrayLike, top: int = 30, cell: str | None = None
+        self, disturbance: ArrayLike, top: int, cell: str | None
     ) -> builtins.list[dict[str, Any]]: ...
-    def append(
-        self,
-        u: ArrayLike,
-        e: ArrayLike,
-        cycle_s: float,
-        disturbance: ArrayLike | None = None,
-        reference_m: ArrayLike | None = None,
-        *,
-        cell: str = "elsewhere",
-        campaign: str = "elsewhere",
-        law: str = "elsewhere",
-    ) -> int: ...
-    def trim(self, keep: int, cell: str | None = None) -> int: ...
-    def export(self, id: int, path: str | PathLike[str]) -> None: ...
+    def append(self, **keywords: Any) -> int: ...  # noqa: ANN401
+    def trim(self, keep: int, cell: str | None) -> int: ...
 
 @final
 class EventStream:
@@ -319,8 +306,6 @@ def analyze(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def refuse_divergent(**keywords: Any) -> None: ...  # noqa: ANN401
 def tune(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def repeatability(errors: ArrayLike) -> dict[str, Any]: ...
-def _law(cls: type, kind: str, arguments: dict[str, Any]) -> Law: ...
-def _filter(cls: type, kind: str, arguments: dict[str, Any]) -> Filter: ...
 def from_transfer_function(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
 def second_order(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
 def discretize(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
@@ -343,6 +328,7 @@ def velocity_loop_response(
     **model: Any,  # noqa: ANN401
 ) -> NDArray[np.complex128]: ...
 def second_order_model(**model: Any) -> StateSpace: ...  # noqa: ANN401
+def _made_of_kind(cls: type, native: str, kind: str, arguments: dict[str, Any], /) -> object: ...
 def _made(cls: object, how: str | None, arguments: dict[str, Any]) -> object: ...
 
 @disjoint_base

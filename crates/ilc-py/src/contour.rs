@@ -13,7 +13,7 @@ use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::made::Made;
-use crate::whole;
+use crate::whole::whole;
 
 #[pyclass(name = "Line", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
@@ -69,8 +69,9 @@ fn contour_error<'py>(
     py: Python<'py>,
     reference_m: &Bound<'py, PyAny>,
     actual_m: &Bound<'py, PyAny>,
-    #[pyo3(from_py_with = whole::maybe::window)] window: Option<usize>,
+    window: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let window = window.map(|window| whole("window", window)).transpose()?;
     if let Some(shapes) = read_shapes(reference_m, window)? {
         let points = read_points("actual_m", actual_m)?;
         let errors = detached(py, || Shape::contour_error_m(&shapes, &points));

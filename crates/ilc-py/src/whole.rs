@@ -76,36 +76,6 @@ pub(crate) fn pair<'py>(
     })
 }
 
-/// One reader for each name, as `from_py_with` takes them.
-macro_rules! named {
-    ($($name:ident),* $(,)?) => {
-        $(pub(crate) fn $name(object: &Bound<'_, PyAny>) -> PyResult<usize> {
-            whole(stringify!($name), object)
-        })*
-    };
-}
-
-/// The same for arguments that may be `None`.
-macro_rules! named_maybe {
-    ($($name:ident),* $(,)?) => {
-        $(pub(crate) fn $name(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-            if object.is_none() { Ok(None) } else { whole(stringify!($name), object).map(Some) }
-        })*
-    };
-}
-
-named! {
-    input, keep, n, n_samples, output, period_samples, top,
-}
-
-/// Arguments that may be `None`.
-pub(crate) mod maybe {
-    use super::{Bound, PyAny, PyAnyMethods, PyResult, whole};
-    named_maybe! {
-        window,
-    }
-}
-
 /// Reads the identity of a run.
 pub(crate) fn id(object: &Bound<'_, PyAny>) -> PyResult<i64> {
     let range = format!("0 to {}", i64::MAX);
