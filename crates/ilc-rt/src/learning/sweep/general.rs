@@ -7,8 +7,8 @@ use super::{Channels, Run, Sweep, fixed};
 /// The solver for coupled axes, and for time-varying gains.
 ///
 /// # Real Time
-/// Cold path. Allocates at creation, never in [`Sweep::solve`]; each sample costs about `(n + m)(n
-/// + p + m) + (n + m)(n + m)` multiply-adds.
+/// Cold path. Allocates at creation, never in [`Sweep::solve`]; each sample costs about
+/// `(n + m)(n + p + m) + (n + m)(n + m)` multiply-adds.
 #[derive(Debug, Clone)]
 pub struct General {
     gains: Gains,
