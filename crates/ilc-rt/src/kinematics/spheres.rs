@@ -19,9 +19,10 @@ pub(super) enum NoPoint {
 /// Returns the upper of the two points at distance `radius` from three centres.
 ///
 /// It lies above the circumcentre of the triangle of centres, at the height that the radius leaves:
-/// `p = c + n sqrt(radius^2 - |c - c_0|^2)` with `c - c_0 = (|u|^2 (v x n) + |v|^2 (n x u)) / (2
-/// |n|^2)`, `n = u x v`. There is no cancellation of large numbers, so the result is as accurate as
-/// the triangle is well shaped. "Upper" is the side from which the centres run counter-clockwise.
+/// `p = c + n sqrt(radius^2 - |c - c_0|^2)` with
+/// `c - c_0 = (|u|^2 (v x n) + |v|^2 (n x u)) / (2 |n|^2)`, `n = u x v`. There is no cancellation of
+/// large numbers, so the result is as accurate as the triangle is well shaped. "Upper" is the side
+/// from which the centres run counter-clockwise.
 pub(super) fn upper_meeting_point(
     centres: &[Vector3<f64>; 3],
     radius: f64,
