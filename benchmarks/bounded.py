@@ -20,7 +20,7 @@ def compare(n_samples: int) -> dict[str, float]:
 
     task = problem(n_samples, dense=False)
     zero = np.zeros(n_samples)
-    bounds = {"u_bounds": (-INPUT_MAX, INPUT_MAX), "step_bounds": (-STEP_MAX, STEP_MAX)}
+    bounds = {"input_max": (-INPUT_MAX, INPUT_MAX), "step_max": (-STEP_MAX, STEP_MAX)}
     law = ConstrainedIlc(axis(), n_samples, r=R, **bounds)
     ours = law.update(zero, task.error)
     binding = {

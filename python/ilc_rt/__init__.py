@@ -1,40 +1,35 @@
 """The motion controller that learns: iterative learning control on the machine."""
 
-from ilc_rt import control, identify, kinematics, signal, trajectory, weights
+from ilc_rt import control, identify, kinematics, laws, signal, trajectory, weights
 from ilc_rt._native import (
-    AdjointIlc,
-    Analysis,
     Cell,
+    LearningError,
+    Library,
+    ModelError,
+    SignalError,
+    StateSpace,
+    TimeVarying,
+    TrajectoryError,
+    __version__,
+)
+from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
+from ilc_rt.campaign import Campaign, Law
+from ilc_rt.errors import BadInputError, CampaignError
+from ilc_rt.laws import (
+    AdjointIlc,
     ConstrainedIlc,
     ErrorFeedforwardIlc,
     FlexibleIlc,
     Gate,
     Ladder,
-    LearningError,
-    Library,
-    ModelError,
     ModelInverseIlc,
     NormOptimalIlc,
     PdIlc,
     RelevanceIlc,
     RelevanceWeights,
-    Repeatability,
-    SignalError,
-    StateSpace,
     ThroughJacobian,
-    TimeVarying,
-    TrajectoryError,
-    Tuning,
-    __version__,
-    analyze,
-    discretize,
-    from_transfer_function,
-    repeatability,
-    second_order,
-    tune,
 )
-from ilc_rt.campaign import Campaign, Law
-from ilc_rt.errors import BadInputError, CampaignError
+from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 
@@ -75,6 +70,7 @@ __all__ = [
     "from_transfer_function",
     "identify",
     "kinematics",
+    "laws",
     "repeatability",
     "second_order",
     "signal",

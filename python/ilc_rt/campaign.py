@@ -5,14 +5,16 @@ from __future__ import annotations
 import signal
 import warnings
 from contextlib import closing
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from ilc_rt._native import Cell, check_options, refuse_divergent
+from ilc_rt._native import Cell, check_options
+from ilc_rt.analysis import refuse_divergent
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
-from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
+from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError, FaultError
 from ilc_rt.events import EndEvent, Event, IterationEvent, parse_event
 from ilc_rt.interruption import ControlledStop
 from ilc_rt.options import Verb, arguments, options
@@ -265,7 +267,12 @@ class Campaign:
             code = failure.exit_code if failure else EXIT_FAULT
             if failure is not None and failure.reason not in reason:
                 reason = failure.reason if reason in failure.reason else reason
-            raise CampaignError(reason, code)
+            cause = failure.__cause__ if failure else None
+            fault = self.result.fault
+            if fault is not None:
+                named = {field.name: getattr(fault, field.name) for field in fields(fault)}
+                raise FaultError(exit_code=code, **{**named, "reason": reason}) from cause
+            raise CampaignError(reason, code) from cause
         if status == "running":
             message = "the controller ended without saying so"
             raise CampaignError(message)

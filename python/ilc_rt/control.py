@@ -1,5 +1,170 @@
-"""Controllers as the loop runs them, tick by tick: PID, cascade, cross-coupled."""
+"""Controllers as the loop runs them, tick by tick: PID, cascade, cross-coupled.
 
-from ilc_rt._native import Cascade, CrossCoupled, Pid
+Each has the methods of the compiled class that it derives from: `step` for one tick, and
+`reset` to start again from rest.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from ilc_rt import _native
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 __all__ = ["Cascade", "CrossCoupled", "Pid"]
+
+
+class Pid(_native.Pid):
+    """PID controller with a filtered derivative and anti-windup.
+
+    ``u[k] = kp e[k] + ki dt sum(e[:k]) + kd (de/dt)[k]``, cut to +-output_max
+
+    Parameters
+    ----------
+    kp : float
+        Proportional gain.
+    ki_per_s : float
+        Integral gain in 1/s.
+    kd_s : float
+        Derivative gain in s.
+    dt_s : float
+        Sample time in s.
+    derivative : {"difference", "delayed", "filtered"}
+        ``(e[k] - e[k-1]) / dt``, the same one sample late, or ``s / (T s + 1)``,
+        exact for an error that is held over the sample.
+    filter_s : float
+        T of the filtered derivative in s.
+    output_max : float or None
+        Largest output, either way.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, or a time or limit is not above 0.
+
+    References
+    ----------
+    [barton2010], Eq. (8.3); [dimarco2016], Sect. 4.1.
+
+    Examples
+    --------
+    >>> from ilc_rt.control import Pid
+    >>> pid = Pid(kp=2.0, kd_s=0.5, dt_s=0.1)
+    >>> pid.step(1.0), pid.step(1.0)
+    (7.0, 2.0)
+    """
+
+    def __new__(
+        cls,
+        kp: float,
+        ki_per_s: float = 0.0,
+        kd_s: float = 0.0,
+        *,
+        dt_s: float,
+        derivative: Literal["difference", "delayed", "filtered"] = "difference",
+        filter_s: float = 0.01,
+        output_max: float | None = None,
+    ) -> Self:
+        return super().__new__(
+            cls,
+            kp=kp,
+            ki_per_s=ki_per_s,
+            kd_s=kd_s,
+            dt_s=dt_s,
+            derivative=derivative,
+            filter_s=filter_s,
+            output_max=output_max,
+        )
+
+
+class Cascade(_native.Cascade):
+    """Cascade of proportional position and proportional-integral velocity control.
+
+    ``v* = kv (r - y) + f r'``, ``F = kp (v* - y') + kp dt / Tn sum(v* - y') + m r''``
+
+    Parameters
+    ----------
+    position_gain_per_s : float
+        kv in 1/s.
+    velocity_gain_n_s_m : float
+        kp in N s/m.
+    integral_time_s : float or None
+        Tn in s; None for no integral part.
+    dt_s : float
+        Sample time in s.
+    velocity_feedforward : float
+        f, the share of the reference velocity that is fed forward.
+    acceleration_feedforward_kg : float
+        m, the mass that is fed forward.
+    velocity_max_m_s, force_max_n : float or None
+        Limits.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, or a time or limit is not above 0.
+
+    References
+    ----------
+    [haas2016], Sect. 3.
+
+    Examples
+    --------
+    >>> from ilc_rt.control import Cascade
+    >>> Cascade(50.0, 100.0, dt_s=0.001).step(0.001, 0.0, 0.0)
+    5.0
+    """
+
+    def __new__(
+        cls,
+        position_gain_per_s: float,
+        velocity_gain_n_s_m: float,
+        integral_time_s: float | None = None,
+        *,
+        dt_s: float,
+        velocity_feedforward: float = 0.0,
+        acceleration_feedforward_kg: float = 0.0,
+        velocity_max_m_s: float | None = None,
+        force_max_n: float | None = None,
+    ) -> Self:
+        return super().__new__(
+            cls,
+            position_gain_per_s=position_gain_per_s,
+            velocity_gain_n_s_m=velocity_gain_n_s_m,
+            integral_time_s=integral_time_s,
+            dt_s=dt_s,
+            velocity_feedforward=velocity_feedforward,
+            acceleration_feedforward_kg=acceleration_feedforward_kg,
+            velocity_max_m_s=velocity_max_m_s,
+            force_max_n=force_max_n,
+        )
+
+
+class CrossCoupled(_native.CrossCoupled):
+    """Cross-coupled control of two axes.
+
+    ``epsilon = c1 e1 + c2 e2``, ``w = PID(epsilon)``, ``u_i += c_i w``
+
+    Parameters
+    ----------
+    controller : Pid
+        Controller of the contour error; a copy of it is taken, at rest.
+
+    References
+    ----------
+    [koren1991]; [barton2010], Eq. (4.1).
+
+    Examples
+    --------
+    >>> from ilc_rt.control import CrossCoupled, Pid
+    >>> CrossCoupled(Pid(10.0, dt_s=0.001)).step([0.0, 0.5], [0.0, 1.0])
+    (array([0., 5.]), 0.5)
+    """
+
+    def __new__(
+        cls,
+        controller: Pid,
+    ) -> Self:
+        return super().__new__(cls, controller=controller)

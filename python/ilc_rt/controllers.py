@@ -162,6 +162,8 @@ class InProcessController:
             yield from self._stream
         except (ValueError, OSError) as error:
             self._error = CampaignError(str(error), EXIT_BAD_INPUT)
+            # The exception of a law that is written in Python, with its traceback.
+            self._error.__cause__ = error.__cause__
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
         """Ask for a controlled stop; `lines` goes on until it has happened."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ilc_rt._native import VelocityLoopFit
+from ilc_rt.fits import VelocityLoopFit
 from ilc_rt.result import json_text, write_text
 from ilc_rt.text import label
 
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from ilc_rt._native import FrequencyResponse, SecondOrderFit
     from ilc_rt.experiment import Experiment
+    from ilc_rt.fits import SecondOrderFit
+    from ilc_rt.response import FrequencyResponse
 
     Array = NDArray[np.float64]
 
@@ -56,6 +57,11 @@ class Identification:
         Reason not to use the model, if there is one.
     axis_model : str
         The section ``[axis.model]`` with the described model.
+    followed : bool
+        False if the output does not follow the input: no figure means anything.
+    input_unit : str or None
+        Unit of the input: m, m/s, rad or rad/s; None if it is not an axis of a
+        cell. That of the output is the same without ``/s``.
     """
 
     measured: FrequencyResponse
@@ -70,6 +76,8 @@ class Identification:
     interface: Literal["csp", "csv"] | None = None
     doubt: str | None = None
     axis_model: str = ""
+    followed: bool = True
+    input_unit: str | None = None
 
     def __repr__(self) -> str:
         """Return the result on one line, without the signals."""
@@ -167,6 +175,7 @@ class Identification:
             "axis": self.experiment.axis,
             "waveform": self.experiment.waveform,
             "amplitude": self.experiment.amplitude,
+            "input_unit": self.input_unit,
             "dt_s": self.dt_s,
             "periods": self.experiment.periods,
             "frequency_hz": self.frequency_hz.tolist(),

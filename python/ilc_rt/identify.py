@@ -15,26 +15,25 @@ import numpy as np
 
 from ilc_rt._native import (
     Cell,
-    FrequencyResponse,
     ModelError,
-    RationalFit,
-    SecondOrderFit,
-    VelocityLoopFit,
     evaluate_experiment,
-    excitation,
-    fit_rational,
-    fit_second_order,
-    fit_velocity_loop,
-    frequency_response,
     identify_axis,
     single_experiment,
-    uncertainty,
 )
 from ilc_rt.campaign import Campaign, Drives, load_cell
 from ilc_rt.errors import BadInputError
 from ilc_rt.experiment import Experiment
+from ilc_rt.fits import (
+    RationalFit,
+    SecondOrderFit,
+    VelocityLoopFit,
+    fit_rational,
+    fit_second_order,
+    fit_velocity_loop,
+)
 from ilc_rt.identification import Identification
 from ilc_rt.options import arguments, options
+from ilc_rt.response import FrequencyResponse, excitation, frequency_response, uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -274,8 +273,24 @@ def identify(
     experiment = Experiment(**found.pop("experiment"))
     index = list(cell.axis_names).index(experiment.axis)
     return Identification(
-        **found, dt_s=cell.cycle_s, experiment=experiment, interface=cell.interfaces[index]
+        **_with_models(found),
+        dt_s=cell.cycle_s,
+        experiment=experiment,
+        interface=cell.interfaces[index],
+        input_unit=campaign.result.input_unit(index),
     )
+
+
+def _with_models(found: dict[str, Any]) -> dict[str, Any]:
+    """Return what an identification found, with its response and its models as objects."""
+    described = found["described"]
+    form = VelocityLoopFit if "bandwidth_hz" in described else SecondOrderFit
+    return {
+        **found,
+        "measured": FrequencyResponse(**found["measured"]),
+        "model": SecondOrderFit(**found["model"]),
+        "described": form(**described),
+    }
 
 
 def _excite_function(
@@ -294,7 +309,7 @@ def _excite_function(
     found = evaluate_experiment(
         values[used], y[used], period, experiment.from_hz, experiment.to_hz, dt_s
     )
-    return Identification(**found, dt_s=dt_s, experiment=experiment)
+    return Identification(**_with_models(found), dt_s=dt_s, experiment=experiment)
 
 
 __all__ = [

@@ -1,5 +1,91 @@
 """Mechanisms between the drives and the tool: gantry and delta."""
 
-from ilc_rt._native import Delta, Gantry, KinematicsError
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ilc_rt import _native
+from ilc_rt._native import KinematicsError
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 __all__ = ["Delta", "Gantry", "KinematicsError"]
+
+
+class Delta(_native.Delta):
+    """Three-leg parallel mechanism.
+
+    Cranks at 0, 120 and 240 degrees around a base, each with a rod to the tool,
+    which stands above the knees:
+    ``|p - k_i| = rod``, ``k_i = Rz(phi_i) (base + crank cos theta_i, 0, crank sin theta_i)``
+
+    Parameters
+    ----------
+    base_m : float
+        Radius at which the cranks turn, less the radius at which the rods are
+        fixed to the tool, in m.
+    crank_m : float
+        Length of a crank in m.
+    rod_m : float
+        Length of a rod in m.
+
+    Raises
+    ------
+    KinematicsError
+        If the lengths make no mechanism.
+
+    References
+    ----------
+    [barton2010], Ch. 7, with the lengths of App. C as defaults.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt.kinematics import Delta
+    >>> delta = Delta()
+    >>> theta_rad = delta.inverse([0.01, 0.0, 0.18])
+    >>> bool(np.allclose(delta.forward(theta_rad), [0.01, 0.0, 0.18]))
+    True
+    """
+
+    def __new__(
+        cls,
+        base_m: float = 0.037,
+        crank_m: float = 0.060,
+        rod_m: float = 0.145,
+    ) -> Self:
+        return super().__new__(cls, base_m=base_m, crank_m=crank_m, rod_m=rod_m)
+
+
+class Gantry(_native.Gantry):
+    """Gantry whose second axis is out of square.
+
+    ``x_tool = x + orthogonality_rad y``, ``y_tool = y``
+
+    Parameters
+    ----------
+    orthogonality_rad : float
+        Error of the right angle in rad.
+
+    Raises
+    ------
+    KinematicsError
+        If the angle is not a number.
+
+    References
+    ----------
+    [haas2016], Sect. 4.
+
+    Examples
+    --------
+    >>> from ilc_rt.kinematics import Gantry
+    >>> Gantry(0.002).forward([0.0, 1.0])
+    array([0.002, 1.   ])
+    """
+
+    def __new__(
+        cls,
+        orthogonality_rad: float = 0.0,
+    ) -> Self:
+        return super().__new__(cls, orthogonality_rad=orthogonality_rad)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ilc_rt._native import repeatability
+from ilc_rt.analysis import repeatability
 from ilc_rt.campaign import Campaign, Drives, load_cell
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import json_text, write_text

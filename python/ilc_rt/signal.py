@@ -1,23 +1,27 @@
 """Filters, and the frequency that a signal has at each moment.
 
-Butterworth, Gaussian, symmetric and switched low-passes; each can be applied by
-itself or given to a law.
+Butterworth, Gaussian, symmetric and switched low-passes; each can be applied to a
+signal or given to a law. All derive from `Filter`, whose `zero_phase` is the same for
+all.
 """
 
-from ilc_rt._native import (
-    ButterworthFilter,
-    FirFilter,
-    GaussianFilter,
-    SwitchedFilter,
-    butterworth,
-    fir,
-    gaussian,
-    instantaneous_frequency,
-    zero_phase,
-)
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ilc_rt import _native
+from ilc_rt._native import Filter, zero_phase
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+    from typing_extensions import Self
 
 __all__ = [
     "ButterworthFilter",
+    "Filter",
     "FirFilter",
     "GaussianFilter",
     "SwitchedFilter",
@@ -27,3 +31,380 @@ __all__ = [
     "instantaneous_frequency",
     "zero_phase",
 ]
+
+
+class _Filter(Filter):
+    """A filter whose numbers are attributes."""
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401
+        """Return a number of the filter."""
+        if not name.startswith("_"):
+            figures = self._figures()
+            if name in figures:
+                return figures[name]
+        line = f"{type(self).__name__} has no {name}"
+        raise AttributeError(line)
+
+
+class ButterworthFilter(_Filter):
+    """Butterworth low-pass filter.
+
+    Parameters
+    ----------
+    order : int
+        1 to 12.
+    cutoff_hz : float
+        Frequency in Hz at which one pass has a gain of 1/sqrt(2). `zero_phase` makes
+        two: there its gain is 1/2.
+    dt_s : float
+        Sample time in seconds.
+    causal : bool
+        Apply it in a learning law forward only, with lag, instead of forward and
+        backward, without.
+
+    Raises
+    ------
+    SignalError
+        If order, cut-off or sample time cannot be designed for.
+
+    Examples
+    --------
+    >>> from ilc_rt import signal
+    >>> signal.ButterworthFilter(2, 50.0, 0.002).sos.shape
+    (1, 6)
+    """
+
+    order: int
+    cutoff_hz: float
+    dt_s: float
+    causal: bool
+
+    def __new__(cls, order: int, cutoff_hz: float, dt_s: float, causal: bool = False) -> Self:  # noqa: FBT001
+        return super().__new__(
+            cls, "butterworth", order=order, cutoff_hz=cutoff_hz, dt_s=dt_s, causal=causal
+        )
+
+    @property
+    def sos(self) -> NDArray[np.float64]:
+        """Second-order sections, shape (n_sections, 6): b0 b1 b2 1 a1 a2."""
+        return self._sos()
+
+    def filter(self, x: ArrayLike) -> NDArray[np.float64]:
+        """Return the signal filtered forward only, from rest.
+
+        Parameters
+        ----------
+        x : array_like, shape (n_samples,) or (n_samples, n_channels)
+            Signal.
+
+        Returns
+        -------
+        ndarray of float64, same shape
+            Filtered signal.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If `x` has the wrong shape, dtype or a number that is not finite.
+        """
+        return self._forward(x)
+
+
+class GaussianFilter(_Filter):
+    """Gaussian low-pass filter, without lag or overshoot.
+
+    ``w[i] = exp(-(i T / sigma)^2 / 2) / sum``, ``sigma = sqrt(ln 2) / (2 pi f)``
+
+    Parameters
+    ----------
+    bandwidth_hz : float
+        Frequency f in Hz at which the gain is 1/sqrt(2).
+    dt_s : float
+        Sample time T in seconds.
+
+    Attributes
+    ----------
+    sigma_samples : float
+        Standard deviation of the bell in samples.
+
+    Raises
+    ------
+    SignalError
+        If bandwidth or sample time cannot be designed for.
+
+    Notes
+    -----
+    Beyond its ends the signal is mirrored between two samples. The bell is cut
+    off where 99.99 % of its area are inside.
+
+    References
+    ----------
+    [barton2010], H.3.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import signal
+    >>> float(signal.GaussianFilter(15.0, 0.002).zero_phase(np.ones(100))[3].round(12))
+    1.0
+    """
+
+    bandwidth_hz: float
+    dt_s: float
+    sigma_samples: float
+
+    def __new__(cls, bandwidth_hz: float, dt_s: float) -> Self:
+        return super().__new__(cls, "gaussian", bandwidth_hz=bandwidth_hz, dt_s=dt_s)
+
+
+class FirFilter(_Filter):
+    """Symmetric smoother of finite length, without lag.
+
+    ``y[k] = sum_i h[i] x[k + i - r]``, ``h[i] = h[2 r - i]``
+
+    Parameters
+    ----------
+    taps : array_like, shape (2 r + 1,)
+        Taps h, the same from either end.
+    repeats : int
+        Number of passes that the filter does in one: the taps are convolved with
+        themselves.
+
+    Raises
+    ------
+    SignalError
+        If the taps are an even number, or not symmetric.
+    ValueError, TypeError
+        If `taps` has the wrong shape, dtype or a number that is not finite.
+
+    Notes
+    -----
+    Beyond its ends the signal is held.
+
+    References
+    ----------
+    [dimarco2016], Eq. (3.2), for which the filter of the example serves.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import signal
+    >>> signal.FirFilter(np.array([-1, 4, 10, 4, -1]) / 16, repeats=6).taps.shape
+    (25,)
+    """
+
+    taps: NDArray[np.float64]
+    repeats: int
+
+    def __new__(cls, taps: ArrayLike, repeats: int = 1) -> Self:
+        return super().__new__(cls, "fir", taps=taps, repeats=repeats)
+
+
+class SwitchedFilter(_Filter):
+    """Zero-phase low-pass with another cut-off on each segment.
+
+    ``y[k] = sum_i w_i[k] (Q_i x)[k]``, the weights going over along half a cosine
+
+    Parameters
+    ----------
+    cutoffs_hz : sequence of float
+        Cut-off of one pass on each segment, in Hz.
+    starts : sequence of int
+        First sample of each segment, 0 for the first one.
+    dt_s : float
+        Sample time in seconds.
+    order : int
+        Order of one pass, 1 to 12.
+    blend : int
+        Samples within which it goes over from one segment to the next, half of
+        them before the start of the later one.
+
+    Raises
+    ------
+    SignalError
+        If a cut-off or the order cannot be designed for, the segments are not in
+        order, or there are not as many starts as cut-offs. `zero_phase` raises it
+        if the signal ends before a segment starts.
+
+    References
+    ----------
+    [filter-based], Eq. (12); the cross-fade is ours.
+
+    Examples
+    --------
+    >>> from ilc_rt import signal
+    >>> signal.SwitchedFilter([10.0, 50.0, 10.0], [0, 300, 600], 0.002, blend=50).starts
+    [0, 300, 600]
+    """
+
+    cutoffs_hz: list[float]
+    starts: list[int]
+    dt_s: float
+    order: int
+    blend: int
+
+    def __new__(
+        cls,
+        cutoffs_hz: Sequence[float],
+        starts: Sequence[int],
+        dt_s: float,
+        order: int = 2,
+        blend: int = 0,
+    ) -> Self:
+        return super().__new__(
+            cls,
+            "switched",
+            cutoffs_hz=cutoffs_hz,
+            starts=starts,
+            dt_s=dt_s,
+            order=order,
+            blend=blend,
+        )
+
+    @classmethod
+    def from_signal(
+        cls,
+        reference: ArrayLike,
+        dt_s: float,
+        low_hz: float,
+        high_hz: float,
+        threshold_hz: float,
+        order: int = 2,
+        window_s: float | None = None,
+        margin_s: float | None = None,
+        blend_s: float | None = None,
+    ) -> Self:
+        """Design the filter for a motion by its instantaneous frequency.
+
+        Parameters
+        ----------
+        reference : array_like, shape (n_samples,) or (n_samples, n_channels)
+            The motion; a velocity shows the fast stretches better than a position.
+        dt_s : float
+            Sample time in seconds.
+        low_hz, high_hz : float
+            Cut-offs in Hz where the motion is slow, and where it is fast.
+        threshold_hz : float
+            Instantaneous frequency of the motion in Hz above which it is fast.
+        order : int
+            Order of one pass.
+        window_s : float or None
+            Span over which the frequency is averaged, weighted by the squared
+            amplitude; one period of the threshold unless given.
+        margin_s : float or None
+            Time before and after a fast stretch in which the filter is open; one
+            period of the lower cut-off unless given.
+        blend_s : float or None
+            Time within which it goes over; one period of the lower cut-off unless
+            given.
+
+        Returns
+        -------
+        SwitchedFilter
+            Filter for runs of as many samples; open wherever any channel is fast.
+
+        Raises
+        ------
+        SignalError
+            If a frequency or time is out of range.
+        ValueError, TypeError
+            If `reference` has the wrong shape, dtype or a number that is not finite.
+
+        References
+        ----------
+        [filter-based], Section 5.
+        """
+        return super().__new__(
+            cls,
+            "from_signal",
+            reference=reference,
+            dt_s=dt_s,
+            low_hz=low_hz,
+            high_hz=high_hz,
+            threshold_hz=threshold_hz,
+            order=order,
+            window_s=window_s,
+            margin_s=margin_s,
+            blend_s=blend_s,
+        )
+
+
+def butterworth(
+    order: int,
+    cutoff_hz: float,
+    dt_s: float,
+    causal: bool = False,  # noqa: FBT001
+) -> ButterworthFilter:
+    """Return a Butterworth low-pass filter, as `ButterworthFilter` describes it.
+
+    Examples
+    --------
+    >>> from ilc_rt import signal
+    >>> signal.butterworth(2, 50.0, 0.002)
+    ButterworthFilter(order=2, cutoff_hz=50.0, dt_s=0.002, causal=False)
+    """
+    return ButterworthFilter(order, cutoff_hz, dt_s, causal)
+
+
+def gaussian(bandwidth_hz: float, dt_s: float) -> GaussianFilter:
+    """Return a Gaussian low-pass filter, as `GaussianFilter` describes it.
+
+    Examples
+    --------
+    >>> from ilc_rt import signal
+    >>> signal.gaussian(15.0, 0.002)
+    GaussianFilter(bandwidth_hz=15.0, dt_s=0.002)
+    """
+    return GaussianFilter(bandwidth_hz, dt_s)
+
+
+def fir(taps: ArrayLike, repeats: int = 1) -> FirFilter:
+    """Return a symmetric smoother of finite length, as `FirFilter` describes it.
+
+    Examples
+    --------
+    >>> from ilc_rt import signal
+    >>> signal.fir([0.25, 0.5, 0.25])
+    FirFilter(taps=[0.25, 0.5, 0.25], repeats=1)
+    """
+    return FirFilter(taps, repeats)
+
+
+def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]:
+    """Return the frequency of a signal from sample to sample.
+
+    ``f[k] = wrap(arg a[k+1] - arg a[k]) / (2 pi T)``, a the analytic signal
+
+    Parameters
+    ----------
+    x : array_like, shape (n_samples,)
+        Signal that swings about zero.
+    dt_s : float
+        Sample time T in seconds.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_samples - 1,)
+        Frequency in Hz. Where the amplitude is small it is noise and may be
+        negative.
+
+    Raises
+    ------
+    SignalError
+        If there are fewer than two samples or the sample time is not positive.
+    ValueError, TypeError
+        If `x` has the wrong shape, dtype or a number that is not finite.
+
+    References
+    ----------
+    [filter-based], Section 5; [oppenheim2009], Ch. 12.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import signal
+    >>> x = np.sin(2 * np.pi * 8.0 * 0.002 * np.arange(500))
+    >>> float(signal.instantaneous_frequency(x, 0.002)[100].round(9))
+    8.0
+    """
+    return _native.instantaneous_frequency(x=x, dt_s=dt_s)

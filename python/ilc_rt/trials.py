@@ -12,13 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tomlkit
 
-from ilc_rt._native import (
-    NormOptimalIlc,
-    StateSpace,
-    discretize,
-    from_transfer_function,
-    second_order,
-)
+from ilc_rt._native import StateSpace
+from ilc_rt.laws import NormOptimalIlc
+from ilc_rt.models import discretize, from_transfer_function, second_order
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

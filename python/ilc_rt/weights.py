@@ -1,8 +1,301 @@
 """Weights of norm-optimal learning along the run, from what they mean."""
 
-from ilc_rt._native import contour_weights as contour
-from ilc_rt._native import coupled_weights as coupled
-from ilc_rt._native import formation_errors, schedule
-from ilc_rt._native import formation_weights as formation
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ilc_rt import _native
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["contour", "coupled", "formation", "formation_errors", "schedule"]
+
+
+def contour(
+    reference: ArrayLike,
+    q: ArrayLike = 1.0,
+    contour: ArrayLike = 1.0,
+    along: ArrayLike = 0.0,
+    axes: Sequence[int] | None = None,
+) -> NDArray[np.float64]:
+    """Return weights by which the error across the path counts more.
+
+    ``Q_k = q I + contour (I - t_k t_k') + along t_k t_k'`` with ``t_k`` the unit
+    tangent of the reference.
+
+    Parameters
+    ----------
+    reference : ndarray of float64, shape (n_samples, n_outputs)
+        Reference of every output, the axes of the path in one unit.
+    q : float or ndarray of shape (n_samples,), (p, p) or (n_samples, p, p)
+        Weight of every output by itself.
+    contour : float or ndarray of shape (n_samples,)
+        Weight of the error across the path: to first order the contour error.
+    along : float or ndarray of shape (n_samples,)
+        Weight of the error along the path.
+    axes : sequence of int, optional
+        Outputs that make the path; by default all.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_samples, n_outputs, n_outputs)
+        Weight of the error, to be given to a law as `q`.
+
+    Raises
+    ------
+    LearningError
+        If a weight is negative or does not fit, the path never moves, or it has
+        fewer than two axes.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    Notes
+    -----
+    Where the reference rests its tangent is undefined; there the one nearest in
+    time holds. With q = along = 0 nothing weighs the error along the path: give
+    the law an s or r above 0.
+
+    References
+    ----------
+    [barton2010], Eq. (4.1) to (4.3), (5.9) to (5.11).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import weights
+    >>> line = np.outer(np.linspace(0.0, 0.1, 5), [1.0, 1.0])
+    >>> weights.contour(line, q=0.0, contour=2.0)[2].round(12).tolist()
+    [[1.0, -1.0], [-1.0, 1.0]]
+    """
+    return _native.contour_weights(
+        reference=reference, q=q, contour=contour, along=along, axes=axes
+    )
+
+
+def coupled(
+    coupling: ArrayLike, sigma: ArrayLike = 1.0, gamma: ArrayLike = 0.0
+) -> NDArray[np.float64]:
+    """Return weights that divide between channels and coupled signals.
+
+    ``Q_k = sigma_k (gamma_k I + (1 - gamma_k) C_k' C_k)``
+
+    Parameters
+    ----------
+    coupling : ndarray of float64, shape (n_samples, c, p)
+        What each of p channels contributes to each of c coupled signals, as
+        ``[-sin theta, cos theta]`` to the contour error.
+    sigma : float or ndarray of shape (n_samples,)
+        Overall weight.
+    gamma : float or ndarray of shape (n_samples,)
+        Share of the channels by themselves, 0 to 1.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_samples, p, p)
+        Weight, to be given to a law as `q`, `s` or `r`.
+
+    Raises
+    ------
+    LearningError
+        If sigma is negative or gamma outside 0 to 1, or a length does not fit.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    References
+    ----------
+    [barton2010], Eq. (5.2) to (5.7).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import weights
+    >>> coupling = np.broadcast_to([[-0.6, 0.8]], (3, 1, 2))
+    >>> weights.coupled(coupling, sigma=2.0, gamma=0.0)[0].round(12).tolist()
+    [[0.72, -0.96], [-0.96, 1.28]]
+    """
+    return _native.coupled_weights(coupling=coupling, sigma=sigma, gamma=gamma)
+
+
+def schedule(
+    segments: Sequence[tuple[int, float]],
+    n_samples: int,
+    bandwidth_hz: float | None = None,
+    dt_s: float | None = None,
+) -> NDArray[np.float64]:
+    """Return numbers that switch smoothly from one part of a run to the next.
+
+    Each value holds from its start on; a Gaussian filter makes the steps smooth.
+
+    Parameters
+    ----------
+    segments : sequence of (int, float)
+        First sample and value of each part; the first at sample 0.
+    n_samples : int
+        Samples of a run.
+    bandwidth_hz : float, optional
+        Frequency in Hz that the filter lowers to 1/sqrt(2); by default the values
+        step. From 10 % to 90 % takes 0.34 / bandwidth_hz seconds.
+    dt_s : float, optional
+        Sample time in seconds; needed with `bandwidth_hz`.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_samples,)
+        Values, none outside the range of those given.
+
+    Raises
+    ------
+    LearningError
+        If the starts do not rise from 0 within the run, or a value is not finite.
+    SignalError
+        If there is no such filter, or it is longer than the run.
+    ValueError
+        If only one of `bandwidth_hz` and `dt_s` is given.
+
+    References
+    ----------
+    [barton2010], sections 5.4.2 and 5.4.3, listing H.3.
+
+    Examples
+    --------
+    >>> from ilc_rt import weights
+    >>> weights.schedule([(0, 1.0), (2, 30.0)], 4).tolist()
+    [1.0, 1.0, 30.0, 30.0]
+    """
+    return _native.schedule(
+        segments=segments, n_samples=n_samples, bandwidth_hz=bandwidth_hz, dt_s=dt_s
+    )
+
+
+def formation(
+    n_agents: int,
+    n_axes: int,
+    n_samples: int,
+    tracking: ArrayLike = 1.0,
+    own: ArrayLike = 1.0,
+    centre: ArrayLike = 0.0,
+    sigma: ArrayLike = 1.0,
+    weight: ArrayLike = 1.0,
+    leaders: Sequence[int] | None = None,
+    pairs: Sequence[tuple[int, int]] | None = None,
+    axes: Sequence[int] | None = None,
+) -> NDArray[np.float64]:
+    """Return weights of several agents that keep a formation.
+
+    ``Q = sigma (tracking (own Q_i + centre K' Q_c K) + (1 - tracking) F' F)``
+
+    Parameters
+    ----------
+    n_agents, n_axes : int
+        Agents, and axes of each; their errors stand one agent after the other.
+    n_samples : int
+        Samples of a run.
+    tracking : float or array that broadcasts to (n_samples, n_agents)
+        Share of tracking; the rest is the formation's.
+    own : float or array that broadcasts to (n_samples, n_agents)
+        Share of its own error in what an agent tracks.
+    centre : float or array that broadcasts to (n_samples, n_agents)
+        Share of the error of the formation's centre in what an agent tracks.
+    sigma : float or array that broadcasts to (n_samples, n_agents)
+        Overall weight.
+    weight : float or ndarray of shape (n_samples,), (d, d) or (n_samples, d, d)
+        Weight of the d axes of an agent, and of the centre.
+    leaders : sequence of int, optional
+        Agents that alone track their references; takes the place of `own`.
+    pairs : sequence of (int, int), optional
+        Pairs of agents that keep their offset; by default all.
+    axes : sequence of int, optional
+        Axes of an agent that keep the offset; by default all.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_samples, n_agents * n_axes, n_agents * n_axes)
+        Weight of all agents' errors, to be given to a law as `q`.
+
+    Raises
+    ------
+    LearningError
+        If a share lies outside 0 to 1, a weight is negative, or an agent or axis
+        is not there.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    Notes
+    -----
+    The formation error of agents i and j is ``e_j - e_i``: the wanted offset, as
+    their references have it, less the actual one. Where agents that a term
+    couples have different gains, the symmetric form of the product is taken.
+
+    References
+    ----------
+    [barton2010], Eq. (6.1) to (6.9), (6.13) to (6.15).
+
+    Examples
+    --------
+    >>> from ilc_rt import weights
+    >>> weights.formation(2, 1, 3, tracking=0.75)[0].tolist()
+    [[1.0, -0.25], [-0.25, 1.0]]
+    """
+    return _native.formation_weights(
+        n_agents=n_agents,
+        n_axes=n_axes,
+        n_samples=n_samples,
+        tracking=tracking,
+        own=own,
+        centre=centre,
+        sigma=sigma,
+        weight=weight,
+        leaders=leaders,
+        pairs=pairs,
+        axes=axes,
+    )
+
+
+def formation_errors(
+    e: ArrayLike,
+    n_agents: int,
+    pairs: Sequence[tuple[int, int]] | None = None,
+    axes: Sequence[int] | None = None,
+) -> NDArray[np.float64]:
+    """Return the formation errors of several agents.
+
+    ``e_j - e_i`` for each axis and each pair of agents, axis by axis.
+
+    Parameters
+    ----------
+    e : ndarray of float64, shape (n_samples, n_agents * n_axes)
+        Errors of all agents, one agent after the other.
+    n_agents : int
+        Agents.
+    pairs : sequence of (int, int), optional
+        Pairs of agents; by default all.
+    axes : sequence of int, optional
+        Axes of an agent; by default all.
+
+    Returns
+    -------
+    ndarray of float64, shape (n_samples, n_axes * n_pairs)
+        Wanted offset less actual one.
+
+    Raises
+    ------
+    LearningError
+        If an agent or axis is not there.
+    ValueError, TypeError
+        If `e` has the wrong shape, dtype or a number that is not finite.
+
+    References
+    ----------
+    [barton2010], Eq. (4.4).
+
+    Examples
+    --------
+    >>> from ilc_rt import weights
+    >>> weights.formation_errors([[1.0, 2.0, 4.0, 6.0]], 2).tolist()
+    [[3.0, 4.0]]
+    """
+    return _native.formation_errors(e=e, n_agents=n_agents, pairs=pairs, axes=axes)

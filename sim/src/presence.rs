@@ -7,7 +7,7 @@
 use std::time::{Duration, Instant};
 
 use ilc_rt::fieldbus::bring_up::listen;
-use ilc_rt::fieldbus::canopen::sdo::SdoRequest;
+use ilc_rt::fieldbus::canopen::sdo::{SdoRequest, Turn};
 use ilc_rt::fieldbus::canopen::{NodeId, ObjectAddress, cob_id};
 use ilc_rt::fieldbus::cia402::objects;
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
@@ -30,7 +30,7 @@ pub(crate) fn find(bus: &mut dyn Bus, nodes: &[NodeId]) -> Result<Option<NodeId>
     if listen::other_master(bus, nodes, MASTER)?.is_some() {
         return Ok(None);
     }
-    let question = SdoRequest::UploadInitiate(ObjectAddress::new(objects::DEVICE_TYPE, 0));
+    let question = SdoRequest::Upload(Turn::Initiate(ObjectAddress::new(objects::DEVICE_TYPE, 0)));
     for &node in nodes {
         let id = cob_id::of(cob_id::SDO_REQUEST, node);
         if let Some(frame) = Frame::new(id, &question.encode()) {

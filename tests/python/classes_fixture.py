@@ -90,7 +90,7 @@ EXAMPLES = {
         ),
         lambda m: m.simulate(U),
     ),
-    PdIlc: (lambda: PdIlc(0.4, 0.1, low_pass(), lead=2), updated),
+    PdIlc: (lambda: PdIlc(0.4, 0.1, low_pass(), lead_samples=2), updated),
     ErrorFeedforwardIlc: (
         lambda: ErrorFeedforwardIlc(0.4, signal.gaussian(20.0, 0.002), 3, 0.5),
         updated,
@@ -100,7 +100,7 @@ EXAMPLES = {
         updated,
     ),
     ConstrainedIlc: (
-        lambda: ConstrainedIlc(axis(), N, r=0.1, u_bounds=(-0.4, 0.4)),
+        lambda: ConstrainedIlc(axis(), N, r=0.1, input_max=(-0.4, 0.4)),
         updated,
     ),
     AdjointIlc: (lambda: AdjointIlc(axis(), N, q_filter=low_pass()), updated),
@@ -111,7 +111,7 @@ EXAMPLES = {
     ),
     Gate: (lambda: Gate(PdIlc(0.4, 0.0), tolerance=0.1, measure="max", patience=3), updated),
     Ladder: (lambda: Ladder(PdIlc(0.4, 0.0), 2), updated),
-    RelevanceWeights: (lambda: RelevanceWeights(e=3.0, d=[0.1, 0.2]), None),
+    RelevanceWeights: (lambda: RelevanceWeights(error=3.0, disturbance=[0.1, 0.2]), None),
     RelevanceIlc: (
         lambda: RelevanceIlc(None, PdIlc(0.4, 0.0), RelevanceWeights(), dt_s=0.002),
         None,

@@ -94,7 +94,7 @@ def test_the_servo_example_agrees_with_its_equations(q, s, r):
 
 def test_a_filtered_law_agrees_with_its_columns():
     model = axis()
-    law = PdIlc(kp=0.4, kd=1.0, q_filter=signal.butterworth(2, 15.0, DT_S), lead=5)
+    law = PdIlc(kp=0.4, kd=1.0, q_filter=signal.butterworth(2, 15.0, DT_S), lead_samples=5)
     found = analyze(law, model, N)
     keep, learn = columns(law, N)
     t = keep - learn @ lifted(model, N)
@@ -105,7 +105,7 @@ def test_a_filtered_law_agrees_with_its_columns():
 
 
 def test_long_runs_are_analysed_without_their_matrix():
-    law = PdIlc(kp=0.4, kd=0.0, q_filter=signal.butterworth(2, 15.0, DT_S), lead=6)
+    law = PdIlc(kp=0.4, kd=0.0, q_filter=signal.butterworth(2, 15.0, DT_S), lead_samples=6)
     found = analyze(law, axis(), 5000, noise_std=1e-6)
     assert found.method == "structured"
     assert found.converges

@@ -62,13 +62,13 @@ def test_sizes_are_bounded_before_memory_is_asked_for(call, words):
 
 @pytest.mark.parametrize("given", [2.0, np.float64(2.0), True, np.bool_(True), "2", None, [2], 1j])
 def test_what_counts_nothing_is_a_type_error_with_a_name(given):
-    with pytest.raises(TypeError, match=r"lead = .*a whole number from 0"):
-        PdIlc(0.5, 0.0, lead=given)
+    with pytest.raises(TypeError, match=r"lead_samples = .*a whole number from 0"):
+        PdIlc(0.5, 0.0, lead_samples=given)
 
 
 @pytest.mark.parametrize("given", [2, np.int64(2), np.uint8(2), np.array(2)])
 def test_whole_numbers_of_any_kind_do(given):
-    assert "lead=2" in repr(PdIlc(0.5, 0.0, lead=given))
+    assert "lead_samples=2" in repr(PdIlc(0.5, 0.0, lead_samples=given))
     assert "patience=2" in repr(Gate(PdIlc(0.5, 0.0), patience=given))
 
 

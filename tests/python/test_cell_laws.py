@@ -26,7 +26,7 @@ from ilc_rt import (
     second_order,
     signal,
 )
-from ilc_rt._native import refuse_divergent
+from ilc_rt.analysis import refuse_divergent
 
 DT_S = 0.002
 N = 300
@@ -65,12 +65,12 @@ def low_pass(cutoff_hz: float) -> signal.ButterworthFilter:
 
 
 NATIVE = {
-    "pd": lambda: PdIlc(0.5, 0.0, low_pass(4.0), lead=9),
+    "pd": lambda: PdIlc(0.5, 0.0, low_pass(4.0), lead_samples=9),
     "norm_optimal": lambda: NormOptimalIlc(axis(), N, rate=3.0),
-    "constrained": lambda: ConstrainedIlc(axis(), N, rate=3.0, u_bounds=(-1e-6, 1e-6)),
+    "constrained": lambda: ConstrainedIlc(axis(), N, rate=3.0, input_max=(-1e-6, 1e-6)),
     "adjoint": lambda: AdjointIlc(axis(), N),
     "model_inverse": lambda: ModelInverseIlc(axis(), N, 0.5, low_pass(4.0)),
-    "error_feedforward": lambda: ErrorFeedforwardIlc(0.3, limit=1e-6),
+    "error_feedforward": lambda: ErrorFeedforwardIlc(0.3, input_max=1e-6),
 }
 AROUND = {
     "alone": lambda law: law,
@@ -171,7 +171,7 @@ def test_a_campaign_warns_of_the_cells_law_unless_another_one_learns(tmp_path: P
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         Campaign(cell, library=library, bus="loopback:", learning=False)
-        Campaign(cell, PdIlc(0.3, 0.0, low_pass(3.0), lead=10), library, bus="loopback:")
+        Campaign(cell, PdIlc(0.3, 0.0, low_pass(3.0), lead_samples=10), library, bus="loopback:")
     assert Cell.load(GANTRY).warnings == []
 
 

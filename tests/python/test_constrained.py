@@ -50,7 +50,7 @@ def test_a_bounded_input_agrees_with_scipys_least_squares(q, s, r, rate):
     u = 1e-3 * np.cos(np.arange(n_samples))
     free = NormOptimalIlc(axis(), n_samples, q=q, s=s, r=r, rate=rate).update(u, e)
     limit = 0.6 * np.abs(free).max()
-    law = ConstrainedIlc(axis(), n_samples, q=q, s=s, r=r, rate=rate, u_bounds=(-limit, limit))
+    law = ConstrainedIlc(axis(), n_samples, q=q, s=s, r=r, rate=rate, input_max=(-limit, limit))
     found = law.update(u, e)
     assert law.status == "solved"
     assert law.iterations > 0
@@ -75,9 +75,9 @@ def test_all_bounds_together_agree_with_scipys_minimize():
     rise = np.concatenate([[0.0], np.diff(r)]) / DT_S
     bend = first @ rise / DT_S
     bounds = {
-        "u_bounds": (-0.9 * size, 0.8 * size),
-        "v_bounds": (-0.85 * size, None),
-        "step_bounds": (-0.2 * size, 0.15 * size),
+        "input_max": (-0.9 * size, 0.8 * size),
+        "change_max": (-0.85 * size, None),
+        "step_max": (-0.2 * size, 0.15 * size),
         "velocity_bounds": (-0.2, 0.9 * np.abs(rise + first @ free / DT_S).max()),
         "acceleration_bounds": (-np.inf, 0.6 * np.abs(bend + first @ first @ free / DT_S**2).max()),
         "output_bounds": (-1e-3, r + 0.8e-3),
@@ -130,7 +130,7 @@ def test_bounds_that_are_not_reached_change_nothing():
     n_samples = 200
     r, e = problem(n_samples)
     free = NormOptimalIlc(axis(), n_samples, rate=3.0).update(np.zeros(n_samples), e)
-    law = ConstrainedIlc(axis(), n_samples, rate=3.0, u_bounds=(-1.0, 1.0), reference=r)
+    law = ConstrainedIlc(axis(), n_samples, rate=3.0, input_max=(-1.0, 1.0), reference=r)
     found = law.update(np.zeros(n_samples), e)
     assert (law.status, law.iterations, law.gap) == ("solved", 0, 0.0)
     assert np.abs(found - free).max() < 1e-8 * np.abs(free).max()
@@ -149,8 +149,8 @@ def test_no_bound_is_exceeded_over_several_runs(seed, n_samples):
         model,
         n_samples,
         rate=rng.uniform(0.1, 3.0),
-        u_bounds=(-limit, limit),
-        step_bounds=(-step, step),
+        input_max=(-limit, limit),
+        step_max=(-step, step),
         velocity_bounds=(-rise, rise),
         reference=r,
     )
@@ -168,14 +168,14 @@ def test_no_bound_is_exceeded_over_several_runs(seed, n_samples):
 def test_what_cannot_be_honoured_keeps_the_input_and_says_so():
     u = np.zeros(9)
     u[3] = 0.5
-    law = ConstrainedIlc(axis(), 9, rate=3.0, u_bounds=(-0.1, 0.1), v_bounds=(-0.01, 0.01))
+    law = ConstrainedIlc(axis(), 9, rate=3.0, input_max=(-0.1, 0.1), change_max=(-0.01, 0.01))
     assert law.status == "untried"
     assert np.array_equal(law.update(u, np.ones(9)), u)
     assert law.status == "infeasible"
     assert "at sample 3, channel 0" in law.message
     r, e = problem(30)
     law = ConstrainedIlc(
-        axis(), 30, rate=3.0, u_bounds=(-0.1, 0.1), output_bounds=(5.0, 6.0), reference=r
+        axis(), 30, rate=3.0, input_max=(-0.1, 0.1), output_bounds=(5.0, 6.0), reference=r
     )
     assert np.array_equal(law.update(np.zeros(30), e), np.zeros(30))
     assert law.status == "max_iterations"
@@ -183,7 +183,7 @@ def test_what_cannot_be_honoured_keeps_the_input_and_says_so():
 
 def test_a_second_search_starts_from_the_first_and_a_reset_forgets_it():
     _, e = problem(200)
-    law = ConstrainedIlc(axis(), 200, rate=3.0, u_bounds=(-1e-3, 1e-3))
+    law = ConstrainedIlc(axis(), 200, rate=3.0, input_max=(-1e-3, 1e-3))
     first = law.update(np.zeros(200), e)
     cold = law.iterations
     again = law.update(np.zeros(200), e)
@@ -196,12 +196,12 @@ def test_a_second_search_starts_from_the_first_and_a_reset_forgets_it():
 @pytest.mark.parametrize(
     ("name", "value", "error", "words"),
     [
-        ("u_bounds", 1.0, TypeError, "a pair"),
-        ("u_bounds", (1.0,), ValueError, "1 sides"),
-        ("u_bounds", (np.nan, 1.0), ValueError, r"u_bounds\[0\] holds NaN"),
-        ("v_bounds", (None, np.zeros(8)), ValueError, r"v_bounds\[1\] has shape \(8,\)"),
-        ("step_bounds", (np.zeros((9, 2)), None), ValueError, r"step_bounds\[0\] has shape"),
-        ("step_bounds", ("a", None), (TypeError, ValueError), r"step_bounds\[0\]"),
+        ("input_max", "1", TypeError, "a pair"),
+        ("input_max", (1.0,), ValueError, "1 sides"),
+        ("input_max", (np.nan, 1.0), ValueError, r"input_max\[0\] holds NaN"),
+        ("change_max", (None, np.zeros(8)), ValueError, r"change_max\[1\] has shape \(8,\)"),
+        ("step_max", (np.zeros((9, 2)), None), ValueError, r"step_max\[0\] has shape"),
+        ("step_max", ("a", None), (TypeError, ValueError), r"step_max\[0\]"),
         ("reference", np.zeros(8), ValueError, "reference has shape"),
         ("reference", np.full(9, np.inf), ValueError, "reference holds inf"),
         ("position_bounds", (0.0, 1.0), LearningError, "position bound needs the reference"),
@@ -213,8 +213,8 @@ def test_a_second_search_starts_from_the_first_and_a_reset_forgets_it():
             "acceleration bound needs the reference",
         ),
         ("output_bounds", (0.0, 1.0), LearningError, "output bound needs the reference"),
-        ("u_bounds", (1.0, -1.0), LearningError, "lower input bound 1 lies above"),
-        ("v_bounds", (np.inf, np.inf), LearningError, "lower change bound is inf"),
+        ("input_max", (1.0, -1.0), LearningError, "lower input bound 1 lies above"),
+        ("change_max", (np.inf, np.inf), LearningError, "lower change bound is inf"),
         ("q", np.ones(8), ValueError, "q has shape"),
         ("r", -1.0, LearningError, "r = -1"),
         ("rate", -1.0, LearningError, "rate = -1"),
@@ -229,16 +229,21 @@ def test_bounds_that_exclude_each_other_are_refused_with_the_sample():
     r = np.linspace(0.0, 0.08, 9)
     with pytest.raises(LearningError, match=r"input and position bounds leave no value.* sample 6"):
         ConstrainedIlc(
-            axis(), 9, rate=3.0, u_bounds=(-0.005, 0.005), position_bounds=(0.0, 0.051), reference=r
+            axis(),
+            9,
+            rate=3.0,
+            input_max=(-0.005, 0.005),
+            position_bounds=(0.0, 0.051),
+            reference=r,
         )
     low = np.full(9, -1.0)
     low[1] = 0.3
     with pytest.raises(LearningError, match="at sample 1, channel 0"):
-        ConstrainedIlc(axis(), 9, rate=3.0, u_bounds=(low, 1.0), step_bounds=(-0.1, 0.1))
+        ConstrainedIlc(axis(), 9, rate=3.0, input_max=(low, 1.0), step_max=(-0.1, 0.1))
 
 
 def test_wrong_signals_are_refused_one_at_a_time():
-    law = ConstrainedIlc(axis(), 9, rate=3.0, u_bounds=(-1.0, 1.0))
+    law = ConstrainedIlc(axis(), 9, rate=3.0, input_max=(-1.0, 1.0))
     for u, e, name in [
         (np.zeros(8), np.zeros(9), "u"),
         (np.zeros(9), np.zeros(8), "e"),

@@ -5,24 +5,21 @@ from __future__ import annotations
 import itertools
 import json
 import socket
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 from processes_fixture import PATIENT, Bench, free_port, goodbye
 
 from ilc_rt.events import parse_event
+from ilc_rt.figures import Figures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
 RUNS = 4
-FIGURES = {
-    "index", "tracking_inf_m", "tracking_rms_m", "contour_inf_m", "contour_rms_m",
-    "encoder_tracking_inf_m", "tool_tracking_inf_m", "overruns", "missing_samples",
-    "late_updates", "update_ms", "rolled_back", "learning_off", "remark",
-    "axes_tracking_inf_m", "axes_tracking_rms_m",
-}  # fmt: skip
+FIGURES = {"index", *(figure.name for figure in fields(Figures))}
 
 
 class Job(NamedTuple):

@@ -17,7 +17,7 @@ import ilc_rt
 from ilc_rt import Campaign, Gate, Library, NormOptimalIlc, PdIlc
 
 # Not values: a connection to a file, an interface, a running controller.
-OTHERS = {Library, ilc_rt.Law, Campaign}
+OTHERS = {Library, ilc_rt.Law, ilc_rt.signal.Filter, Campaign}
 
 
 def attributes(thing):

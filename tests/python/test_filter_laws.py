@@ -89,14 +89,14 @@ def test_pd_and_feedforward_are_their_equations_with_every_filter(name, lead):
     held = np.concatenate([e[:1], e, np.repeat(e[-1:], lead, axis=0)])
     ahead, before = held[1 + lead :], held[lead:-1]
     expected = apply(q_filter, u + 0.7 * ahead + 2.0 * (ahead - before))
-    found = PdIlc(0.7, 2.0, q_filter=q_filter, lead=lead).update(u, e)
+    found = PdIlc(0.7, 2.0, q_filter=q_filter, lead_samples=lead).update(u, e)
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
     smooth = apply(q_filter, e)
     expected = u + 0.5 * np.concatenate([smooth, np.repeat(smooth[-1:], lead, axis=0)])[lead:]
     law = ErrorFeedforwardIlc(0.5, q_filter, lead)
     np.testing.assert_allclose(law.update(u, e), expected, atol=1e-12)
-    limited = ErrorFeedforwardIlc(0.5, q_filter, lead, limit=0.4)
+    limited = ErrorFeedforwardIlc(0.5, q_filter, lead, input_max=0.4)
     np.testing.assert_allclose(limited.update(u, e), expected.clip(-0.4, 0.4), atol=1e-12)
     assert limited.n_limited == (abs(expected) > 0.4).sum()
 
@@ -159,7 +159,7 @@ def test_inverse_of_several_axes_leaves_no_error_that_can_be_reached(seed, n, m,
             ModelInverseIlc(model, n_samples)
         return
     e = np.random.default_rng(seed).normal(size=(n_samples, m))
-    change = ModelInverseIlc(model, n_samples).update(np.zeros((n_samples, m)), e)
+    change = ModelInverseIlc(model, n_samples, 1.0).update(np.zeros((n_samples, m)), e)
     left = e - model.simulate(change).reshape(e.shape)
     growth = np.linalg.norm(lifted(model, n_samples), 2) * abs(change).max()
     np.testing.assert_allclose(left, 0.0, atol=1e-11 * (1.0 + growth))
@@ -192,7 +192,7 @@ def test_wrong_numbers_are_refused_when_the_law_is_made():
     with pytest.raises(LearningError, match="gain = NaN"):
         ErrorFeedforwardIlc(np.nan)
     with pytest.raises(LearningError, match="limit = -1"):
-        ErrorFeedforwardIlc(1.0, limit=-1.0)
+        ErrorFeedforwardIlc(1.0, input_max=-1.0)
     with pytest.raises(TypeError, match="filter is a int"):
         ErrorFeedforwardIlc(1.0, 5)
     with pytest.raises(LearningError, match="n_samples = 0"):
@@ -205,7 +205,7 @@ LAWS = {
     "pd": lambda: PdIlc(1.0, 0.0),
     "feedforward": lambda: ErrorFeedforwardIlc(0.5),
     "adjoint": lambda: AdjointIlc(axis(), 50),
-    "inverse": lambda: ModelInverseIlc(axis(), 50),
+    "inverse": lambda: ModelInverseIlc(axis(), 50, 1.0),
     "gate": lambda: Gate(PdIlc(1.0, 0.0), tolerance=0.1),
     "ladder": lambda: Ladder(PdIlc(1.0, 0.0), 1),
     "gate_of_ladder": lambda: Gate(Ladder(AdjointIlc(axis(), 50), 1)),
@@ -316,7 +316,7 @@ def test_gate_stops_a_law_before_it_diverges():
 def test_ladder_averages_the_runs_and_falls_with_their_root():
     rng = np.random.default_rng(0)
     errors = rng.normal(size=(16, 5000))
-    law = Ladder(PdIlc(1.0, 0.0, lead=0), repeats=16)
+    law = Ladder(PdIlc(1.0, 0.0, lead_samples=0), repeats=16)
     for k, e in enumerate(errors[:-1]):
         np.testing.assert_array_equal(law.update(np.zeros(5000), e), np.zeros(5000))
         assert law.runs == k + 1
@@ -330,7 +330,7 @@ def test_ladder_averages_the_runs_and_falls_with_their_root():
 
 
 def test_ladder_adapts_its_gain_to_the_decay():
-    law = Ladder(PdIlc(1.0, 0.0, lead=0), repeats=1)
+    law = Ladder(PdIlc(1.0, 0.0, lead_samples=0), repeats=1)
     gains = []
     for size in [10.0, 5.0, 4.5, 4.4, 4.3, 4.35, 1.0]:
         u = law.update(np.zeros(1), np.array([size]))

@@ -98,6 +98,9 @@ to_m = [0.02, 0.02]
 law = "norm_optimal"
 measure = "encoder"
 input_max_m = 0.005
+
+[learning.norm_optimal]
+rate = 3.0
 """
 
 

@@ -134,7 +134,9 @@ def test_pd_update_is_its_equation():
         ahead = np.vstack([e, np.repeat(e[-1:], lead, axis=0)])[lead:]
         held = np.vstack([np.repeat(e[:1], 1, axis=0), e, np.repeat(e[-1:], lead, axis=0)])
         plain = u + 1.284 * ahead + 0.7 * (ahead - held[lead : lead + 200])
-        np.testing.assert_allclose(PdIlc(1.284, 0.7, lead=lead).update(u, e), plain, atol=1e-13)
+        np.testing.assert_allclose(
+            PdIlc(1.284, 0.7, lead_samples=lead).update(u, e), plain, atol=1e-13
+        )
         expected = scipy_signal.sosfiltfilt(low_pass.sos, plain, axis=0)
         found = PdIlc(1.284, 0.7, low_pass, lead).update(u, e)
         np.testing.assert_allclose(found, expected, atol=1e-12)

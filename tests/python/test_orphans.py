@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import subprocess
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from children_fixture import children
 from processes_fixture import Bench
 
 if TYPE_CHECKING:
@@ -24,15 +24,6 @@ DEADLINE_S = 30.0
 def bench(tmp_path: Path) -> Iterator[Bench]:
     with Bench(tmp_path) as bench:
         yield bench
-
-
-def children(pid: int) -> dict[str, int]:
-    """Return the child processes of a process."""
-    found = {}
-    for number in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-        with contextlib.suppress(OSError):
-            found[Path(f"/proc/{number}/comm").read_text().strip()] = int(number)
-    return found
 
 
 def is_gone(pid: int) -> bool:

@@ -24,6 +24,7 @@ from ilc_rt import (
     RelevanceWeights,
     discretize,
     second_order,
+    signal,
 )
 
 if TYPE_CHECKING:
@@ -139,8 +140,9 @@ def test_a_core_that_fails_says_so() -> None:
             raise ValueError(message)
 
     law = RelevanceIlc(None, Broken(), (1.0, 0.0, 1.0))  # type: ignore[arg-type]
-    with pytest.raises(LearningError, match=r"Broken failed: .*no idea"):
+    with pytest.raises(ValueError, match="no idea") as raised:
         law.update(np.zeros(3), np.zeros(3))
+    assert raised.traceback[-1].name == "update"
 
 
 def test_trimming_keeps_the_runs_most_relevant_for_a_disturbance() -> None:
@@ -208,13 +210,13 @@ def test_wrong_laws_are_refused() -> None:
     with pytest.raises(LearningError, match="dt_s = -1"):
         RelevanceIlc(None, core, WEIGHTS, dt_s=-1.0)
     with pytest.raises(LearningError, match="error = -1"):
-        RelevanceWeights(e=-1.0)
+        RelevanceWeights(error=-1.0)
     with pytest.raises(LearningError, match="rate_filter_s = 0"):
         RelevanceWeights(rate_filter_s=0.0)
     with pytest.raises(LearningError, match="tolerance = -1"):
         FlexibleIlc(None, core, -1.0)
-    weights = RelevanceWeights(e=1.0, er=0.0, d=[1.0, 2.0], epsilon=0.5)
-    np.testing.assert_array_equal(weights.d, [1.0, 2.0])
+    weights = RelevanceWeights(error=1.0, error_rate=0.0, disturbance=[1.0, 2.0], epsilon=0.5)
+    np.testing.assert_array_equal(weights.disturbance, [1.0, 2.0])
     assert (weights.epsilon, weights.error_gain, weights.input_gain) == (0.5, 1.0, 1.0)
 
 
@@ -320,8 +322,9 @@ def test_a_campaign_measures_keeps_and_tells_the_disturbance(tmp_path: Path) -> 
 
 def test_a_resumed_campaign_weighs_what_the_whole_one_does(tmp_path: Path) -> None:
     def law(library: Library | None = None) -> RelevanceIlc:
-        weights = RelevanceWeights(e=1e6, er=0.0, d=1e-3, epsilon=1e-3)
-        return RelevanceIlc(library, PdIlc(0.6, 0.0, lead=2), weights, dt_s=0.002)
+        weights = RelevanceWeights(error=1e6, error_rate=0.0, disturbance=1e-3, epsilon=1e-3)
+        core = PdIlc(0.5, 0.0, signal.butterworth(2, 4.0, 0.002), lead_samples=9)
+        return RelevanceIlc(library, core, weights, dt_s=0.002)
 
     temperatures = [20.0, 30.0, 25.0, 21.0, 29.0]
     (tmp_path / "a").mkdir()

@@ -161,7 +161,10 @@ def test_deviation_is_normal_to_the_path_and_ignores_lag() -> None:
 
 def record(index: int, error_m: float, contour_m: float | None) -> IterationRecord:
     """Return a record with these figures."""
-    return IterationRecord("l.db", index + 1, index, error_m, error_m / 2, contour_m)
+    return IterationRecord(
+        library="l.db", id=index + 1, index=index, tracking_inf_m=error_m,
+        tracking_rms_m=error_m / 2, contour_inf_m=contour_m,
+    )  # fmt: skip
 
 
 def test_the_sentence_says_what_was_learned() -> None:

@@ -101,8 +101,10 @@ def test_a_path_without_a_contour_is_told_by_its_tracking_error(
 
 def record(index: int, tracking_m: float, contour_m: float | None = None, **more: Any):
     return IterationRecord(
-        "l.db", index + 1, index, tracking_m, tracking_m / 2, contour_m,
-        contour_m, axes_tracking_inf_m=(tracking_m, 0.5), axes_tracking_rms_m=(tracking_m, 0.5),
+        library="l.db", id=index + 1, index=index, tracking_inf_m=tracking_m,
+        tracking_rms_m=tracking_m / 2, contour_inf_m=contour_m,
+        contour_rms_m=contour_m, axes_tracking_inf_m=(tracking_m, 0.5),
+        axes_tracking_rms_m=(tracking_m, 0.5),
         **more,
     )  # fmt: skip
 
@@ -178,7 +180,7 @@ def test_a_roll_back_is_shown_with_its_reason():
 
 def test_what_a_law_decides_later_is_put_with_its_run():
     result = CampaignResult("l.db")
-    result.follow(IterationEvent(7, 0, 1e-3, 5e-4, None, None))
+    result.follow(IterationEvent(id=7, index=0, tracking_inf_m=1e-3, tracking_rms_m=5e-4))
     result.follow(JudgedEvent(7, 0, rolled_back=True, learning_off=True, remark="it grew"))
     assert result.records[0].rolled_back
     assert result.records[0].remark == "it grew"
@@ -193,12 +195,12 @@ def test_what_a_law_decides_later_is_put_with_its_run():
         ('law = "pd"\nallow_divergent = true\n[learning.pd]\nkp = -0.4\n'
          "[learning.gate]\ntolerance_m = 0.0\ngrowth = 1.05\npatience = 1\n", 1),
     ],
-    ids=["supervisor", "gate"],
+    ids=["campaign", "gate"],
 )  # fmt: skip
 def test_a_law_that_makes_it_worse_is_told_everywhere(
     ilc: Callable[..., Any], tmp_path: Path, learning: str, off: int
 ) -> None:
-    """Rollback by the supervisor or by a gate."""
+    """The campaign and a gate restore the best input alike."""
     (tmp_path / "cell.toml").write_text(cell_text(["m"], [0.02], learning=learning))
     done = ilc("run", "cell.toml", "--iterations", 8, "--json", "f.json", "--report", "r.html")
     assert done.returncode == 0, done.stderr

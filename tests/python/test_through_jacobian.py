@@ -44,7 +44,7 @@ def test_it_is_the_law_of_the_model_seen_at_the_tool():
 def test_each_sample_may_have_its_own_jacobian():
     rng = np.random.default_rng(5)
     jacobians = np.eye(2) + 0.2 * rng.normal(size=(N_SAMPLES, 2, 2))
-    through = ThroughJacobian(PdIlc(kp=0.7, kd=0.0, lead=0), jacobians)
+    through = ThroughJacobian(PdIlc(kp=0.7, kd=0.0, lead_samples=0), jacobians)
     u, e = signals(2, 2)
     expected = u + 0.7 * np.linalg.solve(jacobians, e[:, :, None])[:, :, 0]
     assert np.allclose(through.update(u, e), expected, rtol=1e-12, atol=1e-12)
@@ -54,7 +54,7 @@ def test_each_sample_may_have_its_own_jacobian():
 
 def test_more_joints_than_coordinates_move_as_little_as_they_can():
     jacobian = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, -1.0]])
-    through = ThroughJacobian(PdIlc(kp=1.0, kd=0.0, lead=0), jacobian)
+    through = ThroughJacobian(PdIlc(kp=1.0, kd=0.0, lead_samples=0), jacobian)
     assert (through.n_joints, through.n_coordinates) == (3, 2)
     for length in (N_SAMPLES, 7):
         u, e = (signal[:length] for signal in signals(3, 2))
@@ -79,7 +79,8 @@ def test_the_law_inside_is_told_everything_and_its_exceptions_come_out():
     own = Own()
     through = ThroughJacobian(own, 2.0 * np.eye(3)[:2])
     assert through.law is own
-    assert repr(through).endswith("2 coordinates, 3 joints)")
+    assert repr(through).endswith("jacobian=array of shape (2, 3))")
+    assert (through.n_coordinates, through.n_joints) == (2, 3)
     u, e = signals(3, 2)
     with pytest.raises(KeyError, match="no temperature"):
         through.update(u, e)

@@ -30,6 +30,9 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
+from children_fixture import children
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -74,15 +77,6 @@ def disk_load(folder: Path) -> Iterator[None]:
         for pid in pids:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
-
-
-def children(pid: int) -> dict[str, int]:
-    """Return the process ids of a process' children by their program."""
-    found = {}
-    for number in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-        with contextlib.suppress(OSError):
-            found[Path(f"/proc/{number}/comm").read_text().strip()] = int(number)
-    return found
 
 
 def start_demo(folder: Path, *more: str) -> subprocess.Popen[bytes]:

@@ -1,298 +1,249 @@
-//! `Analysis`: the figures of what a law will do.
+//! What a law will do, with which weights, and what repeats from run to run: `analyze`,
+//! `refuse_divergent`, `tune`, `repeatability`.
+//!
+//! Each returns its figures by name; the classes that hold them are those of `ilc_rt.analysis`.
 
-use ilc_rt::learning::analysis::{Analysis, Estimate, Method, PdCondition};
+use std::ffi::CString;
+
+use ilc_rt::learning::analysis::{self, Analysis, Method, Question, Uncertainty};
+use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
+use ilc_rt::learning::tune::{Knowledge, TuningStep, tune as propose};
+use ilc_rt::learning::{self, Law};
 use ilc_rt::model::StateSpace;
-use numpy::IntoPyArray;
-use numpy::ndarray::Array1;
+use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::argument::give_signal;
-use crate::made::Made;
+use crate::argument::{Runs, Signal, give_signal, misfit, read_vector};
+use crate::arguments::{Arguments, number};
+use crate::detached::detached;
+use crate::error::OrRaise;
+use crate::laws;
+use crate::python_law::Channels;
 
-/// What a law will do with a model.
-///
-/// ``u[j+1] = T u[j] + L_e r`` with ``T = L_u - L_e P``.
-///
-/// Attributes
-/// ----------
-/// converges, monotonic : bool
-///     Whether the error converges; whether every run brings the input nearer
-///     to its end.
-/// why : str
-///     The verdict as a sentence with its figures.
-/// spectral_radius, spectral_radius_error : float
-///     Largest absolute eigenvalue of T, and how far off it may be.
-/// monotonic_factor, monotonic_factor_error : float or None
-///     Largest singular value of T; None where it cannot be had.
-/// transient_growth : float
-///     How far an error may grow before it falls.
-/// critical_frequency_hz, learnable_frequency_hz : float or None
-///     First frequency at which a run makes the error grow, with the law's
-///     filter and without; None if there is none.
-/// robust_factor, robust_lifted, uncertainty_allowed : float or None
-///     Worst factor of a run within the uncertainty given, over frequency; an
-///     upper bound of it over the whole run; the largest uncertainty that would do.
-/// initial_error_rms, converged_error_rms : float or None
-///     RMS error before learning and in the end, for the reference given.
-/// expected_rms_limit : float or None
-///     Expected RMS error in the end under the noise given.
-#[pyclass(name = "Analysis", module = "ilc_rt", frozen)]
-#[derive(Debug)]
-pub(crate) struct PyAnalysis {
-    made: Made,
-    analysis: Analysis,
-    n_inputs: usize,
-    n_outputs: usize,
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn analyze<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let model = a.model("model")?;
+    let law = a.get("law")?;
+    let given = a.maybe_whole("n_samples")?;
+    let reference = read_reference(a, &model, given)?;
+    let known = given.map_or_else(|| laws::samples_of(&law), |given| Ok(Some(given)))?;
+    let of_reference = reference.as_ref().map(|signal| signal.n_samples);
+    let Some(n_samples) = known.or(of_reference) else {
+        return Err(PyValueError::new_err(
+            "n_samples = None; the samples of a run are needed, as neither law nor reference say them",
+        ));
+    };
+    if let Some(found) = &reference
+        && found.n_samples != n_samples
+    {
+        let rule = format!("({n_samples}, {})", model.n_outputs());
+        return Err(misfit("reference", &found.shape(), &rule));
+    }
+    let question = Question {
+        uncertainty: read_uncertainty(a)?,
+        reference: reference.map(|signal| signal.values),
+        noise_std: a.maybe_number("noise_std")?,
+        n_runs: a.whole("n_runs")?,
+    };
+    let mut law = read_law(&law, &model, n_samples)?;
+    let found = detached(a.py(), || analysis::analyze(law.as_mut(), &model, n_samples, &question));
+    figures(a.py(), &found.or_raise()?, &model)
 }
 
-impl PyAnalysis {
-    pub(crate) fn new(analysis: Analysis, model: &StateSpace, made: Made) -> Self {
-        Self { made, analysis, n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
+/// Returns the figures of an analysis by the names of `ilc_rt.Analysis`.
+fn figures<'py>(
+    py: Python<'py>,
+    found: &Analysis,
+    model: &StateSpace,
+) -> PyResult<Bound<'py, PyDict>> {
+    let array = |values: &[f64]| give_signal(py, values.to_vec(), 1, true);
+    let signal = |values: &Option<Vec<f64>>, n_channels| {
+        let values = values.clone();
+        values.map(|values| give_signal(py, values, n_channels, false)).transpose()
+    };
+    let figures = PyDict::new(py);
+    figures.set_item("n_samples", found.n_samples)?;
+    let method = match found.method {
+        Method::Dense => "dense",
+        Method::Structured => "structured",
+    };
+    figures.set_item("method", method)?;
+    figures.set_item("converges", found.converges)?;
+    figures.set_item("monotonic", found.monotonic)?;
+    figures.set_item("why", &found.why)?;
+    figures.set_item("spectral_radius", found.spectral_radius.value)?;
+    figures.set_item("spectral_radius_error", found.spectral_radius.error)?;
+    let factor = found.monotonic_factor;
+    figures.set_item("monotonic_factor", factor.map(|factor| factor.value))?;
+    figures.set_item("monotonic_factor_error", factor.map(|factor| factor.error))?;
+    figures.set_item("transient_growth", found.transient_growth)?;
+    for (name, value) in [
+        ("critical_frequency_hz", found.critical_frequency_hz),
+        ("learnable_frequency_hz", found.learnable_frequency_hz),
+        ("robust_factor", found.robust_factor),
+        ("robust_lifted", found.robust_lifted),
+        ("uncertainty_allowed", found.uncertainty_allowed),
+        ("initial_error_rms", found.initial_error_rms),
+        ("converged_error_rms", found.converged_error_rms),
+        ("expected_rms_limit", found.expected_rms_limit),
+    ] {
+        figures.set_item(name, value)?;
     }
+    let condition = found.pd_condition.as_ref();
+    figures.set_item("pd_factor", condition.map(|condition| condition.factor))?;
+    figures.set_item("pd_gain_range", condition.and_then(|condition| condition.gain_range))?;
+    figures.set_item("frequency_hz", array(&found.frequency_hz)?)?;
+    figures.set_item("contraction", array(&found.contraction)?)?;
+    figures.set_item("converged_input", signal(&found.converged_input, model.n_inputs())?)?;
+    figures.set_item("converged_error", signal(&found.converged_error, model.n_outputs())?)?;
+    figures.set_item("expected_rms", array(&found.expected_rms)?)?;
+    Ok(figures)
 }
 
-fn array<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyAny> {
-    Array1::from(values.to_vec()).into_pyarray(py).into_any()
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn refuse_divergent(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+    let a = Arguments::of(keywords)?;
+    let (model, n_samples) = (a.model("model")?, a.whole("n_samples")?);
+    let law = a.get("law")?;
+    if laws::is_python(&law)? {
+        return Ok(());
+    }
+    let mut law = laws::apart("law", &law, n_samples, channels(&model))?;
+    let found = detached(a.py(), || {
+        analysis::refuse_divergent(law.as_mut(), &model, n_samples)?;
+        analysis::overreach(law.as_mut(), &model, n_samples)
+    });
+    let Some(found) = found.or_raise()? else { return Ok(()) };
+    let message = CString::new(found.to_string())?;
+    PyErr::warn(a.py(), &a.py().get_type::<PyUserWarning>(), &message, 2)
 }
 
-#[pymethods]
-impl PyAnalysis {
-    /// Pickled and copied as the call that made it, which is made again.
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().made.reduce(slf.get_type().as_any())
-    }
+fn channels(model: &StateSpace) -> Channels {
+    Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() }
+}
 
-    /// Samples of a run.
-    #[getter]
-    fn n_samples(&self) -> usize {
-        self.analysis.n_samples
-    }
-
-    /// How the figures were found: `dense` or `structured`.
-    #[getter]
-    fn method(&self) -> &'static str {
-        match self.analysis.method {
-            Method::Dense => "dense",
-            Method::Structured => "structured",
+/// Reads a number or a list of gains.
+fn read_uncertainty(a: Arguments<'_, '_>) -> PyResult<Option<Uncertainty>> {
+    a.maybe("uncertainty", |name, given| {
+        if let Ok(gain) = given.extract::<f64>() {
+            return Ok(Uncertainty::Scalar(gain));
         }
-    }
+        read_vector(name, given).map(Uncertainty::Shaped)
+    })
+}
 
-    /// Whether the error converges, without growing beyond all measure before.
-    #[getter]
-    fn converges(&self) -> bool {
-        self.analysis.converges
-    }
-
-    /// Whether every run brings the input nearer to its end.
-    #[getter]
-    fn monotonic(&self) -> bool {
-        self.analysis.monotonic
-    }
-
-    /// The verdict as a sentence with its figures.
-    #[getter]
-    fn why(&self) -> &str {
-        &self.analysis.why
-    }
-
-    /// Largest absolute eigenvalue of T.
-    #[getter]
-    fn spectral_radius(&self) -> f64 {
-        self.analysis.spectral_radius.value
-    }
-
-    /// How far off `spectral_radius` may be.
-    #[getter]
-    fn spectral_radius_error(&self) -> f64 {
-        self.analysis.spectral_radius.error
-    }
-
-    /// Largest singular value of T: the worst factor of a run.
-    #[getter]
-    fn monotonic_factor(&self) -> Option<f64> {
-        self.analysis.monotonic_factor.map(|factor| factor.value)
-    }
-
-    /// How far off `monotonic_factor` may be.
-    #[getter]
-    fn monotonic_factor_error(&self) -> Option<f64> {
-        self.analysis.monotonic_factor.map(|Estimate { error, .. }| error)
-    }
-
-    /// How far an error may grow before it falls.
-    #[getter]
-    fn transient_growth(&self) -> f64 {
-        self.analysis.transient_growth
-    }
-
-    /// Frequencies of `contraction` in Hz.
-    #[getter]
-    fn frequency_hz<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        array(py, &self.analysis.frequency_hz)
-    }
-
-    /// Largest singular value of T at each frequency.
-    #[getter]
-    fn contraction<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        array(py, &self.analysis.contraction)
-    }
-
-    /// First frequency at which a run makes the error grow.
-    #[getter]
-    fn critical_frequency_hz(&self) -> Option<f64> {
-        self.analysis.critical_frequency_hz
-    }
-
-    /// The same for the law without its filter.
-    #[getter]
-    fn learnable_frequency_hz(&self) -> Option<f64> {
-        self.analysis.learnable_frequency_hz
-    }
-
-    /// Worst factor of a run within the uncertainty, over frequency.
-    #[getter]
-    fn robust_factor(&self) -> Option<f64> {
-        self.analysis.robust_factor
-    }
-
-    /// Upper bound of that factor over the whole run.
-    #[getter]
-    fn robust_lifted(&self) -> Option<f64> {
-        self.analysis.robust_lifted
-    }
-
-    /// Largest uncertainty, the same at all frequencies, that would do.
-    #[getter]
-    fn uncertainty_allowed(&self) -> Option<f64> {
-        self.analysis.uncertainty_allowed
-    }
-
-    /// RMS error before learning, for the reference given.
-    #[getter]
-    fn initial_error_rms(&self) -> Option<f64> {
-        self.analysis.initial_error_rms
-    }
-
-    /// RMS error in the end, for the reference given.
-    #[getter]
-    fn converged_error_rms(&self) -> Option<f64> {
-        self.analysis.converged_error_rms
-    }
-
-    /// Input in the end, shape (n_samples, n_inputs); None if not known.
-    #[getter]
-    fn converged_input<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let input = self.analysis.converged_input.clone();
-        input.map(|input| give_signal(py, input, self.n_inputs, false)).transpose()
-    }
-
-    /// Error in the end, shape (n_samples, n_outputs); None if not known.
-    #[getter]
-    fn converged_error<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let error = self.analysis.converged_error.clone();
-        error.map(|error| give_signal(py, error, self.n_outputs, false)).transpose()
-    }
-
-    /// Expected RMS error of each run under the noise given; may be empty.
-    #[getter]
-    fn expected_rms<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        array(py, &self.analysis.expected_rms)
-    }
-
-    /// Expected RMS error in the end under the noise given.
-    #[getter]
-    fn expected_rms_limit(&self) -> Option<f64> {
-        self.analysis.expected_rms_limit
-    }
-
-    /// ``|1 - (kp + kd) p_1|`` of a proportional-derivative law.
-    #[getter]
-    fn pd_factor(&self) -> Option<f64> {
-        self.analysis.pd_condition.as_ref().map(|condition| condition.factor)
-    }
-
-    /// Range of kp + kd in which that factor is below 1.
-    #[getter]
-    fn pd_gain_range(&self) -> Option<(f64, f64)> {
-        self.analysis.pd_condition.as_ref().and_then(|condition: &PdCondition| condition.gain_range)
-    }
-
-    /// Return the figures as a dict of numbers, texts and None.
-    ///
-    /// Returns
-    /// -------
-    /// dict
-    ///     Everything but the signals; ready for JSON, infinities as None.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let figures = PyDict::new(py);
-        let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
-        let a = &self.analysis;
-        figures.set_item("n_samples", a.n_samples)?;
-        figures.set_item("method", self.method())?;
-        figures.set_item("converges", a.converges)?;
-        figures.set_item("monotonic", a.monotonic)?;
-        figures.set_item("why", &a.why)?;
-        for (name, value) in [
-            ("spectral_radius", Some(a.spectral_radius.value)),
-            ("spectral_radius_error", Some(a.spectral_radius.error)),
-            ("monotonic_factor", self.monotonic_factor()),
-            ("monotonic_factor_error", self.monotonic_factor_error()),
-            ("transient_growth", Some(a.transient_growth)),
-            ("critical_frequency_hz", a.critical_frequency_hz),
-            ("learnable_frequency_hz", a.learnable_frequency_hz),
-            ("robust_factor", a.robust_factor),
-            ("robust_lifted", a.robust_lifted),
-            ("uncertainty_allowed", a.uncertainty_allowed),
-            ("initial_error_rms", a.initial_error_rms),
-            ("converged_error_rms", a.converged_error_rms),
-            ("expected_rms_limit", a.expected_rms_limit),
-            ("pd_factor", self.pd_factor()),
-        ] {
-            figures.set_item(name, finite(value))?;
+/// Reads an error with a channel for each output.
+fn read_reference(
+    a: Arguments<'_, '_>,
+    model: &StateSpace,
+    n_samples: Option<usize>,
+) -> PyResult<Option<Signal>> {
+    a.maybe("reference", |name, given| {
+        let signal = Signal::read(name, given)?.with_channels(name, model.n_outputs())?;
+        match n_samples {
+            Some(n_samples) => signal.with_samples(name, n_samples),
+            None => Ok(signal),
         }
-        figures.set_item("expected_rms", a.expected_rms.clone())?;
-        Ok(figures)
-    }
+    })
+}
 
-    fn __str__(&self) -> String {
-        let a = &self.analysis;
-        let verdict = match (a.converges, a.monotonic) {
-            (false, _) => "will not converge",
-            (true, false) => "converges, not in every run",
-            (true, true) => "converges in every run",
-        };
-        let mut lines = vec![format!("{verdict}: {}", a.why)];
-        for (name, value) in [
-            ("spectral radius", Some(a.spectral_radius.value)),
-            ("worst factor of a run", self.monotonic_factor()),
-            ("critical frequency in Hz", a.critical_frequency_hz),
-            ("learnable frequency in Hz", a.learnable_frequency_hz),
-            ("worst factor within the uncertainty", a.robust_factor),
-            ("uncertainty allowed", a.uncertainty_allowed),
-            ("RMS error before learning", a.initial_error_rms),
-            ("RMS error in the end", a.converged_error_rms),
-            ("expected RMS error in the end", a.expected_rms_limit),
-        ] {
-            if let Some(value) = value {
-                lines.push(format!("  {name:36} {value:.6e}"));
+/// Reads a law, native or written in Python, or the weights of an optimal one.
+fn read_law(
+    object: &Bound<'_, PyAny>,
+    model: &StateSpace,
+    n_samples: usize,
+) -> PyResult<Box<dyn Law>> {
+    if let Ok(named) = object.cast::<PyDict>() {
+        let mut weights = Weights::default();
+        for (name, value) in named {
+            let name: String = name.extract()?;
+            let value = number(&name, &value)?;
+            match name.as_str() {
+                "q" => weights.q = value,
+                "s" => weights.s = value,
+                "r" => weights.r = value,
+                "rate" => weights.rate = value,
+                _ => {
+                    return Err(PyValueError::new_err(format!(
+                        "law = {{{name:?}: {value}}}; the weights are q, s, r and rate"
+                    )));
+                }
             }
         }
-        lines.join("\n")
+        return Ok(Box::new(NormOptimal::new(model, n_samples, weights).or_raise()?));
     }
+    if !object.hasattr("update")? {
+        return Err(PyTypeError::new_err(format!(
+            "law = {}; an object with update(u, e, disturbance=None) or a dict of weights is needed",
+            object.repr()?
+        )));
+    }
+    laws::apart("law", object, n_samples, channels(model))
+}
 
-    fn __repr__(&self) -> String {
-        let a = &self.analysis;
-        let flag = |value: bool| if value { "True" } else { "False" };
-        format!(
-            "Analysis(converges={}, monotonic={}, spectral_radius={})",
-            flag(a.converges),
-            flag(a.monotonic),
-            a.spectral_radius.value
-        )
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn tune<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (model, n_samples) = (a.model("model")?, a.whole("n_samples")?);
+    let knowledge = Knowledge {
+        uncertainty: read_uncertainty(a)?,
+        noise_std: a.maybe_number("noise_std")?,
+        reference: read_reference(a, &model, Some(n_samples))?.map(|found| found.values),
+        n_runs: a.whole("n_runs")?,
+    };
+    let found = detached(a.py(), || propose(&model, n_samples, &knowledge)).or_raise()?;
+    let figures_of_law = figures(a.py(), &found.analysis, &model)?;
+    let step = |step: &TuningStep| {
+        let entry = PyDict::new(a.py());
+        entry.set_item("name", step.name)?;
+        entry.set_item("what", step.what)?;
+        entry.set_item("value", Some(step.value).filter(|value| value.is_finite()))?;
+        entry.set_item("why", &step.why)?;
+        Ok(entry)
+    };
+    let steps: PyResult<Vec<_>> = found.steps.iter().map(step).collect();
+    let figures = PyDict::new(a.py());
+    figures.set_item("q", found.q)?;
+    figures.set_item("s", found.s)?;
+    figures.set_item("r", found.r)?;
+    figures.set_item("smoothing_hz", found.smoothing_hz)?;
+    figures.set_item("steps", steps?)?;
+    figures.set_item("analysis", figures_of_law)?;
+    Ok(figures)
+}
+
+#[pyfunction]
+fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+    let py = errors.py();
+    let runs = Runs::read("errors", errors)?;
+    let Runs { count, n_samples, n_channels, is_flat, .. } = runs;
+    let found =
+        detached(py, || learning::repeatability(&runs.values, count, n_samples, n_channels))
+            .or_raise()?;
+    let figures = PyDict::new(py);
+    figures.set_item("mean", give_signal(py, found.mean, n_channels, is_flat)?)?;
+    figures.set_item("spread", give_signal(py, found.spread, n_channels, is_flat)?)?;
+    for (name, value) in [
+        ("mean_rms", found.mean_rms),
+        ("spread_rms", found.spread_rms),
+        ("ratio", found.ratio),
+        ("learnable", found.learnable),
+        ("least_rms", found.least_rms),
+        ("largest_rms", found.largest_rms),
+    ] {
+        figures.set_item(name, value)?;
     }
+    Ok(figures)
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyAnalysis>()
+    module.add_function(wrap_pyfunction!(analyze, module)?)?;
+    module.add_function(wrap_pyfunction!(refuse_divergent, module)?)?;
+    module.add_function(wrap_pyfunction!(tune, module)?)?;
+    module.add_function(wrap_pyfunction!(repeatability, module)?)
 }

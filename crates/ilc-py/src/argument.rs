@@ -43,8 +43,21 @@ impl Layout {
         Ok(())
     }
 
+    /// Refuses any other size.
+    pub(crate) fn require_exactly(
+        self,
+        name: &str,
+        n_samples: usize,
+        n_channels: usize,
+    ) -> PyResult<()> {
+        if (self.n_samples, self.n_channels) == (n_samples, n_channels) {
+            return Ok(());
+        }
+        Err(misfit(name, &self.shape(), &format!("({n_samples}, {n_channels})")))
+    }
+
     /// Returns the shape as it came from Python.
-    fn shape(self) -> Vec<usize> {
+    pub(crate) fn shape(self) -> Vec<usize> {
         if self.is_flat { vec![self.n_samples] } else { vec![self.n_samples, self.n_channels] }
     }
 }
@@ -214,7 +227,7 @@ pub(crate) fn read_numbers(
     name: &str,
     object: &Bound<'_, PyAny>,
 ) -> PyResult<(Vec<f64>, Vec<usize>)> {
-    let array = converted(name, object, false)?;
+    let array = in_order(name, object)?;
     let shape = array.shape().to_vec();
     let array = array.readonly();
     // One plain copy where the numbers lie in order, as they nearly always do.
@@ -225,20 +238,21 @@ pub(crate) fn read_numbers(
     Ok((values, shape))
 }
 
-/// Copies any array of float64 or integers into one of float64 in row-major order that is known to
-/// nobody else.
-pub(crate) fn private<'py>(
+/// Returns an array of float64 in row-major order: the very one that is given, if it is such.
+pub(crate) fn in_order<'py>(
     name: &str,
     object: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    converted(name, object, true)
+    if let Ok(array) = object.cast::<PyArrayDyn<f64>>()
+        && array.is_c_contiguous()
+        && array.data().is_aligned()
+    {
+        return Ok(array.clone());
+    }
+    converted(name, object)
 }
 
-fn converted<'py>(
-    name: &str,
-    object: &Bound<'py, PyAny>,
-    is_copied: bool,
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+fn converted<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let numpy = object.py().import("numpy")?;
     let array = numpy.call_method1("asarray", (object,)).map_err(|error| {
         PyValueError::new_err(format!("{name} is no array of numbers: {error}"))
@@ -253,8 +267,12 @@ fn converted<'py>(
             "{name} has dtype {dtype}; float64, or what widens to it, is needed"
         )));
     }
-    let array = array.call_method1("astype", ("float64", "C", "unsafe", false, is_copied))?;
-    Ok(array.cast_into::<PyArrayDyn<f64>>()?)
+    let array = array.call_method1("astype", ("float64", "C", "unsafe", false, false))?;
+    let array = array.cast_into::<PyArrayDyn<f64>>()?;
+    if array.data().is_aligned() {
+        return Ok(array);
+    }
+    Ok(array.call_method0("copy")?.cast_into::<PyArrayDyn<f64>>()?)
 }
 
 /// Returns the position of a flat index as Python would write it.

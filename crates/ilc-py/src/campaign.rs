@@ -21,7 +21,7 @@ use crate::argument::read_disturbance;
 use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::python_law::PythonLaw;
+use crate::python_law::{Channels, Frame, PythonLaw};
 
 /// Frames that may wait for the loop on the bus inside the process.
 const LOOPBACK_FRAMES: usize = 1024;
@@ -38,6 +38,8 @@ struct EventStream {
     events: Mutex<Receiver<String>>,
     thread: Mutex<Option<JoinHandle<Result<(), CampaignError>>>>,
     stop: Arc<AtomicI32>,
+    /// Of the law that is written in Python.
+    frame: Arc<Frame>,
 }
 
 #[pymethods]
@@ -61,10 +63,7 @@ impl EventStream {
 
     /// Bring the axes to rest; the events go on until they are.
     ///
-    /// Parameters
-    /// ----------
-    /// signal : int
-    ///     Number of the signal that asked for it.
+    /// - signal : int: Number of the signal that asked for it.
     #[pyo3(signature = (signal=SIGTERM))]
     fn stop(&self, signal: i32) {
         self.stop.store(signal, Ordering::Relaxed);
@@ -75,7 +74,12 @@ impl EventStream {
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         match thread.map(|thread| detached(py, || thread.join())) {
-            Some(Ok(ended)) => ended.or_raise(),
+            Some(Ok(ended)) => ended.or_raise().map_err(|error| {
+                if let Some(raised) = self.frame.take_raised() {
+                    error.set_cause(py, Some(raised));
+                }
+                error
+            }),
             Some(Err(_)) => Err(PyValueError::new_err("the campaign's thread died")),
             None => Ok(()),
         }
@@ -103,31 +107,17 @@ impl Drop for EventStream {
 ///
 /// With ``loopback:`` the simulated drives are in this process too.
 ///
-/// Parameters
-/// ----------
-/// cell : Cell
-///     The cell.
-/// arguments : list of str
-///     Options, as words of ``ilc-rt run`` or ``ilc-rt identify``; see
+/// - cell : Cell: The cell.
+/// - arguments : list of str: Options, as words of ``ilc-rt run`` or ``ilc-rt identify``; see
 ///     `described_options`.
-/// verb : {"run", "identify"}
-///     Run the program and learn, or excite an axis once.
-/// law : object or None
-///     A law with ``update(u, e, disturbance=None)`` instead of the cell's.
-/// disturbance : callable or None
-///     Called with the number of each run before it begins; returns its
-///     disturbance, a number or an array of shape (n_disturbances,).
+/// - verb : {"run", "identify"}: Run the program and learn, or excite an axis once.
+/// - law : object or None: A law with ``update(u, e, disturbance=None)`` instead of the cell's.
+/// - disturbance : callable or None: Called with the number of each run before it begins; returns
+///     its disturbance, a number or an array of shape (n_disturbances,).
 ///
-/// Returns
-/// -------
-/// EventStream
-///     An iterator of JSON texts.
-///
-/// Raises
-/// ------
-/// ValueError
-///     If an option cannot be used; from the iterator, before anything moves,
-///     if something else cannot.
+/// Returns EventStream: An iterator of JSON texts.
+/// Raises ValueError if an option cannot be used; from the iterator, before anything moves, if
+///     something else cannot.
 #[pyfunction]
 #[pyo3(signature = (cell, arguments, verb="run", law=None, disturbance=None))]
 fn run_events(
@@ -156,7 +146,11 @@ fn run_events(
         }
     }
     let stop = Arc::clone(&session.stop);
-    let law = law.map(|law| PythonLaw::new(law, cell.n_axes())).transpose()?;
+    let frame = Arc::new(Frame::default());
+    let n_axes = cell.n_axes();
+    let channels = Channels { n_inputs: n_axes, n_outputs: n_axes };
+    let law =
+        law.map(|law| PythonLaw::new("law", law, channels, Arc::clone(&frame))).transpose()?;
     let (sender, events) = sync_channel(EVENTS);
     let thread = std::thread::Builder::new().name("ilc-campaign".to_owned()).spawn(move || {
         let mut cell = cell;
@@ -179,7 +173,7 @@ fn run_events(
         }
         .map(drop)
     })?;
-    Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop })
+    Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop, frame })
 }
 
 /// Options of what the campaign's thread does.
@@ -201,17 +195,10 @@ impl Work {
 
 /// Check options as ``ilc-rt run`` or ``ilc-rt identify`` would.
 ///
-/// Parameters
-/// ----------
-/// verb : {"run", "identify"}
-///     Which verb.
-/// arguments : list of str
-///     Options, as words of its command line.
+/// - verb : {"run", "identify"}: Which verb.
+/// - arguments : list of str: Options, as words of its command line.
 ///
-/// Raises
-/// ------
-/// ValueError
-///     If an option cannot be used: its name, its value and what is allowed.
+/// Raises ValueError if an option cannot be used: its name, its value and what is allowed.
 #[pyfunction]
 fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
     Work::parse(verb, &arguments).map(drop)
@@ -219,20 +206,10 @@ fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
 
 /// Describe the options of ``ilc-rt run`` or ``ilc-rt identify``.
 ///
-/// Parameters
-/// ----------
-/// verb : {"run", "identify"}
-///     Which ones.
+/// - verb : {"run", "identify"}: Which ones.
 ///
-/// Returns
-/// -------
-/// str
-///     A JSON list: name, flags, help, kind, default, choices, placeholder.
-///
-/// Raises
-/// ------
-/// ValueError
-///     For another verb.
+/// Returns str: A JSON list: name, flags, help, kind, default, choices, placeholder.
+/// Raises ValueError for another verb.
 #[pyfunction]
 fn described_options(verb: &str) -> PyResult<String> {
     let options = match verb {

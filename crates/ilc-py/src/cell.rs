@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Axis, Cell, Interface, Measure};
+use ilc_rt::config::{Axis, Cell, Measure};
 use ilc_rt::design::{self, Plan};
 use pyo3::prelude::*;
 
@@ -35,22 +35,12 @@ pub(crate) struct PyCell {
 impl PyCell {
     /// Read a cell description from a TOML file.
     ///
-    /// Parameters
-    /// ----------
-    /// path : str or os.PathLike
-    ///     The file.
-    /// allow_divergent : bool
-    ///     Whether a law that will not converge with the cell's model is
+    /// - path : str or os.PathLike: The file.
+    /// - allow_divergent : bool: Whether a law that will not converge with the cell's model is
     ///     accepted, whatever the file says.
     ///
-    /// Returns
-    /// -------
-    /// Cell
-    ///
-    /// Raises
-    /// ------
-    /// ValueError
-    ///     In one line: file, key, value and what is allowed.
+    /// Returns Cell.
+    /// Raises ValueError in one line: file, key, value and what is allowed.
     #[staticmethod]
     #[pyo3(signature = (path, allow_divergent=false))]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
@@ -114,10 +104,7 @@ impl PyCell {
     /// Command interface of each axis: `csp` (input in m) or `csv` (in m/s).
     #[getter]
     fn interfaces(&self) -> Vec<&'static str> {
-        let name = |axis: &Axis| match axis.interface {
-            Interface::Csp => "csp",
-            Interface::Csv => "csv",
-        };
+        let name = |axis: &Axis| axis.interface.name();
         self.cell.axes.iter().map(name).collect()
     }
 
@@ -163,30 +150,21 @@ impl PyCell {
 
     /// Return the set points of a run, as the loop will give them.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (n_samples, n_axes)
-    ///     Positions in metres.
+    /// Returns ndarray of float64, shape (n_samples, n_axes): Positions in metres.
     fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give_signal(py, self.reference_m.clone(), self.cell.n_axes(), false)
     }
 
     /// Return the model that learning believes in, learned input to position.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     Inputs in the unit of each axis's interface, positions in metres.
+    /// Returns StateSpace: Inputs in the unit of each axis's interface, positions in metres.
     fn model(&self) -> PyResult<PyStateSpace> {
         design::learning_model(&self.cell).or_raise().map(PyStateSpace::from)
     }
 
     /// Return the error of a run without learning, by the model.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (n_samples, n_axes)
-    ///     Set point minus response in metres.
+    /// Returns ndarray of float64, shape (n_samples, n_axes): Set point minus response in metres.
     fn first_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let error = design::first_error(&self.cell, &self.reference_m).or_raise()?;
         give_signal(py, error, self.cell.n_axes(), false)

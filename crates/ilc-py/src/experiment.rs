@@ -6,7 +6,7 @@ use ilc_rt::identification::{
     self, Described, Experiment, ExperimentOptions, Form, IdentificationError, Identified, Signals,
     waveform_name,
 };
-use ilc_rt::model::identify::Waveform;
+use ilc_rt::model::identify::{Doubt, Waveform};
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -16,7 +16,7 @@ use crate::argument::read_vector;
 use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::identify::{PyFrequencyResponse, PySecondOrderFit, PyVelocityLoopFit};
+use crate::identify::{give_measured, give_second_order, give_velocity_loop};
 use crate::whole;
 
 /// Reads the name of a waveform.
@@ -42,29 +42,15 @@ impl From<IdentificationError> for Failure {
 
 /// Identify an axis of a cell by experiments, in narrower bands until a model fits.
 ///
-/// Parameters
-/// ----------
-/// cell : Cell
-///     The cell.
-/// arguments : list of str
-///     Options of the identification, as words of ``ilc-rt identify``.
-/// excite : callable
-///     Called with a dict of the experiment's figures; returns learned input
-///     and error as two arrays of shape (n_samples * n_axes,).
-/// report : callable
-///     Called with a sentence on each band.
+/// - cell : Cell: The cell.
+/// - arguments : list of str: Options of the identification, as words of ``ilc-rt identify``.
+/// - excite : callable: Called with a dict of the experiment's figures; returns learned input and
+///     error as two arrays of shape (n_samples * n_axes,).
+/// - report : callable: Called with a sentence on each band.
 ///
-/// Returns
-/// -------
-/// dict
-///     The experiment, its signals, response, models, uncertainty and doubt.
-///
-/// Raises
-/// ------
-/// ModelError
-///     If the response cannot be fitted.
-/// ValueError
-///     If an option cannot be used, or an amplitude is beyond a limit.
+/// Returns dict: The experiment, its signals, response, models, uncertainty and doubt.
+/// Raises ModelError if the response cannot be fitted.
+/// Raises ValueError if an option cannot be used, or an amplitude is beyond a limit.
 #[pyfunction]
 fn identify_axis<'py>(
     py: Python<'py>,
@@ -110,20 +96,10 @@ fn identify_axis<'py>(
 
 /// Return the experiment of options, in the default band where they give none.
 ///
-/// Parameters
-/// ----------
-/// arguments : list of str
-///     Options of the identification, as words of ``ilc-rt identify``.
+/// - arguments : list of str: Options of the identification, as words of ``ilc-rt identify``.
 ///
-/// Returns
-/// -------
-/// dict
-///     The figures of the experiment.
-///
-/// Raises
-/// ------
-/// ValueError
-///     If an option cannot be used.
+/// Returns dict: The figures of the experiment.
+/// Raises ValueError if an option cannot be used.
 #[pyfunction]
 fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'_, PyDict>> {
     let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
@@ -134,26 +110,13 @@ fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'
 
 /// Evaluate whole periods of input and output of any system.
 ///
-/// Parameters
-/// ----------
-/// u, y : array_like, shape (n_samples,)
-///     Input and output, whole periods.
-/// period_samples : int
-///     Samples in a period.
-/// from_hz, to_hz : float
-///     Band of the excitation in Hz.
-/// dt_s : float
-///     Sample time in seconds.
+/// - u, y : shape (n_samples,): Input and output, whole periods.
+/// - period_samples : int: Samples in a period.
+/// - from_hz, to_hz : float: Band of the excitation in Hz.
+/// - dt_s : float: Sample time in seconds.
 ///
-/// Returns
-/// -------
-/// dict
-///     Signals, response, models, uncertainty and doubt.
-///
-/// Raises
-/// ------
-/// ValueError, TypeError
-///     If the arrays cannot be used, or the response cannot be fitted.
+/// Returns dict: Signals, response, models, uncertainty and doubt.
+/// Raises ValueError, TypeError if the arrays cannot be used, or the response cannot be fitted.
 #[pyfunction]
 fn evaluate_experiment<'py>(
     py: Python<'py>,
@@ -189,13 +152,15 @@ fn describe(py: Python<'_>, found: Identified) -> PyResult<Bound<'_, PyDict>> {
     let array = |values: Vec<f64>| PyArray1::from_vec(py, values);
     let result = PyDict::new(py);
     result.set_item("axis_model", found.section())?;
+    let is_lost = matches!(found.doubt, Some(Doubt::Incoherent { .. } | Doubt::Silent));
+    result.set_item("followed", !is_lost)?;
     result.set_item("doubt", found.doubt.map(|doubt| doubt.to_string()))?;
-    result.set_item("model", PySecondOrderFit::from(found.fit))?;
+    result.set_item("model", give_second_order(py, &found.fit)?)?;
     match found.described {
-        Described::Position(fit) => result.set_item("described", PySecondOrderFit::from(fit))?,
-        Described::Velocity(fit) => result.set_item("described", PyVelocityLoopFit(fit))?,
+        Described::Position(fit) => result.set_item("described", give_second_order(py, &fit)?)?,
+        Described::Velocity(fit) => result.set_item("described", give_velocity_loop(py, &fit)?)?,
     }
-    result.set_item("measured", PyFrequencyResponse(found.measured))?;
+    result.set_item("measured", give_measured(py, found.measured)?)?;
     let bound = (array(found.uncertainty.frequency_hz), array(found.uncertainty.bound));
     result.set_item("uncertainty", bound)?;
     result.set_item("period_samples", found.period_samples)?;

@@ -1,49 +1,18 @@
-//! Mechanisms: `Delta`, `Gantry`.
+//! Mechanisms: what stands behind `Delta` and `Gantry` of `ilc_rt.kinematics`.
 
 use ilc_rt::kinematics::{Delta, Gantry, KinematicsError};
 use numpy::IntoPyArray;
 use numpy::ndarray::{Array2, Array3};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_signal, misfit};
+use crate::arguments::Arguments;
 use crate::error::OrRaise;
 use crate::exceptions;
-use crate::made::{Made, made};
+use crate::made::Made;
 
-/// Three-leg parallel mechanism.
-///
-/// Cranks at 0, 120 and 240 degrees around a base, each with a rod to the tool,
-/// which stands above the knees:
-/// ``|p - k_i| = rod``, ``k_i = Rz(phi_i) (base + crank cos theta_i, 0, crank sin theta_i)``
-///
-/// Parameters
-/// ----------
-/// base_m : float
-///     Radius at which the cranks turn, less the radius at which the rods are
-///     fixed to the tool, in m.
-/// crank_m : float
-///     Length of a crank in m.
-/// rod_m : float
-///     Length of a rod in m.
-///
-/// Raises
-/// ------
-/// KinematicsError
-///     If the lengths make no mechanism.
-///
-/// References
-/// ----------
-/// [barton2010], Ch. 7, with the lengths of App. C as defaults.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np
-/// >>> from ilc_rt.kinematics import Delta
-/// >>> delta = Delta()
-/// >>> theta_rad = delta.inverse([0.01, 0.0, 0.18])
-/// >>> bool(np.allclose(delta.forward(theta_rad), [0.01, 0.0, 0.18]))
-/// True
-#[pyclass(name = "Delta", module = "ilc_rt.kinematics", frozen)]
+#[pyclass(name = "Delta", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
 struct PyDelta {
     made: Made,
@@ -53,13 +22,13 @@ struct PyDelta {
 #[pymethods]
 impl PyDelta {
     #[new]
-    #[pyo3(signature = (base_m=0.037, crank_m=0.060, rod_m=0.145))]
-    fn new(base_m: f64, crank_m: f64, rod_m: f64) -> PyResult<Self> {
-        let made = made!(base_m, crank_m, rod_m);
-        Ok(Self { made, delta: Delta::new(base_m, crank_m, rod_m).or_raise()? })
+    #[pyo3(signature = (**keywords))]
+    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let a = Arguments::of(keywords)?;
+        let delta = Delta::new(a.number("base_m")?, a.number("crank_m")?, a.number("rod_m")?);
+        Ok(Self { made: Made::of(a)?, delta: delta.or_raise()? })
     }
 
-    /// Pickled and copied as the call that made it.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().made.reduce(slf.get_type().as_any())
     }
@@ -84,22 +53,9 @@ impl PyDelta {
 
     /// Return where the tool is.
     ///
-    /// Parameters
-    /// ----------
-    /// theta_rad : ndarray of float64, shape (3,) or (n_samples, 3)
-    ///     Crank angles in rad.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, same shape
-    ///     Tool positions in m.
-    ///
-    /// Raises
-    /// ------
-    /// KinematicsError
-    ///     If the rods do not meet; it names the angles and the sample.
-    /// ValueError, TypeError
-    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    /// Takes theta_rad, shape (3,) or (n_samples, 3): Crank angles in rad.
+    /// Returns ndarray of float64, same shape: Tool positions in m.
+    /// Raises KinematicsError if the rods do not meet; it names the angles and the sample.
     fn forward<'py>(
         &self,
         py: Python<'py>,
@@ -112,22 +68,9 @@ impl PyDelta {
 
     /// Return the crank angles that bring the tool to a place, knees outward.
     ///
-    /// Parameters
-    /// ----------
-    /// p_m : ndarray of float64, shape (3,) or (n_samples, 3)
-    ///     Tool positions in m.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, same shape
-    ///     Crank angles in rad.
-    ///
-    /// Raises
-    /// ------
-    /// KinematicsError
-    ///     If a pose is out of reach; it names the pose, the leg and the sample.
-    /// ValueError, TypeError
-    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    /// Takes p_m, shape (3,) or (n_samples, 3): Tool positions in m.
+    /// Returns ndarray of float64, same shape: Crank angles in rad.
+    /// Raises KinematicsError if a pose is out of reach; it names the pose, the leg and the sample.
     fn inverse<'py>(
         &self,
         py: Python<'py>,
@@ -140,22 +83,9 @@ impl PyDelta {
 
     /// Return how crank velocities become tool velocities, in m/rad.
     ///
-    /// Parameters
-    /// ----------
-    /// theta_rad : ndarray of float64, shape (3,) or (n_samples, 3)
-    ///     Crank angles in rad.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (3, 3) or (n_samples, 3, 3)
-    ///     Jacobians, ``dp = J dtheta``.
-    ///
-    /// Raises
-    /// ------
-    /// KinematicsError
-    ///     If the rods do not meet, or the mechanism is singular there.
-    /// ValueError, TypeError
-    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    /// Takes theta_rad, shape (3,) or (n_samples, 3): Crank angles in rad.
+    /// Returns ndarray of float64, shape (3, 3) or (n_samples, 3, 3): Jacobians, ``dp = J dtheta``.
+    /// Raises KinematicsError if the rods do not meet, or the mechanism is singular there.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -176,45 +106,13 @@ impl PyDelta {
         Ok(jacobians.into_pyarray(py).into_any())
     }
 
-    /// Return whether the tool can be at a place and move on in every direction.
-    ///
-    /// Parameters
-    /// ----------
-    /// p_m : ndarray of float64, shape (3,)
-    ///     Tool position in m.
-    ///
-    /// Returns
-    /// -------
-    /// bool
-    ///     False where it is out of reach or singular.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    /// Return whether the tool can be at a place in m, shape (3,), and move on in every direction.
     fn in_workspace(&self, p_m: &Bound<'_, PyAny>) -> PyResult<bool> {
         let poses = Poses::read("p_m", p_m)?;
         Ok(poses.values.iter().all(|pose| self.delta.is_in_workspace(*pose)))
     }
 
-    /// Return how unevenly the cranks move the tool.
-    ///
-    /// Parameters
-    /// ----------
-    /// theta_rad : ndarray of float64, shape (3,)
-    ///     Crank angles in rad.
-    ///
-    /// Returns
-    /// -------
-    /// float
-    ///     Largest over smallest singular value of the Jacobian; 1 is even.
-    ///
-    /// Raises
-    /// ------
-    /// KinematicsError
-    ///     As `jacobian`.
-    /// ValueError, TypeError
-    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    /// Return the condition of the Jacobian for crank angles in rad, shape (3,); 1 is isotropic.
     fn condition(&self, theta_rad: &Bound<'_, PyAny>) -> PyResult<f64> {
         let poses = Poses::read("theta_rad", theta_rad)?;
         if !poses.is_single {
@@ -229,30 +127,7 @@ impl PyDelta {
     }
 }
 
-/// Gantry whose second axis is out of square.
-///
-/// ``x_tool = x + orthogonality_rad y``, ``y_tool = y``
-///
-/// Parameters
-/// ----------
-/// orthogonality_rad : float
-///     Error of the right angle in rad.
-///
-/// Raises
-/// ------
-/// KinematicsError
-///     If the angle is not a number.
-///
-/// References
-/// ----------
-/// [haas2016], Sect. 4.
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt.kinematics import Gantry
-/// >>> Gantry(0.002).forward([0.0, 1.0])
-/// array([0.002, 1.   ])
-#[pyclass(name = "Gantry", module = "ilc_rt.kinematics", frozen)]
+#[pyclass(name = "Gantry", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
 struct PyGantry {
     made: Made,
@@ -262,13 +137,13 @@ struct PyGantry {
 #[pymethods]
 impl PyGantry {
     #[new]
-    #[pyo3(signature = (orthogonality_rad=0.0))]
-    fn new(orthogonality_rad: f64) -> PyResult<Self> {
-        let made = made!(orthogonality_rad);
-        Ok(Self { made, gantry: Gantry::new(orthogonality_rad).or_raise()? })
+    #[pyo3(signature = (**keywords))]
+    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let a = Arguments::of(keywords)?;
+        let gantry = Gantry::new(a.number("orthogonality_rad")?).or_raise()?;
+        Ok(Self { made: Made::of(a)?, gantry })
     }
 
-    /// Pickled and copied as the call that made it.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().made.reduce(slf.get_type().as_any())
     }
@@ -281,20 +156,8 @@ impl PyGantry {
 
     /// Return where the tool is.
     ///
-    /// Parameters
-    /// ----------
-    /// axes_m : ndarray of float64, shape (2,) or (n_samples, 2)
-    ///     Axis positions in m.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, same shape
-    ///     Tool positions in m.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    /// Takes axes_m, shape (2,) or (n_samples, 2): Axis positions in m.
+    /// Returns ndarray of float64, same shape: Tool positions in m.
     fn forward<'py>(
         &self,
         py: Python<'py>,
@@ -305,20 +168,8 @@ impl PyGantry {
 
     /// Return the axis positions that bring the tool to a place.
     ///
-    /// Parameters
-    /// ----------
-    /// tool_m : ndarray of float64, shape (2,) or (n_samples, 2)
-    ///     Tool positions in m.
-    ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, same shape
-    ///     Axis positions in m.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     If the array has the wrong shape, dtype or a number that is not finite.
+    /// Takes tool_m, shape (2,) or (n_samples, 2): Tool positions in m.
+    /// Returns ndarray of float64, same shape: Axis positions in m.
     fn inverse<'py>(
         &self,
         py: Python<'py>,
@@ -329,10 +180,7 @@ impl PyGantry {
 
     /// Return how axis velocities become tool velocities.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (2, 2)
-    ///     Jacobian; the same everywhere.
+    /// Returns ndarray of float64, shape (2, 2): Jacobian; the same everywhere.
     fn jacobian<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         let rows = self.gantry.jacobian();
         Array2::from_shape_fn((2, 2), |(row, col)| rows[row][col]).into_pyarray(py).into_any()

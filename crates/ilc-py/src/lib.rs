@@ -3,7 +3,7 @@
 //! One file per family of Python names, each with its `register`; `argument` checks what comes in,
 //! `exceptions` and `error` say what is raised, and `detached` lets the interpreter go.
 //!
-//! Family: `laws`, `python_law` and `weights` read each other's arguments.
+//! Family: `laws` and `python_law` call each other: a law inside another one may be written in Python.
 //!
 //! Family: `model` and `model_argument` read each other's arguments.
 //!
@@ -12,8 +12,8 @@
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
 mod analysis;
-mod analyze;
 mod argument;
+mod arguments;
 mod campaign;
 mod cell;
 mod contour;
@@ -22,6 +22,7 @@ mod detached;
 mod error;
 mod exceptions;
 mod experiment;
+mod guard;
 mod held;
 mod identify;
 mod kinematics;
@@ -36,7 +37,6 @@ mod signal;
 mod time_varying;
 mod trajectory;
 mod transport;
-mod tuning;
 mod weights;
 mod whole;
 
@@ -60,8 +60,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     laws::register(module)?;
     weights::register(module)?;
     analysis::register(module)?;
-    analyze::register(module)?;
-    tuning::register(module)?;
     cell::register(module)?;
     library::register(module)?;
     campaign::register(module)?;

@@ -20,19 +20,10 @@ const NAME_MAX: usize = 200;
 
 /// Every run of every campaign, in one SQLite file.
 ///
-/// Parameters
-/// ----------
-/// path : str or os.PathLike
-///     The file; it is made if it is not there. ``:memory:`` is a library in
-///     memory. The name is never taken for an address.
+/// - path : str or os.PathLike: The file; it is made if it is not there. ``:memory:`` is a library
+///     in memory. The name is never taken for an address.
 ///
-/// Raises
-/// ------
-/// OSError
-///     If the file cannot be opened or is no library; it is left as it is.
-///
-/// Notes
-/// -----
+/// Raises OSError if the file cannot be opened or is no library; it is left as it is.
 /// What reads opens the file for reading only, and for no longer than that: a
 /// library that cannot be written is read all the same, and nothing is left
 /// beside it.
@@ -89,22 +80,12 @@ impl PyLibrary {
 
     /// Return the runs kept, oldest first, without their arrays.
     ///
-    /// Parameters
-    /// ----------
-    /// cell : str or None
-    ///     Only runs of the cell of this name.
+    /// - cell : str or None: Only runs of the cell of this name.
     ///
-    /// Returns
-    /// -------
-    /// list of dict
-    ///     Provenance and figures of each run; lengths in metres, angles in radians. A
-    ///     figure over several axes is over the linear ones, or over all of a cell
-    ///     whose axes are all rotary; contour errors are None where the path has none.
-    ///
-    /// Raises
-    /// ------
-    /// OSError
-    ///     If the file cannot be read.
+    /// Returns list of dict: Provenance and figures of each run; lengths in metres, angles in
+    ///     radians. A figure over several axes is over the linear ones, or over all of a cell whose
+    ///     axes are all rotary; contour errors are None where the path has none.
+    /// Raises OSError if the file cannot be read.
     #[pyo3(signature = (cell=None))]
     fn list<'py>(&self, py: Python<'py>, cell: Option<&str>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let rows = detached(py, || self.read(|library| library.list(None))).or_raise()?;
@@ -116,24 +97,13 @@ impl PyLibrary {
 
     /// Return one run with its arrays.
     ///
-    /// Parameters
-    /// ----------
-    /// id : int
-    ///     Key of the run, as `list` gives it.
+    /// - id : int: Key of the run, as `list` gives it.
     ///
-    /// Returns
-    /// -------
-    /// dict
-    ///     What `list` gives, and ``law_parameters`` and ``program`` (JSON),
-    ///     ``reference_m``, ``input``, ``encoder_m``, ``tool_m`` (or None),
-    ///     ``error_m`` of shape (n_samples, n_axes), ``contour_m`` of shape
-    ///     (n_samples,) (None: the path has no contour), ``disturbance`` of shape
-    ///     (n_disturbances,) (None: none is measured).
-    ///
-    /// Raises
-    /// ------
-    /// OSError
-    ///     If there is no such run, or its arrays do not match their digest.
+    /// Returns dict: What `list` gives, and ``law_parameters`` and ``program`` (JSON),
+    ///     ``reference_m``, ``input``, ``encoder_m``, ``tool_m`` (or None), ``error_m`` of shape
+    ///     (n_samples, n_axes), ``contour_m`` of shape (n_samples,) (None: the path has no
+    ///     contour), ``disturbance`` of shape (n_disturbances,) (None: none is measured).
+    /// Raises OSError if there is no such run, or its arrays do not match their digest.
     fn load<'py>(
         &self,
         py: Python<'py>,
@@ -164,27 +134,14 @@ impl PyLibrary {
 
     /// Return the runs made under a disturbance like this one, nearest first.
     ///
-    /// Parameters
-    /// ----------
-    /// disturbance : float or array_like of float64, shape (n_disturbances,)
-    ///     The disturbance.
-    /// top : int
-    ///     How many runs at most.
-    /// cell : str or None
-    ///     Only runs of the cell of this name.
+    /// - disturbance : float or shape (n_disturbances,): The disturbance.
+    /// - top : int: How many runs at most.
+    /// - cell : str or None: Only runs of the cell of this name.
     ///
-    /// Returns
-    /// -------
-    /// list of dict
-    ///     What `list` gives of each, and ``distance``, in the unit of the
+    /// Returns list of dict: What `list` gives of each, and ``distance``, in the unit of the
     ///     disturbance. Of equally near runs the older comes first.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     If the disturbance is no number, or not finite.
-    /// OSError
-    ///     If the file cannot be read.
+    /// Raises ValueError, TypeError if the disturbance is no number, or not finite.
+    /// Raises OSError if the file cannot be read.
     #[pyo3(signature = (disturbance, top=30, cell=None))]
     fn recall<'py>(
         &self,
@@ -209,35 +166,18 @@ impl PyLibrary {
 
     /// Keep a run that was made elsewhere.
     ///
-    /// Parameters
-    /// ----------
-    /// u : ndarray of float64, shape (n_samples,) or (n_samples, n_axes)
-    ///     Its learned input, in m or m/s.
-    /// e : ndarray of float64, same shape as `u`
-    ///     Its error in m, reference minus measurement.
-    /// cycle_s : float
-    ///     Its sample time in s.
-    /// disturbance : float, array_like of float64 or None
-    ///     The disturbance it was made under, shape (n_disturbances,).
-    /// reference_m : ndarray of float64 or None
-    ///     Its set points in m, same shape as `u`; None: zero, so that its path is
-    ///     one point. The contour error is the distance to the path near the same
-    ///     time.
-    /// cell, campaign, law : str
-    ///     Names; its number follows the last one of the campaign.
+    /// - u : shape (n_samples,) or (n_samples, n_axes): Its learned input, in m or m/s.
+    /// - e : ndarray of float64, same shape as `u`: Its error in m, reference minus measurement.
+    /// - cycle_s : float: Its sample time in s.
+    /// - disturbance : float, array_like of float64 or None: The disturbance it was made under,
+    ///     shape (n_disturbances,).
+    /// - reference_m : ndarray of float64 or None: Its set points in m, same shape as `u`; None:
+    ///     zero, so that its path is one point. The contour error is the distance to the path near
+    ///     the same time.
+    /// - cell, campaign, law : str: Names; its number follows the last one of the campaign.
     ///
-    /// Returns
-    /// -------
-    /// int
-    ///     Key of the run.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     If an array has the wrong shape, dtype or a number that is not finite,
-    ///     cycle_s is not above 0, or a name is empty or has control characters.
-    /// OSError
-    ///     If the file cannot be written.
+    /// Returns int: Key of the run.
+    /// Raises OSError if the file cannot be written.
     ///
     /// Examples
     /// --------
@@ -350,27 +290,12 @@ impl PyLibrary {
 
     /// Delete all but the most relevant runs, and return how many were deleted.
     ///
-    /// Parameters
-    /// ----------
-    /// keep : int
-    ///     How many runs stay.
-    /// cell : str or None
-    ///     Only among runs of the cell of this name.
+    /// - keep : int: How many runs stay.
+    /// - cell : str or None: Only among runs of the cell of this name.
     ///
-    /// Returns
-    /// -------
-    /// int
-    ///     Runs deleted.
-    ///
-    /// Raises
-    /// ------
-    /// OSError
-    ///     If the file cannot be written, or the runs have different numbers of
-    ///     disturbances (nothing is deleted then), or the file could not be made
-    ///     smaller.
-    ///
-    /// Notes
-    /// -----
+    /// Returns int: Runs deleted.
+    /// Raises OSError if the file cannot be written, or the runs have different numbers of
+    ///     disturbances (nothing is deleted then), or the file could not be made smaller.
     /// The relevance of DPW-ILC with RMS error and disturbance in units of their
     /// spread over these runs, summed over the disturbances of all of them; without
     /// disturbances the smallest errors stay. The file becomes smaller.
@@ -387,19 +312,11 @@ impl PyLibrary {
 
     /// Write one run to a file: ``.npz``, ``.csv`` or ``.json`` by its ending.
     ///
-    /// Parameters
-    /// ----------
-    /// id : int
-    ///     Key of the run, as `list` gives it.
-    /// path : str or os.PathLike
-    ///     The file.
+    /// - id : int: Key of the run, as `list` gives it.
+    /// - path : str or os.PathLike: The file.
     ///
-    /// Raises
-    /// ------
-    /// BadInputError
-    ///     If the ending is unknown or the file cannot be written.
-    /// OSError
-    ///     If there is no such run, or its arrays do not match their digest.
+    /// Raises BadInputError if the ending is unknown or the file cannot be written.
+    /// Raises OSError if there is no such run, or its arrays do not match their digest.
     fn export(
         &self,
         py: Python<'_>,
@@ -437,7 +354,6 @@ impl PyLibrary {
 
 fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     let run = PyDict::new(py);
-    let figures = &row.record.figures;
     run.set_item("id", row.id)?;
     run.set_item("created_utc", &row.created_utc)?;
     run.set_item("cell", &row.meta.cell)?;
@@ -452,21 +368,9 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     run.set_item("input_units", &row.meta.input_units)?;
     let disturbance = &row.record.disturbance;
     run.set_item("disturbance", (!disturbance.is_empty()).then_some(disturbance))?;
-    run.set_item("tracking_inf_m", figures.tracking_inf_m)?;
-    run.set_item("tracking_rms_m", figures.tracking_rms_m)?;
-    run.set_item("contour_inf_m", figures.contour_inf_m)?;
-    run.set_item("contour_rms_m", figures.contour_rms_m)?;
-    run.set_item("encoder_tracking_inf_m", figures.encoder_tracking_inf_m)?;
-    run.set_item("tool_tracking_inf_m", figures.tool_tracking_inf_m)?;
-    run.set_item("overruns", figures.overruns)?;
-    run.set_item("missing_samples", figures.missing_samples)?;
-    run.set_item("late_updates", figures.late_updates)?;
-    run.set_item("update_ms", figures.update_ms)?;
-    run.set_item("rolled_back", figures.rolled_back)?;
-    run.set_item("learning_off", figures.learning_off)?;
-    run.set_item("remark", &figures.remark)?;
-    run.set_item("axes_tracking_inf_m", &figures.axes_tracking_inf_m)?;
-    run.set_item("axes_tracking_rms_m", &figures.axes_tracking_rms_m)?;
+    let described = serde_json::to_string(&row.record.figures)
+        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    run.update(py.import("json")?.call_method1("loads", (described,))?.cast()?)?;
     run.set_item("digest", &row.digest)?;
     Ok(run)
 }

@@ -5,8 +5,10 @@
 //! up since is not in it.
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::PyDict;
 use pyo3::wrap_pyfunction;
+
+use crate::arguments::Arguments;
 
 /// The call that made an object.
 #[derive(Debug)]
@@ -14,8 +16,6 @@ pub(crate) struct Made {
     /// Name of what was called if not the class itself: one of its static methods, or a function.
     how: Option<&'static str>,
     arguments: Py<PyDict>,
-    /// The attribute of the result that the object is.
-    part: Option<&'static str>,
 }
 
 impl Made {
@@ -27,36 +27,25 @@ impl Made {
         Python::attach(|py| {
             let arguments = PyDict::new(py);
             fill(&arguments)?;
-            // What the caller may change later is copied now.
-            for (name, value) in &arguments {
-                if value.is_instance_of::<PyList>() || value.hasattr("__array_interface__")? {
-                    let copy = py.import("copy")?.getattr("deepcopy")?.call1((value,))?;
-                    arguments.set_item(name, copy)?;
-                }
-            }
-            Ok(Self { how, arguments: arguments.unbind(), part: None })
+            Ok(Self { how, arguments: Arguments::new(&arguments).kept()?.unbind() })
         })
     }
 
-    /// The same call, for what is one attribute of its result.
-    pub(crate) fn part(&self, py: Python<'_>, part: &'static str) -> Self {
-        Self { how: self.how, arguments: self.arguments.clone_ref(py), part: Some(part) }
+    /// Takes down a call of the class with these keywords.
+    pub(crate) fn of(arguments: Arguments<'_, '_>) -> PyResult<Self> {
+        Ok(Self { how: None, arguments: arguments.kept()?.unbind() })
     }
 
     /// Returns the call as Python would write it, for a class of this name.
     pub(crate) fn shown(&self, py: Python<'_>, name: &str) -> PyResult<String> {
-        let mut words = Vec::new();
-        for (key, value) in self.arguments.bind(py) {
-            words.push(format!("{key}={}", value.repr()?));
-        }
-        Ok(format!("{name}({})", words.join(", ")))
+        Arguments::new(self.arguments.bind(py)).call(name)
     }
 
     /// Returns what `__reduce__` returns for an object of a class.
     pub(crate) fn reduce(&self, class: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
         let py = class.py();
         let maker = py.import("ilc_rt._native")?.getattr("_made")?;
-        let parts = (class, self.how, &self.arguments, self.part);
+        let parts = (class, self.how, &self.arguments);
         Ok((maker, parts).into_pyobject(py)?.into_any().unbind())
     }
 }
@@ -76,20 +65,18 @@ pub(crate) use made;
 
 /// Makes an object again by the call that made it.
 #[pyfunction]
-#[pyo3(signature = (cls, how, arguments, part))]
+#[pyo3(signature = (cls, how, arguments))]
 fn _made<'py>(
     cls: &Bound<'py, PyAny>,
     how: Option<&str>,
     arguments: &Bound<'py, PyDict>,
-    part: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let maker = match how {
         None => cls.clone(),
         Some(how) if cls.hasattr(how)? => cls.getattr(how)?,
         Some(how) => cls.py().import("ilc_rt._native")?.getattr(how)?,
     };
-    let object = maker.call((), Some(arguments))?;
-    part.map_or(Ok(object.clone()), |part| object.getattr(part))
+    maker.call((), Some(arguments))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -3,11 +3,11 @@
 use ilc_rt::model::{self, Method, StateSpace};
 use numpy::IntoPyArray;
 use numpy::ndarray::{Array1, Array3};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
@@ -17,29 +17,15 @@ use crate::whole;
 ///
 /// ``x[k+1] = A x[k] + B u[k]``, ``y[k] = C x[k] + D u[k]``.
 ///
-/// Parameters
-/// ----------
-/// a : array_like, shape (n_states, n_states)
-///     State matrix.
-/// b : array_like, shape (n_states, n_inputs)
-///     Input matrix.
-/// c : array_like, shape (n_outputs, n_states)
-///     Output matrix.
-/// d : array_like, shape (n_outputs, n_inputs)
-///     Feedthrough matrix.
-/// dt_s : float or None
-///     Sample time in seconds; None or 0 for a continuous model.
+/// - a : shape (n_states, n_states): State matrix.
+/// - b : shape (n_states, n_inputs): Input matrix.
+/// - c : shape (n_outputs, n_states): Output matrix.
+/// - d : shape (n_outputs, n_inputs): Feedthrough matrix.
+/// - dt_s : float or None: Sample time in seconds; None or 0 for a continuous model.
 ///
-/// Raises
-/// ------
-/// ModelError
-///     If the matrices do not fit each other.
-/// ValueError, TypeError
-///     If a matrix has the wrong number of axes, holds a number that is not
-///     finite, or is not of real numbers.
-///
-/// Notes
-/// -----
+/// Raises ModelError if the matrices do not fit each other.
+/// Raises ValueError, TypeError if a matrix has the wrong number of axes, holds a number that is
+///     not finite, or is not of real numbers.
 /// Objects of scipy.signal and python-control are accepted wherever a model is.
 ///
 /// Examples
@@ -137,24 +123,12 @@ impl PyStateSpace {
 
     /// Return the output that an input produces.
     ///
-    /// Parameters
-    /// ----------
-    /// u : ndarray of float64, shape (n_samples,) or (n_samples, n_inputs)
-    ///     Input.
-    /// x0 : array_like or None, shape (n_states,)
-    ///     State at the first sample; zero if None.
+    /// - u : shape (n_samples,) or (n_samples, n_inputs): Input.
+    /// - x0 : array_like or None, shape (n_states,): State at the first sample; zero if None.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (n_samples,) or (n_samples, n_outputs)
-    ///     Output; without channel axis if `u` has none and there is one output.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If the model is continuous or `x0` does not fit it.
-    /// ValueError, TypeError
-    ///     If `u` has the wrong shape, dtype or a number that is not finite.
+    /// Returns ndarray of float64, shape (n_samples,) or (n_samples, n_outputs): Output; without
+    ///     channel axis if `u` has none and there is one output.
+    /// Raises ModelError if the model is continuous or `x0` does not fit it.
     #[pyo3(signature = (u, x0=None))]
     fn simulate<'py>(
         &self,
@@ -170,20 +144,11 @@ impl PyStateSpace {
 
     /// Return the first Markov parameters: D, CB, CAB, ...
     ///
-    /// Parameters
-    /// ----------
-    /// n : int
-    ///     How many.
+    /// - n : int: How many.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (n, n_outputs, n_inputs)
-    ///     Response to a unit pulse, sample by sample.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If the model is continuous.
+    /// Returns ndarray of float64, shape (n, n_outputs, n_inputs): Response to a unit pulse, sample
+    ///     by sample.
+    /// Raises ModelError if the model is continuous.
     fn markov<'py>(
         &self,
         py: Python<'py>,
@@ -197,21 +162,12 @@ impl PyStateSpace {
 
     /// Return the dense matrix that maps a whole input to a whole output.
     ///
-    /// Parameters
-    /// ----------
-    /// n : int
-    ///     Number of samples of a run.
+    /// - n : int: Number of samples of a run.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (n * n_outputs, n * n_inputs)
-    ///     Block lower-triangular Toeplitz matrix of the Markov parameters, for
-    ///     analysis; signals are stacked sample by sample.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If the model is continuous.
+    /// Returns ndarray of float64, shape (n * n_outputs, n * n_inputs): Block lower-triangular
+    ///     Toeplitz matrix of the Markov parameters, for analysis; signals are stacked sample by
+    ///     sample.
+    /// Raises ModelError if the model is continuous.
     fn lifted<'py>(
         &self,
         py: Python<'py>,
@@ -223,15 +179,8 @@ impl PyStateSpace {
 
     /// Return the poles, the eigenvalues of A.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of complex128, shape (n_states,)
-    ///     Poles in no particular order.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If the eigenvalue iteration does not end.
+    /// Returns ndarray of complex128, shape (n_states,): Poles in no particular order.
+    /// Raises ModelError if the eigenvalue iteration does not end.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let poles = self.0.poles().or_raise()?;
         Ok(Array1::from(poles).into_pyarray(py).into_any())
@@ -239,22 +188,11 @@ impl PyStateSpace {
 
     /// Return the closed loop with a controller, y = P (r - K y).
     ///
-    /// Parameters
-    /// ----------
-    /// controller : StateSpace or compatible
-    ///     K, from the outputs to the inputs of this model P.
+    /// - controller : StateSpace or compatible: K, from the outputs to the inputs of this model P.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     From set-point r to output y: P / (1 + P K).
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If sample times or signals do not match, or the loop is not well posed.
-    /// TypeError
-    ///     If `controller` is no model.
+    /// Returns StateSpace: From set-point r to output y: P / (1 + P K).
+    /// Raises ModelError if sample times or signals do not match, or the loop is not well posed.
+    /// Raises TypeError if `controller` is no model.
     fn feedback(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.feedback(&controller).or_raise().map(Self)
@@ -262,22 +200,11 @@ impl PyStateSpace {
 
     /// Return this model followed by another, y = next(self(u)).
     ///
-    /// Parameters
-    /// ----------
-    /// next : StateSpace or compatible
-    ///     Model that takes this one's outputs.
+    /// - next : StateSpace or compatible: Model that takes this one's outputs.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     From the input of this model to the output of `next`.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If sample times or signals do not match.
-    /// TypeError
-    ///     If `next` is no model.
+    /// Returns StateSpace: From the input of this model to the output of `next`.
+    /// Raises ModelError if sample times or signals do not match.
+    /// Raises TypeError if `next` is no model.
     fn series(&self, next: &Bound<'_, PyAny>) -> PyResult<Self> {
         let next = read_model("next", next)?;
         self.0.series(&next).or_raise().map(Self)
@@ -285,22 +212,12 @@ impl PyStateSpace {
 
     /// Return two sets of axes side by side.
     ///
-    /// Parameters
-    /// ----------
-    /// other : StateSpace or compatible
-    ///     Axes whose inputs and outputs follow those of this model.
+    /// - other : StateSpace or compatible: Axes whose inputs and outputs follow those of this
+    ///     model.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     Block-diagonal model.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If sample times differ.
-    /// TypeError
-    ///     If `other` is no model.
+    /// Returns StateSpace: Block-diagonal model.
+    /// Raises ModelError if sample times differ.
+    /// Raises TypeError if `other` is no model.
     fn append(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
         let other = read_model("other", other)?;
         self.0.append(&other).or_raise().map(Self)
@@ -308,39 +225,19 @@ impl PyStateSpace {
 
     /// Return the model with every input delayed, as by a bus.
     ///
-    /// Parameters
-    /// ----------
-    /// n_samples : int
-    ///     By how many samples.
+    /// - n_samples : int: By how many samples.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     Model with `n_samples` more states for each input.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If the model is continuous.
+    /// Returns StateSpace: Model with `n_samples` more states for each input.
+    /// Raises ModelError if the model is continuous.
     fn delayed(&self, #[pyo3(from_py_with = whole::n_samples)] n_samples: usize) -> PyResult<Self> {
         self.0.delayed(n_samples).or_raise().map(Self)
     }
 
     /// Return the invariant zeros, where an input cancels in every output.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of complex128, shape (n_zeros,)
-    ///     Finite zeros in no particular order.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If the transfer matrix has dependent rows or columns everywhere.
-    ///
-    /// References
-    /// ----------
-    /// [emami1982].
+    /// Returns ndarray of complex128, shape (n_zeros,): Finite zeros in no particular order.
+    /// Raises ModelError if the transfer matrix has dependent rows or columns everywhere.
+    /// Source: [emami1982].
     fn zeros<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let zeros = detached(py, || self.0.zeros()).or_raise()?;
         Ok(Array1::from(zeros).into_pyarray(py).into_any())
@@ -348,35 +245,18 @@ impl PyStateSpace {
 
     /// Return the static gain, G(0) or G(z = 1).
     ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (n_outputs, n_inputs)
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If the model integrates.
+    /// Returns ndarray of float64, shape (n_outputs, n_inputs).
+    /// Raises ModelError if the model integrates.
     fn dc_gain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(give_matrix(py, &self.0.dc_gain().or_raise()?))
     }
 
     /// Return the response to sinusoids, C (q I - A)^-1 B + D.
     ///
-    /// Parameters
-    /// ----------
-    /// w_rad_s : array_like, shape (n_frequencies,)
-    ///     Frequencies in rad/s.
+    /// - w_rad_s : shape (n_frequencies,): Frequencies in rad/s.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of complex128, shape (n_frequencies, n_outputs, n_inputs)
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If a frequency is a pole of the model.
-    /// ValueError, TypeError
-    ///     If `w_rad_s` has the wrong shape or holds a number that is not finite.
+    /// Returns ndarray of complex128, shape (n_frequencies, n_outputs, n_inputs).
+    /// Raises ModelError if a frequency is a pole of the model.
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
@@ -391,22 +271,12 @@ impl PyStateSpace {
 
     /// Return magnitude and phase of one channel, the phase without jumps.
     ///
-    /// Parameters
-    /// ----------
-    /// w_rad_s : array_like, shape (n_frequencies,)
-    ///     Frequencies in rad/s.
-    /// output, input : int
-    ///     Which channel, counted from 0.
+    /// - w_rad_s : shape (n_frequencies,): Frequencies in rad/s.
+    /// - output, input : int: Which channel, counted from 0.
     ///
-    /// Returns
-    /// -------
-    /// magnitude : ndarray of float64, shape (n_frequencies,)
-    /// phase_rad : ndarray of float64, shape (n_frequencies,)
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If there is no such channel, or a frequency is a pole.
+    /// Returns magnitude : ndarray of float64, shape (n_frequencies,).
+    /// Returns phase_rad : ndarray of float64, shape (n_frequencies,).
+    /// Raises ModelError if there is no such channel, or a frequency is a pole.
     #[pyo3(signature = (w_rad_s, output=0, input=0))]
     fn bode<'py>(
         &self,
@@ -423,20 +293,10 @@ impl PyStateSpace {
 
     /// Return the sensitivity to a controller, S = (I + P K)^-1.
     ///
-    /// Parameters
-    /// ----------
-    /// controller : StateSpace or compatible
-    ///     K, from the outputs to the inputs of this model P.
+    /// - controller : StateSpace or compatible: K, from the outputs to the inputs of this model P.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     From set point to control error.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If sample times or signals do not match, or the loop is not well posed.
+    /// Returns StateSpace: From set point to control error.
+    /// Raises ModelError if sample times or signals do not match, or the loop is not well posed.
     fn sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.sensitivity(&controller).or_raise().map(Self)
@@ -444,20 +304,10 @@ impl PyStateSpace {
 
     /// Return the complementary sensitivity, T = P K (I + P K)^-1.
     ///
-    /// Parameters
-    /// ----------
-    /// controller : StateSpace or compatible
-    ///     K, from the outputs to the inputs of this model P.
+    /// - controller : StateSpace or compatible: K, from the outputs to the inputs of this model P.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     From set point to output.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If sample times or signals do not match, or the loop is not well posed.
+    /// Returns StateSpace: From set point to output.
+    /// Raises ModelError if sample times or signals do not match, or the loop is not well posed.
     fn complementary_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.complementary_sensitivity(&controller).or_raise().map(Self)
@@ -465,21 +315,11 @@ impl PyStateSpace {
 
     /// Return the process sensitivity, P (I + K P)^-1.
     ///
-    /// Parameters
-    /// ----------
-    /// controller : StateSpace or compatible
-    ///     K, from the outputs to the inputs of this model P.
+    /// - controller : StateSpace or compatible: K, from the outputs to the inputs of this model P.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     From an input added to the controller's to the output: what parallel
+    /// Returns StateSpace: From an input added to the controller's to the output: what parallel
     ///     learning works on.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If sample times or signals do not match, or the loop is not well posed.
+    /// Raises ModelError if sample times or signals do not match, or the loop is not well posed.
     fn process_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.process_sensitivity(&controller).or_raise().map(Self)
@@ -487,61 +327,34 @@ impl PyStateSpace {
 
     /// Return after how many samples each output answers to some input.
     ///
-    /// Returns
-    /// -------
-    /// list of (int or None), one for each output
-    ///     Index of the first Markov parameter that is not zero; None for an
-    ///     output that answers to nothing.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If a Markov parameter overflows.
+    /// Returns list of (int or None), one for each output: Index of the first Markov parameter that
+    ///     is not zero; None for an output that answers to nothing.
+    /// Raises ModelError if a Markov parameter overflows.
     fn relative_degrees(&self) -> PyResult<Vec<Option<usize>>> {
         model::relative_degrees(&self.0).or_raise()
     }
 
     /// Return after how many samples each output answers to each input.
     ///
-    /// Returns
-    /// -------
-    /// list of list of (int or None)
-    ///     One row for each output with one entry for each input.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If a Markov parameter overflows.
+    /// Returns list of list of (int or None): One row for each output with one entry for each
+    ///     input.
+    /// Raises ModelError if a Markov parameter overflows.
     fn delays(&self) -> PyResult<Vec<Vec<Option<usize>>>> {
         model::delays(&self.0).or_raise()
     }
 
     /// Return a model of the same response without superfluous states.
     ///
-    /// Returns
-    /// -------
-    /// StateSpace
-    ///     Only states that an input reaches and an output sees.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If the numbers overflow on the way.
+    /// Returns StateSpace: Only states that an input reaches and an output sees.
+    /// Raises ModelError if the numbers overflow on the way.
     fn minimal(&self) -> PyResult<Self> {
         self.0.minimal().or_raise().map(Self)
     }
 
     /// Return the model as an object of scipy.signal.
     ///
-    /// Returns
-    /// -------
-    /// scipy.signal.StateSpace
-    ///     Discrete if this model is.
-    ///
-    /// Raises
-    /// ------
-    /// ImportError
-    ///     If SciPy is not installed.
+    /// Returns scipy.signal.StateSpace: Discrete if this model is.
+    /// Raises ImportError if SciPy is not installed.
     fn to_scipy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let arguments = (self.a(py), self.b(py), self.c(py), self.d(py));
         let keywords = PyDict::new(py);
@@ -553,19 +366,23 @@ impl PyStateSpace {
 
     /// Return the model as an object of python-control.
     ///
-    /// Returns
-    /// -------
-    /// control.StateSpace
-    ///     Discrete if this model is.
-    ///
-    /// Raises
-    /// ------
-    /// ImportError
-    ///     If python-control is not installed.
+    /// Returns control.StateSpace: Discrete if this model is.
+    /// Raises ImportError if python-control is not installed.
     fn to_control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let dt_s = self.0.dt_s().unwrap_or(0.0);
         let arguments = (self.a(py), self.b(py), self.c(py), self.d(py), dt_s);
         py.import("control")?.getattr("StateSpace")?.call1(arguments)
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self.0 == other.get().0)
+    }
+
+    fn __hash__(&self) -> u64 {
+        let numbers = [self.0.a(), self.0.b(), self.0.c(), self.0.d()];
+        let bits =
+            numbers.into_iter().flat_map(|matrix| matrix.iter()).map(|x| (x + 0.0).to_bits());
+        bits.fold(0, |hash: u64, bits| hash.rotate_left(5).wrapping_add(bits))
     }
 
     fn __repr__(&self) -> String {
@@ -575,124 +392,30 @@ impl PyStateSpace {
     }
 }
 
-/// Return the state-space model of a transfer function.
-///
-/// ``G = (num[0] s^n + ...) / (den[0] s^n + ...)``, with z for s if sampled.
-///
-/// Parameters
-/// ----------
-/// num : array_like, shape (n_num,)
-///     Numerator, highest power first.
-/// den : array_like, shape (n_den,)
-///     Denominator, highest power first.
-/// dt_s : float or None
-///     Sample time in seconds; None or 0 for a continuous model.
-///
-/// Returns
-/// -------
-/// StateSpace
-///     Controllable canonical form, one input, one output.
-///
-/// Raises
-/// ------
-/// ModelError
-///     If the numerator has the higher degree or the denominator is zero.
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt import from_transfer_function
-/// >>> from_transfer_function([1.0], [1.0, -0.5], 0.001).simulate([1.0, 0.0, 0.0])
-/// array([0. , 1. , 0.5])
 #[pyfunction]
-#[pyo3(signature = (num, den, dt_s=None))]
-fn from_transfer_function(
-    num: &Bound<'_, PyAny>,
-    den: &Bound<'_, PyAny>,
-    dt_s: Option<&Bound<'_, PyAny>>,
-) -> PyResult<PyStateSpace> {
-    let dt_s = dt_s.map_or(Ok(None), |dt_s| read_sample_time("dt_s", dt_s))?;
-    let (num, den) = (read_vector("num", num)?, read_vector("den", den)?);
+#[pyo3(signature = (**keywords))]
+fn from_transfer_function(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<PyStateSpace> {
+    let a = Arguments::of(keywords)?;
+    let dt_s = a.maybe("dt_s", read_sample_time)?.flatten();
+    let (num, den) = (a.vector("num")?, a.vector("den")?);
     model::from_transfer_function(&num, &den, dt_s).or_raise().map(PyStateSpace)
 }
 
-/// Return the continuous model of a position loop.
-///
-/// ``G(s) = w0^2 / (s^2 + 2 delta w0 s + w0^2)``
-///
-/// Parameters
-/// ----------
-/// natural_frequency_rad_s : float
-///     Bandwidth w0 in rad/s.
-/// damping : float
-///     Damping factor delta.
-///
-/// Returns
-/// -------
-/// StateSpace
-///     Continuous model; `discretize` makes it sampled.
-///
-/// Raises
-/// ------
-/// ModelError
-///     If the frequency is not positive or the damping is negative.
-///
-/// References
-/// ----------
-/// [haas2016], Eq. (13).
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt import discretize, second_order
-/// >>> discretize(second_order(157.0, 0.5), 0.002)
-/// StateSpace(n_states=2, n_inputs=1, n_outputs=1, dt_s=0.002)
 #[pyfunction]
-fn second_order(natural_frequency_rad_s: f64, damping: f64) -> PyResult<PyStateSpace> {
-    model::second_order(natural_frequency_rad_s, damping).or_raise().map(PyStateSpace)
+#[pyo3(signature = (**keywords))]
+fn second_order(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<PyStateSpace> {
+    let a = Arguments::of(keywords)?;
+    let (w0, damping) = (a.number("natural_frequency_rad_s")?, a.number("damping")?);
+    model::second_order(w0, damping).or_raise().map(PyStateSpace)
 }
 
-/// Return the sampled form of a continuous model.
-///
-/// Parameters
-/// ----------
-/// model : StateSpace or compatible
-///     Continuous model.
-/// dt_s : float
-///     Sample time in seconds.
-/// method : {"zoh", "tustin"}
-///     Zero-order hold (exact for a held input) or Tustin's bilinear rule.
-///
-/// Returns
-/// -------
-/// StateSpace
-///     Sampled model.
-///
-/// Raises
-/// ------
-/// ModelError
-///     If the model is sampled already or the sample time is not positive.
-/// ValueError
-///     If `method` is not one of those offered.
-/// TypeError
-///     If `model` is no model.
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt import discretize, from_transfer_function
-/// >>> lag = from_transfer_function([1.0], [1.0, 1.0])
-/// >>> discretize(lag, 0.1).dt_s
-/// 0.1
 #[pyfunction]
-#[pyo3(signature = (model, dt_s, method="zoh"))]
-fn discretize(model: &Bound<'_, PyAny>, dt_s: f64, method: &str) -> PyResult<PyStateSpace> {
-    let method = match method {
-        "zoh" => Method::ZeroOrderHold,
-        "tustin" => Method::Tustin,
-        _ => {
-            let line = format!("method = '{method}'; 'zoh' or 'tustin' is needed");
-            return Err(PyValueError::new_err(line));
-        }
-    };
-    let model = read_model("model", model)?;
+#[pyo3(signature = (**keywords))]
+fn discretize(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<PyStateSpace> {
+    let a = Arguments::of(keywords)?;
+    let methods = [("zoh", Method::ZeroOrderHold), ("tustin", Method::Tustin)];
+    let (model, dt_s) = (a.model("model")?, a.number("dt_s")?);
+    let method = a.choice("method", &methods)?;
     model::discretize(&model, dt_s, method).or_raise().map(PyStateSpace)
 }
 

@@ -1,59 +1,133 @@
-//! A learning law that is a Python object, as a campaign's own or as the core of another law.
+//! The one adapter for laws that are Python objects: a campaign's own, inside another law, or analysed.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use ilc_rt::learning::{Law, LearningError, Standing};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::argument::{Signal, give_signal};
-use crate::laws;
+use crate::laws::PyLaw;
+use crate::whole::shown;
 
-/// Any object with `update(u, e, disturbance=None)`; told of a run from which nothing is learned, or
-/// of the first one, by its method `expect(disturbance)` if it has one, and that its last input is
-/// taken back by `taken_back()`.
+/// Channels of the signals that a Python object sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Channels {
+    pub(crate) n_inputs: usize,
+    pub(crate) n_outputs: usize,
+}
+
+/// What passes between a Python object and whoever runs it, beside the signals.
+#[derive(Debug, Default)]
+pub(crate) struct Frame {
+    /// Whether the signals have no channel axis.
+    is_flat: AtomicBool,
+    /// Disturbance of the coming run, handed on as it came.
+    disturbance: Mutex<Option<Py<PyAny>>>,
+    /// The exception that the object raised last, with its traceback.
+    raised: Mutex<Option<PyErr>>,
+}
+
+impl Frame {
+    /// Sets what the next update hands on.
+    pub(crate) fn prepare(&self, is_flat: bool, disturbance: Option<Py<PyAny>>) {
+        self.is_flat.store(is_flat, Ordering::Relaxed);
+        *self.disturbance.lock().unwrap_or_else(PoisonError::into_inner) = disturbance;
+        *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Returns whether the signals of the last update had no channel axis.
+    pub(crate) fn is_flat(&self) -> bool {
+        self.is_flat.load(Ordering::Relaxed)
+    }
+
+    /// Takes the exception that the object raised since [`Frame::prepare`].
+    pub(crate) fn take_raised(&self) -> Option<PyErr> {
+        self.raised.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+/// Any object with `update(u, e, disturbance=None)`, native or written in Python.
+///
+/// A run from which nothing is learned, and the first one, are announced by its method
+/// `expect(disturbance)`, a rollback by `taken_back()`; both are optional.
+#[derive(Debug)]
 pub(crate) struct PythonLaw {
     law: Py<PyAny>,
+    /// The class, which names the law in the library.
     name: String,
-    n_inputs: usize,
-    n_outputs: usize,
-    is_flat: bool,
+    channels: Channels,
+    frame: Arc<Frame>,
     /// Disturbance of the coming run that the object has not been told yet.
-    coming: Option<Vec<f64>>,
+    next_disturbance: Option<Vec<f64>>,
 }
 
 impl PythonLaw {
-    /// Takes the object; its class names it in the library.
-    pub(crate) fn new(law: &Bound<'_, PyAny>, n_axes: usize) -> PyResult<Self> {
-        Self::core(law, n_axes, n_axes, false)
-    }
-
-    /// Takes the object for signals of these shapes, without channel axis if `is_flat`.
-    pub(crate) fn core(
+    /// Wraps an object, named `argument` where it is refused.
+    ///
+    /// # Errors
+    /// - `TypeError` if it has no method `update`.
+    pub(crate) fn new(
+        argument: &str,
         law: &Bound<'_, PyAny>,
-        n_inputs: usize,
-        n_outputs: usize,
-        is_flat: bool,
+        channels: Channels,
+        frame: Arc<Frame>,
     ) -> PyResult<Self> {
-        law.getattr("update")?;
         let name = law.get_type().name()?.to_string();
+        if !law.getattr_opt("update")?.is_some_and(|update| update.is_callable()) {
+            let text = shown(law);
+            return Err(PyTypeError::new_err(format!(
+                "{argument} = {text} is a {name}; an object with update(u, e, disturbance=None) is needed"
+            )));
+        }
         let law = law.clone().unbind();
-        Ok(Self { law, name, n_inputs, n_outputs, is_flat, coming: None })
+        Ok(Self { law, name, channels, frame, next_disturbance: None })
     }
 
-    fn ask(
-        &self,
-        py: Python<'_>,
-        input: &[f64],
-        error: &[f64],
-        coming: Option<Vec<f64>>,
-    ) -> PyResult<Vec<f64>> {
-        let u = give_signal(py, input.to_vec(), self.n_inputs, self.is_flat)?;
-        let e = give_signal(py, error.to_vec(), self.n_outputs, self.is_flat)?;
-        let coming = coming.map(|values| give_signal(py, values, 1, true)).transpose()?;
-        let next = self.law.bind(py).call_method1("update", (u, e, coming))?;
-        let n_samples = input.len() / self.n_inputs.max(1);
-        let next = Signal::read("the input returned by update", &next)?
-            .with_channels("the input returned by update", self.n_inputs)?
-            .with_samples("the input returned by update", n_samples)?;
+    fn ask(&mut self, py: Python<'_>, input: &[f64], error: &[f64]) -> PyResult<Vec<f64>> {
+        const WHAT: &str = "the input returned by update";
+        let Channels { n_inputs, n_outputs } = self.channels;
+        let is_flat = self.frame.is_flat();
+        let given = self.frame.disturbance.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let announced = self.next_disturbance.take();
+        let disturbance = match (given, announced) {
+            (Some(given), Some(announced)) => {
+                self.announce(py, announced);
+                Some(given.into_bound(py))
+            }
+            (Some(given), None) => Some(given.into_bound(py)),
+            (None, announced) => {
+                announced.map(|values| give_signal(py, values, 1, true)).transpose()?
+            }
+        };
+        let u = give_signal(py, input.to_vec(), n_inputs, is_flat && n_inputs == 1)?;
+        let e = give_signal(py, error.to_vec(), n_outputs, is_flat && n_outputs == 1)?;
+        let next = self.law.bind(py).call_method1("update", (u, e, disturbance))?;
+        let next = Signal::read(WHAT, &next)?
+            .with_channels(WHAT, n_inputs)?
+            .with_samples(WHAT, input.len() / n_inputs.max(1))?;
         Ok(next.values)
+    }
+
+    /// Tells the object of a run that it does not learn from.
+    fn announce(&self, py: Python<'_>, disturbance: Vec<f64>) {
+        // A law that has no `expect` has no use for it; one that fails shows it in the update.
+        let _ = give_signal(py, disturbance, 1, true)
+            .and_then(|values| self.law.bind(py).call_method1("expect", (values,)));
+    }
+
+    /// Calls a method that the object may lack; one that fails has done nothing.
+    fn call_if_there(&self, method: &str) {
+        let _ = Python::attach(|py| self.law.bind(py).call_method0(method).map(drop));
+    }
+
+    /// Asks the native law that the object is, if it is one.
+    fn ask_native<T>(&self, ask: impl FnOnce(&dyn Law) -> T) -> Option<T> {
+        Python::attach(|py| {
+            let native = self.law.bind(py).cast::<PyLaw>().ok()?;
+            native.get().look(py, |law| ask(law)).ok()
+        })
     }
 }
 
@@ -64,48 +138,45 @@ impl Law for PythonLaw {
         error: &[f64],
         next: &mut [f64],
     ) -> Result<(), LearningError> {
-        let coming = self.coming.take();
-        let learned = Python::attach(|py| {
-            self.ask(py, input, error, coming).map_err(|raised| LearningError::User {
-                law: self.name.clone(),
-                reason: raised.to_string().replace('\n', " "),
-            })
-        })?;
-        next.copy_from_slice(&learned);
-        Ok(())
+        match Python::attach(|py| self.ask(py, input, error)) {
+            Ok(learned) => {
+                next.copy_from_slice(&learned);
+                Ok(())
+            }
+            Err(raised) => {
+                let reason = raised.to_string().replace('\n', " ");
+                let slot = &self.frame.raised;
+                *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
+                Err(LearningError::User { law: self.name.clone(), reason })
+            }
+        }
     }
 
     fn set_disturbance(&mut self, disturbance: &[f64]) {
-        if let Some(passed) = self.coming.replace(disturbance.to_vec()) {
-            // A law that has no `expect` does not care; one that fails shows it in the update.
-            let _ = Python::attach(|py| -> PyResult<()> {
-                let passed = give_signal(py, passed, 1, true)?;
-                self.law.bind(py).call_method1("expect", (passed,)).map(drop)
-            });
+        if let Some(passed) = self.next_disturbance.replace(disturbance.to_vec()) {
+            Python::attach(|py| self.announce(py, passed));
         }
     }
 
     fn on_rollback(&mut self) {
-        // A law that has no `taken_back` does not care.
-        let _ = Python::attach(|py| self.law.bind(py).call_method0("taken_back").map(drop));
+        self.call_if_there("taken_back");
     }
 
     fn handles_rollback(&self) -> bool {
-        Python::attach(|py| laws::handles_rollback(self.law.bind(py)))
+        self.ask_native(|law| law.handles_rollback()).unwrap_or(false)
     }
 
     fn status(&self) -> Option<String> {
-        Python::attach(|py| laws::standing(self.law.bind(py)).1)
+        self.ask_native(|law| law.status()).flatten()
     }
 
     fn standing(&self) -> Standing {
-        Python::attach(|py| laws::standing(self.law.bind(py)).0)
+        self.ask_native(|law| law.standing()).unwrap_or(Standing::Learns)
     }
 
     fn reset(&mut self) {
-        self.coming = None;
-        // A law may keep nothing and have no `reset`; one that fails is as good as none.
-        let _ = Python::attach(|py| self.law.bind(py).call_method0("reset").map(drop));
+        self.next_disturbance = None;
+        self.call_if_there("reset");
     }
 
     fn describe(&self) -> String {

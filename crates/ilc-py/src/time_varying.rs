@@ -13,26 +13,13 @@ use crate::error::OrRaise;
 ///
 /// ``x[k+1] = A[k] x[k] + B[k] u[k]``, ``y[k] = C[k] x[k] + D[k] u[k]``.
 ///
-/// Parameters
-/// ----------
-/// a : array_like, shape (n_samples, n_states, n_states)
-///     State matrices.
-/// b : array_like, shape (n_samples, n_states, n_inputs)
-///     Input matrices.
-/// c : array_like, shape (n_samples, n_outputs, n_states)
-///     Output matrices.
-/// d : array_like, shape (n_samples, n_outputs, n_inputs)
-///     Feedthrough matrices.
-/// dt_s : float
-///     Sample time in seconds.
+/// - a : shape (n_samples, n_states, n_states): State matrices.
+/// - b : shape (n_samples, n_states, n_inputs): Input matrices.
+/// - c : shape (n_samples, n_outputs, n_states): Output matrices.
+/// - d : shape (n_samples, n_outputs, n_inputs): Feedthrough matrices.
+/// - dt_s : float: Sample time in seconds.
 ///
-/// Raises
-/// ------
-/// ModelError
-///     If there is no sample or the sample time is not positive.
-/// ValueError, TypeError
-///     If a matrix has the wrong shape, holds a number that is not finite, or is
-///     not of real numbers.
+/// Raises ModelError if there is no sample or the sample time is not positive.
 ///
 /// Examples
 /// --------
@@ -177,24 +164,12 @@ impl PyTimeVarying {
 
     /// Return the output that an input produces.
     ///
-    /// Parameters
-    /// ----------
-    /// u : ndarray of float64, shape (n_samples,) or (n_samples, n_inputs)
-    ///     Input.
-    /// x0 : array_like or None, shape (n_states,)
-    ///     State at the first sample; zero if None.
+    /// - u : shape (n_samples,) or (n_samples, n_inputs): Input.
+    /// - x0 : array_like or None, shape (n_states,): State at the first sample; zero if None.
     ///
-    /// Returns
-    /// -------
-    /// ndarray of float64, shape (n_samples,) or (n_samples, n_outputs)
-    ///     Output; without channel axis if `u` has none and there is one output.
-    ///
-    /// Raises
-    /// ------
-    /// ModelError
-    ///     If `x0` does not fit.
-    /// ValueError, TypeError
-    ///     If `u` has the wrong shape, dtype or a number that is not finite.
+    /// Returns ndarray of float64, shape (n_samples,) or (n_samples, n_outputs): Output; without
+    ///     channel axis if `u` has none and there is one output.
+    /// Raises ModelError if `x0` does not fit.
     #[pyo3(signature = (u, x0=None))]
     fn simulate<'py>(
         &self,

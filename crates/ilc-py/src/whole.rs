@@ -42,7 +42,7 @@ fn out_of_range(name: &str, number: &Bound<'_, PyAny>, range: &str) -> PyErr {
 }
 
 /// Returns how a value shows itself, on one line and not for ever.
-fn shown(object: &Bound<'_, PyAny>) -> String {
+pub(crate) fn shown(object: &Bound<'_, PyAny>) -> String {
     const LONGEST: usize = 60;
     // A number of thousands of digits has no text.
     let text = object.repr().map_or_else(|_| "a number".to_owned(), |text| text.to_string());
@@ -54,7 +54,7 @@ fn shown(object: &Bound<'_, PyAny>) -> String {
 }
 
 /// Reads the elements of a sequence.
-fn each<'py, T>(
+pub(crate) fn each<'py, T>(
     name: &str,
     object: &Bound<'py, PyAny>,
     needed: &str,
@@ -66,7 +66,7 @@ fn each<'py, T>(
 }
 
 /// Reads two things that belong together.
-fn pair<'py>(
+pub(crate) fn pair<'py>(
     name: &str,
     object: &Bound<'py, PyAny>,
     needed: &str,
@@ -95,74 +95,15 @@ macro_rules! named_maybe {
 }
 
 named! {
-    blend, input, keep, lead, n, n_agents, n_axes, n_poles, n_runs, n_samples, n_zeros,
-    order, output, patience, period_samples, periods, repeats, rows, top,
+    input, keep, n, n_samples, output, period_samples, rows, top,
 }
 
 /// Arguments that may be `None`.
 pub(crate) mod maybe {
     use super::{Bound, PyAny, PyAnyMethods, PyResult, whole};
     named_maybe! {
-        n_samples, overlap_samples, period_samples, segment_samples, top, window,
+        window,
     }
-}
-
-/// Sequences of whole numbers.
-pub(crate) mod list {
-    use super::{Bound, PyAny, PyResult, each, whole};
-
-    pub(crate) fn starts(object: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
-        each("starts", object, "a sequence of samples", |start| whole("starts", start))
-    }
-}
-
-/// Sequences of whole numbers, or `None`.
-pub(crate) mod maybe_list {
-    use super::{Bound, PyAny, PyAnyMethods, PyResult, each, whole};
-
-    pub(crate) fn axes(object: &Bound<'_, PyAny>) -> PyResult<Option<Vec<usize>>> {
-        list("axes", object)
-    }
-
-    pub(crate) fn leaders(object: &Bound<'_, PyAny>) -> PyResult<Option<Vec<usize>>> {
-        list("leaders", object)
-    }
-
-    fn list(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Option<Vec<usize>>> {
-        if object.is_none() {
-            return Ok(None);
-        }
-        each(name, object, "a sequence of numbers counted from 0", |i| whole(name, i)).map(Some)
-    }
-}
-
-/// Sequences of pairs, or `None`.
-pub(crate) mod maybe_pairs {
-    use super::{Bound, PyAny, PyAnyMethods, PyResult, each, pair, whole};
-
-    pub(crate) fn pairs(object: &Bound<'_, PyAny>) -> PyResult<Option<Vec<(usize, usize)>>> {
-        if object.is_none() {
-            return Ok(None);
-        }
-        let needed = "a sequence of pairs of agents";
-        let read = |both: &Bound<'_, PyAny>| {
-            let (first, second) = pair("pairs", both, "a pair of agents")?;
-            Ok((whole("pairs", &first)?, whole("pairs", &second)?))
-        };
-        each("pairs", object, needed, read).map(Some)
-    }
-}
-
-/// Reads segments: where each starts, and its value.
-pub(crate) fn segments(object: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
-    let needed = "a pair of a sample and a number";
-    each("segments", object, "a sequence of (start, value)", |both| {
-        let (start, value) = pair("segments", both, needed)?;
-        let value = value.extract().map_err(|_| {
-            PyTypeError::new_err(format!("segments holds {}; {needed} is needed", shown(both)))
-        })?;
-        Ok((whole("segments", &start)?, value))
-    })
 }
 
 /// Reads the identity of a run.

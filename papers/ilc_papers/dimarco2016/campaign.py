@@ -59,9 +59,9 @@ def core() -> PdIlc:
 def relevance(system: System, top: int | None) -> RelevanceIlc:
     """Return DPW-ILC (Eq. 4.5 to 4.13) around PD-ILC."""
     weights = RelevanceWeights(
-        e=N_E,
-        er=N_ER,
-        d=system.disturbance_weight,
+        error=N_E,
+        error_rate=N_ER,
+        disturbance=system.disturbance_weight,
         epsilon=EPSILON,
         rate_filter_s=RATE_FILTER_S,
     )

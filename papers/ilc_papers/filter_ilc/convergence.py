@@ -36,7 +36,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     tell("critical frequency")
     by_lead = {}
     for lead in LEADS:
-        told = analyze(ErrorFeedforwardIlc(GAIN, lead=lead), model, n_samples)
+        told = analyze(ErrorFeedforwardIlc(GAIN, lead_samples=lead), model, n_samples)
         by_lead[lead] = {
             "critical_frequency_hz": told.critical_frequency_hz,
             "frequency_hz": told.frequency_hz.tolist(),
@@ -50,7 +50,9 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     }
     if not reduced:
         figures["critical_frequency_by_lead_hz"] = [
-            analyze(ErrorFeedforwardIlc(GAIN, lead=lead), model, n_samples).critical_frequency_hz
+            analyze(
+                ErrorFeedforwardIlc(GAIN, lead_samples=lead), model, n_samples
+            ).critical_frequency_hz
             for lead in range(1, _MOST_LEADS + 1)
         ]
         figures["told"] += [

@@ -99,7 +99,7 @@ def _saturated(moves: Motion, runs: int) -> Figures:
     needed = float(abs(Bench(moves).learn(ErrorFeedforwardIlc(GAIN), 12).inputs[-1]).max())
     limit = LIMIT_SHARE * needed
     free = Bench(moves).learn(ErrorFeedforwardIlc(GAIN), runs)
-    guard = ErrorFeedforwardIlc(GAIN, limit=limit)
+    guard = ErrorFeedforwardIlc(GAIN, input_max=limit)
     limited: list[int] = []
     guarded = Bench(moves).learn(guard, runs, observe=lambda _: limited.append(guard.n_limited))
     return {

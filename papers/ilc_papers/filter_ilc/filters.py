@@ -60,7 +60,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     opening = switched(moves)
     fast = _fast(opening, moves.n_samples)
     laws = {
-        "unfiltered": ErrorFeedforwardIlc(GAIN, lead=LEADS[0]),
+        "unfiltered": ErrorFeedforwardIlc(GAIN, lead_samples=LEADS[0]),
         "zero_phase": ErrorFeedforwardIlc(GAIN, low_pass(), LEADS[0]),
         "switched": ErrorFeedforwardIlc(GAIN, opening, LEADS[1]),
         "switched_lead_1": ErrorFeedforwardIlc(GAIN, opening, LEADS[0]),

@@ -45,9 +45,9 @@ class _Bound:
 
 
 BOUNDS = {
-    "input": _Bound("u_bounds", "m", share=0.6),
-    "change": _Bound("v_bounds", "m", share=0.6),
-    "step": _Bound("step_bounds", "m", share=0.6),
+    "input": _Bound("input_max", "m", share=0.6),
+    "change": _Bound("change_max", "m", share=0.6),
+    "step": _Bound("step_max", "m", share=0.6),
     "position": _Bound("position_bounds", "m", least=0.0, largest=0.1),
     "velocity": _Bound("velocity_bounds", "m/s", least=-0.1, largest=0.2),
     "acceleration": _Bound("acceleration_bounds", "m/s²", least=-2.0, largest=2.0),

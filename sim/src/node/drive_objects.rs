@@ -40,7 +40,7 @@ pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
         default(pdo_map::COMMAND_PDO, TYPE_EVERY_SYNC, &command_map[..]),
         default(PdoNumber::receive(1), TYPE_EVENT, &mode_map[..]),
         default(pdo_map::STATUS_PDO, TYPE_EVERY_SYNC, &pdo_map::STATUS_MAP[..]),
-        default(pdo_map::EXTRA_PDO, TYPE_EVERY_SYNC, &pdo_map::EXTRA_MAP[..]),
+        default(pdo_map::DRIVE_MOTION_PDO, TYPE_EVERY_SYNC, &pdo_map::DRIVE_MOTION_MAP[..]),
         PdoDefault {
             event_ms: DISPLAY_EVENT_MS,
             ..default(PdoNumber::transmit(2), TYPE_EVENT, &display_map[..])
@@ -80,7 +80,7 @@ fn setting(index: u16, sub: u8, value: Value) -> Entry {
 }
 
 fn words_and_options() -> Vec<Entry> {
-    let modes = Mode::Csp.supported_bit() | Mode::Csv.supported_bit();
+    let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.supported_bit());
     vec![
         // 0: nothing, 1: fault, 2: disable voltage, 3: quick stop.
         setting(objects::CONNECTION_LOSS_OPTION, 0, Value::I16(1)).allowing(Allowed::Range(0, 3)),

@@ -46,7 +46,7 @@ fn measure(n_runs: usize) -> Result<Duration, Box<dyn Error>> {
     let shape =
         RunShape { n_samples: N_SAMPLES, n_inputs: 1, n_outputs: 1, n_disturbances: 1, dt_s: 0.01 };
     let core = || -> Result<Box<dyn Law>, Box<dyn Error>> {
-        let gains = PdGains { kp: 1.284, kd: 1.284, lead: 1 };
+        let gains = PdGains { kp: 1.284, kd: 1.284, lead_samples: 1 };
         Ok(Box::new(Pd::new(gains, N_SAMPLES, 1, QFilter::None)?))
     };
     let mut random = Random(1);

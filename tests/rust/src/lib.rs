@@ -1,10 +1,10 @@
 //! Shared set-up of the integration tests: the example cells, whole campaigns on simulated drives,
 //! and a servo cycle ticked by hand.
 //!
-//! [`campaign`] runs the supervisor as a user does; [`far_side`] serves the simulated machine on a
-//! bus from its own thread; [`rig`] is the loop alone, on a bus that records every command and lets
-//! a test inject faults in the middle of a run; [`faulty`] is a bus that loses, delays and corrupts
-//! frames by seed; [`counting`] is a counting allocator; [`source`] reads the project's own source.
+//! [`campaign`] runs a campaign as a user does; [`far_side`] puts the simulated machine on a bus in
+//! a thread of its own; [`rig`] is the loop alone, on a bus that records every command and lets a test
+//! break things in the middle of a run; [`faulty`] is a bus that loses, delays and spoils frames by seed;
+//! [`counting`] is an allocator that counts; [`source`] reads the project's own source.
 
 #![expect(clippy::expect_used, reason = "a test fails where its set-up does")]
 
@@ -21,6 +21,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use ilc_rt::config::Cell;
 
+pub use derived::{hold_derived, hold_derived_file};
+
 /// Returns the root of this checkout.
 ///
 /// Asked of cargo at run time: one target folder may serve several checkouts, and a test built in
@@ -29,7 +31,6 @@ pub fn root() -> PathBuf {
     let compiled = env!("CARGO_MANIFEST_DIR").into();
     PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or(compiled)).join("../..")
 }
-pub use derived::hold_derived;
 
 /// Returns the path of an example, e.g. `01_gantry.toml`.
 pub fn example_path(name: &str) -> PathBuf {

@@ -10,7 +10,7 @@ use ilc_rt::config::Cell;
 use ilc_rt::design::Plan;
 use ilc_rt::fieldbus::bring_up::{bring_up, bring_up_encoder};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, State};
+use ilc_rt::fieldbus::cia402::{CommandRpdo1, State};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};
@@ -95,7 +95,7 @@ impl Line {
 
     fn note(&mut self, frame: &Frame) {
         for (axis, node) in self.nodes.iter().enumerate() {
-            if let Some(command) = Command::decode(frame, *node) {
+            if let Some(command) = CommandRpdo1::decode(frame, *node) {
                 self.pending[axis] = (command.target_counts, command.controlword.0);
             }
         }
@@ -190,6 +190,8 @@ pub struct Rig {
     pub tap: Tap,
     /// Every sample so far.
     pub samples: Vec<Sample>,
+    /// Cycles that came with the stop.
+    pub before: Vec<Sample>,
     /// Reason of the stop, if the axes were stopped.
     pub reason: Option<StopReason>,
     /// SYNCs sent before the tick in which the stop began.
@@ -208,7 +210,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Brings the nodes up like the supervisor in lock-step, and creates the loop for some runs.
+    /// Brings the nodes up as a campaign does in lock-step, and makes the loop for some runs.
     ///
     /// # Panics
     /// If a node cannot be brought up.
@@ -247,6 +249,7 @@ impl Rig {
             mail,
             tap,
             samples: Vec::new(),
+            before: Vec::with_capacity(64),
             reason: None,
             stopping_at: None,
             ended: Vec::new(),
@@ -287,6 +290,7 @@ impl Rig {
                 }
                 Message::RunStarted { run, table } => self.started.push((run, table)),
                 Message::RunEnded { run, overruns } => self.ended.push((run, overruns)),
+                Message::Before(sample) => self.before.push(sample),
                 Message::Stopping(reason) => {
                     (self.reason, self.stopping_at) = (Some(reason), Some(n_syncs));
                 }

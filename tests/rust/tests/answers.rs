@@ -9,7 +9,7 @@ use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::config::{AxisUnit, Cell};
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
-use ilc_rt::fieldbus::cia402::{Controlword, EncoderSample, Extra, State, Status};
+use ilc_rt::fieldbus::cia402::{Controlword, DriveMotionTpdo2, EncoderSample, State, StatusTpdo1};
 use ilc_rt::library::Library;
 use ilc_rt::record::{EndStatus, IterationRecord};
 use ilc_rt::servo::{PhaseName, Sample, StopReason};
@@ -25,8 +25,8 @@ const TOOL: u8 = 10;
 type Which = fn(&Frame) -> bool;
 
 const PDOS: [(&str, Which); 3] = [
-    ("TPDO1", |frame| Status::decode(frame, node(X)).is_some()),
-    ("TPDO2", |frame| Extra::decode(frame, node(X)).is_some()),
+    ("TPDO1", |frame| StatusTpdo1::decode(frame, node(X)).is_some()),
+    ("TPDO2", |frame| DriveMotionTpdo2::decode(frame, node(X)).is_some()),
     ("tool", |frame| EncoderSample::decode(frame, node(TOOL)).is_some()),
 ];
 
@@ -220,7 +220,7 @@ fn a_fault_without_an_emergency_message_says_so() {
         let old = Emergency { node: node(X), code: 0x3210, register: 0, vendor: [0; 5] };
         let mut told = false;
         tap.line().distort(Box::new(move |_, frame, out| {
-            if !told && Status::decode(&frame, node(X)).is_some() {
+            if !told && StatusTpdo1::decode(&frame, node(X)).is_some() {
                 told = true;
                 out.push_back(old.encode());
             }

@@ -12,7 +12,6 @@
 )]
 
 use std::cell::Cell;
-use std::fmt::Write as _;
 use std::fs::File;
 use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};
@@ -488,13 +487,4 @@ fn round_trip_times() {
     assert_eq!(n_answers, n_ticks * (0x81 + 0x82));
     let ticks_per_s = f64::from(u32::try_from(n_ticks).unwrap()) / start.elapsed().as_secs_f64();
     println!("in process: {ticks_per_s:.0} ticks/s with 2 frames out and 2 in");
-}
-
-#[test]
-fn the_readme_names_every_kind_of_bus() {
-    let mut table = "| address | carrier |\n|---|---|\n".to_owned();
-    for scheme in transport::SCHEMES {
-        let _ = writeln!(table, "| `{}` | {} |", scheme.syntax, scheme.summary);
-    }
-    ilc_tests::hold_derived("README.md", "buses", &table);
 }

@@ -7,12 +7,13 @@
     reason = "a test may panic, and prints figures"
 )]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use ilc_rt::campaign::{self, Options, Outcome};
-use ilc_rt::config::Cell;
+use ilc_rt::campaign::{self, Disturbance, Options, Outcome};
+use ilc_rt::config::{Cell, LawName, Learning};
+use ilc_rt::learning::law::LawTables;
 use ilc_rt::library::{Library, Row};
 use ilc_rt::record::{EndStatus, Event, StateName};
 use ilc_tests::campaign::{in_process, options};
@@ -48,7 +49,7 @@ fn rows(library: &Path) -> Vec<Row> {
 /// Runs a campaign and reads the library back.
 fn run(cell: &Cell, iterations: u32) -> (Outcome, Vec<Row>) {
     let scratch = Scratch::new();
-    let options = options(scratch.file("library.db"), iterations);
+    let options = surrounded(scratch.file("library.db"), iterations);
     let outcome = campaign::run(cell, &options, in_process(cell), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
     let rows = rows(&options.session.library);
@@ -63,40 +64,44 @@ fn microns(rms_m: &[f64]) -> String {
     rms_m.iter().map(|rms| format!("{:.1}", rms * 1e6)).collect::<Vec<_>>().join(" ")
 }
 
-/// Each law with the largest share of the first run's RMS error left after five more runs.
-const LAWS: [(&str, &str, f64); 9] = [
-    (SERIES, "law = \"norm_optimal\"\n[learning.norm_optimal]\nrate = 6.0", 0.1),
-    (
-        SERIES,
-        "law = \"norm_optimal\"\n[learning.norm_optimal]\nrate = 16.0\n\
-         contour = { weight = 5.0, along = 0.5 }\n\
-         [[learning.norm_optimal.phase]]\nfrom_s = 0.2\nto_s = 0.5\nq = 2.0\ncontour = 6.0",
-        0.1,
-    ),
-    (SERIES, "law = \"constrained\"\n[learning.constrained]\nrate = 6.0", 0.1),
-    (SERIES, "law = \"pd\"\n[learning.pd]\nkp = 0.5\nlead_samples = 10\ncutoff_hz = 8.0", 0.1),
-    (SERIES, "law = \"adjoint\"", 0.1),
-    (SERIES, "law = \"model_inverse\"\n[learning.model_inverse]\ncutoff_hz = 8.0", 0.1),
-    (PARALLEL, "law = \"adjoint\"\ninput_max_m_s = 0.1", 0.2),
-    (PARALLEL, "law = \"model_inverse\"\ninput_max_m_s = 0.1", 0.2),
-    (
-        PARALLEL,
-        "law = \"error_feedforward\"\ninput_max_m_s = 0.1\n[learning.error_feedforward]\n\
-         gain_per_s = 30.0\nlead_samples = 30\ncutoff_hz = 5.0",
-        0.2,
-    ),
-];
+/// A campaign's options, in surroundings as constant as the simulated machine is; only the laws that ask
+/// are told.
+fn surrounded(library: PathBuf, iterations: u32) -> Options {
+    Options {
+        disturbance: Disturbance::measured(|_| Ok(vec![20.0])),
+        ..options(library, iterations)
+    }
+}
+
+/// The examples of all laws: cell and learning.
+fn examples() -> Vec<(&'static str, &'static str)> {
+    let tables = Learning::default();
+    let of = |law: &LawName| tables.parameters(*law).unwrap().examples();
+    let file = |is_parallel| if is_parallel { PARALLEL } else { SERIES };
+    LawName::ALL
+        .iter()
+        .flat_map(of)
+        .map(|found| (file(found.is_parallel), found.learning))
+        .collect()
+}
 
 #[test]
 fn every_law_that_a_cell_can_name_learns_on_the_gantry() {
+    let tables = Learning::default();
     let mut wrong = Vec::new();
-    for (example, learning, left) in LAWS {
-        let (outcome, rows) = run(&cell(example, learning), 6);
-        let rms_m = rms_m(&rows);
-        let law = &rows[0].meta.law;
-        println!("{example} {law}: rms um {}", microns(&rms_m));
-        if rms_m[5] >= left * rms_m[0] || outcome.runs.iter().any(|(_, run)| run.rolled_back) {
-            wrong.push(format!("{example} {law}: {}", microns(&rms_m)));
+    for law in LawName::ALL {
+        let examples = tables.parameters(*law).unwrap().examples();
+        assert!(!examples.is_empty(), "{law:?} has no example");
+        for example in examples {
+            let cell_file = if example.is_parallel { PARALLEL } else { SERIES };
+            let (outcome, rows) = run(&cell(cell_file, example.learning), 6);
+            let rms_m = rms_m(&rows);
+            assert_eq!(rows[0].meta.law, law.as_str());
+            println!("{cell_file} {law:?}: rms um {}", microns(&rms_m));
+            let rolled_back = outcome.runs.iter().any(|(_, run)| run.rolled_back);
+            if rms_m[5] >= example.error_left * rms_m[0] || rolled_back {
+                wrong.push(format!("{cell_file} {law:?}: {}", microns(&rms_m)));
+            }
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -242,7 +247,7 @@ fn what_the_controller_takes_back_halves_the_steps_of_a_ladder() {
 /// uninterrupted one.
 fn broken_and_whole(cell: &Cell, broken: u32, iterations: u32) -> (Vec<Row>, Vec<Row>) {
     let scratch = Scratch::new();
-    let first = options(scratch.file("library.db"), iterations);
+    let first = surrounded(scratch.file("library.db"), iterations);
     let stop = Arc::clone(&first.session.stop);
     let outcome = campaign::run(cell, &first, in_process(cell), None, &mut |event| {
         if matches!(event, Event::State { state: StateName::Running, iteration } if *iteration == broken)
@@ -252,7 +257,7 @@ fn broken_and_whole(cell: &Cell, broken: u32, iterations: u32) -> (Vec<Row>, Vec
     })
     .unwrap();
     assert_eq!((outcome.status, outcome.runs.len()), (EndStatus::Interrupted, broken as usize));
-    let again = Options { resume: true, ..options(first.session.library.clone(), iterations) };
+    let again = Options { resume: true, ..surrounded(first.session.library.clone(), iterations) };
     let outcome = campaign::run(cell, &again, in_process(cell), None, &mut |_| {}).unwrap();
     assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
     (rows(&first.session.library), run(cell, iterations).1)
@@ -260,7 +265,7 @@ fn broken_and_whole(cell: &Cell, broken: u32, iterations: u32) -> (Vec<Row>, Vec
 
 #[test]
 fn every_law_goes_on_after_a_break_with_the_input_that_would_have_followed() {
-    for (example, learning, _) in LAWS {
+    for (example, learning) in examples() {
         let (kept, whole) = broken_and_whole(&short(example, learning), 2, 3);
         let law = &whole[0].meta.law;
         for index in 0..3 {
@@ -320,7 +325,7 @@ fn another_gate_ladder_or_weight_along_the_run_is_another_campaign() {
         (around(""), around("[learning.ladder]\nrepeats = 1")),
     ] {
         let scratch = Scratch::new();
-        let first = options(scratch.file("library.db"), 2);
+        let first = surrounded(scratch.file("library.db"), 2);
         let cell = short(SERIES, &one);
         campaign::run(&cell, &first, in_process(&cell), None, &mut |_| {}).unwrap();
         let again = Options { resume: true, ..options(first.session.library.clone(), 3) };

@@ -4,8 +4,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use ilc_rt::config::Cell;
+use ilc_rt::config::{Cell, LawName, Learning};
 use ilc_rt::design::{Plan, Prepared};
+use ilc_rt::learning::law::LawTables;
 use ilc_tests::example_text;
 
 const FILE: &str = "cell.toml";
@@ -232,24 +233,15 @@ fn each_refusal_names_file_key_value_and_what_is_allowed() {
 
 #[test]
 fn every_law_says_before_the_start_what_it_will_do() {
-    for (example, law) in [
-        (SERIES, "norm_optimal"),
-        (SERIES, "pd"),
-        (SERIES, "constrained"),
-        (SERIES, "adjoint"),
-        (SERIES, "model_inverse"),
-        (PARALLEL, "adjoint"),
-        (PARALLEL, "constrained"),
-        (PARALLEL, "model_inverse"),
-        (PARALLEL, "error_feedforward"),
-    ] {
+    let tables = Learning::default();
+    let examples = LawName::ALL.iter().flat_map(|law| tables.parameters(*law).unwrap().examples());
+    for example in examples {
+        let cell = if example.is_parallel { PARALLEL } else { SERIES };
         for around in ["", "[learning.ladder]", "[learning.gate]\n[learning.ladder]\nrepeats = 3"] {
-            let learning = format!("law = \"{law}\"\n{around}");
-            let found = prepared(&text(example, &learning));
-            let found = found.unwrap_or_else(|line| panic!("{example} {learning}: {line}"));
-            assert!(!found.verdict.is_empty(), "{example} {learning}");
-            let parameters = found.law.unwrap().describe();
-            assert!(parameters.contains(&format!("\"law\":\"{law}\"")), "{parameters}");
+            let learning = format!("{}\n{around}", example.learning);
+            let found = prepared(&text(cell, &learning));
+            let found = found.unwrap_or_else(|line| panic!("{cell} {learning}: {line}"));
+            assert!(!found.verdict.is_empty(), "{cell} {learning}");
         }
     }
     assert!(prepared(&text(SERIES, "law = \"none\"")).unwrap().law.is_none());
@@ -257,7 +249,9 @@ fn every_law_says_before_the_start_what_it_will_do() {
 
 #[test]
 fn bounds_are_said_to_be_left_out_of_the_forecast() {
-    let found = prepared(&text(SERIES, "law = \"constrained\"")).unwrap();
+    let found =
+        prepared(&text(SERIES, "law = \"constrained\"\n[learning.constrained]\nrate = 6.0"))
+            .unwrap();
     assert!(found.verdict.contains("without its bounds"), "{}", found.verdict);
 }
 

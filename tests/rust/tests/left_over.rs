@@ -7,6 +7,7 @@ use ilc_rt::campaign;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::ObjectAddress;
+use ilc_rt::fieldbus::canopen::sdo::{Data, Expedited, SdoRequest};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::library::Library;
 use ilc_sim::Machine;
@@ -38,14 +39,11 @@ fn u16(index: u16, value: u16) -> Write {
 
 /// Writes an object of node 1 and checks that the node took it.
 fn leave(machine: &mut Machine, (index, sub, bytes): &Write) {
-    let [low, high] = index.to_le_bytes();
-    let unused = u8::try_from(4 - bytes.len()).unwrap();
-    let mut payload = vec![0x23 | unused << 2, low, high, *sub];
-    payload.extend(bytes);
-    payload.resize(8, 0);
+    let data = Data::Expedited(ObjectAddress::new(*index, *sub), Expedited::new(bytes).unwrap());
+    let request = SdoRequest::Download(data).encode();
     let mut answers = Vec::new();
-    machine
-        .receive(&Frame::new(0x601, &payload).unwrap(), &mut |answer: Frame| answers.push(answer));
+    let mut note = |answer: Frame| answers.push(answer);
+    machine.receive(&Frame::new(0x601, &request).unwrap(), &mut note);
     let answer = answers.iter().find(|answer| answer.id() == 0x581).unwrap();
     assert_eq!(answer.payload()[0], 0x60, "0x{index:04X}:{sub:02X} is not taken: {answer:?}");
 }

@@ -65,7 +65,7 @@ fn no_law_allocates_in_an_update() {
     .unwrap();
     let weights = Weights { q: 1.0, s: 0.0, r: 1e-6, rate: 3.0 };
     let sections = || butterworth(2, 50.0, 4e-3).unwrap();
-    let gains = PdGains { kp: 1.0, kd: 3.25, lead: 1 };
+    let gains = PdGains { kp: 1.0, kd: 3.25, lead_samples: 1 };
     let samples = TimeVarying::new(vec![separate.clone(); N_SAMPLES]).unwrap();
     let filter = Dynamic::new(axis(0.8).append(&axis(0.9)).unwrap()).unwrap();
     let filter = filter.with_plain(Weight::Scalar(0.1));
@@ -95,7 +95,7 @@ fn no_law_allocates_in_an_update() {
     ];
     for filter in filters {
         laws.push(Box::new(Pd::new(gains, N_SAMPLES, 2, filter.clone()).unwrap()));
-        let rule = Feedforward { gain: 0.5, lead: 1, limit: 0.8 };
+        let rule = Feedforward { gain_per_s: 0.5, lead_samples: 1, input_max: 0.8 };
         laws.push(Box::new(ErrorFeedforward::new(rule, N_SAMPLES, 2, filter.clone()).unwrap()));
         laws.push(Box::new(Adjoint::new(&coupled, N_SAMPLES, None, filter.clone()).unwrap()));
         laws.push(Box::new(ModelInverse::new(&coupled, N_SAMPLES, 0.5, filter).unwrap()));
@@ -130,7 +130,7 @@ fn factorising_again_allocates_nothing() {
 #[test]
 fn what_goes_round_a_law_allocates_in_its_first_update_only() {
     let law = || {
-        let gains = PdGains { kp: 1.0, kd: 0.0, lead: 1 };
+        let gains = PdGains { kp: 1.0, kd: 0.0, lead_samples: 1 };
         Pd::new(gains, N_SAMPLES, 2, QFilter::None).unwrap()
     };
     let signal = |size: f64| -> Vec<f64> {
@@ -161,7 +161,7 @@ fn recall_allocates_nothing_within_its_capacity() {
     let shape =
         RunShape { n_samples: N_SAMPLES, n_inputs: 2, n_outputs: 2, n_disturbances: 2, dt_s: 4e-3 };
     for top in [None, Some(5)] {
-        let gains = PdGains { kp: 1.0, kd: 0.0, lead: 1 };
+        let gains = PdGains { kp: 1.0, kd: 0.0, lead_samples: 1 };
         let core = Box::new(Pd::new(gains, N_SAMPLES, 2, QFilter::None).unwrap());
         let weights = RelevanceWeights::default();
         let mut law = Relevance::new(core, shape, weights, top).unwrap().with_capacity(40);

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::campaign;
-use ilc_rt::config::{Cell, Interface};
+use ilc_rt::config::{Cell, Mode};
 use ilc_rt::record::EndStatus;
 use ilc_rt::servo::{PhaseName, StopReason};
 use ilc_tests::campaign::{in_process, options};
@@ -45,8 +45,8 @@ fn an_axis_outside_its_limits_is_refused_and_nothing_moves() {
                         assert_eq!(row.controlword[number] & 0x0F, 0, "{name}");
                         let target = row.target_counts[number];
                         match spec.interface {
-                            Interface::Csp => assert!(target == at || target == 0, "{target}"),
-                            Interface::Csv => assert_eq!(target, 0),
+                            Mode::Csp => assert!(target == at || target == 0, "{target}"),
+                            Mode::Csv => assert_eq!(target, 0),
                         }
                     }
                 }
@@ -120,8 +120,8 @@ fn a_sum_beyond_the_limits_brakes_ahead_of_them() {
         let mut rig = Rig::new(&cell, 1);
         let n_samples = rig.n_samples;
         let size = match cell.axes[0].interface {
-            Interface::Csp => 0.004,
-            Interface::Csv => 0.05,
+            Mode::Csp => 0.004,
+            Mode::Csv => 0.05,
         };
         let table = (0..2 * n_samples).map(|i| {
             let turn = (i / 2) as f64 / n_samples as f64 * std::f64::consts::TAU;
@@ -135,7 +135,7 @@ fn a_sum_beyond_the_limits_brakes_ahead_of_them() {
         let plant_m = line.plant_m(0);
         let farthest = plant_m.iter().fold(f64::MIN, |most, m| most.max(*m));
         assert!(farthest <= 0.0805 + 2e-4, "{name}: {farthest}");
-        if spec.interface == Interface::Csp {
+        if spec.interface == Mode::Csp {
             let target: Vec<f64> = line
                 .rows()
                 .filter(|row| row.controlword[0] == 0x0F)

@@ -7,11 +7,11 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use ilc_rt::campaign::{self, Outcome};
-use ilc_rt::config::{Cell, Interface};
+use ilc_rt::config::{Cell, Mode};
 use ilc_rt::fieldbus::canopen::{NmtCommand, emcy};
 use ilc_rt::fieldbus::cia402::State;
 use ilc_rt::fieldbus::transport::{Responder, loopback};
-use ilc_rt::record::{EndStatus, Event, StateName};
+use ilc_rt::record::{EndStatus, Event, FaultKind, StateName};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
 use ilc_tests::campaign::{machine, options};
 use ilc_tests::far_side::FarSide;
@@ -38,8 +38,8 @@ fn smooth_table(n_samples: usize, size: f64) -> Box<[f64]> {
 
 fn size(cell: &Cell) -> f64 {
     match cell.axes[0].interface {
-        Interface::Csp => 0.001,
-        Interface::Csv => 0.02,
+        Mode::Csp => 0.001,
+        Mode::Csv => 0.02,
     }
 }
 
@@ -71,7 +71,7 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
         let enabled = enabled.map_or(rows.len(), |row| row + 3);
         let (v_max, a_max) = (spec.limits.velocity_max_m_s, spec.limits.acceleration_max_m_s2);
         match spec.interface {
-            Interface::Csp => {
+            Mode::Csp => {
                 // Half a count of rounding at either end of a step.
                 let step_max = v_max * dt_s + 1.01 / scale;
                 for k in enabled..rows.len() {
@@ -95,7 +95,7 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
                 let journey = (rest - target[stop_at - 1]).abs();
                 assert!(journey < 0.01, "axis {axis} went on for {journey} m");
             }
-            Interface::Csv => {
+            Mode::Csv => {
                 // The velocity follows from a measured position, so it may be slightly higher than
                 // the reference's, but never a jump.
                 for k in stop_at.max(enabled)..rows.len() {
@@ -250,8 +250,8 @@ fn an_absurd_table_is_bounded_and_never_steps() {
             rig.mail.send_table(1, table.collect()).unwrap();
             rig.tick_to_end();
             let (most, step_max) = match cell.axes[0].interface {
-                Interface::Csp => (cell.learning.input_max_m, 0.5 * cell.cycle_s()),
-                Interface::Csv => (cell.learning.input_max_m_s, 8.0 * cell.cycle_s()),
+                Mode::Csp => (cell.learning.input_max_m, 0.5 * cell.cycle_s()),
+                Mode::Csv => (cell.learning.input_max_m_s, 8.0 * cell.cycle_s()),
             };
             for pair in rig.samples.windows(2) {
                 for axis in 0..2 {
@@ -264,14 +264,14 @@ fn an_absurd_table_is_bounded_and_never_steps() {
             for (axis, spec) in cell.axes.iter().enumerate() {
                 let limits = &spec.limits;
                 let counts_max = match spec.interface {
-                    Interface::Csp => limits.velocity_max_m_s * cell.cycle_s() * spec.counts_per_m,
-                    Interface::Csv => limits.velocity_max_m_s * spec.counts_per_m,
+                    Mode::Csp => limits.velocity_max_m_s * cell.cycle_s() * spec.counts_per_m,
+                    Mode::Csv => limits.velocity_max_m_s * spec.counts_per_m,
                 };
                 for pair in rows.windows(2).filter(|pair| pair[0].controlword[axis] == 0x0F) {
                     let now = pair[1].target_counts[axis];
                     let moved = match spec.interface {
-                        Interface::Csp => now - pair[0].target_counts[axis],
-                        Interface::Csv => now,
+                        Mode::Csp => now - pair[0].target_counts[axis],
+                        Mode::Csv => now,
                     };
                     assert!(f64::from(moved).abs() <= counts_max + 1.01, "{name} {moved}");
                 }
@@ -342,6 +342,7 @@ fn campaign_with(
 fn the_reason_is_told_in_one_sentence() {
     let cell = short(CELLS[0]);
     let fault = |meddle: fn(&mut ilc_sim::Machine, &mut dyn FnMut(ilc_rt::fieldbus::Frame)),
+                 kind: FaultKind,
                  parts: &[&str]| {
         let (outcome, events) = campaign_with(&cell, meddle);
         assert_eq!(outcome.status, EndStatus::Fault);
@@ -350,21 +351,38 @@ fn the_reason_is_told_in_one_sentence() {
             assert!(outcome.reason.contains(part), "{part:?} in {:?}", outcome.reason);
         }
         assert!(!outcome.reason.contains('\n'));
-        let told = Event::Fault { reason: outcome.reason.clone() };
-        assert_eq!(events.iter().filter(|event| **event == told).count(), 1);
+        let mut faults = events.iter().filter_map(|event| match event {
+            Event::Fault { reason, fault } if *reason == outcome.reason => Some(fault),
+            _ => None,
+        });
+        let fault = faults.next().expect("a fault in fields");
+        assert!(faults.next().is_none());
+        assert_eq!(fault.kind, kind);
+        assert!(fault.node.is_some_and(|node| outcome.reason.contains(&format!("node {node}"))));
+        assert_eq!(fault.cycles.encoder_m.len(), 32);
+        assert!(fault.cycles.reference_m.iter().all(|row| row.len() == cell.n_axes()));
+        // The last positions before the stop are those of a run under way.
+        assert!(fault.cycles.encoder_m[0] != fault.cycles.encoder_m[31]);
         assert!(matches!(events.last(), Some(Event::End { status: EndStatus::Fault, .. })));
     };
     fault(
         |machine, _| write_object(X, 0x6065, 1000)(machine),
+        FaultKind::DriveFault,
         &["axis x (node 1)", "0x8611", emcy::meaning(emcy::CODE_FOLLOWING_ERROR), "mm"],
     );
     fault(
         |machine, _| assert!(machine.mute(node(2))),
+        FaultKind::SilentDrive,
         &["axis y (node 2)", "silent", "no answer in 2 s"],
     );
-    fault(|machine, _| assert!(machine.mute(node(TOOL))), &["node 10", "silent"]);
+    fault(
+        |machine, _| assert!(machine.mute(node(TOOL))),
+        FaultKind::SilentTool,
+        &["node 10", "silent"],
+    );
     fault(
         |machine, reply| machine.receive(&NmtCommand::ResetNode.frame(Some(node(X))), reply),
+        FaultKind::NodeRestarted,
         &["node 1 restarted"],
     );
 }

@@ -5,9 +5,9 @@
 
 use std::collections::VecDeque;
 
-use ilc_rt::config::{Cell, Interface};
+use ilc_rt::config::{Cell, Mode};
 use ilc_rt::fieldbus::Frame;
-use ilc_rt::fieldbus::cia402::{Extra, Status};
+use ilc_rt::fieldbus::cia402::{DriveMotionTpdo2, StatusTpdo1};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
 use ilc_tests::rig::{Distort, Rig, node};
 use ilc_tests::short;
@@ -61,10 +61,10 @@ fn distort(lie: Lie, axis_node: u8) -> Distort {
         while waiting.front().is_some_and(|(due, _)| *due <= n_syncs) {
             out.push_back(waiting.pop_front().unwrap().1);
         }
-        let status = Status::decode(&frame, number);
-        let extra = Extra::decode(&frame, number).is_some();
-        let moved = |status: Status, position_counts: i32| {
-            Status { position_counts, ..status }.encode(number)
+        let status = StatusTpdo1::decode(&frame, number);
+        let extra = DriveMotionTpdo2::decode(&frame, number).is_some();
+        let moved = |status: StatusTpdo1, position_counts: i32| {
+            StatusTpdo1 { position_counts, ..status }.encode(number)
         };
         match (lie, status) {
             (Lie::Frozen, Some(_)) => out.push_back(*frozen.get_or_insert(frame)),
@@ -101,10 +101,10 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
         let target: Vec<f64> =
             rows.iter().map(|row| f64::from(row.target_counts[axis]) / spec.counts_per_m).collect();
         let velocity_m_s: Vec<f64> = match spec.interface {
-            Interface::Csp => std::iter::once(0.0)
+            Mode::Csp => std::iter::once(0.0)
                 .chain(target.windows(2).map(|pair| (pair[1] - pair[0]) / dt_s))
                 .collect(),
-            Interface::Csv => target,
+            Mode::Csv => target,
         };
         let rounding = 4.0 / spec.counts_per_m / (dt_s * dt_s);
         // While drives are only told to disable, the target is meaningless.
@@ -123,12 +123,12 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
         let braking_m = w * w / (2.0 * a_max) + w * (a_max + a_0) / jerk + 3.0 * v * dt_s;
         // A drive that closes the position loop (CSP) catches up with its command.
         let lag_m = match spec.interface {
-            Interface::Csp => {
+            Mode::Csp => {
                 let at = f64::from(rows[began - 1].target_counts[axis]) / spec.counts_per_m;
                 (at - plant_m[began - 1]).abs()
             }
             // One that closes the velocity loop (CSV) lags by its time constant.
-            Interface::Csv => 0.02 * v,
+            Mode::Csv => 0.02 * v,
         };
         let way_m = (plant_m[plant_m.len() - 1] - plant_m[began - 1]).abs();
         assert!(

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, Controlword};
+use ilc_rt::fieldbus::cia402::{CommandRpdo1, Controlword};
 use ilc_rt::fieldbus::transport::{self, Responder, ZenohBus, ZenohSettings, loopback};
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_rt::record::{EndStatus, Event, StateName};
@@ -26,8 +26,11 @@ fn request(node: u16) -> Frame {
 }
 
 fn command(to: u8) -> Frame {
-    let command =
-        Command { controlword: Controlword::ENABLE_OPERATION, target_counts: 0, torque_offset: 0 };
+    let command = CommandRpdo1 {
+        controlword: Controlword::ENABLE_OPERATION,
+        target_counts: 0,
+        torque_offset: 0,
+    };
     command.encode(node(to))
 }
 

@@ -1,137 +1,435 @@
-//! Learning laws for Python, one a file; what they share is here.
+//! `Law`: the one class of Python behind every learning law of the controller.
+//!
+//! The typed classes of `ilc_rt.laws` derive from it. A kind of law is one line in [`BUILDERS`] and one small
+//! function that builds it from its arguments; here are the exchange of signals with NumPy, the size of the
+//! runs, pickling, and the way to the law for whoever analyses or runs it.
 
-mod adjoint;
-mod any_size;
-mod constrained;
-mod error_feedforward;
+mod apart;
+mod around;
+mod bounded;
 mod exchange;
-mod fixed_size;
-mod flexible;
-mod gate;
-mod inner;
-mod ladder;
-mod model_inverse;
-mod norm_optimal;
-mod pd;
+mod figure;
+mod kinds;
+mod optimal;
 mod recalled;
-mod relevance;
-mod relevance_weights;
-mod repeatability;
-mod solver;
-mod through_jacobian;
-pub(crate) mod weight;
 
-use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
+use std::sync::Arc;
 
-use ilc_rt::learning::{Law, LearningError, Standing};
-use ilc_rt::model::StateSpace;
+use ilc_rt::learning::Law;
+use ilc_rt::learning::law::q_filter::QFilter;
+use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::argument::Signal;
+use crate::argument::{Layout, read_disturbance};
+use crate::arguments::Arguments;
 use crate::error::OrRaise;
-use crate::held::held;
+use crate::guard::{Borrowed, Guarded};
+use crate::python_law::{Channels, Frame, PythonLaw};
+use crate::signal::read_filter;
+pub(crate) use apart::{apart, is_python, samples_of};
+use exchange::{Given, exchange};
+pub(crate) use figure::Readable;
 
-/// Runs one update and returns the next input.
-fn next(law: &mut dyn Law, u: &Signal, e: &Signal) -> Result<Vec<f64>, LearningError> {
-    let mut next = vec![0.0; u.values.len()];
-    law.update(&u.values, &e.values, &mut next)?;
-    Ok(next)
-}
+/// A function that builds a law from its arguments.
+type Build = fn(&Call<'_, '_>) -> PyResult<Built>;
 
-/// Makes a law of its own for analysis out of one that comes with the controller, for runs of the given
-/// size: of a gate or a ladder the law inside, of a law with bounds the one without them. `None` for any
-/// other object.
-pub(crate) fn own_law(
-    object: &Bound<'_, PyAny>,
+/// The kinds of law, and how each is built.
+const BUILDERS: [(&str, Build); 14] = [
+    ("pd", kinds::pd),
+    ("error_feedforward", kinds::error_feedforward),
+    ("adjoint", kinds::adjoint),
+    ("model_inverse", kinds::model_inverse),
+    ("norm_optimal", optimal::plain),
+    ("contour", optimal::contour),
+    ("formation", optimal::formation),
+    ("dynamic", optimal::dynamic),
+    ("constrained", bounded::constrained),
+    ("gate", around::gate),
+    ("ladder", around::ladder),
+    ("through_jacobian", around::through_jacobian),
+    ("relevance", recalled::relevance),
+    ("flexible", recalled::flexible),
+];
+
+/// The size of a run, as its signals show it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Size {
     n_samples: usize,
-    n_channels: usize,
-) -> PyResult<Option<Box<dyn Law>>> {
-    if let Ok(law) = object.cast::<pd::PyPdIlc>() {
-        return law.get().own(n_samples, n_channels).or_raise().map(Some);
+    channels: Channels,
+    n_disturbances: usize,
+}
+
+impl Size {
+    const ONE: Self =
+        Self { n_samples: 1, channels: Channels { n_inputs: 1, n_outputs: 1 }, n_disturbances: 0 };
+}
+
+/// Which runs a law accepts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fits {
+    /// Those of one size.
+    Fixed(usize, Channels),
+    /// Any whose error has the channels of the input. The law is built again for each other size, which it
+    /// cannot compare with those before.
+    Alike,
+    /// Any with these channels, likewise.
+    Channels(Channels),
+    /// Any, likewise.
+    Any,
+    /// Any first one, and then those of its size until the law is reset.
+    First,
+}
+
+/// One call of a builder.
+struct Call<'a, 'py> {
+    arguments: Arguments<'a, 'py>,
+    /// The runs to come; `None` before the first one, when a law that fits any run is built for a single
+    /// sample: its arguments are checked, and its figures can be read.
+    size: Option<Size>,
+    /// The frame of a law inside that is used where it is; `None` if the whole is built apart.
+    live: Option<&'a Arc<Frame>>,
+}
+
+impl<'py> Call<'_, 'py> {
+    fn py(&self) -> Python<'py> {
+        self.arguments.py()
     }
-    if let Ok(law) = object.cast::<error_feedforward::PyErrorFeedforwardIlc>() {
-        return law.get().own(n_samples, n_channels).or_raise().map(Some);
+
+    /// Returns the size of the runs, of the smallest one before the first.
+    fn size(&self) -> Size {
+        self.size.unwrap_or(Size::ONE)
     }
-    if let Ok(law) = object.cast::<adjoint::PyAdjointIlc>() {
-        return Ok(Some(law.get().own()));
+
+    /// Returns the low-pass of a law; a single sample is too short for any.
+    fn filter(&self, name: &str) -> PyResult<QFilter> {
+        let filter = read_filter(name, self.arguments.given(name)?.as_ref())?;
+        Ok(if self.size.is_some() { filter } else { QFilter::None })
     }
-    if let Ok(law) = object.cast::<model_inverse::PyModelInverseIlc>() {
-        return Ok(Some(law.get().own()));
-    }
-    if let Ok(law) = object.cast::<constrained::PyConstrainedIlc>() {
-        return law.get().unbounded().or_raise().map(Some);
-    }
-    if let Ok(law) = object.cast::<norm_optimal::PyNormOptimalIlc>() {
-        return law.get().own().or_raise().map(Some);
-    }
-    match inside(object) {
-        Some(law) => own_law(&law, n_samples, n_channels),
-        None => Ok(None),
+
+    /// Returns the law inside this one: the object itself, or a copy of it that nobody else uses.
+    fn inner(&self, name: &str, channels: Channels) -> PyResult<Box<dyn Law>> {
+        let object = self.arguments.get(name)?;
+        match self.live {
+            Some(frame) => {
+                Ok(Box::new(PythonLaw::new(name, &object, channels, Arc::clone(frame))?))
+            }
+            None => apart(name, &object, self.size().n_samples, channels),
+        }
     }
 }
 
-/// Returns the law inside a gate or a ladder.
-fn inside<'py>(object: &Bound<'py, PyAny>) -> Option<Bound<'py, PyAny>> {
-    let py = object.py();
-    if let Ok(law) = object.cast::<gate::PyGate>() {
-        return Some(law.get().inside(py).clone());
-    }
-    object.cast::<ladder::PyLadder>().ok().map(|law| law.get().inside(py).clone())
+/// A law and which runs it accepts.
+struct Built {
+    law: Box<dyn Readable>,
+    fits: Fits,
 }
 
-/// Returns whether a law goes back to its best input by itself: a gate does, also inside a ladder.
-pub(crate) fn handles_rollback(object: &Bound<'_, PyAny>) -> bool {
-    object.is_instance_of::<gate::PyGate>()
-        || inside(object).is_some_and(|law| handles_rollback(&law))
+/// The learning law of the controller, whatever its kind.
+///
+/// `ilc_rt.laws` has a typed class for each kind, which documents its equation and parameters.
+#[pyclass(name = "Law", module = "ilc_rt._native", subclass, frozen)]
+pub(crate) struct PyLaw {
+    kind: &'static str,
+    build: Build,
+    arguments: Py<PyDict>,
+    fits: Fits,
+    frame: Arc<Frame>,
+    state: Guarded<State>,
 }
 
-/// Returns what a gate, also one inside a ladder, decided after the last update, and why.
-pub(crate) fn standing(object: &Bound<'_, PyAny>) -> (Standing, Option<String>) {
-    if let Ok(gate) = object.cast::<gate::PyGate>() {
-        return gate.get().standing(object.py());
-    }
-    inside(object).map_or((Standing::Learns, None), |law| standing(&law))
+struct State {
+    law: Box<dyn Readable>,
+    /// The runs that the law was built for; `None` before the first one.
+    size: Option<Size>,
+    /// Disturbances announced before the first run.
+    announced: Vec<Vec<f64>>,
 }
 
-/// Returns the number of samples that a law was made for, if it says so.
-pub(crate) fn samples_of(object: &Bound<'_, PyAny>) -> Option<usize> {
-    if let Ok(law) = object.cast::<adjoint::PyAdjointIlc>() {
-        return Some(law.get().n_samples());
+#[pymethods]
+impl PyLaw {
+    #[new]
+    #[pyo3(signature = (kind, /, **arguments))]
+    fn new(py: Python<'_>, kind: &str, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let Some((kind, build)) = BUILDERS.into_iter().find(|(name, _)| *name == kind) else {
+            let kinds: Vec<&str> = BUILDERS.iter().map(|(name, _)| *name).collect();
+            let line = format!("kind = '{kind}'; one of {} is needed", kinds.join(", "));
+            return Err(PyValueError::new_err(line));
+        };
+        let none = PyDict::new(py);
+        let kept = Arguments::new(arguments.unwrap_or(&none)).kept()?;
+        let frame = Arc::new(Frame::default());
+        let call = Call { arguments: Arguments::new(&kept), size: None, live: Some(&frame) };
+        let Built { law, fits } = build(&call)?;
+        let size = match fits {
+            Fits::Fixed(n_samples, channels) => {
+                Some(Size { n_samples, channels, n_disturbances: 0 })
+            }
+            _ => None,
+        };
+        let state = Guarded::new(State { law, size, announced: Vec::new() });
+        Ok(Self { kind, build, arguments: kept.unbind(), fits, frame, state })
     }
-    if let Ok(law) = object.cast::<model_inverse::PyModelInverseIlc>() {
-        return Some(law.get().n_samples());
+
+    /// Return the input of the next run.
+    ///
+    /// Parameters
+    /// ----------
+    /// u : ndarray of float64, shape (n_samples,) or (n_samples, n_inputs)
+    ///     Input of the run.
+    /// e : ndarray of float64, shape (n_samples,) or (n_samples, n_outputs)
+    ///     Error of the run, reference minus measurement, on the grid of `u`.
+    /// disturbance : float, array_like of float64 or None, shape (n_disturbances,)
+    ///     Measured disturbance of the coming run, e.g. a temperature; only
+    ///     `RelevanceIlc` and `FlexibleIlc` use it, and any law inside another one
+    ///     gets it as it is.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, same shape as `u`
+    ///     Input of the next run.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     If an array has the wrong shape, dtype or a number that is not finite.
+    /// LearningError, SignalError
+    ///     If the run does not suit the law, e.g. it is too short for its filter.
+    #[pyo3(signature = (u, e, disturbance=None))]
+    fn update<'py>(
+        &self,
+        py: Python<'py>,
+        u: &Bound<'py, PyAny>,
+        e: &Bound<'py, PyAny>,
+        disturbance: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (u, e) = (Given::read("u", u)?, Given::read("e", e)?);
+        let mut state = self.state.borrow(py)?;
+        let told = if state.law.uses_disturbance() {
+            disturbance.map(|given| read_disturbance("disturbance", given)).transpose()?
+        } else {
+            None
+        };
+        self.fit(py, &mut state, u.layout(), e.layout(), told.as_deref())?;
+        if let Some(told) = &told {
+            state.law.set_disturbance(told);
+        }
+        let has_inner = state.law.has_inner();
+        if has_inner {
+            let handed_on = disturbance.map(|given| given.clone().unbind());
+            let handed_on = handed_on.filter(|_| told.is_none());
+            self.frame.prepare(u.layout().is_flat, handed_on);
+        }
+        let learned = exchange(py, &u, &e, state.law.as_mut(), has_inner)?;
+        drop(state);
+        match learned {
+            Ok(next) => Ok(next),
+            Err(error) => match self.frame.take_raised() {
+                Some(raised) => Err(raised),
+                None => Err(error).or_raise(),
+            },
+        }
     }
-    if let Ok(law) = object.cast::<constrained::PyConstrainedIlc>() {
-        return Some(law.get().n_samples());
+
+    /// Announce a run before it begins: the first one, or one not learned from.
+    ///
+    /// Parameters
+    /// ----------
+    /// disturbance : float or array_like of float64, shape (n_disturbances,)
+    ///     Measured disturbance of the run about to begin. `update` announces the
+    ///     coming run itself if it is given one.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     If it holds no number, or one that is not finite.
+    fn expect(&self, py: Python<'_>, disturbance: &Bound<'_, PyAny>) -> PyResult<()> {
+        let values = read_disturbance("disturbance", disturbance)?;
+        let mut state = self.state.borrow(py)?;
+        if state.size.is_some() {
+            state.law.set_disturbance(&values);
+        } else {
+            state.announced.push(values);
+        }
+        Ok(())
     }
-    if let Ok(law) = object.cast::<norm_optimal::PyNormOptimalIlc>() {
-        return Some(law.get().n_samples());
+
+    /// Tell the law that the input it made last is not used: the error grew with it.
+    fn taken_back(&self, py: Python<'_>) -> PyResult<()> {
+        self.state.borrow(py)?.law.on_rollback();
+        Ok(())
     }
-    inside(object).and_then(|law| samples_of(&law))
+
+    /// Forget what earlier runs taught the law; one with a library reads it again.
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        let mut state = self.state.borrow(py)?;
+        state.law.reset();
+        state.announced.clear();
+        if self.fits == Fits::First && state.size.take().is_some() {
+            state.law = self.build(py, None)?.law;
+        }
+        Ok(())
+    }
+
+    /// Parameters of the law by name, as they were given.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.arguments.bind(py).copy()
+    }
+
+    /// Figure of the law of this name, for the properties of the typed classes.
+    fn _figure<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let state = self.state.borrow(py)?;
+        let found = state.law.figure(name);
+        let n_inputs = state.size.unwrap_or(Size::ONE).channels.n_inputs;
+        drop(state);
+        match found {
+            Some(found) => found.give(py, n_inputs, self.frame.is_flat()),
+            None => Err(PyAttributeError::new_err(format!("this law has no {name}"))),
+        }
+    }
+
+    /// Remember a run that was made elsewhere.
+    #[pyo3(signature = (u, e, disturbance=None))]
+    fn _remember(
+        &self,
+        py: Python<'_>,
+        u: &Bound<'_, PyAny>,
+        e: &Bound<'_, PyAny>,
+        disturbance: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (u, e) = (Given::read("u", u)?, Given::read("e", e)?);
+        let given = disturbance.filter(|given| !given.is_none());
+        let told = given.map(|given| read_disturbance("disturbance", given)).transpose()?;
+        let told = told.unwrap_or_default();
+        let mut state = self.state.borrow(py)?;
+        self.fit(py, &mut state, u.layout(), e.layout(), Some(&told))?;
+        state.law.remember(u.values()?, e.values()?, &told).or_raise()
+    }
+
+    /// Return numbers and weights of the runs that count under a disturbance.
+    fn _relevant(
+        &self,
+        py: Python<'_>,
+        disturbance: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(Vec<usize>, Vec<f64>)> {
+        let given = disturbance.filter(|given| !given.is_none());
+        let told = given.map(|given| read_disturbance("disturbance", given)).transpose()?;
+        let state = self.state.borrow(py)?;
+        if state.size.is_none() {
+            return Ok((Vec::new(), Vec::new()));
+        }
+        let found = state.law.relevant(&told.unwrap_or_default()).or_raise()?;
+        Ok(found.into_iter().unzip())
+    }
+
+    /// Forget all but some of the remembered runs, and return the numbers of those that stayed.
+    fn _trim(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = crate::whole::keep)] keep: usize,
+        disturbances: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<usize>> {
+        let given = disturbances.filter(|given| !given.is_none());
+        let told = given.map(|given| read_disturbance("disturbances", given)).transpose()?;
+        let mut state = self.state.borrow(py)?;
+        if state.size.is_none() {
+            return Ok(Vec::new());
+        }
+        state.law.trim(keep, &told.unwrap_or_default()).or_raise()
+    }
+
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let this = slf.get();
+        let class = slf.get_type().name()?.to_string();
+        let made_by =
+            optimal::METHODS.contains(&this.kind).then(|| format!("{class}.{}", this.kind));
+        let arguments = this.arguments.bind(slf.py());
+        Arguments::new(arguments).call(&made_by.unwrap_or(class))
+    }
+
+    /// Pickled and copied as it was made: what it has learned since is not in the copy.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, this) = (slf.py(), slf.get());
+        let maker = py.import("ilc_rt._native")?.getattr("_law")?;
+        let parts = (slf.get_type(), this.kind, &this.arguments);
+        let attributes = slf.getattr_opt("__dict__")?;
+        Ok((maker, parts, attributes).into_pyobject(py)?.into_any())
+    }
 }
 
-/// Makes the optimal law of the given weights.
-pub(crate) fn optimal(
-    model: &StateSpace,
-    n_samples: usize,
-    weights: Weights,
-) -> Result<Box<dyn Law>, LearningError> {
-    Ok(Box::new(NormOptimal::new(model, n_samples, weights)?))
+impl PyLaw {
+    fn build(&self, py: Python<'_>, size: Option<Size>) -> PyResult<Built> {
+        let arguments = Arguments::new(self.arguments.bind(py));
+        (self.build)(&Call { arguments, size, live: Some(&self.frame) })
+    }
+
+    /// Refuses a run that the law does not accept, and builds the law for one that it has not seen yet.
+    fn fit(
+        &self,
+        py: Python<'_>,
+        state: &mut Borrowed<'_, State>,
+        u: Layout,
+        e: Layout,
+        disturbance: Option<&[f64]>,
+    ) -> PyResult<()> {
+        let channels = Channels { n_inputs: u.n_channels, n_outputs: e.n_channels };
+        match (self.fits, state.size) {
+            (Fits::Fixed(n_samples, channels), _) => {
+                u.require_exactly("u", n_samples, channels.n_inputs)?;
+                return e.require_exactly("e", n_samples, channels.n_outputs);
+            }
+            (Fits::First, Some(size)) => {
+                u.require_exactly("u", size.n_samples, size.channels.n_inputs)?;
+                return e.require_exactly("e", size.n_samples, size.channels.n_outputs);
+            }
+            (Fits::Channels(needed), _) => {
+                u.require("u", u.n_samples, needed.n_inputs)?;
+                e.require("e", u.n_samples, needed.n_outputs)?;
+            }
+            (Fits::Alike, _) => e.require("e", u.n_samples, u.n_channels)?,
+            (Fits::Any, _) | (Fits::First, None) => e.require("e", u.n_samples, e.n_channels)?,
+        }
+        let told = disturbance.or(state.announced.last().map(Vec::as_slice));
+        let n_disturbances = told.map_or(0, <[f64]>::len);
+        let size = Size { n_samples: u.n_samples, channels, n_disturbances };
+        if self.fits != Fits::First && state.size == Some(Size { n_disturbances: 0, ..size }) {
+            return Ok(());
+        }
+        self.frame.prepare(u.is_flat, None);
+        let mut law = self.build(py, Some(size))?.law;
+        for disturbance in std::mem::take(&mut state.announced) {
+            law.set_disturbance(&disturbance);
+        }
+        state.law = law;
+        state.size =
+            Some(if self.fits == Fits::First { size } else { Size { n_disturbances: 0, ..size } });
+        Ok(())
+    }
+
+    /// Looks at the law.
+    pub(crate) fn look<T>(
+        &self,
+        py: Python<'_>,
+        look: impl FnOnce(&mut dyn Readable) -> T,
+    ) -> PyResult<T> {
+        Ok(look(self.state.borrow(py)?.law.as_mut()))
+    }
+}
+
+/// Makes a law again from its kind and its arguments, for copies and pickles.
+#[pyfunction]
+fn _law<'py>(
+    class: &Bound<'py, PyAny>,
+    kind: &str,
+    arguments: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let native = class.py().get_type::<PyLaw>();
+    native.getattr("__new__")?.call((class, kind), Some(arguments))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<pd::PyPdIlc>()?;
-    module.add_class::<error_feedforward::PyErrorFeedforwardIlc>()?;
-    module.add_class::<adjoint::PyAdjointIlc>()?;
-    module.add_class::<model_inverse::PyModelInverseIlc>()?;
-    module.add_class::<gate::PyGate>()?;
-    module.add_class::<ladder::PyLadder>()?;
-    module.add_class::<through_jacobian::PyThroughJacobian>()?;
-    module.add_class::<repeatability::PyRepeatability>()?;
-    module.add_function(wrap_pyfunction!(repeatability::repeatability, module)?)?;
-    module.add_class::<norm_optimal::PyNormOptimalIlc>()?;
-    module.add_class::<constrained::PyConstrainedIlc>()?;
-    module.add_class::<relevance_weights::PyRelevanceWeights>()?;
-    module.add_class::<relevance::PyRelevanceIlc>()?;
-    module.add_class::<flexible::PyFlexibleIlc>()
+    module.add_class::<PyLaw>()?;
+    module.add_function(wrap_pyfunction!(_law, module)?)?;
+    module.add_function(wrap_pyfunction!(recalled::check_relevance_weights, module)?)
 }

@@ -1,246 +1,166 @@
-//! What the laws that remember runs share: made at the first update, and filled from a library.
+//! Builders of the laws that remember runs: `relevance` and `flexible`, filled from a library.
 
-use std::sync::Mutex;
-
-use ilc_rt::learning::law::flexible::Flexible;
-use ilc_rt::learning::law::relevance::Relevance;
-use ilc_rt::learning::{Law, LearningError};
+use ilc_rt::learning::LearningError;
+use ilc_rt::learning::law::flexible::{Flexible, TableShape};
+use ilc_rt::learning::law::relevance::{Relevance, RelevanceWeights, RunShape};
 use ilc_rt::library::{LibraryError, Task};
 use ilc_rt::record::IterationRecord;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use super::{held, next};
-use crate::argument::{Signal, give_signal, misfit, read_disturbance};
+use super::figure::{Figure, Readable};
+use super::{Built, Call, Fits, Size};
+use crate::argument::read_disturbance;
+use crate::arguments::number;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::library::PyLibrary;
-use crate::python_law::PythonLaw;
+use crate::python_law::Channels;
 
-/// A law that can be told of runs made earlier.
-pub(super) trait Remember: Law {
-    fn remember(&mut self, u: &[f64], e: &[f64], disturbance: &[f64]) -> Result<(), LearningError>;
+pub(super) fn relevance(call: &Call<'_, '_>) -> PyResult<Built> {
+    let a = call.arguments;
+    let weights = read_weights(&a.get("weights")?)?;
+    let top = a.maybe_whole("top")?;
+    let dt_s = a.maybe_number("dt_s")?;
+    let has_library = a.given("library")?.is_some();
+    if weights.error_rate > 0.0 && dt_s.is_none() && !has_library {
+        return Err(no_sample_time(&weights));
+    }
+    let size = call.size.unwrap_or(Size { n_disturbances: weights.disturbance.len(), ..Size::ONE });
+    let (runs, library_dt_s) = earlier_runs(call)?;
+    // Without a weight of the rate, and before the first run, the sample time changes nothing.
+    let is_used = weights.error_rate > 0.0 && call.size.is_some();
+    let dt_s = dt_s.or(library_dt_s).or((!is_used).then_some(1.0));
+    let dt_s = dt_s.ok_or_else(|| no_sample_time(&weights))?;
+    let Size { n_samples, channels: Channels { n_inputs, n_outputs }, n_disturbances } = size;
+    let shape = RunShape { n_samples, n_inputs, n_outputs, n_disturbances, dt_s };
+    let core = call.inner("core", size.channels)?;
+    let law = Relevance::new(core, shape, weights, top).or_raise()?;
+    filled(call, law, &runs)
 }
 
-impl Remember for Relevance {
+pub(super) fn flexible(call: &Call<'_, '_>) -> PyResult<Built> {
+    let tolerance = call.arguments.number("tolerance")?;
+    let (runs, _) = earlier_runs(call)?;
+    let Size { n_samples, channels, n_disturbances } = call.size();
+    let Channels { n_inputs, n_outputs } = channels;
+    let shape = TableShape { n_samples, n_inputs, n_outputs, n_disturbances, tolerance };
+    let law = Flexible::new(call.inner("core", channels)?, shape).or_raise()?;
+    filled(call, law, &runs)
+}
+
+/// Returns the law once it remembers the runs of earlier campaigns.
+fn filled<L: Readable + 'static>(
+    call: &Call<'_, '_>,
+    mut law: L,
+    runs: &[IterationRecord],
+) -> PyResult<Built> {
+    detached(call.py(), || {
+        runs.iter().try_for_each(|run| law.remember(&run.input, &run.error_m, &run.disturbance))
+    })
+    .or_raise()?;
+    Ok(Built { law: Box::new(law), fits: Fits::First })
+}
+
+/// Reads the runs of the library that are like those to come, and their sample time.
+fn earlier_runs(call: &Call<'_, '_>) -> PyResult<(Vec<IterationRecord>, Option<f64>)> {
+    let library = call.arguments.given("library")?;
+    let task = Task { cell: call.arguments.maybe_text("cell")? };
+    let library = library.map(|given| {
+        given.cast_into::<PyLibrary>().map_err(|other| {
+            PyTypeError::new_err(format!("library: {other}; a Library or None is needed"))
+        })
+    });
+    let (Some(library), Some(size)) = (library.transpose()?, call.size) else {
+        return Ok((Vec::new(), None));
+    };
+    let Size { n_samples, channels: Channels { n_inputs, n_outputs }, n_disturbances } = size;
+    if n_inputs != n_outputs {
+        return Ok((Vec::new(), None));
+    }
+    let library = library.get();
+    detached(call.py(), || {
+        library.read(|library| {
+            let (ids, dt_s) = library.fitting(n_samples, n_inputs, n_disturbances, &task)?;
+            let runs: Result<Vec<_>, LibraryError> =
+                ids.into_iter().map(|id| library.load(id).map(|row| row.record)).collect();
+            Ok((runs?, dt_s))
+        })
+    })
+    .or_raise()
+}
+
+impl Readable for Relevance {
+    fn figure(&self, name: &str) -> Option<Figure> {
+        (name == "n_runs").then(|| Figure::Count(self.len()))
+    }
+
+    fn has_inner(&self) -> bool {
+        true
+    }
+
+    fn uses_disturbance(&self) -> bool {
+        true
+    }
+
     fn remember(&mut self, u: &[f64], e: &[f64], disturbance: &[f64]) -> Result<(), LearningError> {
         Relevance::remember(self, u, e, disturbance)
     }
+
+    fn relevant(&self, disturbance: &[f64]) -> Result<Vec<(usize, f64)>, LearningError> {
+        Relevance::relevant(self, disturbance)
+    }
+
+    fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>, LearningError> {
+        Relevance::trim(self, keep, disturbances)
+    }
 }
 
-impl Remember for Flexible {
+impl Readable for Flexible {
+    fn figure(&self, name: &str) -> Option<Figure> {
+        (name == "n_runs").then(|| Figure::Count(self.len()))
+    }
+
+    fn has_inner(&self) -> bool {
+        true
+    }
+
+    fn uses_disturbance(&self) -> bool {
+        true
+    }
+
     fn remember(&mut self, u: &[f64], e: &[f64], disturbance: &[f64]) -> Result<(), LearningError> {
         Flexible::remember(self, u, e, disturbance)
     }
 }
 
-/// Size of the runs, as the first one shows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Size {
-    pub(super) n_samples: usize,
-    pub(super) n_inputs: usize,
-    pub(super) n_outputs: usize,
-    pub(super) n_disturbances: usize,
-    /// Sample time of the runs in the library, if it has any that fit.
-    pub(super) library_dt_s: Option<f64>,
+/// Reads any object with the attributes of `ilc_rt.RelevanceWeights`.
+fn read_weights(object: &Bound<'_, PyAny>) -> PyResult<RelevanceWeights> {
+    let part = |name: &str| number(name, &object.getattr(name)?);
+    let disturbance = read_disturbance("disturbance", &object.getattr("disturbance")?)?;
+    let n = disturbance.len();
+    RelevanceWeights {
+        error: part("error")?,
+        error_rate: part("error_rate")?,
+        disturbance,
+        epsilon: part("epsilon")?,
+        rate_filter_s: part("rate_filter_s")?,
+        error_gain: part("error_gain")?,
+        input_gain: part("input_gain")?,
+    }
+    .spread(n)
+    .or_raise()
 }
 
-/// A law around a core, and where it takes earlier runs from.
-#[derive(Debug)]
-pub(super) struct Recalled<L> {
-    core: Py<PyAny>,
-    library: Option<Py<PyLibrary>>,
-    task: Task,
-    state: Mutex<State<L>>,
+/// Refuses weights of the relevance that cannot be used.
+#[pyfunction]
+pub(super) fn check_relevance_weights(weights: &Bound<'_, PyAny>) -> PyResult<()> {
+    read_weights(weights).map(drop)
 }
 
-#[derive(Debug)]
-struct State<L> {
-    /// The law and the size of run that it is for.
-    law: Option<(Size, L)>,
-    /// Disturbances announced before the law could be made.
-    announced: Vec<Vec<f64>>,
-}
-
-impl<L: Remember> Recalled<L> {
-    pub(super) fn new(
-        library: Option<&Bound<'_, PyLibrary>>,
-        core: &Bound<'_, PyAny>,
-        cell: Option<String>,
-    ) -> PyResult<Self> {
-        if !core.getattr_opt("update")?.is_some_and(|update| update.is_callable()) {
-            let shown = core.repr()?;
-            return Err(PyTypeError::new_err(format!(
-                "core = {shown}: a law with update(u, e, disturbance=None) is needed"
-            )));
-        }
-        Ok(Self {
-            core: core.clone().unbind(),
-            library: library.map(|library| library.clone().unbind()),
-            task: Task { cell },
-            state: Mutex::new(State { law: None, announced: Vec::new() }),
-        })
-    }
-
-    /// Announces a run.
-    pub(super) fn expect(&self, disturbance: &Bound<'_, PyAny>) -> PyResult<()> {
-        let values = read_disturbance("disturbance", disturbance)?;
-        detached(disturbance.py(), || {
-            let mut state = held(&self.state);
-            match &mut state.law {
-                Some((_, law)) => law.set_disturbance(&values),
-                None => state.announced.push(values),
-            }
-        });
-        Ok(())
-    }
-
-    /// Runs one update; `make` makes the law when it is the first.
-    pub(super) fn update<'py>(
-        &self,
-        py: Python<'py>,
-        u: &Bound<'py, PyAny>,
-        e: &Bound<'py, PyAny>,
-        disturbance: Option<&Bound<'py, PyAny>>,
-        make: impl Fn(Box<dyn Law>, Size) -> PyResult<L>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let u = Signal::read("u", u)?;
-        let e = Signal::read("e", e)?.with_samples("e", u.n_samples)?;
-        let coming = disturbance
-            .filter(|disturbance| !disturbance.is_none())
-            .map(|disturbance| read_disturbance("disturbance", disturbance))
-            .transpose()?;
-        self.prepare(py, &u, &e, coming.as_deref(), make)?;
-        let result = detached(py, || {
-            let mut state = held(&self.state);
-            let Some((_, law)) = &mut state.law else {
-                return Err(LearningError::Empty { what: "law" });
-            };
-            if let Some(coming) = &coming {
-                law.set_disturbance(coming);
-            }
-            next(law, &u, &e)
-        });
-        give_signal(py, result.or_raise()?, u.n_channels, u.is_flat)
-    }
-
-    /// Remembers a run made elsewhere.
-    pub(super) fn remember(
-        &self,
-        py: Python<'_>,
-        u: &Bound<'_, PyAny>,
-        e: &Bound<'_, PyAny>,
-        disturbance: Option<&Bound<'_, PyAny>>,
-        make: impl Fn(Box<dyn Law>, Size) -> PyResult<L>,
-    ) -> PyResult<()> {
-        let u = Signal::read("u", u)?;
-        let e = Signal::read("e", e)?.with_samples("e", u.n_samples)?;
-        let own = match disturbance {
-            Some(disturbance) if !disturbance.is_none() => {
-                read_disturbance("disturbance", disturbance)?
-            }
-            _ => Vec::new(),
-        };
-        self.prepare(py, &u, &e, Some(&own), make)?;
-        detached(py, || match &mut held(&self.state).law {
-            Some((_, law)) => law.remember(&u.values, &e.values, &own),
-            None => Err(LearningError::Empty { what: "law" }),
-        })
-        .or_raise()
-    }
-
-    /// Makes the law if it is not there, and refuses runs of another size.
-    fn prepare(
-        &self,
-        py: Python<'_>,
-        u: &Signal,
-        e: &Signal,
-        disturbance: Option<&[f64]>,
-        make: impl Fn(Box<dyn Law>, Size) -> PyResult<L>,
-    ) -> PyResult<()> {
-        let (size, announced) = detached(py, || {
-            let state = held(&self.state);
-            (state.law.as_ref().map(|(size, _)| *size), state.announced.clone())
-        });
-        if let Some(size) = size {
-            for (name, signal, n_channels) in [("u", u, size.n_inputs), ("e", e, size.n_outputs)] {
-                if (signal.n_samples, signal.n_channels) != (size.n_samples, n_channels) {
-                    let allowed = format!("({}, {n_channels})", size.n_samples);
-                    return Err(misfit(name, &signal.shape(), &allowed));
-                }
-            }
-            return Ok(());
-        }
-        let told = disturbance.or(announced.last().map(Vec::as_slice));
-        let mut size = Size {
-            n_samples: u.n_samples,
-            n_inputs: u.n_channels,
-            n_outputs: e.n_channels,
-            n_disturbances: told.map_or(0, <[f64]>::len),
-            library_dt_s: None,
-        };
-        let runs = self.runs(py, &mut size)?;
-        let core = PythonLaw::core(self.core.bind(py), size.n_inputs, size.n_outputs, u.is_flat)?;
-        let mut law = make(Box::new(core), size)?;
-        detached(py, || {
-            for run in &runs {
-                law.remember(&run.input, &run.error_m, &run.disturbance)?;
-            }
-            for disturbance in &announced {
-                law.set_disturbance(disturbance);
-            }
-            let mut state = held(&self.state);
-            state.announced.clear();
-            state.law = Some((size, law));
-            Ok::<(), LearningError>(())
-        })
-        .or_raise()
-    }
-
-    /// Reads the runs of the library that fit.
-    fn runs(&self, py: Python<'_>, size: &mut Size) -> PyResult<Vec<IterationRecord>> {
-        let Some(library) = &self.library else {
-            return Ok(Vec::new());
-        };
-        let library = library.get();
-        let Size { n_samples, n_inputs, n_outputs, n_disturbances, .. } = *size;
-        if n_inputs != n_outputs {
-            return Ok(Vec::new());
-        }
-        detached(py, || -> Result<Vec<IterationRecord>, LibraryError> {
-            library.read(|library| {
-                let (ids, dt_s) =
-                    library.fitting(n_samples, n_inputs, n_disturbances, &self.task)?;
-                size.library_dt_s = dt_s;
-                ids.into_iter()
-                    .map(|id| library.load(id).map(|row| row.record))
-                    .collect::<Result<Vec<_>, _>>()
-            })
-        })
-        .or_raise()
-    }
-
-    /// Forgets everything; the library is read again at the next update.
-    pub(super) fn reset(&self, py: Python<'_>) {
-        detached(py, || {
-            let mut state = held(&self.state);
-            if let Some((_, mut law)) = state.law.take() {
-                law.reset();
-            }
-            state.announced.clear();
-        });
-    }
-
-    /// Does something with the law, if there has been a run.
-    pub(super) fn with<T: Send>(
-        &self,
-        py: Python<'_>,
-        work: impl FnOnce(&mut L) -> T + Send,
-    ) -> Option<T> {
-        detached(py, || held(&self.state).law.as_mut().map(|(_, law)| work(law)))
-    }
-
-    pub(super) fn core_repr(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(self.core.bind(py).repr()?.to_string())
-    }
+fn no_sample_time(weights: &RelevanceWeights) -> PyErr {
+    PyValueError::new_err(format!(
+        "dt_s = None: the weight of the error's rate, {}, needs the sample time, and no library has it",
+        weights.error_rate
+    ))
 }

@@ -1,7 +1,13 @@
 //! Source of the measured disturbance of each run.
 
 use std::fmt;
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::config::{Cell, read_file};
+
+/// Largest file that holds the disturbance of a run.
+const FILE_BYTES_MAX: u64 = 4096;
 
 /// Function from the number of the next run to its disturbance, or to the reason why it has none.
 type Ask = dyn FnMut(u32) -> Result<Vec<f64>, String> + Send;
@@ -16,6 +22,20 @@ impl Disturbance {
     /// Asks a function.
     pub fn measured(ask: impl FnMut(u32) -> Result<Vec<f64>, String> + Send + 'static) -> Self {
         Self(Some(Arc::new(Mutex::new(ask))))
+    }
+
+    /// Reads the file that the cell names, unless a function is asked already.
+    #[must_use]
+    pub(super) fn or_file(self, cell: &Cell) -> Self {
+        match &cell.learning.disturbance_file {
+            Some(name) if self.0.is_none() => {
+                // A relative name is beside the cell description, an absolute one stays as it is.
+                let folder = cell.file.parent().unwrap_or(Path::new(""));
+                let path = folder.join(name);
+                Self::measured(move |_| read(&path))
+            }
+            _ => self,
+        }
     }
 
     /// Returns the disturbance of a run that is about to begin; empty if none is measured.
@@ -34,6 +54,18 @@ impl Disturbance {
             Some(value) => Err(format!("the disturbance of run {run} holds {value}")),
         }
     }
+}
+
+/// Reads the numbers of a file.
+fn read(path: &Path) -> Result<Vec<f64>, String> {
+    let refused = |reason: String| format!("{}: {reason}", path.display());
+    let bytes = read_file(path, FILE_BYTES_MAX).map_err(refused)?;
+    let text = String::from_utf8_lossy(&bytes);
+    let numbers =
+        text.split(|c: char| c.is_whitespace() || c == ',').filter(|part| !part.is_empty());
+    numbers
+        .map(|part| part.parse().map_err(|_| refused(format!("{part:?} is not a number"))))
+        .collect()
 }
 
 impl fmt::Debug for Disturbance {

@@ -10,15 +10,15 @@ use super::learner::{Learner, set_disturbance};
 use super::nodes;
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session};
 use super::pace::Pacer;
-use super::resume::Resumed;
+use super::resume::{Resumed, to_resume};
 use super::rollback::RollbackPolicy;
 use super::running::{Parts, Running};
 use super::telemetry::Telemetry;
 use crate::config::Cell;
-use crate::design::Plan;
+use crate::design::{DesignError, Plan};
 use crate::fieldbus::Bus;
 use crate::identification::Experiment;
-use crate::learning::Law;
+use crate::learning::{Law, LearningError};
 use crate::library::Library;
 use crate::record::{Event, StateName};
 use crate::rt::RtReport;
@@ -115,7 +115,8 @@ fn execute(
     let library = open_library(options)?;
     let mut policy =
         RollbackPolicy::new(campaign.growth_allowed).forgiving(session.forgives_stalls());
-    let (claim, mut resumed) = begin_or_resume(&library, options, &mut campaign, &mut policy)?;
+    let (claim, mut resumed) =
+        begin_or_resume(&library, cell, options, &mut campaign, &mut policy)?;
     let Campaign { mut plan, law, input, .. } = campaign;
     let learner = match law {
         Some(law) if session.lockstep => Some(Learner::in_line(law)),
@@ -194,26 +195,40 @@ fn open_library(options: &Options) -> Result<Library, CampaignError> {
 /// Claims a new campaign, or the newest one of the same kind with its runs and its next input.
 fn begin_or_resume(
     library: &Library,
+    cell: &Cell,
     options: &Options,
     campaign: &mut Campaign,
     policy: &mut RollbackPolicy,
 ) -> Result<(Claim, Resumed), CampaignError> {
     let path = &options.session.library;
-    let meta = &mut campaign.plan.meta;
-    let law = campaign.law.as_deref_mut();
-    if options.resume {
-        // Claimed before it is read: what another program adds to it meanwhile would be made twice.
-        let newest = library.newest_campaign(&meta.fingerprint)?;
-        let held = newest.map_or_else(|| Ok(Claim::none()), |name| claim(path, &name))?;
-        return Ok((held, policy.resume(library, meta, law, &options.disturbance)?));
+    let plan = &mut campaign.plan;
+    let mut law = campaign.law.as_deref_mut();
+    let disturbance = options.disturbance.clone().or_file(cell);
+    plan.meta.campaign =
+        if options.resume { to_resume(library, plan)? } else { library.new_campaign()? };
+    // Claimed before it is read: what another program adds to it meanwhile would be made twice.
+    let held = claim(path, &plan.meta.campaign)?;
+    if let Some(law) = law.as_deref_mut() {
+        policy.recall(library, plan, law)?;
     }
-    meta.campaign = library.new_campaign()?;
-    let held = claim(path, &meta.campaign)?;
-    let next_disturbance = options.disturbance.of(0).map_err(CampaignError::Disturbance)?;
-    if let Some(law) = law {
-        set_disturbance(law, &next_disturbance);
+    let resumed = if options.resume {
+        policy.resume(library, &plan.meta, law.as_deref_mut(), &disturbance)?
+    } else {
+        let next_disturbance = disturbance.of(0).map_err(CampaignError::Disturbance)?;
+        if let Some(law) = law.as_deref_mut() {
+            set_disturbance(law, &next_disturbance);
+        }
+        Resumed { next_disturbance, ..Resumed::default() }
+    };
+    if let Some(expected) = law.and_then(|law| law.n_disturbances())
+        && expected != resumed.next_disturbance.len()
+    {
+        let found = resumed.next_disturbance.len();
+        let source = LearningError::Disturbance { found, expected };
+        let file = cell.file.display().to_string();
+        return Err(DesignError::Learning { file, source }.into());
     }
-    Ok((held, Resumed { next_disturbance, ..Resumed::default() }))
+    Ok((held, resumed))
 }
 
 fn start_event(

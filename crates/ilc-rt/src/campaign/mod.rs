@@ -11,6 +11,7 @@ mod disturbance;
 mod ending;
 mod error;
 mod execute;
+mod fault;
 mod keeper;
 mod learner;
 mod nodes;

@@ -4,8 +4,9 @@ use super::disturbance::Disturbance;
 use super::error::CampaignError;
 use super::learner::{learn, set_disturbance};
 use super::rollback::{Decision, RollbackPolicy};
+use crate::design::Plan;
 use crate::learning::{Law, LearningError};
-use crate::library::Library;
+use crate::library::{Library, Row, Task};
 use crate::record::{Figures, IterationRecord, Meta};
 
 /// A resumed campaign.
@@ -26,25 +27,60 @@ impl Resumed {
     }
 }
 
+/// Returns the newest campaign of the same fingerprint, also of libraries of older versions.
+pub(super) fn to_resume(library: &Library, plan: &Plan) -> Result<String, CampaignError> {
+    if let Some(campaign) = library.newest_campaign(&plan.meta.fingerprint)? {
+        return Ok(campaign);
+    }
+    let older = library.newest_campaign(&plan.legacy_fingerprint)?;
+    let campaign = older.ok_or_else(|| {
+        let reason = "the library has no campaign of this cell, program, measurement and law";
+        CampaignError::Resume(reason.to_owned())
+    })?;
+    tracing::info!("campaign {campaign} was begun by an older version; it goes on as it was");
+    Ok(campaign)
+}
+
 impl RollbackPolicy {
-    /// Resumes the newest campaign of the same fingerprint: its runs, and the input of the next one with
-    /// the time that it took to learn it.
+    /// Gives a law that weighs runs by their disturbance the stored runs of this cell, program and
+    /// measurement that were made before this campaign.
+    pub(super) fn recall(
+        &self,
+        library: &Library,
+        plan: &Plan,
+        law: &mut dyn Law,
+    ) -> Result<(), CampaignError> {
+        let Some(n_disturbances) = law.n_disturbances() else { return Ok(()) };
+        let meta = &plan.meta;
+        let task = Task { cell: Some(meta.cell.clone()) };
+        let (ids, _) = library.fitting(plan.n_samples(), meta.n_axes, n_disturbances, &task)?;
+        for id in ids {
+            let Row { meta: stored, record, .. } = library.load(id)?;
+            if stored.campaign == meta.campaign {
+                break;
+            }
+            let is_alike = stored.program == meta.program
+                && stored.measure == meta.measure
+                && stored.cycle_s.to_bits() == meta.cycle_s.to_bits();
+            if is_alike && !self.is_disturbed(&record.figures) {
+                law.recall(&record.input, &record.error_m, &record.disturbance).map_err(refused)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Resumes the campaign of `meta`: its runs, and the input of the next one with the time that it took
+    /// to learn it.
     ///
     /// All runs pass through the law again, which then has the state of an unbroken campaign.
     pub(super) fn resume(
         &mut self,
         library: &Library,
-        meta: &mut Meta,
+        meta: &Meta,
         mut law: Option<&mut (dyn Law + '_)>,
         disturbance: &Disturbance,
     ) -> Result<Resumed, CampaignError> {
-        let Some(campaign) = library.newest_campaign(&meta.fingerprint)? else {
-            return Err(CampaignError::Resume(
-                "the library has no campaign of this cell, program, measurement and law".to_owned(),
-            ));
-        };
-        let rows = library.list(Some(&campaign))?;
-        meta.campaign = campaign;
+        let rows = library.list(Some(&meta.campaign))?;
         let mut last: Option<(Decision, IterationRecord)> = None;
         for row in &rows {
             let mut record = library.load(row.id)?.record;

@@ -1,6 +1,6 @@
 //! What is seen from outside: the events and samples of a cell, on Zenoh.
 //!
-//! A thread and a session of their own; the supervisor hands over finished text through a bounded
+//! A thread and a session of their own; the campaign hands over finished text through a bounded
 //! queue and drops what does not fit. Nothing here can hold up the loop, and nothing can command it.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};

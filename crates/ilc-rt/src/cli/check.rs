@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
-use crate::config::{AxisUnit, Cell, GateMeasure, LawName, PathKind};
+use crate::config::{AxisUnit, Cell, LawName, PathKind};
 use crate::design::{DesignError, Plan, Prepared};
+use crate::learning::gate::GateMeasure;
 use crate::record::AxisKinds;
 
 #[derive(Args)]

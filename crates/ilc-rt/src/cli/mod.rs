@@ -6,12 +6,14 @@ mod check;
 mod completions;
 mod figures;
 mod identify;
+mod init;
 mod latency;
 mod option;
 mod parent;
 mod quantity;
 mod run;
 mod runs;
+mod schema;
 mod show;
 
 pub use identify::IdentifyOptions;
@@ -51,6 +53,10 @@ enum Verb {
     Identify(identify::IdentifyArguments),
     /// Check a cell description and print what it would do; touches no bus.
     Check(check::CheckArguments),
+    /// Write a cell description to begin with: every key, its meaning and its range.
+    Init(init::InitArguments),
+    /// Print the JSON schema of the cell description, for editors.
+    Schema(schema::SchemaArguments),
     /// Measure how late this machine wakes the loop's thread.
     Latency(latency::LatencyArguments),
     /// Print a script that completes this command line in a shell.
@@ -84,6 +90,8 @@ pub fn main() -> ExitCode {
         Verb::Run(arguments) => run::run(&arguments),
         Verb::Identify(arguments) => identify::identify(&arguments),
         Verb::Check(arguments) => check::check(&arguments),
+        Verb::Init(arguments) => init::init(&arguments),
+        Verb::Schema(arguments) => schema::schema(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),
         Verb::Completions(arguments) => completions::completions(&arguments, Arguments::command()),
     };

@@ -10,6 +10,7 @@ use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
 use super::program::Program;
 use super::simulation::{AxisSimulation, Simulation};
+pub use crate::fieldbus::cia402::Mode;
 pub use crate::interpolate::AxisUnit;
 use crate::schema::field_order;
 
@@ -83,16 +84,6 @@ fn default_load_max() -> f64 {
     0.8
 }
 
-/// How a drive is commanded, and where the learned input enters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Interface {
-    /// Cyclic synchronous position: the drive closes the position loop (series learning, input in m).
-    Csp,
-    /// Cyclic synchronous velocity: the position loop is here (parallel learning, input in m/s).
-    Csv,
-}
-
 /// `[[axis]]`: one drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -104,7 +95,7 @@ pub struct Axis {
     #[schemars(range(min = 1, max = 127))]
     pub node: u8,
     /// Command interface.
-    pub interface: Interface,
+    pub interface: Mode,
     /// What its coordinate is measured in; every quantity of a rotary axis whose name ends in `_m`,
     /// `_m_s`, … is in rad, rad/s, …
     #[serde(default)]

@@ -1,5 +1,11 @@
 //! Why a cell description was refused: file, place, value and what is allowed, in one line.
 
+use crate::record::{TEXT_MAX, printable};
+use crate::schema::Violation;
+
+/// Most characters of a value that is refused.
+const VALUE_MAX: usize = 80;
+
 /// A refused cell description.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
@@ -35,4 +41,17 @@ pub enum ConfigError {
         /// What is allowed.
         allowed: String,
     },
+}
+
+impl ConfigError {
+    /// Refuses a value of a file.
+    pub(crate) fn value(file: &str, violation: &Violation) -> Self {
+        let Violation { key, value, allowed } = violation;
+        Self::Value {
+            file: printable(file, TEXT_MAX),
+            key: printable(key, TEXT_MAX),
+            value: printable(value, VALUE_MAX),
+            allowed: printable(allowed, TEXT_MAX),
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! The cell description (TOML): typed, validated, and refused in one clear line.
 //!
-//! Whoever starts a cell reads it through [`Cell::load`]: the supervisor, the binary, the simulator
+//! Whoever starts a cell reads it through [`Cell::load`]: design, the binary, the simulator
 //! and Python. It knows the numbers and their ranges, and nothing of how they are used.
 //!
 //! Family: `cell` and `validate` call each other, as a cell is checked where it is loaded.
@@ -8,26 +8,23 @@
 mod cell;
 mod error;
 mod file;
-mod law;
 mod learning;
-mod norm_optimal;
+pub mod mode;
 mod path;
 mod program;
 mod simulation;
 mod validate;
 
 pub use cell::{
-    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Interface, Limits, PositionLoop,
-    Safety, TcpEncoder, Telemetry,
+    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Limits, Mode, PositionLoop, Safety,
+    TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};
-pub use law::{
-    AdjointSection, ConstrainedSection, ErrorFeedforwardSection, ModelInverseSection, PdSection,
-};
-pub use learning::{GateMeasure, GateSection, LadderSection, LawName, Learning, Measure};
-pub use norm_optimal::{ContourSection, NormOptimalSection, PhaseSection};
+pub use learning::{Learning, Measure};
 pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
 pub use program::{Corner, Program, Segment};
 pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;
+
+pub use crate::learning::law::catalogue::LawName;

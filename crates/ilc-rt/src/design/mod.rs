@@ -6,14 +6,14 @@
 //! Family: `forecast`, `law` and `plan` work one cell description out together.
 
 mod error;
+mod fingerprint;
 mod forecast;
 mod law;
 mod plan;
 mod program;
-mod weights;
 
 pub use error::DesignError;
 pub use forecast::{first_error, learning_model};
 pub use law::Prepared;
 pub use plan::Plan;
-pub(crate) use plan::{input_unit, mode, node, scale};
+pub(crate) use plan::{input_unit, node, scale};

@@ -1,6 +1,10 @@
 //! The switching mechanism: when any law is to learn, to rest, or to go back to what was best.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::{Law, LearningError, Standing, Surrogate};
+use crate::schema::field_order;
 
 /// What a run is judged by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,6 +36,61 @@ impl Measure {
         match self {
             Self::Rms { .. } => "rms",
             Self::Max => "max",
+        }
+    }
+}
+
+/// Figure of a run's error that a gate judges it by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GateMeasure {
+    /// RMS over time of the Euclidean norm of the tracking error, as in the table of runs.
+    Rms,
+    /// Largest magnitude of any sample of any axis.
+    Max,
+}
+
+/// `[learning.gate]`: when the law learns, rests, or goes back to the best input.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct GateParameters {
+    /// Error up to which the input is kept as it is; 0 to learn for ever.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub tolerance_m: f64,
+    /// Figure by which a run is judged.
+    pub measure: GateMeasure,
+    /// By what factor the error must leave the tolerance before learning resumes.
+    #[schemars(range(min = 1.0, max = 1e3))]
+    pub resume: f64,
+    /// By what factor the error may exceed the best one so far.
+    #[schemars(range(min = 1.0, max = 1e3))]
+    pub growth: f64,
+    /// For how many runs in a row it may do so before the best input is restored; with a ladder, for
+    /// how many of its steps.
+    #[schemars(range(min = 1, max = 100))]
+    pub patience: usize,
+}
+
+impl Default for GateParameters {
+    fn default() -> Self {
+        Self { tolerance_m: 0.0, measure: GateMeasure::Rms, resume: 1.5, growth: 1.5, patience: 2 }
+    }
+}
+
+impl GateParameters {
+    /// Returns the rule for a cell of so many axes, whose ladder makes so many runs a step.
+    pub fn rule(&self, n_axes: usize, runs_a_step: usize) -> GateRule {
+        GateRule {
+            measure: match self.measure {
+                GateMeasure::Rms => Measure::Rms { n_channels: n_axes },
+                GateMeasure::Max => Measure::Max,
+            },
+            tolerance: self.tolerance_m,
+            resume: self.resume,
+            growth: self.growth,
+            // A step's error shows in all its runs; the ladder must have seen them to answer.
+            patience: self.patience * runs_a_step,
         }
     }
 }
@@ -232,6 +291,19 @@ impl<L: Law> Law for Gate<L> {
 
     fn set_disturbance(&mut self, disturbance: &[f64]) {
         self.law.set_disturbance(disturbance);
+    }
+
+    fn n_disturbances(&self) -> Option<usize> {
+        self.law.n_disturbances()
+    }
+
+    fn recall(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        disturbance: &[f64],
+    ) -> Result<bool, LearningError> {
+        self.law.recall(input, error, disturbance)
     }
 
     fn linear_surrogate(&mut self) -> Surrogate<'_> {

@@ -1,23 +1,41 @@
 //! The ladder mechanism: several runs with the same input before each step of learning.
 
-use super::{Law, LearningError, Standing, Surrogate};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// How a [`Ladder`] averages and adapts.
+use super::{Law, LearningError, Standing, Surrogate};
+use crate::schema::field_order;
+
+/// `[learning.ladder]`: several runs with the same input before each step of learning, and how the gain
+/// of a step follows from the decay of the error.
 ///
 /// # Units
 /// - numbers of runs and ratios
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct LadderRule {
     /// Runs with the same input before each step.
+    #[schemars(range(min = 1, max = 1000))]
     pub repeats: usize,
     /// Ratio of the error to that before the last step above which it decays too slowly.
+    #[schemars(range(min = 1e-3, max = 1.0))]
     pub slow: f64,
     /// By what factor the gain is then raised; 1 to leave it alone.
+    #[schemars(range(min = 1.0, max = 10.0))]
     pub increase: f64,
     /// Lowest gain.
+    #[schemars(range(min = 1e-6, max = 1.0))]
     pub lowest: f64,
     /// Highest gain.
+    #[schemars(range(min = 1.0, max = 10.0))]
     pub highest: f64,
+}
+
+impl Default for LadderRule {
+    fn default() -> Self {
+        Self::new(2)
+    }
 }
 
 impl LadderRule {
@@ -221,6 +239,19 @@ impl<L: Law> Law for Ladder<L> {
         self.law.set_disturbance(disturbance);
     }
 
+    fn n_disturbances(&self) -> Option<usize> {
+        self.law.n_disturbances()
+    }
+
+    fn recall(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        disturbance: &[f64],
+    ) -> Result<bool, LearningError> {
+        self.law.recall(input, error, disturbance)
+    }
+
     fn linear_surrogate(&mut self) -> Surrogate<'_> {
         Surrogate::Inside(&mut self.law)
     }
@@ -264,7 +295,7 @@ mod tests {
     use crate::learning::law::q_filter::QFilter;
 
     fn ladder(rule: LadderRule, n_samples: usize) -> Ladder<Pd> {
-        let gains = PdGains { kp: 1.0, kd: 0.0, lead: 0 };
+        let gains = PdGains { kp: 1.0, kd: 0.0, lead_samples: 0 };
         Ladder::new(Pd::new(gains, n_samples, 1, QFilter::None).unwrap(), rule).unwrap()
     }
 
@@ -378,7 +409,8 @@ mod tests {
     fn wrong_rules_and_signals_are_refused_one_at_a_time() {
         let rule = LadderRule::new(2);
         let refuse = |rule| {
-            let law = Pd::new(PdGains { kp: 1.0, kd: 0.0, lead: 0 }, 1, 1, QFilter::None).unwrap();
+            let law = Pd::new(PdGains { kp: 1.0, kd: 0.0, lead_samples: 0 }, 1, 1, QFilter::None)
+                .unwrap();
             Ladder::new(law, rule).unwrap_err().to_string()
         };
         assert!(refuse(LadderRule::new(0)).contains("repeats = 0"));

@@ -13,7 +13,9 @@ use std::time::Duration;
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 
 use super::error::{LibraryError, told};
+use super::row::{ARRAYS, COLUMNS};
 use super::schema;
+use crate::record::figure_fields;
 
 /// How long to wait for another process that is writing: a run that cannot be kept has to stop the axes.
 pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
@@ -192,8 +194,13 @@ fn has_columns(connection: &Connection) -> rusqlite::Result<bool> {
     let mut statement = connection.prepare("SELECT name FROM pragma_table_info('iteration')")?;
     let names: Vec<String> =
         statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
-    let mut wanted = super::row::COLUMNS.split(',').chain(super::row::ARRAYS.split(','));
-    Ok(wanted.all(|column| names.iter().any(|name| name == column.trim())))
+    let figures = figure_fields().iter().filter(|field| field.is_required);
+    let mut wanted = COLUMNS
+        .iter()
+        .chain(&ARRAYS)
+        .map(|(name, _)| *name)
+        .chain(figures.map(|field| field.name.as_str()));
+    Ok(wanted.all(|column| names.iter().any(|name| name == column)))
 }
 
 /// A path that SQLite takes as it is: an absolute one is no address, whatever its letters.
@@ -222,7 +229,7 @@ fn immutable(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::Library;
-    use super::super::store::tests::{meta, record};
+    use super::super::tests::{meta, record};
     use super::*;
 
     /// A folder of its own, gone when dropped.

@@ -112,7 +112,7 @@ impl Library {
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::tests::{meta, record};
+    use super::super::tests::{meta, record};
     use super::*;
     use crate::record::IterationRecord;
 

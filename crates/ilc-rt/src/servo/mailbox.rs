@@ -199,6 +199,8 @@ pub enum Message {
         /// Cycles in it that began a whole cycle late.
         overruns: u32,
     },
+    /// A cycle before a stop, complete or not; they come oldest first, and then the stop.
+    Before(Sample),
     /// The axes are being stopped.
     Stopping(StopReason),
 }
@@ -210,7 +212,7 @@ pub(super) struct Table {
     pub(super) input: Box<[f64]>,
 }
 
-/// The supervisor's side.
+/// The campaign's side.
 #[derive(Debug)]
 pub struct Mailbox {
     messages: Consumer<Message>,

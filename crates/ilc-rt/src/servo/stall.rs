@@ -46,12 +46,12 @@ impl Stall {
     }
 
     /// Whether to hold still in this tick, as nodes do not answer and patience is left.
-    pub(super) fn holds(&mut self, nodes_wait: bool, most: u32) -> bool {
+    pub(super) fn holds(&mut self, nodes_wait: bool, max: u32) -> bool {
         if !nodes_wait {
             self.held = 0;
             return false;
         }
-        if self.held >= most {
+        if self.held >= max {
             return false;
         }
         self.held += 1;

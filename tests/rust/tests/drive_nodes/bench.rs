@@ -8,7 +8,7 @@ use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::bring_up::{DriveSetup, SdoClient, bring_up};
 use ilc_rt::fieldbus::canopen::{Emergency, NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{
-    self, Command, Controlword, Extra, Mode, State, Status, next_command,
+    self, CommandRpdo1, Controlword, DriveMotionTpdo2, Mode, State, StatusTpdo1, next_command,
 };
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
@@ -126,8 +126,8 @@ impl Plant for Ideal {
 /// Frames of drive 1 in one cycle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Answer {
-    pub(crate) status: Option<Status>,
-    pub(crate) extra: Option<Extra>,
+    pub(crate) status: Option<StatusTpdo1>,
+    pub(crate) extra: Option<DriveMotionTpdo2>,
     pub(crate) emergencies: Vec<u16>,
     pub(crate) frames: Vec<Frame>,
 }
@@ -187,7 +187,7 @@ impl Bench {
 
     /// Runs one cycle: command first, then SYNC, at which the drive takes over the last command.
     pub(crate) fn cycle(&mut self, controlword: Controlword, target_counts: i32) -> Answer {
-        let command = Command { controlword, target_counts, torque_offset: 0 };
+        let command = CommandRpdo1 { controlword, target_counts, torque_offset: 0 };
         self.bus.send(&command.encode(node(1))).unwrap();
         self.sync()
     }
@@ -206,10 +206,10 @@ impl Bench {
     pub(crate) fn collect(&mut self) -> Answer {
         let mut answer = Answer::default();
         while let Some(frame) = self.bus.recv(Duration::ZERO).unwrap() {
-            if let Some(status) = Status::decode(&frame, node(1)) {
+            if let Some(status) = StatusTpdo1::decode(&frame, node(1)) {
                 answer.status = Some(status);
             }
-            if let Some(extra) = Extra::decode(&frame, node(1)) {
+            if let Some(extra) = DriveMotionTpdo2::decode(&frame, node(1)) {
                 answer.extra = Some(extra);
             }
             if let Some(emergency) = Emergency::decode(&frame) {

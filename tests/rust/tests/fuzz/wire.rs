@@ -7,7 +7,7 @@ use ilc_rt::campaign::drive_setup;
 use ilc_rt::fieldbus::bring_up::{SdoClient, bring_up};
 use ilc_rt::fieldbus::canopen::sdo::{SdoRequest, SdoResponse};
 use ilc_rt::fieldbus::canopen::{Emergency, Heartbeat, NmtCommand, sync};
-use ilc_rt::fieldbus::cia402::{Command, EncoderSample, Extra, Status};
+use ilc_rt::fieldbus::cia402::{CommandRpdo1, DriveMotionTpdo2, EncoderSample, StatusTpdo1};
 use ilc_rt::fieldbus::transport::{InProcess, Responder, udp_codec};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_tests::campaign::machine;
@@ -65,14 +65,14 @@ fn frames_are_decoded_or_passed_over() {
                 assert_eq!(Heartbeat::decode(&found.encode()), Some(found));
             }
             for node in [1, 2, 10, 127].map(node) {
-                if let Some(found) = Command::decode(&frame, node) {
-                    assert_eq!(Command::decode(&found.encode(node), node), Some(found));
+                if let Some(found) = CommandRpdo1::decode(&frame, node) {
+                    assert_eq!(CommandRpdo1::decode(&found.encode(node), node), Some(found));
                 }
-                if let Some(found) = Status::decode(&frame, node) {
-                    assert_eq!(Status::decode(&found.encode(node), node), Some(found));
+                if let Some(found) = StatusTpdo1::decode(&frame, node) {
+                    assert_eq!(StatusTpdo1::decode(&found.encode(node), node), Some(found));
                 }
-                if let Some(found) = Extra::decode(&frame, node) {
-                    assert_eq!(Extra::decode(&found.encode(node), node), Some(found));
+                if let Some(found) = DriveMotionTpdo2::decode(&frame, node) {
+                    assert_eq!(DriveMotionTpdo2::decode(&found.encode(node), node), Some(found));
                 }
                 if let Some(found) = EncoderSample::decode(&frame, node) {
                     assert_eq!(EncoderSample::decode(&found.encode(node), node), Some(found));

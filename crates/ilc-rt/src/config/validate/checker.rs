@@ -1,11 +1,7 @@
 //! The one way to refuse a value: file, key, value, and what is allowed.
 
 use crate::config::{Cell, ConfigError};
-use crate::record::{TEXT_MAX, printable};
 use crate::schema::{self, Violation};
-
-/// Most characters of a value that is refused.
-const VALUE_MAX: usize = 80;
 
 /// Refuses values of one file.
 pub(super) struct Checker {
@@ -19,12 +15,8 @@ impl Checker {
         value: &dyn std::fmt::Display,
         allowed: &str,
     ) -> ConfigError {
-        ConfigError::Value {
-            file: printable(&self.file, TEXT_MAX),
-            key: printable(key, TEXT_MAX),
-            value: printable(&value.to_string(), VALUE_MAX),
-            allowed: printable(allowed, TEXT_MAX),
-        }
+        let (key, value, allowed) = (key.to_owned(), value.to_string(), allowed.to_owned());
+        ConfigError::value(&self.file, &Violation { key, value, allowed })
     }
 
     pub(super) fn that(
@@ -39,8 +31,11 @@ impl Checker {
 
     /// Refuses the first number that is out of the range that its field states.
     pub(super) fn ranges(&self, cell: &Cell) -> Result<(), ConfigError> {
-        schema::check(cell, "")
-            .map_err(|Violation { key, value, allowed }| self.refuse(&key, &value, &allowed))
+        self.allow(schema::check(cell, ""))
+    }
+
+    pub(super) fn allow(&self, found: Result<(), Violation>) -> Result<(), ConfigError> {
+        found.map_err(|violation| ConfigError::value(&self.file, &violation))
     }
 
     /// Refuses what is not a finite number from `low` to `high`.
@@ -57,16 +52,5 @@ impl Checker {
             &value,
             &format!("allowed {low} to {high}"),
         )
-    }
-
-    /// [`Checker::range`] for a value that need not be there.
-    pub(super) fn range_if(
-        &self,
-        key: &str,
-        value: Option<f64>,
-        low: f64,
-        high: f64,
-    ) -> Result<(), ConfigError> {
-        value.map_or(Ok(()), |value| self.range(key, value, low, high))
     }
 }

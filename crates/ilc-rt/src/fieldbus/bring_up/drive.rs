@@ -110,7 +110,7 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
         setup.rpdo_deadline_ms,
     )?;
     process_data::open(&mut remote, pdo_map::STATUS_PDO, &pdo_map::STATUS_MAP, 0)?;
-    process_data::open(&mut remote, pdo_map::EXTRA_PDO, &pdo_map::EXTRA_MAP, 0)?;
+    process_data::open(&mut remote, pdo_map::DRIVE_MOTION_PDO, &pdo_map::DRIVE_MOTION_MAP, 0)?;
 
     scaling::check(&mut remote, setup)?;
     remote.ensure_all(&settings::interpolation(period))?;

@@ -33,9 +33,10 @@ impl PdCondition {
     /// - [`LearningError::Model`] for a continuous model.
     pub fn new(gains: PdGains, model: &StateSpace) -> Result<Self, LearningError> {
         let channels = model.n_inputs().min(model.n_outputs());
-        let parameters = model.markov(gains.lead + 1)?;
+        let parameters = model.markov(gains.lead_samples + 1)?;
         let leads = first_effects(model)?;
-        let markov: Vec<f64> = (0..channels).map(|i| parameters[gains.lead][(i, i)]).collect();
+        let markov: Vec<f64> =
+            (0..channels).map(|i| parameters[gains.lead_samples][(i, i)]).collect();
         let sum = gains.kp + gains.kd;
         let factor = markov.iter().map(|p| (1.0 - sum * p).abs()).fold(0.0, f64::max);
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);

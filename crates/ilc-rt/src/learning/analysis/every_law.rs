@@ -38,7 +38,7 @@ fn signal(count: usize, seed: f64) -> Vec<f64> {
 fn transposes_are_those_of_the_update() {
     let (model, n) = (two_axes(), 60);
     let size = 2 * n;
-    let rule = Feedforward { gain: 0.4, lead: 7, limit: f64::INFINITY };
+    let rule = Feedforward { gain_per_s: 0.4, lead_samples: 7, input_max: f64::INFINITY };
     let mut laws: Vec<Box<dyn Law>> = Vec::new();
     for filter in [QFilter::None, low_pass(20.0)] {
         laws.push(Box::new(Adjoint::new(&model, n, None, filter.clone()).unwrap()));
@@ -60,7 +60,8 @@ fn transposes_are_those_of_the_update() {
 
 /// A diverging law and a converging one.
 fn pair(n: usize) -> [Pd; 2] {
-    [2.5, 0.5].map(|kp| Pd::new(PdGains { kp, kd: 0.0, lead: 9 }, n, 1, low_pass(8.0)).unwrap())
+    [2.5, 0.5]
+        .map(|kp| Pd::new(PdGains { kp, kd: 0.0, lead_samples: 9 }, n, 1, low_pass(8.0)).unwrap())
 }
 
 #[test]
@@ -99,7 +100,7 @@ fn bounds_are_left_out_and_said_to_be() {
     assert!(verdict.converges && verdict.why.contains("without its bounds"), "{}", verdict.why);
 
     let law = |limit: f64| {
-        let rule = Feedforward { gain: 0.5, lead: 9, limit };
+        let rule = Feedforward { gain_per_s: 0.5, lead_samples: 9, input_max: limit };
         ErrorFeedforward::new(rule, n, 1, low_pass(6.0)).unwrap()
     };
     let found = divergence(&mut law(1e-6), &model, n).unwrap().unwrap();
@@ -146,8 +147,9 @@ fn a_low_pass_above_the_critical_frequency_is_told_with_both() {
     let model = from_transfer_function(&[1.0], &[1.0, 0.0, 0.0, 0.0, 0.0], Some(DT_S)).unwrap();
     let (n, gain) = (400, 0.5_f64);
     let critical_hz = (0.5 * gain).acos() / (3.0 * std::f64::consts::TAU * DT_S);
-    let pd = |filter| Pd::new(PdGains { kp: gain, kd: 0.0, lead: 1 }, n, 1, filter).unwrap();
-    let rule = Feedforward { gain, lead: 1, limit: 1e-9 };
+    let pd =
+        |filter| Pd::new(PdGains { kp: gain, kd: 0.0, lead_samples: 1 }, n, 1, filter).unwrap();
+    let rule = Feedforward { gain_per_s: gain, lead_samples: 1, input_max: 1e-9 };
     let feedforward = |filter| ErrorFeedforward::new(rule, n, 1, filter).unwrap();
     let switched = |high_hz: f64| {
         let segments =

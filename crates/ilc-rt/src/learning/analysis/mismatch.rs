@@ -59,7 +59,7 @@ fn laws(model: &StateSpace, n: usize) -> Vec<(&'static str, Box<dyn Law>)> {
     let optimal =
         |cost: Cost| -> Box<dyn Law> { Box::new(NormOptimal::new(model, n, cost).unwrap()) };
     let pd = |filter: QFilter| -> Box<dyn Law> {
-        Box::new(Pd::new(PdGains { kp: 0.4, kd: 0.2, lead: 2 }, n, 1, filter).unwrap())
+        Box::new(Pd::new(PdGains { kp: 0.4, kd: 0.2, lead_samples: 2 }, n, 1, filter).unwrap())
     };
     let varying: Vec<f64> = (0..n).map(|k| if k % 97 < 60 { 1.0 } else { 0.05 }).collect();
     let effort: Vec<f64> = (0..n).map(|k| 0.02 + 0.3 * (k as f64 / n as f64)).collect();
@@ -131,7 +131,7 @@ fn laws(model: &StateSpace, n: usize) -> Vec<(&'static str, Box<dyn Law>)> {
             "feed-forward",
             Box::new(
                 ErrorFeedforward::new(
-                    Feedforward { gain: 0.4, lead: 3, limit: 1e-7 },
+                    Feedforward { gain_per_s: 0.4, lead_samples: 3, input_max: 1e-7 },
                     n,
                     1,
                     low_pass(40.0),
@@ -304,7 +304,10 @@ fn coupled_axes_that_the_law_takes_for_separate_ones_are_seen() {
             Box::new(NormOptimal::new(&model, n, w).unwrap()),
             Box::new(NormOptimal::new(&model, n, coupled).unwrap()),
             Box::new(Adjoint::new(&model, n, None, QFilter::None).unwrap()),
-            Box::new(Pd::new(PdGains { kp: 0.3, kd: 0.0, lead: 4 }, n, 2, low_pass(15.0)).unwrap()),
+            Box::new(
+                Pd::new(PdGains { kp: 0.3, kd: 0.0, lead_samples: 4 }, n, 2, low_pass(15.0))
+                    .unwrap(),
+            ),
         ];
         for mut law in laws {
             let free = free_of(law.as_mut(), &plant, n);

@@ -205,7 +205,7 @@ fn expected_errors_agree_with_many_simulated_campaigns() {
 fn the_usual_condition_does_not_make_the_error_fall() {
     let (model, n) = (axis(2e-3), 200);
     let first = model.markov(2).unwrap()[1][(0, 0)];
-    let gains = PdGains { kp: 0.5 / first, kd: 0.4 / first, lead: 1 };
+    let gains = PdGains { kp: 0.5 / first, kd: 0.4 / first, lead_samples: 1 };
     let mut law = Pd::new(gains, n, 1, QFilter::None).unwrap();
     let found = analyze(&mut law, &model, n, &Question::default()).unwrap();
     let condition = found.pd_condition.as_ref().unwrap();
@@ -223,7 +223,7 @@ fn the_usual_condition_does_not_make_the_error_fall() {
 fn laws(model: &StateSpace, n: usize) -> Vec<(&'static str, Box<dyn Law>)> {
     let m = model.n_inputs();
     let dt_s = model.dt_s().unwrap();
-    let gains = PdGains { kp: 0.4, kd: 1.5, lead: 2 };
+    let gains = PdGains { kp: 0.4, kd: 1.5, lead_samples: 2 };
     let filter = || butterworth(2, 0.05 / dt_s, dt_s).unwrap();
     let pd = |filter: QFilter| -> Box<dyn Law> { Box::new(Pd::new(gains, n, m, filter).unwrap()) };
     let optimal = |w: Weights| -> Box<dyn Law> { Box::new(NormOptimal::new(model, n, w).unwrap()) };
@@ -305,7 +305,7 @@ fn long_runs_agree_with_short_ones_of_the_same_law() {
 #[test]
 fn a_long_run_of_a_filtered_law_ends_where_its_fixed_point_says() {
     let (model, n) = (axis(2e-3), 1300);
-    let gains = PdGains { kp: 0.5, kd: 0.0, lead: 8 };
+    let gains = PdGains { kp: 0.5, kd: 0.0, lead_samples: 8 };
     let filter = QFilter::ZeroPhase(butterworth(2, 8.0, 2e-3).unwrap());
     let mut law = Pd::new(gains, n, 1, filter).unwrap();
     let reference: Vec<f64> = (0..n).map(|k| 0.01 * (1.0 - (k as f64 / 90.0).cos())).collect();
@@ -330,7 +330,7 @@ fn a_long_run_of_a_filtered_law_ends_where_its_fixed_point_says() {
 #[test]
 fn the_critical_frequency_is_where_the_equation_crosses_one() {
     let (model, n, dt_s) = (axis(2e-3), 600, 2e-3);
-    let gains = PdGains { kp: 0.5, kd: 0.0, lead: 4 };
+    let gains = PdGains { kp: 0.5, kd: 0.0, lead_samples: 4 };
     let mut law = Pd::new(gains, n, 1, QFilter::None).unwrap();
     let found = analyze(&mut law, &model, n, &Question::default()).unwrap();
     // The first of |1 - kp z^lead P| > 1, from the impulse response.
@@ -417,7 +417,7 @@ fn divergent_laws_are_refused_and_sound_ones_are_not() {
     let n = 1300;
     let pd = |kp: f64, lead: usize, cutoff_hz: f64| {
         let filter = QFilter::ZeroPhase(butterworth(2, cutoff_hz, 2e-3).unwrap());
-        Pd::new(PdGains { kp, kd: 0.0, lead }, n, 1, filter).unwrap()
+        Pd::new(PdGains { kp, kd: 0.0, lead_samples: lead }, n, 1, filter).unwrap()
     };
     for (kp, lead, cutoff_hz) in [(0.5, 1, 10.0), (0.5, 8, 10.0), (0.9, 10, 10.0)] {
         let verdict = divergence(&mut pd(kp, lead, cutoff_hz), &model, n).unwrap().unwrap();
@@ -473,7 +473,7 @@ fn laws_that_say_nothing_are_tried() {
     let line = analyze(&mut Clipped, &model, n, &question).unwrap_err().to_string();
     assert!(line.contains("the law is not linear"), "{line}");
     assert!(refuse_divergent(&mut Clipped, &model, n).is_ok());
-    let gains = PdGains { kp: 0.5, kd: 0.3, lead: 4 };
+    let gains = PdGains { kp: 0.5, kd: 0.3, lead_samples: 4 };
     let filter = || QFilter::ZeroPhase(butterworth(2, 20.0, 2e-3).unwrap());
     let pd = || Pd::new(gains, n, 1, filter()).unwrap();
     let open = analyze(&mut pd(), &model, n, &question).unwrap();

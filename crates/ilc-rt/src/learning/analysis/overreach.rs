@@ -1,7 +1,7 @@
 //! Check of a law's low-pass (Q-filter) against the critical frequency.
 //!
-//! The Q-filter must suppress the frequencies at which an update amplifies the error; this file
-//! checks that its cut-off is low enough. `supervisor` and the Python bindings warn with it.
+//! A filter keeps out the frequencies at which each update would make the error grow; this file says
+//! whether it begins to do so early enough. `design` and the Python bindings warn with it.
 
 use std::fmt;
 

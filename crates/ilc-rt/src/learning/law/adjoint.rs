@@ -1,10 +1,62 @@
 //! Gradient learning: the error, run backward through the model.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, check_cutoff};
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::operator::Operator;
 use crate::learning::{Law, LearningError, LowPass};
 use crate::model::{ModelError, StateSpace};
+use crate::schema::{Violation, field_order};
+
+/// `[learning.adjoint]`: the gain, and a low-pass if one is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct AdjointParameters {
+    /// Step down the gradient, below `2 / |P|^2` unless there is a low-pass; half of that if not given.
+    #[schemars(range(min = 1e-12, max = 1e12))]
+    pub gain: Option<f64>,
+    /// Order of the zero-phase Butterworth low-pass.
+    #[schemars(range(min = 1, max = 12))]
+    pub order: usize,
+    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate; no low-pass if not given.
+    pub cutoff_hz: Option<f64>,
+}
+
+impl Default for AdjointParameters {
+    fn default() -> Self {
+        Self { gain: None, order: 2, cutoff_hz: None }
+    }
+}
+
+impl LawParameters for AdjointParameters {
+    fn check(&self, cell: &LawCell) -> Result<(), Violation> {
+        check_cutoff("[learning.adjoint] cutoff_hz", self.cutoff_hz, cell)
+    }
+
+    fn build(&self, context: &LawContext) -> Result<Box<dyn Law>, BuildError> {
+        let filter = match self.cutoff_hz {
+            Some(cutoff_hz) => QFilter::low_pass(self.order, cutoff_hz, context.cell.cycle_s)
+                .map_err(LearningError::from)?,
+            None => QFilter::None,
+        };
+        Ok(Box::new(Adjoint::new(context.model, context.n_samples(), self.gain, filter)?))
+    }
+
+    fn examples(&self) -> &'static [Example] {
+        &[
+            Example { is_parallel: false, learning: "law = \"adjoint\"", error_left: 0.1 },
+            Example {
+                is_parallel: true,
+                learning: "law = \"adjoint\"\ninput_max_m_s = 0.1",
+                error_left: 0.2,
+            },
+        ]
+    }
+}
 
 /// Gradient learning: one step down the squared error.
 ///

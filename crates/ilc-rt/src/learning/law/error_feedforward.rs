@@ -1,21 +1,100 @@
 //! Feed-forward learned from the filtered error: the open-loop P-type law of the parallel structure.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::catalogue::LawName;
+use super::context::{
+    BuildError, Example, LawCell, LawContext, LawParameters, check_cutoff, needs_inputs,
+};
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::{Law, LearningError, LowPass, Surrogate};
+use crate::schema::{Violation, field_order};
+
+/// `[learning.error_feedforward]`: gain, lead, and the zero-phase Butterworth low-pass of the error.
+///
+/// Only with `interface = "csv"` on every axis: what is learned is added to the output of the position
+/// loop in the controller, which goes on acting on the error itself.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct ErrorFeedforwardParameters {
+    /// Learned speed per error.
+    #[schemars(range(min = 1e-6, max = 1e4))]
+    pub gain_per_s: f64,
+    /// Lead of the error over the input.
+    #[schemars(range(min = 0, max = 1000))]
+    pub lead_samples: usize,
+    /// Order of the zero-phase Butterworth low-pass.
+    #[schemars(range(min = 1, max = 12))]
+    pub order: usize,
+    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate.
+    pub cutoff_hz: f64,
+}
+
+impl Default for ErrorFeedforwardParameters {
+    fn default() -> Self {
+        Self { gain_per_s: 10.0, lead_samples: 1, order: 2, cutoff_hz: 5.0 }
+    }
+}
+
+impl LawParameters for ErrorFeedforwardParameters {
+    fn check(&self, cell: &LawCell) -> Result<(), Violation> {
+        check_cutoff("[learning.error_feedforward] cutoff_hz", Some(self.cutoff_hz), cell)
+    }
+
+    fn requires(&self, cell: &LawCell) -> Result<(), Violation> {
+        let law = LawName::ErrorFeedforward;
+        // The law adds to the output of a controller that goes on acting on the error itself.
+        if let Some(axis) = cell.axes.iter().find(|axis| axis.corrects_set_point) {
+            return Err(LawCell::unfit(
+                law,
+                format!(
+                    "only with interface = \"csv\" on every axis, as it adds to the output of the \
+                     position loop here; axis {} has its position loop in the drive",
+                    axis.name
+                ),
+            ));
+        }
+        needs_inputs(law, cell)
+    }
+
+    /// The loop clamps the input to its bound; the law knows it, so that it does not wind up beyond.
+    fn build(&self, context: &LawContext) -> Result<Box<dyn Law>, BuildError> {
+        let Self { gain_per_s, lead_samples, order, cutoff_hz } = *self;
+        let input_max = context.cell.axes.iter().map(|axis| axis.input_max);
+        let input_max = input_max.fold(f64::INFINITY, f64::min);
+        let filter = QFilter::low_pass(order, cutoff_hz, context.cell.cycle_s)
+            .map_err(LearningError::from)?;
+        let rule = Feedforward { gain_per_s, lead_samples, input_max };
+        let law = ErrorFeedforward::new(rule, context.n_samples(), context.n_axes(), filter)?;
+        Ok(Box::new(law))
+    }
+
+    fn examples(&self) -> &'static [Example] {
+        &[Example {
+            is_parallel: true,
+            learning: "law = \"error_feedforward\"\ninput_max_m_s = 0.1\n\
+                       [learning.error_feedforward]\ngain_per_s = 30.0\nlead_samples = 30\n\
+                       cutoff_hz = 5.0",
+            error_left: 0.2,
+        }]
+    }
+}
 
 /// The numbers of an [`ErrorFeedforward`] law.
 ///
 /// # Units
-/// - `gain`: input units per error unit; `lead` in samples; `limit` in input units
+/// - `gain_per_s`: input units per error unit; `input_max` in input units
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Feedforward {
-    /// Learning gain, in the paper phi.
-    pub gain: f64,
+    /// Learning gain_per_s, in the paper phi.
+    pub gain_per_s: f64,
     /// How many samples ahead the error is taken: 1 for an axis without delay.
-    pub lead: usize,
+    pub lead_samples: usize,
     /// Largest magnitude of the learned feed-forward; infinite for none.
-    pub limit: f64,
+    pub input_max: f64,
 }
 
 /// Open-loop learning from the filtered error, each channel by itself.
@@ -57,14 +136,14 @@ impl ErrorFeedforward {
         n_channels: usize,
         q_filter: QFilter,
     ) -> Result<Self, LearningError> {
-        let Feedforward { gain, limit, .. } = rule;
+        let Feedforward { gain_per_s: gain, input_max: limit, .. } = rule;
         if !gain.is_finite() {
             let allowed = "a gain must be finite";
-            return Err(LearningError::Parameter { what: "gain", value: gain, allowed });
+            return Err(LearningError::Parameter { what: "gain_per_s", value: gain, allowed });
         }
         if limit.is_nan() || limit <= 0.0 {
-            let allowed = "a limit must be greater than 0";
-            return Err(LearningError::Parameter { what: "limit", value: limit, allowed });
+            let allowed = "a bound must be greater than 0";
+            return Err(LearningError::Parameter { what: "input_max", value: limit, allowed });
         }
         check_counts(&[("n_samples", n_samples), ("n_channels", n_channels)])?;
         let runner = q_filter.for_samples(n_samples)?;
@@ -79,7 +158,7 @@ impl ErrorFeedforward {
 
     /// Makes the law without its limit, with another filter.
     fn unlimited(&self, q_filter: QFilter) -> Option<Box<dyn Law>> {
-        let rule = Feedforward { limit: f64::INFINITY, ..self.rule };
+        let rule = Feedforward { input_max: f64::INFINITY, ..self.rule };
         let law = Self::new(rule, self.n_samples, self.n_channels, q_filter).ok()?;
         Some(Box::new(law))
     }
@@ -96,7 +175,7 @@ impl Law for ErrorFeedforward {
         check_update(input, error, next, n_samples, [n_channels; 2])?;
         self.filtered.copy_from_slice(error);
         self.runner.apply(&mut self.filtered, n_channels)?;
-        let Feedforward { gain, lead, limit } = self.rule;
+        let Feedforward { gain_per_s: gain, lead_samples: lead, input_max: limit } = self.rule;
         self.n_limited = 0;
         for k in 0..n_samples {
             let ahead = k.saturating_add(lead).min(n_samples - 1);
@@ -120,7 +199,7 @@ impl Law for ErrorFeedforward {
         check_adjoint(dual, to_input, to_error, n_samples, [n_channels; 2])?;
         to_input.copy_from_slice(dual);
         to_error.fill(0.0);
-        let Feedforward { gain, lead, .. } = self.rule;
+        let Feedforward { gain_per_s: gain, lead_samples: lead, .. } = self.rule;
         for k in 0..n_samples {
             let ahead = k.saturating_add(lead).min(n_samples - 1);
             for channel in 0..n_channels {
@@ -131,7 +210,7 @@ impl Law for ErrorFeedforward {
     }
 
     fn linear_surrogate(&mut self) -> Surrogate<'_> {
-        if self.rule.limit.is_infinite() {
+        if self.rule.input_max.is_infinite() {
             return Surrogate::Itself;
         }
         self.unlimited(self.q_filter.clone()).map_or(Surrogate::Itself, Surrogate::Unbounded)
@@ -147,10 +226,10 @@ impl Law for ErrorFeedforward {
     }
 
     fn describe(&self) -> String {
-        let Feedforward { gain, lead, limit } = self.rule;
+        let Feedforward { gain_per_s: gain, lead_samples: lead, input_max: limit } = self.rule;
         let limit = if limit.is_finite() { limit.to_string() } else { "null".to_owned() };
         format!(
-            r#"{{"law":"error_feedforward","gain":{gain},"lead":{lead},"limit":{limit},"filter":{},"n_samples":{},"n_channels":{}}}"#,
+            r#"{{"law":"error_feedforward","gain_per_s":{gain},"lead_samples":{lead},"input_max":{limit},"filter":{},"n_samples":{},"n_channels":{}}}"#,
             self.q_filter.describe(),
             self.n_samples,
             self.n_channels
@@ -164,7 +243,8 @@ mod tests {
     use crate::model::from_transfer_function;
     use crate::signal::{FirFilter, butterworth};
 
-    const PLAIN: Feedforward = Feedforward { gain: 0.5, lead: 1, limit: f64::INFINITY };
+    const PLAIN: Feedforward =
+        Feedforward { gain_per_s: 0.5, lead_samples: 1, input_max: f64::INFINITY };
 
     #[test]
     fn the_equation_holds_sample_by_sample() {
@@ -184,7 +264,7 @@ mod tests {
 
     #[test]
     fn the_limit_bounds_every_channel_and_is_counted() {
-        let rule = Feedforward { gain: 1.0, lead: 0, limit: 2.0 };
+        let rule = Feedforward { gain_per_s: 1.0, lead_samples: 0, input_max: 2.0 };
         let mut law = ErrorFeedforward::new(rule, 2, 2, QFilter::None).unwrap();
         let mut next = [0.0; 4];
         law.update(&[0.0; 4], &[1.0, -3.0, 2.0, 5.0], &mut next).unwrap();
@@ -244,9 +324,13 @@ mod tests {
     fn wrong_numbers_are_refused_one_at_a_time() {
         let line =
             |rule, n, m| ErrorFeedforward::new(rule, n, m, QFilter::None).unwrap_err().to_string();
-        assert!(line(Feedforward { gain: f64::NAN, ..PLAIN }, 4, 1).contains("gain = NaN"));
-        assert!(line(Feedforward { limit: 0.0, ..PLAIN }, 4, 1).contains("limit = 0"));
-        assert!(line(Feedforward { limit: f64::NAN, ..PLAIN }, 4, 1).contains("limit = NaN"));
+        assert!(
+            line(Feedforward { gain_per_s: f64::NAN, ..PLAIN }, 4, 1).contains("gain_per_s = NaN")
+        );
+        assert!(line(Feedforward { input_max: 0.0, ..PLAIN }, 4, 1).contains("input_max = 0"));
+        assert!(
+            line(Feedforward { input_max: f64::NAN, ..PLAIN }, 4, 1).contains("input_max = NaN")
+        );
         assert!(line(PLAIN, 0, 1).contains("n_samples = 0"));
         assert!(line(PLAIN, 4, 0).contains("n_channels = 0"));
         let mut law = ErrorFeedforward::new(PLAIN, 4, 1, QFilter::None).unwrap();

@@ -2,10 +2,69 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::catalogue::LawName;
+use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, check_core};
 use super::expectation::{Expectation, check as check_disturbance};
 use super::inputs::Inputs;
 use crate::learning::error::check;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Surrogate};
+use crate::schema::{Violation, field_order};
+
+/// `[learning.flexible]`: the core law and the resolution of the table.
+///
+/// The runs of this cell, program and measurement that the library holds are entered at the start.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct FlexibleParameters {
+    /// The law that proposes an input after each run, with the parameters of its own table.
+    pub core: LawName,
+    /// Numbers that describe the disturbance of a run, as temperatures.
+    #[schemars(range(min = 0, max = 7))]
+    pub disturbances: usize,
+    /// Distance up to which two disturbances are the same entry of the table.
+    #[schemars(range(min = 0.0, max = 1e12))]
+    pub tolerance: f64,
+}
+
+impl Default for FlexibleParameters {
+    fn default() -> Self {
+        Self { core: LawName::NormOptimal, disturbances: 1, tolerance: 0.0 }
+    }
+}
+
+impl LawParameters for FlexibleParameters {
+    fn check(&self, cell: &LawCell) -> Result<(), Violation> {
+        check_core("[learning.flexible] core", self.core, cell)
+    }
+
+    fn core(&self) -> Option<LawName> {
+        Some(self.core)
+    }
+
+    fn build(&self, context: &LawContext) -> Result<Box<dyn Law>, BuildError> {
+        let shape = TableShape {
+            n_samples: context.n_samples(),
+            n_inputs: context.n_axes(),
+            n_outputs: context.n_axes(),
+            n_disturbances: self.disturbances,
+            tolerance: self.tolerance,
+        };
+        Ok(Box::new(Flexible::new(context.core(self.core)?, shape)?))
+    }
+
+    fn examples(&self) -> &'static [Example] {
+        &[Example {
+            is_parallel: false,
+            learning: "law = \"flexible\"\n[learning.flexible]\ntolerance = 0.5\n\
+                       [learning.norm_optimal]\nrate = 6.0",
+            error_left: 0.1,
+        }]
+    }
+}
 
 /// Size and resolution of the table of a [`Flexible`] law.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -201,6 +260,24 @@ impl Law for Flexible {
         self.core.set_disturbance(disturbance);
     }
 
+    /// What the core law proposes converges where it does itself.
+    fn linear_surrogate(&mut self) -> Surrogate<'_> {
+        Surrogate::Inside(self.core.as_mut())
+    }
+
+    fn n_disturbances(&self) -> Option<usize> {
+        Some(self.shape.n_disturbances)
+    }
+
+    fn recall(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        disturbance: &[f64],
+    ) -> Result<bool, LearningError> {
+        self.remember(input, error, disturbance).map(|()| true)
+    }
+
     fn reset(&mut self) {
         self.core.reset();
         self.told.forget();
@@ -231,7 +308,7 @@ mod tests {
 
     /// The core proposes `u + e`.
     fn law(n_disturbances: usize, tolerance: f64) -> Flexible {
-        let gains = PdGains { kp: 1.0, kd: 0.0, lead: 0 };
+        let gains = PdGains { kp: 1.0, kd: 0.0, lead_samples: 0 };
         let core = Pd::new(gains, 1, 1, QFilter::None).unwrap();
         let shape =
             TableShape { n_samples: 1, n_inputs: 1, n_outputs: 1, n_disturbances, tolerance };

@@ -1,12 +1,15 @@
-//! The laws, one a file. Each implements [`Law`](super::Law); `supervisor` and the Python bindings
-//! make them.
+//! The laws, one a file: a [`Law`](super::Law) and the parameters that a cell description gives it,
+//! listed in [`catalogue`]. `config`, `design` and the Python bindings import them.
 
 pub mod adjoint;
+pub mod catalogue;
 pub mod constrained;
+mod context;
 pub mod dynamic;
 pub mod error_feedforward;
 mod expectation;
 pub mod flexible;
+pub mod formation;
 mod inputs;
 pub mod model_inverse;
 pub mod norm_optimal;
@@ -14,3 +17,5 @@ pub mod pd;
 pub mod q_filter;
 pub mod relevance;
 pub mod through_jacobian;
+
+pub use context::{BuildError, Example, LawAxis, LawCell, LawContext, LawParameters, LawTables};

@@ -2,11 +2,65 @@
 
 use nalgebra::DMatrix;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, check_cutoff};
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::operator::Operator;
 use crate::learning::{Law, LearningError, LowPass};
 use crate::model::{ModelError, StateSpace, relative_degrees};
+use crate::schema::{Violation, field_order};
+
+/// `[learning.model_inverse]`: gain and zero-phase Butterworth low-pass.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct ModelInverseParameters {
+    /// Share of the predicted error that one update removes.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 2.0))]
+    pub gain: f64,
+    /// Order of the zero-phase Butterworth low-pass.
+    #[schemars(range(min = 1, max = 12))]
+    pub order: usize,
+    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate: the inverse amplifies noise
+    /// where the axis is slow.
+    pub cutoff_hz: f64,
+}
+
+impl Default for ModelInverseParameters {
+    fn default() -> Self {
+        Self { gain: 0.5, order: 2, cutoff_hz: 10.0 }
+    }
+}
+
+impl LawParameters for ModelInverseParameters {
+    fn check(&self, cell: &LawCell) -> Result<(), Violation> {
+        check_cutoff("[learning.model_inverse] cutoff_hz", Some(self.cutoff_hz), cell)
+    }
+
+    fn build(&self, context: &LawContext) -> Result<Box<dyn Law>, BuildError> {
+        let filter = QFilter::low_pass(self.order, self.cutoff_hz, context.cell.cycle_s)
+            .map_err(LearningError::from)?;
+        Ok(Box::new(ModelInverse::new(context.model, context.n_samples(), self.gain, filter)?))
+    }
+
+    fn examples(&self) -> &'static [Example] {
+        &[
+            Example {
+                is_parallel: false,
+                learning: "law = \"model_inverse\"\n[learning.model_inverse]\ncutoff_hz = 8.0",
+                error_left: 0.1,
+            },
+            Example {
+                is_parallel: true,
+                learning: "law = \"model_inverse\"\ninput_max_m_s = 0.1",
+                error_left: 0.2,
+            },
+        ]
+    }
+}
 
 /// A zero nearer to the unit circle than this counts as on it: the inverse would ring for the whole
 /// run.

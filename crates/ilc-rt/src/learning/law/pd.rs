@@ -1,13 +1,67 @@
 //! Proportional-derivative learning with a low-pass filter.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, check_cutoff};
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::{Law, LearningError, LowPass, Structure};
+use crate::schema::{Violation, field_order};
+
+/// `[learning.pd]`: gains and the zero-phase Butterworth low-pass.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct PdParameters {
+    /// Proportional gain.
+    #[schemars(range(min = -1e3, max = 1e3))]
+    pub kp: f64,
+    /// Derivative gain, per sample difference.
+    #[schemars(range(min = -1e3, max = 1e3))]
+    pub kd: f64,
+    /// Lead of the error over the input: the relative degree of the axis, 1 without delay.
+    #[schemars(range(min = 0, max = 1000))]
+    pub lead_samples: usize,
+    /// Order of the zero-phase Butterworth low-pass.
+    #[schemars(range(min = 1, max = 12))]
+    pub order: usize,
+    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate.
+    pub cutoff_hz: f64,
+}
+
+impl Default for PdParameters {
+    fn default() -> Self {
+        Self { kp: 0.5, kd: 0.0, lead_samples: 1, order: 2, cutoff_hz: 10.0 }
+    }
+}
+
+impl LawParameters for PdParameters {
+    fn check(&self, cell: &LawCell) -> Result<(), Violation> {
+        check_cutoff("[learning.pd] cutoff_hz", Some(self.cutoff_hz), cell)
+    }
+
+    fn build(&self, context: &LawContext) -> Result<Box<dyn Law>, BuildError> {
+        let Self { kp, kd, lead_samples, order, cutoff_hz } = *self;
+        let filter = QFilter::low_pass(order, cutoff_hz, context.cell.cycle_s)
+            .map_err(LearningError::from)?;
+        let gains = PdGains { kp, kd, lead_samples };
+        Ok(Box::new(Pd::new(gains, context.n_samples(), context.n_axes(), filter)?))
+    }
+
+    fn examples(&self) -> &'static [Example] {
+        &[Example {
+            is_parallel: false,
+            learning: "law = \"pd\"\n[learning.pd]\nkp = 0.5\nlead_samples = 10\ncutoff_hz = 8.0",
+            error_left: 0.1,
+        }]
+    }
+}
 
 /// The numbers of a [`Pd`] law.
 ///
 /// # Units
-/// - `kp`, `kd`: input units per error unit; `lead` in samples
+/// - `kp`, `kd`: input units per error unit
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PdGains {
     /// Proportional gain.
@@ -15,7 +69,7 @@ pub struct PdGains {
     /// Gain of the error's difference from one sample to the next.
     pub kd: f64,
     /// How many samples ahead the error is taken: the relative degree of the axis, 1 without delay.
-    pub lead: usize,
+    pub lead_samples: usize,
 }
 
 /// Proportional-derivative learning, each channel by itself.
@@ -74,7 +128,7 @@ impl Law for Pd {
     ) -> Result<(), LearningError> {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
         check_update(input, error, next, n_samples, [n_channels; 2])?;
-        let PdGains { kp, kd, lead } = self.gains;
+        let PdGains { kp, kd, lead_samples: lead } = self.gains;
         let last = n_samples - 1;
         for channel in 0..n_channels {
             let at = |sample: usize| sample.min(last) * n_channels + channel;
@@ -101,7 +155,7 @@ impl Law for Pd {
         if !self.runner.apply_transposed(to_input, n_channels)? {
             return Ok(false);
         }
-        let PdGains { kp, kd, lead } = self.gains;
+        let PdGains { kp, kd, lead_samples: lead } = self.gains;
         let last = n_samples - 1;
         for channel in 0..n_channels {
             let at = |sample: usize| sample.min(last) * n_channels + channel;
@@ -128,10 +182,10 @@ impl Law for Pd {
 
     fn describe(&self) -> String {
         format!(
-            r#"{{"law":"pd","kp":{},"kd":{},"lead":{},"q_filter":{},"n_samples":{},"n_channels":{}}}"#,
+            r#"{{"law":"pd","kp":{},"kd":{},"lead_samples":{},"q_filter":{},"n_samples":{},"n_channels":{}}}"#,
             self.gains.kp,
             self.gains.kd,
-            self.gains.lead,
+            self.gains.lead_samples,
             self.q_filter.describe(),
             self.n_samples,
             self.n_channels
@@ -145,7 +199,7 @@ mod tests {
     use crate::signal::butterworth;
 
     fn pd(kp: f64, kd: f64, lead: usize, n_channels: usize) -> Pd {
-        Pd::new(PdGains { kp, kd, lead }, 4, n_channels, QFilter::None).unwrap()
+        Pd::new(PdGains { kp, kd, lead_samples: lead }, 4, n_channels, QFilter::None).unwrap()
     }
 
     #[test]
@@ -173,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_filter_removes_what_alternates() {
-        let gains = PdGains { kp: 0.0, kd: 0.0, lead: 1 };
+        let gains = PdGains { kp: 0.0, kd: 0.0, lead_samples: 1 };
         let sections = butterworth(2, 20.0, 2e-3).unwrap();
         let alternating: Vec<f64> = (0..200).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
         for filter in [QFilter::ZeroPhase(sections.clone()), QFilter::Causal(sections)] {
@@ -196,7 +250,7 @@ mod tests {
         let line = law.update(&[0.0; 4], &error, &mut next).unwrap_err().to_string();
         assert!(line.contains("error is NaN at sample 2, channel 0"), "{line}");
         assert!(law.update(&[0.0; 4], &[0.0; 4], &mut [0.0; 3]).is_err());
-        let gains = PdGains { kp: f64::INFINITY, kd: 0.0, lead: 1 };
+        let gains = PdGains { kp: f64::INFINITY, kd: 0.0, lead_samples: 1 };
         assert!(Pd::new(gains, 4, 1, QFilter::None).is_err());
     }
 }

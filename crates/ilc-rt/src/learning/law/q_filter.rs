@@ -7,7 +7,7 @@ use nalgebra::Complex;
 
 use crate::signal::{
     FirFilter, GaussianFilter, Section, SignalError, SosFilter, Switched, SwitchedFilter,
-    Symmetric, ZeroPhase,
+    Symmetric, ZeroPhase, butterworth,
 };
 
 /// Which filter a law uses.
@@ -28,6 +28,14 @@ pub enum QFilter {
 }
 
 impl QFilter {
+    /// Returns a zero-phase Butterworth low-pass.
+    ///
+    /// # Errors
+    /// - [`SignalError`] for an order or a cut-off that makes none.
+    pub fn low_pass(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Self, SignalError> {
+        Ok(Self::ZeroPhase(butterworth(order, cutoff_hz, dt_s)?))
+    }
+
     /// Sets the filter up for runs of `n_samples` samples.
     ///
     /// # Errors

@@ -1,12 +1,78 @@
 //! Learning in the joints from errors at the tool.
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::catalogue::LawName;
+use super::context::{
+    BuildError, Example, LawCell, LawContext, LawParameters, check_core, violation,
+};
+use crate::schema::{Violation, field_order};
 
 use crate::learning::error::{check, check_adjoint};
 use crate::learning::{Law, LearningError};
 
 /// Largest ratio of singular values of a Jacobian that may still be inverted.
 const CONDITION_MAX: f64 = 1e6;
+
+/// `[learning.through_jacobian]`: a law of the axes, fed with errors measured at the tool.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct ThroughJacobianParameters {
+    /// The law of the axes, with the parameters of its own table.
+    pub core: LawName,
+    /// Motion of each coordinate of the tool (rows) for that of each axis (columns), as
+    /// `[[1.0, 0.01], [0.0, 1.0]]`.
+    pub jacobian: Vec<Vec<f64>>,
+}
+
+impl Default for ThroughJacobianParameters {
+    fn default() -> Self {
+        Self { core: LawName::NormOptimal, jacobian: Vec::new() }
+    }
+}
+
+impl LawParameters for ThroughJacobianParameters {
+    fn check(&self, cell: &LawCell) -> Result<(), Violation> {
+        check_core("[learning.through_jacobian] core", self.core, cell)
+    }
+
+    fn requires(&self, cell: &LawCell) -> Result<(), Violation> {
+        let n_axes = cell.axes.len();
+        if self.jacobian.len() == n_axes && self.jacobian.iter().all(|row| row.len() == n_axes) {
+            return Ok(());
+        }
+        let allowed = format!("{n_axes} rows of {n_axes} numbers, as the cell has {n_axes} axes");
+        Err(violation(
+            "[learning.through_jacobian] jacobian",
+            format!("{:?}", self.jacobian),
+            allowed,
+        ))
+    }
+
+    fn core(&self) -> Option<LawName> {
+        Some(self.core)
+    }
+
+    fn build(&self, context: &LawContext) -> Result<Box<dyn Law>, BuildError> {
+        self.requires(context.cell)?;
+        let core = context.core(self.core)?;
+        let n_axes = context.n_axes();
+        let jacobian = DMatrix::from_fn(n_axes, n_axes, |i, j| self.jacobian[i][j]);
+        Ok(Box::new(ThroughJacobian::new(core, &[jacobian])?))
+    }
+
+    fn examples(&self) -> &'static [Example] {
+        &[Example {
+            is_parallel: false,
+            learning: "law = \"through_jacobian\"\n[learning.through_jacobian]\n\
+                       jacobian = [[1.0, 1e-3], [0.0, 1.0]]\n[learning.norm_optimal]\nrate = 6.0",
+            error_left: 0.1,
+        }]
+    }
+}
 
 /// Any law of the joints, fed with errors measured at the tool.
 ///
@@ -142,6 +208,10 @@ impl<L: Law> Law for ThroughJacobian<L> {
         self.law.set_disturbance(disturbance);
     }
 
+    fn n_disturbances(&self) -> Option<usize> {
+        self.law.n_disturbances()
+    }
+
     fn apply_adjoint(
         &mut self,
         dual: &[f64],
@@ -203,7 +273,7 @@ mod tests {
     use crate::learning::law::q_filter::QFilter;
 
     fn proportional(kp: f64, n_samples: usize, n_channels: usize) -> Box<dyn Law> {
-        let gains = PdGains { kp, kd: 0.0, lead: 0 };
+        let gains = PdGains { kp, kd: 0.0, lead_samples: 0 };
         Box::new(Pd::new(gains, n_samples, n_channels, QFilter::None).unwrap())
     }
 

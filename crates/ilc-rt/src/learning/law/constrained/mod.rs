@@ -2,7 +2,7 @@
 //!
 //! The cost of norm-optimal learning, minimised over the inputs that the machine can take: bounds of
 //! the input, of its change and steps, of the set-point's position, velocity and acceleration and of
-//! the predicted output. `supervisor` and the Python bindings may import it.
+//! the predicted output. `design` and the Python bindings may import it.
 //!
 //! Family: `bounds` and `solver`: the solver refuses with the error of the bounds that it is given.
 
@@ -10,6 +10,7 @@ mod bounds;
 mod group;
 mod interior;
 mod load;
+mod parameters;
 #[cfg(test)]
 mod proof;
 mod reach;
@@ -27,6 +28,7 @@ use crate::model::{ModelError, StateSpace};
 
 use bounds::Extent;
 pub use bounds::{Bound, Bounds, BoundsError, Limit};
+pub use parameters::ConstrainedParameters;
 use solver::Solver;
 
 /// How the last update ended.

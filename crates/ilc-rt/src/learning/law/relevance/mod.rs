@@ -2,6 +2,7 @@
 //! runs, each weighted by how like its disturbance was and how small its error.
 
 mod index;
+mod parameters;
 #[cfg(test)]
 mod proof;
 mod weights;
@@ -11,11 +12,12 @@ use std::fmt;
 use super::expectation::{Expectation, check as check_disturbance};
 use super::inputs::Inputs;
 use crate::learning::error::check;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Surrogate};
 
 use index::{DISTURBANCES_MAX, Index, index};
 use weights::normalise;
 
+pub use parameters::RelevanceParameters;
 pub use weights::RelevanceWeights;
 pub(crate) use weights::shares;
 
@@ -326,6 +328,24 @@ impl Law for Relevance {
     fn set_disturbance(&mut self, disturbance: &[f64]) {
         self.told.announce(disturbance);
         self.core.set_disturbance(disturbance);
+    }
+
+    /// What the core law proposes converges where it does itself.
+    fn linear_surrogate(&mut self) -> Surrogate<'_> {
+        Surrogate::Inside(self.core.as_mut())
+    }
+
+    fn n_disturbances(&self) -> Option<usize> {
+        Some(self.shape.n_disturbances)
+    }
+
+    fn recall(
+        &mut self,
+        input: &[f64],
+        error: &[f64],
+        disturbance: &[f64],
+    ) -> Result<bool, LearningError> {
+        self.remember(input, error, disturbance).map(|()| true)
     }
 
     fn reset(&mut self) {

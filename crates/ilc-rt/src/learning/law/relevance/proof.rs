@@ -11,7 +11,7 @@ use crate::model::{Method, StateSpace, discretize, from_transfer_function};
 use crate::signal::butterworth;
 
 fn pd(kp: f64, kd: f64, n_samples: usize, n_channels: usize) -> Box<dyn Law> {
-    let gains = PdGains { kp, kd, lead: 1 };
+    let gains = PdGains { kp, kd, lead_samples: 1 };
     Box::new(Pd::new(gains, n_samples, n_channels, QFilter::None).unwrap())
 }
 
@@ -328,7 +328,7 @@ fn median(values: &mut [f64]) -> f64 {
 #[test]
 fn a_motor_whose_resistance_follows_the_temperature_is_learned_where_pd_alone_is_not() {
     let core = || {
-        let gains = PdGains { kp: 1.284, kd: 1.284, lead: 1 };
+        let gains = PdGains { kp: 1.284, kd: 1.284, lead_samples: 1 };
         let filter = QFilter::ZeroPhase(butterworth(2, 10.0, 0.01).unwrap());
         Box::new(Pd::new(gains, N, 1, filter).unwrap())
     };
@@ -340,7 +340,7 @@ fn a_motor_whose_resistance_follows_the_temperature_is_learned_where_pd_alone_is
     for seed in 1..=5 {
         let t = temperatures(seed, n_runs);
         let last = |errors: &[f64]| median(&mut errors[n_runs - 20..].to_vec());
-        let gains = PdGains { kp: 0.0, kd: 0.0, lead: 1 };
+        let gains = PdGains { kp: 0.0, kd: 0.0, lead_samples: 1 };
         without.push(last(&campaign(&mut Pd::new(gains, N, 1, QFilter::None).unwrap(), &t)));
         alone.push(last(&campaign(core().as_mut(), &t)));
         let mut law = Relevance::new(core(), shape(N, 1, 1), weights(), None).unwrap();

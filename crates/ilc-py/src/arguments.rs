@@ -1,0 +1,232 @@
+//! Arguments by name, as the typed functions and classes of Python hand them on.
+//!
+//! For every family of this crate: each argument is read, and refused, under its own name. The signatures,
+//! defaults and documentation are those of the Python package.
+
+use ilc_rt::learning::weights::Weight;
+use ilc_rt::model::StateSpace;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyString};
+
+use crate::argument::{Matrix, Signal, misfit, read_array, read_disturbance, read_vector};
+use crate::model_argument::read_model;
+use crate::whole::{each, pair, shown, whole};
+
+/// The keyword arguments of one call.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Arguments<'a, 'py>(&'a Bound<'py, PyDict>);
+
+impl<'a, 'py> Arguments<'a, 'py> {
+    /// Wraps the keywords of a call.
+    pub(crate) fn new(keywords: &'a Bound<'py, PyDict>) -> Self {
+        Self(keywords)
+    }
+
+    /// Wraps the keywords of a function that needs some.
+    pub(crate) fn of(keywords: Option<&'a Bound<'py, PyDict>>) -> PyResult<Self> {
+        keywords.map(Self).ok_or_else(|| PyTypeError::new_err("keyword arguments are needed"))
+    }
+
+    /// Returns the interpreter.
+    pub(crate) fn py(self) -> Python<'py> {
+        self.0.py()
+    }
+
+    /// Returns an argument that has to be there.
+    pub(crate) fn get(self, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.0
+            .get_item(name)?
+            .ok_or_else(|| PyTypeError::new_err(format!("the argument {name} is missing")))
+    }
+
+    /// Returns an argument unless it is `None` or missing.
+    pub(crate) fn given(self, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+        Ok(self.0.get_item(name)?.filter(|value| !value.is_none()))
+    }
+
+    /// Applies a reader to an argument unless it is `None` or missing.
+    pub(crate) fn maybe<T>(
+        self,
+        name: &str,
+        read: impl FnOnce(&str, &Bound<'py, PyAny>) -> PyResult<T>,
+    ) -> PyResult<Option<T>> {
+        self.given(name)?.map(|value| read(name, &value)).transpose()
+    }
+
+    /// Reads a number, infinite ones and NaN included.
+    pub(crate) fn number(self, name: &str) -> PyResult<f64> {
+        number(name, &self.get(name)?)
+    }
+
+    /// Reads a number, or `None`.
+    pub(crate) fn maybe_number(self, name: &str) -> PyResult<Option<f64>> {
+        self.maybe(name, number)
+    }
+
+    /// Reads a whole number.
+    pub(crate) fn whole(self, name: &str) -> PyResult<usize> {
+        whole(name, &self.get(name)?)
+    }
+
+    /// Reads a whole number, or `None`.
+    pub(crate) fn maybe_whole(self, name: &str) -> PyResult<Option<usize>> {
+        self.maybe(name, whole)
+    }
+
+    /// Reads numbers counted from 0, or `None`.
+    pub(crate) fn maybe_wholes(self, name: &str) -> PyResult<Option<Vec<usize>>> {
+        self.maybe(name, |name, list| {
+            each(name, list, "a sequence of numbers counted from 0", |i| whole(name, i))
+        })
+    }
+
+    /// Reads pairs of numbers counted from 0, or `None`.
+    pub(crate) fn maybe_pairs(self, name: &str) -> PyResult<Option<Vec<(usize, usize)>>> {
+        self.maybe(name, |name, list| {
+            each(name, list, "a sequence of pairs of agents", |both| {
+                let (first, second) = pair(name, both, "a pair of agents")?;
+                Ok((whole(name, &first)?, whole(name, &second)?))
+            })
+        })
+    }
+
+    /// Reads a truth value.
+    pub(crate) fn flag(self, name: &str) -> PyResult<bool> {
+        let value = self.get(name)?;
+        value.extract().map_err(|_| refused(name, &value, "True or False"))
+    }
+
+    /// Reads a text.
+    pub(crate) fn text(self, name: &str) -> PyResult<String> {
+        let value = self.get(name)?;
+        value.extract().map_err(|_| refused(name, &value, "a text"))
+    }
+
+    /// Reads a text, or `None`.
+    pub(crate) fn maybe_text(self, name: &str) -> PyResult<Option<String>> {
+        if self.given(name)?.is_some() { self.text(name).map(Some) } else { Ok(None) }
+    }
+
+    /// Reads one of several words, each with its meaning.
+    pub(crate) fn choice<T: Copy>(self, name: &str, choices: &[(&str, T)]) -> PyResult<T> {
+        let text = self.text(name)?;
+        if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
+            return Ok(*meaning);
+        }
+        let words: Vec<String> = choices.iter().map(|(word, _)| format!("'{word}'")).collect();
+        let (last, others) = words
+            .split_last()
+            .map_or((String::new(), &words[..]), |(last, others)| (last.clone(), others));
+        let text = shown(&self.get(name)?);
+        let others = others.join(", ");
+        Err(PyValueError::new_err(format!("{name} = {text}; {others} or {last} is needed")))
+    }
+
+    /// Reads a model that does not change.
+    pub(crate) fn model(self, name: &str) -> PyResult<StateSpace> {
+        read_model(name, &self.get(name)?)
+    }
+
+    /// Reads finite numbers with one axis.
+    pub(crate) fn vector(self, name: &str) -> PyResult<Vec<f64>> {
+        read_vector(name, &self.get(name)?)
+    }
+
+    /// Reads a number for each of two things.
+    pub(crate) fn pair(self, name: &str) -> PyResult<[f64; 2]> {
+        match self.vector(name)?[..] {
+            [first, second] => Ok([first, second]),
+            ref other => Err(misfit(name, &[other.len()], "(2,)")),
+        }
+    }
+
+    /// Reads a signal.
+    pub(crate) fn signal(self, name: &str) -> PyResult<Signal> {
+        Signal::read(name, &self.get(name)?)
+    }
+
+    /// Reads a disturbance; `None` or missing is an empty one.
+    pub(crate) fn disturbance(self, name: &str) -> PyResult<Vec<f64>> {
+        Ok(self.maybe(name, read_disturbance)?.unwrap_or_default())
+    }
+
+    /// Reads a weight: a number, `(n,)`, `(p, p)` or `(n, p, p)`.
+    pub(crate) fn weight(
+        self,
+        name: &str,
+        n_samples: usize,
+        n_channels: usize,
+    ) -> PyResult<Weight> {
+        let (values, shape) = read_array(name, &self.get(name)?)?;
+        let (n, p) = (n_samples, n_channels);
+        let block = |values: &[f64]| Matrix::from_row_slice(p, p, values);
+        match shape[..] {
+            [] => Ok(Weight::Scalar(values[0])),
+            [length] if length == n => Ok(Weight::PerSample(values)),
+            [rows, cols] if (rows, cols) == (p, p) => Ok(Weight::Block(block(&values))),
+            [length, rows, cols] if (length, rows, cols) == (n, p, p) => {
+                Ok(Weight::Blocks(values.chunks_exact((p * p).max(1)).map(block).collect()))
+            }
+            _ => Err(misfit(name, &shape, &format!("(), ({n},), ({p}, {p}) or ({n}, {p}, {p})"))),
+        }
+    }
+
+    /// Returns a copy that nothing changes later: lists and arrays are copied, too.
+    pub(crate) fn kept(self) -> PyResult<Bound<'py, PyDict>> {
+        let kept = PyDict::new(self.py());
+        for (name, value) in self.0 {
+            let is_mutable =
+                value.is_instance_of::<PyList>() || value.hasattr("__array_interface__")?;
+            if is_mutable {
+                let copy = self.py().import("copy")?.getattr("deepcopy")?.call1((value,))?;
+                kept.set_item(name, copy)?;
+            } else {
+                kept.set_item(name, value)?;
+            }
+        }
+        Ok(kept)
+    }
+
+    /// Returns the call as Python would write it; of an array its shape.
+    pub(crate) fn call(self, name: &str) -> PyResult<String> {
+        let mut words = Vec::new();
+        for (key, value) in self.0 {
+            let text = match value.getattr_opt("shape")? {
+                Some(shape) if shape.len().is_ok_and(|axes| axes > 0) => {
+                    format!("array of shape {}", shape.repr()?)
+                }
+                _ => value.repr()?.to_string(),
+            };
+            words.push(format!("{key}={text}"));
+        }
+        Ok(format!("{name}({})", words.join(", ")))
+    }
+}
+
+/// Reads a number: Python's, NumPy's, whatever converts to a float.
+///
+/// # Errors
+/// - `TypeError` for what is not a number.
+/// - `ValueError` for an integer beyond the largest float.
+pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
+    if object.is_instance_of::<PyString>() {
+        return Err(refused(name, object, "a number"));
+    }
+    object.extract::<f64>().map_err(|error| {
+        let py = object.py();
+        if error.is_instance_of::<pyo3::exceptions::PyOverflowError>(py) {
+            let text = shown(object);
+            return PyValueError::new_err(format!(
+                "{name} = {text}; only finite numbers are allowed"
+            ));
+        }
+        refused(name, object, "a number")
+    })
+}
+
+fn refused(name: &str, object: &Bound<'_, PyAny>, needed: &str) -> PyErr {
+    let kind = object.get_type().name().map_or_else(|_| "object".to_owned(), |n| n.to_string());
+    let text = shown(object);
+    PyTypeError::new_err(format!("{name} = {text} is a {kind}; {needed} is needed"))
+}

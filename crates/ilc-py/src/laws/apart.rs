@@ -1,0 +1,53 @@
+//! Laws for an analysis: built apart from the objects that they describe, and asked by their trait.
+
+use std::sync::Arc;
+
+use ilc_rt::learning::Law;
+use pyo3::prelude::*;
+
+use super::{Call, Fits, PyLaw, Size};
+use crate::arguments::Arguments;
+use crate::python_law::{Channels, Frame, PythonLaw};
+
+/// Returns a law of its own for an analysis, for runs of this size: the object is not used, unless it is
+/// written in Python.
+pub(crate) fn apart(
+    name: &str,
+    object: &Bound<'_, PyAny>,
+    n_samples: usize,
+    channels: Channels,
+) -> PyResult<Box<dyn Law>> {
+    let Ok(law) = object.cast::<PyLaw>() else {
+        let frame = Arc::new(Frame::default());
+        return Ok(Box::new(PythonLaw::new(name, object, channels, frame)?));
+    };
+    let this = law.get();
+    let size = Size { n_samples, channels, n_disturbances: 0 };
+    let arguments = Arguments::new(this.arguments.bind(object.py()));
+    Ok((this.build)(&Call { arguments, size: Some(size), live: None })?.law)
+}
+
+/// Returns whether a law, or a law inside it, is written in Python.
+pub(crate) fn is_python(object: &Bound<'_, PyAny>) -> PyResult<bool> {
+    match inside(object)? {
+        Some(inner) => is_python(&inner),
+        None => Ok(!object.is_instance_of::<PyLaw>()),
+    }
+}
+
+/// Returns the number of samples that a law, or a law inside it, was made for.
+pub(crate) fn samples_of(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+    if let Ok(law) = object.cast::<PyLaw>()
+        && let Fits::Fixed(n_samples, _) = law.get().fits
+    {
+        return Ok(Some(n_samples));
+    }
+    inside(object)?.map_or(Ok(None), |inner| samples_of(&inner))
+}
+
+/// Returns the law inside a native one.
+fn inside<'py>(object: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let Ok(law) = object.cast::<PyLaw>() else { return Ok(None) };
+    let arguments = Arguments::new(law.get().arguments.bind(object.py()));
+    Ok(arguments.given("law")?.or(arguments.given("core")?))
+}

@@ -1,0 +1,136 @@
+//! Builder of learning within bounds: `constrained`.
+
+use ilc_rt::learning::law::constrained::{Bound as Limits, Bounds, Constrained, Limit, Status};
+use ilc_rt::learning::law::norm_optimal::Cost;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
+
+use super::figure::Figure;
+use super::kinds::modelled;
+use super::{Built, Call, Readable};
+use crate::argument::{Signal, misfit, read_numbers};
+use crate::detached::detached;
+use crate::error::OrRaise;
+
+pub(super) fn constrained(call: &Call<'_, '_>) -> PyResult<Built> {
+    let a = call.arguments;
+    let (model, n_samples, fits) = modelled(call)?;
+    let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
+    let cost = Cost {
+        q: a.weight("q", n_samples, n_outputs)?,
+        s: a.weight("s", n_samples, n_inputs)?,
+        r: a.weight("r", n_samples, n_inputs)?,
+        rate: a.number("rate")?,
+    };
+    let limits = |name: &str, n_channels| {
+        a.maybe(name, |name, given| read_limits(name, given, n_samples, n_channels))
+    };
+    let signal = |name: &str, n_channels| {
+        a.maybe(name, |name, given| {
+            let signal = Signal::read(name, given)?.with_samples(name, n_samples)?;
+            signal.with_channels(name, n_channels).map(|signal| signal.values)
+        })
+    };
+    let position = limits("position_bounds", n_inputs)?;
+    let velocity = limits("velocity_bounds", n_inputs)?;
+    let acceleration = limits("acceleration_bounds", n_inputs)?;
+    // Bounds of the output alone may come with the reference of the outputs as `reference`.
+    let is_setpoint = n_inputs == n_outputs
+        || [&position, &velocity, &acceleration].iter().any(|bound| bound.is_some());
+    let reference = signal("reference", if is_setpoint { n_inputs } else { n_outputs })?;
+    let output_reference = signal("output_reference", n_outputs)?;
+    let bounds = Bounds {
+        input: limits("input_max", n_inputs)?,
+        change: limits("change_max", n_inputs)?,
+        step: limits("step_max", n_inputs)?,
+        position,
+        velocity,
+        acceleration,
+        output: limits("output_bounds", n_outputs)?,
+        output_reference: match (output_reference, is_setpoint) {
+            (None, false) => reference.clone(),
+            (given, _) => given,
+        },
+        reference: reference.filter(|_| is_setpoint),
+    };
+    let law = detached(call.py(), || Constrained::new(&model, n_samples, cost, bounds));
+    Ok(Built { law: Box::new(law.or_raise()?), fits })
+}
+
+impl Readable for Constrained {
+    fn figure(&self, name: &str) -> Option<Figure> {
+        Some(match name {
+            "status" => Figure::Text(
+                match Constrained::status(self) {
+                    Status::Untried => "untried",
+                    Status::Solved => "solved",
+                    Status::Infeasible(_) => "infeasible",
+                    Status::MaxIterations => "max_iterations",
+                }
+                .to_owned(),
+            ),
+            "message" => Figure::Text(match Constrained::status(self) {
+                Status::Untried => "there was no update yet".to_owned(),
+                Status::Solved => "the input is optimal within the bounds".to_owned(),
+                Status::Infeasible(error) => error.to_string(),
+                Status::MaxIterations => {
+                    "no optimum was found: the bounds most likely contradict each other".to_owned()
+                }
+            }),
+            "iterations" => Figure::Count(self.iterations()),
+            "gap" => Figure::Number(self.gap()),
+            _ => return None,
+        })
+    }
+
+    fn is_long(&self) -> bool {
+        true
+    }
+}
+
+/// Reads a bound b, for -b to b, or a pair (lower, upper) of which `None` is infinite.
+fn read_limits(
+    name: &str,
+    object: &Bound<'_, PyAny>,
+    n_samples: usize,
+    n_channels: usize,
+) -> PyResult<Limits> {
+    if let Ok(bound) = object.extract::<f64>() {
+        return Ok(Limits { lower: Limit::Scalar(-bound), upper: Limit::Scalar(bound) });
+    }
+    if !(object.is_instance_of::<PyTuple>() || object.is_instance_of::<PyList>()) {
+        let kind = object.get_type().name()?;
+        return Err(PyTypeError::new_err(format!(
+            "{name} is a {kind}; a number b for -b to b, or a pair (lower, upper), is needed"
+        )));
+    }
+    let length = object.len()?;
+    if length != 2 {
+        return Err(PyValueError::new_err(format!(
+            "{name} has {length} sides; a pair (lower, upper) is needed"
+        )));
+    }
+    let side = |place: usize, unbounded: f64| -> PyResult<Limit> {
+        let given = object.get_item(place)?;
+        if given.is_none() {
+            return Ok(Limit::Scalar(unbounded));
+        }
+        let name = format!("{name}[{place}]");
+        let (values, shape) = read_numbers(&name, &given)?;
+        if let Some(index) = values.iter().position(|value| value.is_nan()) {
+            return Err(PyValueError::new_err(format!(
+                "{name} holds NaN as its value {index}; a number or infinity is needed"
+            )));
+        }
+        let (n, m) = (n_samples, n_channels);
+        match shape[..] {
+            [] => Ok(Limit::Scalar(values[0])),
+            [length] if length == n => Ok(Limit::PerSample(values)),
+            [rows, cols] if (rows, cols) == (n, m) => Ok(Limit::Full(values)),
+            [1, cols] if cols == m => Ok(Limit::PerChannel(values)),
+            _ => Err(misfit(&name, &shape, &format!("(), ({n},), ({n}, {m}) or (1, {m})"))),
+        }
+    };
+    Ok(Limits { lower: side(0, f64::NEG_INFINITY)?, upper: side(1, f64::INFINITY)? })
+}

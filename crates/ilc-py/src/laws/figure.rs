@@ -1,0 +1,82 @@
+//! What Python can read of a law beside its update.
+
+use ilc_rt::learning::{Law, LearningError};
+use pyo3::prelude::*;
+
+use crate::argument::give_signal;
+
+/// A figure of a law: what a property of its Python class returns.
+pub(crate) enum Figure {
+    Absent,
+    Number(f64),
+    Count(usize),
+    Text(String),
+    /// An input of the law, time first.
+    Input(Vec<f64>),
+}
+
+impl From<Option<f64>> for Figure {
+    fn from(value: Option<f64>) -> Self {
+        value.map_or(Self::Absent, Self::Number)
+    }
+}
+
+impl Figure {
+    /// Returns the figure to Python.
+    pub(super) fn give(
+        self,
+        py: Python<'_>,
+        n_inputs: usize,
+        is_flat: bool,
+    ) -> PyResult<Bound<'_, PyAny>> {
+        Ok(match self {
+            Self::Absent => py.None().into_bound(py),
+            Self::Number(value) => value.into_pyobject(py)?.into_any(),
+            Self::Count(value) => value.into_pyobject(py)?.into_any(),
+            Self::Text(value) => value.into_pyobject(py)?.into_any(),
+            Self::Input(values) => give_signal(py, values, n_inputs, is_flat && n_inputs == 1)?,
+        })
+    }
+}
+
+/// A law as `Law` of Python keeps it; most have nothing but their update.
+pub(crate) trait Readable: Law {
+    /// Returns the figure of this name, if the law has it.
+    fn figure(&self, name: &str) -> Option<Figure> {
+        let _ = name;
+        None
+    }
+
+    /// Returns whether the law calls another one, which may be written in Python.
+    fn has_inner(&self) -> bool {
+        false
+    }
+
+    /// Returns whether an update takes long, however short the run.
+    fn is_long(&self) -> bool {
+        false
+    }
+
+    /// Returns whether the law itself uses the measured disturbance of the coming run.
+    fn uses_disturbance(&self) -> bool {
+        false
+    }
+
+    /// Remembers a run made elsewhere.
+    fn remember(&mut self, u: &[f64], e: &[f64], disturbance: &[f64]) -> Result<(), LearningError> {
+        let _ = (u, e, disturbance);
+        Err(LearningError::Empty { what: "memory" })
+    }
+
+    /// Returns numbers and weights of the remembered runs that count under a disturbance.
+    fn relevant(&self, disturbance: &[f64]) -> Result<Vec<(usize, f64)>, LearningError> {
+        let _ = disturbance;
+        Err(LearningError::Empty { what: "memory" })
+    }
+
+    /// Forgets all but the remembered runs that count most, and returns the numbers of those.
+    fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>, LearningError> {
+        let _ = (keep, disturbances);
+        Err(LearningError::Empty { what: "memory" })
+    }
+}

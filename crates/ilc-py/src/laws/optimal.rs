@@ -1,0 +1,130 @@
+//! Builders of norm-optimal learning: `norm_optimal`, and `contour`, `formation`, `dynamic` beside it.
+
+use ilc_rt::learning::LearningError;
+use ilc_rt::learning::law::dynamic::DynamicNormOptimal;
+use ilc_rt::learning::law::norm_optimal::{Cost, NormOptimal};
+use ilc_rt::learning::weights::{Dynamic, Weight};
+use ilc_rt::model::StateSpace;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::figure::Figure;
+use super::{Built, Call, Fits, Readable};
+use crate::argument::misfit;
+use crate::arguments::Arguments;
+use crate::detached::detached;
+use crate::error::OrRaise;
+use crate::model_argument::{AnyModel, read_any_model, read_model};
+use crate::python_law::Channels;
+use crate::weights::{read_contour, read_formation_weight, read_matrices};
+
+/// The kinds that are class methods of `NormOptimalIlc`.
+pub(super) const METHODS: [&str; 3] = ["contour", "formation", "dynamic"];
+
+pub(super) fn plain(call: &Call<'_, '_>) -> PyResult<Built> {
+    let model = read_any_model("model", &call.arguments.get("model")?)?;
+    let n_samples = call.arguments.whole("n_samples")?;
+    let q = call.arguments.weight("q", n_samples, model.n_outputs())?;
+    build(call, &model, n_samples, q, None)
+}
+
+pub(super) fn contour(call: &Call<'_, '_>) -> PyResult<Built> {
+    let model = read_any_model("model", &call.arguments.get("model")?)?;
+    let (q, n_samples, p) = read_contour(call.arguments)?;
+    if p != model.n_outputs() {
+        let rule = format!("(n_samples, {}), one column an output,", model.n_outputs());
+        return Err(misfit("reference", &[n_samples, p], &rule));
+    }
+    build(call, &model, n_samples, q, None)
+}
+
+pub(super) fn formation(call: &Call<'_, '_>) -> PyResult<Built> {
+    let n_samples = call.arguments.whole("n_samples")?;
+    let (model, n_agents, n_outputs) = side_by_side(call.arguments)?;
+    let q = read_formation_weight(call.arguments, n_samples, n_agents, n_outputs)?;
+    build(call, &AnyModel::Invariant(model), n_samples, q, None)
+}
+
+pub(super) fn dynamic(call: &Call<'_, '_>) -> PyResult<Built> {
+    let model = read_any_model("model", &call.arguments.get("model")?)?;
+    let n_samples = call.arguments.whole("n_samples")?;
+    let filter = read_dynamic(call.arguments, n_samples)?;
+    let q = call.arguments.weight("q", n_samples, filter.n_filtered())?;
+    build(call, &model, n_samples, q, Some(&filter))
+}
+
+fn build(
+    call: &Call<'_, '_>,
+    model: &AnyModel,
+    n_samples: usize,
+    q: Weight,
+    filter: Option<&Dynamic>,
+) -> PyResult<Built> {
+    let a = call.arguments;
+    let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
+    let (s, r) = (
+        a.weight("s", n_samples, channels.n_inputs)?,
+        a.weight("r", n_samples, channels.n_inputs)?,
+    );
+    let cost = Cost { q, s, r, rate: a.number("rate")? };
+    let law = detached(call.py(), || -> Result<Box<dyn Readable>, LearningError> {
+        let plant = model.plant();
+        Ok(match filter {
+            None => Box::new(NormOptimal::new(plant, n_samples, cost)?),
+            Some(filter) => Box::new(DynamicNormOptimal::new(plant, n_samples, filter, cost)?),
+        })
+    });
+    Ok(Built { law: law.or_raise()?, fits: Fits::Fixed(n_samples, channels) })
+}
+
+impl Readable for NormOptimal {
+    fn figure(&self, name: &str) -> Option<Figure> {
+        (name == "conditioning").then(|| Figure::Number(self.conditioning()))
+    }
+}
+
+impl Readable for DynamicNormOptimal {
+    fn figure(&self, name: &str) -> Option<Figure> {
+        self.inner().figure(name)
+    }
+}
+
+/// Reads the filter of the error, its coupling and the weight of the error itself.
+fn read_dynamic(a: Arguments<'_, '_>, n_samples: usize) -> PyResult<Dynamic> {
+    let mut dynamic = Dynamic::new(a.model("filter")?).or_raise()?;
+    if let Some(matrices) = a.maybe("coupling", read_matrices)? {
+        if matrices.len() != n_samples {
+            let (rows, cols) = matrices[0].shape();
+            let rule = format!("({n_samples}, rows, columns)");
+            return Err(misfit("coupling", &[matrices.len(), rows, cols], &rule));
+        }
+        dynamic = dynamic.with_coupling(matrices).or_raise()?;
+    }
+    if a.given("plain")?.is_some() {
+        let weight = a.weight("plain", n_samples, dynamic.n_outputs())?;
+        dynamic = dynamic.with_plain(weight);
+    }
+    Ok(dynamic)
+}
+
+/// Reads the models of several agents side by side; also their number and the outputs of each.
+fn side_by_side(a: Arguments<'_, '_>) -> PyResult<(StateSpace, usize, usize)> {
+    let models: Vec<Bound<'_, PyAny>> = a.get("models")?.extract()?;
+    let Some((first, others)) = models.split_first() else {
+        return Err(PyValueError::new_err("models is empty; at least one agent is needed"));
+    };
+    let mut all = read_model("models[0]", first)?;
+    let n_outputs = all.n_outputs();
+    for (i, model) in others.iter().enumerate() {
+        let name = format!("models[{}]", i + 1);
+        let agent = read_model(&name, model)?;
+        if agent.n_outputs() != n_outputs {
+            let found = agent.n_outputs();
+            return Err(PyValueError::new_err(format!(
+                "{name} has {found} outputs; {n_outputs} are needed, as models[0] has"
+            )));
+        }
+        all = all.append(&agent).or_raise()?;
+    }
+    Ok((all, models.len(), n_outputs))
+}

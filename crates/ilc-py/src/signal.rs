@@ -1,0 +1,269 @@
+//! Filters for Python: one class, `Filter`, behind the typed ones of `ilc_rt.signal`.
+
+use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::signal::{
+    self, FirFilter, GaussianFilter, Section, Segment, SwitchRule, SwitchedFilter,
+};
+use numpy::IntoPyArray;
+use numpy::ndarray::Array2;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+
+use crate::argument::{Signal, give_signal, read_vector};
+use crate::arguments::Arguments;
+use crate::detached::detached;
+use crate::error::OrRaise;
+use crate::exceptions;
+use crate::whole::{each, whole};
+
+/// A filter of any kind, to be applied or given to a law.
+#[pyclass(name = "Filter", module = "ilc_rt._native", subclass, frozen)]
+#[derive(Debug)]
+pub(crate) struct PyFilter {
+    kind: String,
+    arguments: Py<PyDict>,
+    filter: QFilter,
+}
+
+#[pymethods]
+impl PyFilter {
+    #[new]
+    #[pyo3(signature = (kind, /, **arguments))]
+    fn new(py: Python<'_>, kind: String, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let none = PyDict::new(py);
+        let kept = Arguments::new(arguments.unwrap_or(&none)).kept()?;
+        let a = Arguments::new(&kept);
+        let filter = match kind.as_str() {
+            "butterworth" => {
+                let (order, cutoff_hz) = (a.whole("order")?, a.number("cutoff_hz")?);
+                let sections =
+                    signal::butterworth(order, cutoff_hz, a.number("dt_s")?).or_raise()?;
+                if a.flag("causal")? {
+                    QFilter::Causal(sections)
+                } else {
+                    QFilter::ZeroPhase(sections)
+                }
+            }
+            "gaussian" => QFilter::Gaussian(
+                GaussianFilter::new(a.number("bandwidth_hz")?, a.number("dt_s")?).or_raise()?,
+            ),
+            "fir" => {
+                let once = FirFilter::new(&a.vector("taps")?).or_raise()?;
+                QFilter::Fir(once.repeated(a.whole("repeats")?).or_raise()?)
+            }
+            "switched" => QFilter::Switched(switched(a)?),
+            "from_signal" => QFilter::Switched(from_signal(a)?),
+            _ => {
+                let line = format!(
+                    "kind = '{kind}'; butterworth, gaussian, fir, switched or from_signal is needed"
+                );
+                return Err(PyValueError::new_err(line));
+            }
+        };
+        Ok(Self { kind, arguments: kept.unbind(), filter })
+    }
+
+    /// Return the signal filtered without lag.
+    ///
+    /// Parameters
+    /// ----------
+    /// x : ndarray of float64, shape (n_samples,) or (n_samples, n_channels)
+    ///     Signal.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, same shape
+    ///     Filtered signal.
+    ///
+    /// Raises
+    /// ------
+    /// SignalError
+    ///     If the signal is too short for the filter.
+    /// ValueError, TypeError
+    ///     If `x` has the wrong shape, dtype or a number that is not finite.
+    fn zero_phase<'py>(
+        &self,
+        py: Python<'py>,
+        x: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        filtered(py, &without_lag(&self.filter), x)
+    }
+
+    /// Return the signal filtered forward only, from rest; recursive filters only.
+    fn _forward<'py>(&self, py: Python<'py>, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        filtered(py, &QFilter::Causal(self.sections()?.to_vec()), x)
+    }
+
+    /// Sections b0 b1 b2 1 a1 a2 of a recursive filter.
+    fn _sos<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let row = |&Section { b, a }: &Section| [b[0], b[1], b[2], 1.0, a[0], a[1]];
+        let rows: Vec<[f64; 6]> = self.sections()?.iter().map(row).collect();
+        let table = Array2::from_shape_fn((rows.len(), 6), |(row, col)| rows[row][col]);
+        Ok(table.into_pyarray(py).into_any())
+    }
+
+    /// Numbers of the filter by name, beside those that it was made of.
+    fn _figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let figures = self.arguments.bind(py).copy()?;
+        match &self.filter {
+            QFilter::Gaussian(filter) => {
+                figures.set_item("sigma_samples", filter.sigma_samples())?;
+            }
+            QFilter::Fir(filter) => {
+                figures.set_item("taps", give_signal(py, filter.taps().to_vec(), 1, true)?)?;
+            }
+            QFilter::Switched(filter) => {
+                let segments = filter.segments();
+                let cutoffs_hz: Vec<f64> = segments.iter().map(|found| found.cutoff_hz).collect();
+                let starts: Vec<usize> = segments.iter().map(|found| found.start).collect();
+                figures.set_item("cutoffs_hz", cutoffs_hz)?;
+                figures.set_item("starts", starts)?;
+                figures.set_item("order", filter.order())?;
+                figures.set_item("blend", filter.blend())?;
+            }
+            _ => {}
+        }
+        Ok(figures)
+    }
+
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let this = slf.get();
+        let class = slf.get_type().name()?.to_string();
+        let class = if this.kind == "from_signal" { class + ".from_signal" } else { class };
+        Arguments::new(this.arguments.bind(slf.py())).call(&class)
+    }
+
+    fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let Ok(other) = other.cast::<Self>() else { return Ok(false) };
+        Ok(slf.get().filter == other.get().filter && slf.get_type().is(other.get_type()))
+    }
+
+    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
+        PyString::new(py, &self.filter.describe()).hash()
+    }
+
+    /// Pickled and copied as it was made.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, this) = (slf.py(), slf.get());
+        let maker = py.import("ilc_rt._native")?.getattr("_filter")?;
+        let parts = (slf.get_type(), &this.kind, &this.arguments);
+        let attributes = slf.getattr_opt("__dict__")?;
+        Ok((maker, parts, attributes).into_pyobject(py)?.into_any())
+    }
+}
+
+impl PyFilter {
+    fn sections(&self) -> PyResult<&[Section]> {
+        match &self.filter {
+            QFilter::ZeroPhase(sections) | QFilter::Causal(sections) => Ok(sections),
+            _ => Err(PyTypeError::new_err("this filter is not recursive: it has no sections")),
+        }
+    }
+}
+
+/// Makes a filter again, for copies and pickles.
+#[pyfunction]
+fn _filter<'py>(
+    class: &Bound<'py, PyAny>,
+    kind: &str,
+    arguments: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let native = class.py().get_type::<PyFilter>();
+    native.getattr("__new__")?.call((class, kind), Some(arguments))
+}
+
+fn switched(a: Arguments<'_, '_>) -> PyResult<SwitchedFilter> {
+    let cutoffs_hz = a.vector("cutoffs_hz")?;
+    let starts = a.get("starts")?;
+    let starts = each("starts", &starts, "a sequence of samples", |start| whole("starts", start))?;
+    if cutoffs_hz.len() != starts.len() {
+        return Err(exceptions::SignalError::new_err(format!(
+            "{} cutoffs_hz for {} starts; as many are needed",
+            cutoffs_hz.len(),
+            starts.len()
+        )));
+    }
+    let segments: Vec<Segment> = starts
+        .into_iter()
+        .zip(cutoffs_hz)
+        .map(|(start, cutoff_hz)| Segment { start, cutoff_hz })
+        .collect();
+    SwitchedFilter::new(a.whole("order")?, &segments, a.whole("blend")?, a.number("dt_s")?)
+        .or_raise()
+}
+
+fn from_signal(a: Arguments<'_, '_>) -> PyResult<SwitchedFilter> {
+    let (reference, dt_s) = (a.signal("reference")?, a.number("dt_s")?);
+    let usual =
+        SwitchRule::new(a.number("low_hz")?, a.number("high_hz")?, a.number("threshold_hz")?);
+    let rule = SwitchRule {
+        order: a.whole("order")?,
+        window_s: a.maybe_number("window_s")?.unwrap_or(usual.window_s),
+        margin_s: a.maybe_number("margin_s")?.unwrap_or(usual.margin_s),
+        blend_s: a.maybe_number("blend_s")?.unwrap_or(usual.blend_s),
+        ..usual
+    };
+    detached(a.py(), || rule.design(&reference.values, reference.n_channels, dt_s)).or_raise()
+}
+
+/// Reads a filter, an array of taps, or no filter.
+pub(crate) fn read_filter(name: &str, object: Option<&Bound<'_, PyAny>>) -> PyResult<QFilter> {
+    let Some(object) = object else { return Ok(QFilter::None) };
+    if let Ok(filter) = object.cast::<PyFilter>() {
+        return Ok(filter.get().filter.clone());
+    }
+    // Anything with a length may be taps; what is not is named as a filter, not as an array.
+    if object.len().is_err() || object.is_instance_of::<PyString>() {
+        let kind = object.get_type().name()?;
+        return Err(PyTypeError::new_err(format!(
+            "{name} is a {kind}; a filter of ilc_rt.signal, an array of taps or None is needed"
+        )));
+    }
+    Ok(QFilter::Fir(FirFilter::new(&read_vector(name, object)?).or_raise()?))
+}
+
+fn without_lag(filter: &QFilter) -> QFilter {
+    match filter {
+        QFilter::Causal(sections) => QFilter::ZeroPhase(sections.clone()),
+        filter => filter.clone(),
+    }
+}
+
+fn filtered<'py>(
+    py: Python<'py>,
+    filter: &QFilter,
+    x: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut x = Signal::read("x", x)?;
+    detached(py, || filter.for_samples(x.n_samples)?.apply(&mut x.values, x.n_channels))
+        .or_raise()?;
+    give_signal(py, x.values, x.n_channels, x.is_flat)
+}
+
+#[pyfunction]
+fn zero_phase<'py>(
+    py: Python<'py>,
+    filter: &Bound<'py, PyAny>,
+    x: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyAny>> {
+    filtered(py, &without_lag(&read_filter("filter", Some(filter))?), x)
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn instantaneous_frequency<'py>(
+    keywords: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let a = Arguments::of(keywords)?;
+    let (x, dt_s) = (a.vector("x")?, a.number("dt_s")?);
+    let found = detached(a.py(), || signal::instantaneous_frequency(&x, dt_s)).or_raise()?;
+    give_signal(a.py(), found, 1, true)
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyFilter>()?;
+    module.add_function(wrap_pyfunction!(_filter, module)?)?;
+    module.add_function(wrap_pyfunction!(zero_phase, module)?)?;
+    module.add_function(wrap_pyfunction!(instantaneous_frequency, module)?)
+}

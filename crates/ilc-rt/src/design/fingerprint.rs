@@ -1,0 +1,93 @@
+//! What a campaign must have in common with an earlier one to go on with it: a digest of cell, program,
+//! measurement, law and parameters, kept with every run. `plan` asks for it, `campaign` compares it.
+
+use serde_json::json;
+
+use crate::config::Cell;
+use crate::record::{Meta, fingerprint};
+
+/// Returns the digest of the canonical JSON of all that decides what a law learns; `law` and
+/// `parameters` are those of the law that will be used.
+pub(super) fn of(cell: &Cell, meta: &Meta, law: &str, parameters: &str) -> String {
+    let axes: Vec<_> = cell
+        .axes
+        .iter()
+        .map(|axis| {
+            json!({
+                "name": axis.name,
+                "interface": axis.interface,
+                "limits": axis.limits,
+                "model": axis.model,
+                "position_loop": axis.position_loop,
+            })
+        })
+        .collect();
+    let whole = json!({
+        "cell": meta.cell,
+        "axes": axes,
+        "program": meta.program,
+        "cycle_us": cell.cell.cycle_us,
+        "measure": meta.measure,
+        "law": law,
+        "parameters": parameters,
+        "input_max_m": cell.learning.input_max_m,
+        "input_max_m_s": cell.learning.input_max_m_s,
+        // Of weights that vary along the run the law's own parameters do not tell every number.
+        "learning": is_named(cell, law).then(|| cell.learning.law_json()),
+    });
+    fingerprint(&whole.to_string())
+}
+
+fn is_named(cell: &Cell, law: &str) -> bool {
+    law == cell.learning.law.as_str()
+}
+
+/// Returns the digest that versions up to 0.1 kept, made of `Debug` texts: for their libraries only.
+///
+/// A struct whose fields change must be written out here as it was; the test below has digests that
+/// those versions made.
+pub(super) fn legacy(cell: &Cell, meta: &Meta, law: &str, parameters: &str) -> String {
+    let axes: Vec<_> = cell
+        .axes
+        .iter()
+        .map(|a| format!("{:?}", (&a.name, a.interface, a.limits, a.model, a.position_loop)))
+        .collect();
+    let learning = &cell.learning;
+    let law_text = || {
+        let tables = format!(
+            "({:?}, {}, {:?}, {:?})",
+            learning.law,
+            learning.table_debug(),
+            learning.ladder,
+            learning.gate
+        );
+        [("ContourParameters", "ContourSection"), ("PhaseParameters", "PhaseSection")]
+            .iter()
+            .chain(&[("LadderRule", "LadderSection"), ("GateParameters", "GateSection")])
+            .chain(&[("Parameters {", "Section {")])
+            .fold(tables, |text, (now, then)| text.replace(now, then))
+    };
+    let parameters = [
+        ("\"lead_samples\":", "\"lead\":"),
+        ("\"gain_per_s\":", "\"gain\":"),
+        ("\"input_max\":", "\"limit\":"),
+    ]
+    .iter()
+    .fold(parameters.to_owned(), |text, (now, then)| text.replace(now, then));
+    let whole = format!(
+        "{:?}",
+        (
+            &meta.cell,
+            axes,
+            &meta.program,
+            cell.cell.cycle_us,
+            &meta.measure,
+            law,
+            &*parameters,
+            learning.input_max_m,
+            learning.input_max_m_s,
+            is_named(cell, law).then(law_text),
+        )
+    );
+    fingerprint(&whole)
+}

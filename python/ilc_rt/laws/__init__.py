@@ -1,0 +1,31 @@
+"""Learning laws: from one run's error to the next run's input.
+
+Each class documents its equation, its parameters with shapes and units, and its
+source. All derive from `Law`, whose `update` is the same for all; a law of your own
+is any object with ``update(u, e, disturbance=None)``.
+"""
+
+from ilc_rt._native import Law
+from ilc_rt.laws.around import Gate, Ladder, ThroughJacobian
+from ilc_rt.laws.constrained import ConstrainedIlc
+from ilc_rt.laws.filtered import ErrorFeedforwardIlc, PdIlc
+from ilc_rt.laws.modelled import AdjointIlc, ModelInverseIlc
+from ilc_rt.laws.norm_optimal import NormOptimalIlc
+from ilc_rt.laws.recalled import FlexibleIlc, RelevanceIlc
+from ilc_rt.laws.relevance_weights import RelevanceWeights
+
+__all__ = [
+    "AdjointIlc",
+    "ConstrainedIlc",
+    "ErrorFeedforwardIlc",
+    "FlexibleIlc",
+    "Gate",
+    "Ladder",
+    "Law",
+    "ModelInverseIlc",
+    "NormOptimalIlc",
+    "PdIlc",
+    "RelevanceIlc",
+    "RelevanceWeights",
+    "ThroughJacobian",
+]

@@ -1,0 +1,260 @@
+"""What goes round any law: `Gate`, `Ladder`, `ThroughJacobian`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+from ilc_rt._native import Law
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+    from typing_extensions import Self
+
+    from ilc_rt.laws.arguments import AnyLaw
+
+
+class _Around(Law):
+    """A law round another one."""
+
+    @property
+    def law(self) -> Any:  # noqa: ANN401
+        """The law inside."""
+        return self.parameters["law"]
+
+
+class Gate(_Around):
+    """Stop any law when the error is good enough, or before it diverges.
+
+    Parameters
+    ----------
+    law : Law or object
+        Any law: one of this package, or an object with
+        ``update(u, e, disturbance)``.
+    tolerance : float or None
+        Error up to which the input is kept as it is; None to keep learning.
+    measure : {"rms", "max"}
+        Norm of a run's error: the RMS over time of the Euclidean norm of all channels,
+        as a cell description and `tracking_rms_m` have it; or the largest magnitude
+        of any channel.
+    resume : float
+        Factor by which the error must leave the tolerance before learning resumes.
+    growth : float
+        Factor by which the error may exceed the best one so far; infinite to let
+        it grow.
+    patience : int
+        Runs in a row in which it may do so. Then the input of the best run is
+        restored.
+
+    Raises
+    ------
+    LearningError
+        If the tolerance is negative, a ratio below 1 or the patience 0.
+    ValueError, TypeError
+        If `measure` is not "rms" or "max", or `law` is not a law.
+
+    Notes
+    -----
+    `state` is "learning", "holding" (inside the tolerance) or "rolled_back" (to
+    the best input). Learning resumes from "holding" when the error exceeds
+    `resume` times the tolerance, and from "rolled_back" when for `patience` runs
+    in a row the error exceeds `growth` times what the same input once gave.
+
+    References
+    ----------
+    [filter-based], Section 4 (Fig. 19) and Section 6.3.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import Gate, PdIlc
+    >>> law = Gate(PdIlc(kp=1.0, kd=0.0), tolerance=0.1)
+    >>> law.update(np.zeros(2), np.full(2, 0.05))
+    array([0., 0.])
+    >>> law.state
+    'holding'
+    """
+
+    def __new__(
+        cls,
+        law: AnyLaw,
+        tolerance: float | None = None,
+        measure: Literal["rms", "max"] = "rms",
+        resume: float = 1.5,
+        growth: float = 1.5,
+        patience: int = 2,
+    ) -> Self:
+        return super().__new__(
+            cls,
+            "gate",
+            law=law,
+            tolerance=tolerance,
+            measure=measure,
+            resume=resume,
+            growth=growth,
+            patience=patience,
+        )
+
+    @property
+    def state(self) -> Literal["learning", "holding", "rolled_back"]:
+        """What the gate is doing."""
+        return self._figure("state")
+
+    @property
+    def best_error(self) -> float | None:
+        """Error of the best run since learning began or resumed; None before the first."""
+        return self._figure("best_error")
+
+    @property
+    def best_input(self) -> NDArray[np.float64] | None:
+        """Input of the best run, in the shape of `u`; None before the first."""
+        return self._figure("best_input")
+
+
+class Ladder(_Around):
+    """Learn from the mean error of several runs with the same input.
+
+    ``u' = u + g (law(u, mean(e)) - u)`` after `repeats` runs, ``u' = u`` between
+
+    Parameters
+    ----------
+    law : Law or object
+        Any law: one of this package, or an object with
+        ``update(u, e, disturbance)``.
+    repeats : int
+        Runs with the same input before each step.
+    slow : float
+        Ratio of the error to that before the last step above which it decays too
+        slowly.
+    increase : float
+        Factor by which the gain g is then raised; 1 to leave it alone.
+    lowest, highest : float
+        Lowest and highest gain.
+
+    Raises
+    ------
+    LearningError
+        If `repeats` is 0 or a ratio is out of range.
+    TypeError
+        If `law` is not a law.
+
+    Notes
+    -----
+    What does not repeat falls with the root of `repeats`. The gain is 1 at first;
+    it is halved when the repeatable error grew over a step or an input was rolled
+    back, raised when it decayed too slowly, and left alone where the error is less
+    than twice the noise that is left in the mean. Another input begins a new mean.
+
+    References
+    ----------
+    [filter-based], Section 6.2; the rule for the gain is ours.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import Ladder, PdIlc
+    >>> law = Ladder(PdIlc(kp=1.0, kd=0.0), repeats=2)
+    >>> law.update(np.zeros(2), np.array([0.0, 1.0]))
+    array([0., 0.])
+    >>> law.update(np.zeros(2), np.array([0.0, 3.0]))
+    array([2., 2.])
+    """
+
+    def __new__(
+        cls,
+        law: AnyLaw,
+        repeats: int = 2,
+        slow: float = 0.8,
+        increase: float = 1.25,
+        lowest: float = 0.0625,
+        highest: float = 1.5,
+    ) -> Self:
+        return super().__new__(
+            cls,
+            "ladder",
+            law=law,
+            repeats=repeats,
+            slow=slow,
+            increase=increase,
+            lowest=lowest,
+            highest=highest,
+        )
+
+    @property
+    def gain(self) -> float:
+        """Gain of the next step."""
+        return self._figure("gain")
+
+    @property
+    def runs(self) -> int:
+        """Runs in the mean that the next step will use."""
+        return self._figure("runs")
+
+    @property
+    def repeatable_rms(self) -> float | None:
+        """RMS of the repeatable error at the last step; None before."""
+        return self._figure("repeatable_rms")
+
+    @property
+    def noise_rms(self) -> float:
+        """RMS of the noise left in the mean at the last step."""
+        return self._figure("noise_rms")
+
+
+class ThroughJacobian(_Around):
+    """Learn in the joints from errors at the tool, with any law.
+
+    ``e_joint[k] = pinv(J_k) e_tool[k]``
+
+    Parameters
+    ----------
+    law : Law or object
+        A law of the joints: one of this package, or an object with
+        ``update(u, e, disturbance)``.
+    jacobian : array_like, shape (n_coordinates, n_joints) or (n_samples, n_coordinates, n_joints)
+        Tool motion for joint motion, as `Delta.jacobian` returns it; one matrix for
+        runs of any length, or one for each sample. Several mechanisms side by side
+        have theirs on the diagonal.
+
+    Raises
+    ------
+    LearningError
+        If a Jacobian is singular: its largest singular value may be 1e6 times
+        the smallest. `update` raises it for another number of samples.
+    ValueError, TypeError
+        If the array has the wrong shape, dtype or a number that is not finite,
+        or `law` is not a law.
+
+    Notes
+    -----
+    `update` takes inputs of shape (n_samples, n_joints) in the unit of the joints, and
+    errors at the tool of shape (n_samples, n_coordinates) in m. The law sees errors
+    of the joints. To weigh errors at the tool by Q, give a norm-optimal law of the
+    joints ``q = J.T @ Q @ J``; for a constant square J this is the law of the model
+    ``J P``.
+
+    References
+    ----------
+    [barton2010], Eq. (8.1), (8.5) to (8.7).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import PdIlc, ThroughJacobian
+    >>> law = ThroughJacobian(PdIlc(kp=1.0, kd=0.0, lead_samples=0), [[2.0, 0.0], [0.0, 4.0]])
+    >>> law.update(np.zeros((3, 2)), np.ones((3, 2)))[0]
+    array([0.5 , 0.25])
+    """
+
+    def __new__(cls, law: AnyLaw, jacobian: ArrayLike) -> Self:
+        return super().__new__(cls, "through_jacobian", law=law, jacobian=jacobian)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints: channels of the input."""
+        return self._figure("n_joints")
+
+    @property
+    def n_coordinates(self) -> int:
+        """Number of coordinates of the tool: channels of the error."""
+        return self._figure("n_coordinates")
