@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 CARGO = ["cargo", "test", "--release", "--workspace"]
-# : Shares of the time for readers and for the Python border; property tests have the rest.
+#: Shares of the time for readers and for the Python border; property tests have the rest.
 READERS_SHARE, BORDER_SHARE = 0.4, 0.2
 KEEP = """
 What was found becomes a test that is tried first:

@@ -23,7 +23,7 @@ from ilc_rt.cli import app
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 
-# : Languages of a fence; all but the first two are for reading only.
+#: Languages of a fence; all but the first two are for reading only.
 LANGUAGES = ("sh", "python", "text", "toml", "json")
 NOT_RUN = re.compile(r"<!-- not run: (.+) -->$")
 PROGRAMS = ("ilc", "ilc-rt", "ilc-sim", "make", "python", "pip", "cargo")

@@ -37,7 +37,7 @@ to_m = [0.08, 0.04]
 to_m = [0.06, 0.06]
 
 """
-# : For real-time tests that do not concern punctuality: a busy machine may delay a process.
+#: For real-time tests that do not concern punctuality: a busy machine may delay a process.
 PATIENT = """
 [safety]
 silent_cycles_max = 500

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-# : The replaced text of the example cell, its replacement, and the names in the refusal.
+#: The replaced text of the example cell, its replacement, and the names in the refusal.
 CELLS = {
     "not TOML": ('name = "gantry"', 'name = "gantry', ["cell.toml:5", "[cell]"]),
     "unknown key": ("damping = 1.0", "dampening = 1.0", ["[axis.model]", "dampening", "damping"]),
@@ -55,7 +55,7 @@ CELLS = {
     ),
 }  # fmt: skip
 
-# : The arguments added to `ilc-rt run cell.toml`, and the names in the refusal.
+#: The arguments added to `ilc-rt run cell.toml`, and the names in the refusal.
 OPTIONS = {
     "no such file": (["nix.toml"], ["nix.toml", "cannot be read", "No such file"]),
     "a folder for a file": (["."], ["cannot be read", "not a regular file"]),

@@ -44,7 +44,7 @@ PYTHON = [
 ]
 NETWORK_CELL = "examples/01_gantry.toml"
 
-# : Each option and its replacement: as short as its purpose allows.
+#: Each option and its replacement: as short as its purpose allows.
 SHORTER = (
     (r"^ilc (run|demo)(?!.* --iterations)(.*)$", r"ilc \1\2 --iterations 2"),
     (r"--iterations \d+", "--iterations 2"),

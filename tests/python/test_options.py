@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# : Options with another form in Python: the argument of `run`, and `drives`.
+#: Options with another form in Python: the argument of `run`, and `drives`.
 ELSEWHERE = {"iterations", "simulated"}
 
 

@@ -64,8 +64,8 @@ fn microns(rms_m: &[f64]) -> String {
     rms_m.iter().map(|rms| format!("{:.1}", rms * 1e6)).collect::<Vec<_>>().join(" ")
 }
 
-/// A campaign's options, in surroundings as constant as the simulated machine is; only the laws that ask
-/// are told.
+/// Returns the options of a campaign with a constant disturbance, like the simulated machine's; only
+/// relevance-weighted laws use it.
 fn surrounded(library: PathBuf, iterations: u32) -> Options {
     Options {
         disturbance: Disturbance::measured(|_| Ok(vec![20.0])),

@@ -1,10 +1,10 @@
 //! Learning laws: from one run's error to the next run's input.
 //!
-//! This folder holds the [`Law`] trait, one law a file under [`law`], the linear-time solver
-//! ([`sweep`]) that the optimal ones share, and what goes round any law: when to stop ([`gate`]) and
-//! how many runs to average ([`ladder`]); [`analysis`] says before the first run whether a law will
-//! converge, and [`tune`] proposes weights. It runs between iterations, never in the tick; `config`,
-//! `design` and the Python bindings may import it.
+//! This folder holds the [`Law`] trait, one law per file under [`law`], the linear-time solver
+//! ([`sweep`]) shared by the norm-optimal laws, and wrappers of any law: when to stop ([`gate`]) and
+//! how many runs to average ([`ladder`]). [`analysis`] predicts convergence before the first run, and
+//! [`tune`] proposes weights. It runs between iterations, never in the tick; `config`, `design` and
+//! the Python bindings may import it.
 //!
 //! Family: `error`, `krylov`, `law`, `operator`, `structure` and `weights` share the error of the folder,
 //! which carries that of the bounds, and a law answers with the structure that the analysis asks for.
@@ -55,14 +55,12 @@ pub trait Law: Send {
         let _ = disturbance;
     }
 
-    /// Returns how many numbers describe the disturbance of a run, for a law that must be told;
-    /// `None` for one that has no use for it.
+    /// Returns the number of disturbances that the law needs; `None` for a law that ignores them.
     fn n_disturbances(&self) -> Option<usize> {
         None
     }
 
-    /// Learns from a run that was made earlier, under a disturbance like those announced; returns
-    /// whether the law has use for it.
+    /// Learns from an earlier run under a disturbance like those set; returns true if the law uses it.
     ///
     /// # Errors
     /// - as [`Law::update`], or [`LearningError::Disturbance`].

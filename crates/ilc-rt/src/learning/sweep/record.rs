@@ -20,7 +20,7 @@ pub(super) struct Sizes {
 /// `[p_k; kappa_k] = back [p_{k+1}; e_k; u_k]`, `[x_{k+1}; v_k] = fore [x_k; kappa_k]`
 ///
 /// with `back = [(A-BK)' (C-DK)'Q K'S; H^-1 B' H^-1 D'Q -H^-1 S]` and
-/// `fore = [A-BK B; -K I]`, of which the identity is not stored.
+/// `fore = [A-BK B; -K I]`, whose identity is not stored.
 ///
 /// Column-major, because each column times a scalar is added to all rows at once, and the terms
 /// that do not depend on the previous sample can be added first.
