@@ -133,14 +133,6 @@ impl<'a, 'py> Arguments<'a, 'py> {
         read_vector(name, &self.get(name)?)
     }
 
-    /// Reads a number for each of two things.
-    pub(crate) fn pair(self, name: &str) -> PyResult<[f64; 2]> {
-        match self.vector(name)?[..] {
-            [first, second] => Ok([first, second]),
-            ref other => Err(misfit(name, &[other.len()], "(2,)")),
-        }
-    }
-
     /// Reads a signal.
     pub(crate) fn signal(self, name: &str) -> PyResult<Signal> {
         Signal::read(name, &self.get(name)?)
