@@ -27,13 +27,10 @@ __all__ = [
     "SignalError",
     "StateSpace",
     "TimeVarying",
-    "Trajectory",
     "TrajectoryError",
     "__version__",
-    "_filter",
-    "_law",
     "_made",
-    "_trajectory",
+    "_made_of_kind",
     "analyze",
     "butterfly",
     "check_options",
@@ -75,6 +72,7 @@ __all__ = [
     "spiral",
     "spline",
     "tracking_index",
+    "transports",
     "tune",
     "uncertainty",
     "velocity_loop_response",
@@ -298,23 +296,6 @@ def tracking_index(
     trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0
 ) -> tuple[float, float]: ...
 
-@final
-class Line:
-    def __new__(cls, from_m: ArrayLike, to_m: ArrayLike) -> Line: ...
-
-@final
-class Arc:
-    def __new__(
-        cls,
-        from_m: ArrayLike,
-        centre_m: ArrayLike,
-        sweep_rad: float,
-        axis: ArrayLike | None = None,
-    ) -> Arc: ...
-
-def contour_error(
-    reference_m: ArrayLike | list[Line | Arc], actual_m: ArrayLike, window: int | None = None
-) -> NDArray[np.float64]: ...
 def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 
@@ -362,28 +343,16 @@ class Cell:
     def model(self) -> StateSpace: ...
     def first_error(self) -> NDArray[np.float64]: ...
 
-@final
+@disjoint_base
 class Library:
-    def __new__(cls, path: str | PathLike[str]) -> Library: ...
-    def list(self, cell: str | None = None) -> list[dict[str, Any]]: ...
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+    def list(self, cell: str | None) -> list[dict[str, Any]]: ...
     def load(self, id: int) -> dict[str, Any]: ...
     def recall(
-        self, disturbance: ArrayLike, top: int = 30, cell: str | None = None
+        self, disturbance: ArrayLike, top: int, cell: str | None
     ) -> builtins.list[dict[str, Any]]: ...
-    def append(
-        self,
-        u: ArrayLike,
-        e: ArrayLike,
-        cycle_s: float,
-        disturbance: ArrayLike | None = None,
-        reference_m: ArrayLike | None = None,
-        *,
-        cell: str = "elsewhere",
-        campaign: str = "elsewhere",
-        law: str = "elsewhere",
-    ) -> int: ...
-    def trim(self, keep: int, cell: str | None = None) -> int: ...
-    def export(self, id: int, path: str | PathLike[str]) -> None: ...
+    def append(self, **keywords: Any) -> int: ...  # noqa: ANN401
+    def trim(self, keep: int, cell: str | None) -> int: ...
 
 @final
 class EventStream:
@@ -403,13 +372,6 @@ def run_events(
 ) -> EventStream: ...
 
 # Make objects again, for copies and pickles.
-def _trajectory(
-    dt_s: float,
-    samples: Sequence[NDArray[np.float64]],
-    alphas: Sequence[Any],
-    computing_s: float,
-) -> Trajectory: ...
-
 # What the typed classes and functions of the package stand on: arguments by name, checked here.
 @disjoint_base
 class Law:
@@ -451,8 +413,6 @@ def analyze(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def refuse_divergent(**keywords: Any) -> None: ...  # noqa: ANN401
 def tune(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def repeatability(errors: ArrayLike) -> dict[str, Any]: ...
-def _law(cls: type, kind: str, arguments: dict[str, Any]) -> Law: ...
-def _filter(cls: type, kind: str, arguments: dict[str, Any]) -> Filter: ...
 def from_transfer_function(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
 def second_order(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
 def discretize(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
@@ -475,6 +435,7 @@ def velocity_loop_response(
     **model: Any,  # noqa: ANN401
 ) -> NDArray[np.complex128]: ...
 def second_order_model(**model: Any) -> StateSpace: ...  # noqa: ANN401
+def _made_of_kind(cls: type, native: str, kind: str, arguments: dict[str, Any], /) -> object: ...
 def _made(cls: object, how: str | None, arguments: dict[str, Any]) -> object: ...
 
 @disjoint_base
@@ -530,3 +491,15 @@ class Gantry:
     def forward(self, axes_m: ArrayLike) -> NDArray[np.float64]: ...
     def inverse(self, tool_m: ArrayLike) -> NDArray[np.float64]: ...
     def jacobian(self) -> NDArray[np.float64]: ...
+
+def contour_error(
+    reference_m: ArrayLike | Sequence[Line | Arc], actual_m: ArrayLike, window: int | None = None
+) -> NDArray[np.float64]: ...
+
+@disjoint_base
+class Line:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+
+@disjoint_base
+class Arc:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401

@@ -9,7 +9,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 
-use crate::argument::{Matrix, Signal, misfit, read_array, read_disturbance, read_vector};
+use crate::argument::{Matrix, Signal, misfit, read_array, read_vector};
 use crate::model_argument::read_model;
 use crate::whole::{each, pair, shown, whole};
 
@@ -133,22 +133,9 @@ impl<'a, 'py> Arguments<'a, 'py> {
         read_vector(name, &self.get(name)?)
     }
 
-    /// Reads a number for each of two things.
-    pub(crate) fn pair(self, name: &str) -> PyResult<[f64; 2]> {
-        match self.vector(name)?[..] {
-            [first, second] => Ok([first, second]),
-            ref other => Err(misfit(name, &[other.len()], "(2,)")),
-        }
-    }
-
     /// Reads a signal.
     pub(crate) fn signal(self, name: &str) -> PyResult<Signal> {
         Signal::read(name, &self.get(name)?)
-    }
-
-    /// Reads a disturbance; `None` or missing is an empty one.
-    pub(crate) fn disturbance(self, name: &str) -> PyResult<Vec<f64>> {
-        Ok(self.maybe(name, read_disturbance)?.unwrap_or_default())
     }
 
     /// Reads a weight: a number, `(n,)`, `(p, p)` or `(n, p, p)`.

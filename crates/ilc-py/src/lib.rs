@@ -23,7 +23,6 @@ mod error;
 mod exceptions;
 mod experiment;
 mod guard;
-mod held;
 mod identify;
 mod kinematics;
 mod laws;

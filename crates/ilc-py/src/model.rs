@@ -11,7 +11,7 @@ use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
-use crate::whole;
+use crate::whole::whole;
 
 /// Linear time-invariant model, sampled or continuous.
 ///
@@ -149,11 +149,8 @@ impl PyStateSpace {
     /// Returns ndarray of float64, shape (n, n_outputs, n_inputs): Response to a unit pulse, sample
     ///     by sample.
     /// Raises ModelError if the model is continuous.
-    fn markov<'py>(
-        &self,
-        py: Python<'py>,
-        #[pyo3(from_py_with = whole::n)] n: usize,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let n = whole("n", n)?;
         let parameters = detached(py, || self.0.markov(n)).or_raise()?;
         let shape = (n, self.0.n_outputs(), self.0.n_inputs());
         let array = Array3::from_shape_fn(shape, |(k, row, col)| parameters[k][(row, col)]);
@@ -168,11 +165,8 @@ impl PyStateSpace {
     ///     Toeplitz matrix of the Markov parameters, for analysis; signals are stacked sample by
     ///     sample.
     /// Raises ModelError if the model is continuous.
-    fn lifted<'py>(
-        &self,
-        py: Python<'py>,
-        #[pyo3(from_py_with = whole::n)] n: usize,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let n = whole("n", n)?;
         let lifted = detached(py, || self.0.lifted(n)).or_raise()?;
         Ok(give_matrix(py, &lifted))
     }
@@ -229,7 +223,8 @@ impl PyStateSpace {
     ///
     /// Returns StateSpace: Model with `n_samples` more states for each input.
     /// Raises ModelError if the model is continuous.
-    fn delayed(&self, #[pyo3(from_py_with = whole::n_samples)] n_samples: usize) -> PyResult<Self> {
+    fn delayed(&self, n_samples: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let n_samples = whole("n_samples", n_samples)?;
         self.0.delayed(n_samples).or_raise().map(Self)
     }
 
@@ -277,15 +272,17 @@ impl PyStateSpace {
     /// Returns magnitude : ndarray of float64, shape (n_frequencies,).
     /// Returns phase_rad : ndarray of float64, shape (n_frequencies,).
     /// Raises ModelError if there is no such channel, or a frequency is a pole.
-    #[pyo3(signature = (w_rad_s, output=0, input=0))]
+    #[pyo3(signature = (w_rad_s, output=None, input=None), text_signature = "(w_rad_s, output=0, input=0)")]
     fn bode<'py>(
         &self,
         py: Python<'py>,
         w_rad_s: &Bound<'py, PyAny>,
-        #[pyo3(from_py_with = whole::output)] output: usize,
-        #[pyo3(from_py_with = whole::input)] input: usize,
+        output: Option<&Bound<'py, PyAny>>,
+        input: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let w = read_vector("w_rad_s", w_rad_s)?;
+        let output = output.map_or(Ok(0), |output| whole("output", output))?;
+        let input = input.map_or(Ok(0), |input| whole("input", input))?;
         let bode = detached(py, || self.0.bode(&w, output, input)).or_raise()?;
         let give = |values| Array1::from(values).into_pyarray(py).into_any();
         Ok((give(bode.magnitude), give(bode.phase_rad)))

@@ -76,34 +76,9 @@ pub(crate) fn pair<'py>(
     })
 }
 
-/// One reader for each name, as `from_py_with` takes them.
-macro_rules! named {
-    ($($name:ident),* $(,)?) => {
-        $(pub(crate) fn $name(object: &Bound<'_, PyAny>) -> PyResult<usize> {
-            whole(stringify!($name), object)
-        })*
-    };
-}
-
-/// The same for arguments that may be `None`.
-macro_rules! named_maybe {
-    ($($name:ident),* $(,)?) => {
-        $(pub(crate) fn $name(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-            if object.is_none() { Ok(None) } else { whole(stringify!($name), object).map(Some) }
-        })*
-    };
-}
-
-named! {
-    input, keep, n, n_samples, output, period_samples, rows, top,
-}
-
-/// Arguments that may be `None`.
-pub(crate) mod maybe {
-    use super::{Bound, PyAny, PyAnyMethods, PyResult, whole};
-    named_maybe! {
-        window,
-    }
+/// Reads the number of rows of a raster.
+pub(crate) fn rows(object: &Bound<'_, PyAny>) -> PyResult<usize> {
+    whole("rows", object)
 }
 
 /// Reads the identity of a run.

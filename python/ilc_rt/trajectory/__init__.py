@@ -1,15 +1,13 @@
 """Trajectories that hold the limits of every axis, and the geometry of contours."""
 
-from ilc_rt._native import (
+from ilc_rt._native import Trajectory, sigmoid_pair, tracking_index
+from ilc_rt.trajectory.contour import (
     Arc,
     ContourError,
     Line,
-    Trajectory,
     contour_error,
     coupling_gains,
     projection_across,
-    sigmoid_pair,
-    tracking_index,
 )
 from ilc_rt.trajectory.curves import butterfly, spiral, spline
 from ilc_rt.trajectory.moves import exponential_sigmoid, jerk_limited, modulated

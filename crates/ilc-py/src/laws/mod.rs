@@ -25,8 +25,10 @@ use crate::argument::{Layout, read_disturbance};
 use crate::arguments::Arguments;
 use crate::error::OrRaise;
 use crate::guard::{Borrowed, Guarded};
+use crate::made::reduce_kind;
 use crate::python_law::{Channels, Frame, PythonLaw};
 use crate::signal::read_filter;
+use crate::whole::whole;
 pub(crate) use apart::{apart, is_python, samples_of};
 use exchange::{Given, exchange};
 pub(crate) use figure::Readable;
@@ -327,9 +329,10 @@ impl PyLaw {
     fn _trim(
         &self,
         py: Python<'_>,
-        #[pyo3(from_py_with = crate::whole::keep)] keep: usize,
+        keep: &Bound<'_, PyAny>,
         disturbances: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<usize>> {
+        let keep = whole("keep", keep)?;
         let given = disturbances.filter(|given| !given.is_none());
         let told = given.map(|given| read_disturbance("disturbances", given)).transpose()?;
         let mut state = self.state.borrow(py)?;
@@ -350,11 +353,8 @@ impl PyLaw {
 
     /// Pickled and copied as it was made: what it has learned since is not in the copy.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let (py, this) = (slf.py(), slf.get());
-        let maker = py.import("ilc_rt._native")?.getattr("_law")?;
-        let parts = (slf.get_type(), this.kind, &this.arguments);
-        let attributes = slf.getattr_opt("__dict__")?;
-        Ok((maker, parts, attributes).into_pyobject(py)?.into_any())
+        let this = slf.get();
+        reduce_kind(slf.as_any(), "Law", this.kind, &this.arguments)
     }
 }
 
@@ -417,19 +417,7 @@ impl PyLaw {
     }
 }
 
-/// Makes a law again from its kind and its arguments, for copies and pickles.
-#[pyfunction]
-fn _law<'py>(
-    class: &Bound<'py, PyAny>,
-    kind: &str,
-    arguments: &Bound<'py, PyDict>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let native = class.py().get_type::<PyLaw>();
-    native.getattr("__new__")?.call((class, kind), Some(arguments))
-}
-
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyLaw>()?;
-    module.add_function(wrap_pyfunction!(_law, module)?)?;
     module.add_function(wrap_pyfunction!(recalled::check_relevance_weights, module)?)
 }
