@@ -7,10 +7,12 @@ SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o
            Cargo.toml Cargo.lock pyproject.toml README.md
 # Half of the Python tests wait for a process or for time to pass.
 JOBS    := $(shell expr 2 \* $$(nproc))
+# Tests that hold derived files against the source.
+DERIVED := --test derived --test derived_cell
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
+.PHONY: help build derived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -42,6 +44,9 @@ $(VENV)/.bench: $(VENV)/.built
 	@touch $@
 
 build: $(VENV)/.built ## Build the binaries and the Python package into .venv
+
+derived: ## Write the files and tables that derive from the source
+	ILC_DERIVE=1 cargo test --release --workspace --quiet $(DERIVED)
 
 demo: build ## Ten runs on simulated drives, the error falling, and a report
 	$(BIN)/ilc demo
@@ -90,6 +95,7 @@ lint: $(VENV)/.test ## Formatting, lints, types, layers
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest ilc_rt._native
 	$(BIN)/lint-imports
+	cargo test --release --workspace --quiet $(DERIVED)
 
 docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps

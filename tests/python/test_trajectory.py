@@ -27,7 +27,9 @@ PLANS = {
         interpolation="on_time", **LIMITS,
     ),
     "spline": lambda dt: trajectory.spline(SQUARE, feed_m_s=0.05, dt_s=dt, **LIMITS),
-    "butterfly": lambda dt: trajectory.butterfly(dt_s=dt, **LIMITS),
+    "butterfly": lambda dt: trajectory.butterfly(
+        dt_s=dt, curvature_acceleration_max_m_s2=0.02, **LIMITS
+    ),
     "spiral": lambda dt: trajectory.spiral(
         pitch_m=0.004, turns=2.5, feed_m_s=0.03, dt_s=dt, **LIMITS
     ),
@@ -236,7 +238,9 @@ def test_the_index_is_the_integral_of_its_definition():
 
 
 def test_the_butterfly_is_the_curve_of_its_equation():
-    path = trajectory.butterfly(dt_s=0.002, turns=1.0, **LIMITS)
+    path = trajectory.butterfly(
+        dt_s=0.002, curvature_acceleration_max_m_s2=0.02, turns=1.0, **LIMITS
+    )
     t = np.linspace(0.0, 2.0 * np.pi, 200_001)
     r = 0.00185 * (np.exp(np.cos(t)) - 2 * np.cos(4 * t) - np.sin(t / 12) ** 5)
     curve = np.column_stack((r * np.sin(t), r * np.cos(t)))

@@ -5,7 +5,7 @@
 //!
 //! Family: `laws` and `python_law` call each other: a law inside another one may be written in Python.
 //!
-//! Family: `model` and `model_argument` read each other's arguments.
+//! Family: `arguments`, `model` and `model_argument` read each other's arguments.
 //!
 //! Family: `experiment` and `identify` read each other's arguments.
 

@@ -76,11 +76,7 @@ impl PyLibrary {
     }
 
     /// Return one run with its arrays.
-    fn load<'py>(
-        &self,
-        py: Python<'py>,
-        id: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    fn load<'py>(&self, py: Python<'py>, id: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
         let id = whole::id(id)?;
         let row = detached(py, || self.read(|library| library.load(id))).or_raise()?;
         let run = describe(py, &row)?;

@@ -149,11 +149,7 @@ impl PyStateSpace {
     /// Returns ndarray of float64, shape (n, n_outputs, n_inputs): Response to a unit pulse, sample
     ///     by sample.
     /// Raises ModelError if the model is continuous.
-    fn markov<'py>(
-        &self,
-        py: Python<'py>,
-        n: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let n = whole("n", n)?;
         let parameters = detached(py, || self.0.markov(n)).or_raise()?;
         let shape = (n, self.0.n_outputs(), self.0.n_inputs());
@@ -169,11 +165,7 @@ impl PyStateSpace {
     ///     Toeplitz matrix of the Markov parameters, for analysis; signals are stacked sample by
     ///     sample.
     /// Raises ModelError if the model is continuous.
-    fn lifted<'py>(
-        &self,
-        py: Python<'py>,
-        n: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let n = whole("n", n)?;
         let lifted = detached(py, || self.0.lifted(n)).or_raise()?;
         Ok(give_matrix(py, &lifted))

@@ -8,11 +8,12 @@ use std::time::Instant;
 use ilc_rt::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
 use ilc_rt::trajectory::exponential::AlphaMax;
 use ilc_rt::trajectory::exponential::listing::{ListedLeg, Listing};
+use ilc_rt::trajectory::kind::RasterSection;
 use ilc_rt::trajectory::program::{GcodeSetting, read_gcode};
 use ilc_rt::trajectory::{
-    AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
+    AxisLimits, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
     ModulatedSegment, MoveError, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion,
-    TrackingIndex, TrajectoryError, points_program, raster as raster_program,
+    TrackingIndex, TrajectoryError, points_program,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -97,7 +98,7 @@ fn read_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<Vec<AxisLimits>>
 fn read_run_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<RunLimits> {
     Ok(RunLimits {
         feed_m_s: a.number("feed_m_s")?,
-        curvature_acceleration_m_s2: a.number("curvature_acceleration_max_m_s2")?,
+        curvature_acceleration_max_m_s2: a.number("curvature_acceleration_max_m_s2")?,
         axes: read_limits(a, n_axes)?,
     })
 }
@@ -325,11 +326,16 @@ fn spiral<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDic
 fn raster<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
     let a = Arguments::of(keywords)?;
     let (limits, start, dt_s) = (read_limits(a, 2)?, read_place(a, "start_m")?, a.number("dt_s")?);
-    let (width_m, pitch_m, rows) = (a.number("width_m")?, a.number("pitch_m")?, a.whole("rows")?);
-    let (feed_m_s, there_and_back) = (a.number("feed_m_s")?, a.flag("there_and_back")?);
+    let raster = RasterSection {
+        width_m: a.number("width_m")?,
+        pitch_m: a.number("pitch_m")?,
+        rows: a.whole("rows")?,
+        there_and_back: a.flag("there_and_back")?,
+    };
+    let feed_m_s = a.number("feed_m_s")?;
     let setting = a.choice("setting", &SETTINGS)?;
     planned(a.py(), || {
-        let program = raster_program(start, width_m, pitch_m, rows, feed_m_s, there_and_back)?;
+        let program = raster.segments(start, feed_m_s)?;
         sample_linear(&start, &program, &limits, setting, dt_s)
     })
 }
@@ -359,7 +365,7 @@ fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict
     let spec = PathSpec {
         start_m: start,
         segments: program.segments,
-        corner: blend_s.map_or(CornerRule::ExactStop, |window_s| CornerRule::Blend { window_s }),
+        blend_s,
         dwell_before_s: program.dwell_before_s,
         dwell_after_s: 0.0,
     };

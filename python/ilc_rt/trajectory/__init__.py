@@ -8,8 +8,9 @@ from ilc_rt.trajectory.contour import (
     coupling_gains,
     projection_across,
 )
-from ilc_rt.trajectory.curves import butterfly, gcode, raster, spiral, spline
+from ilc_rt.trajectory.curves import butterfly, spiral, spline
 from ilc_rt.trajectory.moves import exponential_sigmoid, jerk_limited, modulated, sigmoid_pair
+from ilc_rt.trajectory.programs import gcode, raster
 from ilc_rt.trajectory.sampled import Trajectory, tracking_index
 
 __all__ = [

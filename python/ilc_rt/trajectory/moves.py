@@ -1,8 +1,8 @@
-"""Moves from point to point: jerk-limited, exponential and sigmoid."""
+"""Straight moves: limited in jerk, exponential/sigmoid, and with an oscillation along them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from ilc_rt import _native
 from ilc_rt.trajectory.sampled import Trajectory
@@ -19,7 +19,7 @@ def jerk_limited(
     velocity_max_m_s: float | ArrayLike,
     acceleration_max_m_s2: float | ArrayLike,
     jerk_max_m_s3: float | ArrayLike,
-    setting: Literal["complete", "on_time"] = "complete",
+    setting: str = "complete",
 ) -> Trajectory:
     """Plan straight moves, each axis limited in jerk.
 

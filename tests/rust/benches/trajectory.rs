@@ -37,7 +37,7 @@ fn moves(criterion: &mut Criterion) {
 
 fn curves(criterion: &mut Criterion) {
     let limits =
-        RunLimits { feed_m_s: 0.004, curvature_acceleration_m_s2: 0.02, axes: vec![LIMITS; 2] };
+        RunLimits { feed_m_s: 0.004, curvature_acceleration_max_m_s2: 0.02, axes: vec![LIMITS; 2] };
     let mut group = criterion.benchmark_group("curve");
     group.sample_size(10);
     group.bench_function("butterfly: plan", |bench| {

@@ -16,7 +16,7 @@ pub fn hold_derived(document: &str, name: &str, text: &str) {
     }
     assert!(
         std::env::var_os("ILC_DERIVE").is_some(),
-        "{document}: {name} is not what the source says; `ILC_DERIVE=1 cargo test` writes it"
+        "{document}: {name} is not what the source says; `make derived` writes it"
     );
     let written = format!("{}{text}{}", &whole[..from], &whole[from + len..]);
     std::fs::write(&path, written).expect("the document can be written");
@@ -33,7 +33,7 @@ pub fn hold_derived_file(document: &str, text: &str) {
     }
     assert!(
         std::env::var_os("ILC_DERIVE").is_some(),
-        "{document} is not what the source says; `ILC_DERIVE=1 cargo test` writes it"
+        "{document} is not what the source says; `make derived` writes it"
     );
     std::fs::write(&path, text).expect("the file can be written");
 }

@@ -182,13 +182,23 @@ pub struct Crate {
 }
 
 /// A paragraph `//! Family: …` at the head of a folder: rooms in it or below, in backticks, that may
-/// import each other, and why.
+/// import each other, and why; without names all rooms of the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Family {
     /// The folder's module.
     pub head: ModulePath,
-    /// The last names of the rooms.
+    /// The last names of the rooms; empty for all of the folder.
     pub members: BTreeSet<String>,
+}
+
+impl Family {
+    /// True if all of these rooms belong to it.
+    pub fn holds(&self, rooms: &[ModulePath]) -> bool {
+        rooms.iter().all(|room| {
+            let named = room.last().is_some_and(|last| self.members.contains(last));
+            room.starts_with(&self.head) && (named || self.members.is_empty())
+        })
+    }
 }
 
 impl Crate {

@@ -1,5 +1,5 @@
 //! Files that derive from the Rust source: the Python class of the figures, the schema of the events, and
-//! tables of the documents. `ILC_DERIVE=1` writes them.
+//! tables of the documents. `make derived` writes them.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 

@@ -107,6 +107,37 @@ fn every_law_that_a_cell_can_name_learns_on_the_gantry() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+#[test]
+fn relevance_goes_on_from_the_runs_of_the_library_under_the_disturbance_of_a_file() {
+    let scratch = Scratch::new();
+    let (library, told) = (scratch.file("library.db"), scratch.file("temperature.txt"));
+    let learning = |file: &str| {
+        format!(
+            "law = \"relevance\"\n{file}\n[learning.relevance]\nerror = 1.0\nerror_rate = 0.0\n\
+             epsilon = 1e-9\n[learning.norm_optimal]\nrate = 6.0"
+        )
+    };
+    let start = |cell: &Cell, iterations| {
+        let options = options(library.clone(), iterations);
+        campaign::run(cell, &options, in_process(cell), None, &mut |_| {})
+    };
+    let line = start(&cell(SERIES, &learning("")), 2).unwrap_err().to_string();
+    assert!(line.contains("0 numbers; 1 needed"), "{line}");
+
+    let cell = cell(SERIES, &learning(&format!("disturbance_file = {:?}", told.to_str().unwrap())));
+    let line = start(&cell, 2).unwrap_err().to_string();
+    assert!(line.contains("run 0") && line.contains("temperature.txt"), "{line}");
+    std::fs::write(&told, "warm").unwrap();
+    let line = start(&cell, 2).unwrap_err().to_string();
+    assert!(line.contains("\"warm\" is not a number"), "{line}");
+    std::fs::write(&told, "20.5\n").unwrap();
+    let rms_m = |outcome: &Outcome, run: usize| outcome.runs[run].1.tracking_rms_m;
+    let first = start(&cell, 4).unwrap();
+    let second = start(&cell, 2).unwrap();
+    assert!(rms_m(&second, 1) < 0.5 * rms_m(&first, 1), "{first:?} {second:?}");
+    assert!(rows(&library).iter().all(|row| row.record.disturbance == [20.5]));
+}
+
 const CO_ILC: &str = "law = \"norm_optimal\"\n[learning.norm_optimal]\nrate = 6.0";
 /// A law that converges by the model, and makes the error of the real axes grow after two runs: it
 /// learns at the frequency of the mode that the model leaves out.

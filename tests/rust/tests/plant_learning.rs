@@ -6,10 +6,8 @@
 
 #![expect(clippy::expect_used, reason = "a test may fail where the example is not as it should be")]
 
-use ilc_rt::config::{Cell, Corner};
-use ilc_rt::trajectory::{
-    AxisLimits, CornerRule, Interpolator, PathSegment, PathSpec, contour_error_m,
-};
+use ilc_rt::config::Cell;
+use ilc_rt::trajectory::{AxisLimits, Interpolator, PathSegment, PathSpec, contour_error_m};
 use ilc_sim::plant::{Demand, Gantry, Plant};
 
 const RATE: f64 = 6.0;
@@ -27,10 +25,7 @@ fn plan(cell: &Cell) -> Interpolator {
     let spec = PathSpec {
         start_m: program.start_m.clone(),
         segments: program.segments.iter().map(segment).collect(),
-        corner: match program.corner {
-            Corner::ExactStop => CornerRule::ExactStop,
-            Corner::Blend => CornerRule::Blend { window_s: program.blend_s },
-        },
+        blend_s: program.window_s(),
         dwell_before_s: program.dwell_before_s,
         dwell_after_s: program.dwell_after_s,
     };

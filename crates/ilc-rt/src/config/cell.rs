@@ -8,18 +8,18 @@ use serde::{Deserialize, Serialize};
 use super::error::ConfigError;
 use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
-use super::program::Program;
 use super::simulation::{AxisSimulation, Simulation};
 pub use crate::fieldbus::cia402::Mode;
 pub use crate::interpolate::AxisUnit;
 use crate::schema::field_order;
+use crate::trajectory::kind::Program;
 
 /// A whole cell description, validated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Cell {
-    /// Where it was read from; empty for a text.
+    /// File it was read from; empty for a text.
     #[serde(skip)]
     pub file: PathBuf,
     /// `[cell]`
@@ -52,9 +52,9 @@ pub struct Cell {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct CellSection {
-    /// Name, used in Zenoh keys and in the library: letters, digits, `-` and `_`.
+    /// Names the cell in the library and on Zenoh (`ilc/<name>/…`): 1 to 64 letters, digits, `-` and `_`.
     pub name: String,
-    /// Servo cycle in microseconds; exact, as both clocks count in integers.
+    /// Servo cycle in microseconds, as both clocks count in integers.
     #[schemars(range(min = 100, max = 100_000))]
     pub cycle_us: u32,
 }
@@ -64,13 +64,13 @@ pub struct CellSection {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct BusSection {
-    /// `can:vcan0`, `udp:239.74.163.2[:port]`, `zenoh:KEY` or `loopback:`.
+    /// Bus: `can:vcan0`, `udp:239.74.163.2[:port]`, `zenoh:KEY` or `loopback:`; `--bus` replaces it.
     pub address: String,
-    /// Bit rate of a real CAN bus, for the load check.
+    /// Bit rate of a CAN bus, for the load check.
     #[serde(default = "default_bitrate_bit_s")]
     #[schemars(range(min = 10_000, max = 1_000_000))]
     pub bitrate_bit_s: u32,
-    /// Largest share of the bus that cyclic traffic may take, 0 to 1.
+    /// Largest share of a CAN bus that cyclic frames may take in the worst case.
     #[serde(default = "default_load_max")]
     #[schemars(range(min = 0.05, max = 1.0))]
     pub load_max: f64,
@@ -89,18 +89,22 @@ fn default_load_max() -> f64 {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Axis {
-    /// Name, as `x`.
+    /// Name, as `"x"`: 1 to 64 characters without control characters, no spaces around; no two axes of
+    /// one name, also without case and spaces.
     pub name: String,
-    /// CANopen node, 1 to 127.
+    /// CANopen node of the drive, each once.
     #[schemars(range(min = 1, max = 127))]
     pub node: u8,
-    /// Command interface.
+    /// Command interface. `csp`: the drive closes the position loop, the learned input (m) is added to
+    /// the set point. `csv`: the position loop is in the controller, the learned input (m/s) is added to
+    /// the velocity command.
     pub interface: Mode,
-    /// What its coordinate is measured in; every quantity of a rotary axis whose name ends in `_m`,
+    /// Unit of its coordinate; every quantity of a rotary axis whose name ends in `_m`,
     /// `_m_s`, … is in rad, rad/s, …
     #[serde(default)]
     pub unit: AxisUnit,
-    /// Position counts of the drive in one metre (or radian).
+    /// Counts of the drive's encoder in one metre (or radian); the farthest position and the highest
+    /// speed must fit 32 bits.
     #[schemars(range(min = 1.0, max = 1e10))]
     pub counts_per_m: f64,
     /// `[axis.limits]`
@@ -144,16 +148,17 @@ pub struct Limits {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct AxisModel {
-    /// Natural frequency of the drive's position loop; csp only.
+    /// Natural frequency of the drive's position loop, `w0^2 / (s^2 + 2 d w0 s + w0^2)`; csp only.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub natural_frequency_hz: Option<f64>,
     /// Damping ratio of the drive's position loop; csp only.
     #[schemars(range(min = 0.05, max = 5.0))]
     pub damping: Option<f64>,
-    /// Bandwidth of the drive's velocity loop; csv only.
+    /// Bandwidth of the drive's velocity loop, first order; csv only.
     #[schemars(range(min = 0.1, max = 10000.0))]
     pub velocity_bandwidth_hz: Option<f64>,
-    /// Whole servo cycles from sending a command to its first effect, beyond the sampler's one.
+    /// Servo cycles from a command to its first effect, beyond the one of the sampler. A drive that
+    /// interpolates its set points adds one; a little more makes up for lags that the model leaves out.
     #[serde(default)]
     #[schemars(range(min = 0, max = 20))]
     pub delay_samples: u32,
@@ -191,13 +196,14 @@ pub struct TcpEncoder {
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Safety {
-    /// Consecutive cycles without an answer of a node before a controlled stop.
+    /// Cycles without any one PDO of a node before a controlled stop; drives stop as well when commands
+    /// stay away as long.
     #[schemars(range(min = 1, max = 1000))]
     pub silent_cycles_max: u32,
-    /// Consecutive overrun cycles before a controlled stop.
+    /// Cycles missed in a row before a controlled stop.
     #[schemars(range(min = 1, max = 10_000))]
     pub overrun_cycles_max: u32,
-    /// How long a node may take to boot and to answer.
+    /// Longest time that a node may take to boot and to answer.
     #[schemars(range(min = 0.01, max = 60.0))]
     pub answer_timeout_s: f64,
 }
@@ -213,13 +219,13 @@ impl Default for Safety {
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Telemetry {
-    /// Whether to publish at all.
+    /// Publish on Zenoh.
     pub enabled: bool,
     /// Zenoh endpoints to listen on, as `tcp/127.0.0.1:7447`.
     pub listen: Vec<String>,
     /// Zenoh endpoints to connect to.
     pub connect: Vec<String>,
-    /// Whether to look for others by multicast.
+    /// Look for other programs by multicast.
     pub scouting: bool,
 }
 

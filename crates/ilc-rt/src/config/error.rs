@@ -1,4 +1,4 @@
-//! Why a cell description was refused: file, place, value and what is allowed, in one line.
+//! Refusals of a cell description: file, place, value and what is allowed, in one line.
 
 use crate::record::{TEXT_MAX, printable};
 use crate::schema::Violation;
@@ -14,7 +14,7 @@ pub enum ConfigError {
     Read {
         /// The path as given.
         file: String,
-        /// What the operating system said.
+        /// Reason given by the operating system.
         reason: String,
     },
     /// The text is not TOML, or a key is unknown, missing or of the wrong type.
@@ -26,7 +26,7 @@ pub enum ConfigError {
         line: usize,
         /// Table and key, as `[axis.limits] position_min_m`.
         key: String,
-        /// What is wrong and what is allowed.
+        /// Reason, and what is allowed.
         reason: String,
     },
     /// A value is out of its range, or two values contradict each other.
@@ -38,7 +38,7 @@ pub enum ConfigError {
         key: String,
         /// The value found.
         value: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
 }

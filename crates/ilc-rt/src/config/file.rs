@@ -7,17 +7,13 @@ use std::path::{Component, Path};
 
 /// Largest cell description.
 pub const CELL_BYTES_MAX: u64 = 16 << 20;
-/// Largest part program.
-pub const GCODE_BYTES_MAX: u64 = 16 << 20;
-/// Largest table of set points.
-pub const TABLE_BYTES_MAX: u64 = 64 << 20;
 
 /// Reads a regular file of at most so many bytes.
 ///
 /// Pipes and devices are refused without waiting for them.
 ///
 /// # Errors
-/// Why not, in a few words.
+/// The reason in a few words.
 pub fn read_file(path: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
     // Without this the opening of a pipe waits for the one who writes to it.
     let file = OpenOptions::new()
@@ -45,7 +41,7 @@ pub fn read_file(path: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
 /// Reads a file that stands in the folder of a cell description, or below it.
 ///
 /// # Errors
-/// Why not, in a few words: a name or a link that leads out of the folder, or as [`read_file`].
+/// The reason in a few words: a name or a link that leads out of the folder, or as [`read_file`].
 pub fn read_beside(cell_file: &Path, name: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
     let inside = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
     if !name.components().all(inside) {

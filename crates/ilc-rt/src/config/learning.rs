@@ -102,7 +102,7 @@ impl Learning {
     }
 }
 
-/// Which measurement is learned from.
+/// Measurement that is learned from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {

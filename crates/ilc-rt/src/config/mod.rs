@@ -10,20 +10,17 @@ mod error;
 mod file;
 mod learning;
 pub mod mode;
-mod path;
-mod program;
 mod simulation;
 mod validate;
 
+pub use crate::trajectory::kind::{Corner, PathKind, Program, Segment};
 pub use cell::{
     Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Limits, Mode, PositionLoop, Safety,
     TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
-pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};
+pub use file::{CELL_BYTES_MAX, read_beside, read_file};
 pub use learning::{Learning, Measure};
-pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
-pub use program::{Corner, Program, Segment};
 pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;
 

@@ -1,4 +1,4 @@
-//! `[simulation]` and `[axis.simulation]`: what the simulated drives are; nobody else reads them.
+//! `[simulation]` and `[axis.simulation]`: the simulated drives; read by `ilc-sim` only.
 
 use crate::schema::field_order;
 use schemars::JsonSchema;

@@ -1,4 +1,4 @@
-//! What a campaign must have in common with an earlier one to go on with it: a digest of cell, program,
+//! Fingerprint that a campaign shares with an earlier one if it can go on with it: a digest of cell, program,
 //! measurement, law and parameters, kept with every run. `plan` asks for it, `campaign` compares it.
 
 use serde_json::json;

@@ -16,9 +16,9 @@ use crate::learning::{Law, LearningError};
 pub struct Prepared {
     /// The law; `None` if nothing shall be learned.
     pub law: Option<Box<dyn Law>>,
-    /// What the analysis says of it, as a sentence; empty if it can say nothing.
+    /// Verdict of the analysis, as a sentence; empty if there is none.
     pub verdict: String,
-    /// What does not keep it from starting and should be known all the same, a sentence each.
+    /// Findings that do not keep it from starting, a sentence each.
     pub warnings: Vec<String>,
 }
 

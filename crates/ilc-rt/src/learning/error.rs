@@ -1,4 +1,4 @@
-//! What can be wrong with a law or the signals it is given.
+//! Refusals of laws, parameters and signals.
 
 use thiserror::Error;
 
@@ -9,13 +9,13 @@ use crate::signal::SignalError;
 /// Values of a signal, samples times channels: as many as a trajectory may have.
 pub(crate) const MAX_VALUES: usize = 10_000_000;
 
-/// Why a law or a signal was refused.
+/// A refused law or signal.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum LearningError {
     /// A signal has the wrong number of values.
     #[error("{what} holds {found} values; {n_samples} samples of {n_channels} channels are needed")]
     Length {
-        /// Which signal: `input`, `error` or `next`.
+        /// Name of the signal: `input`, `error` or `next`.
         what: &'static str,
         /// Values given.
         found: usize,
@@ -29,7 +29,7 @@ pub enum LearningError {
         "{what} is {value} at sample {sample}, channel {channel}; only finite values are allowed"
     )]
     NotFinite {
-        /// Which signal: `input`, `error` or `next`.
+        /// Name of the signal: `input`, `error` or `next`.
         what: &'static str,
         /// The offending sample.
         sample: usize,
@@ -46,12 +46,12 @@ pub enum LearningError {
         /// Numbers that describe a disturbance.
         expected: usize,
     },
-    /// A law that somebody else wrote refused, or gave something that is no input.
+    /// A law from outside this crate refused, or returned no valid input.
     #[error("the law {law} failed: {reason}")]
     User {
         /// Name of the law.
         law: String,
-        /// What it said.
+        /// Its reason.
         reason: String,
     },
     /// A parameter outside its range.
@@ -71,7 +71,7 @@ pub enum LearningError {
         what: &'static str,
         /// The first sample at which it is wrong.
         sample: usize,
-        /// What is wrong, and what is allowed.
+        /// Reason, and what is allowed.
         reason: String,
     },
     /// A count that must not be zero.
@@ -125,7 +125,7 @@ pub enum LearningError {
     /// A model that cannot be inverted.
     #[error("the model has no inverse: {reason}")]
     NoInverse {
-        /// Why not.
+        /// Reason.
         reason: &'static str,
     },
     /// A model whose inverse is unstable.
@@ -164,19 +164,19 @@ pub enum LearningError {
     /// A run too long for any memory.
     #[error("{what} = {value}; at most {allowed} are allowed here")]
     TooMany {
-        /// What was asked for.
+        /// Name of the count.
         what: &'static str,
-        /// How many.
+        /// The count.
         value: usize,
-        /// How many there may be.
+        /// Largest count allowed.
         allowed: usize,
     },
     /// An eigenvalue or a fixed point could not be computed.
     #[error("{what} could not be computed: {reason}")]
     Numerics {
-        /// Which figure.
+        /// Name of the figure.
         what: &'static str,
-        /// Why.
+        /// Reason.
         reason: &'static str,
     },
     /// The model was refused.

@@ -21,7 +21,7 @@ pub struct LadderRule {
     /// Ratio of the error to that before the last step above which it decays too slowly.
     #[schemars(range(min = 1e-3, max = 1.0))]
     pub slow: f64,
-    /// By what factor the gain is then raised; 1 to leave it alone.
+    /// Factor by which the gain is then raised; 1 to leave it alone.
     #[schemars(range(min = 1.0, max = 10.0))]
     pub increase: f64,
     /// Lowest gain.
@@ -50,8 +50,8 @@ impl LadderRule {
 ///
 /// `m_j = (e_1 + .. + e_n) / n`, `u_{j+1} = u_j + g_j (law(u_j, m_j) - u_j)`
 ///
-/// What does not repeat falls with the root of n. Between the steps the input is the same; if the
-/// runs do not come with the same input, the mean begins anew.
+/// The part that does not repeat falls with the root of n. Between the steps the input is the same; if the
+/// runs do not come with the same input, the mean starts over.
 ///
 /// The gain `g`, 1 at first, follows the decay of the repeatable error `f_j`, with
 /// `f_j^2 = ms(m_j) - s_j^2 / n` and `s_j^2` the mean variance from run to run (0 for one repeat):
@@ -61,8 +61,8 @@ impl LadderRule {
 /// - otherwise, or if `f_j` is less than twice the noise `s_j / sqrt(n)` of the mean, so that its
 ///   ratio says nothing: `g` stays.
 ///
-/// Where whoever runs the law takes an input back ([`Law::on_rollback`]) the error grew too, though the
-/// law never learns from that run: `g` is halved, and the mean begins anew.
+/// Where the caller rolls an input back ([`Law::on_rollback`]) the error grew too, though the
+/// law never learns from that run: `g` is halved, and the mean starts over.
 ///
 /// # Shapes
 /// - those of the law inside

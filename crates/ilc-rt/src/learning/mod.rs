@@ -33,7 +33,7 @@ pub use structure::{LowPass, Structure, Surrogate};
 ///   have `n_samples` x `n_inputs`, `error` has `n_samples` x `n_outputs`
 /// - `error[k] = reference[k] - measured[k]` on the grid of `input`: `input[k]` acts from sample `k`
 ///   on and shows at `k + 1` at the earliest unless the axis has direct feedthrough. Each law pairs
-///   the samples by itself; nobody shifts anything beforehand.
+///   the samples itself; the caller shifts nothing.
 pub trait Law: Send {
     /// Computes the input of the next run.
     ///
@@ -108,12 +108,12 @@ pub trait Law: Send {
         None
     }
 
-    /// Tells the law that the input it made last is taken back, as the error grew with it: the run to
+    /// Tells the law that its last input is rolled back, as the error grew with it: the run to
     /// come has an earlier input. Most laws look at one run only and have no use for it.
     fn on_rollback(&mut self) {}
 
-    /// Returns whether the law goes back to an earlier input by itself where the error grows, so that
-    /// nobody else should.
+    /// Returns whether the law restores an earlier input where the error grows, so that its caller should
+    /// not.
     fn handles_rollback(&self) -> bool {
         false
     }
@@ -135,7 +135,7 @@ pub trait Law: Send {
     fn describe(&self) -> String;
 }
 
-/// What came of the last update of a law that may also rest.
+/// Outcome of the last update of a law that may also rest.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
     /// It learned.

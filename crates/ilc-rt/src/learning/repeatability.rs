@@ -1,9 +1,9 @@
-//! Whether learning is worth while: what of the error repeats, and what does not.
+//! Repeatability: the part of the error that repeats, which learning can remove, and the part that does not.
 
 use super::LearningError;
 use super::error::{check, check_counts};
 
-/// What several runs with the same input have in common.
+/// Common part of several runs with the same input.
 ///
 /// # Units
 /// - those of the error; `ratio` and `learnable` are without unit

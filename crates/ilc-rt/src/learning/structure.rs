@@ -1,11 +1,11 @@
-//! What a law says of itself to whoever analyses it: `analysis` reads it, the laws write it.
+//! Structure of a law, for its analysis: the laws state it, `analysis` reads it.
 
 use crate::learning::Law;
 use crate::learning::law::norm_optimal::Weights;
 use crate::learning::law::pd::PdGains;
 use crate::model::StateSpace;
 
-/// What is known of a law beyond its update.
+/// Structure of a law beyond its update.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Structure<'a> {
     /// Nothing: analysis tries whether it is linear.
@@ -15,14 +15,14 @@ pub enum Structure<'a> {
     /// Each update minimises a quadratic cost with this model. Whatever the weights, learning then
     /// converges if the model is right.
     Optimal {
-        /// What the law believes of the axes.
+        /// Nominal model of the axes.
         model: &'a StateSpace,
         /// The weights of the cost; `None` if they change along the run or tie channels together.
         weights: Option<Weights>,
     },
 }
 
-/// Which law analysis looks at in place of one that is not linear itself.
+/// Linear law that analysis uses in place of one that is not linear itself.
 #[expect(missing_debug_implementations, reason = "laws need not have one")]
 pub enum Surrogate<'a> {
     /// The law itself.

@@ -16,7 +16,7 @@ pub struct Violation {
     pub key: String,
     /// The value found.
     pub value: String,
-    /// What is allowed.
+    /// Allowed values.
     pub allowed: String,
 }
 
@@ -35,7 +35,7 @@ pub fn check<T: Serialize + JsonSchema>(value: &T, table: &str) -> Result<(), Vi
     walk(&found, inlined::<T>().as_value(), &Place::Table(table.to_owned()))
 }
 
-/// Where a value stands in a file.
+/// Place of a value in a file.
 enum Place {
     Table(String),
     /// An element of an array of tables, by its name or its number from 1.

@@ -10,7 +10,7 @@ use super::node::{Kind, Node};
 /// Mark at which a table ends.
 const END: &str = "<!-- end -->";
 
-/// Returns the document with each of its tables written anew.
+/// Returns the document with each of its tables rewritten.
 ///
 /// # Errors
 /// One line for a mark that names no table of the schema, or has no end.

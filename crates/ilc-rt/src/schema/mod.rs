@@ -1,4 +1,4 @@
-//! What a struct of parameters says of itself: its JSON schema, with the range and the unit of each field
+//! JSON schema of the structs of parameters, with the range and the unit of each field
 //! at the field. Values are checked against it, and tables, templates and editors read it.
 //!
 //! Any cold module may import it: the structs of parameters, which derive `JsonSchema`, and `config`,

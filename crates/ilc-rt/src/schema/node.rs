@@ -13,7 +13,7 @@ pub(super) struct Node<'a> {
     pub(super) is_required: bool,
 }
 
-/// What a key holds.
+/// Kind of value that a key holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// A number, a text, a list of such, …

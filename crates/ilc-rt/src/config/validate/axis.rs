@@ -1,4 +1,4 @@
-//! What is allowed in `[[axis]]`.
+//! Contradictions within `[[axis]]`.
 
 use super::checker::Checker;
 use crate::config::{Axis, Cell, ConfigError, Mode, mode};

@@ -1,4 +1,4 @@
-//! What is allowed in `[learning]`, its laws, and what goes round them.
+//! Contradictions within `[learning]`, its laws, and what goes round them.
 
 use super::checker::Checker;
 use crate::config::{Cell, ConfigError, LawName, Measure, mode};

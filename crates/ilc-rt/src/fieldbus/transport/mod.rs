@@ -4,7 +4,7 @@
 //! which is cold, turns an address of a cell description into one. Used by `servo`, `campaign`, the
 //! simulator and the tools, which know the address and nothing else of the carrier.
 //!
-//! Family: `opening`, `udp_multicast` and `zenoh`: each carrier is opened cold, by what it is made of.
+//! Family: `opening`, `socketcan`, `udp_multicast` and `zenoh`: each carrier is opened cold, by what it is made of.
 
 mod doorbell;
 pub mod loopback;

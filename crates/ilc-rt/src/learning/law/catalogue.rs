@@ -12,7 +12,7 @@ macro_rules! every_law {
         $macro! {
             /// The input that a quadratic cost over the whole run asks for; with `rate` it is CO-ILC.
             NormOptimal norm_optimal crate::learning::law::norm_optimal::NormOptimalParameters;
-            /// Proportional-derivative learning from the error some samples ahead, each axis by itself.
+            /// Proportional-derivative learning from the error some samples ahead, each axis on its own.
             Pd pd crate::learning::law::pd::PdParameters;
             /// Norm-optimal learning within bounds of input and set point.
             Constrained constrained crate::learning::law::constrained::ConstrainedParameters;
@@ -41,7 +41,7 @@ pub(crate) use every_law;
 
 macro_rules! names {
     ($($(#[$doc:meta])* $law:ident $name:ident $parameters:ty;)*) => {
-        /// Which law learns.
+        /// Name of a law.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
         pub enum LawName {

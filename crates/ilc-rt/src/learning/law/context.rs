@@ -1,4 +1,4 @@
-//! What a law is built from besides its parameters, and what its parameters may ask of a cell.
+//! Context in which a law is built and its parameters are checked: cell, model, set points of a run.
 //!
 //! `config` and `design` fill it in from a cell description; the laws read it.
 
@@ -17,8 +17,8 @@ use crate::schema::Violation;
 pub struct LawAxis<'a> {
     /// Name.
     pub name: &'a str,
-    /// Whether the learned input is added to the set point of a drive that closes the position loop;
-    /// otherwise it is added to the output of the position loop in the controller.
+    /// The learned input is added to the set point of a drive that closes the position loop; otherwise
+    /// it is added to the output of the position loop in the controller.
     pub corrects_set_point: bool,
     /// Largest learned input.
     pub input_max: f64,
@@ -128,9 +128,9 @@ pub trait LawParameters: Json + Debug {
 /// A cell in which a law learns.
 #[derive(Clone, Copy, Debug)]
 pub struct Example {
-    /// Whether its axes have their position loop in the controller.
+    /// Its axes have their position loop in the controller.
     pub is_parallel: bool,
-    /// What follows `[learning]`, the law's name included.
+    /// Text that follows `[learning]`, the law's name included.
     pub learning: &'static str,
     /// Share of the first run's RMS error that may be left after five updates.
     pub error_left: f64,
@@ -148,7 +148,7 @@ impl<T: Serialize> Json for T {
     }
 }
 
-/// Why a law could not be built.
+/// Reason why a law could not be built.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum BuildError {
     /// A parameter does not suit the cell.

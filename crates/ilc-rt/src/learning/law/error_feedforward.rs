@@ -91,13 +91,13 @@ impl LawParameters for ErrorFeedforwardParameters {
 pub struct Feedforward {
     /// Learning gain_per_s, in the paper phi.
     pub gain_per_s: f64,
-    /// How many samples ahead the error is taken: 1 for an axis without delay.
+    /// Samples by which the error is taken ahead: 1 for an axis without delay.
     pub lead_samples: usize,
     /// Largest magnitude of the learned feed-forward; infinite for none.
     pub input_max: f64,
 }
 
-/// Open-loop learning from the filtered error, each channel by itself.
+/// Open-loop learning from the filtered error, each channel on its own.
 ///
 /// `w_j[k] = clamp(w_{j-1}[k] + phi (Q e_{j-1})[k + lead])`, the drive being given `w_j + C e_j`
 ///

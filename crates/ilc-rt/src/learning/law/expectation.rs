@@ -1,4 +1,4 @@
-//! Which disturbance belongs to which run, for the laws that weigh runs by it.
+//! Disturbances of the finished and of the next run, for the laws that weigh runs by them.
 
 use crate::learning::LearningError;
 

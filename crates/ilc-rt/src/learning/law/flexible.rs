@@ -260,7 +260,7 @@ impl Law for Flexible {
         self.core.set_disturbance(disturbance);
     }
 
-    /// What the core law proposes converges where it does itself.
+    /// The entries converge where the core law does.
     fn linear_surrogate(&mut self) -> Surrogate<'_> {
         Surrogate::Inside(self.core.as_mut())
     }

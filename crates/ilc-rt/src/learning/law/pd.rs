@@ -68,11 +68,11 @@ pub struct PdGains {
     pub kp: f64,
     /// Gain of the error's difference from one sample to the next.
     pub kd: f64,
-    /// How many samples ahead the error is taken: the relative degree of the axis, 1 without delay.
+    /// Samples by which the error is taken ahead: the relative degree of the axis, 1 without delay.
     pub lead_samples: usize,
 }
 
-/// Proportional-derivative learning, each channel by itself.
+/// Proportional-derivative learning, each channel on its own.
 ///
 /// `u_{j+1}[n] = Q (u_j[n] + kp e_j[n + lead] + kd (e_j[n + lead] - e_j[n + lead - 1]))`
 ///

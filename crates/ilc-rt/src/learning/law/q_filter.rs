@@ -10,7 +10,7 @@ use crate::signal::{
     Symmetric, ZeroPhase, butterworth,
 };
 
-/// Which filter a law uses.
+/// Filter of a law.
 #[derive(Debug, Clone, PartialEq)]
 pub enum QFilter {
     /// None: the law converges only where the model allows it.

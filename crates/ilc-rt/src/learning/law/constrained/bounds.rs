@@ -19,12 +19,12 @@ pub enum Limit {
     Full(Vec<f64>),
 }
 
-/// What a quantity may be at least and at most.
+/// Lower and upper limit of a quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bound {
-    /// The least.
+    /// Lower limit.
     pub lower: Limit,
-    /// The most.
+    /// Upper limit.
     pub upper: Limit,
 }
 
@@ -63,7 +63,7 @@ pub struct Bounds {
     pub output_reference: Option<Vec<f64>>,
 }
 
-/// Why bounds were refused, or cannot be honoured in a run.
+/// Refused bounds, or bounds that cannot be honoured in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum BoundsError {
     /// A limit that is no limit.
@@ -72,15 +72,15 @@ pub enum BoundsError {
          or infinity away from the other side, is needed"
     )]
     NoLimit {
-        /// Which bound.
+        /// Name of the bound.
         what: &'static str,
-        /// Which side of it.
+        /// Its side.
         side: &'static str,
         /// Where.
         sample: usize,
         /// Where.
         channel: usize,
-        /// What it is.
+        /// Value found.
         value: f64,
     },
     /// The lower limit above the upper one.
@@ -89,7 +89,7 @@ pub enum BoundsError {
          {channel}"
     )]
     Crossed {
-        /// Which bound.
+        /// Name of the bound.
         what: &'static str,
         /// Where.
         sample: usize,
@@ -114,9 +114,9 @@ pub enum BoundsError {
         sample: usize,
         /// Where.
         channel: usize,
-        /// What they ask of the input at least (for the rates: of its step).
+        /// Least that they require of the input (for the rates: of its step).
         lower: f64,
-        /// What they allow at most.
+        /// Largest value that they allow.
         upper: f64,
     },
     /// Bounds of the value that the bounds of the steps keep the input from reaching.
@@ -141,7 +141,7 @@ pub enum BoundsError {
     /// No reference for a bound that needs one.
     #[error("a {what} bound needs the reference")]
     NoReference {
-        /// Which bound.
+        /// Name of the bound.
         what: &'static str,
     },
 }

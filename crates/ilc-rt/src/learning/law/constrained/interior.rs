@@ -12,7 +12,7 @@ const GAP: f64 = 1e-13;
 const GAP_ENOUGH: f64 = 1e-9;
 /// An iteration that leaves more of the gap than this has met rounding.
 const STALLED: f64 = 0.9;
-/// What of the cost before learning counts as nothing.
+/// Part of the cost before learning that counts as zero.
 const FLOOR: f64 = 1e-12;
 /// Part of the first violation that may be left when the search ends.
 const RESIDUAL: f64 = 1e-11;
@@ -57,13 +57,13 @@ pub(super) struct Interior<const N: usize, const M: usize, const P: usize, const
     /// `-S u`.
     pub(super) hold: Vec<[f64; M]>,
     pub(super) input: Vec<[f64; M]>,
-    /// Where the search is: the change of the input and the output that it causes.
+    /// Current point of the search: the change of the input and the output that it causes.
     pub(super) v: Vec<[f64; M]>,
     pub(super) output: Vec<[f64; P]>,
     /// The step from there.
     pub(super) v_step: Vec<[f64; M]>,
     pub(super) output_step: Vec<[f64; P]>,
-    /// How the cost pulls there.
+    /// Gradient of the cost there.
     pub(super) pulls: Vec<Pull<M, P>>,
     /// Input that the last solution gave, from which the next search may start.
     pub(super) last: Vec<[f64; M]>,

@@ -8,7 +8,7 @@ use super::rows::{BEND, CHANGE, OUTPUT, STEP};
 use super::solver::Band;
 use crate::learning::sweep::Run;
 
-/// The most that a bound may be exceeded by, as a part of its size.
+/// Relative tolerance on bound violation.
 const EXCESS: f64 = 1e-9;
 
 impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {

@@ -31,7 +31,7 @@ pub use bounds::{Bound, Bounds, BoundsError, Limit};
 pub use parameters::ConstrainedParameters;
 use solver::Solver;
 
-/// How the last update ended.
+/// Outcome of the last update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Status {
     /// There was none.
@@ -60,7 +60,7 @@ pub enum Status {
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
 /// # Real Time
 /// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` time an iteration,
-/// of which there are at most 60 in a search; one from the last solution that fails is begun anew, and
+/// of which there are at most 60 in a search; one from the last solution that fails starts over, and
 /// then once more with care, in at most 240 iterations altogether.
 /// # Source
 /// - \[haas2016\], section 4: constraints on set points. \[mehrotra1992\]: the interior point.

@@ -1,4 +1,4 @@
-//! Whether an input can honour the bounds of its value and of its steps at all.
+//! Feasibility of the bounds of an input's value and of its steps.
 
 use super::BoundsError;
 use super::solver::Bands;

@@ -6,7 +6,7 @@
 #![expect(clippy::needless_range_loop, reason = "matrices are written with their indices")]
 #![expect(clippy::inline_always, reason = "one copy in each sweep, its matrices in registers")]
 
-/// What is left of a pivot below this part of its diagonal entry is rounding.
+/// A pivot below this part of its diagonal entry is rounding.
 const VANISHED: f64 = 1e-13;
 
 /// `x+ = A x + B v`, `y = C x + D v`.
@@ -117,7 +117,7 @@ impl<const M: usize, const NS: usize> Gain<M, NS> {
 }
 
 impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
-    /// How many delayed changes a state of `ns` numbers holds: 0, 1 or 2.
+    /// Delayed changes that a state of `ns` numbers holds: 0, 1 or 2.
     const fn delays(ns: usize) -> usize {
         (ns - N) / M
     }

@@ -10,7 +10,7 @@ pub(super) const BEND: usize = 2;
 /// The predicted output.
 pub(super) const OUTPUT: usize = 3;
 
-/// How far a slack starts from zero, as a part of the width between two limits.
+/// Distance of a slack from zero at the start, relative to the width between two limits.
 const START_WIDTH: f64 = 0.1;
 /// The same, as a part of the largest overshoot of any row of its kind.
 const START_OVERSHOOT: f64 = 0.1;
@@ -163,7 +163,7 @@ impl Side {
 /// All rows of one group of axes.
 #[derive(Debug)]
 pub(super) struct Rows {
-    /// Where each kind begins, if it has rows at all.
+    /// First row of each kind, if it has any.
     pub(super) begin: [Option<usize>; 4],
     ranges: Vec<std::ops::Range<usize>>,
     pub(super) upper: Side,

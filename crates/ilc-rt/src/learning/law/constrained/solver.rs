@@ -1,4 +1,4 @@
-//! What the law and the solvers of its groups of axes say to each other.
+//! Interface between the law and the solvers of its groups of axes.
 
 use super::BoundsError;
 use crate::learning::sweep::Run;
@@ -47,7 +47,7 @@ pub(super) struct Bands {
     pub(super) output: Option<Band>,
 }
 
-/// Where the signals of a group lie among those of the machine.
+/// Places of the signals of a group among those of the machine.
 #[derive(Debug, Clone)]
 pub(super) struct Places {
     pub(super) inputs: Vec<usize>,
@@ -56,7 +56,7 @@ pub(super) struct Places {
     pub(super) shifts: Vec<usize>,
 }
 
-/// How a solution ended.
+/// Outcome of a solution.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outcome {
     pub(super) is_solved: bool,

@@ -1,4 +1,4 @@
-//! What an iteration of the interior point does along the run: the recursion for the gains, the cost
+//! Sweeps of an iteration of the interior point along the run: the recursion for the gains, the cost
 //! and its pull at a point, and the two sweeps for the step from there.
 
 #![expect(clippy::needless_range_loop, reason = "matrices are written with their indices")]

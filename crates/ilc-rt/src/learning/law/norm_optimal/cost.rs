@@ -1,4 +1,4 @@
-//! What a good next input is.
+//! Quadratic cost of the next input.
 
 use crate::learning::LearningError;
 use crate::learning::weights::Weight;

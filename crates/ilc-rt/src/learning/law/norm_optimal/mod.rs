@@ -57,9 +57,9 @@ pub struct NormOptimal {
     inverses: Inverses,
 }
 
-/// The Hessians of the parts, factorised only if somebody asks for them.
+/// The Hessians of the parts, factorised on first use.
 enum Inverses {
-    /// What there is to factorise: the stages of each part, its channels and its free samples.
+    /// Data to factorise: the stages of each part, its channels and its free samples.
     Of(Vec<(Box<dyn Stages + Send>, Channels, usize)>),
     Made(Vec<Inverse>),
     /// The stages were not given away.

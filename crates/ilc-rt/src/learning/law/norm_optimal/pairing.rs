@@ -1,4 +1,4 @@
-//! Which sample of the error belongs to which sample of the input.
+//! Pairing of the samples of the error with those of the input.
 
 use std::ops::Range;
 

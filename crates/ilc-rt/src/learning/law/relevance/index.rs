@@ -15,7 +15,7 @@ const FEW: usize = 512;
 /// Width of the border in which the tree's rounding must not decide.
 const ROUNDING: f64 = 1e-9;
 
-/// Where the runs lie, and which lie nearest.
+/// Places of the runs, and the nearest of them.
 pub(super) trait Index: Send + std::fmt::Debug {
     /// Adds a run.
     fn push(&mut self, weights: &RelevanceWeights, error_sum: f64, disturbance: &[f64]);
@@ -53,7 +53,7 @@ pub(super) fn index(n_samples: usize, n_disturbances: usize) -> Option<Box<dyn I
 
 /// A tree over the older runs, and the newer ones behind it, which are searched one by one.
 ///
-/// The tree is made anew when a few times the square root of all runs have come since.
+/// The tree is rebuilt when a few times the square root of all runs have come since.
 struct Grown<const K: usize> {
     n_samples: usize,
     places: Vec<[f64; K]>,

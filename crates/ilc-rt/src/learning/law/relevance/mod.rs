@@ -57,17 +57,17 @@ pub struct RunShape {
 /// allocates nothing up to the number of runs given to [`Relevance::with_capacity`], as long as they
 /// are searched one by one (512 runs, or any number without `top`). Beyond, it allocates for what is
 /// kept (a block of about a megabyte at a time, never moved by growth) and for the tree over the runs
-/// (made anew after about `4 sqrt(n_runs)` of them, and a list of `top` numbers a search).
+/// (rebuilt after about `4 sqrt(n_runs)` of them, and a list of `top` numbers a search).
 /// # Source
 /// - \[dimarco2016\], Eq. (4.2) to (4.14), Appendix C. The listing computes the sum over all runs
-///   anew after each; `top` and [`Relevance::trim`] are its future work (Sec. 5.1).
+///   again after each; `top` and [`Relevance::trim`] are its future work (Sec. 5.1).
 pub struct Relevance {
     core: Box<dyn Law>,
     shape: RunShape,
     weights: RelevanceWeights,
     top: Option<usize>,
     told: Expectation,
-    /// Whether runs that were remembered may come again as runs that have just been made.
+    /// Remembered runs may come again as runs that have just been made.
     is_replayed: bool,
     proposals: Inputs,
     disturbances: Vec<f64>,
@@ -330,7 +330,7 @@ impl Law for Relevance {
         self.core.set_disturbance(disturbance);
     }
 
-    /// What the core law proposes converges where it does itself.
+    /// The proposals converge where the core law does.
     fn linear_surrogate(&mut self) -> Surrogate<'_> {
         Surrogate::Inside(self.core.as_mut())
     }

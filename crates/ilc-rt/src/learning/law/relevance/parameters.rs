@@ -47,7 +47,7 @@ pub struct RelevanceParameters {
     /// Gain of the input itself.
     #[schemars(range(min = -1e3, max = 1e3))]
     pub input_gain: f64,
-    /// How many of the most relevant runs count; all if not given.
+    /// Number of the most relevant runs that count; all if not given.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub top: Option<usize>,
 }
