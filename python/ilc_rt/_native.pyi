@@ -244,7 +244,7 @@ class Library:
     def recall(
         self, disturbance: ArrayLike, top: int, cell: str | None
     ) -> builtins.list[dict[str, Any]]: ...
-    def append(self, **keywords: Any) -> int: ...  # noqa: ANN401
+    def _append(self, **keywords: Any) -> int: ...  # noqa: ANN401
     def trim(self, keep: int, cell: str | None) -> int: ...
 
 @final

@@ -193,12 +193,9 @@ impl Work {
     }
 }
 
-/// Check options as ``ilc-rt run`` or ``ilc-rt identify`` would.
+/// Check options, the words of ``ilc-rt run`` or ``ilc-rt identify`` after the verb.
 ///
-/// - verb : {"run", "identify"}: Which verb.
-/// - arguments : list of str: Options, as words of its command line.
-///
-/// Raises ValueError if an option cannot be used: its name, its value and what is allowed.
+/// Raises ValueError with the name of the option, its value and what is allowed.
 #[pyfunction]
 fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
     Work::parse(verb, &arguments).map(drop)

@@ -94,12 +94,7 @@ fn identify_axis<'py>(
     Ok(result)
 }
 
-/// Return the experiment of options, in the default band where they give none.
-///
-/// - arguments : list of str: Options of the identification, as words of ``ilc-rt identify``.
-///
-/// Returns dict: The figures of the experiment.
-/// Raises ValueError if an option cannot be used.
+/// Return the experiment of options, words of ``ilc-rt identify``, in the default band if they give none.
 #[pyfunction]
 fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'_, PyDict>> {
     let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
@@ -108,15 +103,9 @@ fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'
     figures(py, &Experiment { axis, excitation: options.excitation(None), at_m })
 }
 
-/// Evaluate whole periods of input and output of any system.
+/// Evaluate whole periods of input and output of any system, excited in a band in Hz.
 ///
-/// - u, y : shape (n_samples,): Input and output, whole periods.
-/// - period_samples : int: Samples in a period.
-/// - from_hz, to_hz : float: Band of the excitation in Hz.
-/// - dt_s : float: Sample time in seconds.
-///
-/// Returns dict: Signals, response, models, uncertainty and doubt.
-/// Raises ValueError, TypeError if the arrays cannot be used, or the response cannot be fitted.
+/// Returns signals, response, models, uncertainty and doubt by name.
 #[pyfunction]
 fn evaluate_experiment<'py>(
     py: Python<'py>,
