@@ -203,10 +203,7 @@ fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
 
 /// Describe the options of ``ilc-rt run`` or ``ilc-rt identify``.
 ///
-/// - verb : {"run", "identify"}: Which ones.
-///
-/// Returns str: A JSON list: name, flags, help, kind, default, choices, placeholder.
-/// Raises ValueError for another verb.
+/// Returns a JSON list: name, flags, help, kind, default, choices, placeholder.
 #[pyfunction]
 fn described_options(verb: &str) -> PyResult<String> {
     let options = match verb {
