@@ -15,11 +15,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_signal, misfit, read_array, read_vector};
-use crate::arguments::{Arguments, number};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::laws;
 use crate::python_law::Channels;
+use crate::whole::number;
 
 #[pyfunction]
 #[pyo3(signature = (**keywords))]

@@ -17,7 +17,7 @@ use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::identify::{give_measured, give_second_order, give_velocity_loop};
-use crate::whole::whole;
+use crate::whole::{Real, whole};
 
 /// Reads the name of a waveform.
 pub(crate) fn read_waveform(name: &str) -> PyResult<Waveform> {
@@ -112,13 +112,13 @@ fn evaluate_experiment<'py>(
     u: &Bound<'py, PyAny>,
     y: &Bound<'py, PyAny>,
     period_samples: &Bound<'py, PyAny>,
-    from_hz: f64,
-    to_hz: f64,
-    dt_s: f64,
+    from_hz: Real,
+    to_hz: Real,
+    dt_s: Real,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (u, y) = (read_vector("u", u)?, read_vector("y", y)?);
     let period_samples = whole("period_samples", period_samples)?;
-    let band_hz = (from_hz, to_hz);
+    let (band_hz, dt_s) = ((from_hz.0, to_hz.0), dt_s.0);
     let evaluate = || Identified::evaluate(u, y, period_samples, band_hz, dt_s, Form::Free);
     describe(py, detached(py, evaluate).or_raise()?)
 }

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use crate::argument::{Matrix, Signal, give_signal, misfit, read_array, read_vector};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::whole::Real;
 
 /// Linear model whose matrices vary along the run.
 ///
@@ -66,7 +67,7 @@ impl PyTimeVarying {
         b: &Bound<'_, PyAny>,
         c: &Bound<'_, PyAny>,
         d: &Bound<'_, PyAny>,
-        dt_s: f64,
+        dt_s: Real,
     ) -> PyResult<Self> {
         let (a, b) = (read_matrices("a", a)?, read_matrices("b", b)?);
         let (c, d) = (read_matrices("c", c)?, read_matrices("d", d)?);
@@ -87,7 +88,7 @@ impl PyTimeVarying {
             Matrix::from_row_slice(*rows, *cols, &values[k * size..(k + 1) * size])
         };
         let samples: Result<Vec<_>, _> = (0..n_samples)
-            .map(|k| StateSpace::discrete(at(&a, k), at(&b, k), at(&c, k), at(&d, k), dt_s))
+            .map(|k| StateSpace::discrete(at(&a, k), at(&b, k), at(&c, k), at(&d, k), dt_s.0))
             .collect();
         TimeVarying::new(samples.or_raise()?).or_raise().map(Self)
     }
