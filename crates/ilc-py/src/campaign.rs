@@ -14,7 +14,7 @@ use ilc_rt::fieldbus::transport::{self, loopback::InProcess};
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
 use ilc_sim::machine::{ClockMode, Machine};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyBaseException, PyValueError};
 use pyo3::prelude::*;
 
 use crate::argument::read_disturbance;
@@ -61,6 +61,11 @@ impl EventStream {
         }
     }
 
+    /// Return the exception that the law raised, with its traceback, or None.
+    fn raised(&self, py: Python<'_>) -> Option<Py<PyBaseException>> {
+        self.frame.take_raised().map(|raised| raised.into_value(py))
+    }
+
     /// Bring the axes to rest; the events go on until they are.
     ///
     /// - signal : int: Number of the signal that asked for it.
@@ -74,12 +79,7 @@ impl EventStream {
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         match thread.map(|thread| detached(py, || thread.join())) {
-            Some(Ok(ended)) => ended.or_raise().map_err(|error| {
-                if let Some(raised) = self.frame.take_raised() {
-                    error.set_cause(py, Some(raised));
-                }
-                error
-            }),
+            Some(Ok(ended)) => ended.or_raise(),
             Some(Err(_)) => Err(PyValueError::new_err("the campaign's thread died")),
             None => Ok(()),
         }

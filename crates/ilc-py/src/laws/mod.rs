@@ -337,9 +337,7 @@ impl PyLaw {
             optimal::METHODS.contains(&this.kind).then(|| format!("{class}.{}", this.kind));
         let arguments = this.arguments.bind(slf.py()).copy()?;
         // The runs that it has are not what the law is: a campaign resumes with another library.
-        if arguments.contains("library")? {
-            arguments.del_item("library")?;
-        }
+        let _ = arguments.del_item("library");
         Arguments::new(&arguments).call(&made_by.unwrap_or(class))
     }
 
