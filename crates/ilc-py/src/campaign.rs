@@ -109,11 +109,11 @@ impl Drop for EventStream {
 ///
 /// - cell : Cell: The cell.
 /// - arguments : list of str: Options, as words of ``ilc-rt run`` or ``ilc-rt identify``; see
-///     `described_options`.
+///   `described_options`.
 /// - verb : {"run", "identify"}: Run the program and learn, or excite an axis once.
 /// - law : object or None: A law with ``update(u, e, disturbance=None)`` instead of the cell's.
 /// - disturbance : callable or None: Called with the number of each run before it begins; returns
-///     its disturbance, a number or an array of shape (n_disturbances,).
+///   its disturbance, a number or an array of shape (n_disturbances,).
 ///
 /// Returns EventStream: An iterator of JSON texts.
 /// Raises ValueError if an option cannot be used; from the iterator, before anything moves, if
