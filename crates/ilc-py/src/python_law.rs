@@ -163,15 +163,15 @@ impl Law for PythonLaw {
     }
 
     fn handles_rollback(&self) -> bool {
-        self.ask_native(Law::handles_rollback).unwrap_or(false)
+        self.ask_native(|law| law.handles_rollback()).unwrap_or(false)
     }
 
     fn status(&self) -> Option<String> {
-        self.ask_native(Law::status).flatten()
+        self.ask_native(|law| law.status()).flatten()
     }
 
     fn standing(&self) -> Standing {
-        self.ask_native(Law::standing).unwrap_or(Standing::Learns)
+        self.ask_native(|law| law.standing()).unwrap_or(Standing::Learns)
     }
 
     fn reset(&mut self) {
