@@ -28,7 +28,6 @@ NOT_YET_CLEAN: tuple[str, ...] = (
         "campaign", "cli", "config", "design", "schema", "trajectory", "model/identify", "learning/law",
     )),
     "crates/ilc-rt/src/learning/gate.rs",
-    "docs/cell.md",
     "papers/",
     "python/",
 )  # fmt: skip
