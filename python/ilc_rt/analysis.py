@@ -81,10 +81,8 @@ class Analysis:
         ``|1 - (kp + kd) p_1|`` of a proportional-derivative law.
     pd_gain_range : tuple[float, float] or None
         Range of kp + kd in which that factor is below 1.
-    frequency_hz : ndarray of float64
-        Frequencies of `contraction` in Hz.
-    contraction : ndarray of float64
-        Largest singular value of T at each frequency.
+    frequency_hz, contraction : ndarray of float64
+        Frequencies in Hz, and the largest singular value of T at each.
     converged_input, converged_error : ndarray of float64 or None
         Steady state, shape (n_samples, n_inputs or n_outputs); None if not known.
     expected_rms : ndarray of float64
