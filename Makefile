@@ -87,7 +87,7 @@ fmt: $(VENV)/.test ## Format
 	cargo fmt --all
 	$(BIN)/ruff format python papers tests examples
 
-lint: $(VENV)/.test ## Formatting, lints, types, layers
+lint: $(VENV)/.test ## Formatting, lints, types, layers, language
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
 	$(BIN)/ruff format --check python papers tests examples
@@ -96,6 +96,7 @@ lint: $(VENV)/.test ## Formatting, lints, types, layers
 	$(BIN)/python -m mypy.stubtest ilc_rt._native
 	$(BIN)/lint-imports
 	cargo test --release --workspace --quiet $(DERIVED)
+	$(BIN)/python tests/lint/language.py
 
 docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps

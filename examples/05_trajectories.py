@@ -1,13 +1,12 @@
-"""The same feed with an oscillation, three ways, and a butterfly.
+"""The same feed with a superimposed oscillation, three ways, and a butterfly.
 
-A modulated tool path breaks chips by an oscillation along the feed. A machine
-that completes every move loses frequency, one that starts the next on time
-loses amplitude; exponential/sigmoid (E/S) interpolation loses neither. Run it
-with
+A modulated tool path breaks chips by an oscillation along the feed. A machine that completes every
+move loses frequency, one that starts the next on time loses amplitude; exponential/sigmoid (E/S)
+interpolation loses neither. Run it with
 
     python examples/05_trajectories.py
 
-It prints one line a trajectory and leaves a picture in the current folder.
+It prints one line per trajectory and leaves a picture in the current folder.
 """
 
 import numpy as np

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ilc_rt._native import Library
 from ilc_rt.errors import BadInputError
 from ilc_rt.figures import Figures
+from ilc_rt.library import Library
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

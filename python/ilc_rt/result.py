@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ilc_rt._native import Library
 from ilc_rt.comparison import Comparison
 from ilc_rt.errors import BadInputError
 from ilc_rt.events import (
@@ -21,6 +20,7 @@ from ilc_rt.events import (
     LatencyEvent,
     StartEvent,
 )
+from ilc_rt.library import Library
 from ilc_rt.quantity import digits
 from ilc_rt.record import IterationRecord
 

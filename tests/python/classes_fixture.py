@@ -1,4 +1,4 @@
-"""One example or more of every public class, for what is to hold of all of them alike."""
+"""One example or more of every public class, for the tests over all of them."""
 
 from pathlib import Path
 
@@ -71,7 +71,7 @@ def response():
 
 
 def updated(law, n_channels=1):
-    """Return what a law makes of a run."""
+    """Return a law's update for a run."""
     shape = (N,) if n_channels == 1 else (N, n_channels)
     size = N * n_channels
     return law.update(np.resize(U, size).reshape(shape), np.resize(ERROR, size).reshape(shape))
@@ -81,7 +81,7 @@ def limits():
     return {"velocity_max_m_s": 0.5, "acceleration_max_m_s2": 2.0, "jerk_max_m_s3": 50.0}
 
 
-# One or more examples of each class, and what tells two of them apart beyond their attributes.
+# One or more examples of each class, and the call that distinguishes two beyond their attributes.
 EXAMPLES = {
     StateSpace: (lambda: axis().delayed(2), lambda m: m.simulate(U)),
     TimeVarying: (

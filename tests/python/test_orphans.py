@@ -1,4 +1,4 @@
-"""Programs end with the one that started them, and drives that are left over are recognised."""
+"""Programs end with their parent, and left-over drives are recognised."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def is_gone(pid: int) -> bool:
-    """Whether a process has ended, reaped or not."""
+    """Return whether a process has ended, reaped or not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
     except OSError:
@@ -82,7 +82,7 @@ def test_killed_programs_leave_no_children_and_a_clean_place(bench: Bench, also:
 
 
 def test_lock_step_programs_end_as_well(bench: Bench) -> None:
-    """Without a clock too."""
+    """Also without a clock."""
     process = run(bench, bench.cell(short=True), "--lockstep")
     programs = list(children(process.pid).values())
     process.kill()
@@ -91,7 +91,7 @@ def test_lock_step_programs_end_as_well(bench: Bench) -> None:
 
 
 def test_drives_that_are_there_already_are_recognised(bench: Bench) -> None:
-    """The second ones do not boot, so that the first and their controller go on undisturbed."""
+    """The second ones do not boot, so the first ones and their controller continue undisturbed."""
     cell = bench.cell(short=True)
     first = bench.drives(cell)
     controller = bench.controller(cell, "--simulated-drives", runs=3)
@@ -102,7 +102,7 @@ def test_drives_that_are_there_already_are_recognised(bench: Bench) -> None:
     assert line.startswith(f"ilc-sim: {bench.bus}: node ")
     assert "is on this bus already" in line
     assert controller.end() == 0, controller.errors
-    # Idle drives, whose heartbeat has not been switched on, are found by asking.
+    # Idle drives, whose heartbeat is not enabled, are found by asking.
     first.signal(signal.SIGINT)
     first.end()
     bench.drives(cell)

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::argument::give_signal;
 use crate::error::OrRaise;
-use crate::made::{Made, made};
+use crate::made::Made;
 use crate::model::PyStateSpace;
 
 /// A cell description, read and validated.
@@ -45,7 +45,10 @@ impl PyCell {
     #[pyo3(signature = (path, allow_divergent=false))]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn load(path: std::path::PathBuf, allow_divergent: bool) -> PyResult<Self> {
-        let made = made!("load": path, allow_divergent);
+        let made = Made::new("load", |call| {
+            call.set_item("path", &path)?;
+            call.set_item("allow_divergent", allow_divergent)
+        })?;
         let mut cell = Cell::load(Path::new(&path)).or_raise()?;
         cell.learning.allow_divergent |= allow_divergent;
         let plan = Plan::new(&cell, None, false).or_raise()?;

@@ -16,13 +16,13 @@ from rich.console import Console
 from rich.table import Table
 from typer import Typer
 
-from ilc_rt._native import Library
 from ilc_rt.commands.options import (
     DEFAULT_LIBRARY_FILE,
     LibraryArgument,
 )
 from ilc_rt.errors import BadInputError
 from ilc_rt.export import export_run
+from ilc_rt.library import Library
 from ilc_rt.quantity import unit_for
 from ilc_rt.result import STANDARD_OUTPUT, json_text, library_rows, write_text
 from ilc_rt.text import printable

@@ -6,7 +6,7 @@ use ilc_rt::fieldbus::cia402::{State, Statusword};
 
 use super::communication::{Communication, Incoming, Silence};
 use super::dictionary::{Dictionary, Slot};
-use super::drive_objects::{self, DriveSlots, whole};
+use super::drive_objects::{self, DriveSlots, rounded};
 use super::motion::Motion;
 use super::state_machine::StateMachine;
 use super::units::Units;
@@ -15,7 +15,7 @@ use crate::plant::Demand;
 /// Bit 8 of the controlword.
 const HALT: u16 = 1 << 8;
 
-/// What the drive's maker and integrator have set, in SI units.
+/// Parameters set by the maker of the drive and the integrator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveParameters {
     /// Counts in one metre.
@@ -34,7 +34,7 @@ pub struct DriveParameters {
     pub force_max_n: f64,
 }
 
-/// What the drive measures of its axis.
+/// Measurements of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Measured {
     /// Position of the encoder.
@@ -353,12 +353,12 @@ impl DriveNode {
         let demand_m = self.motion.demand_m().unwrap_or(position_m);
         let values = [
             (self.slots.position_demand, units.position(demand_m)),
-            (self.slots.position_internal, whole(position_m * self.parameters.counts_per_m)),
+            (self.slots.position_internal, rounded(position_m * self.parameters.counts_per_m)),
             (self.slots.position_actual, units.position(position_m)),
             (self.slots.velocity_demand, units.velocity(self.motion.demand_m_s())),
             (self.slots.velocity_actual, units.velocity(velocity_m_s)),
-            (self.slots.torque_actual, whole(force_n / self.parameters.force_max_n * 1000.0)),
-            (self.slots.following_error, whole(self.following_error_counts())),
+            (self.slots.torque_actual, rounded(force_n / self.parameters.force_max_n * 1000.0)),
+            (self.slots.following_error, rounded(self.following_error_counts())),
         ];
         for (slot, number) in values {
             self.set(slot, number);

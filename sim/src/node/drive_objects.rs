@@ -105,8 +105,8 @@ fn words_and_options() -> Vec<Entry> {
 }
 
 fn motion(parameters: &DriveParameters) -> Vec<Entry> {
-    let unsigned = |counts: f64| Value::U32(0).with_number(whole(counts));
-    let signed = |counts: f64| Value::I32(0).with_number(whole(counts));
+    let unsigned = |counts: f64| Value::U32(0).with_number(rounded(counts));
+    let signed = |counts: f64| Value::I32(0).with_number(rounded(counts));
     let counts = |value_si: f64| value_si * parameters.counts_per_m;
     let limit = objects::POSITION_LIMIT;
     let period = objects::INTERPOLATION_PERIOD;
@@ -188,7 +188,7 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
 
 /// The whole number nearest to a count, as wide as any object needs.
 #[expect(clippy::cast_possible_truncation, reason = "saturates; no count is NaN")]
-pub(super) fn whole(counts: f64) -> i64 {
+pub(super) fn rounded(counts: f64) -> i64 {
     counts.round() as i64
 }
 

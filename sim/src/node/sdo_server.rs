@@ -7,7 +7,7 @@ use ilc_rt::fieldbus::canopen::sdo::{
 
 use super::value::{Encoded, TEXT_MAX, Value};
 
-/// What the server reads and writes.
+/// Objects behind the server.
 pub trait Objects {
     /// Reads an object.
     ///

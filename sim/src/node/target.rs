@@ -5,7 +5,7 @@ use ilc_rt::fieldbus::canopen::emcy;
 use ilc_rt::fieldbus::cia402::{Mode, State};
 
 use super::drive::DriveNode;
-use super::drive_objects::whole;
+use super::drive_objects::rounded;
 
 /// The following-error monitor is off at this window.
 const WINDOW_OFF: i64 = 0xFFFF_FFFF;
@@ -71,7 +71,7 @@ impl DriveNode {
         let watched = self.state() == State::OperationEnabled
             && self.mode() == Some(Mode::Csp)
             && window != WINDOW_OFF;
-        if !watched || whole(self.following_error_counts()).abs() <= window {
+        if !watched || rounded(self.following_error_counts()).abs() <= window {
             self.astray_us = 0;
             return;
         }

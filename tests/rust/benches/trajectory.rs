@@ -1,4 +1,4 @@
-//! Computing time of a move, kind by kind: what a planner costs between two ticks, or before a run.
+//! Planning time of a move, kind by kind: between two ticks, or before a run.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ilc_rt::trajectory::curve::{Butterfly, Run, RunLimits};

@@ -1,9 +1,9 @@
-//! Parts of documents that derive from the source: compared, or with `ILC_DERIVE=1` written again.
+//! Parts of documents that are derived from the source: compared, or rewritten with `ILC_DERIVE=1`.
 
-/// Holds the part of a document between `<!-- derived: NAME -->` and `<!-- end -->` against `text`.
+/// Compares the part of a document between `<!-- derived: NAME -->` and `<!-- end -->` with `text`.
 ///
 /// # Panics
-/// If they differ, or the document has no such part.
+/// If they differ, or the document lacks this part.
 pub fn hold_derived(document: &str, name: &str, text: &str) {
     let path = crate::root().join(document);
     let whole = std::fs::read_to_string(&path).expect("the document is there");

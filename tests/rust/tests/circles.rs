@@ -1,4 +1,4 @@
-//! No rooms of a crate import each other in a circle, but for families that say why.
+//! The rooms of a crate have no import cycles, except families that give a reason.
 
 use std::collections::BTreeSet;
 use std::path::Path;

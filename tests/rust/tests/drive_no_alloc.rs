@@ -1,5 +1,5 @@
-//! Simulated drives allocate nothing once they are set up: in lock-step they run inside the
-//! controller's own tick.
+//! Simulated drives do not allocate after set-up: in lock-step they run inside the controller's
+//! tick.
 
 use std::time::Duration;
 

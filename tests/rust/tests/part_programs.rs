@@ -36,7 +36,7 @@ fn a_part_program_goes_where_it_says() {
     let nearest = |x: f64, y: f64| {
         plan.reference_m.chunks(2).map(|p| (p[0] - x).hypot(p[1] - y)).fold(f64::INFINITY, f64::min)
     };
-    // The middle of the corner arcs and of the notch, to what the blend rounds off.
+    // The middle of the corner arcs and of the notch, to within the blend's rounding.
     let along = 0.02 * std::f64::consts::FRAC_1_SQRT_2;
     for (x, y) in [(0.06 + along, 0.02 - along), (0.06 + along, 0.04 + along), (0.04, 0.05)] {
         assert!(nearest(x, y) < 1e-4, "{x} {y}: {}", nearest(x, y));
@@ -146,7 +146,7 @@ fn a_bad_part_program_is_refused_with_its_line() {
     assert!(line.contains("04_gcode.ngc: line 2: G33: allowed G0 G1"), "{line}");
 }
 
-/// Largest differences of the set points over the cycle, with rest before and after.
+/// Largest differences of the set points per cycle, with rest before and after.
 fn peaks(reference_m: &[f64], n_axes: usize, cycle_s: f64) -> [f64; 3] {
     let mut peaks = [0.0_f64; 3];
     for axis in 0..n_axes {
@@ -183,13 +183,13 @@ fn with_exact_stops_a_feed_beyond_the_limits_is_refused() {
         )
     };
     let line = cell_with(&program(1.0)).unwrap_err();
-    // 0.8 of it is y's share, which may be 0.5 m/s.
+    // 0.8 of it is y's share, whose limit is 0.5 m/s.
     assert!(line.contains("(axis 2 is y)") && line.contains("velocity reaches 0.8"), "{line}");
     assert!(line.contains("largest admissible feed 0.625 m/s"), "{line}");
     assert!(cell_with(&program(0.625)).is_ok());
 }
 
-/// The G-code example with another part program beside it.
+/// Returns the plan of the G-code example with another part program.
 fn part_program(text: impl AsRef<[u8]>) -> Result<Plan, String> {
     let folder = Scratch::new();
     std::fs::write(folder.file("cell.toml"), example_text("04_gcode.toml")).unwrap();

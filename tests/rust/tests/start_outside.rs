@@ -1,5 +1,5 @@
-//! An axis that stands outside its limits when its drive is switched on is refused, and nothing moves;
-//! limits are kept by braking ahead of them, never by a jump.
+//! An axis outside its limits when its drive is enabled is refused, and nothing moves; limits are
+//! kept by braking ahead of them, never by a jump.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -13,7 +13,7 @@ use ilc_tests::{Scratch, example_text, short};
 
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 
-/// The short cell with an axis standing somewhere.
+/// Returns the short cell with an axis at a given position.
 fn standing(name: &str, axis: usize, start_m: f64) -> Cell {
     let mut cell = short(name);
     cell.axes[axis].simulation.position_start_m = start_m;
@@ -37,7 +37,7 @@ fn an_axis_outside_its_limits_is_refused_and_nothing_moves() {
                 for number in 0..2 {
                     let plant_m = line.plant_m(number);
                     assert!(plant_m.iter().all(|m| m.to_bits() == plant_m[0].to_bits()));
-                    // Neither was enabled, nor was a place asked for that the axis is not at.
+                    // Neither drive was enabled, nor commanded to a position other than its own.
                     let spec = &cell.axes[number];
                     #[expect(clippy::cast_possible_truncation, reason = "a place in counts")]
                     let at = (plant_m[0] * spec.counts_per_m).round() as i32;
@@ -108,13 +108,13 @@ fn a_start_that_is_no_number_is_refused_where_it_is_written() {
     }
 }
 
-/// A learned input that pushes an axis beyond its limit is held there without a jump, and let go of
+/// A learned input that pushes an axis beyond its limit is held there without a jump, and released
 /// without one.
 #[test]
 fn a_sum_beyond_the_limits_brakes_ahead_of_them() {
     for name in CELLS {
         let mut cell = short(name);
-        // The program goes to 80 mm; the limit is where the learned input carries it beyond.
+        // The program goes to 80 mm; the limit lies where the learned input exceeds it.
         cell.axes[0].limits.position_max_m = 0.0805;
         (cell.learning.input_max_m, cell.learning.input_max_m_s) = (0.005, 0.05);
         let mut rig = Rig::new(&cell, 1);

@@ -1,13 +1,13 @@
-//! The seven-phase jerk-limited profile from rest to rest, in closed form.
+//! The seven-phase jerk-limited profile (S-curve) from rest to rest, in closed form.
 //!
 //! Jerk is `+J 0 -J 0 -J 0 +J`: up to the acceleration limit, up to the velocity limit, cruise, and
-//! the mirror image. A short move drops the phases that it has no room for.
+//! the mirror image. A short move omits the phases that do not fit.
 
 use super::error::MoveError;
 use super::limits::{PathLimits, is_positive};
 use super::quantity::Quantity;
 
-/// Where a move along its path is at one time.
+/// Motion along the path at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathState {
     /// Distance from the start.
@@ -16,14 +16,14 @@ pub struct PathState {
     pub v_m_s: f64,
     /// Acceleration.
     pub a_m_s2: f64,
-    /// Jerk; at a switch, of the phase that ends there.
+    /// Jerk; at a switching time, that of the phase that ends.
     pub j_m_s3: f64,
 }
 
 /// A time-optimal move from rest to rest under limits of velocity, acceleration and jerk.
 ///
 /// The first half is computed from the start and the second as its mirror image from the end, so
-/// that the move ends exactly at its length.
+/// the move ends exactly at its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JerkLimited {
     length_m: f64,
@@ -44,10 +44,10 @@ impl JerkLimited {
     /// `T_j = ∛(length / 2j)`.
     ///
     /// # Real Time
-    /// Allocates nothing; a few roots.
+    /// Does not allocate; computes a few roots.
     /// # Errors
-    /// [`MoveError::Length`] or [`MoveError::Limit`] for what is not finite and above 0,
-    /// [`MoveError::Duration`] if the numbers are too far apart to compute with.
+    /// [`MoveError::Length`] or [`MoveError::Limit`] for a value that is not finite and positive,
+    /// [`MoveError::Duration`] if the duration overflows.
     pub fn plan(
         length_m: f64,
         velocity_m_s: f64,
@@ -107,7 +107,7 @@ impl JerkLimited {
         Self::plan(length_m, limits.velocity_m_s, limits.acceleration_m_s2, limits.jerk_m_s3)
     }
 
-    /// How long the move lasts.
+    /// Returns the duration of the move.
     pub fn duration_s(&self) -> f64 {
         2.0 * self.rise_time_s() + self.cruise_time_s
     }
@@ -115,7 +115,7 @@ impl JerkLimited {
     /// State at a time from the start; at rest before it and, exactly at the end, after the move.
     ///
     /// # Real Time
-    /// Allocates nothing; no roots, no branches that depend on history.
+    /// Does not allocate; no roots, no dependence on previous calls.
     pub fn at(&self, t_s: f64) -> PathState {
         let duration_s = self.duration_s();
         let half_m = 0.5 * self.length_m;
@@ -141,7 +141,7 @@ impl JerkLimited {
         2.0 * self.jerk_time_s + self.hold_time_s
     }
 
-    /// The first three phases and the cruise.
+    /// Returns the state in the first three phases and the cruise.
     fn rise(&self, t_s: f64) -> PathState {
         let (j, a, v) = (self.jerk_m_s3, self.peak_acceleration_m_s2, self.peak_velocity_m_s);
         let rise_s = self.rise_time_s();

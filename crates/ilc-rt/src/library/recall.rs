@@ -7,7 +7,7 @@ use super::row::{Row, as_integer, numbers};
 use super::schema;
 use super::store::Library;
 
-/// Which runs belong to the same task; without a name, all that a library holds.
+/// Runs of the same task; without a name, all that a library holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Task {
     /// Name of the cell.

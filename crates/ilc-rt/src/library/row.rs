@@ -10,7 +10,7 @@ pub struct Row {
     pub id: i64,
     /// When it was appended, UTC.
     pub created_utc: String,
-    /// Where it comes from.
+    /// Provenance.
     pub meta: Meta,
     /// SHA-256 of the arrays, as they were appended.
     pub digest: String,
@@ -95,12 +95,12 @@ pub(super) fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::
     })
 }
 
-/// Whether a row was written before each axis had figures of its own.
+/// Returns whether a row was written before each axis had figures of its own.
 pub(super) fn is_old(row: &Row) -> bool {
     row.record.figures.axes_tracking_inf_m.is_empty() && row.meta.n_axes > 0
 }
 
-/// Works out the figures of a run that was kept before each axis had its own: from its arrays, which the
+/// Computes the figures of a run that was kept before each axis had its own: from its arrays, which the
 /// row must have.
 pub(super) fn refresh(row: &mut Row) {
     let kinds = AxisKinds::new(&row.meta.input_units, row.meta.n_axes);
@@ -126,7 +126,7 @@ pub(super) fn json_numbers(values: &[f64]) -> String {
     serde_json::Value::from(values.to_vec()).to_string()
 }
 
-/// Reads a disturbance; one that cannot be read is none.
+/// Reads a list of numbers; a text that is not one is an empty list.
 pub(super) fn numbers(text: Option<&str>) -> Vec<f64> {
     text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
 }

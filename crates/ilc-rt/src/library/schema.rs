@@ -1,5 +1,7 @@
 //! The tables, how they come to be, and how older ones are brought up to date.
 
+use std::fmt::Write as _;
+
 use rusqlite::Connection;
 
 use super::figures;
@@ -32,8 +34,11 @@ fn table() -> String {
     let figures =
         figure_fields().iter().map(|field| (field.name.as_str(), figures::column_type(field)));
     let columns = COLUMNS.into_iter().chain(ARRAYS).chain(figures);
-    let columns: String = columns.map(|(name, kind)| format!("    {name:<24}{kind},\n")).collect();
-    format!("CREATE TABLE IF NOT EXISTS iteration (\n{columns}    UNIQUE (campaign, iteration)\n);")
+    let mut table = "CREATE TABLE IF NOT EXISTS iteration (\n".to_owned();
+    for (name, kind) in columns {
+        let _ = writeln!(table, "    {name:<24}{kind},");
+    }
+    table + "    UNIQUE (campaign, iteration)\n);"
 }
 
 /// Sets what must be said before the first page of a file is written: the pages of runs that are deleted
@@ -44,7 +49,7 @@ pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
 
 /// Makes the tables of a new file, or gives those of an older version what they lack: all or nothing.
 ///
-/// No run is rewritten: what older runs lack is worked out when they are read.
+/// No run is rewritten: what older runs lack is computed when they are read.
 pub(super) fn bring_up_to_date(connection: &Connection) -> rusqlite::Result<()> {
     let transaction =
         rusqlite::Transaction::new_unchecked(connection, rusqlite::TransactionBehavior::Immediate)?;

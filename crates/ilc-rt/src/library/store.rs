@@ -15,7 +15,7 @@ use super::row::{
 use super::schema;
 use crate::record::{Figures, IterationRecord, Meta};
 
-/// How long to wait for it when there was a wait in vain before.
+/// Time-out after one that was in vain.
 const HURRIED: Duration = Duration::from_millis(200);
 /// SQLite's extended code for a row that is there already.
 const UNIQUE: i32 = rusqlite::ffi::SQLITE_CONSTRAINT_UNIQUE;
@@ -59,7 +59,7 @@ impl Library {
         // Asked once more, as what a killed process had begun is undone when the file is opened.
         let is_newest = file::found(&connection, path)? == Found::Library(schema::VERSION);
         if is_newest && schema::missing(&connection).map_err(fail)?.is_empty() {
-            // Whoever cannot write must hear of it now, and not when the first run is to be kept.
+            // A program that cannot write must hear of it now, and not when the first run is to be kept.
             connection.execute_batch("BEGIN IMMEDIATE; ROLLBACK").map_err(fail)?;
         } else {
             schema::bring_up_to_date(&connection).map_err(fail)?;
@@ -192,7 +192,7 @@ impl Library {
     /// # Errors
     /// [`LibraryError::NoSuchRow`]; [`LibraryError::Damaged`] if the digest does not match.
     pub fn load(&self, id: i64) -> Result<Row, LibraryError> {
-        let row = self.whole(id)?;
+        let row = self.load_unchecked(id)?;
         if row.record.digest() != row.digest {
             return Err(LibraryError::Damaged { path: self.path.clone(), id });
         }
@@ -200,7 +200,7 @@ impl Library {
     }
 
     /// Reads one run with its arrays, as they are.
-    fn whole(&self, id: i64) -> Result<Row, LibraryError> {
+    fn load_unchecked(&self, id: i64) -> Result<Row, LibraryError> {
         let arrays = ARRAYS.map(|(name, _)| name).join(", ");
         let query = format!("SELECT {}, {arrays} FROM iteration WHERE id = ?1", self.columns()?);
         let mut row = self
@@ -225,7 +225,7 @@ impl Library {
             .map_err(|source| self.fail(source))?
             .ok_or_else(|| LibraryError::NoSuchRow { path: self.path.clone(), id })?;
         if is_old(&row) {
-            row.record.figures = self.whole(id)?.record.figures;
+            row.record.figures = self.load_unchecked(id)?.record.figures;
         }
         Ok(row)
     }

@@ -52,7 +52,7 @@ pub enum Event {
         /// The run it belongs to.
         iteration: u32,
     },
-    /// Where the running run is; about ten a second.
+    /// Progress of the current run; about ten per second.
     Progress {
         /// Number of the run.
         iteration: u32,
@@ -88,10 +88,10 @@ pub enum Event {
     },
     /// Timing of the loop over the whole campaign; in real time only.
     Latency {
-        /// How late the loop woke on its grid.
+        /// Lateness of the loop on its grid.
         #[schemars(with = "serde_json::Value")]
         wake_late_us: LatencyFigures,
-        /// How long a tick took.
+        /// Execution time of a tick.
         #[schemars(with = "serde_json::Value")]
         execution_us: LatencyFigures,
     },
@@ -105,7 +105,7 @@ pub enum Event {
     },
     /// The campaign is over and the axes are at rest.
     End {
-        /// How.
+        /// Outcome.
         status: EndStatus,
         /// One sentence.
         reason: String,
@@ -134,7 +134,7 @@ pub enum StateName {
     Stopped,
 }
 
-/// How a campaign ended.
+/// Outcome of a campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EndStatus {

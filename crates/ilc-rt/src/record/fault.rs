@@ -72,7 +72,7 @@ pub struct Fault {
     pub cycles: LastCycles,
 }
 
-/// Servo cycles in a row, oldest first; one row a cycle, one column an axis.
+/// Servo cycles in a row, oldest first; one row per cycle, one column per axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct LastCycles {
     /// Count of SYNCs at the first one; absent without cycles.

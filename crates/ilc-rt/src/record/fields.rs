@@ -27,9 +27,9 @@ pub struct Field {
     pub name: String,
     /// Type.
     pub kind: FieldKind,
-    /// Whether it may be absent.
+    /// True if it may be absent.
     pub is_optional: bool,
-    /// Whether a source without it is refused.
+    /// True if a source without it is refused.
     pub is_required: bool,
     /// Its doc comment.
     pub doc: String,

@@ -103,7 +103,7 @@ impl Figures {
         self.contour_rms_m = there.then(|| measured(rms(contour_m, 1)));
     }
 
-    /// What a run is judged by, all axes together: a number to compare runs with, without a unit of its
+    /// Returns the figure that a run is judged by, all axes together: a number to compare runs with, without a unit of its
     /// own where axes differ in theirs.
     pub fn judged_by(&self) -> f64 {
         if self.axes_tracking_rms_m.is_empty() {

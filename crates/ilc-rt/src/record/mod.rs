@@ -1,4 +1,4 @@
-//! What remains of an iteration: its arrays, its figures, and the events that tell of it.
+//! Records of iterations: their arrays, their figures, and the events that report them.
 //!
 //! The campaign fills it, the library keeps it, telemetry and Python read it. Imports signal,
 //! trajectory and models at most; never the loop, the library or the bus.

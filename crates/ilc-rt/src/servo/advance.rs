@@ -9,9 +9,9 @@ use super::phase::Phase;
 use crate::fieldbus::cia402::State;
 use crate::interpolate::PointToPoint;
 
-/// How long the axes shall rest after a stop before the drives are switched off.
+/// Rest of the axes after a stop before the drives are switched off.
 const REST_S: f64 = 0.1;
-/// How long the drives may take to switch off.
+/// Longest time of the drives to switch off.
 const DISABLE_S: f64 = 0.5;
 
 impl Cycle {

@@ -101,7 +101,7 @@ impl Cycle {
         }
     }
 
-    /// Whether every drive has told its state and position.
+    /// Returns whether every drive has told its state and position.
     fn all_heard(&self) -> bool {
         self.drives[..self.n_axes()].iter().all(|drive| drive.heard)
     }

@@ -18,7 +18,7 @@ use crate::rt::Nanos;
 /// Longest fade of the learned input after a run.
 const FADE_MAX_S: f64 = 0.2;
 
-/// Whether the loop has more to do.
+/// True if the loop has more to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TickStatus {
     /// Tick on.

@@ -75,7 +75,7 @@ impl LearnedInput {
         self.fade_tick = self.fade_ticks;
     }
 
-    /// Whether no input is left.
+    /// Returns whether no input is left.
     pub(super) fn faded(&self) -> bool {
         self.fade_tick >= self.fade_ticks
     }

@@ -1,4 +1,4 @@
-//! What the loop knows of one drive: its last answer, and what it was last told.
+//! State of one drive in the loop: its last answer, and the last command to it.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -7,7 +7,7 @@ use crate::fieldbus::cia402::{CommandRpdo1, Controlword, State, StatusTpdo1, Sta
 /// One drive as last heard.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Drive {
-    /// Whether it has answered at all.
+    /// True if it has answered at all.
     pub(super) heard: bool,
     /// Last statusword.
     pub(super) statusword: u16,
@@ -17,9 +17,9 @@ pub(super) struct Drive {
     pub(super) following_error_m: f64,
     /// Last emergency code since it was switched on.
     pub(super) emergency: Option<u16>,
-    /// Whether it is lost and shall only be told to stop.
+    /// True if it is lost and shall only be told to stop.
     pub(super) lost: bool,
-    /// Whether what it measures is not to be trusted any more.
+    /// True if what it measures is not to be trusted any more.
     pub(super) distrusted: bool,
     /// Distance of the last two positions, if it is farther than the axis can move.
     pub(super) jump_m: Option<f64>,
@@ -68,12 +68,12 @@ impl Drive {
         Statusword(self.statusword).state()
     }
 
-    /// Whether it follows commands.
+    /// Returns whether it follows commands.
     pub(super) fn enabled(&self) -> bool {
         self.heard && self.state() == Some(State::OperationEnabled)
     }
 
-    /// Whether it has stopped itself.
+    /// Returns whether it has stopped itself.
     pub(super) fn faulted(&self) -> bool {
         matches!(self.state(), Some(State::Fault | State::FaultReactionActive))
     }

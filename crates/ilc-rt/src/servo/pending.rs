@@ -40,11 +40,11 @@ struct PendingCycle {
     last_of_run: bool,
     /// SYNCs sent when each part came; 0 if it has not.
     came: [u64; PARTS_MAX],
-    /// Whether something in this cycle makes its measurement worthless.
+    /// True if something in this cycle makes its measurement worthless.
     spoiled: bool,
 }
 
-/// How far one part is.
+/// Progress of one part of the answers.
 #[derive(Clone, Copy, Debug, Default)]
 struct Lag {
     answers: u64,
@@ -115,7 +115,7 @@ impl PendingCycles {
         let Some(number) = self.number(part) else { return };
         let lag = &mut self.lags[number];
         if lag.answers >= self.sent {
-            // Nothing asked for it: of two answers to one SYNC nobody knows which is the right one.
+            // Nothing asked for it: of two answers to one SYNC it is not known which is right.
             if self.sent > self.given {
                 self.ring[index(self.sent - 1)].spoiled = true;
             }
@@ -159,12 +159,12 @@ impl PendingCycles {
         self.number(part).map_or(0, |number| self.lags[number].silent)
     }
 
-    /// Whether a part that is not given up has stayed away for the last `n_cycles` SYNCs.
+    /// Returns whether a part that is not given up has stayed away for the last `n_cycles` SYNCs.
     pub(super) fn waits(&self, n_cycles: u64) -> bool {
         self.lags[..self.n_parts].iter().any(|lag| !lag.given_up && lag.silent >= n_cycles)
     }
 
-    /// Whether a part is no longer waited for.
+    /// Returns whether a part is no longer waited for.
     pub(super) fn is_given_up(&self, part: Part) -> bool {
         self.number(part).is_some_and(|number| self.lags[number].given_up)
     }
@@ -176,7 +176,7 @@ impl PendingCycles {
         }
     }
 
-    /// Whether every part that is not given up has answered every SYNC.
+    /// Returns whether every part that is not given up has answered every SYNC.
     pub(super) fn all_answered(&self) -> bool {
         self.lags[..self.n_parts].iter().all(|lag| lag.given_up || lag.answers == self.sent)
     }

@@ -123,7 +123,7 @@ impl Cycle {
         false
     }
 
-    /// Whether a node belongs to this cell.
+    /// Returns whether a node belongs to this cell.
     pub(super) fn is_ours(&self, node: NodeId) -> bool {
         self.spec.axes.iter().any(|axis| axis.node == node)
             || self.spec.tool.is_some_and(|tool| tool.node == node)

@@ -16,7 +16,7 @@ impl Cycle {
     /// The first part that has been silent for too long, each one told once.
     pub(super) fn find_silence(&mut self) -> Option<StopReason> {
         // Paced by answers, the wait is over when this is asked: one unanswered SYNC is silence.
-        let most = match self.spec.pace {
+        let max = match self.spec.pace {
             Pace::Answers(_) => 0,
             Pace::Clock => u64::from(self.spec.silent_cycles_max),
         };
@@ -24,7 +24,7 @@ impl Cycle {
         for axis in 0..self.n_axes() {
             for part in [Part::Status(axis), Part::DriveMotion(axis)] {
                 let silence = self.pending.silence(part);
-                if silence <= most || self.pending.is_given_up(part) {
+                if silence <= max || self.pending.is_given_up(part) {
                     continue;
                 }
                 found = found.or(Some(self.silent_part(axis, part, silence)));
@@ -37,7 +37,7 @@ impl Cycle {
         }
         let silence = self.pending.silence(Part::Tool);
         if let Some(tool) = self.spec.tool
-            && silence > most
+            && silence > max
             && !self.pending.is_given_up(Part::Tool)
         {
             self.pending.give_up(Part::Tool);
@@ -50,7 +50,7 @@ impl Cycle {
         found
     }
 
-    /// Why a part of an axis stays away, as far as that can be told.
+    /// Returns the reason that a part of an axis stays away, as far as it is known.
     fn silent_part(&self, axis: usize, part: Part, silence: u64) -> StopReason {
         let (pdo, other) = match part {
             Part::DriveMotion(_) => (2, Part::Status(axis)),

@@ -1,4 +1,4 @@
-//! How a stop begins: every axis to rest from what it was commanded, whatever has failed.
+//! Begin of a stop: every axis to rest from what it was commanded, whatever has failed.
 //!
 //! A stop is open loop in both modes. Its set points start from the last commands, learned input
 //! included, so that nothing steps; and no measurement takes part in it, so that one that froze, is

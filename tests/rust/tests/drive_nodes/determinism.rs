@@ -1,4 +1,5 @@
-//! In lock-step the same commands give the same frames, to the last bit, on the gantry with friction.
+//! Determinism: in lock-step the same commands give bit-identical frames, on the gantry with
+//! friction.
 
 use std::time::Duration;
 

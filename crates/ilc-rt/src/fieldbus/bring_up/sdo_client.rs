@@ -8,13 +8,13 @@ use crate::fieldbus::canopen::sdo::{
 use crate::fieldbus::canopen::{AbortCode, NodeId, cob_id};
 use crate::fieldbus::{Bus, BusError};
 
-/// How often a transfer is begun before the node counts as silent.
+/// Attempts at a transfer before the node counts as silent.
 pub const TRIES: u32 = 2;
 
 /// Longest object accepted from a node: a wrong size must not fill the memory.
 const UPLOAD_MAX: usize = 65_536;
 
-/// Why an object could not be read or written.
+/// Reason that an object was not read or written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SdoError {
     /// The node refused.
@@ -37,9 +37,9 @@ pub enum SdoError {
         node: NodeId,
         /// The object.
         address: ObjectAddress,
-        /// How long each try waited.
+        /// Time-out of each attempt.
         timeout: Duration,
-        /// What came from the node instead, last.
+        /// Last frame from the node instead.
         other: Option<Stray>,
     },
     /// The node answered against the protocol.
@@ -49,9 +49,9 @@ pub enum SdoError {
         node: NodeId,
         /// The object.
         address: ObjectAddress,
-        /// What the protocol asks for.
+        /// Demand of the protocol.
         expected: &'static str,
-        /// What came.
+        /// Frame or data found.
         found: String,
     },
     /// The bus failed.
@@ -185,7 +185,7 @@ impl SdoClient {
         })
     }
 
-    /// Runs a transfer; begins anew after a time-out, as one lost frame must not stop a machine.
+    /// Runs a transfer, and again after a time-out, as one lost frame must not stop a machine.
     fn with_retry<T>(
         &self,
         bus: &mut dyn Bus,
@@ -340,7 +340,7 @@ impl SdoClient {
                     },
                 }
             }
-            // A bus that babbles must not hold the question for ever.
+            // A bus that babbles must not hold the question indefinitely.
             if frame.is_none() || left.is_zero() {
                 let (node, timeout) = (self.node, self.timeout);
                 return Err(SdoError::Timeout { node, address, timeout, other });

@@ -55,7 +55,7 @@ impl Expedited {
         &self.bytes[..usize::from(self.len)]
     }
 
-    /// Whether the sender said how many bytes count.
+    /// Returns whether the sender said how many bytes count.
     pub fn size_indicated(&self) -> bool {
         self.size_indicated
     }
@@ -180,9 +180,9 @@ pub enum SdoRequest {
 /// A message from server to client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SdoResponse {
-    /// What is read.
+    /// Data of a read.
     Upload(Data),
-    /// What is written was taken, or may be sent.
+    /// Confirmation of a write, or permission to send its segments.
     Download(Turn),
     /// Refused.
     Abort(ObjectAddress, AbortCode),

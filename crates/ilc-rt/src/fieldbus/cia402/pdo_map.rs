@@ -50,7 +50,7 @@ const fn mapped(index: u16, sub: u8, bits: u8) -> MappedObject {
     MappedObject { address: ObjectAddress::new(index, sub), bits }
 }
 
-/// What the controller sends to a drive every cycle.
+/// RPDO1 of a drive: the command of every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct CommandRpdo1 {
     /// Controlword.
@@ -61,7 +61,7 @@ pub struct CommandRpdo1 {
     pub torque_offset: i16,
 }
 
-/// What a drive sends every cycle.
+/// TPDO1 of a drive: its status in every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct StatusTpdo1 {
     /// Statusword.
@@ -72,7 +72,7 @@ pub struct StatusTpdo1 {
     pub torque: i16,
 }
 
-/// What a drive also sends every cycle.
+/// TPDO2 of a drive: its motion in every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct DriveMotionTpdo2 {
     /// Velocity, in counts/s.
@@ -81,7 +81,7 @@ pub struct DriveMotionTpdo2 {
     pub following_error_counts: i32,
 }
 
-/// What an encoder node sends every cycle.
+/// TPDO1 of an encoder node: its positions in every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct EncoderSample {
     /// First coordinate, in counts.

@@ -18,7 +18,7 @@ use crate::interpolate::AxisLimits;
 pub(super) struct Moment<'a> {
     pub(super) spec: &'a AxisSpec,
     pub(super) phase: &'a Phase,
-    /// Whether the drive follows its commands.
+    /// True if the drive follows its commands.
     pub(super) enabled: bool,
     pub(super) encoder_m: f64,
     pub(super) reference_m: f64,
@@ -57,7 +57,7 @@ pub(super) trait AxisMode: Sync {
     /// Velocity and acceleration of the last three commands: a stop begins with them.
     fn motion(&self, last: [f64; 3], dt_s: f64) -> [f64; 2];
 
-    /// Whether the command is computed from the measured position.
+    /// Returns whether the command is computed from the measured position.
     fn closes_position_loop(&self) -> bool;
 }
 
