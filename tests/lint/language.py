@@ -26,7 +26,8 @@ NOT_YET_CLEAN: tuple[str, ...] = (
     "ARCHITECTURE.md",
     "crates/ilc-py/",
     *(f"crates/ilc-rt/src/{name}/" for name in (
-        "campaign", "cli", "config", "design", "schema", "trajectory", "model/identify", "learning/law",
+        "campaign", "cli", "config", "design", "schema", "trajectory", "model/identify",
+        "learning/law",
     )),
     "crates/ilc-rt/src/learning/gate.rs",
     "docs/cell.md",
