@@ -189,112 +189,6 @@ def evaluate_experiment(
 
 class TrajectoryError(ValueError): ...
 
-@final
-class Trajectory:
-    @property
-    def dt_s(self) -> float: ...
-    @property
-    def n_samples(self) -> int: ...
-    @property
-    def n_axes(self) -> int: ...
-    @property
-    def computing_s(self) -> float: ...
-    @property
-    def t_s(self) -> NDArray[np.float64]: ...
-    @property
-    def position_m(self) -> NDArray[np.float64]: ...
-    @property
-    def velocity_m_s(self) -> NDArray[np.float64]: ...
-    @property
-    def acceleration_m_s2(self) -> NDArray[np.float64]: ...
-    @property
-    def programmed_m(self) -> NDArray[np.float64]: ...
-    @property
-    def alphas(self) -> list[tuple[int, str, float, list[tuple[float, float]]]]: ...
-
-_Limits: TypeAlias = tuple[float | ArrayLike, float | ArrayLike, float | ArrayLike]
-
-def plan_linear(
-    points_m: ArrayLike,
-    feed_m_s: float | ArrayLike,
-    dt_s: float,
-    limits: _Limits,
-    setting: str,
-) -> Trajectory: ...
-def plan_exponential(
-    points_m: ArrayLike,
-    feed_m_s: float | ArrayLike,
-    dt_s: float,
-    limits: _Limits,
-    oscillation: tuple[float | ArrayLike | None, float | ArrayLike | None],
-    alpha_max: float | dict[str, float] | None,
-) -> Trajectory: ...
-def plan_modulated(
-    points_m: ArrayLike,
-    feed_m_s: float,
-    amplitude_m: float,
-    frequency_hz: float,
-    dt_s: float,
-    limits: _Limits,
-    interpolation: str,
-) -> Trajectory: ...
-def plan_spline(
-    points_m: ArrayLike, speed: tuple[float, float], dt_s: float, limits: _Limits
-) -> Trajectory: ...
-def plan_butterfly(
-    scale_m: float,
-    turns: float,
-    center_m: tuple[float, float],
-    speed: tuple[float, float],
-    dt_s: float,
-    limits: _Limits,
-) -> Trajectory: ...
-def plan_spiral(
-    pitch_m: float,
-    turns: float,
-    center_m: tuple[float, float],
-    speed: tuple[float, float],
-    dt_s: float,
-    limits: _Limits,
-) -> Trajectory: ...
-def plan_raster(
-    width_m: float,
-    pitch_m: float,
-    rows: int,
-    feed_m_s: float,
-    dt_s: float,
-    limits: _Limits,
-    start_m: tuple[float, float],
-    there_and_back: bool,
-    setting: str,
-) -> Trajectory: ...
-def plan_gcode(
-    text: str | bytes,
-    start_m: ArrayLike,
-    feed_m_s: float,
-    dt_s: float,
-    limits: _Limits,
-    rapid_m_s: float | None,
-    blend_s: float | None,
-    block_delete: bool,
-) -> Trajectory: ...
-def sigmoid_pair(
-    *,
-    velocity_m_s: ArrayLike,
-    amplitude_m: ArrayLike,
-    omega_rad_s: ArrayLike,
-    phase_zero_s: ArrayLike,
-    corner_s: float,
-    duration_s: float,
-    start_alpha: float,
-    transition_alpha: float,
-    sine_alpha: float,
-    sine_offset_s: float,
-    dt_s: float,
-) -> Trajectory: ...
-def tracking_index(
-    trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0
-) -> tuple[float, float]: ...
 def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 
@@ -350,7 +244,7 @@ class Library:
     def recall(
         self, disturbance: ArrayLike, top: int, cell: str | None
     ) -> builtins.list[dict[str, Any]]: ...
-    def append(self, **keywords: Any) -> int: ...  # noqa: ANN401
+    def _append(self, **keywords: Any) -> int: ...  # noqa: ANN401
     def trim(self, keep: int, cell: str | None) -> int: ...
 
 @final
@@ -491,6 +385,16 @@ class Gantry:
     def inverse(self, tool_m: ArrayLike) -> NDArray[np.float64]: ...
     def jacobian(self) -> NDArray[np.float64]: ...
 
+def jerk_limited(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def exponential_sigmoid(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def modulated(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def sigmoid_pair(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def spline(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def butterfly(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def spiral(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def raster(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def gcode(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def tracking_index(**keywords: Any) -> tuple[float, float]: ...  # noqa: ANN401
 def contour_error(
     reference_m: ArrayLike | Sequence[Line | Arc], actual_m: ArrayLike, window: int | None = None
 ) -> NDArray[np.float64]: ...

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 from importlib import import_module
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from ilc_rt import _native
 
 if TYPE_CHECKING:
+    import builtins
+
     from numpy.typing import ArrayLike
     from typing_extensions import Self
 
@@ -173,7 +174,7 @@ class Library(_native.Library):
         >>> library.recall(20.0)[0]["distance"]
         1.5
         """
-        return super().append(
+        return super()._append(
             u=u,
             e=e,
             cycle_s=cycle_s,

@@ -7,11 +7,11 @@ use ilc_rt::learning::weights::Weight;
 use ilc_rt::model::StateSpace;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyString};
+use pyo3::types::{PyDict, PyList};
 
 use crate::argument::{Matrix, Signal, misfit, read_array, read_vector};
 use crate::model_argument::read_model;
-use crate::whole::{each, pair, shown, whole};
+use crate::whole::{each, number, pair, refused, shown, whole};
 
 /// The keyword arguments of one call.
 #[derive(Debug, Clone, Copy)]
@@ -133,6 +133,14 @@ impl<'a, 'py> Arguments<'a, 'py> {
         read_vector(name, &self.get(name)?)
     }
 
+    /// Reads a number for each of two things.
+    pub(crate) fn pair(self, name: &str) -> PyResult<[f64; 2]> {
+        match self.vector(name)?[..] {
+            [first, second] => Ok([first, second]),
+            ref other => Err(misfit(name, &[other.len()], "(2,)")),
+        }
+    }
+
     /// Reads a signal.
     pub(crate) fn signal(self, name: &str) -> PyResult<Signal> {
         Signal::read(name, &self.get(name)?)
@@ -189,31 +197,4 @@ impl<'a, 'py> Arguments<'a, 'py> {
         }
         Ok(format!("{name}({})", words.join(", ")))
     }
-}
-
-/// Reads a number: Python's, NumPy's, whatever converts to a float.
-///
-/// # Errors
-/// - `TypeError` for what is not a number.
-/// - `ValueError` for an integer beyond the largest float.
-pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
-    if object.is_instance_of::<PyString>() {
-        return Err(refused(name, object, "a number"));
-    }
-    object.extract::<f64>().map_err(|error| {
-        let py = object.py();
-        if error.is_instance_of::<pyo3::exceptions::PyOverflowError>(py) {
-            let text = shown(object);
-            return PyValueError::new_err(format!(
-                "{name} = {text}; only finite numbers are allowed"
-            ));
-        }
-        refused(name, object, "a number")
-    })
-}
-
-fn refused(name: &str, object: &Bound<'_, PyAny>, needed: &str) -> PyErr {
-    let kind = object.get_type().name().map_or_else(|_| "object".to_owned(), |n| n.to_string());
-    let text = shown(object);
-    PyTypeError::new_err(format!("{name} = {text} is a {kind}; {needed} is needed"))
 }

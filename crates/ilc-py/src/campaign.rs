@@ -193,12 +193,9 @@ impl Work {
     }
 }
 
-/// Check options as ``ilc-rt run`` or ``ilc-rt identify`` would.
+/// Check options, the words of ``ilc-rt run`` or ``ilc-rt identify`` after the verb.
 ///
-/// - verb : {"run", "identify"}: Which verb.
-/// - arguments : list of str: Options, as words of its command line.
-///
-/// Raises ValueError if an option cannot be used: its name, its value and what is allowed.
+/// Raises ValueError with the name of the option, its value and what is allowed.
 #[pyfunction]
 fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
     Work::parse(verb, &arguments).map(drop)
@@ -206,10 +203,7 @@ fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
 
 /// Describe the options of ``ilc-rt run`` or ``ilc-rt identify``.
 ///
-/// - verb : {"run", "identify"}: Which ones.
-///
-/// Returns str: A JSON list: name, flags, help, kind, default, choices, placeholder.
-/// Raises ValueError for another verb.
+/// Returns a JSON list: name, flags, help, kind, default, choices, placeholder.
 #[pyfunction]
 fn described_options(verb: &str) -> PyResult<String> {
     let options = match verb {

@@ -126,7 +126,7 @@ impl PyLibrary {
 
     /// Keep a run that was made elsewhere.
     #[pyo3(signature = (**keywords))]
-    fn append(&self, py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<i64> {
+    fn _append(&self, py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<i64> {
         let a = Arguments::of(keywords)?;
         let u = a.signal("u")?;
         let alike = |name: &str, signal: &Bound<'_, PyAny>| {

@@ -1,210 +1,404 @@
-//! `Trajectory`, a planned motion in samples, and its index.
+//! Trajectories: what stands behind the functions of `ilc_rt.trajectory` that plan one.
+//!
+//! Each returns its samples by name; the class that holds them is `ilc_rt.trajectory.Trajectory`.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
-use ilc_rt::trajectory::{SampledMotion, TrackingIndex, TrajectoryError};
+use ilc_rt::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
+use ilc_rt::trajectory::exponential::AlphaMax;
+use ilc_rt::trajectory::exponential::listing::{ListedLeg, Listing};
+use ilc_rt::trajectory::kind::RasterSection;
+use ilc_rt::trajectory::program::{GcodeSetting, read_gcode};
+use ilc_rt::trajectory::{
+    AxisLimits, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
+    ModulatedSegment, MoveError, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion,
+    TrackingIndex, TrajectoryError, points_program,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::argument::{Signal, give_signal};
+use crate::argument::{give_signal, read_vector};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::exceptions;
 
-/// Place of an alpha, the alpha, and the intervals in which it might be.
-pub(crate) type Alpha = (usize, String, f64, Vec<(f64, f64)>);
+/// A chosen alpha: segment, place, value, and the intervals that hold the limits.
+type Alpha = (usize, String, f64, Vec<(f64, f64)>);
+/// A planned motion.
+type Planned = Result<(SampledMotion, Vec<Alpha>), TrajectoryError>;
+/// The keywords of a call from Python.
+type Keywords<'a, 'py> = &'a Bound<'py, PyDict>;
 
-/// A planned motion, sampled.
-///
-/// All arrays are float64 of shape (n_samples, n_axes), time first. The first
-/// and the last sample are at rest, but for `sigmoid_pair`.
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt import trajectory
-/// >>> move = trajectory.jerk_limited(
-/// ...     [[0.0], [0.1]], feed_m_s=0.2, dt_s=0.001,
-/// ...     velocity_max_m_s=0.5, acceleration_max_m_s2=2.0, jerk_max_m_s3=50.0)
-/// >>> float(move.position_m[-1, 0])
-/// 0.1
-#[pyclass(name = "Trajectory", module = "ilc_rt.trajectory", frozen)]
-#[derive(Debug)]
-pub(crate) struct PyTrajectory {
-    motion: SampledMotion,
-    alphas: Vec<Alpha>,
-    /// Time that planning and sampling took, in seconds.
-    #[pyo3(get)]
-    computing_s: f64,
-}
+const SETTINGS: [(&str, LinearSetting); 2] =
+    [("complete", LinearSetting::CompleteEveryMove), ("on_time", LinearSetting::StartOnTime)];
 
-#[pymethods]
-impl PyTrajectory {
-    /// Pickled and copied as its samples.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-        let (py, this) = (slf.py(), slf.get());
-        let samples = (
-            this.position_m(py)?,
-            this.velocity_m_s(py)?,
-            this.acceleration_m_s2(py)?,
-            this.programmed_m(py)?,
-        );
-        let parts = (this.motion.dt_s, samples, this.alphas(), this.computing_s);
-        let maker = py.import("ilc_rt._native")?.getattr("_trajectory")?;
-        Ok((maker, parts.into_pyobject(py)?.into_any()))
-    }
-
-    /// Sample time in seconds.
-    #[getter]
-    fn dt_s(&self) -> f64 {
-        self.motion.dt_s
-    }
-
-    /// Number of samples.
-    #[getter]
-    fn n_samples(&self) -> usize {
-        self.motion.n_samples()
-    }
-
-    /// Number of axes.
-    #[getter]
-    fn n_axes(&self) -> usize {
-        self.motion.n_axes
-    }
-
-    /// Time of each sample in seconds, shape (n_samples,).
-    #[getter]
-    fn t_s<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let dt_s = self.motion.dt_s;
-        give_signal(py, (0..self.n_samples()).map(|k| k as f64 * dt_s).collect(), 1, true)
-    }
-
-    /// Positions in m.
-    #[getter]
-    fn position_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give_signal(py, self.motion.position_m.clone(), self.motion.n_axes, false)
-    }
-
-    /// Velocities in m/s.
-    #[getter]
-    fn velocity_m_s<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give_signal(py, self.motion.velocity_m_s.clone(), self.motion.n_axes, false)
-    }
-
-    /// Accelerations in m/s^2.
-    #[getter]
-    fn acceleration_m_s2<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give_signal(py, self.motion.acceleration_m_s2.clone(), self.motion.n_axes, false)
-    }
-
-    /// Where the program would be at each sample if there were no limits, in m.
-    #[getter]
-    fn programmed_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give_signal(py, self.motion.programmed_m.clone(), self.motion.n_axes, false)
-    }
-
-    /// Each alpha of an E/S move: (segment, place, alpha, admissible intervals).
-    #[getter]
-    fn alphas(&self) -> Vec<Alpha> {
-        self.alphas.clone()
-    }
-
-    fn __repr__(&self) -> String {
-        format!(
-            "Trajectory(n_samples={}, n_axes={}, dt_s={})",
-            self.n_samples(),
-            self.n_axes(),
-            self.dt_s()
-        )
-    }
-}
-
-/// Plans without the interpreter, and measures how long it takes.
-pub(crate) fn planned(
-    py: Python<'_>,
-    plan: impl FnOnce() -> Result<(SampledMotion, Vec<Alpha>), TrajectoryError> + Send,
-) -> PyResult<PyTrajectory> {
+/// Plans a motion while other Python threads run, and returns its samples by name.
+fn planned<'py>(
+    py: Python<'py>,
+    plan: impl FnOnce() -> Planned + Send,
+) -> PyResult<Bound<'py, PyDict>> {
     let begun = Instant::now();
     let (motion, alphas) = detached(py, plan).or_raise()?;
-    Ok(PyTrajectory { motion, alphas, computing_s: begun.elapsed().as_secs_f64() })
+    let computing_s = begun.elapsed().as_secs_f64();
+    let n_axes = motion.n_axes;
+    let samples = PyDict::new(py);
+    samples.set_item("dt_s", motion.dt_s)?;
+    samples.set_item("position_m", give_signal(py, motion.position_m, n_axes, false)?)?;
+    samples.set_item("velocity_m_s", give_signal(py, motion.velocity_m_s, n_axes, false)?)?;
+    let acceleration_m_s2 = give_signal(py, motion.acceleration_m_s2, n_axes, false)?;
+    samples.set_item("acceleration_m_s2", acceleration_m_s2)?;
+    samples.set_item("programmed_m", give_signal(py, motion.programmed_m, n_axes, false)?)?;
+    samples.set_item("alphas", alphas)?;
+    samples.set_item("computing_s", computing_s)?;
+    Ok(samples)
 }
 
-/// Return the two parts of the index J of an interpolated motion.
-///
-/// ``J = integral of k_e (y_des - y)^2 + k_a y''^2``, by the trapezoidal rule.
-///
-/// Parameters
-/// ----------
-/// trajectory : Trajectory
-///     The motion; `programmed_m` is what it is compared with.
-/// k_e : float
-///     Weight of the tracking error.
-/// k_a : float
-///     Weight of the acceleration.
-///
-/// Returns
-/// -------
-/// (float, float)
-///     The parts of tracking and of acceleration; their sum is J.
-///
-/// Raises
-/// ------
-/// TrajectoryError
-///     If a weight is below 0 or not finite.
-///
-/// References
-/// ----------
-/// [dimarco2016], Eq. 2.19.
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt import trajectory
-/// >>> move = trajectory.jerk_limited(
-/// ...     [0.0, 0.1], feed_m_s=0.1, dt_s=0.001,
-/// ...     velocity_max_m_s=0.5, acceleration_max_m_s2=2.0, jerk_max_m_s3=50.0)
-/// >>> tracking, acceleration = trajectory.tracking_index(move)
-/// >>> tracking > 0.0 and acceleration > 0.0
-/// True
+/// Reads the points of a path, one a row.
+fn read_points(a: Arguments<'_, '_>) -> PyResult<Vec<Vec<f64>>> {
+    let points = a.signal("points_m")?;
+    Ok(points.values.chunks(points.n_channels).map(<[f64]>::to_vec).collect())
+}
+
+/// Reads a number for all of `n`, or one for each.
+fn read_each(name: &str, object: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<f64>> {
+    if let Ok(value) = object.extract::<f64>() {
+        return Ok(vec![value; n]);
+    }
+    let values = read_vector(name, object)?;
+    if values.len() == n {
+        return Ok(values);
+    }
+    Err(PyValueError::new_err(format!(
+        "{name} has {} entries; a number, or {n} of them, is needed",
+        values.len()
+    )))
+}
+
+/// Reads the limits of `n_axes` axes.
+fn read_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<Vec<AxisLimits>> {
+    if !(1..=MAX_AXES).contains(&n_axes) {
+        return Err(TrajectoryError::from(MoveError::Axes { n_axes })).or_raise();
+    }
+    let each = |name: &str| read_each(name, &a.get(name)?, n_axes);
+    let velocity = each("velocity_max_m_s")?;
+    let acceleration = each("acceleration_max_m_s2")?;
+    let jerk = each("jerk_max_m_s3")?;
+    let axis = |i| AxisLimits {
+        velocity_max_m_s: velocity[i],
+        acceleration_max_m_s2: acceleration[i],
+        jerk_max_m_s3: jerk[i],
+    };
+    Ok((0..n_axes).map(axis).collect())
+}
+
+/// Reads the limits of a run along a curve.
+fn read_run_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<RunLimits> {
+    Ok(RunLimits {
+        feed_m_s: a.number("feed_m_s")?,
+        curvature_acceleration_max_m_s2: a.number("curvature_acceleration_max_m_s2")?,
+        axes: read_limits(a, n_axes)?,
+    })
+}
+
+/// Reads a place in the plane.
+fn read_place(a: Arguments<'_, '_>, name: &str) -> PyResult<[f64; 2]> {
+    let (x, y): (f64, f64) = a.get(name)?.extract()?;
+    if x.is_finite() && y.is_finite() {
+        return Ok([x, y]);
+    }
+    Err(PyValueError::new_err(format!("{name} = ({x}, {y}); finite numbers are needed")))
+}
+
+/// Reads the largest alphas: a number, or one by place.
+fn read_alpha_max(a: Arguments<'_, '_>) -> PyResult<AlphaMax> {
+    let mut alpha_max = AlphaMax::default();
+    let Some(object) = a.given("alpha_max")? else { return Ok(alpha_max) };
+    if let Ok(value) = object.extract::<f64>() {
+        return Ok(AlphaMax { start_up: value, transition: value, end: value });
+    }
+    let Ok(by_place) = object.extract::<BTreeMap<String, f64>>() else {
+        return Err(PyTypeError::new_err(format!(
+            "alpha_max = {}; a number, or a dict of numbers by place, is needed",
+            object.repr()?
+        )));
+    };
+    for (place, value) in by_place {
+        match place.as_str() {
+            "start-up" => alpha_max.start_up = value,
+            "transition" => alpha_max.transition = value,
+            "end" => alpha_max.end = value,
+            other => {
+                return Err(PyValueError::new_err(format!(
+                    "alpha_max: {other:?}; \"start-up\", \"transition\" or \"end\" is needed"
+                )));
+            }
+        }
+    }
+    Ok(alpha_max)
+}
+
+fn sample_linear(
+    start_m: &[f64],
+    segments: &[PathSegment],
+    limits: &[AxisLimits],
+    setting: LinearSetting,
+    dt_s: f64,
+) -> Planned {
+    let plan = Linear::plan(start_m, segments, limits, setting)?;
+    let motion = SampledMotion::sample(plan.duration_s(), dt_s, plan.n_axes(), |t_s| {
+        (plan.at(t_s), plan.programmed_m(t_s))
+    })?;
+    Ok((motion.verified(limits)?, Vec::new()))
+}
+
+fn sample_exponential(
+    start_m: &[f64],
+    segments: &[ModulatedSegment],
+    limits: &[AxisLimits],
+    alpha_max: &AlphaMax,
+    dt_s: f64,
+) -> Planned {
+    let plan = ExponentialSigmoid::plan_below(start_m, segments, limits, alpha_max)?;
+    let motion = SampledMotion::sample(plan.duration_s(), dt_s, plan.n_axes(), |t_s| {
+        (plan.at(t_s), plan.programmed_m(t_s))
+    })?;
+    let alphas = plan.choices().iter().map(|choice| {
+        let intervals = choice.admissible.iter().map(|i| (i.from, i.to)).collect();
+        (choice.segment, choice.place.to_owned(), choice.alpha, intervals)
+    });
+    let alphas = alphas.collect();
+    Ok((motion.verified(limits)?, alphas))
+}
+
+fn sample_run(curve: &impl Curve, limits: &RunLimits, dt_s: f64) -> Planned {
+    Ok((Run::plan(curve, limits, dt_s)?.motion().clone(), Vec::new()))
+}
+
+fn sample_path(spec: &PathSpec, limits: &[AxisLimits], dt_s: f64) -> Planned {
+    let mut plan = Interpolator::plan(spec, limits, dt_s)?;
+    let n_axes = plan.n_axes();
+    let mut motion = SampledMotion { dt_s, n_axes, ..SampledMotion::default() };
+    for _ in 0..plan.n_samples() {
+        let setpoint = plan.next();
+        motion.position_m.extend_from_slice(&setpoint.position_m[..n_axes]);
+        motion.velocity_m_s.extend_from_slice(&setpoint.velocity_m_s[..n_axes]);
+    }
+    let v = &motion.velocity_m_s;
+    let last = v.len();
+    motion.acceleration_m_s2 = (0..last)
+        .map(|i| {
+            // At rest at both ends, where there is no neighbour.
+            let inside = i >= n_axes && i + n_axes < last;
+            if inside { (v[i + n_axes] - v[i - n_axes]) / (2.0 * dt_s) } else { 0.0 }
+        })
+        .collect();
+    motion.programmed_m.clone_from(&motion.position_m);
+    Ok((motion, Vec::new()))
+}
+
 #[pyfunction]
-#[pyo3(signature = (trajectory, k_e=600.0, k_a=1.0))]
-fn tracking_index(
-    trajectory: &Bound<'_, PyTrajectory>,
-    k_e: f64,
-    k_a: f64,
-) -> PyResult<(f64, f64)> {
-    let motion = &trajectory.get().motion;
+#[pyo3(signature = (**keywords))]
+fn jerk_limited<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
+    let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, points.len() - 1)?;
+    let limits = read_limits(a, points[0].len())?;
+    let setting = a.choice("setting", &SETTINGS)?;
+    let moves = points.iter().skip(1).zip(&feeds);
+    let segments: Vec<_> =
+        moves.map(|(to_m, feed)| PathSegment::line(to_m.clone(), *feed)).collect();
+    planned(a.py(), || sample_linear(&points[0], &segments, &limits, setting, dt_s))
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn exponential_sigmoid<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
+    let n_legs = points.len() - 1;
+    let each = |name: &str| match a.given(name)? {
+        Some(given) => read_each(name, &given, n_legs),
+        None => Ok(vec![0.0; n_legs]),
+    };
+    let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, n_legs)?;
+    let (amplitudes, frequencies) = (each("amplitude_m")?, each("frequency_hz")?);
+    let limits = read_limits(a, points[0].len())?;
+    let segment = |i: usize| ModulatedSegment {
+        to_m: points[i + 1].clone(),
+        feed_m_s: feeds[i],
+        amplitude_m: amplitudes[i],
+        frequency_hz: frequencies[i],
+    };
+    let segments: Vec<ModulatedSegment> = (0..n_legs).map(segment).collect();
+    let alpha_max = read_alpha_max(a)?;
+    planned(a.py(), || sample_exponential(&points[0], &segments, &limits, &alpha_max, dt_s))
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn modulated<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
+    let [start, end] = &points[..] else {
+        return Err(PyValueError::new_err(format!(
+            "points_m has {} rows; start and end, 2, are needed",
+            points.len()
+        )));
+    };
+    let limits = read_limits(a, start.len())?;
+    let segment = ModulatedSegment {
+        to_m: end.clone(),
+        feed_m_s: a.number("feed_m_s")?,
+        amplitude_m: a.number("amplitude_m")?,
+        frequency_hz: a.number("frequency_hz")?,
+    };
+    let [complete, on_time] = SETTINGS.map(|(word, setting)| (word, Some(setting)));
+    let interpolations = [("exponential_sigmoid", None), complete, on_time];
+    match a.choice("interpolation", &interpolations)? {
+        None => {
+            let alpha_max = AlphaMax::default();
+            planned(a.py(), || sample_exponential(start, &[segment], &limits, &alpha_max, dt_s))
+        }
+        Some(setting) => planned(a.py(), || {
+            let program = points_program(start, &segment, POINTS_A_PERIOD)?;
+            sample_linear(start, &program, &limits, setting, dt_s)
+        }),
+    }
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn sigmoid_pair<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (velocity, amplitude) = (a.pair("velocity_m_s")?, a.pair("amplitude_m")?);
+    let (omega, phase_zero) = (a.pair("omega_rad_s")?, a.pair("phase_zero_s")?);
+    let pair = Listing {
+        legs: std::array::from_fn(|i| ListedLeg {
+            velocity_m_s: velocity[i],
+            amplitude_m: amplitude[i],
+            omega_rad_s: omega[i],
+            phase_zero_s: phase_zero[i],
+        }),
+        corner_s: a.number("corner_s")?,
+        start_alpha: a.number("start_alpha")?,
+        transition_alpha: a.number("transition_alpha")?,
+        sine_alpha: a.number("sine_alpha")?,
+        sine_offset_s: a.number("sine_offset_s")?,
+    };
+    let (duration_s, dt_s) = (a.number("duration_s")?, a.number("dt_s")?);
+    planned(a.py(), || Ok((pair.sample(duration_s, dt_s)?, Vec::new())))
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn spline<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
+    let limits = read_run_limits(a, points[0].len())?;
+    planned(a.py(), || sample_run(&Spline::through(&points)?, &limits, dt_s))
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn butterfly<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (limits, dt_s) = (read_run_limits(a, 2)?, a.number("dt_s")?);
+    let (scale_m, turns) = (a.number("scale_m")?, a.number("turns")?);
+    let center = read_place(a, "center_m")?;
+    planned(a.py(), || sample_run(&Butterfly::new(scale_m, turns, center)?, &limits, dt_s))
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn spiral<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (limits, dt_s) = (read_run_limits(a, 2)?, a.number("dt_s")?);
+    let (pitch_m, turns) = (a.number("pitch_m")?, a.number("turns")?);
+    let center = read_place(a, "center_m")?;
+    planned(a.py(), || sample_run(&Spiral::new(pitch_m, turns, center)?, &limits, dt_s))
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn raster<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let (limits, start, dt_s) = (read_limits(a, 2)?, read_place(a, "start_m")?, a.number("dt_s")?);
+    let raster = RasterSection {
+        width_m: a.number("width_m")?,
+        pitch_m: a.number("pitch_m")?,
+        rows: a.whole("rows")?,
+        there_and_back: a.flag("there_and_back")?,
+    };
+    let feed_m_s = a.number("feed_m_s")?;
+    let setting = a.choice("setting", &SETTINGS)?;
+    planned(a.py(), || {
+        let program = raster.segments(start, feed_m_s)?;
+        sample_linear(&start, &program, &limits, setting, dt_s)
+    })
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+    let a = Arguments::of(keywords)?;
+    let text = a.get("text")?;
+    let bytes = match text.extract::<&[u8]>() {
+        Ok(bytes) => bytes,
+        Err(_) => text.extract::<&str>()?.as_bytes(),
+    };
+    let (start, dt_s) = (a.vector("start_m")?, a.number("dt_s")?);
+    let limits = read_limits(a, start.len())?;
+    let (feed_m_s, blend_s) = (a.number("feed_m_s")?, a.maybe_number("blend_s")?);
+    let setting = GcodeSetting {
+        start_m: &start,
+        feed_m_s,
+        rapid_m_s: a.maybe_number("rapid_m_s")?.unwrap_or(feed_m_s),
+        rotary: &[],
+        exact_corners: blend_s.is_none(),
+        block_delete: a.flag("block_delete")?,
+    };
+    let program = read_gcode(bytes, &setting)
+        .map_err(|error| exceptions::TrajectoryError::new_err(error.to_string()))?;
+    let spec = PathSpec {
+        start_m: start,
+        segments: program.segments,
+        blend_s,
+        dwell_before_s: program.dwell_before_s,
+        dwell_after_s: 0.0,
+    };
+    planned(a.py(), || sample_path(&spec, &limits, dt_s))
+}
+
+#[pyfunction]
+#[pyo3(signature = (**keywords))]
+fn tracking_index(keywords: Option<Keywords<'_, '_>>) -> PyResult<(f64, f64)> {
+    let a = Arguments::of(keywords)?;
+    let programmed = a.signal("programmed_m")?;
+    let gains = (a.number("k_e")?, a.number("k_a")?);
     let index = TrackingIndex::of(
-        &motion.programmed_m,
-        &motion.position_m,
-        &motion.acceleration_m_s2,
-        motion.n_axes,
-        motion.dt_s,
-        (k_e, k_a),
+        &programmed.values,
+        &a.signal("position_m")?.values,
+        &a.signal("acceleration_m_s2")?.values,
+        programmed.n_channels,
+        a.number("dt_s")?,
+        gains,
     )
     .or_raise()?;
     Ok((index.tracking, index.acceleration))
 }
 
-/// Makes a trajectory again from its samples, for copies.
-#[pyfunction]
-fn _trajectory(
-    dt_s: f64,
-    samples: [Bound<'_, PyAny>; 4],
-    alphas: Vec<Alpha>,
-    computing_s: f64,
-) -> PyResult<PyTrajectory> {
-    let [position, velocity, acceleration, programmed] = samples;
-    let position = Signal::read("position_m", &position)?;
-    let motion = SampledMotion {
-        dt_s,
-        n_axes: position.n_channels,
-        velocity_m_s: Signal::read("velocity_m_s", &velocity)?.values,
-        acceleration_m_s2: Signal::read("acceleration_m_s2", &acceleration)?.values,
-        programmed_m: Signal::read("programmed_m", &programmed)?.values,
-        position_m: position.values,
-    };
-    Ok(PyTrajectory { motion, alphas, computing_s })
-}
-
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyTrajectory>()?;
-    module.add_function(wrap_pyfunction!(_trajectory, module)?)?;
+    module.add_function(wrap_pyfunction!(jerk_limited, module)?)?;
+    module.add_function(wrap_pyfunction!(exponential_sigmoid, module)?)?;
+    module.add_function(wrap_pyfunction!(modulated, module)?)?;
+    module.add_function(wrap_pyfunction!(sigmoid_pair, module)?)?;
+    module.add_function(wrap_pyfunction!(spline, module)?)?;
+    module.add_function(wrap_pyfunction!(butterfly, module)?)?;
+    module.add_function(wrap_pyfunction!(spiral, module)?)?;
+    module.add_function(wrap_pyfunction!(raster, module)?)?;
+    module.add_function(wrap_pyfunction!(gcode, module)?)?;
     module.add_function(wrap_pyfunction!(tracking_index, module)?)
 }

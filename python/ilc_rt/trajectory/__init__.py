@@ -1,6 +1,5 @@
 """Trajectories that hold the limits of every axis, and the geometry of contours."""
 
-from ilc_rt._native import Trajectory, sigmoid_pair, tracking_index
 from ilc_rt.trajectory.contour import (
     Arc,
     ContourError,
@@ -10,8 +9,9 @@ from ilc_rt.trajectory.contour import (
     projection_across,
 )
 from ilc_rt.trajectory.curves import butterfly, spiral, spline
-from ilc_rt.trajectory.moves import exponential_sigmoid, jerk_limited, modulated
+from ilc_rt.trajectory.moves import exponential_sigmoid, jerk_limited, modulated, sigmoid_pair
 from ilc_rt.trajectory.programs import gcode, raster
+from ilc_rt.trajectory.sampled import Trajectory, tracking_index
 
 __all__ = [
     "Arc",

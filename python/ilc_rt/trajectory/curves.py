@@ -6,11 +6,10 @@ import math
 from typing import TYPE_CHECKING
 
 from ilc_rt import _native
+from ilc_rt.trajectory.sampled import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from ilc_rt._native import Trajectory
 
 
 def spline(
@@ -65,9 +64,17 @@ def spline(
     >>> path.n_axes
     2
     """
-    limits = (velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)
-    speed = (feed_m_s, curvature_acceleration_max_m_s2)
-    return _native.plan_spline(points_m, speed, dt_s, limits)
+    return Trajectory(
+        **_native.spline(
+            points_m=points_m,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            curvature_acceleration_max_m_s2=curvature_acceleration_max_m_s2,
+        )
+    )
 
 
 def butterfly(
@@ -128,9 +135,19 @@ def butterfly(
     >>> path.n_axes
     2
     """
-    limits = (velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)
-    speed = (feed_m_s, curvature_acceleration_max_m_s2)
-    return _native.plan_butterfly(scale_m, turns, center_m, speed, dt_s, limits)
+    return Trajectory(
+        **_native.butterfly(
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            feed_m_s=feed_m_s,
+            curvature_acceleration_max_m_s2=curvature_acceleration_max_m_s2,
+            scale_m=scale_m,
+            turns=turns,
+            center_m=center_m,
+        )
+    )
 
 
 def spiral(
@@ -195,6 +212,16 @@ def spiral(
     >>> bool(abs((path.position_m[-1] ** 2).sum() ** 0.5 - 0.012) < 1e-12)
     True
     """
-    limits = (velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)
-    speed = (feed_m_s, curvature_acceleration_max_m_s2)
-    return _native.plan_spiral(pitch_m, turns, center_m, speed, dt_s, limits)
+    return Trajectory(
+        **_native.spiral(
+            pitch_m=pitch_m,
+            turns=turns,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            curvature_acceleration_max_m_s2=curvature_acceleration_max_m_s2,
+            center_m=center_m,
+        )
+    )

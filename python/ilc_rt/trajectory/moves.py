@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ilc_rt import _native
+from ilc_rt.trajectory.sampled import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from ilc_rt._native import Trajectory
 
 
 def jerk_limited(
@@ -69,8 +68,17 @@ def jerk_limited(
     >>> round(float(move.t_s[-1]), 6)
     2.75
     """
-    limits = (velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)
-    return _native.plan_linear(points_m, feed_m_s, dt_s, limits, setting)
+    return Trajectory(
+        **_native.jerk_limited(
+            points_m=points_m,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            setting=setting,
+        )
+    )
 
 
 def exponential_sigmoid(
@@ -145,9 +153,19 @@ def exponential_sigmoid(
     >>> " ".join(place for _, place, _, _ in move.alphas)
     'start-up transition end'
     """
-    limits = (velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)
-    oscillation = (amplitude_m, frequency_hz)
-    return _native.plan_exponential(points_m, feed_m_s, dt_s, limits, oscillation, alpha_max)
+    return Trajectory(
+        **_native.exponential_sigmoid(
+            points_m=points_m,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            amplitude_m=amplitude_m,
+            frequency_hz=frequency_hz,
+            alpha_max=alpha_max,
+        )
+    )
 
 
 def modulated(
@@ -214,7 +232,111 @@ def modulated(
     >>> round(float(path.t_s[-1]), 6)
     5.0
     """
-    limits = (velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)
-    return _native.plan_modulated(
-        points_m, feed_m_s, amplitude_m, frequency_hz, dt_s, limits, interpolation
+    return Trajectory(
+        **_native.modulated(
+            points_m=points_m,
+            feed_m_s=feed_m_s,
+            amplitude_m=amplitude_m,
+            frequency_hz=frequency_hz,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            interpolation=interpolation,
+        )
+    )
+
+
+def sigmoid_pair(
+    *,
+    velocity_m_s: ArrayLike,
+    amplitude_m: ArrayLike,
+    omega_rad_s: ArrayLike,
+    phase_zero_s: ArrayLike,
+    corner_s: float,
+    duration_s: float,
+    start_alpha: float,
+    transition_alpha: float,
+    sine_alpha: float,
+    sine_offset_s: float,
+    dt_s: float,
+) -> Trajectory:
+    """Sample two legs on one axis, joined by sigmoids, every alpha given.
+
+    ``x = (x1 a/(a + exp(s c)) + x2 b/(b + exp(-s c))) (1 - exp(-a0 t^2))``
+
+    with c the time from the corner, ``a = |v2/v1|``, ``b = 1/a``, and
+    oscillations on x1 and x2 that fade before the corner and after it.
+
+    Parameters
+    ----------
+    velocity_m_s : array_like of float64, shape (2,)
+        Velocity of each leg, signed, in m/s.
+    amplitude_m : array_like of float64, shape (2,)
+        Amplitude of each oscillation, in m.
+    omega_rad_s : array_like of float64, shape (2,)
+        Its angular frequency, in rad/s.
+    phase_zero_s : array_like of float64, shape (2,)
+        Time at which its phase is 0, in s.
+    corner_s : float
+        When the first leg gives way to the second, in s.
+    duration_s : float
+        Length of the motion, in s; it does not come to rest.
+    start_alpha : float
+        Of the start, a0 in 1/s^2.
+    transition_alpha : float
+        Of the sigmoids between the legs, s in 1/s.
+    sine_alpha : float
+        Of the sigmoids that fade the oscillations, in 1/s.
+    sine_offset_s : float
+        How far from the corner these are half open, in s.
+    dt_s : float
+        Sample time in s.
+
+    Returns
+    -------
+    Trajectory
+        `programmed_m` is without start and transition.
+
+    Raises
+    ------
+    TrajectoryError
+        If a velocity is 0, an alpha or a time is not above 0, or a number is not
+        finite.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    Notes
+    -----
+    No limit is held: it is the thesis's own program, to compare with and to
+    make its reference again. `exponential_sigmoid` plans for a machine.
+
+    References
+    ----------
+    [dimarco2016], Appendix A.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> path = trajectory.sigmoid_pair(
+    ...     velocity_m_s=[10.0, -5.0], amplitude_m=[2.0, 1.0], omega_rad_s=[10.0, 20.0],
+    ...     phase_zero_s=[0.0, 6.01], corner_s=6.0, duration_s=14.0, start_alpha=5.0,
+    ...     transition_alpha=2.0, sine_alpha=3.0, sine_offset_s=1.0, dt_s=0.01)
+    >>> path.n_samples
+    1401
+    """
+    return Trajectory(
+        **_native.sigmoid_pair(
+            velocity_m_s=velocity_m_s,
+            amplitude_m=amplitude_m,
+            omega_rad_s=omega_rad_s,
+            phase_zero_s=phase_zero_s,
+            corner_s=corner_s,
+            duration_s=duration_s,
+            start_alpha=start_alpha,
+            transition_alpha=transition_alpha,
+            sine_alpha=sine_alpha,
+            sine_offset_s=sine_offset_s,
+            dt_s=dt_s,
+        )
     )

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ilc_rt import _native
+from ilc_rt.trajectory.sampled import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from ilc_rt._native import Trajectory
 
 
 def raster(
@@ -77,9 +76,20 @@ def raster(
     >>> path.position_m[-1].tolist()
     [0.02, 0.01]
     """
-    limits = (velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)
-    return _native.plan_raster(
-        width_m, pitch_m, rows, feed_m_s, dt_s, limits, start_m, there_and_back, setting
+    return Trajectory(
+        **_native.raster(
+            width_m=width_m,
+            pitch_m=pitch_m,
+            rows=rows,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            start_m=start_m,
+            there_and_back=there_and_back,
+            setting=setting,
+        )
     )
 
 
@@ -147,7 +157,17 @@ def gcode(
     >>> path.position_m[-1].tolist()
     [0.0, 0.01]
     """
-    limits = (velocity_max_m_s, acceleration_max_m_s2, jerk_max_m_s3)
-    return _native.plan_gcode(
-        text, start_m, feed_m_s, dt_s, limits, rapid_m_s, blend_s, block_delete
+    return Trajectory(
+        **_native.gcode(
+            text=text,
+            start_m=start_m,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            rapid_m_s=rapid_m_s,
+            blend_s=blend_s,
+            block_delete=block_delete,
+        )
     )

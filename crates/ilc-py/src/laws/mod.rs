@@ -235,16 +235,8 @@ impl PyLaw {
 
     /// Announce a run before it begins: the first one, or one not learned from.
     ///
-    /// Parameters
-    /// ----------
-    /// disturbance : float or array_like of float64, shape (n_disturbances,)
-    ///     Measured disturbance of the run about to begin. `update` announces the
-    ///     coming run itself if it is given one.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     If it holds no number, or one that is not finite.
+    /// Its measured disturbance is a number or an array of shape (n_disturbances,). `update` announces the
+    /// coming run itself if it is given one.
     fn expect(&self, py: Python<'_>, disturbance: &Bound<'_, PyAny>) -> PyResult<()> {
         let values = read_disturbance("disturbance", disturbance)?;
         let mut state = self.state.borrow(py)?;
@@ -301,9 +293,7 @@ impl PyLaw {
         disturbance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let (u, e) = (Given::read("u", u)?, Given::read("e", e)?);
-        let given = disturbance.filter(|given| !given.is_none());
-        let told = given.map(|given| read_disturbance("disturbance", given)).transpose()?;
-        let told = told.unwrap_or_default();
+        let told = read_told("disturbance", disturbance)?;
         let mut state = self.state.borrow(py)?;
         self.fit(py, &mut state, u.layout(), e.layout(), Some(&told))?;
         state.law.remember(u.values()?, e.values()?, &told).or_raise()
@@ -315,13 +305,12 @@ impl PyLaw {
         py: Python<'_>,
         disturbance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(Vec<usize>, Vec<f64>)> {
-        let given = disturbance.filter(|given| !given.is_none());
-        let told = given.map(|given| read_disturbance("disturbance", given)).transpose()?;
+        let told = read_told("disturbance", disturbance)?;
         let state = self.state.borrow(py)?;
         if state.size.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
-        let found = state.law.relevant(&told.unwrap_or_default()).or_raise()?;
+        let found = state.law.relevant(&told).or_raise()?;
         Ok(found.into_iter().unzip())
     }
 
@@ -333,13 +322,12 @@ impl PyLaw {
         disturbances: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<usize>> {
         let keep = whole("keep", keep)?;
-        let given = disturbances.filter(|given| !given.is_none());
-        let told = given.map(|given| read_disturbance("disturbances", given)).transpose()?;
+        let told = read_told("disturbances", disturbances)?;
         let mut state = self.state.borrow(py)?;
         if state.size.is_none() {
             return Ok(Vec::new());
         }
-        state.law.trim(keep, &told.unwrap_or_default()).or_raise()
+        state.law.trim(keep, &told).or_raise()
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
@@ -415,6 +403,11 @@ impl PyLaw {
     ) -> PyResult<T> {
         Ok(look(self.state.borrow(py)?.law.as_mut()))
     }
+}
+
+/// Reads disturbances; `None` is an empty one.
+fn read_told(name: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
+    given.map_or_else(|| Ok(Vec::new()), |given| read_disturbance(name, given))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
