@@ -473,7 +473,7 @@ def test_a_fault_is_an_exception_with_its_fields(gantry: Path, tmp_path: Path) -
     assert abs(fault.value) > 1e-5
     cycles = fault.cycles
     assert isinstance(cycles, LastCycles)
-    assert len(cycles.encoder_m) == len(cycles.missing) == 32
+    assert 0 < len(cycles.encoder_m) == len(cycles.missing) <= 32
     assert {len(row) for row in cycles.reference_m} == {2}
     assert campaign.result.fault is not None
     assert not campaign.result.unkept
