@@ -1,7 +1,7 @@
 import builtins
 from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, Protocol, final
+from typing import Any, Literal, Protocol, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +32,6 @@ __all__ = [
     "_made",
     "_made_of_kind",
     "analyze",
-    "butterfly",
     "check_options",
     "check_relevance_weights",
     "check_response",
@@ -44,7 +43,6 @@ __all__ = [
     "discretize",
     "evaluate_experiment",
     "excitation",
-    "exponential_sigmoid",
     "fit_rational",
     "fit_second_order",
     "fit_velocity_loop",
@@ -52,13 +50,17 @@ __all__ = [
     "formation_weights",
     "frequency_response",
     "from_transfer_function",
-    "gcode",
     "identify_axis",
     "instantaneous_frequency",
-    "jerk_limited",
-    "modulated",
+    "plan_butterfly",
+    "plan_exponential",
+    "plan_gcode",
+    "plan_linear",
+    "plan_modulated",
+    "plan_raster",
+    "plan_spiral",
+    "plan_spline",
     "projection_across",
-    "raster",
     "refuse_divergent",
     "relative_deviation",
     "repeatability",
@@ -69,8 +71,6 @@ __all__ = [
     "second_order_response",
     "sigmoid_pair",
     "single_experiment",
-    "spiral",
-    "spline",
     "tracking_index",
     "transports",
     "tune",
@@ -251,6 +251,7 @@ class Library:
 class EventStream:
     def __iter__(self) -> Iterator[str]: ...
     def __next__(self) -> str: ...
+    def raised(self) -> BaseException | None: ...
     def stop(self, signal: int = ...) -> None: ...
 
 def check_options(verb: str, arguments: list[str]) -> None: ...

@@ -75,7 +75,7 @@ class Campaign:
         Learn; if not, every run is like the first.
     disturbance : callable, array_like of float64 or None
         Measured disturbance before each run, e.g. a temperature: stored with
-        the run, and given to the law for the next run. Either one row a run,
+        the run, and given to the law for the next run. Either one row per run,
         shape (n_runs,) or (n_runs, n_disturbances), or a function of the run's
         number (from 0) that is called while the axes return. The controller
         then runs inside this process.

@@ -23,14 +23,12 @@ ROOT = Path(__file__).parents[2]
 DERIVED = ("docs/gallery/",)
 # Folders and files that are not reworded yet; the list shrinks to nothing.
 NOT_YET_CLEAN: tuple[str, ...] = (
-    "ARCHITECTURE.md",
     "crates/ilc-py/",
     *(f"crates/ilc-rt/src/{name}/" for name in (
         "campaign", "cli", "config", "design", "schema", "trajectory", "model/identify",
         "learning/law",
     )),
     "crates/ilc-rt/src/learning/gate.rs",
-    "docs/cell.md",
     "papers/",
     "python/",
 )  # fmt: skip

@@ -60,7 +60,7 @@ OPTIONS = {
     "no such file": (["nix.toml"], ["nix.toml", "cannot be read", "No such file"]),
     "a folder for a file": (["."], ["cannot be read", "not a regular file"]),
     "unknown option": (["cell.toml", "--fast"], ["--fast", "--help"]),
-    "no runs": (["cell.toml", "--iterations", "0"], ["--iterations", "'0'", "1.."]),
+    "no runs": (["cell.toml", "--iterations", "0"], ["--iterations", "'0'", "allowed 1 to 4294967295"]),
     "no such measure": (["cell.toml", "--measure", "eye"], ["'eye'", "encoder, tcp"]),
     "no bus at all": (
         ["cell.toml", "--bus", "usb:0"], ["--bus", "`usb:0`", "can:INTERFACE", "udp:GROUP"],
@@ -76,7 +76,7 @@ OPTIONS = {
         ["cell.toml", "--bus", "can:an-interface-too-long"], ["1 to 15 printable characters"],
     ),
     "drives in another program": (
-        ["cell.toml", "--bus", "loopback:"], ["--bus", "loopback:", "can:, udp:, zenoh:"],
+        ["cell.toml", "--bus", "loopback:"], ["--bus", "loopback:", "can:INTERFACE, udp:"],
     ),
     "library in no folder": (
         ["cell.toml", "--library", "nix/library.db"],

@@ -238,8 +238,9 @@ def test_arguments_reach_the_controller(
     list(campaign.run(5))
     said = (tmp_path / "argv").read_text()
     assert said == str(
-        ["run", str(gantry), "--events", "--with-parent", "--iterations", "5", "--library", "l.db",
-         "--measure", "encoder", "--resume", "--bus", "udp:239.1.1.1", "--lockstep"]
+        ["run", str(gantry), "--events", "--with-parent", "--bus", "udp:239.1.1.1", "--measure",
+         "encoder", "--lockstep", "--simulated-drives", "--library", "l.db", "--iterations", "5",
+         "--resume"]
     )  # fmt: skip
 
 

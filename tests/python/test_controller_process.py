@@ -77,7 +77,8 @@ def test_the_job_is_done_and_learned(job: Job) -> None:
 
 def test_the_figures_are_those_of_the_events_and_of_the_library(job: Job) -> None:
     """Figures, events and library agree."""
-    assert set(job.figures) == {"campaign", "status", "reason", "iterations"}
+    assert set(job.figures) == {"campaign", "status", "reason", "axis_units", "iterations"}
+    assert job.figures["axis_units"] == ["m", "m"]
     assert job.figures["status"] == "completed"
     told = [event for event in job.events if event["event"] == "iteration"]
     assert [event["index"] for event in told] == list(range(RUNS))

@@ -167,18 +167,19 @@ impl<'a, 'py> Arguments<'a, 'py> {
         }
     }
 
-    /// Returns a copy that nothing changes later: lists and arrays are copied, too.
+    /// Returns a copy that nothing changes later: lists and arrays are copied, NumPy's numbers are Python's.
     pub(crate) fn kept(self) -> PyResult<Bound<'py, PyDict>> {
         let kept = PyDict::new(self.py());
         for (name, value) in self.0 {
-            let is_mutable =
-                value.is_instance_of::<PyList>() || value.hasattr("__array_interface__")?;
-            if is_mutable {
-                let copy = self.py().import("copy")?.getattr("deepcopy")?.call1((value,))?;
-                kept.set_item(name, copy)?;
+            let shape = value.getattr_opt("shape")?;
+            let value = if shape.is_some_and(|shape| shape.len().is_ok_and(|axes| axes == 0)) {
+                value.call_method0("item")?
+            } else if value.is_instance_of::<PyList>() || value.hasattr("__array_interface__")? {
+                self.py().import("copy")?.getattr("deepcopy")?.call1((value,))?
             } else {
-                kept.set_item(name, value)?;
-            }
+                value
+            };
+            kept.set_item(name, value)?;
         }
         Ok(kept)
     }

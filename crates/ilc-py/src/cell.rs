@@ -37,7 +37,7 @@ impl PyCell {
     ///
     /// - path : str or os.PathLike: The file.
     /// - allow_divergent : bool: Whether a law that will not converge with the cell's model is
-    ///     accepted, whatever the file says.
+    ///   accepted, whatever the file says.
     ///
     /// Returns Cell.
     /// Raises ValueError in one line: file, key, value and what is allowed.

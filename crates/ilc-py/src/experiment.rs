@@ -45,7 +45,7 @@ impl From<IdentificationError> for Failure {
 /// - cell : Cell: The cell.
 /// - arguments : list of str: Options of the identification, as words of ``ilc-rt identify``.
 /// - excite : callable: Called with a dict of the experiment's figures; returns learned input and
-///     error as two arrays of shape (n_samples * n_axes,).
+///   error as two arrays of shape (n_samples * n_axes,).
 /// - report : callable: Called with a sentence on each band.
 ///
 /// Returns dict: The experiment, its signals, response, models, uncertainty and doubt.

@@ -78,7 +78,7 @@ def list_runs(
     json_file: JsonRows = None,
     csv_file: CsvRows = None,
 ) -> None:
-    """List the runs, one a line.
+    """List the runs, one per line.
 
     Example: ilc library list ilc-library.db --cell gantry
     """
@@ -199,7 +199,7 @@ def error_text(row: Mapping[str, Any], figure: str) -> str:
 
 
 def note(row: Mapping[str, Any]) -> str:
-    """Return what became of a run in a few words."""
+    """Return the outcome of a run in a few words."""
     said = ("rolled back", row["rolled_back"]), ("learning off", row["learning_off"])
     return ", ".join(words for words, holds in said if holds)
 

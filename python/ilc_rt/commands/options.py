@@ -27,7 +27,7 @@ TYPES: dict[str, type] = {
 
 
 class DriveChoice(str, Enum):
-    """Whether to start simulated drives."""
+    """Choice of simulated or external drives."""
 
     auto = "auto"
     simulated = "simulated"

@@ -335,8 +335,10 @@ impl PyLaw {
         let class = slf.get_type().name()?.to_string();
         let made_by =
             optimal::METHODS.contains(&this.kind).then(|| format!("{class}.{}", this.kind));
-        let arguments = this.arguments.bind(slf.py());
-        Arguments::new(arguments).call(&made_by.unwrap_or(class))
+        let arguments = this.arguments.bind(slf.py()).copy()?;
+        // The runs that it has are not what the law is: a campaign resumes with another library.
+        let _ = arguments.del_item("library");
+        Arguments::new(&arguments).call(&made_by.unwrap_or(class))
     }
 
     /// Pickled and copied as it was made: what it has learned since is not in the copy.

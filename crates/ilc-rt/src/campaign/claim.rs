@@ -1,4 +1,4 @@
-//! The claim to a campaign: two programs must not go on with the same one.
+//! The claim to a campaign: two programs must not continue the same one.
 //!
 //! A name in the kernel's own space, which is free again the moment its owner ends, however it ends:
 //! no file is left behind that could outlive a killed process.

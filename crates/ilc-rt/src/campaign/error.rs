@@ -13,7 +13,7 @@ use crate::library::LibraryError;
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// The cell description is refused.
+    /// The cell description cannot be used.
     #[error(transparent)]
     Design(#[from] DesignError),
     /// The experiment is refused.
@@ -68,7 +68,7 @@ pub enum CampaignError {
     /// The library.
     #[error("{0}")]
     Library(#[from] LibraryError),
-    /// There is nothing to resume.
+    /// There is no campaign to resume.
     #[error("--resume: {0}")]
     Resume(#[from] ResumeError),
     /// A bus in one process was asked of a program that has no drives in it.
@@ -94,7 +94,7 @@ pub enum CampaignError {
     /// A thread could not be started.
     #[error("the {what} thread could not be started: {source}")]
     Thread {
-        /// Its name.
+        /// Name of the thread.
         what: &'static str,
         /// Reason given by the system.
         source: std::io::Error,

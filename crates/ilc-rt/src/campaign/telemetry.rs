@@ -18,21 +18,21 @@ use crate::fieldbus::transport::opening::zenoh_reach::{self, Reach};
 
 /// Messages that may wait for the network.
 const QUEUE: usize = 1024;
-/// Time that the end of a campaign waits for messages in the queue, and for subscribers. One
-/// that no longer reads is left after a second.
+/// Time that the end of a campaign waits for the queue and for the subscribers. One that no longer reads
+/// is left after a second.
 const CLOSE_MAX: Duration = Duration::from_secs(6);
-/// Time for subscribers to confirm that they have received all.
+/// Time that subscribers may take to acknowledge the last message.
 const HEARD_MAX: Duration = Duration::from_secs(3);
 
-/// Time that the token outlives the last message: Zenoh sends declarations before data that waits, and
-/// a subscriber leaves when the token goes.
+/// Time that the token outlives the last message: Zenoh sends declarations before data that waits, and a
+/// subscriber leaves when the token goes.
 const LINGER: Duration = Duration::from_millis(250);
 
 /// Something to publish.
 struct Message {
     key: &'static str,
     json: String,
-    /// True for the state, which a late subscriber gets.
+    /// A late subscriber gets it as the state.
     is_state: bool,
 }
 
@@ -65,7 +65,7 @@ impl Telemetry {
         Ok(Self { queue: Some(queue), thread: Some(thread), ended, dropped: 0 })
     }
 
-    /// Publishes under `ilc/<cell>/<key>`, unless the queue is full; `is_state` is what a late joiner
+    /// Publishes under `ilc/<cell>/<key>`, unless the queue is full; `is_state` marks what a late subscriber
     /// gets.
     pub(super) fn send(&mut self, key: &'static str, json: String, is_state: bool) {
         let Some(queue) = &self.queue else { return };
@@ -138,7 +138,7 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
     session.close().wait()
 }
 
-/// Waits until every subscriber has received all that was published: a monitor answers on `heard`, and its
+/// Waits until the subscribers have received all that was published: a monitor answers on `heard`, and its
 /// answer comes after what it was sent before. Those that do not answer get [`LINGER`].
 fn await_readers(session: &zenoh::Session, prefix: &str) -> zenoh::Result<()> {
     let asked = Instant::now();
