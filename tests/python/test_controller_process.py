@@ -9,10 +9,10 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
-from ilc_rt.figures import Figures
 from processes_fixture import PATIENT, Bench, free_port, goodbye
 
 from ilc_rt.events import parse_event
+from ilc_rt.figures import Figures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
