@@ -13,7 +13,7 @@ from ilc_rt._native import (
 )
 from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
 from ilc_rt.campaign import Campaign, Law
-from ilc_rt.errors import BadInputError, CampaignError
+from ilc_rt.errors import BadInputError, CampaignError, FaultError
 from ilc_rt.laws import (
     AdjointIlc,
     ConstrainedIlc,
@@ -43,6 +43,7 @@ __all__ = [
     "Cell",
     "ConstrainedIlc",
     "ErrorFeedforwardIlc",
+    "FaultError",
     "FlexibleIlc",
     "Gate",
     "IterationRecord",

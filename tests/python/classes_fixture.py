@@ -13,6 +13,7 @@ from ilc_rt import (
     Cell,
     ConstrainedIlc,
     ErrorFeedforwardIlc,
+    FaultError,
     FlexibleIlc,
     Gate,
     IterationRecord,
@@ -192,6 +193,7 @@ EXAMPLES = {
     IterationRecord: (lambda: IterationRecord.from_row(ROW, "nowhere.db"), None),
     CampaignResult: (lambda: CampaignResult("nowhere.db", cell="gantry"), None),
     CampaignError: (lambda: CampaignError("node 2 is silent", exit_code=3), None),
+    FaultError: (lambda: FaultError("node 2 is silent", kind="silent_drive", node=2), None),
     BadInputError: (lambda: BadInputError("no such file"), None),
 }
 ROW = {"id": 4, "index": 2, "tracking_inf_m": 1e-3, "tracking_rms_m": 1e-4}

@@ -13,11 +13,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from ilc_rt import BadInputError, Campaign, CampaignError, CampaignResult, processes
+from ilc_rt import (
+    BadInputError,
+    Campaign,
+    CampaignError,
+    CampaignResult,
+    FaultError,
+    processes,
+)
 from ilc_rt.events import (
     EndEvent,
     EventError,
     IterationEvent,
+    LastCycles,
     LatencyEvent,
     StartEvent,
     StateEvent,
@@ -444,3 +452,29 @@ def test_events_survive_a_round_trip() -> None:
         assert event is not None
         assert parse_event(json.dumps(event_payload(event))) == event
     assert isinstance(parse_event(json.dumps(latency)), LatencyEvent)
+
+
+def test_a_fault_is_an_exception_with_its_fields(gantry: Path, tmp_path: Path) -> None:
+    """Kind, axis, node, numbers and the last cycles, beside the sentence."""
+    text = gantry.read_text().replace(
+        "following_error_max_m = 0.01", "following_error_max_m = 1e-4"
+    )
+    cell = tmp_path / "tight.toml"
+    cell.write_text(text)
+    campaign = Campaign(cell, bus="loopback:", library=tmp_path / "l.db")
+    with pytest.raises(FaultError) as caught:
+        list(campaign.run(2))
+    fault = caught.value
+    assert fault.kind in {"following_error", "drive_fault"}
+    assert (fault.axis, fault.node) in {("x", 1), ("y", 2)}
+    assert fault.axis in str(fault)
+    assert str(fault.node) in str(fault)
+    assert (fault.limit, fault.unit, fault.exit_code) == (1e-4, "m", 3)
+    assert fault.value is not None
+    assert abs(fault.value) > 1e-5
+    cycles = fault.cycles
+    assert isinstance(cycles, LastCycles)
+    assert 0 < len(cycles.encoder_m) == len(cycles.missing) <= 32
+    assert {len(row) for row in cycles.reference_m} == {2}
+    assert campaign.result.fault is not None
+    assert not campaign.result.unkept

@@ -183,7 +183,7 @@ impl Running<'_> {
         match std::mem::replace(&mut update.input, Ok(Vec::new())) {
             Ok(input) => self.policy.send(&mut self.mail, input, update.update_ms),
             Err(error) => {
-                self.fail(FaultKind::Law, format!("the law refused the last run: {error}"))
+                self.fail(FaultKind::Law, format!("the law refused the last run: {error}"));
             }
         }
         update

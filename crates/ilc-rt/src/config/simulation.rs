@@ -34,7 +34,7 @@ impl Default for Simulation {
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct AxisSimulation {
     /// Moving mass, the mode's included.
-    #[schemars(range(min = 0.001, max = 100000.0))]
+    #[schemars(range(min = 0.001, max = 1e5))]
     pub mass_kg: f64,
     /// Natural frequency for which the cascade is tuned.
     #[schemars(range(min = 0.1, max = 1000.0))]

@@ -1,5 +1,7 @@
 //! The limited quantities of an axis and their units.
 
+#![allow(clippy::disallowed_methods, reason = "the calls of the derived schema are cold")]
+
 use std::fmt;
 
 use schemars::JsonSchema;

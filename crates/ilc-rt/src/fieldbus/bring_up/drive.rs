@@ -230,11 +230,7 @@ impl Remote<'_> {
         if !has_power(state) {
             return Ok(());
         }
-        Err(BringUpError::UnderPower {
-            node: self.node,
-            statusword: word.0,
-            state: state.map_or_else(|| "no known state".to_owned(), |state| state.to_string()),
-        })
+        Err(BringUpError::UnderPower { node: self.node, statusword: word })
     }
 
     /// Writes a controlword and waits until the drive has no power any more, or the time is over.

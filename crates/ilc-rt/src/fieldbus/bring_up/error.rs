@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::sdo_client::SdoError;
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
-use crate::fieldbus::cia402::Mode;
+use crate::fieldbus::cia402::{Mode, Statusword};
 
 /// Reason that a node cannot be brought up: node, step, expected and found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -109,16 +109,16 @@ pub enum BringUpError {
     },
     /// The drive keeps its power.
     #[error(
-        "node {node}: the drive was left under power and does not let go: found {state} \
-         (0x6041 = 0x{statusword:04X}), needed switch on disabled; switch it off and on again"
+        "node {node}: the drive was left under power and does not let go: found {} \
+         (0x6041 = 0x{:04X}), needed switch on disabled; switch it off and on again",
+        statusword.state().map_or_else(|| "no known state".to_owned(), |state| state.to_string()),
+        statusword.0
     )]
     UnderPower {
         /// The node.
         node: NodeId,
         /// Object 0x6041.
-        statusword: u16,
-        /// Its state in words.
-        state: String,
+        statusword: Statusword,
     },
     /// A question to the node failed.
     #[error("{source} (step: {step})")]
