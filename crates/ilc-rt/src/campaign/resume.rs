@@ -113,7 +113,6 @@ impl RollbackPolicy {
     }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
 fn refused(error: LearningError) -> CampaignError {
     ResumeError::Refused(error).into()
 }

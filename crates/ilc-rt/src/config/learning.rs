@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::learning::gate::GateParameters;
 use crate::learning::ladder::LadderRule;
 use crate::learning::law::catalogue::{LawName, every_law};
-use crate::learning::law::{LawParameters, LawTables};
+use crate::learning::law::{Json, LawParameters, LawTables};
 use crate::schema::field_order;
 
 /// Growth of the RMS error over the best run at which the best input is restored, if nothing is said.

@@ -210,9 +210,7 @@ fn plan_piece<C: Curve>(
             slow_down(&mut speed, &ticks, &found, step_m, window);
         } else {
             let factor = most.slower.min(0.98);
-            for v in &mut speed {
-                *v *= factor;
-            }
+            speed = speed.iter().map(|v| v * factor).collect();
             acceleration *= factor * factor;
             window = ticks_at_least(window as f64 / factor);
         }
