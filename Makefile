@@ -7,6 +7,8 @@ SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o
            Cargo.toml Cargo.lock pyproject.toml README.md
 # Half of the Python tests wait for a process or for time to pass.
 JOBS    := $(shell expr 2 \* $$(nproc))
+# Tests that hold derived files against the source.
+DERIVED := --test derived --test derived_cell
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
@@ -43,10 +45,8 @@ $(VENV)/.bench: $(VENV)/.built
 
 build: $(VENV)/.built ## Build the binaries and the Python package into .venv
 
-derived: build ## Write docs/cell.schema.json and the tables of docs/cell.md from the schema of the cell
-	$(BIN)/ilc-rt schema > docs/cell.schema.json
-	$(BIN)/ilc-rt schema --document docs/cell.md > build/cell.md
-	mv build/cell.md docs/cell.md
+derived: ## Write the files and tables that derive from the source
+	ILC_DERIVE=1 cargo test --release --workspace --quiet $(DERIVED)
 
 demo: build ## Ten runs on simulated drives, the error falling, and a report
 	$(BIN)/ilc demo
@@ -87,7 +87,7 @@ fmt: $(VENV)/.test ## Format
 	cargo fmt --all
 	$(BIN)/ruff format python papers tests examples
 
-lint: $(VENV)/.test ## Formatting, lints, types, layers
+lint: $(VENV)/.test ## Formatting, lints, types, layers, language
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
 	$(BIN)/ruff format --check python papers tests examples
@@ -95,8 +95,8 @@ lint: $(VENV)/.test ## Formatting, lints, types, layers
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest ilc_rt._native
 	$(BIN)/lint-imports
-	$(BIN)/ilc-rt schema | cmp - docs/cell.schema.json || { echo "stale: run make derived"; exit 1; }
-	$(BIN)/ilc-rt schema --document docs/cell.md | cmp - docs/cell.md || { echo "stale: run make derived"; exit 1; }
+	cargo test --release --workspace --quiet $(DERIVED)
+	$(BIN)/python tests/lint/language.py
 
 docs: ## Rust documentation, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps

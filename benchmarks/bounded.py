@@ -1,4 +1,4 @@
-"""One update of learning within bounds: ours beside interior-point solvers, in one process."""
+"""One update of ILC within bounds: ours against interior-point solvers, in one process."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def compare(n_samples: int) -> dict[str, float]:
         program = clarabel.DefaultSolver(upper, gradient, stacked, right, cones, settings)
         return np.array(program.solve().x)[-n_samples:]
 
-    # Where the cost hardly depends on the input, their inputs are less exact than their costs.
+    # If the cost hardly depends on the input, their inputs are less exact than their costs.
     for name, solve in (("PIQP", by_piqp), ("Clarabel", by_clarabel)):
         gap = float(np.abs(solve() - ours).max() / INPUT_MAX)
         if gap > 1e-3:

@@ -12,18 +12,18 @@ from ilc_rt import NormOptimalIlc
 
 
 def forget_peak() -> None:
-    """Let the largest memory of this process be that of now."""
+    """Reset the peak memory of this process to the current value."""
     Path("/proc/self/clear_refs").write_text("5")
 
 
 def peak_mb() -> float:
-    """Return the largest memory that this process had since."""
+    """Return the peak memory of this process since then."""
     lines = Path("/proc/self/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:")) / 1024.0
 
 
 def main() -> None:
-    """Print the median seconds and the memory over that of input and error themselves."""
+    """Print the median seconds, and the memory beyond that of input and error."""
     n_samples = 1_000_000
     u, e = np.zeros(n_samples), np.sin(0.01 * np.arange(n_samples))
     law = NormOptimalIlc(axis(), 100, r=R)

@@ -1,4 +1,4 @@
-"""The one problem that all solvers get: an axis, its cost, and that cost as a sparse system."""
+"""The problem for all solvers: an axis, its cost, and that cost as a sparse system."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def problem(n_samples: int, *, dense: bool = True) -> Problem:
     model = discretize(second_order(157.0, 0.5), DT_S)
     a, b, c = model.a, model.b, model.c
     n_states = a.shape[0]
-    # The error of sample k + 1 belongs to v[k]; the last input shows in no sample of the run.
+    # The error of sample k + 1 belongs to v[k]; the last input affects no sample of the run.
     weights = np.ones(n_samples)
     weights[-1] = 0.0
     eye = sparse.identity(n_samples, format="csc")
@@ -80,7 +80,7 @@ def problem(n_samples: int, *, dense: bool = True) -> Problem:
 
 
 def median_s(work: Callable[[], object], least_s: float = 0.3, most: int = 2000) -> float:
-    """Return the median duration of a call, repeated for some time after one that warms up."""
+    """Return the median duration of a call, repeated for some time after a warm-up."""
     work()
     durations: list[float] = []
     while len(durations) < 3 or (sum(durations) < least_s and len(durations) < most):

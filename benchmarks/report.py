@@ -1,4 +1,4 @@
-"""Run the comparisons and write docs/benchmarks.md, with the figures of the Rust benches beside."""
+"""Run the comparisons and write docs/benchmarks.md, with the figures of the Rust benches."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ PEERS = ("numpy", "scipy", "osqp", "clarabel", "piqp")
 
 
 def main() -> None:
-    """Measure, and write what came out."""
-    # Looked for first: the comparisons take minutes.
+    """Measure, and write the report."""
+    # Checked first: the comparisons take minutes.
     in_rust = criterion(criterion_folder())
     lines = [
         "# Benchmarks",
@@ -68,13 +68,13 @@ def main() -> None:
 
 
 def progress(what: str, compare: object, n_samples: int) -> dict[str, float]:
-    """Say what is being measured, and measure it."""
+    """Print the name of a measurement, and run it."""
     print(f"{what} ...", flush=True)
     return compare(n_samples)
 
 
 def table(columns: dict[int, dict[str, float]]) -> list[str]:
-    """Return rows of solvers, each with its time and how many times as long as ours it takes."""
+    """Return a row for each solver, with its time absolute and relative to ours."""
     names = list(next(iter(columns.values()), {}))
     if not names or any("ilc-rt" not in seconds for seconds in columns.values()):
         fail(f"a table of {', '.join(f'N = {n}' for n in columns) or 'nothing'} has no figures")
@@ -92,7 +92,7 @@ def table(columns: dict[int, dict[str, float]]) -> list[str]:
 
 
 def criterion_folder() -> Path:
-    """Return where the Rust benches leave their figures."""
+    """Return the folder of the Rust benches' figures."""
     if home := os.environ.get("CRITERION_HOME"):
         return Path(home)
     described = json.loads(command("cargo", "metadata", "--no-deps", "--format-version", "1"))
@@ -112,7 +112,7 @@ def criterion(folder: Path) -> list[tuple[str, float]]:
 
 
 def fail(reason: str) -> NoReturn:
-    """End with one line; what was written before stays as it is."""
+    """Exit with one line; the report stays unchanged."""
     sys.exit(f"benchmarks/report.py: {reason}")
 
 
@@ -133,7 +133,7 @@ def processor() -> str:
 
 
 def command(*words: str) -> str:
-    """Return what a command prints."""
+    """Return the output of a command."""
     done = subprocess.run(words, check=True, capture_output=True, text=True, cwd=ROOT)
     return done.stdout.strip()
 

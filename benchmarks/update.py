@@ -1,4 +1,4 @@
-"""One update of norm-optimal learning: ours beside the solvers that people have, in one process."""
+"""One update of norm-optimal ILC: ours against common solvers, in one process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ilc_rt import NormOptimalIlc
 
 
 def compare(n_samples: int) -> dict[str, float]:
-    """Return the median seconds of an update by each solver, factors kept where they can be."""
+    """Return the median seconds of an update by each solver, factors kept where possible."""
     task = problem(n_samples)
     zero = np.zeros(n_samples)
     law = NormOptimalIlc(axis(), n_samples, r=R)
@@ -49,7 +49,7 @@ def compare(n_samples: int) -> dict[str, float]:
 
 
 def by_quadratic_programs(task: object, check: object) -> dict[str, float]:
-    """Return the seconds of the solvers for quadratic programs, to 1e-8."""
+    """Return the seconds of the QP solvers, to 1e-8."""
     import clarabel
     import osqp
 

@@ -1,13 +1,11 @@
 """A two-axis gantry learns its contour, run from Python.
 
-The cell description beside this file says everything about the machine; the
-drives are simulated inside this process, in lock-step, so that the figures
-are the same on every computer. Run it with
+The cell description beside this file defines the machine; the drives are simulated inside this
+process, in lock-step, so the figures are the same on every computer. Run it with
 
     python examples/01_gantry.py [RUNS]
 
-It prints one line a run and leaves a picture and a library of the runs in
-the current folder.
+It prints one line per run and leaves a picture and a library of the runs in the current folder.
 """
 
 import sys

@@ -1,4 +1,5 @@
-//! The gantry of `01_gantry.toml`, ten runs inside this process: what `01_gantry.py` does, in Rust.
+//! The gantry of `01_gantry.toml`, ten runs inside this process: the Rust version of
+//! `01_gantry.py`.
 //!
 //! `cargo run --release -p ilc-tests --example 01_gantry`
 
@@ -17,17 +18,17 @@ use ilc_sim::{ClockMode, Machine};
 fn main() -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let cell = Cell::load(&root.join("examples/01_gantry.toml"))?;
-    // The drives run in this thread, one cycle for every SYNC: no clock, the same numbers every time.
+    // The drives run in this thread, one cycle per SYNC: no clock, the same numbers every time.
     let drives = Machine::from_cell(&cell, ClockMode::LockStep)?;
     let bus = Box::new(InProcess::new(drives, 1024));
-    // Those of the command line.
+    // The defaults of the command line.
     let options: Options =
         parse(&["--lockstep", "--library", ":memory:", "--no-telemetry"].map(str::to_owned))?;
     println!("run  max tracking um  max contour um");
     let outcome = campaign::run(&cell, &options, bus, None, &mut |event| {
         if let Event::Iteration { index, figures, .. } = event {
             let tracking = figures.tracking_inf_m * 1e6;
-            // Absent where one axis moves alone.
+            // Absent if only one axis moves.
             let contour = figures.contour_inf_m.unwrap_or_default() * 1e6;
             println!("{index:>3}  {tracking:>15.1}  {contour:>14.1}");
         }

@@ -1,12 +1,12 @@
-"""Watch a controller learn, from any computer on the network.
+"""Monitor a learning controller from any computer on the network.
 
 Start this in one terminal and `ilc run examples/01_gantry.toml` in another:
 
     python examples/02_monitor.py [RUNS] [ENDPOINT]
 
-It prints the error of each run as it falls, and ends after RUNS runs. With
-an ENDPOINT, as tcp/192.168.1.5:7447, it connects there instead of looking
-around on the local network. A monitor can command nothing.
+It prints the error of each run as it falls, and ends after RUNS runs. With an ENDPOINT, e.g.
+tcp/192.168.1.5:7447, it connects there instead of discovering the local network. A monitor cannot
+command anything.
 """
 
 import math

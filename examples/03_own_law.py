@@ -1,8 +1,7 @@
-"""A learning law of one's own, run by the real controller.
+"""A custom learning law, run by the real controller.
 
-A law is any object with `update(u, e, disturbance=None)`. It is called
-between the runs, never inside the servo loop, so it may take its time and
-use whatever Python offers. Run it with
+A law is any object with `update(u, e, disturbance=None)`. It is called between the runs, never
+inside the servo loop, so it may take its time and use anything in Python. Run it with
 
     python examples/03_own_law.py [RUNS]
 """
@@ -19,7 +18,7 @@ HERE = Path(__file__).parent
 
 
 class ShiftedErrorLaw:
-    """Add a share of the smoothed error, a little earlier than it occurred.
+    """Add a share of the smoothed error, shifted to slightly earlier samples (look-ahead).
 
     Parameters
     ----------
@@ -44,14 +43,14 @@ class ShiftedErrorLaw:
         disturbance: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
         """Return the next input; all shapes are (n_samples, n_axes), in m."""
-        del disturbance  # this law knows nothing of disturbances
+        del disturbance  # this law ignores disturbances
         ahead = np.concatenate((e[self.lead_samples :], np.zeros_like(e[: self.lead_samples])))
         wanted = u + self.gain * ahead
         return np.column_stack([np.convolve(axis, self.window, "same") for axis in wanted.T])
 
 
 def main() -> None:
-    """Run a campaign with the law above and print how the error falls."""
+    """Run a campaign with the law above and print the falling error."""
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 8
     law = ShiftedErrorLaw(gain=0.5, lead_samples=12, window_samples=21)
     campaign = Campaign(HERE / "01_gantry.toml", law=law, bus="loopback:", library="03_own_law.db")

@@ -1,13 +1,12 @@
-"""The same feed with an oscillation, three ways, and a butterfly.
+"""The same feed with a superimposed oscillation, three ways, and a butterfly.
 
-A modulated tool path breaks chips by an oscillation along the feed. A machine
-that completes every move loses frequency, one that starts the next on time
-loses amplitude; exponential/sigmoid (E/S) interpolation loses neither. Run it
-with
+A modulated tool path breaks chips by an oscillation along the feed. A machine that completes every
+move loses frequency, one that starts the next on time loses amplitude; exponential/sigmoid (E/S)
+interpolation loses neither. Run it with
 
     python examples/05_trajectories.py
 
-It prints one line a trajectory and leaves a picture in the current folder.
+It prints one line per trajectory and leaves a picture in the current folder.
 """
 
 import numpy as np
@@ -42,7 +41,7 @@ def main() -> None:
     over_time.set(xlabel="time (s)", ylabel="position (mm)", title="Modulated tool path, 8 Hz")
     over_time.legend(fontsize="small")
 
-    contour = trajectory.butterfly(dt_s=0.002, **LIMITS)
+    contour = trajectory.butterfly(dt_s=0.002, curvature_acceleration_max_m_s2=0.02, **LIMITS)
     speed_m_s = np.hypot(*contour.velocity_m_s.T)
     print(f"{'butterfly':38s}{contour.t_s[-1]:6.2f} s{'':14s}{contour.computing_s * 1e3:10.1f} ms")
     points = plane.scatter(*(contour.position_m.T * 1e3), c=speed_m_s * 1e3, s=2)

@@ -1,13 +1,12 @@
-"""Measure an axis on the real loop, and learn as boldly as the measurement allows.
+"""Identify an axis on the real loop, and learn as fast as the identified uncertainty allows.
 
-The axis is excited with all harmonics of a period at once while the other
-holds still; a model is fitted to its response, and what the model leaves over
-bounds how far learning may trust it. Run it with
+The axis is excited with all harmonics of a period at once (multisine) while the other holds still;
+a model is fitted to its response, and the residual bounds the model's uncertainty. Run it with
 
     python examples/06_identify.py
 
-It prints the model and what norm-optimal learning may expect of it, and leaves
-a Bode picture in the current folder.
+It prints the model and the predicted convergence of norm-optimal ILC, and leaves a Bode plot in the
+current folder.
 """
 
 from pathlib import Path
@@ -24,7 +23,7 @@ N_SAMPLES = 400
 def main() -> None:
     """Identify axis y, analyse two laws with its model, save the picture."""
     cell = Cell.load(CELL)
-    # The band ends early: that leaves room for an amplitude at which friction is small.
+    # A band that ends early leaves room for an amplitude at which friction is small.
     found = identify.multisine(
         cell, axis="y", measure="encoder", bus="loopback:",
         from_hz=3.0, to_hz=20.0, amplitude=6e-4, periods=3,

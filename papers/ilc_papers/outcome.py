@@ -1,4 +1,4 @@
-"""What came of reproducing a paper, and the JSON file that keeps it.
+"""Outcome of reproducing a paper, and the JSON file that keeps it.
 
 The file is `{"haas2016": {...}, ...}`: under a paper's name its figures, with "claims" and
 "seconds" added. The command, the workers and the gallery import it.
@@ -105,7 +105,7 @@ def read_json(
     Raises
     ------
     BadInputError
-        If the file is none of these, or a paper is missing in it.
+        If the file is not one of these, or a paper is missing in it.
     """
     try:
         entries = json.loads(path.read_text(encoding="utf-8"))

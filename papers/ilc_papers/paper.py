@@ -1,4 +1,4 @@
-"""What a reproduced paper is: how its figures are computed, what it printed, its pictures.
+"""A reproduced paper: how its figures are computed, what it printed, its pictures.
 
 Every paper's own package makes one `Paper`; the command `ilc reproduce` and the gallery import it.
 Claims and pictures are made from the figures alone, so that pages can be made again from a JSON
@@ -23,7 +23,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement of a paper beside what came out here.
+    """One statement of a paper beside the result here.
 
     Parameters
     ----------

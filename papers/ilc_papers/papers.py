@@ -1,4 +1,4 @@
-"""Which papers are reproduced, by their names on the command line.
+"""Reproduced papers, by their names on the command line.
 
 A paper's package is imported only when it is asked for, so that one does not wait for another's.
 The command, the workers and the tests import it.

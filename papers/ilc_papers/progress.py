@@ -1,4 +1,4 @@
-"""What is being computed, shown while it is.
+"""Display of the current computation.
 
 On a terminal a line for each paper with its time, otherwise a line for each step. Only the
 command imports it.

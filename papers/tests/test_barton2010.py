@@ -1,4 +1,4 @@
-"""What Barton's thesis says and what of it holds, on reduced sizes."""
+"""Statements of Barton's thesis that hold, on reduced sizes."""
 
 import json
 from functools import cache

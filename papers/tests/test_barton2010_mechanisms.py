@@ -13,7 +13,7 @@ from ilc_rt.kinematics import Delta
 
 
 def silent(_: str) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 @pytest.fixture(scope="module")

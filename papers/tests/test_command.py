@@ -175,7 +175,7 @@ def test_a_paper_that_fails_is_named_and_ends_the_others(name: str, says: str) -
 
 
 def test_figures_that_json_does_not_know_are_not_written(tmp_path: Path) -> None:
-    """A NaN would be read by nobody else."""
+    """A NaN would not be read by other programs."""
     bad = Paper("bad", "", "", lambda *_: {"error_m": [float("nan")]}, lambda _: [], [])
     found = outcome.compute(bad, reduced=False, tell=lambda _: None)
     with pytest.raises(ValueError, match="not JSON compliant"):
@@ -194,7 +194,7 @@ def test_quantities_share_a_unit_and_ratios_need_both() -> None:
 
 
 def test_ctrl_c_ends_every_process_with_one_code(tmp_path: Path) -> None:
-    """The terminal interrupts the whole group, and nobody leaves a trace."""
+    """The terminal interrupts the whole group, and no process leaves a trace."""
     process = subprocess.Popen(
         [sys.executable, "-m", "ilc_rt.cli", "reproduce", "all", "--reduced"],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

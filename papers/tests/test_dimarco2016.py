@@ -1,4 +1,4 @@
-"""DiMarco 2016 on reduced sizes: what comes out whatever the inputs that the thesis leaves open."""
+"""DiMarco 2016 on reduced sizes: results for any of the inputs that the thesis leaves open."""
 
 import csv
 import json

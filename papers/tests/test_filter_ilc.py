@@ -1,4 +1,4 @@
-"""What the filter-based paper says that does not depend on what its print leaves open."""
+"""Statements of the filter-based paper that do not depend on what its print leaves open."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_without_filter_the_error_falls_and_then_rises(filtered: Figures) -> Non
 
 
 def test_it_rises_without_noise_too() -> None:
-    """What repeats above the critical frequency grows."""
+    """Repeating errors above the critical frequency grow."""
     course = bench.Bench(bench.motion(), noise_m=0.0).learn(ErrorFeedforwardIlc(bench.GAIN), 35)
     assert course.rmse_m[-1] > 1.5 * min(course.rmse_m)
 

@@ -1,4 +1,4 @@
-"""What Haas et al. say that does not depend on what their print leaves open."""
+"""Statements of Haas et al. that do not depend on what their print leaves open."""
 
 from __future__ import annotations
 

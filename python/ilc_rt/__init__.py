@@ -4,7 +4,6 @@ from ilc_rt import control, identify, kinematics, laws, signal, trajectory, weig
 from ilc_rt._native import (
     Cell,
     LearningError,
-    Library,
     ModelError,
     SignalError,
     StateSpace,
@@ -14,7 +13,7 @@ from ilc_rt._native import (
 )
 from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
 from ilc_rt.campaign import Campaign, Law
-from ilc_rt.errors import BadInputError, CampaignError
+from ilc_rt.errors import BadInputError, CampaignError, FaultError
 from ilc_rt.laws import (
     AdjointIlc,
     ConstrainedIlc,
@@ -29,6 +28,7 @@ from ilc_rt.laws import (
     RelevanceWeights,
     ThroughJacobian,
 )
+from ilc_rt.library import Library
 from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
@@ -43,6 +43,7 @@ __all__ = [
     "Cell",
     "ConstrainedIlc",
     "ErrorFeedforwardIlc",
+    "FaultError",
     "FlexibleIlc",
     "Gate",
     "IterationRecord",

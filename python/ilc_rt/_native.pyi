@@ -1,7 +1,7 @@
 import builtins
 from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, Protocol, final
+from typing import Any, Literal, Protocol, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,15 +27,11 @@ __all__ = [
     "SignalError",
     "StateSpace",
     "TimeVarying",
-    "Trajectory",
     "TrajectoryError",
     "__version__",
-    "_filter",
-    "_law",
     "_made",
-    "_trajectory",
+    "_made_of_kind",
     "analyze",
-    "butterfly",
     "check_options",
     "check_relevance_weights",
     "check_response",
@@ -47,7 +43,6 @@ __all__ = [
     "discretize",
     "evaluate_experiment",
     "excitation",
-    "exponential_sigmoid",
     "fit_rational",
     "fit_second_order",
     "fit_velocity_loop",
@@ -55,13 +50,17 @@ __all__ = [
     "formation_weights",
     "frequency_response",
     "from_transfer_function",
-    "gcode",
     "identify_axis",
     "instantaneous_frequency",
-    "jerk_limited",
-    "modulated",
+    "plan_butterfly",
+    "plan_exponential",
+    "plan_gcode",
+    "plan_linear",
+    "plan_modulated",
+    "plan_raster",
+    "plan_spiral",
+    "plan_spline",
     "projection_across",
-    "raster",
     "refuse_divergent",
     "relative_deviation",
     "repeatability",
@@ -72,9 +71,8 @@ __all__ = [
     "second_order_response",
     "sigmoid_pair",
     "single_experiment",
-    "spiral",
-    "spline",
     "tracking_index",
+    "transports",
     "tune",
     "uncertainty",
     "velocity_loop_response",
@@ -191,159 +189,6 @@ def evaluate_experiment(
 
 class TrajectoryError(ValueError): ...
 
-@final
-class Trajectory:
-    @property
-    def dt_s(self) -> float: ...
-    @property
-    def n_samples(self) -> int: ...
-    @property
-    def n_axes(self) -> int: ...
-    @property
-    def computing_s(self) -> float: ...
-    @property
-    def t_s(self) -> NDArray[np.float64]: ...
-    @property
-    def position_m(self) -> NDArray[np.float64]: ...
-    @property
-    def velocity_m_s(self) -> NDArray[np.float64]: ...
-    @property
-    def acceleration_m_s2(self) -> NDArray[np.float64]: ...
-    @property
-    def programmed_m(self) -> NDArray[np.float64]: ...
-    @property
-    def alphas(self) -> list[tuple[int, str, float, list[tuple[float, float]]]]: ...
-
-def jerk_limited(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float | ArrayLike,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    setting: str = "complete",
-) -> Trajectory: ...
-def exponential_sigmoid(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float | ArrayLike,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    amplitude_m: float | ArrayLike | None = None,
-    frequency_hz: float | ArrayLike | None = None,
-    alpha_max: float | dict[str, float] | None = None,
-) -> Trajectory: ...
-def sigmoid_pair(
-    *,
-    velocity_m_s: ArrayLike,
-    amplitude_m: ArrayLike,
-    omega_rad_s: ArrayLike,
-    phase_zero_s: ArrayLike,
-    corner_s: float,
-    duration_s: float,
-    start_alpha: float,
-    transition_alpha: float,
-    sine_alpha: float,
-    sine_offset_s: float,
-    dt_s: float,
-) -> Trajectory: ...
-def modulated(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float,
-    amplitude_m: float,
-    frequency_hz: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    interpolation: str = "exponential_sigmoid",
-) -> Trajectory: ...
-def spline(
-    points_m: ArrayLike,
-    *,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    curvature_acceleration_max_m_s2: float = ...,
-) -> Trajectory: ...
-def butterfly(
-    *,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    feed_m_s: float = 0.004,
-    curvature_acceleration_max_m_s2: float = 0.02,
-    scale_m: float = 0.00185,
-    turns: float = 1.0,
-    center_m: tuple[float, float] = ...,
-) -> Trajectory: ...
-def spiral(
-    *,
-    pitch_m: float,
-    turns: float,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    curvature_acceleration_max_m_s2: float = ...,
-    center_m: tuple[float, float] = ...,
-) -> Trajectory: ...
-def raster(
-    *,
-    width_m: float,
-    pitch_m: float,
-    rows: int,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    start_m: tuple[float, float] = ...,
-    there_and_back: bool = False,
-    setting: str = "complete",
-) -> Trajectory: ...
-def gcode(
-    text: str | bytes,
-    *,
-    start_m: ArrayLike,
-    feed_m_s: float,
-    dt_s: float,
-    velocity_max_m_s: float | ArrayLike,
-    acceleration_max_m_s2: float | ArrayLike,
-    jerk_max_m_s3: float | ArrayLike,
-    rapid_m_s: float | None = None,
-    blend_s: float | None = None,
-    block_delete: bool = False,
-) -> Trajectory: ...
-def tracking_index(
-    trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0
-) -> tuple[float, float]: ...
-
-@final
-class Line:
-    def __new__(cls, from_m: ArrayLike, to_m: ArrayLike) -> Line: ...
-
-@final
-class Arc:
-    def __new__(
-        cls,
-        from_m: ArrayLike,
-        centre_m: ArrayLike,
-        sweep_rad: float,
-        axis: ArrayLike | None = None,
-    ) -> Arc: ...
-
-def contour_error(
-    reference_m: ArrayLike | list[Line | Arc], actual_m: ArrayLike, window: int | None = None
-) -> NDArray[np.float64]: ...
 def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 
@@ -391,33 +236,22 @@ class Cell:
     def model(self) -> StateSpace: ...
     def first_error(self) -> NDArray[np.float64]: ...
 
-@final
+@disjoint_base
 class Library:
-    def __new__(cls, path: str | PathLike[str]) -> Library: ...
-    def list(self, cell: str | None = None) -> list[dict[str, Any]]: ...
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+    def list(self, cell: str | None) -> list[dict[str, Any]]: ...
     def load(self, id: int) -> dict[str, Any]: ...
     def recall(
-        self, disturbance: ArrayLike, top: int = 30, cell: str | None = None
+        self, disturbance: ArrayLike, top: int, cell: str | None
     ) -> builtins.list[dict[str, Any]]: ...
-    def append(
-        self,
-        u: ArrayLike,
-        e: ArrayLike,
-        cycle_s: float,
-        disturbance: ArrayLike | None = None,
-        reference_m: ArrayLike | None = None,
-        *,
-        cell: str = "elsewhere",
-        campaign: str = "elsewhere",
-        law: str = "elsewhere",
-    ) -> int: ...
-    def trim(self, keep: int, cell: str | None = None) -> int: ...
-    def export(self, id: int, path: str | PathLike[str]) -> None: ...
+    def _append(self, **keywords: Any) -> int: ...  # noqa: ANN401
+    def trim(self, keep: int, cell: str | None) -> int: ...
 
 @final
 class EventStream:
     def __iter__(self) -> Iterator[str]: ...
     def __next__(self) -> str: ...
+    def raised(self) -> BaseException | None: ...
     def stop(self, signal: int = ...) -> None: ...
 
 def check_options(verb: str, arguments: list[str]) -> None: ...
@@ -432,13 +266,6 @@ def run_events(
 ) -> EventStream: ...
 
 # Make objects again, for copies and pickles.
-def _trajectory(
-    dt_s: float,
-    samples: Sequence[NDArray[np.float64]],
-    alphas: Sequence[Any],
-    computing_s: float,
-) -> Trajectory: ...
-
 # What the typed classes and functions of the package stand on: arguments by name, checked here.
 @disjoint_base
 class Law:
@@ -480,8 +307,6 @@ def analyze(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def refuse_divergent(**keywords: Any) -> None: ...  # noqa: ANN401
 def tune(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def repeatability(errors: ArrayLike) -> dict[str, Any]: ...
-def _law(cls: type, kind: str, arguments: dict[str, Any]) -> Law: ...
-def _filter(cls: type, kind: str, arguments: dict[str, Any]) -> Filter: ...
 def from_transfer_function(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
 def second_order(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
 def discretize(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
@@ -504,6 +329,7 @@ def velocity_loop_response(
     **model: Any,  # noqa: ANN401
 ) -> NDArray[np.complex128]: ...
 def second_order_model(**model: Any) -> StateSpace: ...  # noqa: ANN401
+def _made_of_kind(cls: type, native: str, kind: str, arguments: dict[str, Any], /) -> object: ...
 def _made(cls: object, how: str | None, arguments: dict[str, Any]) -> object: ...
 
 @disjoint_base
@@ -559,3 +385,25 @@ class Gantry:
     def forward(self, axes_m: ArrayLike) -> NDArray[np.float64]: ...
     def inverse(self, tool_m: ArrayLike) -> NDArray[np.float64]: ...
     def jacobian(self) -> NDArray[np.float64]: ...
+
+def jerk_limited(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def exponential_sigmoid(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def modulated(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def sigmoid_pair(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def spline(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def butterfly(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def spiral(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def raster(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def gcode(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def tracking_index(**keywords: Any) -> tuple[float, float]: ...  # noqa: ANN401
+def contour_error(
+    reference_m: ArrayLike | Sequence[Line | Arc], actual_m: ArrayLike, window: int | None = None
+) -> NDArray[np.float64]: ...
+
+@disjoint_base
+class Line:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
+
+@disjoint_base
+class Arc:
+    def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401

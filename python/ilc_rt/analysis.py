@@ -56,46 +56,35 @@ class Analysis:
         Every run brings the input nearer to its limit.
     why : str
         The verdict as a sentence with its figures.
-    spectral_radius : float
-        Largest absolute eigenvalue of T.
-    spectral_radius_error : float
-        Uncertainty of `spectral_radius`.
-    monotonic_factor : float or None
-        Largest singular value of T: the worst factor of a run; None where it is not
-        computed.
-    monotonic_factor_error : float or None
-        Uncertainty of `monotonic_factor`.
+    spectral_radius, spectral_radius_error : float
+        Largest absolute eigenvalue of T, and its uncertainty.
+    monotonic_factor, monotonic_factor_error : float or None
+        Largest singular value of T, the worst factor of a run, and its uncertainty;
+        None where it is not computed.
     transient_growth : float
         Largest growth of an error before it falls.
     critical_frequency_hz : float or None
         First frequency in Hz at which a run makes the error grow; None if there is none.
     learnable_frequency_hz : float or None
         The same for the law without its filter.
-    robust_factor : float or None
-        Worst factor of a run within the uncertainty, over frequency.
-    robust_lifted : float or None
-        Upper bound of that factor over the whole run.
+    robust_factor, robust_lifted : float or None
+        Worst factor of a run within the uncertainty over frequency, and its upper
+        bound over the whole run.
     uncertainty_allowed : float or None
         Largest uncertainty, the same at all frequencies, with which the law still
         converges.
-    initial_error_rms : float or None
-        RMS error before learning, for the reference given.
-    converged_error_rms : float or None
-        Steady-state RMS error, for the reference given.
+    initial_error_rms, converged_error_rms : float or None
+        RMS error before learning and in the steady state, for the reference given.
     expected_rms_limit : float or None
         Steady-state expected RMS error under the noise given.
     pd_factor : float or None
         ``|1 - (kp + kd) p_1|`` of a proportional-derivative law.
     pd_gain_range : tuple[float, float] or None
         Range of kp + kd in which that factor is below 1.
-    frequency_hz : ndarray of float64
-        Frequencies of `contraction` in Hz.
-    contraction : ndarray of float64
-        Largest singular value of T at each frequency.
-    converged_input : ndarray of float64 or None
-        Steady-state input, shape (n_samples, n_inputs); None if not known.
-    converged_error : ndarray of float64 or None
-        Steady-state error, shape (n_samples, n_outputs); None if not known.
+    frequency_hz, contraction : ndarray of float64
+        Frequencies in Hz, and the largest singular value of T at each.
+    converged_input, converged_error : ndarray of float64 or None
+        Steady state, shape (n_samples, n_inputs or n_outputs); None if not known.
     expected_rms : ndarray of float64
         Expected RMS error of each run under the noise given; may be empty.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import warnings
 from contextlib import closing
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -13,7 +14,7 @@ import numpy as np
 from ilc_rt._native import Cell, check_options
 from ilc_rt.analysis import refuse_divergent
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
-from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError
+from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError, FaultError
 from ilc_rt.events import EndEvent, Event, IterationEvent, parse_event
 from ilc_rt.interruption import ControlledStop
 from ilc_rt.options import Verb, arguments, options
@@ -74,7 +75,7 @@ class Campaign:
         Learn; if not, every run is like the first.
     disturbance : callable, array_like of float64 or None
         Measured disturbance before each run, e.g. a temperature: stored with
-        the run, and given to the law for the next run. Either one row a run,
+        the run, and given to the law for the next run. Either one row per run,
         shape (n_runs,) or (n_runs, n_disturbances), or a function of the run's
         number (from 0) that is called while the axes return. The controller
         then runs inside this process.
@@ -266,7 +267,12 @@ class Campaign:
             code = failure.exit_code if failure else EXIT_FAULT
             if failure is not None and failure.reason not in reason:
                 reason = failure.reason if reason in failure.reason else reason
-            raise CampaignError(reason, code) from (failure.__cause__ if failure else None)
+            cause = failure.__cause__ if failure else None
+            fault = self.result.fault
+            if fault is not None:
+                named = {field.name: getattr(fault, field.name) for field in fields(fault)}
+                raise FaultError(exit_code=code, **{**named, "reason": reason}) from cause
+            raise CampaignError(reason, code) from cause
         if status == "running":
             message = "the controller ended without saying so"
             raise CampaignError(message)

@@ -14,7 +14,7 @@ import time
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ilc_rt._native import run_events
-from ilc_rt.errors import EXIT_BAD_INPUT, CampaignError
+from ilc_rt.errors import EXIT_BAD_INPUT, EXIT_FAULT, CampaignError
 from ilc_rt.processes import Program, find_program
 
 if TYPE_CHECKING:
@@ -162,8 +162,11 @@ class InProcessController:
             yield from self._stream
         except (ValueError, OSError) as error:
             self._error = CampaignError(str(error), EXIT_BAD_INPUT)
-            # The exception of a law that is written in Python, with its traceback.
-            self._error.__cause__ = error.__cause__
+        raised = self._stream.raised() if self._stream is not None else None
+        if raised is not None:
+            # That of a law written in Python, with its traceback.
+            self._error = self._error or CampaignError(str(raised), EXIT_FAULT)
+            self._error.__cause__ = raised
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
         """Ask for a controlled stop; `lines` goes on until it has happened."""

@@ -31,6 +31,52 @@ class CampaignError(RuntimeError):
         self.exit_code = exit_code
 
 
+class FaultError(CampaignError):
+    """A controlled stop after a fault, in its fields.
+
+    Parameters
+    ----------
+    reason : str
+        One line for people.
+    exit_code : int
+        What the program exits with.
+    kind : str
+        Cause, as ``"following_error"``; `docs/events.schema.json` lists all.
+    axis, node : str or None, int or None
+        Where, if it is one axis or node.
+    code : int or None
+        Number that the kind says, as an emergency code.
+    value, limit, unit : float or None, float or None, str or None
+        What was found, and the limit that it exceeds.
+    cycles : object or None
+        The last servo cycles before the stop, a `ilc_rt.events.LastCycles`.
+
+    Examples
+    --------
+    >>> FaultError("axis x lags", kind="following_error", axis="x", value=0.02).axis
+    'x'
+    """
+
+    def __init__(
+        self,
+        reason: str,
+        exit_code: int = EXIT_FAULT,
+        *,
+        kind: str = "",
+        axis: str | None = None,
+        node: int | None = None,
+        code: int | None = None,
+        value: float | None = None,
+        limit: float | None = None,
+        unit: str | None = None,
+        cycles: object = None,
+    ) -> None:
+        super().__init__(reason, exit_code)
+        self.kind, self.axis, self.node, self.code = kind, axis, node, code
+        self.value, self.limit, self.unit = value, limit, unit
+        self.cycles = cycles
+
+
 class BadInputError(CampaignError):
     """A file, an option or a value that cannot be used."""
 

@@ -10,6 +10,8 @@ import json
 from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any, ClassVar
 
+from ilc_rt.figures import Figures
+
 
 class EventError(ValueError):
     """A line that is not an event of the controller."""
@@ -84,37 +86,18 @@ class ProgressEvent:
     n_samples: int
 
 
-@dataclass(frozen=True, slots=True)
-class IterationEvent:
-    """One run is over and in the library; lengths in metres, angles in radians.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IterationEvent(Figures):
+    """One run is over and in the library, with its figures.
 
     `id` is the key of the run in the library, `index` counts the runs of the
-    campaign from 0. `tracking_inf_m` and `contour_inf_m` are the largest
-    values over time, the `_rms_m` ones root mean squares; all of them are of
-    the measurement that is learned from. Contour errors are None where the
-    path has none. `axes_tracking_inf_m` and `axes_tracking_rms_m` have one
-    number for each axis, in its own unit.
+    campaign from 0, `digest` is the SHA-256 of its arrays.
     """
 
     name: ClassVar[str] = "iteration"
     id: int
     index: int
-    tracking_inf_m: float
-    tracking_rms_m: float
-    contour_inf_m: float | None
-    contour_rms_m: float | None
-    encoder_tracking_inf_m: float | None = None
-    tool_tracking_inf_m: float | None = None
-    overruns: int = 0
-    missing_samples: int = 0
-    late_updates: int = 0
-    update_ms: float | None = None
-    rolled_back: bool = False
     digest: str = ""
-    axes_tracking_inf_m: tuple[float, ...] = ()
-    axes_tracking_rms_m: tuple[float, ...] = ()
-    learning_off: bool = False
-    remark: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,11 +122,39 @@ class LatencyEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class LastCycles:
+    """Servo cycles before a stop, oldest first; one row a cycle, one column an axis.
+
+    `missing` is True for a cycle whose measurement has not come.
+    """
+
+    first_sync: int | None
+    reference_m: tuple[tuple[float, ...], ...]
+    input: tuple[tuple[float, ...], ...]
+    encoder_m: tuple[tuple[float, ...], ...]
+    tool_m: tuple[tuple[float, ...], ...]
+    missing: tuple[bool, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class FaultEvent:
-    """Why the axes are being stopped, in one sentence."""
+    """Why the axes are being stopped: a sentence, and the same in fields.
+
+    `kind` is the cause, as ``"following_error"``; `axis` and `node` say where,
+    `code` is the number that the kind says, as an emergency code, `value` what
+    was found and `limit` what is allowed, in `unit`.
+    """
 
     name: ClassVar[str] = "fault"
     reason: str
+    kind: str = ""
+    axis: str | None = None
+    node: int | None = None
+    code: int | None = None
+    value: float | None = None
+    limit: float | None = None
+    unit: str | None = None
+    cycles: LastCycles | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,8 +217,8 @@ def parse_event(line: str | bytes) -> Event | None:
 
     Examples
     --------
-    >>> parse_event('{"event": "fault", "reason": "node 2 is silent"}')
-    FaultEvent(reason='node 2 is silent')
+    >>> parse_event('{"event": "state", "state": "running", "iteration": 3}')
+    StateEvent(state='running', iteration=3)
     """
     try:
         data = json.loads(line)
@@ -228,8 +239,8 @@ def event_payload(event: Event) -> dict[str, Any]:
 
     Examples
     --------
-    >>> event_payload(FaultEvent("node 2 is silent"))
-    {'event': 'fault', 'reason': 'node 2 is silent'}
+    >>> event_payload(StateEvent("running", 3))
+    {'event': 'state', 'state': 'running', 'iteration': 3}
     """
     return {"event": event.name, **asdict(event)}
 
@@ -257,8 +268,9 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Event:
             report = values.get("rt")
             values["rt"] = _real_time_report(report) if report else None
         elif cls is IterationEvent:
-            for name in ("axes_tracking_inf_m", "axes_tracking_rms_m"):
-                values[name] = tuple(values.get(name) or ())
+            values |= {key: tuple(v) for key, v in values.items() if isinstance(v, list)}
+        elif cls is FaultEvent:
+            values["cycles"] = _last_cycles(values.get("cycles"))
         elif cls is LatencyEvent:
             values = {key: parse_histogram(value) for key, value in values.items()}
     except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
@@ -266,6 +278,17 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Event:
         raise EventError(message) from error
     event: Event = cls(**values)
     return event
+
+
+def _last_cycles(data: dict[str, Any] | None) -> LastCycles | None:
+    if data is None:
+        return None
+    rows = {
+        key: tuple(tuple(float(value) for value in row) for row in data[key])
+        for key in ("reference_m", "input", "encoder_m", "tool_m")
+    }
+    missing = tuple(bool(value) for value in data["missing"])
+    return LastCycles(first_sync=data["first_sync"], missing=missing, **rows)
 
 
 def _real_time_report(data: dict[str, Any]) -> RealTimeReport:

@@ -57,6 +57,11 @@ class Identification:
         Reason not to use the model, if there is one.
     axis_model : str
         The section ``[axis.model]`` with the described model.
+    followed : bool
+        False if the output does not follow the input: no figure means anything.
+    input_unit : str or None
+        Unit of the input: m, m/s, rad or rad/s; None if it is not an axis of a
+        cell. That of the output is the same without ``/s``.
     """
 
     measured: FrequencyResponse
@@ -71,6 +76,8 @@ class Identification:
     interface: Literal["csp", "csv"] | None = None
     doubt: str | None = None
     axis_model: str = ""
+    followed: bool = True
+    input_unit: str | None = None
 
     def __repr__(self) -> str:
         """Return the result on one line, without the signals."""
@@ -168,6 +175,7 @@ class Identification:
             "axis": self.experiment.axis,
             "waveform": self.experiment.waveform,
             "amplitude": self.experiment.amplitude,
+            "input_unit": self.input_unit,
             "dt_s": self.dt_s,
             "periods": self.experiment.periods,
             "frequency_hz": self.frequency_hz.tolist(),

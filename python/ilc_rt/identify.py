@@ -234,7 +234,8 @@ def identify(
     words = arguments("identify", asked)
     if callable(system):
         session |= {"axis": axis, "at_m": at_m, "library": library, "observe": observe}
-        given = [name for name, value in session.items() if value not in {None, "auto", True}]
+        unset = (None, "auto", True)
+        given = [name for name, value in session.items() if not any(value is one for one in unset)]
         if given:
             message = f"{', '.join(given)}: for a cell only"
             raise ValueError(message)
@@ -277,6 +278,7 @@ def identify(
         dt_s=cell.cycle_s,
         experiment=experiment,
         interface=cell.interfaces[index],
+        input_unit=campaign.result.input_unit(index),
     )
 
 

@@ -33,7 +33,8 @@ class Delta(_native.Delta):
     Raises
     ------
     KinematicsError
-        If the lengths make no mechanism.
+        If the lengths make no mechanism. The methods raise it for a pose that is out of
+        reach or singular, and name pose, leg and sample.
 
     References
     ----------

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
-from ilc_rt import _native
+from ilc_rt._native import described_options
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -85,7 +85,7 @@ def options(verb: Verb) -> dict[str, Option]:
     >>> options("run")["iterations"].default
     '10'
     """
-    described = json.loads(_native.described_options(verb))
+    described = json.loads(described_options(verb))
     return {
         one["name"]: Option(
             **{**one, "flags": tuple(one["flags"]), "choices": tuple(one["choices"])}

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ilc_rt._native import Library
 from ilc_rt.errors import BadInputError
+from ilc_rt.figures import Figures
+from ilc_rt.library import Library
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,58 +19,26 @@ if TYPE_CHECKING:
 
     from ilc_rt.events import IterationEvent
 
-FIGURES = (
-    "id",
-    "index",
-    "tracking_inf_m",
-    "tracking_rms_m",
-    "contour_inf_m",
-    "contour_rms_m",
-    "axes_tracking_inf_m",
-    "axes_tracking_rms_m",
-    "encoder_tracking_inf_m",
-    "tool_tracking_inf_m",
-    "overruns",
-    "missing_samples",
-    "late_updates",
-    "update_ms",
-    "rolled_back",
-    "learning_off",
-    "remark",
-    "digest",
-)
-AXES_FIGURES = ("axes_tracking_inf_m", "axes_tracking_rms_m")
+FIGURES = ("id", "index", *(figure.name for figure in fields(Figures)), "digest")
 SIGNALS = ("reference_m", "input", "encoder_m", "tool_m", "error_m", "contour_m")
 
 
-@dataclass(frozen=True, slots=True)
-class IterationRecord:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IterationRecord(Figures):
     """One run: figures at once, signals from the library when asked for.
 
     Attributes
     ----------
+    library : str
+        File of the library.
     id, index : int
         Key in the library; number of the run in its campaign, from 0.
-    tracking_inf_m, tracking_rms_m : float
-        Largest and root-mean-square tracking error in m, of the measurement
-        that is learned from: of the linear axes, or in rad of all axes where
-        all are rotary.
-    contour_inf_m, contour_rms_m : float or None
-        Distance from the programmed path in m; None where the path has no
-        contour, as fewer than two linear axes move along it.
-    overruns, missing_samples, late_updates : int
-        Servo cycles that began too late; measurements that never arrived;
-        runs so far that repeated the old input because learning was late.
-    update_ms : float or None
-        How long the learning took.
-    rolled_back, learning_off : bool
-        Whether the error had grown so far that the best input was restored
-        after this run; whether learning is off because of that.
-    remark : str or None
-        Why, or what else decided on the next input, in one sentence.
-    axes_tracking_inf_m, axes_tracking_rms_m : tuple of float
-        Largest and root-mean-square tracking error of each axis in its own
-        unit; empty if not known.
+    digest : str
+        SHA-256 of the arrays.
+
+    Notes
+    -----
+    The other attributes are the figures of `ilc_rt.figures.Figures`.
 
     Examples
     --------
@@ -82,22 +51,7 @@ class IterationRecord:
     library: str
     id: int
     index: int
-    tracking_inf_m: float
-    tracking_rms_m: float
-    contour_inf_m: float | None = None
-    contour_rms_m: float | None = None
-    encoder_tracking_inf_m: float | None = None
-    tool_tracking_inf_m: float | None = None
-    overruns: int = 0
-    missing_samples: int = 0
-    late_updates: int = 0
-    update_ms: float | None = None
-    rolled_back: bool = False
     digest: str = ""
-    axes_tracking_inf_m: tuple[float, ...] = ()
-    axes_tracking_rms_m: tuple[float, ...] = ()
-    learning_off: bool = False
-    remark: str | None = None
     _loaded: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
@@ -108,10 +62,8 @@ class IterationRecord:
     @classmethod
     def from_row(cls, row: Mapping[str, Any], library: str) -> IterationRecord:
         """Return the record of one row of `Library.list`."""
-        known = {f.name for f in fields(cls)} & set(FIGURES)
-        values = {name: row[name] for name in known if name in row}
-        for name in AXES_FIGURES:
-            values[name] = tuple(values.get(name) or ())
+        values = {name: row[name] for name in FIGURES if name in row}
+        values |= {name: tuple(v) for name, v in values.items() if isinstance(v, list)}
         return cls(library=library, **values)
 
     def figures(self) -> dict[str, Any]:

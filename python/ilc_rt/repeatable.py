@@ -1,4 +1,4 @@
-"""Whether learning applies: what of a cell's error repeats, and what does not."""
+"""Repeatability of a cell's error: the part that repeats, and the rest."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SOME, WELL = 1.0, 3.0
 
 @dataclass(frozen=True, slots=True)
 class AxisRepeatability:
-    """What of one axis' error repeats from run to run.
+    """Repeatability of one axis' error from run to run.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class AxisRepeatability:
 
     @property
     def verdict(self) -> Literal["yes", "a little", "no"]:
-        """Whether learning is worth while on this axis."""
+        """Verdict whether learning is worth while on this axis."""
         if self.repeatable_rms_m <= 0.0:
             return "no"
         if self.ratio is None or self.ratio >= WELL:
@@ -78,7 +78,7 @@ class RepeatabilityCheck:
 
     @property
     def applicable(self) -> bool:
-        """Whether learning is worth while on any axis."""
+        """True if learning is worth while on any axis."""
         return any(axis.verdict != "no" for axis in self.axes)
 
     def to_json(self) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ilc_rt._native import Library
 from ilc_rt.comparison import Comparison
 from ilc_rt.errors import BadInputError
 from ilc_rt.events import (
@@ -21,6 +20,7 @@ from ilc_rt.events import (
     LatencyEvent,
     StartEvent,
 )
+from ilc_rt.library import Library
 from ilc_rt.quantity import digits
 from ilc_rt.record import IterationRecord
 
@@ -64,6 +64,7 @@ class CampaignResult:
     latency: LatencyEvent | None = None
     status: str = "running"
     reason: str | None = None
+    fault: FaultEvent | None = None
 
     @classmethod
     def from_library(cls, library: str | Path, campaign: str | None = None) -> CampaignResult:
@@ -130,7 +131,7 @@ class CampaignResult:
         elif isinstance(event, LatencyEvent):
             self.latency = event
         elif isinstance(event, FaultEvent):
-            self.reason = event.reason
+            self.reason, self.fault = event.reason, event
         elif isinstance(event, EndEvent):
             self.status = event.status
             self.reason = event.reason or self.reason
@@ -138,7 +139,7 @@ class CampaignResult:
     @property
     def unkept(self) -> bool:
         """Whether the campaign was stopped as a run could not be kept."""
-        return self.status == "fault" and (self.reason or "").startswith("library ")
+        return self.fault is not None and self.fault.kind == "library"
 
     @property
     def mode(self) -> str:

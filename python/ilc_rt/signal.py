@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ilc_rt import _native
-from ilc_rt._native import Filter, zero_phase
+from ilc_rt._native import Filter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -408,3 +408,38 @@ def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]:
     8.0
     """
     return _native.instantaneous_frequency(x=x, dt_s=dt_s)
+
+
+def zero_phase(filter: Filter | ArrayLike, x: ArrayLike) -> NDArray[np.float64]:
+    """Return a signal filtered without lag.
+
+    Parameters
+    ----------
+    filter : Filter or array_like
+        Filter; an array holds the taps of a symmetric one. A Butterworth filter
+        is applied forward and backward, also one that laws apply forward only.
+    x : array_like, shape (n_samples,) or (n_samples, n_channels)
+        Signal.
+
+    Returns
+    -------
+    ndarray of float64, same shape
+        Filtered signal.
+
+    Raises
+    ------
+    SignalError
+        If the signal is too short for the filter.
+    ValueError, TypeError
+        If `x` has the wrong shape, dtype or a number that is not finite, or
+        `filter` is not a filter.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import signal
+    >>> smooth = signal.zero_phase(signal.butterworth(2, 50.0, 0.002), np.ones(100))
+    >>> bool(np.allclose(smooth, 1.0))
+    True
+    """
+    return _native.zero_phase(filter, x)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ilc_rt import _native
+from ilc_rt._native import transports
 from ilc_rt.errors import BadInputError
 
 
@@ -32,7 +32,7 @@ class Transport:
     in_process: bool
 
 
-TRANSPORTS = {kind["name"]: Transport(**kind) for kind in _native.transports()}
+TRANSPORTS = {kind["name"]: Transport(**kind) for kind in transports()}
 SYNTAXES = ", ".join(kind.syntax for kind in TRANSPORTS.values())
 
 

@@ -29,14 +29,14 @@ GROWTH_MAX = 1.2
 TRIAL_RUNS_MAX = 100
 """Runs that a trial makes at most: what has not grown by then grows slowly enough to be seen."""
 ACROSS_TO_ALONG = 1.5
-"""How much more an error across the path may weigh than one along it."""
+"""Largest ratio of the weights of an error across the path and along it."""
 SAMPLES_MAX = 20_000
 """Samples of a run that a trial looks at."""
 
 
 @dataclass(frozen=True)
 class Reason:
-    """What a weight became, and why."""
+    """A proposed weight, with its reason."""
 
     key: str
     value: float

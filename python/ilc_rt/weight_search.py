@@ -104,7 +104,7 @@ class WeightSearch:
         """Return the trials of all axes; None if an error grows by more than allowed.
 
         Of several weights of the error the larger, with which learning is bolder, may forbid a
-        rate; what is left is told of the smallest.
+        rate; the residual error is that of the smallest.
         """
         found: list[Trial] = []
         for bench in self.benches:

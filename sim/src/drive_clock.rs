@@ -22,7 +22,7 @@ const IN_STEP: u32 = 10;
 /// Most that passes between two looks at the bus; what is beyond it is a stall of this process.
 const LOOK_MAX: Duration = Duration::from_millis(10);
 
-/// The clock; it is told the wall time and gives steps to take.
+/// The clock; it is given the wall time and returns steps to take.
 #[derive(Debug)]
 pub(crate) struct DriveClock {
     cycle: Duration,
@@ -59,7 +59,7 @@ impl DriveClock {
         let is_regular = silence + passed < self.loose();
         self.n_in_step = if is_regular { self.n_in_step.saturating_add(1) } else { 0 };
         self.owed = Duration::ZERO;
-        whole(self.cycle, self.step)
+        count(self.cycle, self.step)
     }
 
     /// Steps to take at `now` when no SYNC has come: none while locked.
@@ -67,8 +67,8 @@ impl DriveClock {
         let passed = self.look(now);
         let Some(silence) = self.silence else { return self.take(passed) };
         let silence = silence + passed;
-        let most = if self.n_in_step >= IN_STEP { self.patience } else { self.loose() };
-        let is_lost = silence >= most;
+        let max = if self.n_in_step >= IN_STEP { self.patience } else { self.loose() };
+        let is_lost = silence >= max;
         self.silence = (!is_lost).then_some(silence);
         if is_lost {
             self.n_in_step = 0;
@@ -89,14 +89,14 @@ impl DriveClock {
 
     fn take(&mut self, passed: Duration) -> u32 {
         self.owed += passed;
-        let n_steps = whole(self.owed, self.step);
+        let n_steps = count(self.owed, self.step);
         self.owed -= self.step * n_steps;
         n_steps
     }
 }
 
-/// How many times `part` fits into `span`.
-fn whole(span: Duration, part: Duration) -> u32 {
+/// Returns the number of times that `part` fits into `span`.
+fn count(span: Duration, part: Duration) -> u32 {
     u32::try_from(span.as_nanos() / part.as_nanos().max(1)).unwrap_or(u32::MAX)
 }
 
@@ -198,6 +198,6 @@ mod tests {
     #[test]
     fn a_stall_without_sync_is_not_run_through_at_once() {
         let mut clock = clock();
-        assert_eq!(clock.idle(Duration::from_secs(5)), whole(LOOK_MAX, STEP));
+        assert_eq!(clock.idle(Duration::from_secs(5)), count(LOOK_MAX, STEP));
     }
 }

@@ -1,4 +1,4 @@
-//! What happened to a node that a person watching would want to know.
+//! Events of a node for people.
 
 use ilc_rt::fieldbus::canopen::{NmtState, NodeId, emcy};
 use ilc_rt::fieldbus::cia402::State;
@@ -8,13 +8,13 @@ use ilc_rt::fieldbus::cia402::State;
 pub struct Event {
     /// Time of the machine, since it was powered.
     pub time_us: u64,
-    /// Who.
+    /// Node.
     pub node: NodeId,
-    /// What.
+    /// Event.
     pub change: Change,
 }
 
-/// What changed.
+/// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// Another NMT state.

@@ -15,7 +15,7 @@ use crate::plant::{Demand, Gantry, Plant};
 /// Events kept until they are taken; older ones are dropped.
 const EVENTS_MAX: usize = 64;
 
-/// What moves the machine's time.
+/// Source of the machine's time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClockMode {
     /// Every SYNC advances the machine by one cycle, before the nodes sample.
@@ -24,7 +24,7 @@ pub enum ClockMode {
     RealTime,
 }
 
-/// Why a machine cannot be made from a cell description.
+/// Reason that a cell description makes no machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MachineError {
     /// A node number is not one.
@@ -35,7 +35,7 @@ pub enum MachineError {
     Dictionary {
         /// The node.
         node: NodeId,
-        /// What the look-up said.
+        /// Abort code of the look-up.
         code: AbortCode,
     },
     /// The plant has another number of axes than the cell.
@@ -55,7 +55,7 @@ struct Axis {
     is_muted: bool,
     nmt: NmtState,
     state: State,
-    /// Share of its force that the plant was told the motor may use.
+    /// Share of its force that the plant lets the motor use.
     force_share: f64,
 }
 
@@ -208,7 +208,7 @@ impl Machine {
         self.axes.iter().find(|axis| axis.drive.node() == node).map(|axis| axis.drive.state())
     }
 
-    /// Whether any drive has power over its axis, so that it may move.
+    /// Returns whether any drive has power over its axis, so that it may move.
     pub fn is_energised(&self) -> bool {
         self.axes.iter().any(|axis| {
             let state = axis.drive.state();

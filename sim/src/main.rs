@@ -62,15 +62,15 @@ enum Verb {
     Eds {
         /// Cell description.
         cell: PathBuf,
-        /// Which node.
+        /// Node.
         #[arg(long)]
         node: u8,
     },
 }
 
-/// Why the program ends early.
+/// Reason that the program ends early.
 enum Failure {
-    /// What the user gave cannot be used: exit status 2.
+    /// Input that cannot be used: exit status 2.
     Input(String),
     /// Something broke on the way: exit status 1.
     Broken(String),
@@ -88,7 +88,7 @@ fn main() -> ExitCode {
         Err(Failure::Input(line)) => (line, 2),
         Err(Failure::Broken(line)) => (line, 1),
     };
-    // Nobody is left to tell if standard error is gone.
+    // There is no reader if standard error is gone.
     let _ = writeln!(std::io::stderr(), "ilc-sim: {}", printable_lines(&line));
     ExitCode::from(status)
 }

@@ -1,4 +1,4 @@
-//! Whether the nodes that are to be simulated are on the bus already: listened for, then asked for.
+//! Detection of nodes on the bus before they are simulated: listened for, then asked for.
 //!
 //! A second node of a number makes every answer on the bus ambiguous, and its boot-up stops the campaign
 //! that is under way. So nothing is sent while anything is heard of the nodes; only nodes that are idle
@@ -7,16 +7,16 @@
 use std::time::{Duration, Instant};
 
 use ilc_rt::fieldbus::bring_up::listen;
-use ilc_rt::fieldbus::canopen::sdo::SdoRequest;
+use ilc_rt::fieldbus::canopen::sdo::{SdoRequest, Turn};
 use ilc_rt::fieldbus::canopen::{NodeId, ObjectAddress, cob_id};
 use ilc_rt::fieldbus::cia402::objects;
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 
-/// How long is listened: drives under way send in every cycle, and a heartbeat every 100 ms.
+/// Listening time: drives under way send in every cycle, and a heartbeat every 100 ms.
 const LISTEN: Duration = Duration::from_millis(150);
-/// How long a master is listened for: the longest servo cycle, and some more.
+/// Listening time for a master: the longest servo cycle, and some more.
 const MASTER: Duration = Duration::from_millis(120);
-/// How long an idle node may take to answer.
+/// Time-out of an idle node.
 const ANSWER: Duration = Duration::from_millis(150);
 
 /// Returns the first of `nodes` that is there.
@@ -30,7 +30,7 @@ pub(crate) fn find(bus: &mut dyn Bus, nodes: &[NodeId]) -> Result<Option<NodeId>
     if listen::other_master(bus, nodes, MASTER)?.is_some() {
         return Ok(None);
     }
-    let question = SdoRequest::UploadInitiate(ObjectAddress::new(objects::DEVICE_TYPE, 0));
+    let question = SdoRequest::Upload(Turn::Initiate(ObjectAddress::new(objects::DEVICE_TYPE, 0)));
     for &node in nodes {
         let id = cob_id::of(cob_id::SDO_REQUEST, node);
         if let Some(frame) = Frame::new(id, &question.encode()) {

@@ -25,7 +25,7 @@ const PRIORITY: i32 = 70;
 /// A node that is to lose its power.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mute {
-    /// Which node.
+    /// Node.
     pub(crate) node: NodeId,
     /// When, since the start.
     pub(crate) after: Duration,
@@ -44,7 +44,7 @@ impl FromStr for Mute {
     }
 }
 
-/// How long axes that lost their controller must have been at rest before the drives end.
+/// Rest of axes that lost their controller before the drives end.
 const REST: Duration = Duration::from_millis(300);
 /// When the drives end in any case after the program that started them is gone.
 const ORPHAN_MAX: Duration = Duration::from_secs(10);
@@ -57,7 +57,7 @@ struct Orphan {
 }
 
 impl Orphan {
-    /// Whether to end now: the axes have been at rest for a while, as the controller has stopped them or
+    /// Returns whether to end now: the axes have been at rest for a while, as the controller has stopped them or
     /// the drives have, missing its commands.
     fn is_over(&mut self, now: Duration, is_energised: bool) -> bool {
         let since = *self.since.get_or_insert(now);
@@ -69,18 +69,18 @@ impl Orphan {
     }
 }
 
-/// What the machine shall do beyond what its cell says.
+/// Behaviour of the machine beyond its cell description.
 #[derive(Clone, Debug)]
 pub(crate) struct Habits {
     /// Silence after which SYNC counts as lost and time goes on by itself.
     pub(crate) sync_lost_after: Duration,
     /// Nodes that are to lose their power.
     pub(crate) mutes: Vec<Mute>,
-    /// Whether to end, when the axes are at rest, once standard input closes.
+    /// True if to end, when the axes are at rest, once standard input closes.
     pub(crate) with_parent: bool,
 }
 
-/// Why the machine cannot go on.
+/// Reason that the machine stops.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RunError {
     /// The bus failed.

@@ -1,14 +1,13 @@
-"""Wrong arguments for everything public of `ilc_rt`: nothing may abort, hang, panic or lie.
+"""Wrong arguments for everything public in `ilc_rt`: no abort, hang, panic or false result.
 
-Run it by itself for as long as wanted, with any seed::
+Run it directly for any time, with any seed::
 
     python tests/fuzz/border.py --seconds 60 --seed 7
 
-Calls are made in another process, with bounded memory, and watched. What is drawn are the
-arguments: mostly right ones, of which one or two are replaced by something else. A call may
-succeed or raise `ValueError` (which every error of the package is), `TypeError`, `MemoryError` or
-`OSError`; what it returns holds no number that is not finite. Exits 1 with the calls that broke a
-rule.
+Calls are made in another process, with bounded memory, and watched. The arguments are drawn: mostly
+valid ones, one or two of which are replaced. A call may succeed or raise `ValueError` (the base of
+every error of the package), `TypeError`, `MemoryError` or `OSError`; its result holds no non-finite
+number. Exits 1 with the calls that broke a rule.
 """
 
 from __future__ import annotations
@@ -36,11 +35,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 MEMORY_MAX = 6 << 30
 SILENCE_MAX_S = 60.0
 ALLOWED = (ValueError, TypeError, MemoryError, OSError, CampaignError)
-# What runs machines or writes files where it is told to.
+# Runs machines, or writes files to a given place.
 SKIPPED = {"Campaign", "Law", "CampaignResult", "IterationRecord", "Experiment", "Identification",
            "swept_sine", "Library", "Cell"}  # fmt: skip
-# Figures that may be infinite by what they mean: a growth without bound, no limit at all, the
-# deviation of what a measurement does not determine.
+# Figures that may be infinite by definition: unbounded growth, no limit, the deviation of a
+# parameter that the measurement does not determine.
 UNBOUNDED = {"bandwidth_deviation_hz", "gain_deviation", "delay_deviation_s", "damping_deviation",
              "natural_frequency_deviation_hz",
              "transient_growth", "spectral_radius", "expected_rms", "growth", "limit",
@@ -71,7 +70,7 @@ def odd_values(rng: random.Random) -> list[object]:
 
 
 def right_values() -> dict[str, object]:
-    """Return an argument for each name that occurs, as a reasonable caller gives it."""
+    """Return a valid argument for each parameter name."""
     from classes_fixture import ERROR, N, U, axis, both, line, low_pass, response
 
     from ilc_rt import PdIlc, RelevanceWeights, identify, trajectory
@@ -86,8 +85,10 @@ def right_values() -> dict[str, object]:
         "a": axis().a, "b": axis().b, "c": axis().c, "d": axis().d, "dt_s": 0.002, "model": axis(),
         "models": [axis(), axis()], "n_samples": N, "n": 20, "u": U, "e": ERROR, "y": ERROR,
         "x": ERROR, "x0": [0.0, 0.0], "q": 1.0, "s": 0.01, "r": 0.1, "rate": 0.3, "kp": 0.4,
-        "kd": 0.1, "q_filter": low_pass(), "filter": low_pass(), "lead": 2, "gain": 0.5,
-        "limit": 0.4, "law": PdIlc(0.4, 0.0), "core": PdIlc(0.4, 0.0), "library": None,
+        "kd": 0.1, "q_filter": low_pass(), "filter": low_pass(), "lead_samples": 2,
+        "gain": 0.5,
+        "gain_per_s": 0.5, "input_max": 0.4, "change_max": 0.4, "step_max": 0.4,
+        "law": PdIlc(0.4, 0.0), "core": PdIlc(0.4, 0.0), "library": None,
         "weights": RelevanceWeights(), "repeats": 2, "patience": 2, "jacobian": np.eye(1),
         "order": 2, "cutoff_hz": 40.0, "bandwidth_hz": 20.0, "taps": [0.25, 0.5, 0.25],
         "cutoffs_hz": [10.0, 50.0], "starts": [0, 30], "blend": 8, "reference": ERROR,
@@ -122,7 +123,7 @@ def signature(call: object) -> list[inspect.Parameter] | None:
 
 
 def targets() -> list[tuple[str, object, list[inspect.Parameter]]]:
-    """Return everything that can be called: functions, classes, methods of examples."""
+    """Return every callable: functions, classes, methods of examples."""
     from classes_fixture import EXAMPLES, MODULES
 
     found: dict[str, object] = {}
@@ -145,7 +146,7 @@ def targets() -> list[tuple[str, object, list[inspect.Parameter]]]:
 
 
 def draw(rng: random.Random, given: list[inspect.Parameter], right: dict[str, object]):
-    """Return arguments by name, of which one or two are odd."""
+    """Return arguments by name, one or two of them odd."""
     odd = odd_values(rng)
     arguments: dict[str, object] = {}
     for parameter in given:
@@ -169,7 +170,7 @@ def told(name: str, arguments: dict[str, object]) -> str:
 
 
 def not_finite(value: object, path: str = "", depth: int = 0) -> str | None:
-    """Return where a result holds a number that is not finite."""
+    """Return the place of a non-finite number in a result."""
     if depth > 3 or path.rsplit(".", 1)[-1] in UNBOUNDED:
         return None
     if isinstance(value, np.ndarray) and value.dtype.kind in "fc":
@@ -190,7 +191,7 @@ def not_finite(value: object, path: str = "", depth: int = 0) -> str | None:
 
 
 def verdict(call: object, arguments: dict[str, object]) -> str | None:
-    """Make one call; return what is wrong with what came of it."""
+    """Make one call; return the rule that it broke."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -209,7 +210,7 @@ def verdict(call: object, arguments: dict[str, object]) -> str | None:
 
 
 def work(seed: int, first: int, seconds: float, calls: int) -> None:
-    """Make calls and report each on a line before it is made and after."""
+    """Make calls, and report each on a line before and after it is made."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_MAX, MEMORY_MAX))
     out = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -229,7 +230,7 @@ def work(seed: int, first: int, seconds: float, calls: int) -> None:
 
 
 def watch(seed: int, seconds: float, calls: int) -> tuple[int, list[str]]:
-    """Run workers until the calls or the time are used up; return how many, and what was wrong."""
+    """Run workers until the calls or the time are used up; return their number and the failures."""
     broken: list[str] = []
     number, ends = 0, time.monotonic() + seconds
     with tempfile.TemporaryDirectory(prefix="ilc-border-") as folder:
@@ -245,12 +246,12 @@ def watch(seed: int, seconds: float, calls: int) -> tuple[int, list[str]]:
 
 
 def follow(command: list[str], folder: str, number: int) -> tuple[int, list[str], bool]:
-    """Follow one worker; return the next call, what was wrong, and whether it came to its end."""
+    """Follow one worker; return the next call, the failures, and whether it finished."""
     import selectors
 
     broken: list[str] = []
     current = "before the first call"
-    # The same order of names in every process, so that a seed draws the same calls again.
+    # The same order of names in every process, so that a seed reproduces the calls.
     environment = {**os.environ, "PYTHONHASHSEED": "0"}
     with subprocess.Popen(
         command, cwd=folder, stdout=subprocess.PIPE, bufsize=0, env=environment

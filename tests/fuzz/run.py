@@ -1,7 +1,7 @@
 """`make fuzz`: new problems for every property test, and mutated inputs for every reader.
 
-Takes about FUZZ_S seconds (60 if not set) once everything is built, from the seed FUZZ_SEED (a
-new one if not set). Prints the seed, and after a failure what makes it a case that `make test`
+Takes about FUZZ_S seconds (60 by default) once everything is built, from the seed FUZZ_SEED (a new
+one by default). Prints the seed, and after a failure the steps that make it a case that `make test`
 tries first.
 """
 
@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 CARGO = ["cargo", "test", "--release", "--workspace"]
-#: Shares of the time for readers and for the border to Python; property tests have the rest.
+#: Shares of the time for readers and for the Python border; property tests have the rest.
 READERS_SHARE, BORDER_SHARE = 0.4, 0.2
 KEEP = """
 What was found becomes a test that is tried first:
@@ -43,7 +43,7 @@ def property_tests() -> list[str]:
 
 
 class Hunt:
-    """A search with a seed and an end."""
+    """A search with a seed and a time limit."""
 
     def __init__(self, seconds: float, seed: int) -> None:
         self.seconds = seconds
@@ -51,7 +51,7 @@ class Hunt:
         self.failed: list[str] = []
 
     def run(self, what: str, argv: list[str], seed: int, **variables: str) -> None:
-        """Run a program; what it says is shown if it finds something."""
+        """Run a program; its output is shown if it finds something."""
         environment = {**os.environ, "ILC_FUZZ_SEED": str(seed), **variables}
         done = subprocess.run(
             argv, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -64,7 +64,7 @@ class Hunt:
             print(f"  {line}")
 
     def readers(self) -> None:
-        """Try every reader on mutated inputs, as many at a time as there are processors."""
+        """Run every reader on mutated inputs, as many at a time as there are processors."""
         listed = subprocess.run(
             [*CARGO, "--test", "fuzz", "--", "--list"],
             cwd=ROOT, capture_output=True, text=True, check=True,
@@ -77,7 +77,7 @@ class Hunt:
                  ILC_FUZZ_S=f"{each_s:.3f}")  # fmt: skip
 
     def border(self) -> None:
-        """Call everything that Python can call with what it does not expect."""
+        """Call the whole public Python interface with unexpected arguments."""
         script = ROOT / "tests" / "fuzz" / "border.py"
         seconds = BORDER_SHARE * self.seconds
         print(f"the border to Python, {seconds:.1f} s", flush=True)
@@ -85,7 +85,7 @@ class Hunt:
                             "--seed", str(self.seed)], self.seed)  # fmt: skip
 
     def property_tests(self, until: float) -> None:
-        """Draw new problems for every property test, again and again."""
+        """Draw new problems for every property test, repeatedly."""
         names = property_tests()
         seed = self.seed
         rounds = 0
@@ -106,7 +106,7 @@ class Hunt:
 
 
 def main() -> int:
-    """Hunt, and tell."""
+    """Run the search and report."""
     seconds = float(os.environ.get("FUZZ_S") or 60)
     seed = int(os.environ.get("FUZZ_SEED") or secrets.randbelow(2**32))
     print(f"seed {seed}, {seconds:g} s; building", flush=True)

@@ -1,4 +1,4 @@
-"""One example or more of every public class, for what is to hold of all of them alike."""
+"""One example or more of every public class, for the tests over all of them."""
 
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from ilc_rt import (
     Cell,
     ConstrainedIlc,
     ErrorFeedforwardIlc,
+    FaultError,
     FlexibleIlc,
     Gate,
     IterationRecord,
@@ -71,7 +72,7 @@ def response():
 
 
 def updated(law, n_channels=1):
-    """Return what a law makes of a run."""
+    """Return a law's update for a run."""
     shape = (N,) if n_channels == 1 else (N, n_channels)
     size = N * n_channels
     return law.update(np.resize(U, size).reshape(shape), np.resize(ERROR, size).reshape(shape))
@@ -81,7 +82,7 @@ def limits():
     return {"velocity_max_m_s": 0.5, "acceleration_max_m_s2": 2.0, "jerk_max_m_s3": 50.0}
 
 
-# One or more examples of each class, and what tells two of them apart beyond their attributes.
+# One or more examples of each class, and the call that distinguishes two beyond their attributes.
 EXAMPLES = {
     StateSpace: (lambda: axis().delayed(2), lambda m: m.simulate(U)),
     TimeVarying: (
@@ -192,6 +193,7 @@ EXAMPLES = {
     IterationRecord: (lambda: IterationRecord.from_row(ROW, "nowhere.db"), None),
     CampaignResult: (lambda: CampaignResult("nowhere.db", cell="gantry"), None),
     CampaignError: (lambda: CampaignError("node 2 is silent", exit_code=3), None),
+    FaultError: (lambda: FaultError("node 2 is silent", kind="silent_drive", node=2), None),
     BadInputError: (lambda: BadInputError("no such file"), None),
 }
 ROW = {"id": 4, "index": 2, "tracking_inf_m": 1e-3, "tracking_rms_m": 1e-4}

@@ -1,4 +1,4 @@
-"""What several test files share: the cell, a finished campaign, programs to stand in."""
+"""Shared fixtures: the cell, a finished campaign, stand-ins for programs."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 GANTRY = ROOT / "examples" / "01_gantry.toml"
 
-# A change is judged by fixed problems: every run draws the same examples. `make fuzz` names another
-# seed (and hands it to Hypothesis too); what it finds becomes an `@example` of the test.
+# A change is judged by fixed problems: every run draws the same examples. `make fuzz` sets another
+# seed (also for Hypothesis); a failing case becomes an `@example` of the test.
 settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
 settings.register_profile("fuzz", deadline=None, database=None, print_blob=True)
 settings.load_profile("fuzz" if "ILC_FUZZ_SEED" in os.environ else "fixed")
 
 
 def pytest_sessionstart() -> None:
-    """Undo what a background job or nohup inherits: the tests send these signals in earnest."""
+    """Restore the signal handlers that a background job or nohup inherits as ignored."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
@@ -73,9 +73,9 @@ def ilc(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
 
 @pytest.fixture
 def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], None]:
-    """Return a function that puts a script in the place of a program.
+    """Return a function that puts a script in place of a program.
 
-    The scripts misbehave in ways that the real programs do not.
+    The scripts fail in ways that the real programs do not.
     """
     folder = tmp_path / "programs"
     folder.mkdir()

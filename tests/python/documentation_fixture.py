@@ -1,7 +1,7 @@
-"""Finds what the documents say that one can type: command lines, and blocks of Python.
+"""Collects the runnable parts of the documents: command lines, and blocks of Python.
 
-A fenced block of ``sh`` or ``python`` is for running. One that cannot run says so on the line
-before it, with the reason, which GitHub does not show::
+A fenced block of ``sh`` or ``python`` is meant to run. One that cannot run gives the reason on the
+line before it, in a comment that GitHub does not show::
 
     <!-- not run: the reason -->
 """
@@ -23,7 +23,7 @@ from ilc_rt.cli import app
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 
-#: What a fence may say; all but the first two are for reading only.
+#: Languages of a fence; all but the first two are for reading only.
 LANGUAGES = ("sh", "python", "text", "toml", "json")
 NOT_RUN = re.compile(r"<!-- not run: (.+) -->$")
 PROGRAMS = ("ilc", "ilc-rt", "ilc-sim", "make", "python", "pip", "cargo")
@@ -91,7 +91,7 @@ def blocks(document: Path) -> list[Block]:
 
 
 def outside_of_blocks(document: Path) -> list[tuple[int, str]]:
-    """Return the numbered lines of a document that stand in no fenced block."""
+    """Return the numbered lines of a document outside fenced blocks."""
     kept = []
     inside = False
     for number, line in enumerate(document.read_text(encoding="utf-8").splitlines(), 1):
@@ -117,7 +117,7 @@ def commands_of_blocks() -> list[Command]:
 
 
 def launcher(name: str) -> list[str]:
-    """Return how one of the three programs is started."""
+    """Return the command that starts one of the three programs."""
     if name == "ilc":
         return [sys.executable, "-m", "ilc_rt.cli"]
     return [str(program(name))]
@@ -125,7 +125,7 @@ def launcher(name: str) -> list[str]:
 
 @cache
 def help_of(name: str, *verb: str) -> str:
-    """Return what a program says of itself or of a verb; of `ilc`, what that is made of."""
+    """Return the help text of a program or a verb; for `ilc`, also its parts."""
     if name != "ilc":
         argv = [*launcher(name), *verb, "--help"]
         return subprocess.run(argv, capture_output=True, text=True, check=True, timeout=60).stdout
@@ -138,7 +138,7 @@ def help_of(name: str, *verb: str) -> str:
 
 
 def verbs_of(name: str) -> list[list[str]]:
-    """Return every verb of a program, verbs of verbs too."""
+    """Return every verb of a program, including nested ones."""
     if name == "ilc":
         found: list[list[str]] = []
         open_ones = [([], get_command(app))]
@@ -155,7 +155,7 @@ def verbs_of(name: str) -> list[list[str]]:
 
 
 def commands_of_help() -> list[Command]:
-    """Return every example that a program's help gives."""
+    """Return every example in a program's help."""
     found = []
     for name in ("ilc", "ilc-rt", "ilc-sim"):
         example = re.compile(rf"^\s*(?:Examples?:)?\s*({name} .*?)\s*$", re.MULTILINE)

@@ -1,7 +1,7 @@
-"""Drives the programs `ilc-rt` and `ilc-sim` as a person at two terminals would.
+"""Drives the programs `ilc-rt` and `ilc-sim` like a person at two terminals.
 
-Everything a program says is read as it comes, and every wait has a deadline
-that only a program that hangs reaches.
+All output of a program is read as it arrives, and every wait has a deadline that only a hanging
+program reaches.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ to_m = [0.08, 0.04]
 to_m = [0.06, 0.06]
 
 """
-#: For tests in real time whose subject is not punctuality: a busy machine may hold a process up.
+#: For real-time tests that do not concern punctuality: a busy machine may delay a process.
 PATIENT = """
 [safety]
 silent_cycles_max = 500
@@ -64,14 +64,14 @@ def program(name: str) -> Path:
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
-    """Return a port that nobody uses."""
+    """Return a free port."""
     with socket.socket(type=kind) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
 
 class Process:
-    """A running program and what it has said so far.
+    """A running program and its output so far.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class Process:
     def line(
         self, is_wanted: Callable[[str], bool], wanted: str, deadline_s: float = DEADLINE_S
     ) -> str:
-        """Read until a line is the wanted one, and return it."""
+        """Read until a line equals the wanted one, and return it."""
         until = time.monotonic() + deadline_s
         while (line := self._next(until, wanted)) is not None:
             if is_wanted(line):
@@ -154,14 +154,14 @@ class Process:
         self._process.send_signal(number)
 
     def end(self, deadline_s: float = DEADLINE_S) -> int:
-        """Read until it ends, and return its exit status."""
+        """Read until the program ends, and return its exit status."""
         until = time.monotonic() + deadline_s
         while self._next(until, "good-bye") is not None:
             pass
         return self._process.wait(max(1.0, until - time.monotonic()))
 
     def close(self) -> None:
-        """End it, whatever state it is in."""
+        """Kill the program if it still runs."""
         if self._process.poll() is None:
             self._process.kill()
         self._process.wait()
@@ -171,7 +171,7 @@ class Process:
 
 
 class Bench:
-    """A folder, a bus of its own, and the programs that were started on it."""
+    """A folder, a bus of its own, and the programs started on it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -213,7 +213,7 @@ class Bench:
         return path
 
     def start(self, *argv: str | Path, stdout: int | None = None) -> Process:
-        """Start a program of the project; `stdout` is a descriptor in place of being read."""
+        """Start a program of the project; `stdout` is a descriptor to use instead of a pipe."""
         process = Process([program(str(argv[0])), *argv[1:]], self.folder, stdout)
         self._processes.append(process)
         return process
@@ -232,7 +232,7 @@ class Bench:
         bus: str | None = None,
         stdout: int | None = None,
     ) -> Process:
-        """Start the controller; it says its events, and nothing on Zenoh."""
+        """Start the controller with events on standard output, and without Zenoh."""
         return self.start(
             "ilc-rt", "run", cell, "--bus", bus or self.bus, "--iterations", str(runs),
             "--library", self.library, "--events", "--no-telemetry", *arguments,
@@ -250,7 +250,7 @@ class Bench:
 
 
 def goodbye(drives: Process) -> str:
-    """Interrupt simulated drives and return their last line, which tells their states."""
+    """Interrupt simulated drives and return their last line, which states their states."""
     drives.signal(signal.SIGINT)
     last = drives.line_with("stopped after")
     assert drives.end() == 0

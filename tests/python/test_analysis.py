@@ -47,13 +47,13 @@ def triangle(n=401):
 
 
 def lifted(model, n):
-    """Return the dense operator, one simulated impulse a column."""
+    """Return the dense lifted system, one simulated impulse per column."""
     first = model.simulate(np.eye(n)[:, 0])
     return np.array([[first[i - j] if i >= j else 0.0 for j in range(n)] for i in range(n)])
 
 
 def columns(law, n):
-    """Return L_u and L_e of a law, one update a column."""
+    """Return L_u and L_e of a law, one update per column."""
     eye, zero = np.eye(n), np.zeros(n)
     keep = np.column_stack([law.update(eye[:, i], zero) for i in range(n)])
     learn = np.column_stack([law.update(zero, eye[:, i]) for i in range(n)])
@@ -61,7 +61,7 @@ def columns(law, n):
 
 
 def optimal(model, n, q, s, r):
-    """Return L_u, L_e and P by the equations of the source."""
+    """Return L_u, L_e and P in closed form."""
     p = lifted(model, n)
     cost = q * p.T @ p + (s + r) * np.eye(n)
     keep = np.linalg.solve(cost, q * p.T @ p + r * np.eye(n))
@@ -99,7 +99,7 @@ def test_a_filtered_law_agrees_with_its_columns():
     keep, learn = columns(law, N)
     t = keep - learn @ lifted(model, N)
     np.testing.assert_allclose(found.monotonic_factor, np.linalg.norm(t, 2), rtol=1e-9)
-    # Far from normal: an eigenvalue moves by much more than the rounding of the matrix.
+    # Far from normal: an eigenvalue is much more sensitive than the matrix's rounding.
     np.testing.assert_allclose(found.spectral_radius, np.abs(np.linalg.eigvals(t)).max(), rtol=1e-6)
     assert found.method == "dense"
 
@@ -127,14 +127,14 @@ class Proportional:
     """A law written in Python."""
 
     def update(self, u, e, disturbance=None):
-        """Return the next input, the error taken one sample ahead."""
+        """Return the next input from the error one sample ahead."""
         del disturbance
         ahead = np.vstack([e[1:], e[-1:]])
         return u + 0.5 * ahead
 
 
 class Clipped:
-    """A law that is not linear."""
+    """A nonlinear law."""
 
     def update(self, u, e, disturbance=None):
         """Return a bounded input."""
@@ -221,7 +221,7 @@ def test_the_cell_knows_its_model_and_its_first_error():
 
 
 def divergent_cell(tmp_path):
-    """Write the gantry with a proportional law that is far too eager."""
+    """Write the gantry with a proportional law whose gain is far too high."""
     text = Path(GANTRY).read_text(encoding="utf-8").replace('law = "norm_optimal"', 'law = "pd"')
     path = tmp_path / "cell.toml"
     path.write_text(text + "\n[learning.pd]\nkp = 5.0\ncutoff_hz = 100.0\n", encoding="utf-8")

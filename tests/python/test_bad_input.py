@@ -1,4 +1,4 @@
-"""What a person may get wrong: refused with one line before anything moves."""
+"""User errors: each is refused with one line before anything moves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-#: What is replaced in the example cell, by what, and what the refusal has to name.
+#: The replaced text of the example cell, its replacement, and the names in the refusal.
 CELLS = {
     "not TOML": ('name = "gantry"', 'name = "gantry', ["cell.toml:5", "[cell]"]),
     "unknown key": ("damping = 1.0", "dampening = 1.0", ["[axis.model]", "dampening", "damping"]),
@@ -55,12 +55,12 @@ CELLS = {
     ),
 }  # fmt: skip
 
-#: What is added to `ilc-rt run cell.toml`, and what the refusal has to name.
+#: The arguments added to `ilc-rt run cell.toml`, and the names in the refusal.
 OPTIONS = {
     "no such file": (["nix.toml"], ["nix.toml", "cannot be read", "No such file"]),
     "a folder for a file": (["."], ["cannot be read", "not a regular file"]),
     "unknown option": (["cell.toml", "--fast"], ["--fast", "--help"]),
-    "no runs": (["cell.toml", "--iterations", "0"], ["--iterations", "'0'", "1.."]),
+    "no runs": (["cell.toml", "--iterations", "0"], ["--iterations", "'0'", "allowed 1 to 4294967295"]),
     "no such measure": (["cell.toml", "--measure", "eye"], ["'eye'", "encoder, tcp"]),
     "no bus at all": (
         ["cell.toml", "--bus", "usb:0"], ["--bus", "`usb:0`", "can:INTERFACE", "udp:GROUP"],
@@ -70,13 +70,13 @@ OPTIONS = {
     ),
     "port 0": (["cell.toml", "--bus", "udp:239.74.163.2:0"], ["port `0`", "1 to 65535"]),
     "a key with a wildcard": (["cell.toml", "--bus", "zenoh:a/*"], ["key `a/*`", "wildcards"]),
-    # Where the kernel has no CAN at all the line says that.
+    # A kernel without CAN support says that instead.
     "no such interface": (["cell.toml", "--bus", "can:nix0"], ["--bus", "`can:nix0`", "CAN"]),
     "interface name too long": (
         ["cell.toml", "--bus", "can:an-interface-too-long"], ["1 to 15 printable characters"],
     ),
     "drives in another program": (
-        ["cell.toml", "--bus", "loopback:"], ["--bus", "loopback:", "can:, udp:, zenoh:"],
+        ["cell.toml", "--bus", "loopback:"], ["--bus", "loopback:", "can:INTERFACE, udp:"],
     ),
     "library in no folder": (
         ["cell.toml", "--library", "nix/library.db"],
@@ -115,7 +115,7 @@ def check_refusal(program: str, status: int, errors: list[str], named: list[str]
 
 @pytest.mark.parametrize("case", CELLS)
 def test_a_wrong_cell_is_refused(bench: Bench, case: str) -> None:
-    """By `check` and by `run` alike, with file, key, value and what is allowed."""
+    """Refused by `check` and `run` alike, with file, key, value and the allowed values."""
     old, new, named = CELLS[case]
     cell = bench.cell((old, new))
     check = bench.start("ilc-rt", "check", cell)
@@ -129,7 +129,7 @@ def test_a_wrong_cell_is_refused(bench: Bench, case: str) -> None:
 
 @pytest.mark.parametrize("case", CELLS)
 def test_the_simulated_drives_refuse_a_wrong_cell_as_well(bench: Bench, case: str) -> None:
-    """What concerns the machine; the program and the learning are none of theirs."""
+    """Only errors of the machine; the simulator ignores the program and the learning."""
     old, new, named = CELLS[case]
     drives = bench.start("ilc-sim", "run", bench.cell((old, new)), "--bus", "can:nix0")
     status = drives.end()
@@ -140,7 +140,7 @@ def test_the_simulated_drives_refuse_a_wrong_cell_as_well(bench: Bench, case: st
 
 @pytest.mark.parametrize("case", OPTIONS)
 def test_wrong_options_are_refused(bench: Bench, case: str) -> None:
-    """With the drives listening: none of them is told anything."""
+    """With the drives listening: none of them receives anything."""
     arguments, named = OPTIONS[case]
     cell = bench.cell(("udp:239.74.163.2", bench.bus))
     library = bench.folder / "newer.db"
@@ -162,14 +162,14 @@ def test_wrong_options_are_refused(bench: Bench, case: str) -> None:
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_library_that_may_not_be_written_is_refused(bench: Bench) -> None:
-    """The first run would be lost."""
+    """Refused, as the first run would be lost."""
     bench.library.touch(0o400)
     run = bench.controller(bench.cell(), runs=1)
     check_refusal("ilc-rt", run.end(), run.errors, ["library", "allowed"])
 
 
 def test_no_drives_on_the_bus(bench: Bench) -> None:
-    """Refused once the first node had its time to answer."""
+    """Refused once the first node's timeout has passed."""
     cell = bench.cell(more="\n[safety]\nanswer_timeout_s = 0.1\n")
     run = bench.controller(cell, runs=1)
     named = ["cell.toml", "x node = 1", bench.bus, "no boot-up within"]
@@ -185,7 +185,7 @@ def test_no_drives_on_the_bus(bench: Bench) -> None:
     ],
 )
 def test_one_node_missing(bench: Bench, old: str, new: str, named: list[str]) -> None:
-    """The node that does not answer is named; those that do stay where they are."""
+    """The node that does not answer is named; the others stay where they are."""
     drives = bench.drives(bench.cell((old, new), name="drives.toml"))
     cell = bench.cell(more="\n[safety]\nanswer_timeout_s = 0.5\n")
     run = bench.controller(cell, runs=1)
@@ -195,7 +195,7 @@ def test_one_node_missing(bench: Bench, old: str, new: str, named: list[str]) ->
 
 
 def test_a_port_that_another_program_has(bench: Bench) -> None:
-    """UDP in use by somebody who does not share it."""
+    """A UDP port in exclusive use by another program."""
     with socket.socket(type=socket.SOCK_DGRAM) as other:
         other.bind(("", 0))
         bus = f"udp:239.74.163.2:{other.getsockname()[1]}"
@@ -242,7 +242,7 @@ def test_the_simulated_drives_refuse_wrong_options(
 def test_the_python_program_passes_it_on(
     bench: Bench, arguments: list[str], named: list[str]
 ) -> None:
-    """`ilc run` says the same line in its own name."""
+    """`ilc run` prints the same line under its own name."""
     bench.cell()
     bench.cell(("to_m = [0.08, 0.04]", "to_m = [0.08, 0.4]"), name="wrong.toml")
     bus = [] if "--bus" in arguments else ["--bus", bench.bus]

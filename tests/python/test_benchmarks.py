@@ -13,7 +13,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 @pytest.fixture
 def report(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
-    # What the comparisons need is not installed where the tests run.
+    # The comparisons need packages that are not installed where the tests run.
     for name in ("bounded", "update"):
         monkeypatch.setitem(sys.modules, name, type(sys)(name))
     spec = importlib.util.spec_from_file_location("benchmark_report", FOLDER / "report.py")

@@ -1,4 +1,4 @@
-"""Wrong arguments for everything public: no abort, no panic, no hang, no number that is none."""
+"""Wrong arguments for the public interface: no abort, panic, hang or non-finite result."""
 
 import subprocess
 import sys
@@ -149,7 +149,7 @@ def test_a_bell_wider_than_any_number_is_refused(bandwidth_hz: float, dt_s: floa
 
 
 def test_a_loop_at_rest_answers_with_its_gain_alone() -> None:
-    """The open loop integrates, so that only the position loop is left at 0 Hz."""
+    """The open loop integrates, so only the position gain remains at 0 Hz."""
     frequency_hz = np.linspace(1.0, 40.0, 80)
     z = np.exp(2j * np.pi * frequency_hz * 0.002)
     fit = identify.fit_velocity_loop(

@@ -1,4 +1,4 @@
-"""Campaigns: what they yield, and how the programs behind them are handled."""
+"""Campaigns: their results, and the handling of the programs behind them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from ilc_rt import BadInputError, Campaign, CampaignError, CampaignResult, processes
+from ilc_rt import (
+    BadInputError,
+    Campaign,
+    CampaignError,
+    CampaignResult,
+    FaultError,
+    processes,
+)
 from ilc_rt.events import (
     EndEvent,
     EventError,
     IterationEvent,
+    LastCycles,
     LatencyEvent,
     StartEvent,
     StateEvent,
@@ -62,7 +70,7 @@ def end(status: str = "completed") -> dict[str, object]:
 
 
 def test_a_run_in_this_process_learns_and_keeps_every_run(finished: CampaignResult) -> None:
-    """The real controller: errors fall, arrays have their shapes, figures match arrays."""
+    """The real controller: errors fall, arrays have the right shapes, figures match arrays."""
     first, last = finished.records[0], finished.records[-1]
     assert [record.index for record in finished.records] == [0, 1, 2]
     assert last.tracking_rms_m < 0.5 * first.tracking_rms_m
@@ -79,7 +87,7 @@ def test_a_run_in_this_process_learns_and_keeps_every_run(finished: CampaignResu
 
 
 def test_two_lockstep_campaigns_are_the_same_bit_by_bit(gantry: Path, tmp_path: Path) -> None:
-    """No wall clock anywhere: equal digests."""
+    """No wall clock: equal digests."""
     digests = []
     for name in ("a.db", "b.db"):
         campaign = Campaign(gantry, library=tmp_path / name, bus="loopback:")
@@ -95,7 +103,7 @@ def test_records_are_frozen(finished: CampaignResult) -> None:
 
 
 def test_a_law_written_in_python_is_asked_between_the_runs(gantry: Path, tmp_path: Path) -> None:
-    """It gets input and error of the run before, and its answer is applied."""
+    """It receives input and error of the previous run, and its result is applied."""
 
     class Constant:
         def __init__(self) -> None:
@@ -115,7 +123,7 @@ def test_a_law_written_in_python_is_asked_between_the_runs(gantry: Path, tmp_pat
 
 
 def test_a_late_law_costs_a_run_and_is_counted(gantry: Path, tmp_path: Path) -> None:
-    """By the clock nobody waits for the law: the old input is repeated until it has answered."""
+    """In real time the loop does not wait for a late law: it repeats the old input."""
     program, first, *_ = gantry.read_text().split("[[program.segment]]")
     learning = gantry.read_text().partition("[learning]")
     cell = tmp_path / "short.toml"
@@ -144,7 +152,7 @@ def test_a_late_law_costs_a_run_and_is_counted(gantry: Path, tmp_path: Path) -> 
 
 
 def test_a_law_that_fails_is_a_fault_that_names_it(gantry: Path, tmp_path: Path) -> None:
-    """The axes are stopped; the error says which law and why; the run before is kept."""
+    """The axes are stopped; the error names the law and the reason; the previous run is kept."""
 
     class Broken:
         def update(self, u: np.ndarray, e: np.ndarray, disturbance: object = None) -> np.ndarray:
@@ -161,7 +169,7 @@ def test_a_law_that_fails_is_a_fault_that_names_it(gantry: Path, tmp_path: Path)
 
 
 def test_ctrl_c_in_this_process_is_a_controlled_stop(gantry: Path, tmp_path: Path) -> None:
-    """The controller ends by itself, then the exception comes; the runs are kept."""
+    """The controller stops, then the exception is raised; the runs are kept."""
     campaign = Campaign(gantry, library=tmp_path / "l.db", bus="loopback:")
     with pytest.raises(KeyboardInterrupt):  # noqa: PT012
         for record in campaign.run(500):
@@ -175,7 +183,7 @@ def test_ctrl_c_in_this_process_is_a_controlled_stop(gantry: Path, tmp_path: Pat
 def test_a_campaign_that_was_left_goes_on_with_what_it_had_learned(
     gantry: Path, tmp_path: Path
 ) -> None:
-    """The next input is the same bit by bit as without the break; the result has all runs."""
+    """The next input is bit-identical to that without the break; the result has all runs."""
     whole = Campaign(gantry, library=tmp_path / "whole.db", bus="loopback:")
     expected = list(whole.run(6))
     for record in Campaign(gantry, library=tmp_path / "cut.db", bus="loopback:").run(4):
@@ -191,7 +199,7 @@ def test_a_campaign_that_was_left_goes_on_with_what_it_had_learned(
 
 
 def test_a_campaign_is_found_again_in_the_library(finished: CampaignResult) -> None:
-    """What the events said and what the library says are the same."""
+    """The events and the library agree."""
     again = CampaignResult.from_library(finished.library)
     assert again.campaign == finished.campaign
     assert again.records == finished.records
@@ -204,7 +212,7 @@ def test_a_campaign_is_found_again_in_the_library(finished: CampaignResult) -> N
 def test_processes_give_the_same_stream(
     gantry: Path, tmp_path: Path, programs: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Events of the program arrive typed; drives end after it; all are reaped."""
+    """Events of the program arrive typed; drives end after it; all processes are reaped."""
     monkeypatch.chdir(tmp_path)
     programs("ilc-sim", GOOD_DRIVES)
     programs("ilc-rt", controller(START, {"event": "novelty"}, ITERATION, end()))
@@ -220,7 +228,7 @@ def test_processes_give_the_same_stream(
 def test_arguments_reach_the_controller(
     gantry: Path, tmp_path: Path, programs: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Everything that was asked for is on its command line."""
+    """All arguments are on its command line."""
     monkeypatch.chdir(tmp_path)
     programs("ilc-sim", GOOD_DRIVES)
     programs("ilc-rt", controller(START, end(), then="open('argv', 'w').write(str(sys.argv[1:]))"))
@@ -230,8 +238,9 @@ def test_arguments_reach_the_controller(
     list(campaign.run(5))
     said = (tmp_path / "argv").read_text()
     assert said == str(
-        ["run", str(gantry), "--events", "--with-parent", "--iterations", "5", "--library", "l.db",
-         "--measure", "encoder", "--resume", "--bus", "udp:239.1.1.1", "--lockstep"]
+        ["run", str(gantry), "--events", "--with-parent", "--bus", "udp:239.1.1.1", "--measure",
+         "encoder", "--lockstep", "--simulated-drives", "--library", "l.db", "--iterations", "5",
+         "--resume"]
     )  # fmt: skip
 
 
@@ -254,7 +263,7 @@ def test_drives_that_do_not_start_are_an_error_of_one_line(
     code: int,
     said: str,
 ) -> None:
-    """The error says why, and the controller is never started."""
+    """The error gives the reason, and the controller is never started."""
     monkeypatch.setattr(processes, "READY_DEADLINE_S", 1.0)
     programs("ilc-sim", source)
     programs("ilc-rt", "open('started', 'w').close()")
@@ -270,7 +279,7 @@ def test_drives_that_do_not_start_are_an_error_of_one_line(
 def test_the_controllers_line_and_exit_code_are_handed_on(
     gantry: Path, tmp_path: Path, programs: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Refused by the controller: its last line, its exit code."""
+    """A refusal by the controller: its last line, its exit code."""
     monkeypatch.chdir(tmp_path)
     programs("ilc-sim", GOOD_DRIVES)
     programs(
@@ -284,7 +293,7 @@ def test_the_controllers_line_and_exit_code_are_handed_on(
 def test_a_fault_is_raised_after_the_runs_before_it(
     gantry: Path, tmp_path: Path, programs: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Completed runs are kept, the reason is the fault's."""
+    """Completed runs are kept; the reason is that of the fault."""
     monkeypatch.chdir(tmp_path)
     fault = {"event": "fault", "reason": "x: following error 0.012 m"}
     programs("ilc-sim", GOOD_DRIVES)
@@ -300,7 +309,7 @@ def test_a_fault_is_raised_after_the_runs_before_it(
 def test_dying_drives_are_reported_with_the_reason(
     gantry: Path, tmp_path: Path, programs: Install
 ) -> None:
-    """The controller's fault and what became of the drives, in one line."""
+    """The controller's fault and the end of the drives, in one line."""
     programs(
         "ilc-sim",
         "import sys, time\nprint('ready:', flush=True)\ntime.sleep(0.3)\nsys.exit('out of memory')",
@@ -335,7 +344,7 @@ def stopping_controller(*events: object) -> str:
 def test_interrupting_stops_the_axes_before_the_drives(
     gantry: Path, tmp_path: Path, programs: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C: the controller stops first, then the drives go, then the exception comes."""
+    """Ctrl-C: the controller stops first, then the drives, then the exception is raised."""
     monkeypatch.chdir(tmp_path)
     programs("ilc-sim", GOOD_DRIVES)
     programs("ilc-rt", stopping_controller(START, ITERATION))
@@ -435,7 +444,7 @@ def test_lines_that_are_no_events_are_refused(line: str) -> None:
 
 
 def test_events_survive_a_round_trip() -> None:
-    """What is written is what is read."""
+    """Written events are read back unchanged."""
     histogram = {"p50": 1.0, "p99": 2.0, "p999": 3.0, "max": 4.0, "bins": [[2.0, 10], [4.0, 1]]}
     latency = {"event": "latency", "wake_late_us": histogram, "execution_us": histogram}
     for data in (START, ITERATION, latency, end()):
@@ -443,3 +452,29 @@ def test_events_survive_a_round_trip() -> None:
         assert event is not None
         assert parse_event(json.dumps(event_payload(event))) == event
     assert isinstance(parse_event(json.dumps(latency)), LatencyEvent)
+
+
+def test_a_fault_is_an_exception_with_its_fields(gantry: Path, tmp_path: Path) -> None:
+    """Kind, axis, node, numbers and the last cycles, beside the sentence."""
+    text = gantry.read_text().replace(
+        "following_error_max_m = 0.01", "following_error_max_m = 1e-4"
+    )
+    cell = tmp_path / "tight.toml"
+    cell.write_text(text)
+    campaign = Campaign(cell, bus="loopback:", library=tmp_path / "l.db")
+    with pytest.raises(FaultError) as caught:
+        list(campaign.run(2))
+    fault = caught.value
+    assert fault.kind in {"following_error", "drive_fault"}
+    assert (fault.axis, fault.node) in {("x", 1), ("y", 2)}
+    assert fault.axis in str(fault)
+    assert str(fault.node) in str(fault)
+    assert (fault.limit, fault.unit, fault.exit_code) == (1e-4, "m", 3)
+    assert fault.value is not None
+    assert abs(fault.value) > 1e-5
+    cycles = fault.cycles
+    assert isinstance(cycles, LastCycles)
+    assert 0 < len(cycles.encoder_m) == len(cycles.missing) <= 32
+    assert {len(row) for row in cycles.reference_m} == {2}
+    assert campaign.result.fault is not None
+    assert not campaign.result.unkept

@@ -1,4 +1,4 @@
-"""python-canopen, a master that others wrote, drives the simulated drives.
+"""python-canopen, an independent master, drives the simulated drives.
 
 It runs over UDP multicast on this host (hop limit 0), against the program ``ilc-sim`` as users
 run it.
@@ -38,7 +38,7 @@ STEP_COUNTS = 50_000
 
 
 def find_sim() -> Path:
-    """Return the built ``ilc-sim``: beside Python, along the path, or in cargo's folder."""
+    """Return the built ``ilc-sim``: beside Python, on the path, or in cargo's folder."""
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     beside = Path(sys.executable).parent / "ilc-sim"
     for candidate in (target / "release" / "ilc-sim", beside):
@@ -64,7 +64,7 @@ def wait_until(holds: Callable[[], bool], what: str, timeout_s: float = PATIENCE
 
 
 class Sim:
-    """A running ``ilc-sim`` and what it prints."""
+    """A running ``ilc-sim`` and its output."""
 
     def __init__(self, *arguments: str) -> None:
         self.port = free_port()
@@ -144,13 +144,13 @@ def attach(network: canopen.Network, number: int, eds: Path) -> BaseNode402:
     """Reset a drive, wait for its boot-up, and return it."""
     node = BaseNode402(number, str(eds))
     network.add_node(node)
-    # Its defaults, 0.2 to 0.8 s, are for a machine that has nothing else to do.
+    # The defaults, 0.2 to 0.8 s, are too short on a busy machine.
     node.sdo.RESPONSE_TIMEOUT = 2.0
     node.TIMEOUT_CHECK_TPDO = 2.0
     node.TIMEOUT_SWITCH_OP_MODE = 5.0
     node.TIMEOUT_SWITCH_STATE_FINAL = 5.0
     node.TIMEOUT_SWITCH_STATE_SINGLE = 5.0
-    # `wait_for_bootup` would miss an answer that comes before it begins to wait.
+    # `wait_for_bootup` would miss an answer that arrives before it starts to wait.
     has_booted = threading.Event()
     node.nmt.add_heartbeat_callback(lambda state: has_booted.set() if state == 0 else None)
     node.nmt.state = "RESET COMMUNICATION"
@@ -160,7 +160,7 @@ def attach(network: canopen.Network, number: int, eds: Path) -> BaseNode402:
 
 
 def enable(network: canopen.Network, node: BaseNode402, mode: str) -> None:
-    """Bring a drive from pre-operational to operation enabled, holding where it is."""
+    """Bring a drive from pre-operational to operation enabled, holding its position."""
     node.sdo[0x60C2][1].raw = round(SYNC_S * 1000)
     node.setup_402_state_machine()
     network.sync.start(SYNC_S)
@@ -170,7 +170,7 @@ def enable(network: canopen.Network, node: BaseNode402, mode: str) -> None:
     assert node.op_mode == mode
     if mode == "CYCLIC SYNCHRONOUS POSITION":
         node.rpdo_pointers[0x607A].raw = node.tpdo_values[0x6064]
-    # python-canopen sends a synchronous RPDO only when it is told its period.
+    # python-canopen sends a synchronous RPDO only if its period is set.
     node.rpdo[1].start(SYNC_S)
     node.state = "OPERATION ENABLED"
 
@@ -190,7 +190,7 @@ def test_boot_and_identity_and_texts(eds: Path) -> None:
         assert node.nmt.state == "PRE-OPERATIONAL"
         assert node.sdo[0x1000].raw == 0x0002_0192
         assert node.sdo[0x1018][4].raw == 1
-        # Longer than four bytes: segmented, both ways.
+        # Longer than four bytes: segmented, in both directions.
         assert node.sdo[0x1008].raw == "ilc-sim CiA 402 drive"
         node.sdo[0x2000].raw = "named by python-canopen"
         assert node.sdo[0x2000].raw == "named by python-canopen"
@@ -227,7 +227,7 @@ def test_pdo_configuration(eds: Path) -> None:
         for _ in range(6):
             network.sync.transmit()
         wait_until(lambda: len(received) >= 3, "three answers to six SYNC")
-        # Answered: whatever else was to come has come.
+        # Answered: all earlier messages have arrived.
         assert node.sdo[0x6064].raw == received[-1] == START_COUNTS
         assert len(received) == 3
 
@@ -239,7 +239,7 @@ def test_position_move(eds: Path) -> None:
         sim.wait_line("node 1: operation enabled")
         last = follow(node, STEP_COUNTS, 20)
         assert last == START_COUNTS + 20 * STEP_COUNTS
-        # Static friction leaves the axis a little short until the integral has built up.
+        # Static friction leaves the axis slightly short until the integral has built up.
         wait_until(
             lambda: abs(node.tpdo_values[0x6064] - last) < COUNTS_PER_M * 0.0002,
             f"0.2 mm around {last}",
@@ -252,7 +252,7 @@ def test_position_move(eds: Path) -> None:
 def test_velocity_move(eds: Path) -> None:
     with running() as (_, network):
         node = attach(network, 2, eds)
-        # The data sheet is node 1's: identifiers are the node's own.
+        # The data sheet is that of node 1: the identifiers are the node's own.
         node.rpdo.read()
         pdo = node.rpdo[1]
         pdo.clear()
@@ -319,7 +319,8 @@ def test_heartbeat_of_the_controller_is_watched(eds: Path) -> None:
         node.sdo[0x1016][1].raw = (100 << 16) | 500
         beat = network.send_periodic(0x700 + 100, b"\x05", 0.02)
         try:
-            # The first one arms the watch; twice the limit later the drive is still content.
+            # The first heartbeat starts the monitoring; twice the limit later the drive is still
+            # operational.
             assert node.tpdo[1].wait_for_reception(timeout=2.0) is not None
             end = time.monotonic() + 1.0
             while time.monotonic() < end:
@@ -329,7 +330,7 @@ def test_heartbeat_of_the_controller_is_watched(eds: Path) -> None:
             beat.stop()
         assert node.emcy.wait(0x8130, timeout=PATIENCE_S) is not None
         sim.wait_line("EMCY 0x8130")
-        # Its answer to a lost controller: no process data any more, and the axis stopped.
+        # Its reaction to a lost controller: no process data, and the axis stopped.
         sim.wait_line("node 1: pre-operational")
         sim.wait_line("node 1: fault")
 
@@ -340,7 +341,7 @@ def test_drive_that_loses_power_goes_silent(eds: Path) -> None:
         node.sdo[0x1017].raw = 20
         node.nmt.wait_for_heartbeat(timeout=1.0)
         sim.wait_line("node 2: lost power")
-        # What was under way has come by then; 25 periods later there must be nothing more.
+        # Frames in flight have arrived by then; 25 periods later there must be no more.
         with contextlib.suppress(canopen.nmt.NmtError):
             node.nmt.wait_for_heartbeat(timeout=0.1)
         with pytest.raises(canopen.nmt.NmtError):
@@ -352,7 +353,7 @@ def test_in_lockstep_time_is_counted_in_syncs(eds: Path) -> None:
         node = attach(network, 1, eds)
         beats: list[int] = []
         node.nmt.add_heartbeat_callback(beats.append)
-        # The cell's cycle is 2 ms: one heartbeat in ten SYNC, however long they take.
+        # The cell's cycle is 2 ms: one heartbeat in ten SYNCs, however long they take.
         node.sdo[0x1017].raw = 20
         for _ in range(35):
             network.sync.transmit()

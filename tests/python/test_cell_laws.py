@@ -1,4 +1,4 @@
-"""Laws that a cell names, and laws handed to a campaign: what is said of each before it starts."""
+"""Laws of a cell, and laws passed to a campaign: the checks before they start."""
 
 import warnings
 from pathlib import Path
@@ -43,12 +43,12 @@ LAWS = [
 
 
 def axis() -> StateSpace:
-    """Return the closed position loop of one axis, two samples late."""
+    """Return the closed position loop of one axis, with a dead time of two samples."""
     return discretize(second_order(94.0, 0.8), DT_S).delayed(2)
 
 
 def believed(name: str) -> StateSpace:
-    """Return the model on which a law is tried: feed-forward wants an axis that only lags."""
+    """Return the model that a law is tested on: feed-forward needs an axis that only lags."""
     if name != "error_feedforward":
         return axis()
     return from_transfer_function([1.0], [1.0, 0.0], DT_S)
@@ -121,7 +121,7 @@ def test_a_law_written_in_python_is_let_through_also_in_a_gate() -> None:
 
 @pytest.mark.parametrize("kind", ["pd", "switched", "gated"])
 def test_a_low_pass_above_the_critical_frequency_warns_with_both(kind: str) -> None:
-    # From 11.4 Hz on the axis lags by more than a quarter turn; the low-pass still holds it down.
+    # From 11.4 Hz on the axis lags by more than 90 degrees; the low-pass still suppresses it.
     cutoff_hz = 15.0
     switched = signal.SwitchedFilter([2.0, cutoff_hz], [0, 150], DT_S, blend=20)
     laws = {
@@ -182,7 +182,7 @@ def test_a_cell_tells_its_law(name: str, tmp_path: Path) -> None:
 
 
 class Growing:
-    """Learns well twice and badly ever after; counts what is taken back."""
+    """Improves twice, then worsens; counts rollbacks."""
 
     def __init__(self) -> None:
         self.updates = self.taken = 0

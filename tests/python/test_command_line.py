@@ -1,4 +1,4 @@
-"""What every verb of the programs has in common: versions, targets, numbers, completion."""
+"""Common features of all verbs: versions, targets, numbers, completion."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_shells_complete_both_programs(tmp_path: Path, shell: str) -> None:
     assert "no-telemetry" in script
     if shell == "bash":
         (tmp_path / "script").write_text(script)
-        # The function that the script itself names; then a verb, and an option of a verb.
+        # The completion function that the script names; then a verb, and an option of a verb.
         ask = (
             "source ./script; f=$(complete -p ilc-rt | grep -o '[^ ]*ilc__rt'); "
             'COMP_WORDS=(ilc-rt ru); COMP_CWORD=1; $f ilc-rt ru ilc-rt; echo "${COMPREPLY[@]}"; '
@@ -121,10 +121,10 @@ def only_json(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
 def test_figures_stand_alone_on_standard_output(
     ilc: Ilc, gantry: Path, tmp_path: Path, arguments: list[str], key: str
 ) -> None:
-    """All else goes to standard error, and no file named ``-`` is made."""
+    """Everything else goes to standard error, and no file named ``-`` is created."""
     words = [str(gantry) if word == "CELL" else word for word in arguments]
     done = ilc(*words, "--json", "-")
-    # An axis may have no model: the figures are told all the same.
+    # An axis may have no model: the figures are still printed.
     if done.returncode == 1:
         done.returncode = 0
     assert key in only_json(done)
@@ -171,7 +171,7 @@ def test_targets_are_looked_at_before_anything_moves(
 
 
 def test_a_new_folder_is_told(ilc: Ilc, gantry: Path, tmp_path: Path) -> None:
-    """Once, when it is made."""
+    """Once, when it is created."""
     words = ["run", str(gantry), "--bus", "loopback:", "-n", "1", "--report", "pictures"]
     first, second = ilc(*words), ilc(*words)
     assert "folder:  pictures is new" in first.stdout
@@ -180,7 +180,7 @@ def test_a_new_folder_is_told(ilc: Ilc, gantry: Path, tmp_path: Path) -> None:
 
 
 def test_a_reader_who_has_gone_is_no_news(finished: Any, tmp_path: Path) -> None:
-    """As `head` does: nothing on standard error."""
+    """As with `head`: nothing on standard error."""
     for words in (["library", "list", finished.library], ["library", "show", finished.library, "1"],
                   ["--help"]):  # fmt: skip
         process = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""Norm-optimal learning within bounds, against SciPy's solvers and its own promises."""
+"""Norm-optimal ILC within bounds, against SciPy's solvers and its own guarantees."""
 
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ def test_a_bounded_input_agrees_with_scipys_least_squares(q, s, r, rate):
     assert law.status == "solved"
     assert law.iterations > 0
     matrix, target = stacked(axis(), n_samples, u, e, q, s, r, rate)
-    # bvls finds the active set itself: exact, like a direct solution.
+    # bvls finds the active set: exact, like a direct solution.
     best = lsq_linear(matrix, target, (-limit - u, limit - u), method="bvls", tol=1e-15)
     expected = u + best.x
     assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
@@ -102,7 +102,7 @@ def test_all_bounds_together_agree_with_scipys_minimize():
                 -np.inf,
                 (bounds["acceleration_bounds"][1] - bend) * DT_S**2 * scale,
             ),
-            # No input reaches the first sample.
+            # No input affects the first sample.
             LinearConstraint(scale * operator[1:], low_y[1:] * scale, high_y[1:] * scale),
         ]
 

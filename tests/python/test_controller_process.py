@@ -5,28 +5,25 @@ from __future__ import annotations
 import itertools
 import json
 import socket
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 from processes_fixture import PATIENT, Bench, free_port, goodbye
 
 from ilc_rt.events import parse_event
+from ilc_rt.figures import Figures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
 RUNS = 4
-FIGURES = {
-    "index", "tracking_inf_m", "tracking_rms_m", "contour_inf_m", "contour_rms_m",
-    "encoder_tracking_inf_m", "tool_tracking_inf_m", "overruns", "missing_samples",
-    "late_updates", "update_ms", "rolled_back", "learning_off", "remark",
-    "axes_tracking_inf_m", "axes_tracking_rms_m",
-}  # fmt: skip
+FIGURES = {"index", *(figure.name for figure in fields(Figures))}
 
 
 class Job(NamedTuple):
-    """A campaign that is over."""
+    """A finished campaign."""
 
     status: int
     events: list[dict[str, Any]]
@@ -69,7 +66,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def test_the_job_is_done_and_learned(job: Job) -> None:
-    """Exit status 0, no word of complaint, drives off, and the error far below the first run's."""
+    """Exit status 0, empty standard error, drives off, and the error far below the first run's."""
     assert job.status == 0
     assert job.errors == []
     assert "1 (x) switch on disabled, 2 (y) switch on disabled" in job.drives
@@ -79,8 +76,9 @@ def test_the_job_is_done_and_learned(job: Job) -> None:
 
 
 def test_the_figures_are_those_of_the_events_and_of_the_library(job: Job) -> None:
-    """One truth in three places."""
-    assert set(job.figures) == {"campaign", "status", "reason", "iterations"}
+    """Figures, events and library agree."""
+    assert set(job.figures) == {"campaign", "status", "reason", "axis_units", "iterations"}
+    assert job.figures["axis_units"] == ["m", "m"]
     assert job.figures["status"] == "completed"
     told = [event for event in job.events if event["event"] == "iteration"]
     assert [event["index"] for event in told] == list(range(RUNS))
@@ -111,7 +109,7 @@ def test_the_events_tell_the_story_in_order(job: Job) -> None:
     assert kinds[:2] == ["state", "start"]
     assert (kinds.count("end"), kinds[-1]) == (1, "end")
     assert job.events[-1]["iterations"] == RUNS
-    # Each run is told before the next one begins.
+    # Each run is reported before the next one begins.
     for k in range(RUNS - 1):
         told = job.events.index(next(e for e in job.events if e.get("index") == k))
         next_run = {"event": "state", "state": "running", "iteration": k + 1}
@@ -119,13 +117,13 @@ def test_the_events_tell_the_story_in_order(job: Job) -> None:
 
 
 def test_a_second_invocation_gives_the_same_digests(job: Job, tmp_path: Path) -> None:
-    """Lock-step has no wall clock in it: other processes, other port, same numbers."""
+    """Lock-step has no wall clock: other processes, another port, same numbers."""
     assert len(job.digests) == RUNS
     assert carry_out(tmp_path).digests == job.digests
 
 
 def test_zenoh_gives_the_same_digests(job: Job, tmp_path: Path) -> None:
-    """The bus carries the numbers and does not change them."""
+    """The transport does not change the numbers."""
     endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     over_zenoh = carry_out(
         tmp_path,
@@ -137,7 +135,7 @@ def test_zenoh_gives_the_same_digests(job: Job, tmp_path: Path) -> None:
 
 
 def test_another_cell_description_gives_other_digests(job: Job, tmp_path: Path) -> None:
-    """Digests tell runs apart: a thousandth of the friction is enough."""
+    """Digests distinguish runs: a thousandth of the friction is enough."""
     with Bench(tmp_path) as bench:
         cell = bench.cell(("coulomb_n = 60.0", "coulomb_n = 60.06"))
         bench.drives(cell, "--lockstep")
@@ -148,7 +146,7 @@ def test_another_cell_description_gives_other_digests(job: Job, tmp_path: Path) 
 
 
 def test_a_person_gets_a_table(bench: Bench) -> None:
-    """Without --events: one line a run, and how it ended."""
+    """Without --events: one line per run, and the outcome."""
     cell = bench.cell(short=True)
     bench.drives(cell, "--lockstep")
     controller = bench.start(
@@ -163,7 +161,7 @@ def test_a_person_gets_a_table(bench: Bench) -> None:
 
 
 def test_real_time(bench: Bench) -> None:
-    """Two runs by the clock at 500 Hz: the loop tells how punctual it was, and the error falls."""
+    """Two runs in real time at 500 Hz: the loop reports its punctuality, and the error falls."""
     cell = bench.cell(short=True, more=PATIENT)
     drives = bench.drives(cell)
     controller = bench.controller(cell, runs=2)
@@ -174,7 +172,7 @@ def test_real_time(bench: Bench) -> None:
     events = controller.events
     assert all(parse_event(line) is not None for line in controller.said)
     first, second = [event for event in events if event["event"] == "iteration"]
-    # By a tenth in lock-step; a machine that is busy with other things spoils some of it.
+    # By a factor of ten in lock-step; a busy machine spoils some of it.
     assert second["tracking_rms_m"] < 0.8 * first["tracking_rms_m"]
     latency = next(event for event in events if event["event"] == "latency")
     for times in (latency["wake_late_us"], latency["execution_us"]):
@@ -187,7 +185,7 @@ def test_real_time(bench: Bench) -> None:
 
 
 def test_check_tells_what_would_be_done(bench: Bench) -> None:
-    """It touches no bus: an interface that no machine has is no obstacle."""
+    """It opens no bus: an interface that does not exist is no obstacle."""
     check = bench.start("ilc-rt", "check", bench.cell())
     assert check.end() == 0
     assert "axis x (node 1): 0.000 to 0.080 m of -0.020 to 0.100 m" in "\n".join(check.said)
@@ -195,7 +193,7 @@ def test_check_tells_what_would_be_done(bench: Bench) -> None:
 
 
 def test_latency_is_measured(bench: Bench) -> None:
-    """One second of a 1 kHz grid has some thousand wake-ups, fewer if some were missed."""
+    """One second of a 1 kHz grid has about a thousand wake-ups, fewer if some were missed."""
     latency = bench.start("ilc-rt", "latency", "--seconds", "1", "--json", "latency.json")
     assert latency.end() == 0
     figures = json.loads((bench.folder / "latency.json").read_text())

@@ -1,4 +1,4 @@
-"""Pickling, copying and showing of every public class, whatever module it is in.
+"""Pickling, copying and repr of every public class, in every module.
 
 A new class without an example in `classes_fixture` fails the first test.
 """
@@ -16,12 +16,12 @@ from classes_fixture import EXAMPLES, MODULES, N, axis, both, line, updated
 import ilc_rt
 from ilc_rt import Campaign, Gate, Library, NormOptimalIlc, PdIlc
 
-# What is not a value: a connection to a file, a description of an interface, a running controller.
+# Not values: a connection to a file, an interface, a running controller.
 OTHERS = {Library, ilc_rt.Law, ilc_rt.signal.Filter, Campaign}
 
 
 def attributes(thing):
-    """Return everything that can be read of a thing."""
+    """Return all readable attributes of an object."""
     if dataclasses.is_dataclass(thing):
         return {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
     names = [
@@ -43,7 +43,7 @@ def public_classes():
 
 
 def ways(thing):
-    """Return copies made in every way there is."""
+    """Return copies made by every method."""
     for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
         yield pickle.loads(pickle.dumps(thing, protocol))
     yield copy.copy(thing)
@@ -88,7 +88,7 @@ def test_copies_are_what_they_are_copies_of(kind):
         assert kind.__name__ in repr(thing)
         assert "\n" not in repr(thing)
     if does is not None:
-        # Of an original that has been used since: a copy begins where it began.
+        # Of an original that has been used since: a copy starts from the initial state.
         expected = does(make())
         for other in copies:
             assert_same(expected, does(other))
@@ -136,7 +136,7 @@ def test_what_a_law_has_learned_stays_with_it():
     gate = Gate(PdIlc(0.4, 0.0), tolerance=10.0)
     updated(gate)
     assert gate.state == "holding"
-    # A copy begins anew: it may go to another machine.
+    # A copy starts from the initial state: it may go to another machine.
     assert copy.deepcopy(gate).state == "learning"
 
 

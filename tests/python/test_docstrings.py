@@ -1,4 +1,4 @@
-"""The examples in docstrings run, those of the compiled module too."""
+"""The examples in docstrings run, including those of the compiled module."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ EXAMPLES = examples()
 def test_an_example_in_a_docstring_runs(
     where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In a folder with the examples, and with nothing imported but what the example imports."""
+    """In a folder with the examples, with no imports but the example's own."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     module = importlib.import_module(
@@ -78,12 +78,12 @@ def test_an_example_in_a_docstring_runs(
 
 @pytest.mark.parametrize("where", EXAMPLES)
 def test_no_example_is_passed_over(where: str) -> None:
-    """What cannot run is no example."""
+    """Every example can run."""
     assert "+SKIP" not in EXAMPLES[where]
 
 
 def test_there_are_examples() -> None:
-    """Those of the compiled module and of the package are found."""
+    """Examples of the compiled module and of the package are found."""
     assert any(where.endswith(".NormOptimalIlc") for where in EXAMPLES)
     assert any(where.startswith("ilc_rt.identify") for where in EXAMPLES)
     assert len(EXAMPLES) > 40

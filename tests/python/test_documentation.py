@@ -1,7 +1,7 @@
-"""Everything that a document or a help text tells one to type is typed here.
+"""Runs every command and block that a document or a help text gives.
 
-Runs are made fewer, the bus of a real machine becomes one of this host, and a folder holds what a
-reader would have by then. What a line does stays what it does.
+Runs are shortened, the bus of a real machine is replaced by one of this host, and the folder holds
+the files that a reader would have by then. The action of a line is unchanged.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ PYTHON = [
 ]
 NETWORK_CELL = "examples/01_gantry.toml"
 
-#: Each option and what it becomes: as long as it must be to do what it does.
+#: Each option and its replacement: as short as its purpose allows.
 SHORTER = (
     (r"^ilc (run|demo)(?!.* --iterations)(.*)$", r"ilc \1\2 --iterations 2"),
     (r"--iterations \d+", "--iterations 2"),
@@ -56,14 +56,14 @@ SHORTER = (
     (r"^ilc-rt latency(?!.* --seconds)(.*)$", r"ilc-rt latency\1 --seconds 1"),
     (r"--seconds \d+", "--seconds 1"),
     (r"^(ilc library (?:show|export) \S+) \d+", r"\1 1"),
-    # Whoever types these runs this very test, or everything that it needs.
+    # These run this very test, or its prerequisites.
     (r"^make ([a-z-]+)", r"make --dry-run --directory {root} \1"),
     (r"/var/lib/ilc/|/etc/bash_completion.d/|~/.zfunc/", "./"),
 )
 
 
 def shorter(text: str) -> str:
-    """Return the line that is run in place of one that a document has."""
+    """Return the line to run in place of the documented one."""
     for pattern, replacement in SHORTER:
         text = re.sub(pattern, replacement, text)
     return text.replace("{root}", str(ROOT))
@@ -71,7 +71,7 @@ def shorter(text: str) -> str:
 
 @pytest.fixture
 def folder(tmp_path: Path, finished: CampaignResult) -> Path:
-    """Return a folder with what a reader has: the examples, a cell, a library of a few runs."""
+    """Return a folder with a reader's files: the examples, a cell, a library of a few runs."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     gantry = (ROOT / NETWORK_CELL).read_text(encoding="utf-8")
     # A cell that learns in this process, unless a line names a bus.
@@ -92,7 +92,7 @@ def environment() -> dict[str, str]:
 
 
 def run(text: str, folder: Path) -> str:
-    """Run a line as a shell does, and return what it said; it must succeed."""
+    """Run a line in a shell, and return its output; it must succeed."""
     for name in ("ilc", "python"):
         text = re.sub(
             rf"^{name} ",
@@ -108,7 +108,7 @@ def run(text: str, folder: Path) -> str:
 
 
 def with_drives(text: str, folder: Path) -> None:
-    """Run a line of `ilc-rt` that finds drives on its bus: simulated ones, on this host."""
+    """Run a line of `ilc-rt` with simulated drives of this host on its bus."""
     address = f"udp:239.74.163.2:{free_port()}"
     text, found = re.subn(r"--bus \S+", f"--bus {address}", text)
     if not found:
@@ -125,7 +125,7 @@ def with_drives(text: str, folder: Path) -> None:
 
 
 def drives_alone(text: str, folder: Path) -> None:
-    """Run the simulated drives, and end them as Ctrl-C does."""
+    """Run the simulated drives, and end them with Ctrl-C."""
     text = re.sub(r"--bus \S+", "", text) + f" --bus udp:239.74.163.2:{free_port()}"
     drives = Process([program("ilc-sim"), *shlex.split(text)[1:]], folder)
     try:
@@ -137,7 +137,7 @@ def drives_alone(text: str, folder: Path) -> None:
 
 
 def watched(text: str, folder: Path) -> None:
-    """Run a line that watches a cell, and a campaign for it to see."""
+    """Run a line that monitors a cell, and a campaign to monitor."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     name, *rest = shlex.split(text)
     if name == "python":
@@ -159,7 +159,7 @@ def watched(text: str, folder: Path) -> None:
     cell.write_text(f"{(folder / 'gantry.toml').read_text(encoding='utf-8')}\n{listen}", "utf-8")
     watcher = Process(argv, folder)
     try:
-        # Runs are made until the watcher, which needs a moment to connect, has seen its two.
+        # Runs are made until the monitor, which needs a moment to connect, has seen two.
         bus = f"udp:239.74.163.2:{free_port()}"
         argv = [
             *launcher("ilc"),
@@ -185,7 +185,7 @@ def watched(text: str, folder: Path) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda one: f"{one.where}: {one.text}")
 def test_a_line_that_one_is_told_to_type_works(command: Command, folder: Path) -> None:
-    """As it stands, or shorter."""
+    """As documented, or shortened."""
     text = shorter(command.text)
     if re.match(r"ilc monitor|python examples/02_monitor", text):
         watched(text, folder)
@@ -215,7 +215,7 @@ def test_the_python_of_a_document_runs(
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_every_block_says_what_it_is(document: Path) -> None:
-    """A fence names a language, and no command hides in an indented block."""
+    """A fence names a language, and indented blocks contain no commands."""
     for block in blocks(document):
         assert block.language in LANGUAGES, (
             f"{document}:{block.line - 1}: ``` and one of {LANGUAGES}"
@@ -227,7 +227,7 @@ def test_every_block_says_what_it_is(document: Path) -> None:
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_verbs_and_options_in_running_text_exist(document: Path) -> None:
-    """`ilc verb --option` in a sentence names what the program has."""
+    """`ilc verb --option` in running text names an existing option."""
     for number, line in outside_of_blocks(document):
         for code in re.findall(r"`((?:ilc|ilc-rt|ilc-sim) [^`]+)`", line):
             name, *rest = code.split()
@@ -240,7 +240,7 @@ def test_verbs_and_options_in_running_text_exist(document: Path) -> None:
 
 
 def test_there_is_something_to_run() -> None:
-    """The collector finds what is known to be there."""
+    """The collector finds known lines."""
     texts = [command.text for command in COMMANDS]
     assert "make demo" in texts
     assert "ilc demo" in texts

@@ -26,7 +26,7 @@ def run_example(script: Path, folder: Path, *arguments: str) -> str:
 
 
 def test_the_gantry_learns_its_contour(gantry: Path, tmp_path: Path) -> None:
-    """One line a run with falling errors, a picture and a library."""
+    """One line per run with falling errors, a picture and a library."""
     said = run_example(gantry.with_suffix(".py"), tmp_path, "4")
     rows = [line.split() for line in said.splitlines() if re.match(r"\s*\d", line)]
     errors_um = [float(row[2]) for row in rows]
@@ -46,7 +46,7 @@ def test_a_law_of_ones_own_learns(gantry: Path, tmp_path: Path) -> None:
 
 
 def test_trajectories_are_planned_and_drawn(gantry: Path, tmp_path: Path) -> None:
-    """One line a trajectory, E/S the best, and a picture."""
+    """One line per trajectory, E/S the best, and a picture."""
     said = run_example(gantry.with_name("05_trajectories.py"), tmp_path)
     tracking = [float(value) for value in re.findall(r" s\s+([\d.]+e[+-]\d+)", said)]
     assert len(tracking) == 3
@@ -55,7 +55,7 @@ def test_trajectories_are_planned_and_drawn(gantry: Path, tmp_path: Path) -> Non
 
 
 def test_an_axis_is_identified_and_drawn(gantry: Path, tmp_path: Path) -> None:
-    """Near the simulated axis, friction and all; the bolder law leaves less."""
+    """Near the simulated axis, including friction; the bolder law leaves a smaller error."""
     said = run_example(gantry.with_name("06_identify.py"), tmp_path)
     frequencies_hz = [float(value) for value in re.findall(r"natural_frequency_hz = (\S+)", said)]
     assert frequencies_hz == pytest.approx([15.0], rel=0.1)

@@ -1,4 +1,4 @@
-"""Simple laws, gate, ladder and repeatability against dense NumPy and by hand."""
+"""Simple laws, gate, ladder and repeatability against dense NumPy and hand calculations."""
 
 import threading
 
@@ -35,7 +35,7 @@ def axis(w0=157.0, damping=0.5):
 
 
 def lifted(model, n_samples):
-    """Return the dense operator, built from the matrices by powers and nothing else."""
+    """Return the dense lifted system, built from powers of the matrices alone."""
     a, b, c, d = model.a, model.b, model.c, model.d
     n_outputs, n_inputs = d.shape
     matrix = np.zeros((n_samples, n_outputs, n_samples, n_inputs))
@@ -72,7 +72,7 @@ FILTERS = {
 
 
 def apply(low_pass, x):
-    """Return the signal as a law filters it."""
+    """Return the signal filtered as by a law."""
     if low_pass is None:
         return x
     if getattr(low_pass, "causal", False):
@@ -189,9 +189,9 @@ def test_a_gain_that_diverges_is_refused_without_filter():
 
 
 def test_wrong_numbers_are_refused_when_the_law_is_made():
-    with pytest.raises(LearningError, match="gain = NaN"):
+    with pytest.raises(LearningError, match="gain_per_s = NaN"):
         ErrorFeedforwardIlc(np.nan)
-    with pytest.raises(LearningError, match="limit = -1"):
+    with pytest.raises(LearningError, match="input_max = -1"):
         ErrorFeedforwardIlc(1.0, input_max=-1.0)
     with pytest.raises(TypeError, match="filter is a int"):
         ErrorFeedforwardIlc(1.0, 5)
@@ -243,7 +243,7 @@ def test_every_law_keeps_shape_and_takes_a_disturbance(name):
 
 
 class Recorder:
-    """A user's own law: adds one and remembers what it saw."""
+    """A user's own law: adds one and records its arguments."""
 
     def __init__(self):
         self.seen = []
@@ -288,14 +288,14 @@ def test_rms_of_several_channels_is_that_of_the_length_as_in_a_cell():
     law = Gate(Recorder())
     law.update(np.zeros((2, 2)), e)
     assert law.best_error == pytest.approx(np.sqrt((25.0 + 4.0) / 2))
-    # The same numbers as one channel are another figure.
+    # The same numbers as one channel give a different figure.
     law = Gate(Recorder())
     law.update(np.zeros(4), e.ravel())
     assert law.best_error == pytest.approx(np.sqrt(29.0 / 4))
 
 
 def test_gate_stops_a_law_before_it_diverges():
-    # Late by two samples more than the law knows: PD diverges, the gate keeps the best.
+    # Two samples later than in the law's model: PD diverges, the gate keeps the best.
     model = axis().delayed(6)
     reference = np.sin(np.arange(400) / 15.0) ** 3
     for wrapped in (False, True):
@@ -368,7 +368,7 @@ def test_what_the_law_inside_sees_and_raises(wrap):
 
     with pytest.raises(ValueError, match="the input returned by update has shape"):
         wrap(Shrinking()).update(np.zeros(4), np.ones(4))
-    with pytest.raises(TypeError, match="law is a float"):
+    with pytest.raises(TypeError, match=r"law = 1\.5 is a float"):
         wrap(1.5)
 
 

@@ -1,4 +1,4 @@
-"""Identification: its steps against SciPy, and the whole of it on the real loop."""
+"""Identification: its steps against SciPy, and all of it on the real loop."""
 
 import json
 import re
@@ -193,7 +193,7 @@ def test_a_simulated_axis_is_identified_within_two_percent_through_the_loop(benc
     assert found.model.natural_frequency_hz == pytest.approx(12.0, rel=0.02)
     assert found.model.damping == pytest.approx(0.5, rel=0.02)
     assert found.described.natural_frequency_hz == pytest.approx(12.0, rel=0.05)
-    # Noise is really there, and what it does is known.
+    # The noise is present, and its effect is known.
     assert found.coherence.max() < 1.0
     assert 1e-8 < found.model.natural_frequency_deviation_hz < 0.1
     assert f"delay_samples = {found.model.delay_samples}" in found.section()
@@ -362,7 +362,7 @@ def test_repeatability_splits_known_parts():
 def test_repeatability_of_a_cell(bench, ilc, tmp_path):
     found = check_repeatability(bench, runs=3)
     assert [axis.axis for axis in found.axes] == ["x", "y"]
-    # Without learning, all runs are alike but for the noise of the encoders.
+    # Without learning, all runs are equal up to the encoders' noise.
     assert found.axes[0].non_repeatable_rms_m < 1e-6
     assert found.axes[0].repeatable_rms_m > 1e-4
     assert found.applicable
@@ -396,7 +396,7 @@ def test_every_axis_of_the_examples_gets_a_model_near_the_truth(cell, axis, meas
             assert described.natural_frequency_hz == pytest.approx(frequency_hz, rel=0.1)
             assert described.damping == pytest.approx(damping, rel=0.25)
         return
-    # The tool sees the axis, a cycle later, and the mode at 20 Hz.
+    # The tool measures the axis, a cycle later, and the mode at 20 Hz.
     low_hz = np.arange(1.0, 10.0, 0.5)
     s = 2j * np.pi * low_hz
     w0, w1 = 2 * np.pi * frequency_hz, 2 * np.pi * 20.0
@@ -455,7 +455,7 @@ def test_what_was_identified_is_tuned_and_learns(tmp_path):
 
 
 def test_a_band_that_ends_too_low_is_widened(bench):
-    # The cell says 5 Hz, the axis has 12 Hz.
+    # The cell states 5 Hz, the axis has 12 Hz.
     told = []
     found = identify.multisine(bench, axis="x", periods=2, tell=told.append)
     assert found.described.natural_frequency_hz == pytest.approx(12.0, rel=0.05)

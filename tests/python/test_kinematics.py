@@ -1,4 +1,4 @@
-"""Mechanisms against SciPy, and what they refuse."""
+"""Mechanisms against SciPy, and their refusals."""
 
 import numpy as np
 import pytest

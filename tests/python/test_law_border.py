@@ -7,12 +7,15 @@ import inspect
 import pickle
 import threading
 import traceback
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ilc_rt import (
     AdjointIlc,
+    Campaign,
+    CampaignError,
     ConstrainedIlc,
     ErrorFeedforwardIlc,
     Gate,
@@ -175,6 +178,17 @@ def test_the_exception_of_a_law_comes_out_with_its_traceback(around):
             law.update(U, E)
         frames = [frame.name for frame in traceback.extract_tb(raised.value.__traceback__)]
         assert frames[-2:] == ["update", "look_up"]
+
+
+def test_the_exception_of_a_law_is_the_cause_of_the_end_of_its_campaign(tmp_path):
+    cell = Path(__file__).parents[2] / "examples" / "01_gantry.toml"
+    campaign = Campaign(cell, Broken(), library=tmp_path / "runs.db", bus="loopback:")
+    with pytest.raises(CampaignError, match="the law Broken failed: KeyError: 'gain'") as raised:
+        list(campaign.run(3))
+    cause = raised.value.__cause__
+    assert isinstance(cause, KeyError)
+    frames = [frame.name for frame in traceback.extract_tb(cause.__traceback__)]
+    assert frames[-2:] == ["update", "look_up"]
 
 
 def test_a_law_that_asks_the_gate_round_it_in_an_update_is_an_error_and_no_deadlock():

@@ -29,7 +29,7 @@ def axis(w0=157.0, damping=0.5, dt_s=DT_S):
 
 
 def lifted(model, n_samples):
-    """Return the dense operator, built from the matrices by powers and nothing else."""
+    """Return the dense lifted system, built from powers of the matrices alone."""
     a, b, c, d = model.a, model.b, model.c, model.d
     n_outputs, n_inputs = d.shape
     matrix = np.zeros((n_samples, n_outputs, n_samples, n_inputs))
@@ -196,7 +196,7 @@ def test_each_bad_array_is_refused_by_name(kind, name, spoil, error):
     law = PdIlc(1.0, 0.0) if kind == "pd" else NormOptimalIlc(axis(), 50, rate=3.0)
     arrays = {"u": np.zeros(50), "e": np.zeros(50)}
     arrays[name] = spoil(arrays[name])
-    # For a law that takes any size, an array that fits itself makes the other one the odd one.
+    # For a law without a fixed size, a consistent array makes the other one the wrong one.
     named = "[ue]" if kind == "pd" else name
     with pytest.raises(error, match=rf"^{named} (has|holds)"):
         law.update(**arrays)

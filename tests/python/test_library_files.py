@@ -1,4 +1,4 @@
-"""Files that are no library, cannot be written, or go away: nothing is changed or lost."""
+"""Files that are not a library, cannot be written, or disappear: nothing is changed or lost."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 @contextlib.contextmanager
 def mounted(source: str, place: Path, kind: str, flags: int, data: str = "") -> Iterator[None]:
-    """Mount something for a while; skip the test where that is not allowed."""
+    """Mount something temporarily; skip the test where that is not permitted."""
     place.mkdir(exist_ok=True)
     if LIBC.mount(source.encode(), str(place).encode(), kind.encode(), flags, data.encode()):
         pytest.skip(f"no mounts here: {os.strerror(ctypes.get_errno())}")
@@ -55,12 +55,12 @@ def mounted(source: str, place: Path, kind: str, flags: int, data: str = "") -> 
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Return what is in a folder."""
+    """Return the contents of a folder."""
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir()) if path.is_file()}
 
 
 def foreign(kind: str, path: Path) -> None:
-    """Make a file that is no library of this program."""
+    """Make a file that is not a library of this program."""
     if kind == "text":
         path.write_text("this is no database, it only looks like a file")
         return
@@ -90,7 +90,7 @@ VERBS: list[list[str]] = [
 
 @pytest.mark.parametrize("kind", FOREIGN)
 def test_a_foreign_file_is_left_as_it_is(kind: str, tmp_path: Path) -> None:
-    """Whatever is asked: one line, and not a byte is changed or added."""
+    """For every request: one line, and not a byte is changed or added."""
     path = tmp_path / "c.db"
     foreign(kind, path)
     before = files(tmp_path)
@@ -145,7 +145,7 @@ def test_what_is_no_file_is_refused_without_waiting(ilc: Ilc, tmp_path: Path) ->
 def test_a_name_is_never_an_address(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The file has the name that was given, letter by letter, and is read by it."""
+    """The file has exactly the given name, and is read by it."""
     monkeypatch.chdir(tmp_path)
     Library(name).append(np.zeros(3), np.ones(3), 0.01)
     assert (tmp_path / name).is_file()
@@ -158,7 +158,7 @@ def test_a_name_is_never_an_address(
 def test_readers_leave_nothing_beside_the_file(
     ilc: Ilc, finished: CampaignResult, tmp_path: Path
 ) -> None:
-    """Listing, showing and exporting change no file, and add none."""
+    """Listing, showing and exporting neither change nor add files."""
     (tmp_path / "a").mkdir()
     shutil.copy(finished.library, tmp_path / "a" / "l.db")
     before = files(tmp_path / "a")
@@ -190,7 +190,7 @@ def test_an_archive_that_cannot_be_written_is_read(
 
 
 def test_files_are_tried_before_anything_moves(ilc: Ilc, gantry: Path, tmp_path: Path) -> None:
-    """--json and --report where nothing can be written: exit status 2, and no run is made."""
+    """--json and --report in an unwritable place: exit status 2, and no run is made."""
     (tmp_path / "a").mkdir()
     (tmp_path / "file").touch()
     run = ["run", gantry, "--bus", "loopback:", "-n", 1]
@@ -216,7 +216,7 @@ def lock(path: Path) -> sqlite3.Connection:
 
 
 def test_a_locked_library_stops_the_campaign_soon(bench: Bench) -> None:
-    """In real time: the run that cannot be kept stops the axes, and the others are counted."""
+    """In real time: a run that cannot be kept stops the axes, and the others are counted."""
     cell = bench.cell(short=True)
     bench.drives(cell)
     controller = bench.controller(cell, "--simulated-drives", runs=20)
@@ -231,7 +231,7 @@ def test_a_locked_library_stops_the_campaign_soon(bench: Bench) -> None:
     assert [index for _, index, _ in bench.kept()] == [0, 1]
     started = {event["iteration"] for event in controller.events if event.get("state") == "running"}
     assert max(started) <= 4, "stopped before many runs were made in vain"
-    # The next start is clean, on the same drives.
+    # The next start is clean, with the same drives.
     resumed = bench.controller(cell, "--simulated-drives", "--resume", runs=3)
     assert resumed.end() == 0, resumed.errors
     assert [index for _, index, _ in bench.kept()] == [0, 1, 2]
@@ -277,7 +277,7 @@ def test_a_deleted_library_stops_the_campaign(bench: Bench, pace: str) -> None:
 
 
 def test_a_full_disk_stops_the_campaign_and_loses_nothing(bench: Bench) -> None:
-    """The runs that were told of are there, and with room again the campaign goes on."""
+    """All reported runs are there, and once there is space the campaign can be resumed."""
     small = bench.folder / "small"
     with mounted("tmpfs", small, "tmpfs", 0, "size=2m"):
         bench.library = small / "l.db"
@@ -298,7 +298,7 @@ def test_a_full_disk_stops_the_campaign_and_loses_nothing(bench: Bench) -> None:
 
 
 def test_a_campaign_is_gone_on_with_by_one_program_only(bench: Bench) -> None:
-    """The second --resume says so in one line, and disturbs nothing."""
+    """The second --resume is refused in one line, and disturbs nothing."""
     cell = bench.cell(short=True)
     bench.drives(cell, "--lockstep")
     assert bench.controller(cell, "--lockstep", runs=1).end() == 0
@@ -316,7 +316,7 @@ def test_a_campaign_is_gone_on_with_by_one_program_only(bench: Bench) -> None:
 
 
 def old_library(path: Path, runs: int) -> None:
-    """Make a library as it was before files had a mark and gave pages back."""
+    """Make a library in the old format, without application id and incremental vacuum."""
     library = Library(path)
     for run in range(runs):
         library.append(np.zeros((500, 2)), np.full((500, 2), 1e-6 * (run + 1)), 0.002)
@@ -330,7 +330,7 @@ def old_library(path: Path, runs: int) -> None:
 
 @pytest.mark.parametrize("age", ["new", "old"])
 def test_trimming_makes_the_file_smaller(age: str, tmp_path: Path) -> None:
-    """Of a file of before as well."""
+    """Also for an old file."""
     path = tmp_path / "l.db"
     if age == "old":
         old_library(path, 60)
@@ -346,7 +346,7 @@ def test_trimming_makes_the_file_smaller(age: str, tmp_path: Path) -> None:
 
 
 def test_a_trim_that_is_killed_loses_no_run_that_stays(tmp_path: Path) -> None:
-    """Whenever it is killed: all runs are there, or all that were to stay."""
+    """Whenever it is killed: either all runs are there, or all that were to stay."""
     for delay_s in (0.0, 0.005, 0.02, 0.05):
         path = tmp_path / f"{delay_s}.db"
         old_library(path, 60)
@@ -374,7 +374,7 @@ def test_a_run_from_elsewhere_has_all_its_figures(n_axes: int, tmp_path: Path) -
     library = Library(tmp_path / "l.db")
     library.append(np.zeros((40, n_axes)), e, 0.002, reference_m=reference_m)
     (row,) = library.list()
-    # The positions are kept, and the error is their distance: equal but for rounding.
+    # The positions are stored, and the error is their difference: equal up to rounding.
     assert row["tracking_inf_m"] == pytest.approx(np.abs(e).max(), rel=1e-9)
     assert row["encoder_tracking_inf_m"] == pytest.approx(np.abs(e).max(), rel=1e-9)
     if n_axes == 1:
@@ -402,7 +402,7 @@ def test_what_is_no_run_is_not_kept(tmp_path: Path) -> None:
 def test_the_list_fits_a_terminal_of_80_columns(
     ilc: Ilc, finished: CampaignResult, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What `show` and `export` need is there, whole, at every width."""
+    """Everything that `show` and `export` need is complete, at every width."""
     for width in (80, 100, 200):
         monkeypatch.setenv("COLUMNS", str(width))
         argv = [sys.executable, "-m", "ilc_rt.cli", "library", "list", finished.library]
@@ -417,7 +417,7 @@ def test_the_list_fits_a_terminal_of_80_columns(
 
 
 def test_the_list_as_json_and_csv(ilc: Ilc, finished: CampaignResult, tmp_path: Path) -> None:
-    """All that is kept of a run but its arrays; - is standard output and nothing else is there."""
+    """All stored data of a run except its arrays; `-` is standard output, without other text."""
     listed = ilc("library", "list", finished.library, "--json", "-")
     rows = json.loads(listed.stdout)
     assert [row["index"] for row in rows] == [0, 1, 2]

@@ -13,7 +13,7 @@ DT_S = 0.002
 
 
 def random_model(seed, n_states=3, n_inputs=2, n_outputs=2):
-    """Return a stable sampled model without pattern."""
+    """Return a stable random discrete model."""
     rng = np.random.default_rng(seed)
     a = rng.normal(size=(n_states, n_states))
     a *= 0.9 / max(abs(np.linalg.eigvals(a)))

@@ -103,7 +103,7 @@ def test_models_of_every_kind_come_in_and_go_out(dt_s):
     ]
     expected = own.frequency_response(W)
     for model in foreign:
-        # Anything that takes a model shows how it was read.
+        # Every function that takes a model accepts foreign models.
         found = own.append(model).frequency_response(W)[:, 1:, 1:]
         np.testing.assert_allclose(found, expected, rtol=1e-9, err_msg=repr(type(model)))
     assert own.to_control().dt == (dt_s or 0)

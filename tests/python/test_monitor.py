@@ -36,7 +36,7 @@ def iteration(index: int, error_m: float) -> dict[str, object]:
 
 
 class Publisher:
-    """The publishing side as the contract describes it."""
+    """The publisher of the contract."""
 
     def __init__(self, port: int) -> None:
         self.endpoint = f"tcp/127.0.0.1:{port}"
@@ -56,7 +56,7 @@ class Publisher:
 
 
 def free_port() -> int:
-    """Return a port that nobody listens on."""
+    """Return a free port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -64,14 +64,14 @@ def free_port() -> int:
 
 @pytest.fixture
 def publisher() -> Iterator[Publisher]:
-    """Return a session that stands for a controller."""
+    """Return a session that stands in for a controller."""
     publisher = Publisher(free_port())
     yield publisher
     publisher.session.close()
 
 
 def test_a_late_joiner_sees_the_present_state(publisher: Publisher) -> None:
-    """The controller is alive, and its state is asked for at once."""
+    """The controller is alive, and its state is queried at once."""
     with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
         messages = monitor.messages(30.0)
         assert next(messages) == Message("gantry", "alive", {})
@@ -88,7 +88,7 @@ def test_a_late_joiner_sees_the_present_state(publisher: Publisher) -> None:
 
 
 def test_garbage_on_the_network_is_passed_over(publisher: Publisher) -> None:
-    """What is no JSON object is dropped; an incomplete event has no type."""
+    """Anything but a JSON object is dropped; an incomplete event has no type."""
     with Monitor("*", [publisher.endpoint], scouting=False) as monitor:
         messages = monitor.messages(30.0)
         assert [next(messages).topic for _ in range(2)] == ["alive", "state"]
@@ -118,7 +118,7 @@ def test_the_verb_prints_the_error_falling(publisher: Publisher) -> None:
 
 
 def test_the_example_ends_after_its_runs(publisher: Publisher, gantry: Path) -> None:
-    """examples/02_monitor.py draws one bar a run, each shorter than the last."""
+    """examples/02_monitor.py draws one bar per run, each shorter than the last."""
     script = gantry.parent / "02_monitor.py"
     with subprocess.Popen(
         [sys.executable, str(script), "3", publisher.endpoint], stdout=subprocess.PIPE, text=True
@@ -128,7 +128,7 @@ def test_the_example_ends_after_its_runs(publisher: Publisher, gantry: Path) -> 
         stop = threading.Event()
 
         def publish() -> None:
-            # The example's subscription reaches this session a moment after its first line.
+            # The example's subscription reaches this session slightly after its first line.
             index = 0
             while not stop.wait(0.1):
                 publisher.put("iteration", iteration(index, 2e-3 * 0.5**index))
@@ -147,7 +147,7 @@ def test_the_example_ends_after_its_runs(publisher: Publisher, gantry: Path) -> 
 
 
 def test_a_real_controller_is_followed_from_beginning_to_end(gantry: Path, tmp_path: Path) -> None:
-    """A monitor that waits sees all there is to see of a real-time run."""
+    """A monitor that is already waiting receives everything of a real-time run."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     cell = tmp_path / "cell.toml"
     settings = f'[telemetry]\nlisten = ["{endpoint}"]\nscouting = false\n'
@@ -200,7 +200,7 @@ def test_a_real_controller_is_followed_from_beginning_to_end(gantry: Path, tmp_p
 def test_what_a_stranger_publishes_is_one_warning(
     publisher: Publisher, topic: str, payload: object, said: str
 ) -> None:
-    """Wrong types end neither the monitor nor the terminal view."""
+    """Wrong types stop neither the monitor nor the terminal view."""
     with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
         messages = monitor.messages(30.0)
         assert next(messages).topic == "alive"
@@ -218,7 +218,7 @@ def test_what_a_stranger_publishes_is_one_warning(
 def test_control_characters_of_strangers_do_not_reach_the_terminal(
     publisher: Publisher, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """An escape code is shown, not obeyed; texts have an end."""
+    """An escape code is shown, not executed; texts are truncated."""
     with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
         messages = monitor.messages(30.0)
         assert next(messages).topic == "alive"
@@ -233,7 +233,7 @@ def test_control_characters_of_strangers_do_not_reach_the_terminal(
 
 
 def test_a_controller_that_asks_is_told_that_all_was_heard(publisher: Publisher) -> None:
-    """What was published before the question arrives before the answer."""
+    """Events published before the query arrive before its reply."""
     with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
         messages = monitor.messages(30.0)
         assert next(messages).topic == "alive"

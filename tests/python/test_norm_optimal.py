@@ -1,4 +1,4 @@
-"""Norm-optimal learning with every form of weight and model, against dense NumPy solutions."""
+"""Norm-optimal ILC with every form of weight and model, against dense NumPy solutions."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def repeated(model, n_samples):
 
 
 def lifted(model):
-    """Return the dense operator of a model that varies, from its matrices alone, in long double."""
+    """Return the dense lifted system of a time-varying model, from its matrices, in long double."""
     return lifted_of(*(part.astype(LONG) for part in (model.a, model.b, model.c, model.d)))
 
 
@@ -62,8 +62,8 @@ def stacked(weight, n_samples, n_channels):
 def dense_update(operator, u, e, q=1.0, s=0.0, r=0.0, rate=0.0):
     """Return the solution of the normal equations, formed and solved in long double.
 
-    Their condition is the square of the problem's, and long double has 11 bits more: so they are
-    eliminated in long double too, with two steps of refinement.
+    Their condition number is the square of the problem's, and long double has 11 bits more: so they
+    are eliminated in long double too, with two steps of refinement.
     """
     n_samples, n_inputs = u.shape
     q = stacked(q, n_samples, e.shape[1])
@@ -80,7 +80,7 @@ def dense_update(operator, u, e, q=1.0, s=0.0, r=0.0, rate=0.0):
 
 
 def cholesky(h):
-    """Return the lower triangular root of a matrix of any floating-point type."""
+    """Return the lower Cholesky factor of a matrix of any floating-point type."""
     lower, rest = np.zeros_like(h), h.copy()
     for k in range(len(h)):
         lower[k:, k] = rest[k:, k] / np.sqrt(rest[k, k])
@@ -142,8 +142,8 @@ def test_any_weights_and_models_give_the_minimiser(seed, sizes, n_samples, kinds
     found = NormOptimalIlc(model, n_samples, q=q, s=s, r=r, rate=rate).update(u, e)
     exact = [part.astype(LONG) for part in (varying.a, varying.b, varying.c, varying.d)]
     expected = dense_update(lifted_of(*exact), u, e, q, s, r, rate)
-    # What rounding of the matrices alone does to the minimiser: an axis that runs away over the run
-    # loses digits that no solver in double precision has.
+    # Effect of the matrices' rounding on the minimiser: an axis that is unstable over the run loses
+    # digits that no double-precision solver can recover.
     eps = np.finfo(float).eps
     moved = 0.0
     for _ in range(3):
@@ -279,7 +279,7 @@ def test_each_bad_matrix_is_refused_by_name(name, spoil, error):
     model = repeated(axis(), 5)
     parts = {part: getattr(model, part) for part in "abcd"}
     parts[name] = spoil(parts[name])
-    # Where one matrix fits itself, those that depend on it are the odd ones.
+    # If one matrix is consistent, those that depend on it are the wrong ones.
     with pytest.raises(error, match=r"^[abcd] (has|holds)"):
         TimeVarying(**parts, dt_s=DT_S)
 

@@ -1,4 +1,4 @@
-"""The options of the controller are the same at every door, as `ilc-rt` describes them."""
+"""The options of the controller are the same in every interface, as `ilc-rt` describes them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-#: Options that Python gives otherwise: the argument of `run`, and `drives`.
+#: Options with another form in Python: the argument of `run`, and `drives`.
 ELSEWHERE = {"iterations", "simulated"}
 
 
@@ -35,7 +35,7 @@ def test_a_campaign_has_every_option_with_its_default():
         if name in ELSEWHERE:
             continue
         default = parameters[name].default
-        # Without being told, Python paces by answers on loopback: only.
+        # By default, Python paces by answers on loopback only.
         assert option.words(default) == [], name
         assert f"    {name} : " in (Campaign.__doc__ or ""), name
 

@@ -1,8 +1,7 @@
-"""Programs end with the one that started them, and drives that are left over are recognised."""
+"""Programs end with their parent, and left-over drives are recognised."""
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import subprocess
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from children_fixture import children
 from processes_fixture import Bench
 
 if TYPE_CHECKING:
@@ -26,17 +26,8 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
         yield bench
 
 
-def children(pid: int) -> dict[str, int]:
-    """Return the programs that a process has started."""
-    found = {}
-    for number in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-        with contextlib.suppress(OSError):
-            found[Path(f"/proc/{number}/comm").read_text().strip()] = int(number)
-    return found
-
-
 def is_gone(pid: int) -> bool:
-    """Whether a process has ended, reaped or not."""
+    """Return whether a process has ended, reaped or not."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
     except OSError:
@@ -91,7 +82,7 @@ def test_killed_programs_leave_no_children_and_a_clean_place(bench: Bench, also:
 
 
 def test_lock_step_programs_end_as_well(bench: Bench) -> None:
-    """Without a clock too."""
+    """Also without a clock."""
     process = run(bench, bench.cell(short=True), "--lockstep")
     programs = list(children(process.pid).values())
     process.kill()
@@ -100,7 +91,7 @@ def test_lock_step_programs_end_as_well(bench: Bench) -> None:
 
 
 def test_drives_that_are_there_already_are_recognised(bench: Bench) -> None:
-    """The second ones do not boot, so that the first and their controller go on undisturbed."""
+    """The second ones do not boot, so the first ones and their controller continue undisturbed."""
     cell = bench.cell(short=True)
     first = bench.drives(cell)
     controller = bench.controller(cell, "--simulated-drives", runs=3)
@@ -111,7 +102,7 @@ def test_drives_that_are_there_already_are_recognised(bench: Bench) -> None:
     assert line.startswith(f"ilc-sim: {bench.bus}: node ")
     assert "is on this bus already" in line
     assert controller.end() == 0, controller.errors
-    # Idle drives, whose heartbeat has not been switched on, are found by asking.
+    # Idle drives, whose heartbeat is not enabled, are found by asking.
     first.signal(signal.SIGINT)
     first.end()
     bench.drives(cell)

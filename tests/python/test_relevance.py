@@ -1,4 +1,4 @@
-"""Learning from all past runs: the laws, the library that feeds them, and the campaign."""
+"""Learning from all past runs (relevance): the laws, the library that feeds them, the campaign."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def pd_proposal(u: NDArray[Any], e: NDArray[Any], kp: float, kd: float) -> NDArr
 def denominators(
     past: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]], d: NDArray[Any]
 ) -> NDArray[Any]:
-    """Return the sums of DiMarco Eq. (4.12) as in its listing, EPSILON = 1 included."""
+    """Return the sums of DiMarco Eq. (4.12) as in its listing, including EPSILON = 1."""
     sums = []
     for _, e, own in past:
         slow, rate = 0.0, np.empty(N)
@@ -313,7 +313,7 @@ def test_a_campaign_measures_keeps_and_tells_the_disturbance(tmp_path: Path) -> 
 
     records = list(campaign(tmp_path, Listener(), disturbance=thermometer).run(3))
     assert asked == [0, 1, 2]
-    # Nothing is known of a run after the last.
+    # Nothing is known about a run after the last.
     assert told == [("first", [20.0]), [21.0], [22.0], None]
     kept = [record.disturbance for record in records]
     np.testing.assert_array_equal(np.ravel(kept), [20.0, 21.0, 22.0])
@@ -334,8 +334,8 @@ def test_a_resumed_campaign_weighs_what_the_whole_one_does(tmp_path: Path) -> No
         list(campaign(tmp_path / name, law(), disturbance=temperatures).run(3))
         rest = campaign(tmp_path / name, make(), disturbance=temperatures, resume=True)
         first, *_ = list(rest.run(5))
-        # The first run after the break gets bit by bit what it would have got without; its drives
-        # started anew, so that what they measured differs.
+        # The first run after the break receives exactly the input it would have received without;
+        # its drives were restarted, so their measurements differ.
         np.testing.assert_array_equal(first.input, whole[3].input)
         assert isinstance(rest.law, RelevanceIlc)
         assert len(rest.law) == 5

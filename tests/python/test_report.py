@@ -1,4 +1,4 @@
-"""The report: complete, self-contained and true."""
+"""The report: complete, self-contained and correct."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Page(HTMLParser):
         self.text = ""
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        """Note ids and what is referred to."""
+        """Record ids and references."""
         for name, value in attributes:
             if name == "id" and value:
                 self.ids.append(value)
@@ -44,13 +44,13 @@ class Page(HTMLParser):
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        """Take in an element that closes itself."""
+        """Handle an element that closes itself."""
         self.handle_starttag(tag, attributes)
         if tag not in VOID:
             self.open.pop()
 
     def handle_endtag(self, tag: str) -> None:
-        """Check that it is the one that was opened last."""
+        """Check that it is the one opened last."""
         if tag not in VOID:
             assert self.open.pop() == tag
 
@@ -69,14 +69,14 @@ def page(finished: CampaignResult) -> Page:
 
 
 def test_the_page_is_well_formed_and_small(finished: CampaignResult, page: Page) -> None:
-    """All elements closed, ids unique, a size that can be mailed."""
+    """All elements closed, ids unique, small enough to mail."""
     assert page.open == []
     assert len(page.ids) == len(set(page.ids))
     assert len(render(finished).encode()) < 600_000
 
 
 def test_the_page_needs_nothing_else(finished: CampaignResult, page: Page) -> None:
-    """No link leaves the page, and every reference inside it has a target."""
+    """No link leaves the page, and every internal reference has a target."""
     assert not re.search(r"https?:|//[a-z]|@import", render(finished))
     targets = {reference.lstrip("#") for reference in page.references}
     assert all(reference.startswith("#") for reference in page.references)
@@ -84,7 +84,7 @@ def test_the_page_needs_nothing_else(finished: CampaignResult, page: Page) -> No
 
 
 def test_the_page_shows_the_figures_of_every_run(finished: CampaignResult, page: Page) -> None:
-    """Headings, pictures, table and facts are there."""
+    """Headings, pictures, table and facts are present."""
     for name in ("convergence", "contour", "tracking", "input"):
         assert name in page.ids
     for record in finished.records:
@@ -96,7 +96,7 @@ def test_the_page_shows_the_figures_of_every_run(finished: CampaignResult, page:
 
 
 def test_latency_and_faults_are_shown(finished: CampaignResult) -> None:
-    """A real-time campaign that ended in a fault says both."""
+    """A real-time campaign that ended in a fault shows both."""
     times = Histogram(8.0, 20.0, 40.0, 900.0, ((10.0, 900), (50.0, 99), (900.0, 1)))
     faulty = CampaignResult.from_library(finished.library)
     faulty.latency = LatencyEvent(times, times)
@@ -117,7 +117,7 @@ def test_one_run_without_learning_is_a_report_too(finished: CampaignResult) -> N
 
 
 def test_a_folder_gets_the_usual_name(finished: CampaignResult, tmp_path: Path) -> None:
-    """A path without an ending is a folder; no run is no report."""
+    """A path without a suffix is a folder; without a run there is no report."""
     assert write_report(finished, tmp_path / "new") == tmp_path / "new" / "ilc-report.html"
     with pytest.raises(BadInputError, match="no run was completed"):
         write_report(CampaignResult("l.db"), tmp_path)
@@ -127,7 +127,7 @@ def test_a_folder_gets_the_usual_name(finished: CampaignResult, tmp_path: Path) 
 
 
 def test_the_contour_picture_is_to_scale(finished: CampaignResult) -> None:
-    """What is drawn is the path plus the stated multiple of the deviation."""
+    """The picture shows the path plus the stated multiple of the deviation."""
     figure = plots.contour(finished)
     assert figure is not None
     upper = figure.axes[0]
@@ -138,7 +138,7 @@ def test_the_contour_picture_is_to_scale(finished: CampaignResult) -> None:
     deviation = path_deviation(record.reference_m, record.tool_or_encoder_m)
     drawn = upper.lines[1].get_xydata() * 1e-3
     np.testing.assert_allclose(drawn, record.reference_m + factor * deviation, atol=1e-12)
-    # The controller computes the same distance on its own.
+    # The controller computes the same distance independently.
     assert record.contour_m is not None
     np.testing.assert_allclose(
         np.linalg.norm(deviation, axis=1).max(), record.contour_inf_m, rtol=0.02
@@ -146,7 +146,7 @@ def test_the_contour_picture_is_to_scale(finished: CampaignResult) -> None:
 
 
 def test_deviation_is_normal_to_the_path_and_ignores_lag() -> None:
-    """On a circle, lag is nothing and a larger radius is everything."""
+    """On a circle, a lag has no effect and a larger radius has the full one."""
     angle = np.linspace(0.0, np.pi, 2001)
     circle = np.column_stack((np.cos(angle), np.sin(angle)))
     lagging = np.column_stack((np.cos(angle - 0.02), np.sin(angle - 0.02)))
@@ -161,7 +161,10 @@ def test_deviation_is_normal_to_the_path_and_ignores_lag() -> None:
 
 def record(index: int, error_m: float, contour_m: float | None) -> IterationRecord:
     """Return a record with these figures."""
-    return IterationRecord("l.db", index + 1, index, error_m, error_m / 2, contour_m)
+    return IterationRecord(
+        library="l.db", id=index + 1, index=index, tracking_inf_m=error_m,
+        tracking_rms_m=error_m / 2, contour_inf_m=contour_m,
+    )  # fmt: skip
 
 
 def test_the_sentence_says_what_was_learned() -> None:

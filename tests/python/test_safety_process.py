@@ -1,4 +1,4 @@
-"""What may go wrong on a machine, done to the real programs while the axes move."""
+"""Failures of a machine, inflicted on the real programs while the axes move."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 @pytest.fixture
 def patient(bench: Bench) -> Path:
-    """Return a cell that forgives a busy machine."""
+    """Return a cell that tolerates a busy machine."""
     return bench.cell(short=True, more=PATIENT)
 
 
@@ -50,7 +50,7 @@ def states(controller: Process) -> list[str]:
 def test_a_signal_brings_the_axes_to_rest(
     bench: Bench, patient: Path, number: signal.Signals, status: int, reason: str
 ) -> None:
-    """Mid-run: a controlled stop, drives off, the reason named, no run kept."""
+    """Mid-run: a controlled stop, drives off, the reason named, the run not kept."""
     drives = bench.drives(patient)
     controller = bench.controller(patient, "--json", "figures.json", runs=5)
     moving(controller)
@@ -66,7 +66,7 @@ def test_a_signal_brings_the_axes_to_rest(
 
 
 def test_a_signal_under_nohup_is_ignored(bench: Bench, patient: Path) -> None:
-    """Who starts a campaign with nohup wants it to outlive the terminal."""
+    """A campaign started with nohup must outlive the terminal."""
     bench.drives(patient)
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
@@ -92,7 +92,7 @@ def test_a_signal_in_lock_step_stops_as_well(bench: Bench, patient: Path) -> Non
 
 
 def test_a_reader_of_events_who_goes_stops_the_axes(bench: Bench, patient: Path) -> None:
-    """Nobody would notice trouble any more: a controlled stop, drives off, no panic."""
+    """Trouble would go unnoticed: a controlled stop, drives off, no panic."""
     drives = bench.drives(patient, "--lockstep")
     reading, writing = os.pipe()
     controller = bench.controller(patient, "--lockstep", runs=2, stdout=writing)
@@ -122,7 +122,7 @@ def test_a_reader_of_the_table_who_goes_stops_nothing(bench: Bench, patient: Pat
 
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
 def test_drives_that_die_are_noticed(bench: Bench, pace: str) -> None:
-    """After kill -9 of all drives: exit status 3 soon, one line with axis, node and how long."""
+    """After kill -9 of all drives: exit status 3 soon, one line with axis, node and duration."""
     options = ["--lockstep"] if pace == "lockstep" else []
     cell = bench.cell(
         short=True, more="\n[safety]\nsilent_cycles_max = 100\nanswer_timeout_s = 1.0\n"
@@ -133,7 +133,7 @@ def test_drives_that_die_are_noticed(bench: Bench, pace: str) -> None:
     drives.signal(signal.SIGKILL)
     assert controller.end() == 3
     (line,) = controller.errors
-    # Killed between two answers to one SYNC, those that are missing are named first.
+    # Killed between two answers to one SYNC, the missing ones are named first.
     nodes = r"(drive of axis [xy] \(node [12]\)|tool measurement \(node 10\))"
     silence = r"1 s" if options else r"101 cycles \(202 ms\)"
     assert re.fullmatch(f"ilc-rt: controlled stop: {nodes} is silent: no answer in {silence}", line)
@@ -141,13 +141,13 @@ def test_drives_that_die_are_noticed(bench: Bench, pace: str) -> None:
     assert line.endswith(fault["reason"])
     assert controller.events[-1]["status"] == "fault"
     assert {"stopping", "stopped"} <= set(states(controller))
-    # The end of the campaign counts what the library has.
+    # The end of the campaign counts the runs in the library.
     assert controller.events[-1]["iterations"] == len(bench.kept()) >= 1
 
 
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
 def test_one_drive_without_power_stops_the_other(bench: Bench, pace: str) -> None:
-    """The other axis is brought to rest along its ramp and switched off, without a fault."""
+    """The other axis is brought to rest along its ramp and disabled, without a fault."""
     options = ["--lockstep"] if pace == "lockstep" else []
     cell = bench.cell(
         short=True, more="\n[safety]\nsilent_cycles_max = 100\nanswer_timeout_s = 1.0\n"
@@ -157,7 +157,7 @@ def test_one_drive_without_power_stops_the_other(bench: Bench, pace: str) -> Non
     drives.line_with("node 2: lost power")
     assert controller.end() == 3
     (line,) = controller.errors
-    # At 0.1 m/s the command is 10 mm ahead of the last position known before 100 cycles are over.
+    # At 0.1 m/s the command is 10 mm ahead of the last known position in less than 100 cycles.
     assert "drive of axis y (node 2) is silent: no answer in " in line
     assert states(controller)[-2:] == ["stopping", "stopped"]
     assert "1 (x) switch on disabled" in goodbye(drives)
@@ -167,7 +167,7 @@ def test_one_drive_without_power_stops_the_other(bench: Bench, pace: str) -> Non
 
 
 def test_a_tool_measurement_without_power_stops_both(bench: Bench) -> None:
-    """Learning would go blind: both axes to rest, and the node of the measurement named."""
+    """Learning without measurement: both axes stop, and the node of the measurement is named."""
     cell = bench.cell(short=True, more="\n[safety]\nsilent_cycles_max = 100\n")
     drives = bench.drives(cell, "--mute", "10@3")
     controller = bench.controller(cell, runs=10_000)
@@ -179,7 +179,7 @@ def test_a_tool_measurement_without_power_stops_both(bench: Bench) -> None:
 
 
 def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
-    """After kill -9 of the controller, --resume goes on with the same drives and loses no run."""
+    """After kill -9 of the controller, --resume continues with the same drives and loses no run."""
     cell = bench.cell(short=True, more="\n[safety]\nsilent_cycles_max = 250\n")
     drives = bench.drives(cell)
     controller = bench.controller(cell, runs=4)
@@ -205,7 +205,7 @@ def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
     ]
     assert "1 (x) switch on disabled, 2 (y) switch on disabled" in goodbye(drives)
 
-    # Drives that were powered anew, and nothing left to do: refused, and nothing moves.
+    # Drives with power restored, and no runs left: refused, and nothing moves.
     drives = bench.drives(cell)
     again = bench.controller(cell, "--resume", runs=4)
     assert again.end() == 2
@@ -218,7 +218,7 @@ def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
 
 
 def test_a_resumed_campaign_is_the_one_that_was_not_cut(bench: Bench, tmp_path: Path) -> None:
-    """In lock-step: two runs, then two more by other processes, are the four of one campaign."""
+    """In lock-step: two runs, then two more by other processes, equal four of one campaign."""
     cell = bench.cell(short=True)
     digests = []
     for folder, parts in ((tmp_path / "cut", [2, 4]), (tmp_path / "whole", [4])):
@@ -232,5 +232,6 @@ def test_a_resumed_campaign_is_the_one_that_was_not_cut(bench: Bench, tmp_path: 
             digests.append([digest for _, _, digest in other.kept()])
     cut, whole = digests
     assert len(whole) == 4
-    # Powered anew, the axes come from elsewhere, so that friction leaves them elsewhere at rest.
+    # After a power cycle the axes start elsewhere, so friction leaves them at another rest
+    # position.
     assert cut[:2] == whole[:2]

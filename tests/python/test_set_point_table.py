@@ -1,4 +1,4 @@
-"""Cells of many rotary axes whose program is a table of set points."""
+"""Cells of many rotary axes with a table of set points as program."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def cell_text(
 
 
 def set_points() -> np.ndarray:
-    """Return a smooth move of each axis, as far as its number says, and back."""
+    """Return a smooth move of each axis, proportional to its number, and back."""
     share = (0.5 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 161)))) ** 2
     return 0.02 * share[:, None] * np.arange(1, N_AXES + 1)
 

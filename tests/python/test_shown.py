@@ -1,4 +1,4 @@
-"""What is shown of a campaign: units, words and signs, and nothing that is not there."""
+"""The output of a campaign: units, words and signs, and nothing absent."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ limits = {{ position_min_m = -1.0, position_max_m = 1.0, velocity_max_m_s = 1.0,
 model = {{ natural_frequency_hz = 15.0, damping = 1.0, delay_samples = 1 }}
 """
 
-# Figures of the table, the sentence, the report: no number that is none.
+# Patterns of non-finite or unreadable numbers in the table, the sentence and the report.
 NO_NUMBER = re.compile(r"\b(nan|inf)\b|\d{6,}\.\d|e[+-]\d\d", re.IGNORECASE)
 
 
@@ -101,8 +101,10 @@ def test_a_path_without_a_contour_is_told_by_its_tracking_error(
 
 def record(index: int, tracking_m: float, contour_m: float | None = None, **more: Any):
     return IterationRecord(
-        "l.db", index + 1, index, tracking_m, tracking_m / 2, contour_m,
-        contour_m, axes_tracking_inf_m=(tracking_m, 0.5), axes_tracking_rms_m=(tracking_m, 0.5),
+        library="l.db", id=index + 1, index=index, tracking_inf_m=tracking_m,
+        tracking_rms_m=tracking_m / 2, contour_inf_m=contour_m,
+        contour_rms_m=contour_m, axes_tracking_inf_m=(tracking_m, 0.5),
+        axes_tracking_rms_m=(tracking_m, 0.5),
         **more,
     )  # fmt: skip
 
@@ -131,7 +133,7 @@ def test_a_change_has_one_wording_and_one_sign(before, after, words, sign):
                                     (1e-3, float("inf")), (1e-20, 1.0)])  # fmt: skip
 @pytest.mark.parametrize("units", [["m"], ["rad"], ["m", "rad"]])
 def test_any_figures_give_a_sentence_and_a_table(values, units):
-    """Zeros, one run, figures that are no numbers."""
+    """Zeros, one run, non-finite figures."""
     comparison = Comparison([record(i, value) for i, value in enumerate(values)], units)
     names = headings(comparison)
     lines = [plain_line(run_cells(comparison, run), names) for run in comparison.records]
@@ -153,7 +155,7 @@ def test_the_prefix_suits_the_size():
 
 
 def test_a_roll_back_is_shown_with_its_reason():
-    """In the table, below it, in the report, the sentence's neighbours and the figures."""
+    """In the table, below it, in the report, near the sentence and in the figures."""
     why = "the RMS error grew to 1.75 times the best one: the best input is restored"
     off = "learning is off: the error grew twice"
     runs = [
@@ -178,7 +180,7 @@ def test_a_roll_back_is_shown_with_its_reason():
 
 def test_what_a_law_decides_later_is_put_with_its_run():
     result = CampaignResult("l.db")
-    result.follow(IterationEvent(7, 0, 1e-3, 5e-4, None, None))
+    result.follow(IterationEvent(id=7, index=0, tracking_inf_m=1e-3, tracking_rms_m=5e-4))
     result.follow(JudgedEvent(7, 0, rolled_back=True, learning_off=True, remark="it grew"))
     assert result.records[0].rolled_back
     assert result.records[0].remark == "it grew"
@@ -193,12 +195,12 @@ def test_what_a_law_decides_later_is_put_with_its_run():
         ('law = "pd"\nallow_divergent = true\n[learning.pd]\nkp = -0.4\n'
          "[learning.gate]\ntolerance_m = 0.0\ngrowth = 1.05\npatience = 1\n", 1),
     ],
-    ids=["supervisor", "gate"],
+    ids=["campaign", "gate"],
 )  # fmt: skip
 def test_a_law_that_makes_it_worse_is_told_everywhere(
     ilc: Callable[..., Any], tmp_path: Path, learning: str, off: int
 ) -> None:
-    """Whoever takes the input back, the supervisor or a gate."""
+    """The campaign and a gate restore the best input alike."""
     (tmp_path / "cell.toml").write_text(cell_text(["m"], [0.02], learning=learning))
     done = ilc("run", "cell.toml", "--iterations", 8, "--json", "f.json", "--report", "r.html")
     assert done.returncode == 0, done.stderr
@@ -231,7 +233,7 @@ def test_names_that_would_share_a_column_are_refused(tmp_path: Path, names) -> N
     "name", ["", " x", r"a\u001b[2J", r"\u0000", r"\r", r"\u0007", r"a\u202eb", r"\u200b", "x" * 65]
 )
 def test_names_that_do_more_than_being_read_are_refused(ilc, tmp_path: Path, name: str) -> None:
-    """In one line in which every character is seen."""
+    """In one line, with every character visible."""
     (tmp_path / "cell.toml").write_text(cell_text(["m"], [0.02], [name]))
     done = ilc("run", "cell.toml")
     assert done.returncode == 2
@@ -277,7 +279,7 @@ def test_a_library_with_any_names_is_shown(ilc, tmp_path: Path) -> None:
     library.append(np.zeros(3), error, 0.01, cell="[/red]", campaign="c", law="[b]")
     with pytest.raises(ValueError, match="without control characters"):
         library.append(np.zeros(3), error, 0.01, cell="\x1b[2J")
-    # Such names are refused today; a library from elsewhere may hold them all the same.
+    # Such names are refused today; an older library may still contain them.
     with contextlib.closing(sqlite3.connect(tmp_path / "l.db")) as file, file:
         file.execute("UPDATE iteration SET cell = ?, campaign = ?", ("[/red]\x1b[2J", "c\x07"))
     listed = ilc("library", "list", "l.db")

@@ -13,7 +13,7 @@ DT_S = 0.002
 
 
 def walk(seed, *shape):
-    """Return a random walk, as rough as a signal of a machine gets."""
+    """Return a random walk, as rough as a machine's signal gets."""
     return np.random.default_rng(seed).normal(size=shape).cumsum(axis=0)
 
 
@@ -23,7 +23,7 @@ def test_zero_phase_is_that_of_scipy_at_any_size(seed, order, cutoff_hz, n_sampl
     x = walk(seed, n_samples, 2)
     low_pass = signal.butterworth(order, cutoff_hz, DT_S)
     expected = scipy_signal.sosfiltfilt(low_pass.sos, x, axis=0)
-    # A narrow filter of high order amplifies rounding; its own step response says by how much.
+    # A narrow filter of high order amplifies rounding; the factor follows from its step response.
     tolerance = 1e-10 if cutoff_hz > 5.0 else 1e-6
     np.testing.assert_allclose(
         low_pass.zero_phase(x), expected, atol=tolerance * (1.0 + abs(expected).max())
@@ -92,7 +92,7 @@ def test_instantaneous_frequency_is_that_of_scipy(seed, n_samples):
     angle = np.unwrap(np.angle(scipy_signal.hilbert(x)))
     expected = np.diff(angle) / (2.0 * np.pi * DT_S)
     found = signal.instantaneous_frequency(x, DT_S)
-    # Half a turn may be taken either way: the two then differ by the sampling rate.
+    # Half a turn is ambiguous: the two then differ by the sampling rate.
     turns = (found - expected) * DT_S
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-10)
     assert (abs(np.round(turns[abs(abs(expected) * DT_S - 0.5) > 1e-9])) == 0).all()

@@ -1,4 +1,4 @@
-"""A computer that stalls: simulated drives and controller forgive each other what neither did."""
+"""A stalled computer: simulated drives and controller tolerate it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def stall(processes: list[Process], seconds: float) -> None:
-    """Take the processor from some processes for a while."""
+    """Stop some processes for a while."""
     for process in processes:
         process.signal(signal.SIGSTOP)
     time.sleep(seconds)
@@ -35,7 +35,7 @@ def stall(processes: list[Process], seconds: float) -> None:
 
 @pytest.mark.parametrize("who", ["drives", "controller", "both"])
 def test_a_stall_pauses_the_motion_and_ends_nothing(bench: Bench, who: str) -> None:
-    """20 to 300 ms at drawn moments: every run is made, and no sample is lost."""
+    """20 to 300 ms at random moments: every run is made, and no sample is lost."""
     draw = random.Random(f"stalls of {who}")
     cell = bench.cell(short=True)
     drives = bench.drives(cell)
@@ -64,12 +64,12 @@ def test_a_stalled_run_is_the_run_that_was_not_stalled(bench: Bench) -> None:
     assert controller.end() == 0, controller.errors
     runs = [event for event in controller.events if event["event"] == "iteration"]
     assert runs[1]["overruns"] >= 50
-    # Friction keeps a trace of the run before, so that even undisturbed runs differ a little.
+    # Friction depends on the previous run, so even undisturbed runs differ slightly.
     assert runs[1]["tracking_rms_m"] == pytest.approx(runs[2]["tracking_rms_m"], rel=0.05)
 
 
 def test_a_real_drive_is_not_waited_for(bench: Bench) -> None:
-    """Without the promise that the drives are simulated, the computer's stall stops the axes."""
+    """Unless the drives are declared as simulated, the computer's stall stops the axes."""
     cell = bench.cell(short=True)
     bench.drives(cell)
     controller = bench.controller(cell, runs=3)
@@ -95,7 +95,7 @@ def test_drives_come_to_rest_without_their_controller(bench: Bench) -> None:
 
 
 def test_drives_without_power_are_noticed_all_the_same(bench: Bench) -> None:
-    """Patience ends: the loop holds still for a second, and then the node is silent."""
+    """The timeout ends: the loop pauses for a second, and then the node is silent."""
     cell = bench.cell(short=True)
     drives = bench.drives(cell, "--mute", "2@3")
     controller = bench.controller(cell, "--simulated-drives", runs=10_000)

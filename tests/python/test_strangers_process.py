@@ -1,4 +1,4 @@
-"""Others on the same bus or network, beside the real programs."""
+"""Foreign programs on the same bus or network, beside the real ones."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def refused(process: Process, *parts: str) -> None:
 
 
 def test_a_second_simulator_refuses_where_idle_drives_are(bench: Bench) -> None:
-    """It asks, gets an answer, and has sent no boot-up."""
+    """It asks, receives an answer, and has sent no boot-up."""
     cell = bench.cell(short=True)
     drives = bench.drives(cell)
     second = bench.start("ilc-sim", "run", cell, "--bus", bench.bus)
@@ -47,7 +47,7 @@ def test_a_second_simulator_refuses_where_idle_drives_are(bench: Bench) -> None:
 
 
 def test_nobody_disturbs_a_campaign_that_is_under_way(bench: Bench) -> None:
-    """A second simulator and a second controller go away by themselves; every run is kept."""
+    """A second simulator and a second controller exit; every run is kept."""
     cell = bench.cell(short=True, more=PATIENT)
     bench.drives(cell)
     controller = bench.controller(cell, runs=4)
@@ -63,7 +63,7 @@ def test_nobody_disturbs_a_campaign_that_is_under_way(bench: Bench) -> None:
 
 
 def test_a_bus_is_free_again_after_a_controller_was_killed(bench: Bench) -> None:
-    """The drives stop by themselves, and the next controller is let on the bus."""
+    """The drives stop on their own, and the next controller may use the bus."""
     cell = bench.cell(short=True, more=PATIENT)
     bench.drives(cell)
     controller = bench.controller(cell, runs=4)
@@ -92,13 +92,13 @@ STRANGER = textwrap.dedent(
 
 
 def ip(*words: str) -> None:
-    """Run `ip`, as in `ip link add`."""
+    """Run `ip` with arguments, e.g. `ip link add`."""
     subprocess.run(["ip", *words], check=True, capture_output=True)
 
 
 @pytest.fixture
 def two_hosts() -> Iterator[tuple[str, str]]:
-    """Return the names of two network namespaces with a cable between them."""
+    """Return the names of two network namespaces connected by a veth pair."""
     if shutil.which("ip") is None or os.geteuid() != 0:
         pytest.skip("two network namespaces need iproute2 and root")
     tag = uuid.uuid4().hex[:6]
@@ -146,7 +146,7 @@ class On:
 def test_a_zenoh_bus_and_its_telemetry_stay_on_their_host(
     bench: Bench, two_hosts: tuple[str, str]
 ) -> None:
-    """A stranger on the next host hears nothing and stops nothing; a monitor here hears all."""
+    """A foreign session on the next host has no access; a monitor here receives all."""
     ours, theirs = (On(bench, host) for host in two_hosts)
     key = "test/cell/bus"
     cell = bench.cell(short=True, more=PATIENT)
@@ -154,7 +154,7 @@ def test_a_zenoh_bus_and_its_telemetry_stay_on_their_host(
     drives.line_with("ready:")
     stranger = theirs.python("-c", STRANGER, "12", key)
     monitor = ours.python("-m", "ilc_rt.cli", "monitor", "gantry", "-n", "3", "--timeout", "40")
-    # Everybody looks for everybody before the campaign begins.
+    # Discovery has time before the campaign begins.
     time.sleep(2.0)
     controller = ours.start(
         "ilc-rt", "run", cell, "--bus", f"zenoh:{key}", "--iterations", "3",
@@ -174,7 +174,7 @@ def test_a_zenoh_bus_and_its_telemetry_stay_on_their_host(
 
 
 def resident_mb(pid: int) -> float:
-    """Return the memory of a process that is in use."""
+    """Return the resident memory of a process."""
     for line in Path(f"/proc/{pid}/status").read_text().splitlines():
         if line.startswith("VmRSS:"):
             return float(line.split()[1]) / 1024.0
@@ -182,7 +182,7 @@ def resident_mb(pid: int) -> float:
 
 
 def test_strangers_do_not_fill_the_memory(bench: Bench) -> None:
-    """Huge questions and idle connections cost the controller next to nothing."""
+    """Huge queries and idle connections cost the controller almost nothing."""
     port = free_port(socket.SOCK_STREAM)
     endpoint = f"tcp/127.0.0.1:{port}"
     more = f'\n[telemetry]\nscouting = false\nlisten = ["{endpoint}"]\n'
@@ -215,7 +215,7 @@ def test_strangers_do_not_fill_the_memory(bench: Bench) -> None:
 
 
 def connected(port: int) -> socket.socket | None:
-    """Return a connection that says nothing, if it was let in."""
+    """Return an idle connection, if it was accepted."""
     try:
         return socket.create_connection(("127.0.0.1", port), timeout=0.5)
     except OSError:

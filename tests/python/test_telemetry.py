@@ -1,4 +1,4 @@
-"""What is seen from outside: a Zenoh subscriber beside the running programs."""
+"""Telemetry: a Zenoh subscriber beside the running programs."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def endpoint() -> str:
 
 
 def telemetry(*, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> str:
-    """Return the section of a cell that stays on this computer."""
+    """Return the section of a cell whose telemetry stays on this computer."""
     ends = f"listen = {json.dumps(list(listen))}\nconnect = {json.dumps(list(connect))}\n"
     return f"\n[telemetry]\nscouting = false\n{ends}"
 
 
 class Watcher:
-    """A session that keeps all that it hears."""
+    """A session that keeps everything it receives."""
 
     def __init__(self, *, listen: Sequence[str] = (), connect: Sequence[str] = ()) -> None:
         config = zenoh.Config()
@@ -65,18 +65,18 @@ class Watcher:
             self._news.notify_all()
 
     def wait_for_tokens(self, *tokens: str) -> None:
-        """Wait until exactly these have come."""
+        """Wait until exactly these have arrived."""
         with self._news:
             assert self._news.wait_for(lambda: self.tokens == list(tokens), DEADLINE_S), self.tokens
 
     def states_asked(self) -> list[dict[str, Any]]:
-        """Ask for the state, as a late joiner does."""
+        """Query the state, as a late joiner does."""
         replies = self.session.get("ilc/gantry/state", timeout=DEADLINE_S)
         return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
 
 
 class Watched:
-    """Two runs by the clock, what was heard of them, and what is in the library."""
+    """Two runs in real time, their telemetry, and the library."""
 
     def __init__(self, folder: Path) -> None:
         ours, theirs = endpoint(), endpoint()
@@ -97,7 +97,7 @@ class Watched:
                     late.session.close()
                 self.status = self.controller.end()
                 watcher.wait_for_tokens("alive", "gone")
-                # What was published before the token went has come before it.
+                # Everything published before the token disappeared has arrived before it.
                 self.heard = dict(watcher.heard)
             finally:
                 watcher.session.close()
@@ -120,7 +120,7 @@ def start(bench: Bench, cell: Path, *options: str, runs: int) -> Process:
 
 @pytest.fixture(scope="module")
 def watched(tmp_path_factory: pytest.TempPathFactory) -> Watched:
-    """Return two runs that were watched."""
+    """Return two monitored runs."""
     return Watched(tmp_path_factory.mktemp("watched"))
 
 
@@ -131,7 +131,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def test_the_same_events_are_heard_as_are_printed(watched: Watched) -> None:
-    """Under their keys, in order, none missing and none more."""
+    """Under their keys, in order, complete and without extras."""
     assert watched.status == 0, watched.controller.errors
     assert watched.controller.errors == []
     assert set(watched.heard) == {"state", "iteration", "latency", "servo"}
@@ -146,15 +146,15 @@ def test_the_same_events_are_heard_as_are_printed(watched: Watched) -> None:
 
 
 def test_the_error_is_seen_to_fall(watched: Watched) -> None:
-    """One object a run."""
+    """One object per run."""
     first, second = watched.heard["iteration"]
     assert (first["index"], second["index"]) == (0, 1)
-    # By a tenth in lock-step; a machine that is busy with other things spoils some of it.
+    # By a factor of ten in lock-step; a busy machine spoils some of it.
     assert second["tracking_rms_m"] < 0.8 * first["tracking_rms_m"]
 
 
 def test_servo_batches_are_the_samples_of_the_runs(watched: Watched) -> None:
-    """50 ms each, in order; bit for bit what the library has of the same samples."""
+    """50 ms each, in order; bit-identical to the same samples in the library."""
     batches = watched.heard["servo"]
     first_syncs = [batch["first_sync"] for batch in batches]
     assert first_syncs == list(range(0, 25 * len(batches), 25))
@@ -175,13 +175,13 @@ def test_servo_batches_are_the_samples_of_the_runs(watched: Watched) -> None:
 
 
 def test_a_late_joiner_gets_the_state(watched: Watched) -> None:
-    """By asking; what passes by afterwards is only changes."""
+    """By a query; subscriptions only receive changes."""
     (state,) = watched.states_asked
     assert (state["event"], state["state"]) == ("state", "running")
 
 
 def test_a_fault_is_heard(bench: Bench) -> None:
-    """With the reason that is printed; then the controller is gone."""
+    """With the printed reason; then the controller is gone."""
     ours = endpoint()
     cell = bench.cell(short=True, more=telemetry(connect=[ours]))
     watcher = Watcher(listen=[ours])
@@ -213,7 +213,7 @@ signal.pause()
 
 
 def test_a_subscriber_that_stops_reading_holds_nobody_up(bench: Bench) -> None:
-    """The campaign ends while it stands: what is beyond the network's buffers is dropped."""
+    """The campaign ends meanwhile: what exceeds the network's buffers is dropped."""
     runs = 60
     ours = endpoint()
     quiet = bench.cell(short=True, name="quiet.toml")
@@ -256,7 +256,7 @@ signal.pause()
 
 @pytest.mark.parametrize("last", [signal.SIGKILL, signal.SIGTERM, signal.SIGSTOP])
 def test_a_router_that_goes_takes_nothing_with_it(bench: Bench, last: signal.Signals) -> None:
-    """All telemetry goes through it, and the campaign needs none."""
+    """All telemetry goes through it, and the campaign does not depend on it."""
     runs = 20
     ours = endpoint()
     quiet = bench.cell(short=True, name="quiet.toml")
@@ -287,7 +287,7 @@ def test_a_router_that_goes_takes_nothing_with_it(bench: Bench, last: signal.Sig
 
 @pytest.mark.parametrize("wrong", ["tcp/203.0.113.7:7447", "tcp/127.0.0.1:1/nonsense", "nonsense"])
 def test_a_cell_runs_unseen_where_its_endpoint_cannot_be_opened(bench: Bench, wrong: str) -> None:
-    """A warning, and no more than that."""
+    """A warning, and nothing more."""
     cell = bench.cell(short=True, more=telemetry(listen=[wrong]))
     bench.drives(cell, "--lockstep")
     controller = start(bench, cell, "--lockstep", runs=2)

@@ -1,4 +1,4 @@
-"""Learning in the joints from errors at the tool."""
+"""Learning in joint space from errors at the tool."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_it_is_the_law_of_the_model_seen_at_the_tool():
     model, jacobian = three_legs(), Delta().jacobian([-0.2, 0.1, 0.0])
     weight = np.diag([3.0, 1.0, 2.0])
     at_tool = StateSpace(model.a, model.b, jacobian @ model.c, jacobian @ model.d, DT_S)
-    # The Jacobian is in m/rad, so that effort and change of input weigh little in comparison.
+    # The Jacobian is in m/rad, so effort and change of input weigh little in comparison.
     direct = NormOptimalIlc(at_tool, N_SAMPLES, q=weight, s=1e-7, r=1e-5)
     joints = NormOptimalIlc(model, N_SAMPLES, q=jacobian.T @ weight @ jacobian, s=1e-7, r=1e-5)
     through = ThroughJacobian(joints, jacobian)

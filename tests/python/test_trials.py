@@ -1,7 +1,7 @@
-"""Trials by what breaks machines: kills, full disks, damaged files, babble, strangers.
+"""Randomised trials of failures: kills, full disks, damaged files, babble, foreign nodes.
 
-Each is made a few times here, and many times by `make soak` (`ILC_SOAK`, a factor). What is drawn,
-is drawn from the number of the trial.
+A few trials are made here, and many by `make soak` (`ILC_SOAK`, a factor). Random draws depend on
+the number of the trial alone.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 def complete(bench: Bench) -> list[str]:
-    """Return the digests of what the library holds; loading each run checks its arrays."""
+    """Return the digests in the library; loading each run checks its arrays."""
     library = Library(str(bench.library))
     rows = library.list()
     for row in rows:
@@ -57,7 +57,7 @@ def complete(bench: Bench) -> list[str]:
 
 @pytest.mark.parametrize("trial", trials(2))
 def test_a_kill_at_any_moment_loses_no_completed_run(bench: Bench, trial: int) -> None:
-    """By kill -9, in lock-step: the library is whole, and the next start is clean."""
+    """By kill -9, in lock-step: the library is intact, and the next start is clean."""
     cell = bench.cell(short=True)
     drives = bench.drives(cell, "--lockstep")
     controller = bench.controller(cell, "--lockstep", runs=10_000)
@@ -67,7 +67,7 @@ def test_a_kill_at_any_moment_loses_no_completed_run(bench: Bench, trial: int) -
     assert controller.end() == -signal.SIGKILL
     told = [event["digest"] for event in controller.events if event["event"] == "iteration"]
     kept = complete(bench)
-    # A run may be in the library before the world was told of it.
+    # A run may be in the library before it is published.
     assert kept[: len(told)] == told
     assert len(kept) - len(told) in (0, 1)
 
@@ -81,7 +81,7 @@ def test_a_kill_at_any_moment_loses_no_completed_run(bench: Bench, trial: int) -
 
 @pytest.mark.parametrize("trial", trials(2))
 def test_a_signal_at_any_moment_is_a_controlled_stop(bench: Bench, trial: int) -> None:
-    """By the clock, from bring-up to the fourth run: the axes rest, one reason, drives off."""
+    """In real time, from bring-up to the fourth run: the axes stop, one reason, drives off."""
     draws = random.Random(trial)
     cell = bench.cell(short=True, more=PATIENT)
     drives = bench.drives(cell)
@@ -98,10 +98,10 @@ def test_a_signal_at_any_moment_is_a_controlled_stop(bench: Bench, trial: int) -
 def test_a_full_disk_stops_the_campaign_and_keeps_what_was_kept(
     bench: Bench, request: pytest.FixtureRequest
 ) -> None:
-    """Files that may not grow beyond a size stand in for the disk: one sentence, axes at rest."""
+    """A file size limit stands in for the disk: one sentence, axes at rest."""
     cell = bench.cell(short=True)
     drives = bench.drives(cell, "--lockstep")
-    # The shell passes on that the signal is ignored, so that the write fails as on a full disk.
+    # The shell inherits the ignored signal, so the write fails as on a full disk.
     limited = ["bash", "-c", 'trap "" XFSZ; ulimit -f 400; exec "$@"', "bash"]
     controller = Process(
         [*limited, program("ilc-rt"), "run", cell, "--bus", bench.bus, "--iterations", "1000",
@@ -126,7 +126,7 @@ def test_a_full_disk_stops_the_campaign_and_keeps_what_was_kept(
 def test_a_damaged_library_is_read_in_part_or_refused(
     finished: CampaignResult, tmp_path: Path, trial: int
 ) -> None:
-    """Bytes changed, or the end missing: an error of one line, or what is whole; never a crash."""
+    """A damaged file: an error of one line, or the intact part; never a crash."""
     draws = random.Random(trial)
     source = sqlite3.connect(finished.library)
     damaged = tmp_path / "damaged.db"
@@ -159,7 +159,7 @@ def test_a_damaged_library_is_read_in_part_or_refused(
 
 
 def test_babble_on_the_bus_leaves_idle_drives_as_they_were(bench: Bench) -> None:
-    """Random datagrams, long and short: the drives go on, and a campaign runs on them after."""
+    """Random datagrams, long and short: the drives continue, and a campaign runs on them after."""
     cell = bench.cell(short=True)
     drives = bench.drives(cell, "--lockstep")
     _, group, port = bench.bus.split(":")
@@ -176,7 +176,7 @@ def test_babble_on_the_bus_leaves_idle_drives_as_they_were(bench: Bench) -> None
 
 
 def run_heard_by(bench: Bench, endpoint: str, meddle: Callable[[], None]) -> list[str]:
-    """Make three runs in lock-step that anybody at the endpoint can hear, and meddle meanwhile."""
+    """Make three runs in lock-step, visible at an endpoint, and interfere meanwhile."""
     telemetry = f'[telemetry]\nlisten = ["{endpoint}"]\nscouting = false\n'
     cell = bench.cell(short=True, more=f"\n{telemetry}")
     drives = bench.drives(cell, "--lockstep")
@@ -192,7 +192,7 @@ def run_heard_by(bench: Bench, endpoint: str, meddle: Callable[[], None]) -> lis
 
 
 def test_nobody_commands_through_telemetry(tmp_path: Path) -> None:
-    """Puts, deletes and queries on every key of the cell: the runs are those without them."""
+    """Puts, deletes and queries on every key of the cell: the runs are unaffected."""
     digests = []
     for folder in (tmp_path / "alone", tmp_path / "meddled"):
         folder.mkdir()
@@ -228,7 +228,7 @@ def test_nobody_commands_through_telemetry(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["<script>alert(1)</script>", "x'; DROP TABLE iteration; --"])
 def test_a_name_is_shown_and_kept_as_the_text_that_it_is(bench: Bench, name: str) -> None:
-    """Markup and SQL in a cell's name: refused, or escaped wherever it comes out."""
+    """Markup and SQL in a cell's name: refused, or escaped wherever it is shown."""
     cell = bench.cell(('name = "gantry"', f'name = "{name}"'), short=True)
     argv = [sys.executable, "-m", "ilc_rt.cli"]
     done = subprocess.run(

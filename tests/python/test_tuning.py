@@ -1,4 +1,4 @@
-"""Weights that `ilc tune` proposes: what they do on cells they do not know, and where they go."""
+"""Weights proposed by `ilc tune`: their effect on unknown cells, and their output."""
 
 import json
 import re
@@ -21,14 +21,14 @@ SHIPPED = ["examples/01_gantry.toml", "examples/02_parallel.toml", "examples/04_
 
 
 def copied(tmp_path, cell):
-    """Copy a cell with the part program that it may name."""
+    """Copy a cell with its part program, if it has one."""
     for file in (Path(cell), Path("examples/04_gcode.ngc")):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     return tmp_path / Path(cell).name
 
 
 def assert_learns(path, tmp_path, left):
-    """Run a cell; assert what is left of its contour error, and that no input was restored."""
+    """Run a cell; assert the remaining contour error, and that no input was rolled back."""
     records = list(Campaign(path, bus="loopback:", library=tmp_path / "runs.db").run(RUNS))
     contour = [record.contour_inf_m for record in records]
     assert contour[-1] <= left * contour[0]
@@ -82,7 +82,7 @@ def test_a_mode_nearer_by_asks_for_slower_learning():
 
 
 def test_gains_that_reach_one_say_up_to_where_the_model_is_known():
-    # 0.3 at rest, 1 at 25 Hz of 250 Hz.
+    # 0.3 at frequency zero, 1 at 25 Hz of 250 Hz.
     gains = [0.3 + 7.0 * k / 100 for k in range(101)]
     found = propose_weights(GANTRY, uncertainty=gains)
     assert found.uncertainty == 0.3
@@ -143,7 +143,7 @@ def test_axes_of_both_kinds_share_one_rate(tmp_path):
     path.write_text(mixed, encoding="utf-8")
     found = propose_weights(path)
     assert all(trial.growth <= 1.2 for trial in found.trials)
-    # The input of y is a velocity: a rate that suits x makes it slow, and that is said.
+    # The input of y is a velocity: a rate that suits x makes it slow, which is noted.
     assert any(note.startswith("axis y: ") and "--runs" in note for note in found.notes)
 
 

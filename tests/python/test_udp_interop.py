@@ -1,7 +1,7 @@
-"""Frames go back and forth between python-can's ``udp_multicast`` interface and ours.
+"""Frames between python-can's ``udp_multicast`` interface and ours, in both directions.
 
-The other side is ``bus_echo``, an example of the Rust crate, in a process of its own: what it
-receives comes back with the next identifier. ``make test-python`` builds it.
+The other side is ``bus_echo``, an example of the Rust crate, in its own process: it returns each
+    frame with the next identifier. ``make test-python`` builds it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def bus_echo() -> Path:
 
 @pytest.fixture
 def port() -> Iterator[int]:
-    """Hold a UDP port that no other test uses."""
+    """Reserve a unique UDP port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
         # Shared, since python-can binds the port on every address, this one included.
         holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -75,13 +75,13 @@ def echo(bus_echo: Path, bus: can.BusABC, port: int) -> Iterator[subprocess.Pope
 
 
 def is_without_network(error: can.CanInitializationError) -> bool:
-    """Tell whether the machine has no interface that multicast could use."""
+    """Return whether the machine has no interface for multicast."""
     return isinstance(error.__cause__, OSError) and error.__cause__.errno == errno.ENODEV
 
 
 def receive_answer(bus: can.BusABC) -> can.Message:
     """Return the next frame of the echo program, which has an odd identifier."""
-    # python-can hears what it sends: those are even and passed over.
+    # python-can receives its own frames: those are even and skipped.
     while True:
         message = bus.recv(PATIENCE_S)
         assert message is not None, "the echo program did not answer"
@@ -129,7 +129,7 @@ def test_a_burst_comes_back_in_order(bus: can.BusABC) -> None:
 def test_other_kinds_of_frames_are_passed_over(bus: can.BusABC, foreign: can.Message) -> None:
     bus.send(foreign)
     bus.send(can.Message(arbitration_id=0x200, data=[2], is_extended_id=False))
-    # An answer to the foreign frame would be the first to come.
+    # An answer to the foreign frame would arrive first.
     assert receive_answer(bus).arbitration_id == 0x201
 
 

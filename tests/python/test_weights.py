@@ -1,4 +1,4 @@
-"""Weights from what they mean, and the laws that take them, against the printed equations."""
+"""Weights from their meaning, and the laws that use them, against the printed equations."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The wheel is all that a machine needs: the package, both programs, no toolchain."""
+"""The wheel is self-sufficient: the package, both programs, no toolchain."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def wheel() -> Path:
 
 
 def binaries(wheel: Path) -> dict[str, bytes]:
-    """Return what is compiled in the wheel, by its file's name."""
+    """Return the compiled files of the wheel by name."""
     with zipfile.ZipFile(wheel) as archive:
         return {
             Path(name).name: archive.read(name)
@@ -38,7 +38,7 @@ def binaries(wheel: Path) -> dict[str, bytes]:
 
 
 def test_both_programs_are_in_the_wheel(wheel: Path) -> None:
-    """Executable, as pip puts them beside Python."""
+    """Executable, as pip installs them beside Python."""
     with zipfile.ZipFile(wheel) as archive:
         scripts = {
             Path(entry.filename).name: entry.external_attr >> 16
@@ -50,7 +50,7 @@ def test_both_programs_are_in_the_wheel(wheel: Path) -> None:
 
 
 def test_the_papers_are_a_wheel_of_their_own(wheel: Path) -> None:
-    """The library's wheel is without them."""
+    """The library's wheel does not contain them."""
     with zipfile.ZipFile(wheel) as archive:
         folders = {name.split("/")[0] for name in archive.namelist()}
     assert "ilc_papers" not in folders
@@ -69,7 +69,7 @@ def test_the_wheel_is_small_and_stripped(wheel: Path) -> None:
 
 
 def test_the_tag_names_the_c_library_that_is_needed(wheel: Path) -> None:
-    """No compiled file needs a newer one than the wheel's name says."""
+    """No compiled file needs a newer one than the wheel's tag says."""
     tags = re.findall(r"manylinux_2_(\d+)_", wheel.name)
     assert tags, wheel.name
     promised = min(int(minor) for minor in tags)
@@ -87,8 +87,8 @@ def test_an_empty_environment_needs_nothing_but_the_wheel(wheel: Path, tmp_path:
          "--quiet", "--no-deps", "--no-index", "--disable-pip-version-check", str(wheel)],
         check=True, timeout=110,
     )  # fmt: skip
-    # What the wheel depends on comes from here, after the environment's own packages, so that no
-    # network is asked for it.
+    # The wheel's dependencies come from here, after the environment's own packages, so that no
+    # network is needed.
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     site = home / "lib" / version / "site-packages"
     (site / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Cells of simulated drives that differ from what their models say, drawn from a seed."""
+"""Random cells of simulated drives that differ from their models, by seed."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ RUNS = 10
 def other_cell(seed):
     """Return a gantry with other masses, friction, modes, delays and noise, as TOML.
 
-    The models are off by up to 10 % in frequency, 15 % in damping and a cycle
-    or two in delay.
+    The models are off by up to 10 % in frequency, 15 % in damping and a cycle or two in delay.
     """
     rng = np.random.default_rng(seed)
     head, first, second, tail = re.split(
@@ -27,7 +26,7 @@ def other_cell(seed):
     for text in (first, second):
         mass_kg, frequency_hz = rng.uniform(10, 200), rng.uniform(9, 22)
         damping = rng.uniform(0.55, 1.1)
-        # Friction as the error that holds against it.
+        # Friction, expressed as the error that it holds.
         stuck_m = rng.uniform(1e-5, 8e-5)
         coulomb_n = stuck_m * mass_kg * (2 * np.pi * frequency_hz) ** 2
         lines = [

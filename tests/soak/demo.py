@@ -1,14 +1,14 @@
-"""Run `ilc demo` again and again on a computer that is kept busy, and tally what came of it.
+"""Run `ilc demo` repeatedly on a busy computer, and tally the outcomes.
 
-Ways to trouble it:
+Kinds of disturbance:
 
 load
     Three processes write 400 MB files with fsync in a loop, one calls sync in a loop.
 stalls
-    The controller, the drives or both are stopped for 20 to 300 ms at drawn moments.
+    The controller, the drives or both are stopped for 20 to 300 ms at random moments.
 kills
-    The controller, the drives or `ilc` itself are killed at drawn moments; the next start must
-    find every run that was told of, and go on.
+    The controller, the drives or `ilc` itself are killed at random moments; the next start must
+    find every reported run, and continue.
 
 Example: .venv/bin/python tests/soak/demo.py load --times 40
 """
@@ -30,6 +30,9 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
+from children_fixture import children
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -41,7 +44,7 @@ DEADLINE_S = 600.0
 
 
 def write_for_ever(path: str) -> None:
-    """Write a large file with fsync, over and over."""
+    """Write a large file with fsync, repeatedly."""
     while True:
         with open(path, "wb") as file:  # noqa: PTH123 (no time for niceties)
             for _ in range(FILE_BYTES // len(CHUNK)):
@@ -51,7 +54,7 @@ def write_for_ever(path: str) -> None:
 
 
 def sync_for_ever() -> None:
-    """Call sync, over and over."""
+    """Call sync, repeatedly."""
     while True:
         os.sync()
         time.sleep(0.05)
@@ -76,17 +79,8 @@ def disk_load(folder: Path) -> Iterator[None]:
             os.waitpid(pid, 0)
 
 
-def children(pid: int) -> dict[str, int]:
-    """Return the process ids of a process' children by their program."""
-    found = {}
-    for number in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-        with contextlib.suppress(OSError):
-            found[Path(f"/proc/{number}/comm").read_text().strip()] = int(number)
-    return found
-
-
 def start_demo(folder: Path, *more: str) -> subprocess.Popen[bytes]:
-    """Start the demo in a folder of its own."""
+    """Start the demo in its own folder."""
     report = ["--report", str(folder / "report.html"), "--json", str(folder / "figures.json")]
     argv = [str(BIN / "ilc"), "demo", "--library", str(folder / "library.db"), *report, *more]
     with (folder / "said").open("ab") as said:
@@ -109,7 +103,7 @@ def stall_at_random(demo: subprocess.Popen[bytes], draw: random.Random) -> None:
 
 
 def kill_at_random(demo: subprocess.Popen[bytes], draw: random.Random) -> str:
-    """Kill one of the three programs once; return which."""
+    """Kill one of the three programs once; return its name."""
     time.sleep(draw.uniform(1.0, 12.0))
     who = draw.choice(["ilc", "ilc-rt", "ilc-sim"])
     with contextlib.suppress(OSError):
@@ -120,7 +114,7 @@ def kill_at_random(demo: subprocess.Popen[bytes], draw: random.Random) -> str:
 
 
 def kept(folder: Path) -> list[int]:
-    """Return the numbers of the runs of the newest campaign, and check that the file is whole."""
+    """Return the run numbers of the newest campaign; check the file's integrity."""
     if not (folder / "library.db").exists():
         return []
     connection = sqlite3.connect(folder / "library.db")
@@ -137,7 +131,7 @@ def kept(folder: Path) -> list[int]:
 
 
 def one(trouble: str, folder: Path, draw: random.Random) -> str:
-    """Run the demo once; return what came of it in a few words."""
+    """Run the demo once; return the outcome in a few words."""
     demo = start_demo(folder)
     try:
         if trouble == "stalls":
@@ -165,13 +159,13 @@ def one(trouble: str, folder: Path, draw: random.Random) -> str:
 
 
 def main() -> int:
-    """Run what was asked for; return 0 if every demo was completed."""
+    """Run the requested demos; return 0 if all were completed."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("trouble", choices=["load", "stalls", "kills"])
     parser.add_argument("--times", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    # A request to end must end what was started as well.
+    # A request to end must also end the child processes.
     signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
     draw = random.Random(arguments.seed)
     tally: Counter[str] = Counter()

@@ -14,12 +14,13 @@ use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::argument::{Runs, Signal, give_signal, misfit, read_vector};
-use crate::arguments::{Arguments, number};
+use crate::argument::{Signal, give_signal, misfit, read_array, read_vector};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::laws;
 use crate::python_law::Channels;
+use crate::whole::number;
 
 #[pyfunction]
 #[pyo3(signature = (**keywords))]
@@ -220,11 +221,18 @@ fn tune<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDic
 #[pyfunction]
 fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     let py = errors.py();
-    let runs = Runs::read("errors", errors)?;
-    let Runs { count, n_samples, n_channels, is_flat, .. } = runs;
-    let found =
-        detached(py, || learning::repeatability(&runs.values, count, n_samples, n_channels))
-            .or_raise()?;
+    let (values, shape) = read_array("errors", errors)?;
+    let (count, n_samples, n_channels) = match shape[..] {
+        [count, n_samples] if !values.is_empty() => (count, n_samples, 1),
+        [count, n_samples, n_channels] if !values.is_empty() => (count, n_samples, n_channels),
+        _ => {
+            let rule = "(n_runs, n_samples) or (n_runs, n_samples, n_channels)";
+            return Err(misfit("errors", &shape, rule));
+        }
+    };
+    let is_flat = shape.len() == 2;
+    let found = detached(py, || learning::repeatability(&values, count, n_samples, n_channels))
+        .or_raise()?;
     let figures = PyDict::new(py);
     figures.set_item("mean", give_signal(py, found.mean, n_channels, is_flat)?)?;
     figures.set_item("spread", give_signal(py, found.spread, n_channels, is_flat)?)?;

@@ -102,35 +102,6 @@ impl Signal {
     }
 }
 
-/// Several runs of one size, time first within each.
-#[derive(Debug)]
-pub(crate) struct Runs {
-    pub(crate) values: Vec<f64>,
-    pub(crate) count: usize,
-    pub(crate) n_samples: usize,
-    pub(crate) n_channels: usize,
-    pub(crate) is_flat: bool,
-}
-
-impl Runs {
-    /// Reads `(n_runs, n_samples)` or `(n_runs, n_samples, n_channels)`.
-    pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let (values, shape) = read_array(name, object)?;
-        let (n_runs, n_samples, n_channels, is_flat) = match shape[..] {
-            [n_runs, n_samples] => (n_runs, n_samples, 1, true),
-            [n_runs, n_samples, n_channels] => (n_runs, n_samples, n_channels, false),
-            _ => {
-                let rule = "(n_runs, n_samples) or (n_runs, n_samples, n_channels)";
-                return Err(misfit(name, &shape, rule));
-            }
-        };
-        if values.is_empty() {
-            return Err(misfit(name, &shape, "at least one sample of one channel"));
-        }
-        Ok(Self { values, count: n_runs, n_samples, n_channels, is_flat })
-    }
-}
-
 /// Reads a matrix; a single number stands for a 1 x 1 one.
 pub(crate) fn read_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Matrix> {
     let (values, shape) = read_array(name, object)?;

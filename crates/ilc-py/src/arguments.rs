@@ -7,11 +7,11 @@ use ilc_rt::learning::weights::Weight;
 use ilc_rt::model::StateSpace;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyString};
+use pyo3::types::{PyDict, PyList};
 
-use crate::argument::{Matrix, Signal, misfit, read_array, read_disturbance, read_vector};
+use crate::argument::{Matrix, Signal, misfit, read_array, read_vector};
 use crate::model_argument::read_model;
-use crate::whole::{each, pair, shown, whole};
+use crate::whole::{each, number, pair, refused, shown, whole};
 
 /// The keyword arguments of one call.
 #[derive(Debug, Clone, Copy)]
@@ -146,11 +146,6 @@ impl<'a, 'py> Arguments<'a, 'py> {
         Signal::read(name, &self.get(name)?)
     }
 
-    /// Reads a disturbance; `None` or missing is an empty one.
-    pub(crate) fn disturbance(self, name: &str) -> PyResult<Vec<f64>> {
-        Ok(self.maybe(name, read_disturbance)?.unwrap_or_default())
-    }
-
     /// Reads a weight: a number, `(n,)`, `(p, p)` or `(n, p, p)`.
     pub(crate) fn weight(
         self,
@@ -172,18 +167,19 @@ impl<'a, 'py> Arguments<'a, 'py> {
         }
     }
 
-    /// Returns a copy that nothing changes later: lists and arrays are copied, too.
+    /// Returns a copy that nothing changes later: lists and arrays are copied, NumPy's numbers are Python's.
     pub(crate) fn kept(self) -> PyResult<Bound<'py, PyDict>> {
         let kept = PyDict::new(self.py());
         for (name, value) in self.0 {
-            let is_mutable =
-                value.is_instance_of::<PyList>() || value.hasattr("__array_interface__")?;
-            if is_mutable {
-                let copy = self.py().import("copy")?.getattr("deepcopy")?.call1((value,))?;
-                kept.set_item(name, copy)?;
+            let shape = value.getattr_opt("shape")?;
+            let value = if shape.is_some_and(|shape| shape.len().is_ok_and(|axes| axes == 0)) {
+                value.call_method0("item")?
+            } else if value.is_instance_of::<PyList>() || value.hasattr("__array_interface__")? {
+                self.py().import("copy")?.getattr("deepcopy")?.call1((value,))?
             } else {
-                kept.set_item(name, value)?;
-            }
+                value
+            };
+            kept.set_item(name, value)?;
         }
         Ok(kept)
     }
@@ -202,31 +198,4 @@ impl<'a, 'py> Arguments<'a, 'py> {
         }
         Ok(format!("{name}({})", words.join(", ")))
     }
-}
-
-/// Reads a number: Python's, NumPy's, whatever converts to a float.
-///
-/// # Errors
-/// - `TypeError` for what is not a number.
-/// - `ValueError` for an integer beyond the largest float.
-pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
-    if object.is_instance_of::<PyString>() {
-        return Err(refused(name, object, "a number"));
-    }
-    object.extract::<f64>().map_err(|error| {
-        let py = object.py();
-        if error.is_instance_of::<pyo3::exceptions::PyOverflowError>(py) {
-            let text = shown(object);
-            return PyValueError::new_err(format!(
-                "{name} = {text}; only finite numbers are allowed"
-            ));
-        }
-        refused(name, object, "a number")
-    })
-}
-
-fn refused(name: &str, object: &Bound<'_, PyAny>, needed: &str) -> PyErr {
-    let kind = object.get_type().name().map_or_else(|_| "object".to_owned(), |n| n.to_string());
-    let text = shown(object);
-    PyTypeError::new_err(format!("{name} = {text} is a {kind}; {needed} is needed"))
 }

@@ -14,7 +14,7 @@ use ilc_rt::fieldbus::transport::{self, loopback::InProcess};
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
 use ilc_sim::machine::{ClockMode, Machine};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyBaseException, PyValueError};
 use pyo3::prelude::*;
 
 use crate::argument::read_disturbance;
@@ -61,6 +61,11 @@ impl EventStream {
         }
     }
 
+    /// Return the exception that the law raised, with its traceback, or None.
+    fn raised(&self, py: Python<'_>) -> Option<Py<PyBaseException>> {
+        self.frame.take_raised().map(|raised| raised.into_value(py))
+    }
+
     /// Bring the axes to rest; the events go on until they are.
     ///
     /// - signal : int: Number of the signal that asked for it.
@@ -74,12 +79,7 @@ impl EventStream {
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         match thread.map(|thread| detached(py, || thread.join())) {
-            Some(Ok(ended)) => ended.or_raise().map_err(|error| {
-                if let Some(raised) = self.frame.take_raised() {
-                    error.set_cause(py, Some(raised));
-                }
-                error
-            }),
+            Some(Ok(ended)) => ended.or_raise(),
             Some(Err(_)) => Err(PyValueError::new_err("the campaign's thread died")),
             None => Ok(()),
         }
@@ -109,11 +109,11 @@ impl Drop for EventStream {
 ///
 /// - cell : Cell: The cell.
 /// - arguments : list of str: Options, as words of ``ilc-rt run`` or ``ilc-rt identify``; see
-///     `described_options`.
+///   `described_options`.
 /// - verb : {"run", "identify"}: Run the program and learn, or excite an axis once.
 /// - law : object or None: A law with ``update(u, e, disturbance=None)`` instead of the cell's.
 /// - disturbance : callable or None: Called with the number of each run before it begins; returns
-///     its disturbance, a number or an array of shape (n_disturbances,).
+///   its disturbance, a number or an array of shape (n_disturbances,).
 ///
 /// Returns EventStream: An iterator of JSON texts.
 /// Raises ValueError if an option cannot be used; from the iterator, before anything moves, if
@@ -193,12 +193,9 @@ impl Work {
     }
 }
 
-/// Check options as ``ilc-rt run`` or ``ilc-rt identify`` would.
+/// Check options, the words of ``ilc-rt run`` or ``ilc-rt identify`` after the verb.
 ///
-/// - verb : {"run", "identify"}: Which verb.
-/// - arguments : list of str: Options, as words of its command line.
-///
-/// Raises ValueError if an option cannot be used: its name, its value and what is allowed.
+/// Raises ValueError with the name of the option, its value and what is allowed.
 #[pyfunction]
 fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
     Work::parse(verb, &arguments).map(drop)
@@ -206,10 +203,7 @@ fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
 
 /// Describe the options of ``ilc-rt run`` or ``ilc-rt identify``.
 ///
-/// - verb : {"run", "identify"}: Which ones.
-///
-/// Returns str: A JSON list: name, flags, help, kind, default, choices, placeholder.
-/// Raises ValueError for another verb.
+/// Returns a JSON list: name, flags, help, kind, default, choices, placeholder.
 #[pyfunction]
 fn described_options(verb: &str) -> PyResult<String> {
     let options = match verb {

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Axis, Cell, Interface, Measure};
+use ilc_rt::config::{Axis, Cell, Measure};
 use ilc_rt::design::{self, Plan};
 use pyo3::prelude::*;
 
 use crate::argument::give_signal;
 use crate::error::OrRaise;
-use crate::made::{Made, made};
+use crate::made::Made;
 use crate::model::PyStateSpace;
 
 /// A cell description, read and validated.
@@ -37,7 +37,7 @@ impl PyCell {
     ///
     /// - path : str or os.PathLike: The file.
     /// - allow_divergent : bool: Whether a law that will not converge with the cell's model is
-    ///     accepted, whatever the file says.
+    ///   accepted, whatever the file says.
     ///
     /// Returns Cell.
     /// Raises ValueError in one line: file, key, value and what is allowed.
@@ -45,7 +45,10 @@ impl PyCell {
     #[pyo3(signature = (path, allow_divergent=false))]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn load(path: std::path::PathBuf, allow_divergent: bool) -> PyResult<Self> {
-        let made = made!("load": path, allow_divergent);
+        let made = Made::new("load", |call| {
+            call.set_item("path", &path)?;
+            call.set_item("allow_divergent", allow_divergent)
+        })?;
         let mut cell = Cell::load(Path::new(&path)).or_raise()?;
         cell.learning.allow_divergent |= allow_divergent;
         let plan = Plan::new(&cell, None, false).or_raise()?;
@@ -104,10 +107,7 @@ impl PyCell {
     /// Command interface of each axis: `csp` (input in m) or `csv` (in m/s).
     #[getter]
     fn interfaces(&self) -> Vec<&'static str> {
-        let name = |axis: &Axis| match axis.interface {
-            Interface::Csp => "csp",
-            Interface::Csv => "csv",
-        };
+        let name = |axis: &Axis| axis.interface.name();
         self.cell.axes.iter().map(name).collect()
     }
 

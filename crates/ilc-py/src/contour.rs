@@ -6,154 +6,72 @@ use numpy::IntoPyArray;
 use numpy::ndarray::Array3;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyList;
+use pyo3::types::{PyDict, PyList};
 
 use crate::argument::{Signal, give_signal, misfit, read_vector};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::made::{Made, made};
-use crate::whole;
+use crate::made::Made;
+use crate::whole::whole;
 
-/// Straight piece of a contour.
-///
-/// Parameters
-/// ----------
-/// from_m, to_m : sequence of 2 or 3 floats
-///     Its ends in m.
-///
-/// Raises
-/// ------
-/// ValueError, TypeError
-///     If a point has the wrong shape, dtype or a number that is not finite.
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt.trajectory import Line, contour_error
-/// >>> contour_error([Line([0.0, 0.0], [1.0, 0.0])], [[0.5, 0.25]])
-/// array([0.25])
-#[pyclass(name = "Line", module = "ilc_rt.trajectory", frozen)]
+#[pyclass(name = "Line", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
 struct PyLine(Line, Made);
 
 #[pymethods]
 impl PyLine {
     #[new]
-    fn new(from_m: &Bound<'_, PyAny>, to_m: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let made = made!(from_m, to_m);
-        Ok(Self(
-            Line { from_m: read_point("from_m", from_m)?, to_m: read_point("to_m", to_m)? },
-            made,
-        ))
+    #[pyo3(signature = (**keywords))]
+    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let a = Arguments::of(keywords)?;
+        let point = |name: &str| read_point(name, &a.get(name)?);
+        Ok(Self(Line { from_m: point("from_m")?, to_m: point("to_m")? }, Made::of(a)?))
     }
 
-    /// Pickled and copied as the call that made it.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().1.reduce(slf.get_type().as_any())
     }
 
-    fn __repr__(&self) -> String {
-        format!("Line(from_m={:?}, to_m={:?})", self.0.from_m, self.0.to_m)
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        self.1.shown(py, "Line")
     }
 }
 
-/// Circular piece of a contour, in any plane.
-///
-/// Parameters
-/// ----------
-/// from_m : sequence of 2 or 3 floats
-///     Where it begins, in m.
-/// centre_m : sequence of 2 or 3 floats
-///     Its centre in m.
-/// sweep_rad : float
-///     How far it turns around the axis, in rad; up to a full turn either way.
-/// axis : sequence of 3 floats
-///     Around what it turns; perpendicular to the radius.
-///
-/// Raises
-/// ------
-/// ContourError
-///     If the numbers describe no arc.
-/// ValueError, TypeError
-///     If a point has the wrong shape, dtype or a number that is not finite.
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt.trajectory import Arc, contour_error
-/// >>> contour_error([Arc([1.0, 0.0], [0.0, 0.0], 3.14)], [[0.0, 1.5]])
-/// array([0.5])
-#[pyclass(name = "Arc", module = "ilc_rt.trajectory", frozen)]
+#[pyclass(name = "Arc", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
 struct PyArc(Arc, Made);
 
 #[pymethods]
 impl PyArc {
     #[new]
-    #[pyo3(signature = (from_m, centre_m, sweep_rad, axis=None))]
-    fn new(
-        from_m: &Bound<'_, PyAny>,
-        centre_m: &Bound<'_, PyAny>,
-        sweep_rad: f64,
-        axis: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let made = made!(from_m, centre_m, sweep_rad, axis);
-        let (from_m, centre_m) = (read_point("from_m", from_m)?, read_point("centre_m", centre_m)?);
-        let axis = axis.map_or(Ok([0.0, 0.0, 1.0]), |axis| read_point("axis", axis))?;
-        Ok(Self(Arc::new(from_m, centre_m, axis, sweep_rad).or_raise()?, made))
+    #[pyo3(signature = (**keywords))]
+    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let a = Arguments::of(keywords)?;
+        let point = |name: &str| read_point(name, &a.get(name)?);
+        let axis = a.maybe("axis", read_point)?.unwrap_or([0.0, 0.0, 1.0]);
+        let arc = Arc::new(point("from_m")?, point("centre_m")?, axis, a.number("sweep_rad")?);
+        Ok(Self(arc.or_raise()?, Made::of(a)?))
     }
 
-    /// Pickled and copied as the call that made it.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().1.reduce(slf.get_type().as_any())
     }
 
-    fn __repr__(&self) -> String {
-        format!("{:?}", self.0)
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        self.1.shown(py, "Arc")
     }
 }
 
-/// Return how far measured points are from a path.
-///
-/// Parameters
-/// ----------
-/// reference_m : ndarray of float64, shape (n_reference, n_axes), or list of Line and Arc
-///     The path in m: as samples, joined by straight steps, or as exact pieces.
-/// actual_m : ndarray of float64, shape (n_samples, n_axes)
-///     Measured points in m.
-/// window : int or None
-///     For a sampled path of 1 to 12 axes: how many samples before and after its
-///     own time a point is compared with. None, for 2 and 3 axes: the whole path,
-///     by a spatial index.
-///
-/// Returns
-/// -------
-/// ndarray of float64, shape (n_samples,)
-///     Distances in m, exact for the path as it is given.
-///
-/// Raises
-/// ------
-/// ContourError
-///     If there is no path.
-/// ValueError, TypeError
-///     If an array has the wrong shape, dtype or a number that is not finite.
-///
-/// References
-/// ----------
-/// [barton2010], Sect. 4.1.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np
-/// >>> from ilc_rt.trajectory import contour_error
-/// >>> contour_error(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0.5, 0.25]]))
-/// array([0.25])
 #[pyfunction]
 #[pyo3(signature = (reference_m, actual_m, window=None))]
 fn contour_error<'py>(
     py: Python<'py>,
     reference_m: &Bound<'py, PyAny>,
     actual_m: &Bound<'py, PyAny>,
-    #[pyo3(from_py_with = whole::maybe::window)] window: Option<usize>,
+    window: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let window = window.map(|window| whole("window", window)).transpose()?;
     if let Some(shapes) = read_shapes(reference_m, window)? {
         let points = read_points("actual_m", actual_m)?;
         let errors = detached(py, || Shape::contour_error_m(&shapes, &points));
@@ -177,37 +95,6 @@ fn contour_error<'py>(
     give_signal(py, errors, 1, true)
 }
 
-/// Return the linearised coupling gains of two axes.
-///
-/// ``epsilon = c1 e1 + c2 e2``, ``c1 = -sin(theta)``, ``c2 = cos(theta)``
-///
-/// Parameters
-/// ----------
-/// reference_m : ndarray of float64, shape (n_samples, 2)
-///     Reference in m.
-///
-/// Returns
-/// -------
-/// ndarray of float64, shape (n_samples, 2)
-///     One pair a sample; where the reference rests, that of the nearest sample
-///     that moves.
-///
-/// Raises
-/// ------
-/// ValueError, TypeError
-///     If the array has the wrong shape, dtype or a number that is not finite.
-///
-/// References
-/// ----------
-/// [barton2010], Eq. (4.1) to (4.3).
-///
-/// Examples
-/// --------
-/// >>> import numpy as np
-/// >>> from ilc_rt.trajectory import coupling_gains
-/// >>> coupling_gains(np.array([[0.0, 0.0], [0.0, 2.0]]))
-/// array([[-1.,  0.],
-///        [-1.,  0.]])
 #[pyfunction]
 fn coupling_gains<'py>(
     py: Python<'py>,
@@ -218,36 +105,6 @@ fn coupling_gains<'py>(
     give_signal(py, gains.concat(), 2, false)
 }
 
-/// Return what takes the part along the path away from an error.
-///
-/// ``epsilon = (I - t t') e`` with t the unit tangent of the reference.
-///
-/// Parameters
-/// ----------
-/// reference_m : ndarray of float64, shape (n_samples, 2) or (n_samples, 3)
-///     Reference in m.
-///
-/// Returns
-/// -------
-/// ndarray of float64, shape (n_samples, n_axes, n_axes)
-///     One symmetric matrix a sample.
-///
-/// Raises
-/// ------
-/// ValueError, TypeError
-///     If the array has the wrong shape, dtype or a number that is not finite.
-///
-/// References
-/// ----------
-/// [barton2010], Eq. (4.2), for two and three axes.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np
-/// >>> from ilc_rt.trajectory import projection_across
-/// >>> projection_across(np.array([[0.0, 0.0], [0.0, 2.0]]))[0]
-/// array([[1., 0.],
-///        [0., 0.]])
 #[pyfunction]
 fn projection_across<'py>(
     py: Python<'py>,

@@ -10,11 +10,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Matrix, Signal, give_signal, misfit, read_vector};
-use crate::arguments::{Arguments, number};
+use crate::arguments::Arguments;
 use crate::error::OrRaise;
 use crate::guard::Guarded;
 use crate::made::Made;
 use crate::model::PyStateSpace;
+use crate::whole::{Real, number};
 
 #[pyclass(name = "Pid", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
@@ -124,20 +125,25 @@ impl PyCascade {
     /// Reference position, measured position and velocity; reference velocity and acceleration for the
     /// feed-forward; learned force, added before the limit. Raises ValueError if the force is not finite;
     /// nothing is then remembered.
-    #[pyo3(signature = (position_m, actual_m, actual_m_s, velocity_m_s=0.0, acceleration_m_s2=0.0, learned_n=0.0))]
+    #[pyo3(signature = (position_m, actual_m, actual_m_s, velocity_m_s=Real(0.0), acceleration_m_s2=Real(0.0), learned_n=Real(0.0)),
+           text_signature = "($self, position_m, actual_m, actual_m_s, velocity_m_s=0.0, acceleration_m_s2=0.0, learned_n=0.0)")]
     #[expect(clippy::too_many_arguments, reason = "all but the first are named in Python")]
     fn step(
         &self,
         py: Python<'_>,
-        position_m: f64,
-        actual_m: f64,
-        actual_m_s: f64,
-        velocity_m_s: f64,
-        acceleration_m_s2: f64,
-        learned_n: f64,
+        position_m: Real,
+        actual_m: Real,
+        actual_m_s: Real,
+        velocity_m_s: Real,
+        acceleration_m_s2: Real,
+        learned_n: Real,
     ) -> PyResult<f64> {
-        let reference = CascadeReference { position_m, velocity_m_s, acceleration_m_s2 };
-        let force = self.0.borrow(py)?.step(reference, actual_m, actual_m_s, learned_n);
+        let reference = CascadeReference {
+            position_m: position_m.0,
+            velocity_m_s: velocity_m_s.0,
+            acceleration_m_s2: acceleration_m_s2.0,
+        };
+        let force = self.0.borrow(py)?.step(reference, actual_m.0, actual_m_s.0, learned_n.0);
         give("position_m, actual_m or another number", f64::NAN, force)
     }
 
@@ -176,16 +182,17 @@ impl PyCrossCoupled {
     ///
     /// Two tracking errors in m; coupling gains, as `trajectory.coupling_gains` gives them; curvature of the
     /// path, positive to the left, which the gains then follow.
-    #[pyo3(signature = (error_m, gains, curvature_per_m=0.0))]
+    #[pyo3(signature = (error_m, gains, curvature_per_m=Real(0.0)),
+           text_signature = "($self, error_m, gains, curvature_per_m=0.0)")]
     fn step<'py>(
         &self,
         py: Python<'py>,
         error_m: &Bound<'py, PyAny>,
         gains: &Bound<'py, PyAny>,
-        curvature_per_m: f64,
+        curvature_per_m: Real,
     ) -> PyResult<(Bound<'py, PyAny>, f64)> {
         let (error_m, gains) = (read_pair("error_m", error_m)?, read_pair("gains", gains)?);
-        finite("curvature_per_m", curvature_per_m)?;
+        let curvature_per_m = finite("curvature_per_m", curvature_per_m.0)?;
         let gains = variable_gains([gains[1], -gains[0]], error_m, curvature_per_m);
         let (added, contour_m) = self.0.borrow(py)?.step(error_m, gains);
         let added = added.iter().map(|part| part.value).collect();

@@ -16,22 +16,27 @@ pub(crate) trait OrRaise<T> {
     fn or_raise(self) -> PyResult<T>;
 }
 
-impl<T> OrRaise<T> for Result<T, model::ModelError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| exceptions::ModelError::new_err(error.to_string()))
-    }
+/// Says which exception the errors of a module become.
+macro_rules! raise {
+    ($($error:ty => $exception:ty),* $(,)?) => {
+        $(impl<T> OrRaise<T> for Result<T, $error> {
+            fn or_raise(self) -> PyResult<T> {
+                self.map_err(|error| <$exception>::new_err(error.to_string()))
+            }
+        })*
+    };
 }
 
-impl<T> OrRaise<T> for Result<T, signal::SignalError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| exceptions::SignalError::new_err(error.to_string()))
-    }
-}
-
-impl<T> OrRaise<T> for Result<T, trajectory::TrajectoryError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| exceptions::TrajectoryError::new_err(error.to_string()))
-    }
+raise! {
+    model::ModelError => exceptions::ModelError,
+    signal::SignalError => exceptions::SignalError,
+    trajectory::TrajectoryError => exceptions::TrajectoryError,
+    kinematics::KinematicsError => exceptions::KinematicsError,
+    contour::ContourError => exceptions::ContourError,
+    library::LibraryError => PyOSError,
+    config::ConfigError => PyValueError,
+    design::DesignError => PyValueError,
+    campaign::CampaignError => PyValueError,
 }
 
 impl<T> OrRaise<T> for Result<T, learning::LearningError> {
@@ -45,24 +50,6 @@ impl<T> OrRaise<T> for Result<T, learning::LearningError> {
     }
 }
 
-impl<T> OrRaise<T> for Result<T, config::ConfigError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| PyValueError::new_err(error.to_string()))
-    }
-}
-
-impl<T> OrRaise<T> for Result<T, library::LibraryError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| PyOSError::new_err(error.to_string()))
-    }
-}
-
-impl<T> OrRaise<T> for Result<T, design::DesignError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| PyValueError::new_err(error.to_string()))
-    }
-}
-
 impl<T> OrRaise<T> for Result<T, identification::IdentificationError> {
     fn or_raise(self) -> PyResult<T> {
         use identification::IdentificationError::Model;
@@ -70,23 +57,5 @@ impl<T> OrRaise<T> for Result<T, identification::IdentificationError> {
             Model { .. } => exceptions::ModelError::new_err(error.to_string()),
             error => PyValueError::new_err(error.to_string()),
         })
-    }
-}
-
-impl<T> OrRaise<T> for Result<T, campaign::CampaignError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| PyValueError::new_err(error.to_string()))
-    }
-}
-
-impl<T> OrRaise<T> for Result<T, kinematics::KinematicsError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| exceptions::KinematicsError::new_err(error.to_string()))
-    }
-}
-
-impl<T> OrRaise<T> for Result<T, contour::ContourError> {
-    fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| exceptions::ContourError::new_err(error.to_string()))
     }
 }

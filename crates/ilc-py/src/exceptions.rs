@@ -6,26 +6,10 @@ use pyo3::prelude::*;
 
 create_exception!(ilc_rt, ModelError, PyValueError, "A model that cannot be used as asked.");
 create_exception!(ilc_rt, SignalError, PyValueError, "A filter or signal that cannot be used.");
-create_exception!(
-    ilc_rt,
-    LearningError,
-    PyValueError,
-    "A learning law, or what it was given, that cannot be used."
-);
-
-create_exception!(
-    ilc_rt.kinematics,
-    KinematicsError,
-    PyValueError,
-    "A pose or mechanism that cannot be."
-);
-create_exception!(ilc_rt.trajectory, ContourError, PyValueError, "A path or an arc that is none.");
-create_exception!(
-    ilc_rt,
-    TrajectoryError,
-    PyValueError,
-    "A motion that cannot be planned as asked."
-);
+create_exception!(ilc_rt, LearningError, PyValueError, "A law or argument that cannot be used.");
+create_exception!(ilc_rt.kinematics, KinematicsError, PyValueError, "No such pose or mechanism.");
+create_exception!(ilc_rt.trajectory, ContourError, PyValueError, "Not a path or not an arc.");
+create_exception!(ilc_rt, TrajectoryError, PyValueError, "A motion that cannot be planned.");
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();

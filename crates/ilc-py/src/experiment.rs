@@ -6,7 +6,7 @@ use ilc_rt::identification::{
     self, Described, Experiment, ExperimentOptions, Form, IdentificationError, Identified, Signals,
     waveform_name,
 };
-use ilc_rt::model::identify::Waveform;
+use ilc_rt::model::identify::{Doubt, Waveform};
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -17,7 +17,7 @@ use crate::cell::PyCell;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::identify::{give_measured, give_second_order, give_velocity_loop};
-use crate::whole;
+use crate::whole::{Real, whole};
 
 /// Reads the name of a waveform.
 pub(crate) fn read_waveform(name: &str) -> PyResult<Waveform> {
@@ -45,7 +45,7 @@ impl From<IdentificationError> for Failure {
 /// - cell : Cell: The cell.
 /// - arguments : list of str: Options of the identification, as words of ``ilc-rt identify``.
 /// - excite : callable: Called with a dict of the experiment's figures; returns learned input and
-///     error as two arrays of shape (n_samples * n_axes,).
+///   error as two arrays of shape (n_samples * n_axes,).
 /// - report : callable: Called with a sentence on each band.
 ///
 /// Returns dict: The experiment, its signals, response, models, uncertainty and doubt.
@@ -94,12 +94,7 @@ fn identify_axis<'py>(
     Ok(result)
 }
 
-/// Return the experiment of options, in the default band where they give none.
-///
-/// - arguments : list of str: Options of the identification, as words of ``ilc-rt identify``.
-///
-/// Returns dict: The figures of the experiment.
-/// Raises ValueError if an option cannot be used.
+/// Return the experiment of options, words of ``ilc-rt identify``, in the default band if they give none.
 #[pyfunction]
 fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'_, PyDict>> {
     let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
@@ -108,27 +103,22 @@ fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'
     figures(py, &Experiment { axis, excitation: options.excitation(None), at_m })
 }
 
-/// Evaluate whole periods of input and output of any system.
+/// Evaluate whole periods of input and output of any system, excited in a band in Hz.
 ///
-/// - u, y : shape (n_samples,): Input and output, whole periods.
-/// - period_samples : int: Samples in a period.
-/// - from_hz, to_hz : float: Band of the excitation in Hz.
-/// - dt_s : float: Sample time in seconds.
-///
-/// Returns dict: Signals, response, models, uncertainty and doubt.
-/// Raises ValueError, TypeError if the arrays cannot be used, or the response cannot be fitted.
+/// Returns signals, response, models, uncertainty and doubt by name.
 #[pyfunction]
 fn evaluate_experiment<'py>(
     py: Python<'py>,
     u: &Bound<'py, PyAny>,
     y: &Bound<'py, PyAny>,
-    #[pyo3(from_py_with = whole::period_samples)] period_samples: usize,
-    from_hz: f64,
-    to_hz: f64,
-    dt_s: f64,
+    period_samples: &Bound<'py, PyAny>,
+    from_hz: Real,
+    to_hz: Real,
+    dt_s: Real,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (u, y) = (read_vector("u", u)?, read_vector("y", y)?);
-    let band_hz = (from_hz, to_hz);
+    let period_samples = whole("period_samples", period_samples)?;
+    let (band_hz, dt_s) = ((from_hz.0, to_hz.0), dt_s.0);
     let evaluate = || Identified::evaluate(u, y, period_samples, band_hz, dt_s, Form::Free);
     describe(py, detached(py, evaluate).or_raise()?)
 }
@@ -152,6 +142,8 @@ fn describe(py: Python<'_>, found: Identified) -> PyResult<Bound<'_, PyDict>> {
     let array = |values: Vec<f64>| PyArray1::from_vec(py, values);
     let result = PyDict::new(py);
     result.set_item("axis_model", found.section())?;
+    let is_lost = matches!(found.doubt, Some(Doubt::Incoherent { .. } | Doubt::Silent));
+    result.set_item("followed", !is_lost)?;
     result.set_item("doubt", found.doubt.map(|doubt| doubt.to_string()))?;
     result.set_item("model", give_second_order(py, &found.fit)?)?;
     match found.described {

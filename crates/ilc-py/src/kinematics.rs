@@ -51,11 +51,7 @@ impl PyDelta {
         self.delta.lengths_m()[2]
     }
 
-    /// Return where the tool is.
-    ///
-    /// Takes theta_rad, shape (3,) or (n_samples, 3): Crank angles in rad.
-    /// Returns ndarray of float64, same shape: Tool positions in m.
-    /// Raises KinematicsError if the rods do not meet; it names the angles and the sample.
+    /// Return tool positions in m for crank angles in rad: both (3,) or (n_samples, 3).
     fn forward<'py>(
         &self,
         py: Python<'py>,
@@ -66,11 +62,7 @@ impl PyDelta {
         poses.give(py)
     }
 
-    /// Return the crank angles that bring the tool to a place, knees outward.
-    ///
-    /// Takes p_m, shape (3,) or (n_samples, 3): Tool positions in m.
-    /// Returns ndarray of float64, same shape: Crank angles in rad.
-    /// Raises KinematicsError if a pose is out of reach; it names the pose, the leg and the sample.
+    /// Return crank angles in rad, knees outward, for tool positions in m: both (3,) or (n_samples, 3).
     fn inverse<'py>(
         &self,
         py: Python<'py>,
@@ -81,11 +73,7 @@ impl PyDelta {
         poses.give(py)
     }
 
-    /// Return how crank velocities become tool velocities, in m/rad.
-    ///
-    /// Takes theta_rad, shape (3,) or (n_samples, 3): Crank angles in rad.
-    /// Returns ndarray of float64, shape (3, 3) or (n_samples, 3, 3): Jacobians, ``dp = J dtheta``.
-    /// Raises KinematicsError if the rods do not meet, or the mechanism is singular there.
+    /// Return Jacobians ``dp = J dtheta`` in m/rad for crank angles: (3, 3) or (n_samples, 3, 3).
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -154,10 +142,7 @@ impl PyGantry {
         self.gantry.orthogonality_rad()
     }
 
-    /// Return where the tool is.
-    ///
-    /// Takes axes_m, shape (2,) or (n_samples, 2): Axis positions in m.
-    /// Returns ndarray of float64, same shape: Tool positions in m.
+    /// Return tool positions for axis positions in m: both (2,) or (n_samples, 2).
     fn forward<'py>(
         &self,
         py: Python<'py>,
@@ -166,10 +151,7 @@ impl PyGantry {
         pairs(py, "axes_m", axes_m, |axes| self.gantry.forward(axes))
     }
 
-    /// Return the axis positions that bring the tool to a place.
-    ///
-    /// Takes tool_m, shape (2,) or (n_samples, 2): Tool positions in m.
-    /// Returns ndarray of float64, same shape: Axis positions in m.
+    /// Return axis positions for tool positions in m: both (2,) or (n_samples, 2).
     fn inverse<'py>(
         &self,
         py: Python<'py>,
@@ -178,9 +160,7 @@ impl PyGantry {
         pairs(py, "tool_m", tool_m, |tool| self.gantry.inverse(tool))
     }
 
-    /// Return how axis velocities become tool velocities.
-    ///
-    /// Returns ndarray of float64, shape (2, 2): Jacobian; the same everywhere.
+    /// Return the Jacobian, shape (2, 2), the same everywhere.
     fn jacobian<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         let rows = self.gantry.jacobian();
         Array2::from_shape_fn((2, 2), |(row, col)| rows[row][col]).into_pyarray(py).into_any()

@@ -5,7 +5,7 @@
 //!
 //! Family: `laws` and `python_law` call each other: a law inside another one may be written in Python.
 //!
-//! Family: `model` and `model_argument` read each other's arguments.
+//! Family: `arguments`, `model` and `model_argument` read each other's arguments.
 //!
 //! Family: `experiment` and `identify` read each other's arguments.
 
@@ -23,7 +23,6 @@ mod error;
 mod exceptions;
 mod experiment;
 mod guard;
-mod held;
 mod identify;
 mod kinematics;
 mod laws;
@@ -32,7 +31,6 @@ mod made;
 mod model;
 mod model_argument;
 mod python_law;
-mod sigmoid_pair;
 mod signal;
 mod time_varying;
 mod trajectory;
@@ -56,7 +54,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     control::register(module)?;
     trajectory::register(module)?;
     transport::register(module)?;
-    sigmoid_pair::register(module)?;
     laws::register(module)?;
     weights::register(module)?;
     analysis::register(module)?;

@@ -10,30 +10,17 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_signal, misfit, read_disturbance};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::made::{Made, made};
+use crate::made::Made;
 use crate::whole;
 
 /// Longest name of a cell, a campaign or a law.
 const NAME_MAX: usize = 200;
 
-/// Every run of every campaign, in one SQLite file.
-///
-/// - path : str or os.PathLike: The file; it is made if it is not there. ``:memory:`` is a library
-///     in memory. The name is never taken for an address.
-///
-/// Raises OSError if the file cannot be opened or is no library; it is left as it is.
-/// What reads opens the file for reading only, and for no longer than that: a
-/// library that cannot be written is read all the same, and nothing is left
-/// beside it.
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt import Library
-/// >>> Library(":memory:").list()
-/// []
-#[pyclass(name = "Library", module = "ilc_rt", frozen)]
+/// Runs of all campaigns, in memory or in one SQLite file.
+#[pyclass(name = "Library", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
 pub(crate) struct PyLibrary {
     made: Made,
@@ -52,8 +39,10 @@ enum Held {
 #[pymethods]
 impl PyLibrary {
     #[new]
-    fn new(path: PathBuf) -> PyResult<Self> {
-        let made = made!(path);
+    #[pyo3(signature = (**keywords))]
+    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let a = Arguments::of(keywords)?;
+        let (made, path) = (Made::of(a)?, a.get("path")?.extract::<PathBuf>()?);
         if path.as_os_str() == ":memory:" {
             let library = Library::in_memory().or_raise()?;
             return Ok(Self { made, held: Held::Memory(Box::new(Mutex::new(library))) });
@@ -73,20 +62,11 @@ impl PyLibrary {
         self.made.shown(py, "Library")
     }
 
-    /// Pickled and copied as the call that made it.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().made.reduce(slf.get_type().as_any())
     }
 
     /// Return the runs kept, oldest first, without their arrays.
-    ///
-    /// - cell : str or None: Only runs of the cell of this name.
-    ///
-    /// Returns list of dict: Provenance and figures of each run; lengths in metres, angles in
-    ///     radians. A figure over several axes is over the linear ones, or over all of a cell whose
-    ///     axes are all rotary; contour errors are None where the path has none.
-    /// Raises OSError if the file cannot be read.
-    #[pyo3(signature = (cell=None))]
     fn list<'py>(&self, py: Python<'py>, cell: Option<&str>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let rows = detached(py, || self.read(|library| library.list(None))).or_raise()?;
         rows.iter()
@@ -96,19 +76,8 @@ impl PyLibrary {
     }
 
     /// Return one run with its arrays.
-    ///
-    /// - id : int: Key of the run, as `list` gives it.
-    ///
-    /// Returns dict: What `list` gives, and ``law_parameters`` and ``program`` (JSON),
-    ///     ``reference_m``, ``input``, ``encoder_m``, ``tool_m`` (or None), ``error_m`` of shape
-    ///     (n_samples, n_axes), ``contour_m`` of shape (n_samples,) (None: the path has no
-    ///     contour), ``disturbance`` of shape (n_disturbances,) (None: none is measured).
-    /// Raises OSError if there is no such run, or its arrays do not match their digest.
-    fn load<'py>(
-        &self,
-        py: Python<'py>,
-        #[pyo3(from_py_with = whole::id)] id: i64,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    fn load<'py>(&self, py: Python<'py>, id: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+        let id = whole::id(id)?;
         let row = detached(py, || self.read(|library| library.load(id))).or_raise()?;
         let run = describe(py, &row)?;
         let n_axes = row.meta.n_axes;
@@ -133,24 +102,15 @@ impl PyLibrary {
     }
 
     /// Return the runs made under a disturbance like this one, nearest first.
-    ///
-    /// - disturbance : float or shape (n_disturbances,): The disturbance.
-    /// - top : int: How many runs at most.
-    /// - cell : str or None: Only runs of the cell of this name.
-    ///
-    /// Returns list of dict: What `list` gives of each, and ``distance``, in the unit of the
-    ///     disturbance. Of equally near runs the older comes first.
-    /// Raises ValueError, TypeError if the disturbance is no number, or not finite.
-    /// Raises OSError if the file cannot be read.
-    #[pyo3(signature = (disturbance, top=30, cell=None))]
     fn recall<'py>(
         &self,
         py: Python<'py>,
         disturbance: &Bound<'py, PyAny>,
-        #[pyo3(from_py_with = whole::top)] top: usize,
+        top: &Bound<'py, PyAny>,
         cell: Option<String>,
     ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let disturbance = read_disturbance("disturbance", disturbance)?;
+        let (disturbance, top) =
+            (read_disturbance("disturbance", disturbance)?, whole::whole("top", top)?);
         let task = Task { cell };
         let found = detached(py, || self.read(|library| library.recall(&disturbance, top, &task)))
             .or_raise()?;
@@ -165,44 +125,10 @@ impl PyLibrary {
     }
 
     /// Keep a run that was made elsewhere.
-    ///
-    /// - u : shape (n_samples,) or (n_samples, n_axes): Its learned input, in m or m/s.
-    /// - e : ndarray of float64, same shape as `u`: Its error in m, reference minus measurement.
-    /// - cycle_s : float: Its sample time in s.
-    /// - disturbance : float, array_like of float64 or None: The disturbance it was made under,
-    ///     shape (n_disturbances,).
-    /// - reference_m : ndarray of float64 or None: Its set points in m, same shape as `u`; None:
-    ///     zero, so that its path is one point. The contour error is the distance to the path near
-    ///     the same time.
-    /// - cell, campaign, law : str: Names; its number follows the last one of the campaign.
-    ///
-    /// Returns int: Key of the run.
-    /// Raises OSError if the file cannot be written.
-    ///
-    /// Examples
-    /// --------
-    /// >>> import numpy as np
-    /// >>> from ilc_rt import Library
-    /// >>> library = Library(":memory:")
-    /// >>> library.append(np.zeros(3), np.ones(3), cycle_s=0.01, disturbance=21.5)
-    /// 1
-    /// >>> library.recall(20.0)[0]["distance"]
-    /// 1.5
-    #[pyo3(signature = (u, e, cycle_s, disturbance=None, reference_m=None, *, cell="elsewhere", campaign="elsewhere", law="elsewhere"))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments in Python")]
-    fn append(
-        &self,
-        py: Python<'_>,
-        u: &Bound<'_, PyAny>,
-        e: &Bound<'_, PyAny>,
-        cycle_s: f64,
-        disturbance: Option<&Bound<'_, PyAny>>,
-        reference_m: Option<&Bound<'_, PyAny>>,
-        cell: &str,
-        campaign: &str,
-        law: &str,
-    ) -> PyResult<i64> {
-        let u = Signal::read("u", u)?;
+    #[pyo3(signature = (**keywords))]
+    fn _append(&self, py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<i64> {
+        let a = Arguments::of(keywords)?;
+        let u = a.signal("u")?;
         let alike = |name: &str, signal: &Bound<'_, PyAny>| {
             let signal = Signal::read(name, signal)?;
             if (signal.n_samples, signal.n_channels) == (u.n_samples, u.n_channels) {
@@ -211,28 +137,18 @@ impl PyLibrary {
             let allowed = format!("({}, {})", u.n_samples, u.n_channels);
             Err(misfit(name, &signal.shape(), &allowed))
         };
-        let error_m = alike("e", e)?;
-        let reference_m = match reference_m {
-            Some(reference_m) => alike("reference_m", reference_m)?,
-            None => vec![0.0; error_m.len()],
-        };
+        let error_m = alike("e", &a.get("e")?)?;
+        let reference_m =
+            a.maybe("reference_m", alike)?.unwrap_or_else(|| vec![0.0; error_m.len()]);
+        let (cell, campaign, law) = (a.text("cell")?, a.text("campaign")?, a.text("law")?);
+        let cycle_s = a.number("cycle_s")?;
         if !(cycle_s.is_finite() && cycle_s > 0.0) {
             let line = format!("cycle_s = {cycle_s}: a sample time must be finite and above 0");
             return Err(PyValueError::new_err(line));
         }
-        let disturbance = match disturbance.filter(|given| !given.is_none()) {
-            Some(given) => read_disturbance("disturbance", given)?,
-            None => Vec::new(),
-        };
+        let disturbance = a.maybe("disturbance", read_disturbance)?.unwrap_or_default();
         let n_axes = u.n_channels;
-        if u.n_samples == 0 || n_axes == 0 {
-            let line = format!(
-                "u has shape ({}, {n_axes}): at least one sample of one axis is needed",
-                u.n_samples
-            );
-            return Err(PyValueError::new_err(line));
-        }
-        for (key, name) in [("cell", cell), ("campaign", campaign), ("law", law)] {
+        for (key, name) in [("cell", &cell), ("campaign", &campaign), ("law", &law)] {
             if name.is_empty() || name.len() > NAME_MAX || name.chars().any(char::is_control) {
                 let line = format!(
                     "{key} = {}: 1 to {NAME_MAX} bytes without control characters are allowed",
@@ -243,10 +159,10 @@ impl PyLibrary {
         }
         let encoder_m: Vec<f64> = reference_m.iter().zip(&error_m).map(|(r, e)| r - e).collect();
         let meta = Meta {
-            cell: cell.to_owned(),
-            campaign: campaign.to_owned(),
             fingerprint: fingerprint(&format!("elsewhere {cell} {campaign} {law}")),
-            law: law.to_owned(),
+            cell,
+            campaign,
+            law,
             law_parameters: "{}".to_owned(),
             measure: "encoder".to_owned(),
             program: "[]".to_owned(),
@@ -270,7 +186,7 @@ impl PyLibrary {
         }
         detached(py, || {
             self.write(|library| {
-                let index = library.next_index(campaign)?;
+                let index = library.next_index(&meta.campaign)?;
                 let record = IterationRecord {
                     index,
                     reference_m,
@@ -289,42 +205,14 @@ impl PyLibrary {
     }
 
     /// Delete all but the most relevant runs, and return how many were deleted.
-    ///
-    /// - keep : int: How many runs stay.
-    /// - cell : str or None: Only among runs of the cell of this name.
-    ///
-    /// Returns int: Runs deleted.
-    /// Raises OSError if the file cannot be written, or the runs have different numbers of
-    ///     disturbances (nothing is deleted then), or the file could not be made smaller.
-    /// The relevance of DPW-ILC with RMS error and disturbance in units of their
-    /// spread over these runs, summed over the disturbances of all of them; without
-    /// disturbances the smallest errors stay. The file becomes smaller.
-    #[pyo3(signature = (keep, cell=None))]
     fn trim(
         &self,
         py: Python<'_>,
-        #[pyo3(from_py_with = whole::keep)] keep: usize,
+        keep: &Bound<'_, PyAny>,
         cell: Option<String>,
     ) -> PyResult<usize> {
-        let task = Task { cell };
+        let (task, keep) = (Task { cell }, whole::whole("keep", keep)?);
         detached(py, || self.write(|library| library.trim(keep, &task))).or_raise()
-    }
-
-    /// Write one run to a file: ``.npz``, ``.csv`` or ``.json`` by its ending.
-    ///
-    /// - id : int: Key of the run, as `list` gives it.
-    /// - path : str or os.PathLike: The file.
-    ///
-    /// Raises BadInputError if the ending is unknown or the file cannot be written.
-    /// Raises OSError if there is no such run, or its arrays do not match their digest.
-    fn export(
-        &self,
-        py: Python<'_>,
-        #[pyo3(from_py_with = whole::id)] id: i64,
-        path: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
-        let run = self.load(py, id)?;
-        py.import("ilc_rt.export")?.call_method1("export_run", (run, path)).map(drop)
     }
 }
 
@@ -354,7 +242,6 @@ impl PyLibrary {
 
 fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     let run = PyDict::new(py);
-    let figures = &row.record.figures;
     run.set_item("id", row.id)?;
     run.set_item("created_utc", &row.created_utc)?;
     run.set_item("cell", &row.meta.cell)?;
@@ -369,21 +256,9 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     run.set_item("input_units", &row.meta.input_units)?;
     let disturbance = &row.record.disturbance;
     run.set_item("disturbance", (!disturbance.is_empty()).then_some(disturbance))?;
-    run.set_item("tracking_inf_m", figures.tracking_inf_m)?;
-    run.set_item("tracking_rms_m", figures.tracking_rms_m)?;
-    run.set_item("contour_inf_m", figures.contour_inf_m)?;
-    run.set_item("contour_rms_m", figures.contour_rms_m)?;
-    run.set_item("encoder_tracking_inf_m", figures.encoder_tracking_inf_m)?;
-    run.set_item("tool_tracking_inf_m", figures.tool_tracking_inf_m)?;
-    run.set_item("overruns", figures.overruns)?;
-    run.set_item("missing_samples", figures.missing_samples)?;
-    run.set_item("late_updates", figures.late_updates)?;
-    run.set_item("update_ms", figures.update_ms)?;
-    run.set_item("rolled_back", figures.rolled_back)?;
-    run.set_item("learning_off", figures.learning_off)?;
-    run.set_item("remark", &figures.remark)?;
-    run.set_item("axes_tracking_inf_m", &figures.axes_tracking_inf_m)?;
-    run.set_item("axes_tracking_rms_m", &figures.axes_tracking_rms_m)?;
+    let described = serde_json::to_string(&row.record.figures)
+        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    run.update(py.import("json")?.call_method1("loads", (described,))?.cast()?)?;
     run.set_item("digest", &row.digest)?;
     Ok(run)
 }

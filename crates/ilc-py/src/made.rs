@@ -13,21 +13,21 @@ use crate::arguments::Arguments;
 /// The call that made an object.
 #[derive(Debug)]
 pub(crate) struct Made {
-    /// Name of what was called if not the class itself: one of its static methods, or a function.
+    /// The static method that was called, if not the class itself.
     how: Option<&'static str>,
     arguments: Py<PyDict>,
 }
 
 impl Made {
-    /// Takes down a call of the class, or of what is named.
+    /// Takes down a call of a static method.
     pub(crate) fn new(
-        how: Option<&'static str>,
+        how: &'static str,
         fill: impl FnOnce(&Bound<'_, PyDict>) -> PyResult<()>,
     ) -> PyResult<Self> {
         Python::attach(|py| {
             let arguments = PyDict::new(py);
             fill(&arguments)?;
-            Ok(Self { how, arguments: Arguments::new(&arguments).kept()?.unbind() })
+            Ok(Self { how: Some(how), arguments: Arguments::new(&arguments).kept()?.unbind() })
         })
     }
 
@@ -50,19 +50,6 @@ impl Made {
     }
 }
 
-/// Takes down a call with arguments of these names: of the class, or of what is named before them.
-macro_rules! made {
-    ($how:literal: $($name:ident),* $(,)?) => { $crate::made::made!(@ Some($how); $($name),*) };
-    ($($name:ident),* $(,)?) => { $crate::made::made!(@ None; $($name),*) };
-    (@ $how:expr; $($name:ident),*) => {
-        $crate::made::Made::new($how, |arguments| {
-            $(pyo3::types::PyDictMethods::set_item(arguments, stringify!($name), &$name)?;)*
-            Ok(())
-        })?
-    };
-}
-pub(crate) use made;
-
 /// Makes an object again by the call that made it.
 #[pyfunction]
 #[pyo3(signature = (cls, how, arguments))]
@@ -71,14 +58,36 @@ fn _made<'py>(
     how: Option<&str>,
     arguments: &Bound<'py, PyDict>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let maker = match how {
-        None => cls.clone(),
-        Some(how) if cls.hasattr(how)? => cls.getattr(how)?,
-        Some(how) => cls.py().import("ilc_rt._native")?.getattr(how)?,
-    };
+    let maker = how.map_or_else(|| Ok(cls.clone()), |how| cls.getattr(how))?;
     maker.call((), Some(arguments))
 }
 
+/// Makes a law or a filter again from its kind, for copies and pickles: `native` is its class here.
+#[pyfunction]
+fn _made_of_kind<'py>(
+    class: &Bound<'py, PyAny>,
+    native: &str,
+    kind: &str,
+    arguments: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let native = class.py().import("ilc_rt._native")?.getattr(native)?;
+    native.getattr("__new__")?.call((class, kind), Some(arguments))
+}
+
+/// Returns what `__reduce__` returns for a law or a filter: with what a class derived from it keeps.
+pub(crate) fn reduce_kind<'py>(
+    object: &Bound<'py, PyAny>,
+    native: &str,
+    kind: &str,
+    arguments: &Py<PyDict>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let maker = object.py().import("ilc_rt._native")?.getattr("_made_of_kind")?;
+    let parts = (object.get_type(), native, kind, arguments);
+    let attributes = object.getattr_opt("__dict__")?;
+    Ok((maker, parts, attributes).into_pyobject(object.py())?.into_any())
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(_made, module)?)
+    module.add_function(wrap_pyfunction!(_made, module)?)?;
+    module.add_function(wrap_pyfunction!(_made_of_kind, module)?)
 }

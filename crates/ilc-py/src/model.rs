@@ -11,22 +11,20 @@ use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
-use crate::whole;
+use crate::whole::whole;
 
 /// Linear time-invariant model, sampled or continuous.
 ///
 /// ``x[k+1] = A x[k] + B u[k]``, ``y[k] = C x[k] + D u[k]``.
 ///
-/// - a : shape (n_states, n_states): State matrix.
-/// - b : shape (n_states, n_inputs): Input matrix.
-/// - c : shape (n_outputs, n_states): Output matrix.
-/// - d : shape (n_outputs, n_inputs): Feedthrough matrix.
-/// - dt_s : float or None: Sample time in seconds; None or 0 for a continuous model.
+/// - a, b, c, d: matrices of shape (n_states, n_states), (n_states, n_inputs), (n_outputs, n_states) and
+///   (n_outputs, n_inputs).
+/// - dt_s: sample time in seconds; None or 0 for a continuous model.
 ///
-/// Raises ModelError if the matrices do not fit each other.
-/// Raises ValueError, TypeError if a matrix has the wrong number of axes, holds a number that is
-///     not finite, or is not of real numbers.
-/// Objects of scipy.signal and python-control are accepted wherever a model is.
+/// Wherever a model is taken, one of scipy.signal or python-control will do. The methods raise ModelError if
+/// models, sample times or signals do not fit each other, a loop is not well posed, a continuous model is asked
+/// for samples, or numbers overflow; ValueError or TypeError if an array has the wrong shape, dtype or a number
+/// that is not finite.
 ///
 /// Examples
 /// --------
@@ -121,14 +119,10 @@ impl PyStateSpace {
         self.0.n_outputs()
     }
 
-    /// Return the output that an input produces.
+    /// Return the output for an input of shape (n_samples,) or (n_samples, n_inputs).
     ///
-    /// - u : shape (n_samples,) or (n_samples, n_inputs): Input.
-    /// - x0 : array_like or None, shape (n_states,): State at the first sample; zero if None.
-    ///
-    /// Returns ndarray of float64, shape (n_samples,) or (n_samples, n_outputs): Output; without
-    ///     channel axis if `u` has none and there is one output.
-    /// Raises ModelError if the model is continuous or `x0` does not fit it.
+    /// `x0` is the state at the first sample, shape (n_states,), zero if None. The output has the shape
+    /// (n_samples, n_outputs), or (n_samples,) if `u` has no channel axis and there is one output.
     #[pyo3(signature = (u, x0=None))]
     fn simulate<'py>(
         &self,
@@ -142,121 +136,66 @@ impl PyStateSpace {
         give_signal(py, y, self.0.n_outputs(), is_flat_output(&u, &self.0))
     }
 
-    /// Return the first Markov parameters: D, CB, CAB, ...
-    ///
-    /// - n : int: How many.
-    ///
-    /// Returns ndarray of float64, shape (n, n_outputs, n_inputs): Response to a unit pulse, sample
-    ///     by sample.
-    /// Raises ModelError if the model is continuous.
-    fn markov<'py>(
-        &self,
-        py: Python<'py>,
-        #[pyo3(from_py_with = whole::n)] n: usize,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    /// Return the first `n` Markov parameters D, CB, CAB, ..., shape (n, n_outputs, n_inputs).
+    fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let n = whole("n", n)?;
         let parameters = detached(py, || self.0.markov(n)).or_raise()?;
         let shape = (n, self.0.n_outputs(), self.0.n_inputs());
         let array = Array3::from_shape_fn(shape, |(k, row, col)| parameters[k][(row, col)]);
         Ok(array.into_pyarray(py).into_any())
     }
 
-    /// Return the dense matrix that maps a whole input to a whole output.
+    /// Return the lifted matrix of runs of `n` samples, shape (n * n_outputs, n * n_inputs).
     ///
-    /// - n : int: Number of samples of a run.
-    ///
-    /// Returns ndarray of float64, shape (n * n_outputs, n * n_inputs): Block lower-triangular
-    ///     Toeplitz matrix of the Markov parameters, for analysis; signals are stacked sample by
-    ///     sample.
-    /// Raises ModelError if the model is continuous.
-    fn lifted<'py>(
-        &self,
-        py: Python<'py>,
-        #[pyo3(from_py_with = whole::n)] n: usize,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    /// The block lower-triangular Toeplitz matrix of the Markov parameters, sample by sample.
+    fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let n = whole("n", n)?;
         let lifted = detached(py, || self.0.lifted(n)).or_raise()?;
         Ok(give_matrix(py, &lifted))
     }
 
-    /// Return the poles, the eigenvalues of A.
-    ///
-    /// Returns ndarray of complex128, shape (n_states,): Poles in no particular order.
-    /// Raises ModelError if the eigenvalue iteration does not end.
+    /// Return the poles, the eigenvalues of A, in no particular order.
     fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let poles = self.0.poles().or_raise()?;
         Ok(Array1::from(poles).into_pyarray(py).into_any())
     }
 
-    /// Return the closed loop with a controller, y = P (r - K y).
-    ///
-    /// - controller : StateSpace or compatible: K, from the outputs to the inputs of this model P.
-    ///
-    /// Returns StateSpace: From set-point r to output y: P / (1 + P K).
-    /// Raises ModelError if sample times or signals do not match, or the loop is not well posed.
-    /// Raises TypeError if `controller` is no model.
+    /// Return the closed loop with a controller K, P / (1 + P K), from set point to output.
     fn feedback(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.feedback(&controller).or_raise().map(Self)
     }
 
     /// Return this model followed by another, y = next(self(u)).
-    ///
-    /// - next : StateSpace or compatible: Model that takes this one's outputs.
-    ///
-    /// Returns StateSpace: From the input of this model to the output of `next`.
-    /// Raises ModelError if sample times or signals do not match.
-    /// Raises TypeError if `next` is no model.
     fn series(&self, next: &Bound<'_, PyAny>) -> PyResult<Self> {
         let next = read_model("next", next)?;
         self.0.series(&next).or_raise().map(Self)
     }
 
-    /// Return two sets of axes side by side.
-    ///
-    /// - other : StateSpace or compatible: Axes whose inputs and outputs follow those of this
-    ///     model.
-    ///
-    /// Returns StateSpace: Block-diagonal model.
-    /// Raises ModelError if sample times differ.
-    /// Raises TypeError if `other` is no model.
+    /// Return two sets of axes side by side: a block-diagonal model.
     fn append(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
         let other = read_model("other", other)?;
         self.0.append(&other).or_raise().map(Self)
     }
 
-    /// Return the model with every input delayed, as by a bus.
-    ///
-    /// - n_samples : int: By how many samples.
-    ///
-    /// Returns StateSpace: Model with `n_samples` more states for each input.
-    /// Raises ModelError if the model is continuous.
-    fn delayed(&self, #[pyo3(from_py_with = whole::n_samples)] n_samples: usize) -> PyResult<Self> {
+    /// Return the model with a dead time of `n_samples` at every input, as of a bus.
+    fn delayed(&self, n_samples: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let n_samples = whole("n_samples", n_samples)?;
         self.0.delayed(n_samples).or_raise().map(Self)
     }
 
-    /// Return the invariant zeros, where an input cancels in every output.
-    ///
-    /// Returns ndarray of complex128, shape (n_zeros,): Finite zeros in no particular order.
-    /// Raises ModelError if the transfer matrix has dependent rows or columns everywhere.
-    /// Source: [emami1982].
+    /// Return the finite invariant zeros, in no particular order [emami1982].
     fn zeros<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let zeros = detached(py, || self.0.zeros()).or_raise()?;
         Ok(Array1::from(zeros).into_pyarray(py).into_any())
     }
 
-    /// Return the static gain, G(0) or G(z = 1).
-    ///
-    /// Returns ndarray of float64, shape (n_outputs, n_inputs).
-    /// Raises ModelError if the model integrates.
+    /// Return the static gain G(0) or G(z = 1), shape (n_outputs, n_inputs).
     fn dc_gain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(give_matrix(py, &self.0.dc_gain().or_raise()?))
     }
 
-    /// Return the response to sinusoids, C (q I - A)^-1 B + D.
-    ///
-    /// - w_rad_s : shape (n_frequencies,): Frequencies in rad/s.
-    ///
-    /// Returns ndarray of complex128, shape (n_frequencies, n_outputs, n_inputs).
-    /// Raises ModelError if a frequency is a pole of the model.
+    /// Return C (q I - A)^-1 B + D at frequencies in rad/s, shape (n_frequencies, n_outputs, n_inputs).
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
@@ -269,84 +208,54 @@ impl PyStateSpace {
         Ok(array.into_pyarray(py).into_any())
     }
 
-    /// Return magnitude and phase of one channel, the phase without jumps.
-    ///
-    /// - w_rad_s : shape (n_frequencies,): Frequencies in rad/s.
-    /// - output, input : int: Which channel, counted from 0.
-    ///
-    /// Returns magnitude : ndarray of float64, shape (n_frequencies,).
-    /// Returns phase_rad : ndarray of float64, shape (n_frequencies,).
-    /// Raises ModelError if there is no such channel, or a frequency is a pole.
-    #[pyo3(signature = (w_rad_s, output=0, input=0))]
+    /// Return magnitude and unwrapped phase in rad of one channel at frequencies in rad/s.
+    #[pyo3(signature = (w_rad_s, output=None, input=None), text_signature = "(w_rad_s, output=0, input=0)")]
     fn bode<'py>(
         &self,
         py: Python<'py>,
         w_rad_s: &Bound<'py, PyAny>,
-        #[pyo3(from_py_with = whole::output)] output: usize,
-        #[pyo3(from_py_with = whole::input)] input: usize,
+        output: Option<&Bound<'py, PyAny>>,
+        input: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let w = read_vector("w_rad_s", w_rad_s)?;
+        let output = output.map_or(Ok(0), |output| whole("output", output))?;
+        let input = input.map_or(Ok(0), |input| whole("input", input))?;
         let bode = detached(py, || self.0.bode(&w, output, input)).or_raise()?;
         let give = |values| Array1::from(values).into_pyarray(py).into_any();
         Ok((give(bode.magnitude), give(bode.phase_rad)))
     }
 
-    /// Return the sensitivity to a controller, S = (I + P K)^-1.
-    ///
-    /// - controller : StateSpace or compatible: K, from the outputs to the inputs of this model P.
-    ///
-    /// Returns StateSpace: From set point to control error.
-    /// Raises ModelError if sample times or signals do not match, or the loop is not well posed.
+    /// Return the sensitivity S = (I + P K)^-1, from set point to control error.
     fn sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.sensitivity(&controller).or_raise().map(Self)
     }
 
-    /// Return the complementary sensitivity, T = P K (I + P K)^-1.
-    ///
-    /// - controller : StateSpace or compatible: K, from the outputs to the inputs of this model P.
-    ///
-    /// Returns StateSpace: From set point to output.
-    /// Raises ModelError if sample times or signals do not match, or the loop is not well posed.
+    /// Return the complementary sensitivity T = P K (I + P K)^-1, from set point to output.
     fn complementary_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.complementary_sensitivity(&controller).or_raise().map(Self)
     }
 
-    /// Return the process sensitivity, P (I + K P)^-1.
+    /// Return the process sensitivity P (I + K P)^-1, from an input added to the controller's to the output.
     ///
-    /// - controller : StateSpace or compatible: K, from the outputs to the inputs of this model P.
-    ///
-    /// Returns StateSpace: From an input added to the controller's to the output: what parallel
-    ///     learning works on.
-    /// Raises ModelError if sample times or signals do not match, or the loop is not well posed.
+    /// It is the model of learning in the parallel structure.
     fn process_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.process_sensitivity(&controller).or_raise().map(Self)
     }
 
-    /// Return after how many samples each output answers to some input.
-    ///
-    /// Returns list of (int or None), one for each output: Index of the first Markov parameter that
-    ///     is not zero; None for an output that answers to nothing.
-    /// Raises ModelError if a Markov parameter overflows.
+    /// Return the relative degree of each output: its first Markov parameter that is not zero, or None.
     fn relative_degrees(&self) -> PyResult<Vec<Option<usize>>> {
         model::relative_degrees(&self.0).or_raise()
     }
 
-    /// Return after how many samples each output answers to each input.
-    ///
-    /// Returns list of list of (int or None): One row for each output with one entry for each
-    ///     input.
-    /// Raises ModelError if a Markov parameter overflows.
+    /// Return the dead time in samples of each output (rows) from each input (columns), or None.
     fn delays(&self) -> PyResult<Vec<Vec<Option<usize>>>> {
         model::delays(&self.0).or_raise()
     }
 
-    /// Return a model of the same response without superfluous states.
-    ///
-    /// Returns StateSpace: Only states that an input reaches and an output sees.
-    /// Raises ModelError if the numbers overflow on the way.
+    /// Return a minimal realisation. Keeps the controllable and observable states.
     fn minimal(&self) -> PyResult<Self> {
         self.0.minimal().or_raise().map(Self)
     }

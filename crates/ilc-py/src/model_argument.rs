@@ -10,6 +10,7 @@ use crate::argument::{Matrix, read_matrix, read_vector};
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
 use crate::time_varying::PyTimeVarying;
+use crate::whole::number;
 
 /// Reads a model: one of ours, or one of scipy.signal or python-control. State-space objects have the
 /// attributes `A`, `B`, `C`, `D` and `dt`; scipy's other kinds have a method `to_ss`, and
@@ -105,9 +106,7 @@ pub(crate) fn read_sample_time(name: &str, object: &Bound<'_, PyAny>) -> PyResul
     if object.is_none() {
         return Ok(None);
     }
-    let dt_s: f64 = object.extract().map_err(|_| {
-        PyTypeError::new_err(format!("{name} = {object}; a number of seconds or None is needed"))
-    })?;
+    let dt_s = number(name, object)?;
     Ok(if dt_s == 0.0 { None } else { Some(dt_s) })
 }
 

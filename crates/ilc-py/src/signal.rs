@@ -15,6 +15,7 @@ use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::exceptions;
+use crate::made::reduce_kind;
 use crate::whole::{each, whole};
 
 /// A filter of any kind, to be applied or given to a law.
@@ -145,11 +146,8 @@ impl PyFilter {
 
     /// Pickled and copied as it was made.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let (py, this) = (slf.py(), slf.get());
-        let maker = py.import("ilc_rt._native")?.getattr("_filter")?;
-        let parts = (slf.get_type(), &this.kind, &this.arguments);
-        let attributes = slf.getattr_opt("__dict__")?;
-        Ok((maker, parts, attributes).into_pyobject(py)?.into_any())
+        let this = slf.get();
+        reduce_kind(slf.as_any(), "Filter", &this.kind, &this.arguments)
     }
 }
 
@@ -160,17 +158,6 @@ impl PyFilter {
             _ => Err(PyTypeError::new_err("this filter is not recursive: it has no sections")),
         }
     }
-}
-
-/// Makes a filter again, for copies and pickles.
-#[pyfunction]
-fn _filter<'py>(
-    class: &Bound<'py, PyAny>,
-    kind: &str,
-    arguments: &Bound<'py, PyDict>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let native = class.py().get_type::<PyFilter>();
-    native.getattr("__new__")?.call((class, kind), Some(arguments))
 }
 
 fn switched(a: Arguments<'_, '_>) -> PyResult<SwitchedFilter> {
@@ -263,7 +250,6 @@ fn instantaneous_frequency<'py>(
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyFilter>()?;
-    module.add_function(wrap_pyfunction!(_filter, module)?)?;
     module.add_function(wrap_pyfunction!(zero_phase, module)?)?;
     module.add_function(wrap_pyfunction!(instantaneous_frequency, module)?)
 }

@@ -8,16 +8,14 @@ use pyo3::prelude::*;
 use crate::argument::{Matrix, Signal, give_signal, misfit, read_array, read_vector};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::whole::Real;
 
 /// Linear model whose matrices vary along the run.
 ///
 /// ``x[k+1] = A[k] x[k] + B[k] u[k]``, ``y[k] = C[k] x[k] + D[k] u[k]``.
 ///
-/// - a : shape (n_samples, n_states, n_states): State matrices.
-/// - b : shape (n_samples, n_states, n_inputs): Input matrices.
-/// - c : shape (n_samples, n_outputs, n_states): Output matrices.
-/// - d : shape (n_samples, n_outputs, n_inputs): Feedthrough matrices.
-/// - dt_s : float: Sample time in seconds.
+/// - a, b, c, d: a matrix for each sample, e.g. `a` of shape (n_samples, n_states, n_states).
+/// - dt_s: sample time in seconds.
 ///
 /// Raises ModelError if there is no sample or the sample time is not positive.
 ///
@@ -69,7 +67,7 @@ impl PyTimeVarying {
         b: &Bound<'_, PyAny>,
         c: &Bound<'_, PyAny>,
         d: &Bound<'_, PyAny>,
-        dt_s: f64,
+        dt_s: Real,
     ) -> PyResult<Self> {
         let (a, b) = (read_matrices("a", a)?, read_matrices("b", b)?);
         let (c, d) = (read_matrices("c", c)?, read_matrices("d", d)?);
@@ -90,7 +88,7 @@ impl PyTimeVarying {
             Matrix::from_row_slice(*rows, *cols, &values[k * size..(k + 1) * size])
         };
         let samples: Result<Vec<_>, _> = (0..n_samples)
-            .map(|k| StateSpace::discrete(at(&a, k), at(&b, k), at(&c, k), at(&d, k), dt_s))
+            .map(|k| StateSpace::discrete(at(&a, k), at(&b, k), at(&c, k), at(&d, k), dt_s.0))
             .collect();
         TimeVarying::new(samples.or_raise()?).or_raise().map(Self)
     }
@@ -162,14 +160,10 @@ impl PyTimeVarying {
         self.0.n_outputs()
     }
 
-    /// Return the output that an input produces.
+    /// Return the output for an input of shape (n_samples,) or (n_samples, n_inputs).
     ///
-    /// - u : shape (n_samples,) or (n_samples, n_inputs): Input.
-    /// - x0 : array_like or None, shape (n_states,): State at the first sample; zero if None.
-    ///
-    /// Returns ndarray of float64, shape (n_samples,) or (n_samples, n_outputs): Output; without
-    ///     channel axis if `u` has none and there is one output.
-    /// Raises ModelError if `x0` does not fit.
+    /// `x0` is the state at the first sample, shape (n_states,), zero if None. The output has the shape
+    /// (n_samples, n_outputs), or (n_samples,) if `u` has no channel axis and there is one output.
     #[pyo3(signature = (u, x0=None))]
     fn simulate<'py>(
         &self,

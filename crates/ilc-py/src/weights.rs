@@ -11,10 +11,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Matrix, give_signal, misfit, read_array};
-use crate::arguments::{Arguments, number};
+use crate::arguments::Arguments;
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::whole::{each, pair, shown, whole};
+use crate::whole::{each, number, pair, shown, whole};
 
 /// Reads a number, or one for each sample.
 fn read_gain(a: Arguments<'_, '_>, name: &str, n_samples: usize) -> PyResult<Gain> {

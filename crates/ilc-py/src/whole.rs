@@ -1,8 +1,9 @@
-//! Whole numbers among the arguments: each refused under its own name, with a sentence.
+//! Numbers among the arguments: each refused under its own name, with a sentence.
 
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::Borrowed;
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyFloat};
+use pyo3::types::{PyBool, PyFloat, PyString};
 
 /// The largest number that any count, index or order may be.
 const MAX: u64 = u32::MAX as u64;
@@ -13,7 +14,7 @@ const MAX: u64 = u32::MAX as u64;
 /// - `TypeError` for a truth value, a float, or anything else that counts nothing.
 /// - `ValueError` for a number that is negative or too large.
 pub(crate) fn whole(name: &str, object: &Bound<'_, PyAny>) -> PyResult<usize> {
-    let number = number(name, object, &format!("0 to {MAX}"))?;
+    let number = integer(name, object, &format!("0 to {MAX}"))?;
     match number.extract::<u64>().ok().filter(|value| *value <= MAX) {
         #[expect(clippy::cast_possible_truncation, reason = "at most 32 bits")]
         Some(value) => Ok(value as usize),
@@ -22,14 +23,12 @@ pub(crate) fn whole(name: &str, object: &Bound<'_, PyAny>) -> PyResult<usize> {
 }
 
 /// Returns the integer that an object stands for.
-fn number<'py>(name: &str, object: &Bound<'py, PyAny>, range: &str) -> PyResult<Bound<'py, PyAny>> {
-    let refused = || {
-        let kind = object.get_type().name().map_or_else(|_| "object".to_owned(), |n| n.to_string());
-        let text = shown(object);
-        PyTypeError::new_err(format!(
-            "{name} = {text} is a {kind}; a whole number from {range} is needed"
-        ))
-    };
+fn integer<'py>(
+    name: &str,
+    object: &Bound<'py, PyAny>,
+    range: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let refused = || refused(name, object, &format!("a whole number from {range}"));
     if object.is_instance_of::<PyBool>() || object.is_instance_of::<PyFloat>() {
         return Err(refused());
     }
@@ -76,42 +75,50 @@ pub(crate) fn pair<'py>(
     })
 }
 
-/// One reader for each name, as `from_py_with` takes them.
-macro_rules! named {
-    ($($name:ident),* $(,)?) => {
-        $(pub(crate) fn $name(object: &Bound<'_, PyAny>) -> PyResult<usize> {
-            whole(stringify!($name), object)
-        })*
-    };
-}
-
-/// The same for arguments that may be `None`.
-macro_rules! named_maybe {
-    ($($name:ident),* $(,)?) => {
-        $(pub(crate) fn $name(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-            if object.is_none() { Ok(None) } else { whole(stringify!($name), object).map(Some) }
-        })*
-    };
-}
-
-named! {
-    input, keep, n, n_samples, output, period_samples, rows, top,
-}
-
-/// Arguments that may be `None`.
-pub(crate) mod maybe {
-    use super::{Bound, PyAny, PyAnyMethods, PyResult, whole};
-    named_maybe! {
-        window,
-    }
-}
-
 /// Reads the identity of a run.
 pub(crate) fn id(object: &Bound<'_, PyAny>) -> PyResult<i64> {
     let range = format!("0 to {}", i64::MAX);
-    let number = number("id", object, &range)?;
+    let number = integer("id", object, &range)?;
     match number.extract::<i64>() {
         Ok(value) if value >= 0 => Ok(value),
         _ => Err(out_of_range("id", &number, &range)),
     }
+}
+
+/// Reads a number: Python's, NumPy's, whatever converts to a float.
+///
+/// # Errors
+/// - `TypeError` for what is not a number.
+/// - `ValueError` for an integer beyond the largest float.
+pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
+    if object.is_instance_of::<PyString>() {
+        return Err(refused(name, object, "a number"));
+    }
+    object.extract::<f64>().map_err(|error| {
+        let py = object.py();
+        if error.is_instance_of::<PyOverflowError>(py) {
+            let text = shown(object);
+            return PyValueError::new_err(format!(
+                "{name} = {text}; only finite numbers are allowed"
+            ));
+        }
+        refused(name, object, "a number")
+    })
+}
+
+/// A number without a name of its own, which may not be too large for a float.
+pub(crate) struct Real(pub(crate) f64);
+
+impl<'py> FromPyObject<'_, 'py> for Real {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        number("number", &object).map(Self)
+    }
+}
+
+pub(crate) fn refused(name: &str, object: &Bound<'_, PyAny>, needed: &str) -> PyErr {
+    let kind = object.get_type().name().map_or_else(|_| "object".to_owned(), |n| n.to_string());
+    let text = shown(object);
+    PyTypeError::new_err(format!("{name} = {text} is a {kind}; {needed} is needed"))
 }

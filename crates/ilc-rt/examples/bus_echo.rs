@@ -19,7 +19,7 @@ fn main() -> ExitCode {
     match transport::open(&address) {
         Err(error) => fail(&error),
         Ok(mut bus) => {
-            // Whoever started this waits for the line: from here on no frame is missed.
+            // The parent process waits for this line: from here on no frame is missed.
             let _ = writeln!(std::io::stdout(), "ready on {address}");
             match echo(&mut *bus) {
                 Err(error) => fail(&error),

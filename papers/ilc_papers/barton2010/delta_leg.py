@@ -32,7 +32,7 @@ SUBSTEPS = 4
 #: Resolution of the encoder: 14 bits a turn (not printed).
 RESOLUTION_RAD = 2.0 * math.pi / 2**14
 
-# alpha, c_d and beta of (7.13) with the sign of the weight put right (D.4).
+# alpha, c_d and beta of (7.13) with the sign of the weight corrected (D.4).
 INERTIA = 1.0 / (GAIN_RAD_NM * NATURAL_RAD_S**2)
 FRICTION = 2.0 * DAMPING * NATURAL_RAD_S * INERTIA
 WEIGHT_NM = -1.0 / (GAIN_RAD_NM * math.sin(HOME_RAD))

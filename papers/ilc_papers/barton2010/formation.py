@@ -32,7 +32,7 @@ CASES: dict[str, dict[str, Any]] = {
     "formation": {"tracking": 0.0},
     "combined": {"tracking": 0.5, "own": 0.0, "centre": 1.0},
 }
-#: True gains over the model's, one an axis: the print has an uncertainty and not its size.
+#: True gains over the model's, one per axis: the print has an uncertainty and not its size.
 TRUE_GAINS = np.array([1.08, 1.05, 0.95, 0.93, 1.02, 1.04])
 #: Disturbance of agent 1, new in each run; the print has no size.
 DISTURBANCE_STD_M = 0.01

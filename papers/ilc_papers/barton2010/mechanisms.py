@@ -142,7 +142,7 @@ def _contour_rms(wanted: Array, actual: Array) -> float:
 
 
 def _followed(tools: list[Array], agent: int) -> float | None:
-    """How far an agent went to meet the first one, as a share of what was between them at first.
+    """Return how far an agent went to meet the first one, as a share of their first distance.
 
     In the plane; None for the first agent itself.
     """

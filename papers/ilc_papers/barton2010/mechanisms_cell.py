@@ -100,7 +100,7 @@ enabled = false
 
 @dataclass(frozen=True)
 class Agent:
-    """What one mechanism's legs are beside the nominal ones."""
+    """Deviations of one mechanism's legs from the nominal ones."""
 
     #: Natural frequency of its loops over the nominal one.
     natural: float

@@ -1,4 +1,4 @@
-"""What appendix I prints: tables I.1 to I.3. For comparison alone; nothing is computed from it.
+"""Printed figures of appendix I, tables I.1 to I.3, for comparison alone.
 
 Section `appendix_i` imports it.
 """

@@ -26,7 +26,7 @@ N_SAMPLES = 120
 UNCERTAINTY = 0.9
 S_VALUES = (0.01, 0.1, 1.0, 10.0)
 R_VALUES = (0.0, 0.1, 1.0, 10.0)
-#: Uncertainty for the guidelines, from standstill to half the sample rate.
+#: Uncertainty for the guidelines, from standstill to the Nyquist frequency.
 SHAPED = np.linspace(0.0, 2.0, 33)
 
 
@@ -123,7 +123,7 @@ def _unit(vector: Array) -> Array:
 
 
 def _guidelines(axis: Servo) -> Figures:
-    """Return what guidelines s1 to s4 propose for the axis, and what comes of it."""
+    """Return what guidelines s1 to s4 propose for the axis, and the outcome."""
     tuned = tune(
         axis.plant, axis.n_samples, uncertainty=SHAPED, noise_std=NOISE_STD,
         reference=axis.first_error,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Law(Protocol):
-    """What is common to all laws."""
+    """Settings that all laws share."""
 
     def update(self, u: Any, e: Any, disturbance: Any = None) -> Array:  # noqa: ANN401
         """Return the input of the next run."""

@@ -42,7 +42,7 @@ Q_FILTER = fir(np.array([-1.0, 4.0, 10.0, 4.0, -1.0]) / 16.0, repeats=6)
 
 
 class Law(Protocol):
-    """What a campaign needs of a law."""
+    """Interface of a law to a campaign."""
 
     def update(
         self, u: NDArray[np.float64], e: NDArray[np.float64], disturbance: float | None = None
@@ -80,7 +80,7 @@ LAWS: dict[str, Callable[[System], Law] | None] = {
 
 @dataclass
 class Campaign:
-    """What one law did.
+    """Runs of one law.
 
     Parameters
     ----------
@@ -107,8 +107,8 @@ def run(
 ) -> dict[str, Campaign]:
     """Run the laws side by side through one sequence of temperatures.
 
-    The ILC signal is added to the reference of the PD loop; each law is told the temperature of the
-    coming run before it begins (Eq. 4.11). Errors are relative to the part.
+    The ILC signal is added to the reference of the PD loop; each law is given the temperature of
+    the next run before it begins (Eq. 4.11). Errors are relative to the part.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a machine makes of a six-point sine: both settings of chapter 2 beside E/S interpolation.
+"""Response of a machine to a six-point sine: both settings of chapter 2 beside E/S interpolation.
 
 Read by the other modules of this package only.
 """
@@ -85,7 +85,7 @@ def planned(way: str, frequency_hz: float) -> Trajectory:
 def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     """Return frequency and amplitude ratios over the programmed frequency, and two motions.
 
-    A ratio is None where the program is refused; `refused` then has the reason.
+    A refused program has no ratio (None), and its reason in `refused`.
     """
     tell("the six-point sine in both machine settings")
     frequencies = FREQUENCIES_HZ[3::4] if reduced else FREQUENCIES_HZ

@@ -89,7 +89,7 @@ def motion() -> Motion:
 
 @dataclass
 class Course:
-    """What was measured in a series of runs: the errors as the encoder shows them."""
+    """Measurement of a series of runs: the errors as the encoder shows them."""
 
     errors_m: list[Array] = field(default_factory=list)
     inputs: list[Array] = field(default_factory=list)

@@ -1,6 +1,6 @@
 """Eq. 9 and Fig. 17, 18, 27: up to which frequency learning converges, and what a filter may pass.
 
-This is what a user is told before the first run. Only the paper's package imports it.
+A user sees this before the first run. Only the paper's package imports it.
 """
 
 from __future__ import annotations

@@ -112,7 +112,7 @@ def _saturated(moves: Motion, runs: int) -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set the statements of sections 3 and 4 beside what came out."""
+    """Set the statements of sections 3 and 4 beside the results."""
     disturbed, fed, saturated = (
         figures[name] for name in ("disturbance", "feedforward", "saturation")
     )

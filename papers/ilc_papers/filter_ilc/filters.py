@@ -110,7 +110,7 @@ def falls(rmse_m: list[float]) -> bool:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set the statements of sections 4 to 6 beside what came out."""
+    """Set the statements of sections 4 to 6 beside the results."""
     free, smooth, wide = (figures[name] for name in ("unfiltered", "zero_phase", "switched"))
     rise = int(np.argmin(free["rmse_m"])) + 1
     return [

@@ -118,7 +118,7 @@ def _check(moves: Motion) -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set the statements on mechanisms beside what came out."""
+    """Set the statements on mechanisms beside the results."""
     gate, ladder, check = figures["gate"], figures["ladder"], figures["repeatability"]
     hold = gate["states"].index("holding") + 1
     held = np.array(gate["rmse_m"][hold:])

@@ -1,4 +1,4 @@
-"""What Haas et al. leave to future work: constraints on the set points, while learning.
+"""Future work of Haas et al.: constraints on the set points, while learning.
 
 Each bound is tried where it does not matter, where the figures must be those without it, and where
 it does. Only the paper's package imports it.

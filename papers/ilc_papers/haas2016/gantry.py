@@ -85,7 +85,7 @@ def _shown(path_m: Array) -> list[list[float]]:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set Table 1 and the statements on figures 5 to 7 beside what came out."""
+    """Set Table 1 and the statements on figures 5 to 7 beside the results."""
     gantry = figures["gantry"]
     contour = {name: gantry[name]["contour_inf_m"][PRINTED_RUN] for name in CASES}
     tracking = {name: gantry[name]["tracking_inf_m"][PRINTED_RUN] for name in CASES}

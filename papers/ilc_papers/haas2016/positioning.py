@@ -149,7 +149,7 @@ def _analyse(dt_s: float, n_samples: int) -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set the statements of section 3.1 beside what came out."""
+    """Set the statements of section 3.1 beside the results."""
     runs = figures["positioning"]
     co = {name: np.array(run["co_inf_m"]) for name, run in runs.items()}
     pd = {name: np.array(run["pd_zero_phase_inf_m"]) for name, run in runs.items()}

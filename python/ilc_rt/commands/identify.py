@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from ilc_rt.commands.options import (
@@ -24,8 +23,6 @@ from ilc_rt.events import Event, StartEvent
 from ilc_rt.text import file_name, printable
 
 PICTURE = "identify-{axis}.png"
-COHERENCE_MIN = 0.7
-"""Median coherence below which the output does not follow the input."""
 
 PictureFolder = Annotated[
     Path | None,
@@ -54,7 +51,8 @@ def identify(
     def tell(event: Event) -> None:
         if isinstance(event, StartEvent):
             seconds = event.n_samples * event.cycle_s
-            typer.echo(f"exciting an axis of {event.cell} for {seconds:.1f} s, {event.bus}")
+            axis = f"axis {printable(asked['axis'])}" if "axis" in asked else "the axis"
+            typer.echo(f"exciting {axis} of {event.cell} for {seconds:.1f} s, {event.bus}")
 
     try:
         found = steps.identify(
@@ -84,12 +82,10 @@ def _tell(found: object) -> None:
     assert isinstance(found, Identification)
     count, worst = len(found.frequency_hz), float(found.coherence.min())
     typer.echo(
-        f"{count} frequencies, amplitude {found.experiment.amplitude:.4g}, "
+        f"{count} frequencies, amplitude {found.experiment.amplitude:.4g} {found.input_unit}, "
         f"coherence at least {worst:.4f}"
     )
-    # Figures of an output that does not follow its input say nothing.
-    followed = float(np.median(found.coherence)) >= COHERENCE_MIN
-    for name, value, deviation in found.rows() if followed else []:
+    for name, value, deviation in found.rows() if found.followed else []:
         typer.echo(f"  {name:<24} {value:>10}{f'  +- {deviation}' if deviation else ''}")
     if found.doubt is None:
         typer.echo(f"\n{found.section()}")

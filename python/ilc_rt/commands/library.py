@@ -16,13 +16,13 @@ from rich.console import Console
 from rich.table import Table
 from typer import Typer
 
-from ilc_rt._native import Library
 from ilc_rt.commands.options import (
     DEFAULT_LIBRARY_FILE,
     LibraryArgument,
 )
 from ilc_rt.errors import BadInputError
 from ilc_rt.export import export_run
+from ilc_rt.library import Library
 from ilc_rt.quantity import unit_for
 from ilc_rt.result import STANDARD_OUTPUT, json_text, library_rows, write_text
 from ilc_rt.text import printable
@@ -78,7 +78,7 @@ def list_runs(
     json_file: JsonRows = None,
     csv_file: CsvRows = None,
 ) -> None:
-    """List the runs, one a line.
+    """List the runs, one per line.
 
     Example: ilc library list ilc-library.db --cell gantry
     """
@@ -199,7 +199,7 @@ def error_text(row: Mapping[str, Any], figure: str) -> str:
 
 
 def note(row: Mapping[str, Any]) -> str:
-    """Return what became of a run in a few words."""
+    """Return the outcome of a run in a few words."""
     said = ("rolled back", row["rolled_back"]), ("learning off", row["learning_off"])
     return ", ".join(words for words, holds in said if holds)
 

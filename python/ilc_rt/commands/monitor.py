@@ -118,7 +118,7 @@ class _View:
             run = "" if event.iteration is None else f" (run {event.iteration})"
             typer.echo(f"{message.cell}: {WORDS.get(event.state, event.state)}{run}")
         elif isinstance(event, ProgressEvent) and message.cell not in self._present:
-            # Someone who joins late is told where the run is, once.
+            # A late subscriber gets the progress of the run, once.
             share = 100.0 * event.sample / max(1, event.n_samples)
             typer.echo(f"{message.cell}: run {event.iteration}, {share:.0f} %")
         elif isinstance(event, EndEvent):

@@ -27,7 +27,7 @@ TYPES: dict[str, type] = {
 
 
 class DriveChoice(str, Enum):
-    """Whether to start simulated drives."""
+    """Choice of simulated or external drives."""
 
     auto = "auto"
     simulated = "simulated"
@@ -82,7 +82,8 @@ def _parameter(option: Option) -> inspect.Parameter:
     flags = option.flags if option.kind != "inverse_flag" else (f" /{option.flags[0]}",)
     how = typer.Option(
         *flags,
-        metavar=option.placeholder,
+        metavar=None if option.choices else option.placeholder,
+        show_default=option.kind != "inverse_flag",
         # Here, the simulated drives may be in this process.
         help=f"Bus address in place of the cell's: {SYNTAXES}."
         if option.name == "bus"

@@ -1,4 +1,4 @@
-"""Where figures and reports go: looked at before anything moves, written when all is over."""
+"""Targets of figures and reports: checked before anything moves, written at the end."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Self
 
-    from ilc_rt._native import Library
     from ilc_rt.laws.arguments import AnyLaw
+    from ilc_rt.library import Library
 
 
 class _Recalled(Law):

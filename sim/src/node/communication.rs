@@ -1,4 +1,4 @@
-//! What every CANopen node does: NMT, boot-up, heartbeat, SDO, PDO and EMCY around one dictionary.
+//! Communication of every CANopen node: NMT, boot-up, heartbeat, SDO, PDO and EMCY around one dictionary.
 
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{
@@ -30,7 +30,7 @@ const SAVE: i64 = 0x6576_6173;
 /// "load", as it is written to 0x1011.
 const LOAD: i64 = 0x6461_6F6C;
 
-/// What a frame means to the device behind the communication.
+/// Meaning of a frame to the device behind the communication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Incoming {
     /// Nothing.
@@ -43,7 +43,7 @@ pub enum Incoming {
     Sync,
 }
 
-/// What passing time brought.
+/// Events of passing time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Silence {
     /// Nothing is overdue.
@@ -143,7 +143,7 @@ impl Communication {
         &mut self.dictionary
     }
 
-    /// Whether the sender of RPDO1 has promised to be cyclic.
+    /// Returns whether the sender of RPDO1 has promised to be cyclic.
     pub fn has_deadline(&self) -> bool {
         self.pdos.has_deadline()
     }
@@ -153,7 +153,7 @@ impl Communication {
         self.last_emergency.take()
     }
 
-    /// Whether `frame` asks this node for an object, so that its values must be fresh.
+    /// Returns whether `frame` asks this node for an object, so that its values must be fresh.
     pub fn is_question(&self, frame: &Frame) -> bool {
         frame.id() == cob_id::of(cob_id::SDO_REQUEST, self.node)
     }
@@ -326,7 +326,7 @@ impl Communication {
         Incoming::Written
     }
 
-    /// Whether `frame` is a SYNC on the identifier that this node listens to.
+    /// Returns whether `frame` is a SYNC on the identifier that this node listens to.
     fn is_sync(&self, frame: &Frame) -> bool {
         let identifier = self.dictionary.number(self.slots.sync) & SYNC_IDENTIFIER;
         i64::from(frame.id()) == identifier && frame.payload().len() <= 1
@@ -364,7 +364,7 @@ impl Communication {
         }
     }
 
-    /// Counts the silence of the watched heartbeat; each one is told once.
+    /// Counts the silence of the watched heartbeat; each one is reported once.
     fn controller_is_silent(&mut self, elapsed_us: u64) -> bool {
         let (Some(since_us), Some((_, period_us))) = (self.controller_us, self.watched()) else {
             return false;

@@ -4,7 +4,7 @@ use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
 
 use super::value::Value;
 
-/// Who may do what with an object by SDO.
+/// Access to an object by SDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// Read, and it never changes.
@@ -15,7 +15,7 @@ pub enum Access {
     ReadWrite,
 }
 
-/// Which PDOs may carry an object.
+/// PDOs that may carry an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mappable {
     /// None.
@@ -28,7 +28,7 @@ pub enum Mappable {
     Both,
 }
 
-/// Which values an object takes.
+/// Values that an object takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Allowed {
     /// All of its type.
@@ -42,15 +42,15 @@ pub enum Allowed {
 /// An object.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// Where.
+    /// Address.
     pub address: ObjectAddress,
     /// Name, as in an EDS.
     pub name: &'static str,
-    /// Who may write it.
+    /// Access.
     pub access: Access,
-    /// Which PDOs may carry it.
+    /// PDOs that may carry it.
     pub mappable: Mappable,
-    /// Which values it takes.
+    /// Values that it takes.
     pub allowed: Allowed,
     /// Value at power-on.
     pub power_on: Value,

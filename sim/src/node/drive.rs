@@ -2,22 +2,20 @@
 
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{AbortCode, NmtCommand, NmtState, NodeId, emcy};
-use ilc_rt::fieldbus::cia402::{Mode, State, Statusword};
+use ilc_rt::fieldbus::cia402::{State, Statusword};
 
 use super::communication::{Communication, Incoming, Silence};
 use super::dictionary::{Dictionary, Slot};
-use super::drive_objects::{self, DriveSlots, whole};
+use super::drive_objects::{self, DriveSlots, rounded};
 use super::motion::Motion;
 use super::state_machine::StateMachine;
 use super::units::Units;
 use crate::plant::Demand;
 
-/// The following-error monitor is off at this window.
-const WINDOW_OFF: i64 = 0xFFFF_FFFF;
 /// Bit 8 of the controlword.
 const HALT: u16 = 1 << 8;
 
-/// What the drive's maker and integrator have set, in SI units.
+/// Parameters set by the maker of the drive and the integrator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveParameters {
     /// Counts in one metre.
@@ -36,7 +34,7 @@ pub struct DriveParameters {
     pub force_max_n: f64,
 }
 
-/// What the drive measures of its axis.
+/// Measurements of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Measured {
     /// Position of the encoder.
@@ -52,18 +50,18 @@ pub struct Measured {
 /// Frames come in by [`receive`](Self::receive), time by [`step`](Self::step); neither allocates.
 #[derive(Clone, Debug)]
 pub struct DriveNode {
-    communication: Communication,
-    slots: DriveSlots,
-    parameters: DriveParameters,
+    pub(super) communication: Communication,
+    pub(super) slots: DriveSlots,
+    pub(super) parameters: DriveParameters,
     /// As the dictionary has them; read again when it is written.
-    units: Units,
-    machine: StateMachine,
-    motion: Motion,
-    measured: Measured,
-    is_halted: bool,
+    pub(super) units: Units,
+    pub(super) machine: StateMachine,
+    pub(super) motion: Motion,
+    pub(super) measured: Measured,
+    pub(super) is_halted: bool,
     /// Since the following error left its window.
-    astray_us: u64,
-    has_following_error: bool,
+    pub(super) astray_us: u64,
+    pub(super) has_following_error: bool,
 }
 
 impl DriveNode {
@@ -295,54 +293,6 @@ impl DriveNode {
         self.motion.ramp_down(self.measured.velocity_m_s, self.units.quick_deceleration_m_s2());
     }
 
-    fn forget_targets(&mut self) {
-        let dictionary = self.communication.dictionary_mut();
-        dictionary.take_written(self.slots.target_position);
-        dictionary.take_written(self.slots.target_velocity);
-    }
-
-    /// Takes over the target of the active mode at SYNC.
-    fn take_target(&mut self) {
-        if self.state() != State::OperationEnabled || self.is_halted {
-            self.forget_targets();
-            return;
-        }
-        let dictionary = self.communication.dictionary_mut();
-        let has_position = dictionary.take_written(self.slots.target_position);
-        let has_velocity = dictionary.take_written(self.slots.target_velocity);
-        match self.mode() {
-            Some(Mode::Csp) if has_position => {
-                let counts = self.number(self.slots.target_position)
-                    + self.number(self.slots.position_offset);
-                self.motion.position_target(self.units.place_m(counts), self.period_s());
-            }
-            // Without a promised deadline a target is there to stay, as when it is set by SDO.
-            Some(Mode::Csp) if self.communication.has_deadline() => {
-                self.motion.extrapolate_once(self.period_s());
-            }
-            Some(Mode::Csv) if has_velocity => {
-                let velocity_m_s = self.units.velocity_m_s(self.number(self.slots.target_velocity))
-                    + self.units.velocity_m_s(self.number(self.slots.velocity_offset));
-                self.motion.velocity_target(velocity_m_s);
-            }
-            Some(Mode::Csp | Mode::Csv) | None => {}
-        }
-    }
-
-    /// Shows the mode that is active; a change under power begins with a hold.
-    fn show_mode(&mut self) {
-        let dictionary = self.communication.dictionary_mut();
-        if !dictionary.take_written(self.slots.mode) {
-            return;
-        }
-        let (wanted, shown) =
-            (dictionary.number(self.slots.mode), dictionary.number(self.slots.mode_display));
-        dictionary.set(self.slots.mode_display, wanted);
-        if wanted != shown && self.state() == State::OperationEnabled {
-            self.motion.hold(self.measured.position_m);
-        }
-    }
-
     /// Ends what a ramp was for.
     fn end_ramp(&mut self) {
         if self.motion.is_ramping() {
@@ -365,26 +315,8 @@ impl DriveNode {
         }
     }
 
-    fn watch_following_error(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) {
-        let window = self.number(self.slots.error_window);
-        let watched = self.state() == State::OperationEnabled
-            && self.mode() == Some(Mode::Csp)
-            && window != WINDOW_OFF;
-        if !watched || whole(self.following_error_counts()).abs() <= window {
-            self.astray_us = 0;
-            return;
-        }
-        self.astray_us += u64::from(step_us);
-        let patience_us = u64::try_from(self.number(self.slots.error_time_ms)).unwrap_or(0) * 1000;
-        if self.astray_us > patience_us {
-            self.has_following_error = true;
-            self.communication.emergency(emcy::CODE_FOLLOWING_ERROR, out);
-            self.fault(emcy::CODE_FOLLOWING_ERROR);
-        }
-    }
-
     /// Enters the fault reaction. A drive without power over its axis only reports a lost command.
-    fn fault(&mut self, code: u16) {
+    pub(super) fn fault(&mut self, code: u16) {
         if !matches!(self.state(), State::OperationEnabled | State::QuickStopActive) {
             return;
         }
@@ -401,31 +333,16 @@ impl DriveNode {
         }
     }
 
-    /// Demand before limits minus actual position; 0 where position is not controlled.
-    fn following_error_counts(&self) -> f64 {
-        let demand_m = self.motion.demand_m().unwrap_or(self.measured.position_m);
-        self.units.distance(demand_m - self.measured.position_m)
-    }
-
-    fn mode(&self) -> Option<Mode> {
-        i8::try_from(self.number(self.slots.mode_display)).ok().and_then(Mode::from_code)
-    }
-
-    fn period_s(&self) -> f64 {
-        let exponent = i32::try_from(self.number(self.slots.period_exponent)).unwrap_or(-3);
-        self.number(self.slots.period) as f64 * 10.0_f64.powi(exponent)
-    }
-
     fn read_units(&mut self) {
         let dictionary = self.communication.dictionary();
         self.units = Units::read(dictionary, &self.slots, self.parameters.counts_per_m);
     }
 
-    fn number(&self, slot: Slot) -> i64 {
+    pub(super) fn number(&self, slot: Slot) -> i64 {
         self.communication.dictionary().number(slot)
     }
 
-    fn set(&mut self, slot: Slot, number: i64) {
+    pub(super) fn set(&mut self, slot: Slot, number: i64) {
         self.communication.dictionary_mut().set(slot, number);
     }
 
@@ -436,12 +353,12 @@ impl DriveNode {
         let demand_m = self.motion.demand_m().unwrap_or(position_m);
         let values = [
             (self.slots.position_demand, units.position(demand_m)),
-            (self.slots.position_internal, whole(position_m * self.parameters.counts_per_m)),
+            (self.slots.position_internal, rounded(position_m * self.parameters.counts_per_m)),
             (self.slots.position_actual, units.position(position_m)),
             (self.slots.velocity_demand, units.velocity(self.motion.demand_m_s())),
             (self.slots.velocity_actual, units.velocity(velocity_m_s)),
-            (self.slots.torque_actual, whole(force_n / self.parameters.force_max_n * 1000.0)),
-            (self.slots.following_error, whole(self.following_error_counts())),
+            (self.slots.torque_actual, rounded(force_n / self.parameters.force_max_n * 1000.0)),
+            (self.slots.following_error, rounded(self.following_error_counts())),
         ];
         for (slot, number) in values {
             self.set(slot, number);

@@ -40,7 +40,7 @@ pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
         default(pdo_map::COMMAND_PDO, TYPE_EVERY_SYNC, &command_map[..]),
         default(PdoNumber::receive(1), TYPE_EVENT, &mode_map[..]),
         default(pdo_map::STATUS_PDO, TYPE_EVERY_SYNC, &pdo_map::STATUS_MAP[..]),
-        default(pdo_map::EXTRA_PDO, TYPE_EVERY_SYNC, &pdo_map::EXTRA_MAP[..]),
+        default(pdo_map::DRIVE_MOTION_PDO, TYPE_EVERY_SYNC, &pdo_map::DRIVE_MOTION_MAP[..]),
         PdoDefault {
             event_ms: DISPLAY_EVENT_MS,
             ..default(PdoNumber::transmit(2), TYPE_EVENT, &display_map[..])
@@ -80,7 +80,7 @@ fn setting(index: u16, sub: u8, value: Value) -> Entry {
 }
 
 fn words_and_options() -> Vec<Entry> {
-    let modes = Mode::Csp.supported_bit() | Mode::Csv.supported_bit();
+    let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.supported_bit());
     vec![
         // 0: nothing, 1: fault, 2: disable voltage, 3: quick stop.
         setting(objects::CONNECTION_LOSS_OPTION, 0, Value::I16(1)).allowing(Allowed::Range(0, 3)),
@@ -105,8 +105,8 @@ fn words_and_options() -> Vec<Entry> {
 }
 
 fn motion(parameters: &DriveParameters) -> Vec<Entry> {
-    let unsigned = |counts: f64| Value::U32(0).with_number(whole(counts));
-    let signed = |counts: f64| Value::I32(0).with_number(whole(counts));
+    let unsigned = |counts: f64| Value::U32(0).with_number(rounded(counts));
+    let signed = |counts: f64| Value::I32(0).with_number(rounded(counts));
     let counts = |value_si: f64| value_si * parameters.counts_per_m;
     let limit = objects::POSITION_LIMIT;
     let period = objects::INTERPOLATION_PERIOD;
@@ -188,7 +188,7 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
 
 /// The whole number nearest to a count, as wide as any object needs.
 #[expect(clippy::cast_possible_truncation, reason = "saturates; no count is NaN")]
-pub(super) fn whole(counts: f64) -> i64 {
+pub(super) fn rounded(counts: f64) -> i64 {
     counts.round() as i64
 }
 

@@ -7,7 +7,7 @@ use ilc_rt::fieldbus::cia402::{objects, pdo_map};
 
 use super::communication::{Communication, Incoming};
 use super::dictionary::{Dictionary, Entry, Mappable, Slot};
-use super::drive_objects::whole;
+use super::drive_objects::rounded;
 use super::standard_objects::{self, PdoDefault};
 use super::value::Value;
 
@@ -99,7 +99,7 @@ impl EncoderNode {
 
     fn show(&mut self) {
         for (slot, position_m) in self.positions.into_iter().zip(self.measured_m) {
-            let counts = whole(position_m * self.counts_per_m);
+            let counts = rounded(position_m * self.counts_per_m);
             self.communication.dictionary_mut().set(slot, counts);
         }
     }

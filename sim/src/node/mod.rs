@@ -16,6 +16,7 @@ pub mod pdo_rules;
 pub mod sdo_server;
 pub mod standard_objects;
 pub mod state_machine;
+mod target;
 pub mod units;
 pub mod value;
 

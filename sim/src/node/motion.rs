@@ -22,7 +22,7 @@ pub struct MotionLimits {
     pub deceleration_max_m_s2: f64,
 }
 
-/// What the drive is doing.
+/// Phase of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Off,
@@ -147,17 +147,17 @@ impl Motion {
         }
     }
 
-    /// Whether a limit of the drive changed the demand.
+    /// Returns whether a limit of the drive changed the demand.
     pub fn is_limited(&self) -> bool {
         self.is_limited
     }
 
-    /// Whether a target is being followed, not a ramp or a hold.
+    /// Returns whether a target is being followed, not a ramp or a hold.
     pub fn follows_target(&self) -> bool {
         matches!(self.phase, Phase::Position { .. } | Phase::Velocity { .. })
     }
 
-    /// Whether there is a ramp under way.
+    /// Returns whether there is a ramp under way.
     pub fn is_ramping(&self) -> bool {
         matches!(self.phase, Phase::Ramp { .. })
     }
@@ -221,9 +221,9 @@ impl Motion {
     /// The speed nearest to `wanted_m_s` that the acceleration limits let the demand have now.
     fn reachable_m_s(&self, wanted_m_s: f64, limits: &MotionLimits, dt_s: f64) -> f64 {
         let speeds_up = wanted_m_s.abs() > self.rate_m_s.abs();
-        let most_m_s2 =
+        let max_m_s2 =
             if speeds_up { limits.acceleration_max_m_s2 } else { limits.deceleration_max_m_s2 };
-        let change_m_s = most_m_s2 * dt_s;
+        let change_m_s = max_m_s2 * dt_s;
         // Compared first: what is within the limits must come out to the last bit.
         if (wanted_m_s - self.rate_m_s).abs() <= change_m_s {
             wanted_m_s
@@ -242,7 +242,7 @@ impl Motion {
         let inside_m = if matches!(self.phase, Phase::Hold { .. }) {
             wanted_m
         } else {
-            // An axis that stands outside the limits stays there until it is told to come back.
+            // An axis that stands outside the limits stays there until it is commanded back.
             let (low_m, high_m) = (
                 limits.position_min_m.min(self.limited_m),
                 limits.position_max_m.max(self.limited_m),

@@ -103,7 +103,7 @@ impl Pdo {
     }
 }
 
-/// What a frame was to the process data.
+/// Meaning of a frame to the process data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// No PDO of this node.
@@ -216,7 +216,7 @@ impl PdoEngine {
         }
     }
 
-    /// Counts time and tells whether an RPDO with a deadline is overdue; each silence is told once.
+    /// Counts time and tells whether an RPDO with a deadline is overdue; each silence is reported once.
     pub fn deadline_passed(&mut self, elapsed_us: u64) -> bool {
         let mut passed = false;
         for pdo in &mut self.receive {
@@ -229,7 +229,7 @@ impl PdoEngine {
         passed
     }
 
-    /// Whether RPDO1 has a deadline: its sender has promised to be cyclic.
+    /// Returns whether RPDO1 has a deadline: its sender has promised to be cyclic.
     pub fn has_deadline(&self) -> bool {
         self.receive[0].event_ms > 0
     }

@@ -1,4 +1,4 @@
-//! Which writes to process-data parameters are refused, and why.
+//! Rules that refuse writes to process-data parameters.
 
 use ilc_rt::fieldbus::canopen::pdo::{COB_INVALID, COB_NO_RTR, Direction, MappedObject, PdoNumber};
 use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
@@ -53,7 +53,7 @@ pub fn check(
     }
 }
 
-/// Whether the PDO exists on the bus.
+/// Returns whether the PDO exists on the bus.
 pub fn is_valid(dictionary: &Dictionary, pdo: PdoNumber) -> bool {
     parameter(dictionary, ObjectAddress::new(pdo.communication_index(), 1)) & COB_INVALID == 0
 }

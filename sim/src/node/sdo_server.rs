@@ -2,12 +2,12 @@
 
 use ilc_rt::fieldbus::canopen::AbortCode;
 use ilc_rt::fieldbus::canopen::sdo::{
-    Expedited, ObjectAddress, SEGMENT_MAX, SdoRequest, SdoResponse, Segment,
+    Data, Expedited, ObjectAddress, SEGMENT_MAX, SdoRequest, SdoResponse, Segment, Turn,
 };
 
 use super::value::{Encoded, TEXT_MAX, Value};
 
-/// What the server reads and writes.
+/// Objects behind the server.
 pub trait Objects {
     /// Reads an object.
     ///
@@ -65,16 +65,20 @@ impl SdoServer {
                 self.transfer = Transfer::None;
                 return None;
             }
-            SdoRequest::UploadInitiate(address) => (address, self.begin_upload(address, objects)),
-            SdoRequest::UploadSegment(toggle) => (self.address(), self.upload_segment(toggle)),
-            SdoRequest::DownloadExpedited(address, data) => {
+            SdoRequest::Upload(Turn::Initiate(address)) => {
+                (address, self.begin_upload(address, objects))
+            }
+            SdoRequest::Upload(Turn::Segment(toggle)) => {
+                (self.address(), self.upload_segment(toggle))
+            }
+            SdoRequest::Download(Data::Expedited(address, data)) => {
                 self.transfer = Transfer::None;
                 (address, write_expedited(address, data, objects))
             }
-            SdoRequest::DownloadInitiate(address, size) => {
+            SdoRequest::Download(Data::Initiate(address, size)) => {
                 (address, self.begin_download(address, size, objects))
             }
-            SdoRequest::DownloadSegment(segment) => {
+            SdoRequest::Download(Data::Segment(segment)) => {
                 (self.address(), self.download_segment(segment, objects))
             }
         };
@@ -99,11 +103,11 @@ impl SdoServer {
         self.transfer = Transfer::None;
         let data = objects.read(address)?.encode();
         if let Some(expedited) = Expedited::new(data.as_bytes()) {
-            return Ok(SdoResponse::UploadExpedited(address, expedited));
+            return Ok(SdoResponse::Upload(Data::Expedited(address, expedited)));
         }
         let size = u32::try_from(data.as_bytes().len()).ok();
         self.transfer = Transfer::Upload { address, data, sent: 0, toggle: false };
-        Ok(SdoResponse::UploadInitiate(address, size))
+        Ok(SdoResponse::Upload(Data::Initiate(address, size)))
     }
 
     fn upload_segment(&mut self, asked_toggle: bool) -> Result<SdoResponse, AbortCode> {
@@ -122,7 +126,7 @@ impl SdoServer {
         if last {
             self.transfer = Transfer::None;
         }
-        Ok(SdoResponse::UploadSegment(segment))
+        Ok(SdoResponse::Upload(Data::Segment(segment)))
     }
 
     fn begin_download(
@@ -138,7 +142,7 @@ impl SdoServer {
         }
         self.transfer =
             Transfer::Download { address, buffer: [0; TEXT_MAX], len: 0, size, toggle: false };
-        Ok(SdoResponse::DownloadInitiate(address))
+        Ok(SdoResponse::Download(Turn::Initiate(address)))
     }
 
     fn download_segment(
@@ -164,7 +168,7 @@ impl SdoServer {
             objects.write(*address, &buffer[..*len])?;
             self.transfer = Transfer::None;
         }
-        Ok(SdoResponse::DownloadSegment(segment.toggle))
+        Ok(SdoResponse::Download(Turn::Segment(segment.toggle)))
     }
 }
 
@@ -178,7 +182,7 @@ fn write_expedited(
     let bytes =
         if data.size_indicated() { data.data() } else { &data.data()[..present.len().min(4)] };
     objects.write(address, bytes)?;
-    Ok(SdoResponse::DownloadInitiate(address))
+    Ok(SdoResponse::Download(Turn::Initiate(address)))
 }
 
 /// The object that a request which cannot be decoded seems to speak of.
@@ -219,14 +223,14 @@ mod tests {
     fn a_repeated_toggle_aborts_the_transfer() {
         let (mut server, mut one) =
             (SdoServer::default(), One(Value::Text(Text::new(b"more than seven"))));
-        ask(&mut server, &mut one, SdoRequest::UploadInitiate(LABEL));
-        ask(&mut server, &mut one, SdoRequest::UploadSegment(false));
+        ask(&mut server, &mut one, SdoRequest::Upload(Turn::Initiate(LABEL)));
+        ask(&mut server, &mut one, SdoRequest::Upload(Turn::Segment(false)));
         assert_eq!(
-            ask(&mut server, &mut one, SdoRequest::UploadSegment(false)),
+            ask(&mut server, &mut one, SdoRequest::Upload(Turn::Segment(false))),
             SdoResponse::Abort(LABEL, AbortCode::ToggleBit)
         );
         assert!(matches!(
-            ask(&mut server, &mut one, SdoRequest::UploadSegment(true)),
+            ask(&mut server, &mut one, SdoRequest::Upload(Turn::Segment(true))),
             SdoResponse::Abort(_, AbortCode::UnknownCommand)
         ));
     }
@@ -235,7 +239,7 @@ mod tests {
     fn a_text_longer_than_the_object_is_refused_at_once() {
         let (mut server, mut one) = (SdoServer::default(), One(Value::Text(Text::new(b""))));
         assert_eq!(
-            ask(&mut server, &mut one, SdoRequest::DownloadInitiate(LABEL, Some(33))),
+            ask(&mut server, &mut one, SdoRequest::Download(Data::Initiate(LABEL, Some(33)))),
             SdoResponse::Abort(LABEL, AbortCode::TooLong)
         );
     }
@@ -243,10 +247,10 @@ mod tests {
     #[test]
     fn fewer_bytes_than_announced_write_nothing() {
         let (mut server, mut one) = (SdoServer::default(), One(Value::Text(Text::new(b"old"))));
-        ask(&mut server, &mut one, SdoRequest::DownloadInitiate(LABEL, Some(9)));
+        ask(&mut server, &mut one, SdoRequest::Download(Data::Initiate(LABEL, Some(9))));
         let segment = Segment::new(false, true, b"short").unwrap();
         assert_eq!(
-            ask(&mut server, &mut one, SdoRequest::DownloadSegment(segment)),
+            ask(&mut server, &mut one, SdoRequest::Download(Data::Segment(segment))),
             SdoResponse::Abort(LABEL, AbortCode::Length)
         );
         assert_eq!(one.0, Value::Text(Text::new(b"old")));

@@ -15,13 +15,13 @@ pub const HISTORY_MAX: u8 = 8;
 /// The power-on setting of a PDO.
 #[derive(Clone, Copy, Debug)]
 pub struct PdoDefault<'a> {
-    /// Which PDO.
+    /// The PDO.
     pub number: PdoNumber,
     /// Transmission type.
     pub transmission: u8,
     /// Event timer, in milliseconds; 0 for none.
     pub event_ms: u16,
-    /// What it carries; nothing makes it invalid.
+    /// Its mapping; empty if it is invalid.
     pub map: &'a [MappedObject],
 }
 

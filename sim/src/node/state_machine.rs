@@ -13,7 +13,7 @@ const ENABLE_OPERATION: u16 = 1 << 3;
 /// Bit 7: fault reset, on its rising edge.
 const FAULT_RESET: u16 = 1 << 7;
 
-/// What a controlword asks for.
+/// Demand of a controlword.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Request {
     DisableVoltage,

@@ -1,7 +1,7 @@
-//! How the axis' own coordinate becomes the numbers on the bus: polarity, factors, units, home offset.
+//! From the coordinate of the axis to the numbers on the bus: polarity, factors, units, home offset.
 
 use super::dictionary::{Dictionary, Slot};
-use super::drive_objects::{DriveSlots, UNIT_COUNTS, whole};
+use super::drive_objects::{DriveSlots, UNIT_COUNTS, rounded};
 use super::motion::MotionLimits;
 
 /// Bit 7 of the polarity: positions count backwards.
@@ -17,7 +17,7 @@ pub struct Units {
     position_per_m: f64,
     velocity_per_m: f64,
     home_offset: i64,
-    /// Where positions wrap round, if they do.
+    /// Range after which positions wrap, if they do.
     range: Option<(i64, i64)>,
     limits: MotionLimits,
     quick_deceleration_m_s2: f64,
@@ -107,7 +107,7 @@ impl Units {
 
     /// A position as the drive shows it.
     pub(super) fn position(&self, position_m: f64) -> i64 {
-        let shown = whole(position_m * self.position_per_m) - self.home_offset;
+        let shown = rounded(position_m * self.position_per_m) - self.home_offset;
         match self.range {
             Some((low, high)) => low + (shown - low).rem_euclid(high - low + 1),
             None => shown,
@@ -126,7 +126,7 @@ impl Units {
 
     /// A velocity as the drive shows it.
     pub(super) fn velocity(&self, velocity_m_s: f64) -> i64 {
-        whole(velocity_m_s * self.velocity_per_m)
+        rounded(velocity_m_s * self.velocity_per_m)
     }
 
     /// The velocity that a number stands for.
@@ -135,7 +135,7 @@ impl Units {
     }
 }
 
-/// What one metre is in a unit of 0x60A8 or 0x60A9: counts, or metres with a prefix.
+/// One metre in a unit of 0x60A8 or 0x60A9: counts, or metres with a prefix.
 fn per_m(unit: i64, counts_per_m: f64) -> f64 {
     let [.., numerator, prefix] = u32::try_from(unit).unwrap_or(UNIT_COUNTS).to_le_bytes();
     if numerator == 0x01 { 10.0_f64.powi(-i32::from(prefix.cast_signed())) } else { counts_per_m }

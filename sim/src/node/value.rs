@@ -71,7 +71,7 @@ impl Value {
         }
     }
 
-    /// Whether there is nothing to send: an empty text.
+    /// Returns whether there is nothing to send: an empty text.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -138,8 +138,8 @@ impl Value {
     pub fn with_number(&self, number: i64) -> Self {
         macro_rules! nearest {
             ($variant:ident, $kind:ty) => {{
-                let held = number.clamp(i64::from(<$kind>::MIN), i64::from(<$kind>::MAX));
-                Self::$variant(<$kind>::try_from(held).unwrap_or_default())
+                let clamped = number.clamp(i64::from(<$kind>::MIN), i64::from(<$kind>::MAX));
+                Self::$variant(<$kind>::try_from(clamped).unwrap_or_default())
             }};
         }
         match self {

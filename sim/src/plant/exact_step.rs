@@ -17,19 +17,19 @@ pub struct Mechanics {
     pub carriage_kg: f64,
     /// Mass of the mode; 0 for none.
     pub mode_kg: f64,
-    /// Natural angular frequency of the mode with the carriage held.
+    /// Natural angular frequency of the mode with the carriage locked.
     pub mode_rad_s: f64,
-    /// Damping ratio of the mode with the carriage held.
+    /// Damping ratio of the mode with the carriage locked.
     pub mode_damping: f64,
 }
 
-/// `z⁺ = A z + B F` for a free carriage, and the deflection's part of it for a held one.
+/// `z⁺ = A z + B F` for a free carriage, and the deflection's part of it for a locked one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ExactStep {
     pub(super) dt_s: f64,
     free: [[f64; 4]; 4],
     force: [f64; 4],
-    held: [[f64; 2]; 2],
+    locked: [[f64; 2]; 2],
     stiffness_n_m: f64,
     damping_n_s_m: f64,
 }
@@ -52,12 +52,12 @@ impl ExactStep {
         let mut fixed: Matrix = [[0.0; SIDE]; SIDE];
         fixed[2][3] = 1.0;
         (fixed[3][2], fixed[3][3]) = (-own_stiffness, -own_damping);
-        let held = exponential(&fixed, dt_s);
+        let locked = exponential(&fixed, dt_s);
         Self {
             dt_s,
             free: std::array::from_fn(|row| std::array::from_fn(|column| free[row][column])),
             force: std::array::from_fn(|row| free[row][4]),
-            held: [[held[2][2], held[2][3]], [held[3][2], held[3][3]]],
+            locked: [[locked[2][2], locked[2][3]], [locked[3][2], locked[3][3]]],
             stiffness_n_m: stiffness,
             damping_n_s_m: damping,
         }
@@ -74,9 +74,9 @@ impl ExactStep {
         next
     }
 
-    /// The state after a step with the carriage held where it is.
-    pub(super) fn held(&self, z: &State) -> State {
-        let [[a, b], [c, d]] = self.held;
+    /// The state after a step with the carriage locked where it is.
+    pub(super) fn locked(&self, z: &State) -> State {
+        let [[a, b], [c, d]] = self.locked;
         [z[0], 0.0, a * z[2] + b * z[3], c * z[2] + d * z[3]]
     }
 
@@ -93,7 +93,7 @@ impl ExactStep {
 
 /// `e^{M t}` by scaling, a Taylor series and squaring.
 fn exponential(rates: &Matrix, t_s: f64) -> Matrix {
-    let largest = rates.iter().flatten().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let largest = rates.iter().flatten().fold(0.0_f64, |max, value| max.max(value.abs()));
     let mut squarings = 0;
     let mut step_s = t_s;
     while largest * step_s.abs() > 0.05 && squarings < 60 {
@@ -176,7 +176,7 @@ mod tests {
         let period = std::f64::consts::TAU / damped_rad_s;
         let mut z = [0.0, 0.0, 1e-3, -0.1 * 125.66 * 1e-3];
         for n in 1..=8000_u32 {
-            z = step.held(&z);
+            z = step.locked(&z);
             let t = f64::from(n) * 125e-6;
             let expected = 1e-3 * (-0.1 * 125.66 * t).exp() * (damped_rad_s * t).cos();
             assert!((z[2] - expected).abs() < 1e-12, "at {t} s of period {period}");

@@ -35,7 +35,7 @@ impl Friction {
         let (sign, sliding_n) = if z[1] == 0.0 {
             let driving_n = motor_n + step.mode_force_n(z);
             if driving_n.abs() <= static_n {
-                return step.held(z);
+                return step.locked(z);
             }
             (driving_n.signum(), static_n)
         } else {

@@ -20,13 +20,13 @@ pub struct GantryAxis {
     mechanics: Mechanics,
     friction: Friction,
     drive: DriveLoop,
-    /// What the motor can do at most; the drive may allow it less.
+    /// Largest force of the motor; the drive may allow less.
     force_max_n: f64,
     step: ExactStep,
     state: State,
     integral_n: f64,
     force_n: f64,
-    /// What the encoder shows above the truth in this step.
+    /// Error of the encoder in this step.
     noise_m: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What the simulated drives move: mechanics with the drives' own control loops.
+//! Plants of the simulated drives: mechanics with the drives' own control loops.
 //!
 //! A plant knows physics and nothing of buses or counts; the drives of the simulator own one and
 //! step it, and tests put one directly under a controller.
@@ -11,21 +11,21 @@ mod noise;
 
 pub use gantry::{Gantry, GantryAxis};
 
-/// What a drive wants of its motor during one step.
+/// Demand of a drive on its motor during one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Demand {
     /// No force and the brake on: the axis holds still.
     Off,
     /// Follow a position; the velocity is a feed-forward, normally 0.
     Position {
-        /// Where to be.
+        /// Target position.
         position_m: f64,
         /// Added to the velocity that the position controller asks for.
         velocity_m_s: f64,
     },
     /// Follow a velocity.
     Velocity {
-        /// How fast to move.
+        /// Target velocity.
         velocity_m_s: f64,
     },
 }

@@ -1,25 +1,25 @@
-//! The cases that property tests draw: the same in every run, or new ones for `make fuzz`.
+//! The cases that property tests draw: fixed ones, or new ones for `make fuzz`.
 //!
 //! A change is judged by fixed problems, so that a test that passed here passes everywhere. New
-//! problems are looked for on purpose: `make fuzz` sets `ILC_FUZZ_SEED`, a different number every
-//! time. What it finds is written, one line a case, to the file of regressions beside the test;
-//! from then on every run tries that case first.
+//! problems are searched for on purpose: `make fuzz` sets `ILC_FUZZ_SEED` to a different number
+//! every time. A failing case is written, one line per case, to the regression file beside the
+//! test; every later run tries it first.
 
 use proptest::test_runner::{Config, FileFailurePersistence, RngSeed};
 
-/// The variable by which `make fuzz` asks for other problems.
+/// Environment variable with the seed of `make fuzz`.
 pub const SEED_VARIABLE: &str = "ILC_FUZZ_SEED";
 
 /// The seed of every property test.
 const SEED: u64 = 20_261_128;
 
-/// How many cases a test draws that does not say it.
+/// Default number of cases of a test.
 pub const CASES: u32 = 256;
 
-/// Returns the configuration of a property test of so many cases.
+/// Returns the configuration of a property test with `cases` cases.
 ///
 /// # Panics
-/// If `ILC_FUZZ_SEED` is no whole number from 0 to 2^64 - 1.
+/// If `ILC_FUZZ_SEED` is not a whole number from 0 to 2^64 - 1.
 pub fn cases(cases: u32) -> Config {
     Config {
         cases,
@@ -32,7 +32,7 @@ pub fn cases(cases: u32) -> Config {
 /// Returns the seed of this run: the fixed one, or that of `make fuzz`.
 ///
 /// # Panics
-/// If `ILC_FUZZ_SEED` is no whole number from 0 to 2^64 - 1.
+/// If `ILC_FUZZ_SEED` is not a whole number from 0 to 2^64 - 1.
 pub fn seed() -> u64 {
     match std::env::var(SEED_VARIABLE) {
         Err(_) => SEED,

@@ -1,10 +1,10 @@
-//! Property tests draw the same cases in every run: each says so by `ilc_cases::cases`.
+//! Property tests draw fixed cases: each one must use `ilc_cases::cases`.
 
 #![allow(clippy::unwrap_used, reason = "a test fails where a file is not there")]
 
 use std::path::{Path, PathBuf};
 
-/// Where Rust is written.
+/// Folders with Rust sources.
 const FOLDERS: [&str; 3] = ["crates", "sim", "tests"];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -20,7 +20,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
 
 #[test]
 fn every_property_test_names_its_cases() {
-    // Asked when it runs: the target folder may have been filled by another checkout.
+    // Read at run time: the target folder may have been filled by another checkout.
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap()).join("../..");
     let mut files = Vec::new();
     for folder in FOLDERS {

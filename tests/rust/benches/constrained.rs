@@ -1,5 +1,5 @@
-//! Speed of the law with bounds, at the length of a campaign's run: one axis, two that do not act on
-//! each other, and two that do; from scratch, and from the last solution.
+//! Speed of the law with bounds, at the length of a campaign's run: one axis, two uncoupled axes
+//! and two coupled ones; cold start and warm start from the last solution.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -20,7 +20,7 @@ fn within(size: f64) -> Option<Bound> {
     Some(Bound::within(-size, size))
 }
 
-/// The largest magnitude of a difference of the given order.
+/// Largest magnitude of a difference of the given order.
 fn largest(values: &[f64], width: usize, order: usize) -> f64 {
     let mut values = values.to_vec();
     for _ in 0..order {

@@ -1,7 +1,7 @@
-//! Speed of the learning kernel, each figure beside the limit that it is measured against.
+//! Speed of the learning kernel, each figure relative to its bound.
 //!
-//! `update` beside `memcpy` of the same signals; the varying sweep beside a `triad` over as many
-//! bytes; the dense solution with its factor kept beside the sweep.
+//! `update` relative to `memcpy` of the same signals; the time-varying sweep relative to a `triad`
+//! over as many bytes; the dense solution with its factor kept relative to the sweep.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -78,7 +78,7 @@ fn invariant(criterion: &mut Criterion) -> Outcome {
     Ok(())
 }
 
-/// Two axes that a weight couples: gains at every sample.
+/// Two axes coupled by a weight: different gains at every sample.
 fn varying(criterion: &mut Criterion) -> Outcome {
     let model = axis()?.append(&axis()?)?;
     let mut group = criterion.benchmark_group("contour weight, two axes");
@@ -127,7 +127,7 @@ fn varying(criterion: &mut Criterion) -> Outcome {
     Ok(())
 }
 
-/// The textbook's way: the normal equations once, then a solution with their factor.
+/// The textbook method: the normal equations factorised once, then one solution per update.
 fn dense(criterion: &mut Criterion) -> Outcome {
     let model = axis()?;
     let mut group = criterion.benchmark_group("dense");

@@ -1,5 +1,5 @@
-//! Speed of the main job, as ratios measured in one run: the learning update against the dense
-//! solution, and a campaign in lock-step against the time that it stands for.
+//! Speed of the main job, as ratios measured in one run: the learning update relative to the dense
+//! solution, and a campaign in lock-step relative to the machine time it represents.
 
 #![expect(clippy::print_stdout, reason = "a benchmark tells what it measured")]
 
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The middle of several times of `work`.
+/// Median time of `work`.
 fn median(mut work: impl FnMut()) -> Duration {
     let mut times: Vec<Duration> = (0..REPEATS)
         .map(|_| {
@@ -49,7 +49,7 @@ fn update_against_dense() -> Result<(), Box<dyn Error>> {
     let two = time_update(&axis.append(&axis)?, weights, 2)?;
     println!("update, N = {N_SAMPLES}: {one:.1?} for one axis, {two:.1?} for two");
 
-    // The textbook's way: H = P'P + d^2 D'D once, then a solution with its factor for each update.
+    // The textbook method: H = P'P + d^2 D'D factorised once, then one solution per update.
     let plant = axis.lifted(N_SAMPLES + 1)?.view((1, 0), (N_SAMPLES, N_SAMPLES)).into_owned();
     let difference = DMatrix::from_fn(N_SAMPLES - 1, N_SAMPLES, |row, column| match column {
         _ if column == row => -1.0,
@@ -80,7 +80,8 @@ fn time_update(
     let mut next = input.clone();
     law.update(&input, &error, &mut next)?;
     Ok(median(|| {
-        // Refused only for wrong lengths and numbers, which the update above has shown to be right.
+        // Fails only for wrong lengths and non-finite numbers, which the update above has ruled
+        // out.
         let _ = law.update(&input, &error, &mut next);
         std::hint::black_box(&next);
     }))

@@ -1,5 +1,5 @@
 //! Speed of learning from many past runs, as ratios measured in one run: the 30 most relevant ones
-//! against all of them, and many against few.
+//! relative to all of them, and many relative to few.
 
 #![expect(clippy::print_stdout, reason = "a benchmark tells what it measured")]
 
@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Numbers from -1 to 1, the same in every run of the benchmark.
+/// Pseudo-random numbers from -1 to 1, the same in every run of the benchmark.
 struct Random(u64);
 
 impl Random {

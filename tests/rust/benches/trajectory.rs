@@ -1,4 +1,4 @@
-//! Computing time of a move, kind by kind: what a planner costs between two ticks, or before a run.
+//! Planning time of a move, kind by kind: between two ticks, or before a run.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use ilc_rt::trajectory::curve::{Butterfly, Run, RunLimits};
@@ -37,7 +37,7 @@ fn moves(criterion: &mut Criterion) {
 
 fn curves(criterion: &mut Criterion) {
     let limits =
-        RunLimits { feed_m_s: 0.004, curvature_acceleration_m_s2: 0.02, axes: vec![LIMITS; 2] };
+        RunLimits { feed_m_s: 0.004, curvature_acceleration_max_m_s2: 0.02, axes: vec![LIMITS; 2] };
     let mut group = criterion.benchmark_group("curve");
     group.sample_size(10);
     group.bench_function("butterfly: plan", |bench| {

@@ -1,4 +1,4 @@
-//! Whole campaigns: the course, the loop, the law and the library, on simulated drives.
+//! Whole campaigns on simulated drives: trajectory, loop, law and library.
 
 use std::path::PathBuf;
 
@@ -13,13 +13,13 @@ use ilc_sim::{ClockMode, Machine};
 
 use crate::Scratch;
 
-/// Frames that the machine's answers to one frame may be.
+/// Largest number of the machine's answers to one frame.
 const ANSWERS: usize = 256;
 
 /// The simulated machine of a cell, in lock-step.
 ///
 /// # Panics
-/// If the cell was not validated.
+/// If the cell is invalid.
 pub fn machine(cell: &Cell) -> Machine {
     Machine::from_cell(cell, ClockMode::LockStep).expect("a validated cell")
 }
@@ -29,19 +29,19 @@ pub fn in_process(cell: &Cell) -> Box<dyn Bus> {
     Box::new(InProcess::new(machine(cell), ANSWERS))
 }
 
-/// A campaign in lock-step, without telemetry.
+/// Options of a campaign in lock-step, without telemetry.
 pub fn options(library: PathBuf, iterations: u32) -> Options {
     let mut options: Options = parse(&["--lockstep".into(), "--no-telemetry".into()]).unwrap();
     (options.iterations, options.session.library) = (iterations, library);
     options
 }
 
-/// What a campaign left behind.
+/// The result of a campaign.
 #[derive(Clone, Debug)]
 pub struct Kept {
-    /// What the campaign ended with.
+    /// Outcome of the campaign.
     pub outcome: Outcome,
-    /// Digest of each run, as the library has it and as its arrays give it.
+    /// Digest of each run, as stored in the library and verified against its arrays.
     pub digests: Vec<String>,
 }
 
@@ -55,17 +55,17 @@ impl Kept {
         self.outcome.runs.iter().map(|(_, figures)| of(figures)).collect()
     }
 
-    /// By how much the contour error has fallen from the first run to run `index`, as a share.
+    /// Reduction of the contour error from the first run to run `index`, as a share.
     pub fn contour_fall(&self, index: usize) -> f64 {
         let contour_m = self.contour_m();
         1.0 - contour_m[index] / contour_m[0]
     }
 }
 
-/// Runs a campaign with the cell's own law and reads back what the library has of it.
+/// Runs a campaign with the cell's own law and reads the library back.
 ///
 /// # Panics
-/// If the campaign or the library refuses.
+/// If the campaign or the library fails.
 pub fn run_on(cell: &Cell, bus: Box<dyn Bus>, iterations: u32, measure: Option<Measure>) -> Kept {
     let scratch = Scratch::new();
     let library = scratch.file("library.db");
@@ -84,7 +84,7 @@ pub fn run_on(cell: &Cell, bus: Box<dyn Bus>, iterations: u32, measure: Option<M
 /// Runs a campaign on the machine in the caller's thread.
 ///
 /// # Panics
-/// If the campaign or the library refuses.
+/// If the campaign or the library fails.
 pub fn run(cell: &Cell, iterations: u32, measure: Option<Measure>) -> Kept {
     run_on(cell, in_process(cell), iterations, measure)
 }

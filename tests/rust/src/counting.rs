@@ -1,7 +1,7 @@
-//! An allocator that counts, for tests that promise not to allocate.
+//! A counting allocator, for tests of code that must not allocate.
 //!
-//! A test makes it its own with
-//! `#[global_allocator] static ALLOCATOR: Counting = Counting;`, and compares counts.
+//! A test installs it with `#[global_allocator] static ALLOCATOR: Counting = Counting;`, and
+//! compares counts.
 
 #![expect(unsafe_code, reason = "a global allocator is an unsafe trait")]
 
@@ -15,27 +15,27 @@ thread_local! {
     static DEALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counting the requests of each thread.
+/// The system allocator, with a count of each thread's requests.
 #[derive(Clone, Copy, Debug)]
 pub struct Counting;
 
-/// Allocations of this thread so far; a reallocation is one.
+/// Returns the allocations of this thread so far; a reallocation counts as one.
 pub fn allocations() -> u64 {
     ALLOCATIONS.get()
 }
 
-/// Deallocations of this thread so far; a reallocation is one.
+/// Returns the deallocations of this thread so far; a reallocation counts as one.
 pub fn deallocations() -> u64 {
     DEALLOCATIONS.get()
 }
 
 fn count(what: &'static LocalKey<Cell<u64>>) {
-    // Gone when a thread ends; what is allocated then is nobody's to count.
+    // The counter is gone while a thread ends; allocations of that phase are not counted.
     let _ = what.try_with(|count| count.set(count.get() + 1));
 }
 
-// SAFETY: every call is handed to the system allocator unchanged; counting touches no memory but
-// thread-local cells that need no set-up.
+// SAFETY: every call is forwarded to the system allocator unchanged; counting touches only
+// thread-local cells that need no initialisation.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(&ALLOCATIONS);

@@ -1,13 +1,11 @@
-//! Parts of documents that derive from the source: compared, or with `ILC_DERIVE=1` written again.
+//! Parts of documents that are derived from the source: compared, or rewritten with `ILC_DERIVE=1`.
 
-use std::path::Path;
-
-/// Holds the part of a document between `<!-- derived: NAME -->` and `<!-- end -->` against `text`.
+/// Compares the part of a document between `<!-- derived: NAME -->` and `<!-- end -->` with `text`.
 ///
 /// # Panics
-/// If they differ, or the document has no such part.
+/// If they differ, or the document lacks this part.
 pub fn hold_derived(document: &str, name: &str, text: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(document);
+    let path = crate::root().join(document);
     let whole = std::fs::read_to_string(&path).expect("the document is there");
     let begin = format!("<!-- derived: {name} -->\n");
     let from =
@@ -18,8 +16,24 @@ pub fn hold_derived(document: &str, name: &str, text: &str) {
     }
     assert!(
         std::env::var_os("ILC_DERIVE").is_some(),
-        "{document}: {name} is not what the source says; `ILC_DERIVE=1 cargo test` writes it"
+        "{document}: {name} is not what the source says; `make derived` writes it"
     );
     let written = format!("{}{text}{}", &whole[..from], &whole[from + len..]);
     std::fs::write(&path, written).expect("the document can be written");
+}
+
+/// Holds a whole derived file against `text`.
+///
+/// # Panics
+/// If they differ.
+pub fn hold_derived_file(document: &str, text: &str) {
+    let path = crate::root().join(document);
+    if std::fs::read_to_string(&path).is_ok_and(|found| found == text) {
+        return;
+    }
+    assert!(
+        std::env::var_os("ILC_DERIVE").is_some(),
+        "{document} is not what the source says; `make derived` writes it"
+    );
+    std::fs::write(&path, text).expect("the file can be written");
 }

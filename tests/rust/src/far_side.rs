@@ -1,4 +1,4 @@
-//! The simulated machine on a bus, in a thread of its own.
+//! The simulated machine on a bus, in its own thread.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,10 +9,10 @@ use ilc_rt::fieldbus::transport::Responder;
 use ilc_rt::fieldbus::{Bus, BusError};
 use ilc_sim::Machine;
 
-/// How often the thread looks whether it shall end; frames are answered at once.
+/// Interval at which the thread checks for its end; frames are answered at once.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// A machine that serves a bus until this is dropped.
+/// A machine that serves a bus until dropped.
 #[derive(Debug)]
 pub struct FarSide {
     over: Arc<AtomicBool>,
@@ -20,12 +20,12 @@ pub struct FarSide {
 }
 
 impl FarSide {
-    /// Begins to serve.
+    /// Starts serving.
     pub fn serve(bus: Box<dyn Bus>, machine: Machine) -> Self {
         Self::serve_with(bus, machine, |_| {})
     }
 
-    /// Begins to serve, with `meddle` called before each frame.
+    /// Starts serving; `meddle` is called before each frame.
     pub fn serve_with(
         mut bus: Box<dyn Bus>,
         mut machine: Machine,
@@ -41,7 +41,8 @@ impl FarSide {
                 let mut answers = Vec::new();
                 machine.receive(&frame, &mut |answer| answers.push(answer));
                 for answer in answers {
-                    // A transport that is full for a moment loses the frame; lock-step must not.
+                    // A transport with a full queue drops the frame for a moment; lock-step must
+                    // not lose it.
                     while bus.send(&answer) == Err(BusError::Full) {
                         std::thread::yield_now();
                     }

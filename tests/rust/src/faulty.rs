@@ -1,5 +1,5 @@
-//! A bus that does to frames what a bad line, a switch or a stranger does: by seed, so that the same
-//! misfortune can be had again.
+//! A bus with injected faults, as from a bad line, a switch or a foreign node; reproducible by
+//! seed.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -9,20 +9,20 @@ use ilc_rt::fieldbus::{Bus, BusError, Frame};
 
 use crate::rig::node;
 
-/// SYNCs after which a campaign of a test is over, whatever happens: beyond it, it hangs.
+/// Limit on the SYNCs of a test campaign: beyond it, the campaign hangs.
 const SYNCS_MAX: u32 = 60_000;
 
-/// Numbers from a seed (the generator `SplitMix64`).
+/// Pseudo-random numbers from a seed (`SplitMix64`).
 #[derive(Clone, Debug)]
 pub struct Draws(u64);
 
 impl Draws {
-    /// Begins at a seed.
+    /// Creates the generator from a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// A number of 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
@@ -31,51 +31,51 @@ impl Draws {
         z ^ (z >> 31)
     }
 
-    /// A number below `n`, 0 if `n` is.
+    /// Returns a number below `n`; 0 if `n` is 0.
     pub fn below(&mut self, n: usize) -> usize {
         usize::try_from(self.bits() % (n.max(1) as u64)).unwrap_or(0)
     }
 
-    /// True with a probability.
+    /// Returns true with a probability.
     pub fn chance(&mut self, probability: f64) -> bool {
         ((self.bits() >> 11) as f64) < probability * (1_u64 << 53) as f64
     }
 
-    /// A random byte.
+    /// Returns a random byte.
     pub fn byte(&mut self) -> u8 {
         self.bits().to_le_bytes()[0]
     }
 }
 
-/// Whose frames suffer.
+/// Direction of the affected frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// What the nodes say.
+    /// Frames of the nodes.
     ToController,
-    /// What the controller says.
+    /// Frames of the controller.
     ToNodes,
 }
 
-/// What happens to a frame, each with its probability.
+/// Probability of each fault of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Faults {
-    /// It is gone.
+    /// Loss.
     pub loss: f64,
-    /// It comes some SYNCs later.
+    /// Delay by some SYNCs.
     pub delay: f64,
-    /// Most SYNCs by which it is late.
+    /// Largest delay in SYNCs.
     pub delay_syncs_max: usize,
-    /// It comes twice.
+    /// Duplication.
     pub duplication: f64,
-    /// It changes places with the next one.
+    /// Reordering with the next frame.
     pub reordering: f64,
-    /// A bit of its payload is another, or its end is missing.
+    /// Corruption: a flipped bit in the payload, or a truncated one.
     pub corruption: f64,
-    /// With each SYNC: a frame that is none of the controller's or of its nodes'.
+    /// Per SYNC: a frame of neither the controller nor its nodes.
     pub foreign: f64,
 }
 
-/// A bus with faults, from one SYNC to another.
+/// A bus with faults between two SYNC counts.
 pub struct FaultyBus {
     inner: Box<dyn Bus>,
     faults: Faults,
@@ -83,11 +83,11 @@ pub struct FaultyBus {
     during: std::ops::Range<u32>,
     draws: Draws,
     n_syncs: u32,
-    /// To the controller, next first.
+    /// Frames for the controller, next first.
     ready: VecDeque<Frame>,
-    /// Frames that wait for a SYNC, whichever way they go.
+    /// Frames held until a SYNC, in either direction.
     late: Vec<(u32, Frame)>,
-    /// The one that lets the next one go first.
+    /// The frame that the next one overtakes.
     overtaken: Option<Frame>,
 }
 
@@ -101,7 +101,7 @@ impl std::fmt::Debug for FaultyBus {
 }
 
 impl FaultyBus {
-    /// Puts faults on a bus while the number of SYNCs is in `during`.
+    /// Injects faults on a bus while the number of SYNCs is in `during`.
     pub fn new(
         inner: Box<dyn Bus>,
         faults: Faults,
@@ -126,7 +126,7 @@ impl FaultyBus {
         self.way == way && self.during.contains(&self.n_syncs)
     }
 
-    /// What becomes of a frame: those that arrive now, in order.
+    /// Applies faults to a frame; returns the frames that arrive now, in order.
     fn suffer(&mut self, frame: Frame) -> Vec<Frame> {
         let faults = self.faults;
         if self.draws.chance(faults.loss) {
@@ -155,7 +155,7 @@ impl FaultyBus {
         arriving
     }
 
-    /// Frames whose time has come.
+    /// Returns the delayed frames that are due.
     fn due(&mut self) -> Vec<Frame> {
         let now = self.n_syncs;
         let (due, late): (Vec<_>, Vec<_>) = self.late.drain(..).partition(|(when, _)| *when <= now);
@@ -205,7 +205,7 @@ impl Bus for FaultyBus {
                     self.ready.extend(arriving);
                 }
                 Some(frame) => return Ok(Some(frame)),
-                // Nothing came to overtake it.
+                // No frame came to overtake it.
                 None if self.way == Way::ToController => return Ok(self.overtaken.take()),
                 None => return Ok(None),
             }
@@ -213,7 +213,7 @@ impl Bus for FaultyBus {
     }
 }
 
-/// The frame with one bit changed, or cut short.
+/// Returns the frame with one bit flipped, or truncated.
 fn corrupted(frame: &Frame, draws: &mut Draws) -> Frame {
     let mut payload = frame.payload().to_vec();
     if payload.is_empty() || draws.chance(0.2) {
@@ -225,8 +225,8 @@ fn corrupted(frame: &Frame, draws: &mut Draws) -> Frame {
     Frame::new(frame.id(), &payload).unwrap_or(*frame)
 }
 
-/// A frame of somebody else's node or program: no SYNC, no NMT command and no identifier of ours, which
-/// would be another master.
+/// Returns a frame of a foreign node or program: no SYNC, no NMT command and no identifier of ours,
+/// which would be another master.
 fn foreign(draws: &mut Draws) -> Frame {
     let stranger = node(u8::try_from(20 + draws.below(100)).unwrap_or(20));
     let mut payload = [0; 8];

@@ -1,7 +1,7 @@
-//! Shared set-up of the integration tests: the example cells, whole campaigns on simulated drives, and
-//! a servo cycle that is ticked by hand.
+//! Shared set-up of the integration tests: the example cells, whole campaigns on simulated drives,
+//! and a servo cycle ticked by hand.
 //!
-//! [`campaign`] runs the supervisor as a user does; [`far_side`] puts the simulated machine on a bus in
+//! [`campaign`] runs a campaign as a user does; [`far_side`] puts the simulated machine on a bus in
 //! a thread of its own; [`rig`] is the loop alone, on a bus that records every command and lets a test
 //! break things in the middle of a run; [`faulty`] is a bus that loses, delays and spoils frames by seed;
 //! [`counting`] is an allocator that counts; [`source`] reads the project's own source.
@@ -21,22 +21,23 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use ilc_rt::config::Cell;
 
-/// The root of this checkout.
+pub use derived::{hold_derived, hold_derived_file};
+
+/// Returns the root of this checkout.
 ///
-/// Asked of cargo when the test runs: one target folder may serve several checkouts, and a test that
-/// was built in another one must still look at its own.
+/// Asked of cargo at run time: one target folder may serve several checkouts, and a test built in
+/// another one must still look at its own.
 pub fn root() -> PathBuf {
     let compiled = env!("CARGO_MANIFEST_DIR").into();
     PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or(compiled)).join("../..")
 }
-pub use derived::hold_derived;
 
-/// The path of an example, as `01_gantry.toml`.
+/// Returns the path of an example, e.g. `01_gantry.toml`.
 pub fn example_path(name: &str) -> PathBuf {
     root().join("examples").join(name)
 }
 
-/// The text of an example.
+/// Returns the text of an example.
 ///
 /// # Panics
 /// If there is no such example.
@@ -44,18 +45,18 @@ pub fn example_text(name: &str) -> String {
     std::fs::read_to_string(example_path(name)).expect("the example is there")
 }
 
-/// An example, validated.
+/// Returns a validated example.
 ///
 /// # Panics
-/// If the example is not valid.
+/// If the example is invalid.
 pub fn example(name: &str) -> Cell {
     Cell::load(&example_path(name)).expect("the example is valid")
 }
 
-/// The gantry on a program of two short moves, where a run is over in 0.7 s.
+/// Returns the gantry with a program of two short moves: a run takes 0.7 s.
 ///
 /// # Panics
-/// If the example is not valid.
+/// If the example is invalid.
 pub fn short(name: &str) -> Cell {
     let text = example_text(name);
     let program = text.find("[[program.segment]]").expect("a program");
@@ -66,15 +67,15 @@ pub fn short(name: &str) -> Cell {
     Cell::parse(&text, name).expect("the shortened example is valid")
 }
 
-/// A folder that is gone when dropped.
+/// A temporary folder, deleted when dropped.
 #[derive(Debug)]
 pub struct Scratch(PathBuf);
 
 impl Scratch {
-    /// A new, empty folder.
+    /// Creates an empty folder.
     ///
     /// # Panics
-    /// If it cannot be made.
+    /// If it cannot be created.
     pub fn new() -> Self {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -83,7 +84,7 @@ impl Scratch {
         Self(path)
     }
 
-    /// A file in it.
+    /// Returns the path of a file in it.
     pub fn file(&self, name: &str) -> PathBuf {
         self.0.join(name)
     }

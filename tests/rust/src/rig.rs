@@ -1,4 +1,4 @@
-//! The servo cycle alone, ticked by hand, on a bus that records and that can be meddled with.
+//! The servo cycle alone, ticked by hand, on a bus that records and that a test can interfere with.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicI32, Ordering};
@@ -10,7 +10,7 @@ use ilc_rt::config::Cell;
 use ilc_rt::design::Plan;
 use ilc_rt::fieldbus::bring_up::{bring_up, bring_up_encoder};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, State};
+use ilc_rt::fieldbus::cia402::{CommandRpdo1, State};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};
@@ -18,25 +18,25 @@ use ilc_sim::Machine;
 
 use crate::campaign::machine;
 
-/// Room for the records of a test; nothing is allocated while it is not used up.
+/// Reserved size of a test's records; within it, nothing is allocated.
 const ROWS: usize = 200_000;
-/// Room for answers and for frames that a test puts on the bus.
+/// Reserved number of answers and of frames that a test puts on the bus.
 const FRAMES: usize = 256;
 
-/// What went out with one SYNC: the last command of each axis.
+/// Commands sent with one SYNC: the last one of each axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
-    /// Target of each axis, counts or counts per second.
+    /// Target of each axis, in counts or counts per second.
     pub target_counts: Vec<i32>,
     /// Controlword of each axis.
     pub controlword: Vec<u16>,
 }
 
-/// What a test does to the machine; frames it hands over go to the controller.
+/// An action on the machine; frames it emits go to the controller.
 pub type Meddle = Box<dyn FnOnce(&mut Machine, &mut dyn FnMut(Frame)) + Send>;
 
-/// What a test does to the answers on their way to the controller: it is given the count of SYNCs so far
-/// and a frame, and puts into the queue what arrives.
+/// A distortion of the answers on their way to the controller: receives the count of SYNCs so far
+/// and a frame, and queues the frames that arrive.
 pub type Distort = Box<dyn FnMut(usize, Frame, &mut VecDeque<Frame>) + Send>;
 
 /// The bus between loop and machine.
@@ -49,38 +49,38 @@ pub struct Line {
     injected: VecDeque<Frame>,
     meddle: Option<(u32, Meddle)>,
     distort: Option<Distort>,
-    /// Axis by axis, SYNC by SYNC: where the plant was when the SYNC had been answered.
+    /// Axis by axis, SYNC by SYNC: position of the plant after the SYNC was answered.
     plant_m: Vec<f64>,
 }
 
 impl Line {
-    /// The machine, to look at.
+    /// Returns the machine, for inspection.
     pub fn machine(&self) -> &Machine {
         self.bus.responder()
     }
 
-    /// Does something to the machine now.
+    /// Acts on the machine now.
     pub fn meddle(&mut self, meddle: impl FnOnce(&mut Machine, &mut dyn FnMut(Frame))) {
         let injected = &mut self.injected;
         meddle(self.bus.responder_mut(), &mut |frame| injected.push_back(frame));
     }
 
-    /// Does something to the machine just before the n-th SYNC from now.
+    /// Acts on the machine just before the n-th SYNC from now.
     pub fn meddle_after(&mut self, n_syncs: u32, meddle: Meddle) {
         self.meddle = Some((n_syncs, meddle));
     }
 
-    /// Does something to every answer from now on.
+    /// Distorts every answer from now on.
     pub fn distort(&mut self, distort: Distort) {
         self.distort = Some(distort);
     }
 
-    /// Where an axis of the plant truly was, SYNC by SYNC.
+    /// Returns the true position of an axis of the plant, SYNC by SYNC.
     pub fn plant_m(&self, axis: usize) -> Vec<f64> {
         self.plant_m.chunks(self.nodes.len()).map(|row| row[axis]).collect()
     }
 
-    /// What went out with each SYNC.
+    /// Returns the commands sent with each SYNC.
     pub fn rows(&self) -> impl Iterator<Item = Row> {
         self.rows.chunks(self.nodes.len()).map(|row| Row {
             target_counts: row.iter().map(|command| command.0).collect(),
@@ -88,14 +88,14 @@ impl Line {
         })
     }
 
-    /// Number of SYNCs so far.
+    /// Returns the number of SYNCs so far.
     pub fn n_syncs(&self) -> usize {
         self.rows.len() / self.nodes.len()
     }
 
     fn note(&mut self, frame: &Frame) {
         for (axis, node) in self.nodes.iter().enumerate() {
-            if let Some(command) = Command::decode(frame, *node) {
+            if let Some(command) = CommandRpdo1::decode(frame, *node) {
                 self.pending[axis] = (command.target_counts, command.controlword.0);
             }
         }
@@ -111,7 +111,7 @@ impl Line {
     }
 }
 
-/// One end of a [`Line`]; the other one stays with the test.
+/// One end of a [`Line`]; the test keeps the other one.
 #[derive(Clone)]
 pub struct Tap(Arc<Mutex<Line>>);
 
@@ -128,7 +128,7 @@ impl std::fmt::Debug for Line {
 }
 
 impl Tap {
-    /// A line to the simulated machine of a cell.
+    /// Creates a line to the simulated machine of a cell.
     pub fn new(cell: &Cell) -> Self {
         let nodes: Vec<NodeId> = cell.axes.iter().map(|axis| node(axis.node)).collect();
         Self(Arc::new(Mutex::new(Line {
@@ -143,7 +143,7 @@ impl Tap {
         })))
     }
 
-    /// The line itself.
+    /// Returns the line.
     pub fn line(&self) -> MutexGuard<'_, Line> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -179,7 +179,7 @@ impl Bus for Tap {
     }
 }
 
-/// The loop on a line, and all that it has reported.
+/// The loop on a line, and everything it has reported.
 #[derive(Debug)]
 pub struct Rig {
     /// The loop.
@@ -190,7 +190,9 @@ pub struct Rig {
     pub tap: Tap,
     /// Every sample so far.
     pub samples: Vec<Sample>,
-    /// Why the axes were stopped, if they were.
+    /// Cycles that came with the stop.
+    pub before: Vec<Sample>,
+    /// Reason of the stop, if the axes were stopped.
     pub reason: Option<StopReason>,
     /// SYNCs sent before the tick in which the stop began.
     pub stopping_at: Option<usize>,
@@ -200,7 +202,7 @@ pub struct Rig {
     pub started: Vec<(u32, u32)>,
     /// The phase, and the SYNCs sent when it began.
     pub phase: (PhaseName, usize),
-    /// Velocity of each axis of the plant when the drives were told to switch off.
+    /// Velocity of each axis of the plant when its drive was disabled.
     pub rest_m_s: Vec<f64>,
     /// Samples in a run.
     pub n_samples: usize,
@@ -208,7 +210,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Brings the nodes up as the supervisor does in lock-step, and makes the loop for some runs.
+    /// Brings the nodes up as a campaign does in lock-step, and makes the loop for some runs.
     ///
     /// # Panics
     /// If a node cannot be brought up.
@@ -216,8 +218,8 @@ impl Rig {
         Self::paced(cell, runs, true)
     }
 
-    /// The same with a loop that is paced by the clock, whose ticks the test is: an answer that is not
-    /// there in a tick is late.
+    /// Same, with a loop paced by the clock; the test makes the ticks: an answer not there in a
+    /// tick is late.
     ///
     /// # Panics
     /// If a node cannot be brought up.
@@ -247,6 +249,7 @@ impl Rig {
             mail,
             tap,
             samples: Vec::new(),
+            before: Vec::with_capacity(64),
             reason: None,
             stopping_at: None,
             ended: Vec::new(),
@@ -258,12 +261,12 @@ impl Rig {
         }
     }
 
-    /// Asks the loop to stop, as a signal does.
+    /// Requests a stop of the loop, as a signal does.
     pub fn ask_to_stop(&self, signal: i32) {
         self.stop.store(signal, Ordering::Relaxed);
     }
 
-    /// One tick, and then all that the loop has to say.
+    /// Runs one tick, then reads all messages of the loop.
     pub fn tick(&mut self, missed: u32) -> TickStatus {
         let n_syncs = self.tap.line().n_syncs();
         let status = self.cycle.tick(missed);
@@ -271,7 +274,7 @@ impl Rig {
         status
     }
 
-    /// Reads what the loop has said in a tick that began after `n_syncs` SYNCs.
+    /// Reads the messages of a tick that began after `n_syncs` SYNCs.
     pub fn read_mail(&mut self, n_syncs: usize) {
         while let Some(message) = self.mail.read() {
             match message {
@@ -287,6 +290,7 @@ impl Rig {
                 }
                 Message::RunStarted { run, table } => self.started.push((run, table)),
                 Message::RunEnded { run, overruns } => self.ended.push((run, overruns)),
+                Message::Before(sample) => self.before.push(sample),
                 Message::Stopping(reason) => {
                     (self.reason, self.stopping_at) = (Some(reason), Some(n_syncs));
                 }
@@ -294,7 +298,7 @@ impl Rig {
         }
     }
 
-    /// Ticks until `there` says so.
+    /// Ticks until `there` returns true.
     ///
     /// # Panics
     /// If it never does.
@@ -308,7 +312,7 @@ impl Rig {
         panic!("never came there; phase {:?}, reason {:?}", self.phase, self.reason);
     }
 
-    /// Ticks into the middle of a run: until `n` samples of it are measured.
+    /// Ticks into the middle of a run: until `n` of its samples are measured.
     pub fn tick_into_run(&mut self, run: u32, n: u32) {
         self.tick_until(|rig| rig.samples.last().is_some_and(|last| last.at == Some((run, n))));
     }
@@ -316,7 +320,7 @@ impl Rig {
     /// Ticks to the end.
     ///
     /// # Panics
-    /// If there is none.
+    /// If the loop does not end.
     pub fn tick_to_end(&mut self) {
         for _ in 0..ROWS {
             if self.tick(0) == TickStatus::Stopped {
@@ -326,14 +330,14 @@ impl Rig {
         panic!("never stopped; phase {:?}, reason {:?}", self.phase, self.reason);
     }
 
-    /// State of each drive.
+    /// Returns the state of each drive.
     pub fn drive_states(&self) -> Vec<Option<State>> {
         let line = self.tap.line();
         line.nodes.iter().map(|node| line.machine().drive_state(*node)).collect()
     }
 }
 
-/// Writes a number of 32 bits into an object of a node, as any master on the bus could.
+/// Returns an action that writes 32 bits to an object of a node, as any master on the bus could.
 ///
 /// # Panics
 /// Never: eight bytes fit a frame.
@@ -344,10 +348,10 @@ pub fn write_object(node: u8, index: u16, value: u32) -> impl Fn(&mut Machine) {
     move |machine| machine.receive(&request, &mut |_| {})
 }
 
-/// A node number that is one.
+/// Returns a valid node number.
 ///
 /// # Panics
-/// If it is none.
+/// If it is invalid.
 pub fn node(number: u8) -> NodeId {
     NodeId::new(number).expect("1 to 127")
 }

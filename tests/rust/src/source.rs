@@ -1,13 +1,13 @@
-//! The source of the project as the tests of its structure read it: files, code without comments and
-//! tests, and which module names which.
+//! The project's source for the tests of its structure: files, code without comments and tests, and
+//! the imports of each module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// A module, as the names that lead to it from the crate's root.
+/// A module, as the path of names from the crate's root.
 pub type ModulePath = Vec<String>;
 
-/// The text of a file.
+/// Returns the text of a file.
 ///
 /// # Panics
 /// If it cannot be read.
@@ -15,7 +15,7 @@ pub fn text(file: &Path) -> String {
     std::fs::read_to_string(file).expect("the file can be read")
 }
 
-/// The Rust files of a folder and the folders in it, sorted.
+/// Returns the Rust files of a folder and its subfolders, sorted.
 ///
 /// # Panics
 /// If the folder cannot be read.
@@ -33,7 +33,7 @@ pub fn rust_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The source without comments and without its test modules, which may import what they test with.
+/// Returns the source without comments and test modules, which may import what they test with.
 pub fn code(text: &str) -> String {
     let mut kept = String::new();
     let mut is_for_tests = false;
@@ -42,7 +42,7 @@ pub fn code(text: &str) -> String {
         let code = line.split("//").next().unwrap_or("");
         let indent = &line[..line.len() - line.trim_start().len()];
         if let Some(end) = &ends_with {
-            // As it is formatted, a module ends with the first brace that is as far left as it is.
+            // In formatted code, a module ends with the first closing brace at its own indentation.
             if line == end {
                 ends_with = None;
             }
@@ -61,7 +61,7 @@ pub fn code(text: &str) -> String {
     kept
 }
 
-/// The module that a line declares, whatever its visibility.
+/// Returns the module that a line declares, whatever its visibility.
 fn declared_module(line: &str) -> Option<&str> {
     let line = line.trim_start();
     let line = match line.strip_prefix("pub") {
@@ -72,7 +72,7 @@ fn declared_module(line: &str) -> Option<&str> {
     line.strip_prefix("mod ").map(|rest| rest.trim_end_matches([' ', '{', ';', '\n']))
 }
 
-/// The module of a file below `source`.
+/// Returns the module of a file below `source`.
 pub fn module_of(file: &Path, source: &Path) -> ModulePath {
     let inside = file.strip_prefix(source).unwrap_or(file).with_extension("");
     let mut path: ModulePath =
@@ -83,8 +83,8 @@ pub fn module_of(file: &Path, source: &Path) -> ModulePath {
     path
 }
 
-/// The modules below `source` that exist for tests only: declared under `#[cfg(test)]`, and all that is
-/// in them.
+/// Returns the test-only modules below `source`: those declared under `#[cfg(test)]`, and their
+/// contents.
 pub fn test_modules(source: &Path) -> BTreeSet<ModulePath> {
     let mut found = BTreeSet::new();
     for file in rust_files(source) {
@@ -102,13 +102,13 @@ pub fn test_modules(source: &Path) -> BTreeSet<ModulePath> {
     found
 }
 
-/// Every path of `code` that begins at the crate's root, at a parent or at the module, as its names:
-/// `use super::{a, b::c}` has two.
+/// Returns every path in `code` that begins at the crate's root, at a parent or at the module
+/// itself, as its names: `use super::{a, b::c}` has two.
 pub fn paths(code: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
     for head in ["crate", "super", "self"] {
         for (at, _) in code.match_indices(&format!("{head}::")) {
-            // `$crate::`, `other_crate::` and `super::super::` are not beginnings.
+            // `$crate::`, `other_crate::` and `super::super::` do not begin a path.
             if code[..at].ends_with(|c: char| c.is_alphanumeric() || "_$:".contains(c)) {
                 continue;
             }
@@ -118,7 +118,7 @@ pub fn paths(code: &str) -> Vec<Vec<String>> {
     found
 }
 
-/// Reads `a::b::{c, d::e}` from the start of `text`; returns how much it has read.
+/// Parses `a::b::{c, d::e}` from the start of `text`; returns the length parsed.
 fn tree(text: &str, before: &mut Vec<String>, found: &mut Vec<Vec<String>>) -> usize {
     let depth = before.len();
     let mut at = 0;
@@ -139,7 +139,7 @@ fn tree(text: &str, before: &mut Vec<String>, found: &mut Vec<Vec<String>>) -> u
                     Some(_) => {
                         let read = tree(&text[at..], before, found);
                         at += read.max(1);
-                        // An alias is read over.
+                        // Aliases are skipped.
                         at += text[at..].find([',', '}']).unwrap_or(text.len() - at);
                     }
                 }
@@ -172,27 +172,37 @@ fn blank(text: &str) -> usize {
     text.len() - text.trim_start().len()
 }
 
-/// The modules of a crate, and the names that each of them brings in from others.
+/// The modules of a crate, and the names that each imports from others.
 #[derive(Debug)]
 pub struct Crate {
     code: BTreeMap<ModulePath, String>,
-    /// Names that a module has by `use`: visible in it, and through it where they are public.
+    /// Names that a module imports by `use`: visible in it, and through it if they are public.
     brought_in: BTreeMap<ModulePath, BTreeMap<String, Vec<String>>>,
     families: Vec<Family>,
 }
 
 /// A paragraph `//! Family: …` at the head of a folder: rooms in it or below, in backticks, that may
-/// import each other, and why.
+/// import each other, and why; without names all rooms of the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Family {
     /// The folder's module.
     pub head: ModulePath,
-    /// The last names of the rooms.
+    /// The last names of the rooms; empty for all of the folder.
     pub members: BTreeSet<String>,
 }
 
+impl Family {
+    /// True if all of these rooms belong to it.
+    pub fn holds(&self, rooms: &[ModulePath]) -> bool {
+        rooms.iter().all(|room| {
+            let named = room.last().is_some_and(|last| self.members.contains(last));
+            room.starts_with(&self.head) && (named || self.members.is_empty())
+        })
+    }
+}
+
 impl Crate {
-    /// Reads the files below a folder, without those for tests.
+    /// Reads the files below a folder, except those for tests.
     ///
     /// # Panics
     /// If a file cannot be read.
@@ -226,7 +236,7 @@ impl Crate {
         all
     }
 
-    /// The module that holds what a path names, seen from a module.
+    /// Returns the module that defines the item of a path, seen from a module.
     fn resolve(&self, from: &ModulePath, path: &[String], depth: usize) -> Option<ModulePath> {
         let mut at = from.clone();
         let mut rest = path;
@@ -253,13 +263,14 @@ impl Crate {
         self.code.contains_key(&at).then_some(at)
     }
 
-    /// The families that the heads of folders tell of.
+    /// Returns the families declared in folders' heads.
     pub fn families(&self) -> &[Family] {
         &self.families
     }
 
-    /// Groups of rooms that import each other in a circle. A room is a folder, or a file that stands in
-    /// a folder beside others; a folder's head may name its rooms, and they what stands in the head.
+    /// Returns the groups of rooms that import each other in a circle. A room is a folder, or a
+    /// file beside others in a folder; a folder's head may name its rooms, and they may name items
+    /// of the head.
     pub fn circles(&self) -> Vec<Vec<ModulePath>> {
         let mut arrows: BTreeMap<ModulePath, BTreeSet<ModulePath>> = BTreeMap::new();
         for (from, code) in &self.code {
@@ -303,7 +314,7 @@ fn reach<'a>(
     seen
 }
 
-/// Reads the paragraphs `//! Family: …` of a folder's head.
+/// Parses the paragraphs `//! Family: …` of a folder's head.
 fn families_of(head: &ModulePath, text: &str) -> Vec<Family> {
     let doc: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("//!")).collect();
     let paragraph = |from: usize| {

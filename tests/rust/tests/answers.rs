@@ -1,5 +1,5 @@
-//! Answers that are lost, late, doubled or unreadable: what a sample is worth, what is told of a drive
-//! that falls silent in part, and that nothing is learned from a run that was disturbed.
+//! Lost, late, duplicated and unreadable answers: validity of samples, the report of a drive that
+//! falls silent in part, and no learning from a disturbed run.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -9,7 +9,7 @@ use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::config::{AxisUnit, Cell};
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
-use ilc_rt::fieldbus::cia402::{Controlword, EncoderSample, Extra, State, Status};
+use ilc_rt::fieldbus::cia402::{Controlword, DriveMotionTpdo2, EncoderSample, State, StatusTpdo1};
 use ilc_rt::library::Library;
 use ilc_rt::record::{EndStatus, IterationRecord};
 use ilc_rt::servo::{PhaseName, Sample, StopReason};
@@ -21,16 +21,16 @@ const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 const X: u8 = 1;
 const TOOL: u8 = 10;
 
-/// Frames that a fault is about.
+/// Selects the frames affected by a fault.
 type Which = fn(&Frame) -> bool;
 
 const PDOS: [(&str, Which); 3] = [
-    ("TPDO1", |frame| Status::decode(frame, node(X)).is_some()),
-    ("TPDO2", |frame| Extra::decode(frame, node(X)).is_some()),
+    ("TPDO1", |frame| StatusTpdo1::decode(frame, node(X)).is_some()),
+    ("TPDO2", |frame| DriveMotionTpdo2::decode(frame, node(X)).is_some()),
     ("tool", |frame| EncoderSample::decode(frame, node(TOOL)).is_some()),
 ];
 
-/// Loses some frames, counted from the first one that is asked about.
+/// Loses some frames, counted from the first one that `which` matches.
 fn lose(which: Which, lost: std::ops::Range<u32>) -> Distort {
     let mut n = 0;
     Box::new(move |_, frame, out| {
@@ -44,7 +44,8 @@ fn lose(which: Which, lost: std::ops::Range<u32>) -> Distort {
     })
 }
 
-/// Checks every sample that counts against where the plant was at its SYNC; returns how many do not.
+/// Checks every valid sample against the position of the plant at its SYNC; returns the number of
+/// invalid ones.
 fn missing(cell: &Cell, rig: &Rig) -> usize {
     let line = rig.tap.line();
     let counts = rig.samples.iter().filter(|sample| sample.at.is_some());
@@ -77,7 +78,7 @@ fn what_is_lost_of_an_answer_is_missing_and_nothing_else() {
                 rig.tick_to_end();
                 assert_eq!(rig.reason, None, "{name} {what} {n_lost}");
                 let n = missing(&cell, &rig);
-                // A velocity computed from a position that is too old disturbs a few cycles more.
+                // A velocity computed from a stale position disturbs a few cycles more.
                 assert!(n >= n_lost as usize && n <= n_lost as usize + 10, "{name} {what}: {n}");
             }
         }
@@ -157,7 +158,7 @@ fn a_part_that_falls_silent_is_named() {
     }
 }
 
-/// A campaign in lock-step on a line whose answers are distorted.
+/// Runs a campaign in lock-step on a line with distorted answers.
 fn campaign_with(cell: &Cell, distort: Distort) -> Outcome {
     let scratch = Scratch::new();
     let tap = Tap::new(cell);
@@ -184,7 +185,7 @@ fn a_pdo_of_another_length_is_named() {
         };
         let outcome = campaign_with(&cell, Box::new(shorten));
         assert_eq!((outcome.status, outcome.reason.as_str()), (EndStatus::Fault, sentence));
-        // In real time it is the same, after as long as a silence may last.
+        // In real time the same, after the longest silence allowed.
         let mut rig = Rig::on_clock(&cell, 1);
         rig.tap.line().distort(Box::new(shorten));
         rig.tick_to_end();
@@ -202,7 +203,7 @@ fn a_status_that_never_came_is_not_reported() {
         rig.tap.line().distort(lose(PDOS[0].1, 0..u32::MAX));
         rig.tick_to_end();
         assert!(matches!(rig.reason, Some(StopReason::SilentPdo { axis: 0, pdo: 1, .. })));
-        // Nor was any drive switched on while the state of one is not known.
+        // Nor was any drive enabled while the state of one was unknown.
         for row in rig.tap.line().rows() {
             assert!(row.controlword.iter().all(|word| *word & 0x0D == 0), "{row:?}");
         }
@@ -215,11 +216,11 @@ fn a_fault_without_an_emergency_message_says_so() {
     for (kept, part) in [(true, "0x8611 following error"), (false, "no emergency message")] {
         let scratch = Scratch::new();
         let tap = Tap::new(&cell);
-        // Heard before the drive is switched on: not the cause of what comes later.
+        // Received before the drive is enabled: not the cause of later events.
         let old = Emergency { node: node(X), code: 0x3210, register: 0, vendor: [0; 5] };
         let mut told = false;
         tap.line().distort(Box::new(move |_, frame, out| {
-            if !told && Status::decode(&frame, node(X)).is_some() {
+            if !told && StatusTpdo1::decode(&frame, node(X)).is_some() {
                 told = true;
                 out.push_back(old.encode());
             }
@@ -255,7 +256,7 @@ fn a_node_that_says_that_it_was_stopped_is_told_as_that() {
         rig.tap.line().meddle(|_, reply| reply(frame));
         rig.tick_to_end();
         assert_eq!(rig.reason, Some(reason));
-        // Silent first, and then it says why: the stop is told as what it was.
+        // Silent first, then it sends the reason: the stop is reported with that reason.
         let mut rig = Rig::on_clock(&cell, 2);
         rig.tick_into_run(0, 100);
         rig.tap.line().meddle(|machine, _| {
@@ -279,7 +280,7 @@ fn a_drive_that_switched_itself_off_is_not_switched_on_again_by_a_stop() {
         rig.tick_into_run(0, 100);
         rig.ask_to_stop(2);
         rig.tick(0);
-        // Somebody takes the drive's power away in the middle of the stop.
+        // The drive loses power in the middle of the stop.
         rig.tap.line().meddle(|machine, _| {
             let off = Controlword::DISABLE_VOLTAGE.0.into();
             write_object(X, 0x6040, off)(machine);
@@ -293,7 +294,7 @@ fn a_drive_that_switched_itself_off_is_not_switched_on_again_by_a_stop() {
     }
 }
 
-/// The runs of a real-time campaign on a line that is disturbed as `disturb` says in run 0.
+/// Runs of a real-time campaign on a line disturbed by `distort` in run 0.
 fn disturbed(name: &str, distort: Distort) -> Vec<IterationRecord> {
     let cell = short(name);
     let scratch = Scratch::new();
@@ -324,7 +325,7 @@ fn a_disturbed_run_is_repeated_the_first_one_too() {
                 match kind {
                     0 if on && is_status => return,
                     1 if on && is_status => out.push_back(frame),
-                    // A flood of what is nobody's business.
+                    // A flood of foreign frames.
                     2 if count == first && is_status => {
                         for id in 0..300_u16 {
                             out.push_back(Frame::new(0x6E0, &id.to_le_bytes()).unwrap());
@@ -348,7 +349,7 @@ fn a_disturbed_run_is_repeated_the_first_one_too() {
     }
 }
 
-/// A sample is not made of what is not there.
+/// Without disturbance no sample is missing.
 #[test]
 fn samples_of_a_quiet_bus_are_all_there() {
     for name in CELLS {

@@ -1,7 +1,7 @@
-//! What every transport promises, asked of each of them alike.
+//! The contract of every transport, tested on each of them.
 //!
-//! The cases are written once against the `Bus` trait; each transport brings two endpoints of one bus.
-//! SocketCAN needs an interface: `tests/vcan/run` provides one where the machine has none.
+//! The cases are written once against the `Bus` trait; each transport provides two endpoints of one
+//! bus. SocketCAN needs an interface: `tests/vcan/run` provides one where the machine has none.
 
 #![allow(
     clippy::unwrap_used,
@@ -12,7 +12,6 @@
 )]
 
 use std::cell::Cell;
-use std::fmt::Write as _;
 use std::fs::File;
 use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};
@@ -25,13 +24,13 @@ use ilc_tests::counting::{Counting, allocations};
 
 type Ends = (Box<dyn Bus>, Box<dyn Bus>);
 
-/// Long enough for a loaded machine; no test that passes ever waits for it.
+/// Long enough for a loaded machine; a passing test never waits this long.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Few enough for the smallest buffer of any transport.
+/// Small enough for the smallest buffer of any transport.
 const BURST: usize = 50;
 
-/// The `n`-th frame of a sequence: identifier, length and data all follow from `n`.
+/// Returns the `n`-th frame of a sequence: identifier, length and data all follow from `n`.
 fn numbered(n: usize) -> Frame {
     let data = (n as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).to_le_bytes();
     Frame::new(u16::try_from(n % 0x800).unwrap(), &data[..n % 9]).unwrap()
@@ -57,12 +56,12 @@ fn does_not_hear_itself((mut a, mut b): Ends) {
     for n in 0..BURST {
         a.send(&numbered(n)).unwrap();
     }
-    // Once the other side has them all, an echo would be here too.
+    // Once the other side has received them all, an echo would be here too.
     for n in 0..BURST {
         assert_eq!(receive(&mut *b), numbered(n));
     }
     assert_eq!(a.recv(Duration::from_millis(20)).unwrap(), None);
-    // Own frames in the way do not hide those of the other side.
+    // Own frames in the queue do not hide those of the other side.
     b.send(&numbered(7)).unwrap();
     assert_eq!(receive(&mut *a), numbered(7));
 }
@@ -90,7 +89,7 @@ fn is_woken_by_a_frame((mut a, mut b): Ends) {
         let start = Instant::now();
         (receive(&mut *b), start.elapsed())
     });
-    // The receiver is asleep by then, or else finds the frame at once: both must work.
+    // By then the receiver sleeps, or it finds the frame at once: both must work.
     std::thread::sleep(Duration::from_millis(30));
     a.send(&numbered(8)).unwrap();
     let (frame, waited) = receiver.join().unwrap();
@@ -100,7 +99,7 @@ fn is_woken_by_a_frame((mut a, mut b): Ends) {
 
 fn carries_both_directions_at_once((a, b): Ends) {
     const N: usize = 1000;
-    // Two sides that each run this far ahead have at most a burst on the way between them.
+    // Two sides that each run this far ahead have at most a burst in flight between them.
     const AHEAD: usize = BURST / 2;
     fn talk(mut bus: Box<dyn Bus>) -> Box<dyn Bus> {
         let (mut n_sent, mut n_received) = (0, 0);
@@ -191,7 +190,7 @@ fn loopback_ends() -> Ends {
     (Box::new(a), Box::new(b))
 }
 
-/// A multicast address whose port no other test uses: it stays taken on the host's own address.
+/// Returns a multicast address with a unique port: it stays reserved on the host's own address.
 fn udp_address() -> String {
     let holder = UdpSocket::bind("127.0.0.1:0").unwrap();
     let port = holder.local_addr().unwrap().port();
@@ -205,7 +204,7 @@ fn udp_ends(address: &str) -> Ends {
 
 fn zenoh_ends() -> (ZenohBus, ZenohBus) {
     for _ in 0..10 {
-        // Free when asked; if somebody takes it before Zenoh does, the next one will do.
+        // Free when queried; if another process takes it before Zenoh does, the next one will do.
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let open = |role: &str| {
             let address = format!("zenoh:test/bus?{role}=tcp/127.0.0.1:{port}&scouting=off");
@@ -224,7 +223,7 @@ fn boxed((a, b): (ZenohBus, ZenohBus)) -> Ends {
     (Box::new(a), Box::new(b))
 }
 
-/// The CAN interface for tests, held by one test at a time; `None` where there is none.
+/// Returns the CAN interface for tests, locked by one test at a time; `None` where there is none.
 fn can_interface() -> Option<String> {
     thread_local!(static LOCK: Cell<Option<File>> = const { Cell::new(None) });
     let name = match std::env::var("ILC_TEST_CAN") {
@@ -273,7 +272,7 @@ fn udp_skips_what_is_no_frame_of_ours() {
     for datagram in foreign {
         stranger.send(datagram).unwrap();
     }
-    // A frame that anybody sends in the right format counts; it comes behind all the others.
+    // A well-formed frame from any sender is accepted; it arrives behind all the others.
     stranger.send(good.as_bytes()).unwrap();
     for bus in [&mut a, &mut b] {
         assert_eq!(receive(&mut **bus), numbered(5));
@@ -344,7 +343,7 @@ fn socketcan_skips_what_is_no_frame_of_ours() {
     let extended = ExtendedId::new(0x181).unwrap();
     stranger.write_frame(&CanDataFrame::new(extended, &[1]).unwrap()).unwrap();
     stranger.write_frame(&CanRemoteFrame::new_remote(standard, 2).unwrap()).unwrap();
-    // An interface for classical frames only refuses it, which is as good as skipped.
+    // An interface for classical frames only refuses it, which is as good as ignoring it.
     let _ = stranger.write_frame(&CanFdFrame::new(standard, &[0; 16]).unwrap());
     stranger.write_frame(&CanDataFrame::new(standard, &[2, 3]).unwrap()).unwrap();
     assert_eq!(receive(&mut *bus), Frame::new(0x181, &[2, 3]).unwrap());
@@ -380,7 +379,7 @@ fn a_receiver_asleep_wakes_when_the_other_end_goes() {
     assert!(start.elapsed() < PATIENCE / 2);
 }
 
-/// Answers a frame as often as its first byte says, counting up the identifier.
+/// Answers a frame as often as its first byte says, with increasing identifiers.
 #[derive(Debug, Default)]
 struct Repeater {
     received: Vec<Frame>,
@@ -434,7 +433,7 @@ fn in_process_says_when_answers_do_not_fit() {
     assert_eq!(bus.recv(Duration::ZERO).unwrap(), None);
 }
 
-/// Prints how long a frame takes there and back; run it by name with `--run-ignored all`.
+/// Prints the round-trip time of a frame; run it by name with `--run-ignored all`.
 #[test]
 #[ignore = "prints figures, asserts nothing about them"]
 fn round_trip_times() {
@@ -478,7 +477,7 @@ fn round_trip_times() {
     let n_ticks = 1_000_000;
     let mut n_answers = 0;
     for _ in 0..n_ticks {
-        // A set-point and a SYNC out, two answers in: one axis and one tick.
+        // Set point and SYNC out, two answers in: one axis and one tick.
         bus.send(&Frame::new(0x201, &[0; 8]).unwrap()).unwrap();
         bus.send(&Frame::new(0x80, &[2]).unwrap()).unwrap();
         while let Some(frame) = bus.recv(Duration::ZERO).unwrap() {
@@ -488,13 +487,4 @@ fn round_trip_times() {
     assert_eq!(n_answers, n_ticks * (0x81 + 0x82));
     let ticks_per_s = f64::from(u32::try_from(n_ticks).unwrap()) / start.elapsed().as_secs_f64();
     println!("in process: {ticks_per_s:.0} ticks/s with 2 frames out and 2 in");
-}
-
-#[test]
-fn the_readme_names_every_kind_of_bus() {
-    let mut table = "| address | carrier |\n|---|---|\n".to_owned();
-    for scheme in transport::SCHEMES {
-        let _ = writeln!(table, "| `{}` | {} |", scheme.syntax, scheme.summary);
-    }
-    ilc_tests::hold_derived("README.md", "buses", &table);
 }

@@ -1,5 +1,5 @@
-//! Cell descriptions that cannot be used: each is refused in one line that names file, key, value and
-//! what is allowed, and none makes the program panic.
+//! Invalid cell descriptions: each is refused in one line that names file, key, value and the
+//! allowed values; none causes a panic.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -12,7 +12,7 @@ use proptest::prelude::{any, prop, proptest};
 const FILE: &str = "cell.toml";
 const EXAMPLES: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 
-/// What a campaign does with a cell before anything moves.
+/// Returns the refusal of a cell before anything moves, as in a campaign.
 fn refusal(text: &str) -> Option<String> {
     let cell = match Cell::parse(text, FILE) {
         Ok(cell) => cell,
@@ -57,10 +57,10 @@ fn a_law_that_will_not_converge_is_refused_unless_it_is_allowed() {
     assert_eq!(refusal(&allowed), None);
 }
 
-/// A piece of the first example, what replaces it, and parts of the line that refuses it.
+/// A piece of the first example, its replacement, and parts of the line that refuses it.
 type Edit = (&'static str, &'static str, &'static [&'static str]);
 
-/// What is written: keys, types, sections.
+/// Syntax: keys, types, sections.
 const WRITTEN: &[Edit] = &[
     ("cycle_us = 2000", "cycle_ms = 2", &[":6:", "cycle_ms = 2", "unknown field", "`cycle_us`"]),
     ("damping = 1.0", "dampnig = 1.0", &["[axis.model] dampnig", "unknown field", "`damping`"]),
@@ -125,7 +125,7 @@ const RANGES: &[Edit] = &[
     ("input_max_m = 0.005", "input_max_m = nan", &["[learning] input_max_m = NaN", "allowed"]),
 ];
 
-/// What contradicts something else.
+/// Contradictions between values.
 const CONTRADICTIONS: &[Edit] = &[
     (
         "to_m = [0.06, 0.06]",
@@ -156,7 +156,7 @@ const CONTRADICTIONS: &[Edit] = &[
     ("blend_s = 0.04", "blend_s = 0.001", &["[program] blend_s = 0.001", "allowed 0.002"]),
 ];
 
-/// What planner, bus and law find.
+/// Refusals by planner, bus and law.
 const PLANS: &[Edit] = &[
     (
         "feed_m_s = 0.1",
@@ -261,7 +261,7 @@ proptest! {
                 2 => lines.swap(place, other),
                 3 if !lines[place].is_empty() => {
                     let column = usize::from(byte) % lines[place].len();
-                    // Mostly something that a number or a key could be made of.
+                    // Mostly bytes that a number or a key could consist of.
                     lines[place][column] = b"0123456789-+.eEnaif\"[]=#\n \xC3"[usize::from(byte) % 26];
                 }
                 _ => {
@@ -274,7 +274,7 @@ proptest! {
         if let Some(line) = refusal(&text) {
             assert!(line.starts_with(FILE) && !line.contains('\n'), "{line:?}");
         } else {
-            // An address is refused where it is opened.
+            // An address is checked when it is opened.
             let cell = Cell::parse(&text, FILE).unwrap();
             let _ = cell.bus.address.parse::<Address>();
         }

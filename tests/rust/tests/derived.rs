@@ -1,54 +1,117 @@
-//! What is written from the schema of the cell description is not stale: `make derived` writes it anew.
+//! Files that derive from the Rust source: the Python class of the figures, the schema of the events, and
+//! tables of the documents. `make derived` writes them.
 
-#![allow(clippy::unwrap_used, reason = "a test fails where a file is not there")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
-use std::path::Path;
+use std::fmt::Write as _;
 
-use ilc_rt::config::Cell;
-use ilc_rt::schema::{fill, for_editors, inlined};
+use ilc_rt::fieldbus::transport::SCHEMES;
+use ilc_rt::record::{Event, Field, FieldKind, figure_fields};
+use ilc_rt::schema::inlined;
+use ilc_tests::{hold_derived, hold_derived_file};
 
-fn read(name: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name);
-    std::fs::read_to_string(path).unwrap()
+/// Columns of a line of the Python source.
+const WIDTH: usize = 88;
+
+fn python_type(field: &Field) -> String {
+    let kind = match field.kind {
+        FieldKind::Real => "float",
+        FieldKind::Count => "int",
+        FieldKind::Flag => "bool",
+        FieldKind::Text => "str",
+        FieldKind::List => "tuple[float, ...]",
+    };
+    if field.is_optional { format!("{kind} | None") } else { kind.to_owned() }
 }
 
-/// The first line that differs, so that a failure is short.
-fn differs(found: &str, expected: &str) -> Option<String> {
-    let mut lines = found.lines().zip(expected.lines());
-    let changed = lines.find(|(found, expected)| found != expected);
-    changed
-        .map(|(found, expected)| format!("{found}\nshould be\n{expected}"))
-        .or_else(|| (found != expected).then(|| "the number of lines".to_owned()))
-}
-
-#[test]
-fn the_schema_for_editors_is_current() {
-    let current = format!("{:#}\n", for_editors::<Cell>());
-    assert_eq!(differs(&read("cell.schema.json"), &current), None, "`make derived` writes it anew");
-}
-
-#[test]
-fn the_tables_of_the_cell_reference_are_current() {
-    let text = read("cell.md");
-    let current = fill(&text, inlined::<Cell>().as_value()).unwrap();
-    assert_eq!(differs(&text, &current), None, "`make derived` writes it anew");
-}
-
-#[test]
-fn every_table_of_a_cell_is_in_its_reference() {
-    let (text, schema) = (read("cell.md"), inlined::<Cell>().to_value());
-    let mut open = vec![(String::new(), &schema)];
-    while let Some((path, table)) = open.pop() {
-        let table = table.get("items").unwrap_or(table);
-        for (name, key) in table["properties"].as_object().into_iter().flatten() {
-            let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
-            let of = key.get("items").unwrap_or(key);
-            if of.get("properties").is_some() {
-                let is_program = path.starts_with("program.") && path != "program.segment";
-                let mark = format!("<!-- keys of {path} -->");
-                assert!(is_program || text.contains(&mark), "docs/cell.md lacks {mark}");
-                open.push((path, key));
-            }
-        }
+fn python_default(field: &Field) -> &'static str {
+    match field.kind {
+        _ if field.is_required => "",
+        _ if field.is_optional => " = None",
+        FieldKind::Real => " = 0.0",
+        FieldKind::Count => " = 0",
+        FieldKind::Flag => " = False",
+        FieldKind::Text => " = \"\"",
+        FieldKind::List => " = ()",
     }
+}
+
+fn wrapped(text: &str, indent: &str) -> String {
+    let mut lines = String::new();
+    let mut line = indent.to_owned();
+    for word in text.split_whitespace() {
+        if line.len() + 1 + word.chars().count() > WIDTH && line != indent {
+            let _ = writeln!(lines, "{line}");
+            line = indent.to_owned();
+        }
+        if line != indent {
+            line.push(' ');
+        }
+        line.push_str(word);
+    }
+    lines + &line
+}
+
+#[test]
+fn the_python_class_of_the_figures() {
+    let mut text =
+        "\"\"\"The figures of a run. Derived from the source of the controller: do not edit.\"\"\"
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figures:
+    \"\"\"Figures of one run; lengths in metres, angles in radians.
+
+    A figure over several axes is over the linear ones, or in radians over all of a
+    cell whose axes are all rotary.
+
+    Attributes
+    ----------
+"
+        .to_owned();
+    let fields = figure_fields();
+    for field in fields {
+        let _ = writeln!(text, "    {} : {}", field.name, python_type(field));
+        let _ = writeln!(text, "{}", wrapped(&field.doc.replace('`', ""), "        "));
+    }
+    text += "    \"\"\"\n\n";
+    for field in fields {
+        let _ =
+            writeln!(text, "    {}: {}{}", field.name, python_type(field), python_default(field));
+    }
+    hold_derived_file("python/ilc_rt/figures.py", &text);
+}
+
+#[test]
+fn the_schema_of_the_events() {
+    let text = serde_json::to_string_pretty(&inlined::<Event>()).unwrap();
+    hold_derived_file("docs/events.schema.json", &format!("{text}\n"));
+}
+
+#[test]
+fn the_table_of_the_events() {
+    let schema = inlined::<Event>();
+    let mut table = "| event | fields |\n|---|---|\n".to_owned();
+    for event in schema.as_value()["oneOf"].as_array().unwrap() {
+        let name = event["properties"]["event"]["const"].as_str().unwrap();
+        let fields = event["properties"].as_object().unwrap().keys();
+        let fields: Vec<_> =
+            fields.filter(|field| *field != "event").map(|field| format!("`{field}`")).collect();
+        let doc = event["description"].as_str().unwrap_or_default().replace('\n', " ");
+        let _ = writeln!(table, "| `{name}` | {doc} {} |", fields.join(", "));
+    }
+    hold_derived("docs/telemetry.md", "events", &table);
+}
+
+#[test]
+fn the_table_of_the_buses() {
+    let mut table = "| address | carrier |\n|---|---|\n".to_owned();
+    for scheme in SCHEMES {
+        let _ = writeln!(table, "| `{}` | {} |", scheme.syntax, scheme.summary);
+    }
+    hold_derived("README.md", "buses", &table);
 }

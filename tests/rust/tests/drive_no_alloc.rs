@@ -1,5 +1,5 @@
-//! Simulated drives allocate nothing once they are set up: in lock-step they run inside the
-//! controller's own tick.
+//! Simulated drives do not allocate after set-up: in lock-step they run inside the controller's
+//! tick.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use ilc_rt::campaign::drive_setup;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::bring_up::{DriveSetup, bring_up};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, Controlword, State};
+use ilc_rt::fieldbus::cia402::{CommandRpdo1, Controlword, State};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_sim::{ClockMode, Machine};
@@ -43,7 +43,7 @@ fn cycles_faults_and_questions_allocate_nothing() {
         // From cycle 300 on the controller is silent: deadline, emergency, ramp, fault.
         if cycle < 300 {
             let target_counts = start_counts + 1000 * (cycle - 20).max(0);
-            let command = Command { controlword, target_counts, torque_offset: 0 };
+            let command = CommandRpdo1 { controlword, target_counts, torque_offset: 0 };
             bus.send(&command.encode(node)).unwrap();
         }
         bus.send(&question).unwrap();

@@ -4,7 +4,7 @@ use std::process::Command;
 
 #[test]
 fn the_gantry_learns_its_contour() {
-    // Cargo puts examples beside the folder of this test's own binary.
+    // Cargo puts examples beside the folder of this test's binary.
     let test = std::env::current_exe().unwrap();
     let release = test.parent().and_then(|deps| deps.parent()).unwrap();
     let output = Command::new(release.join("examples/01_gantry")).output().unwrap();

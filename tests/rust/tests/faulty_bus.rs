@@ -1,7 +1,8 @@
-//! Campaigns on a bus that loses, delays, doubles, swaps and spoils frames, or that a stranger uses too.
+//! Campaigns on a bus that loses, delays, duplicates, reorders and corrupts frames, or that a
+//! foreign node uses.
 //!
-//! Whatever it does: the campaign completes with the figures of an undisturbed one, or it stops with a
-//! sentence; nothing panics or hangs, and no axis leaves its limits.
+//! In every case the campaign completes with the figures of an undisturbed one, or stops with a
+//! message; nothing panics or hangs, and no axis exceeds its limits.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -20,13 +21,13 @@ use ilc_tests::{Scratch, short};
 
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 const RUNS: u32 = 4;
-/// How far an axis may overshoot where its set point is within limits.
+/// Largest overshoot of an axis whose set point is within limits.
 const OVERSHOOT_M: f64 = 0.005;
 
-/// Where an axis has been.
+/// Range of an axis's positions.
 type Reach = Arc<Mutex<Vec<(f64, f64)>>>;
 
-/// The machine of a cell, and where its axes have been at any SYNC.
+/// The machine of a cell, with the range of its axes' positions at every SYNC.
 struct Watched {
     tap: Tap,
     reach: Reach,
@@ -57,7 +58,7 @@ impl Bus for Watched {
     }
 }
 
-/// A misfortune with its name.
+/// A kind of fault with its name.
 type Kind = (&'static str, Faults);
 
 fn kinds(probability: f64) -> [Kind; 6] {
@@ -72,7 +73,7 @@ fn kinds(probability: f64) -> [Kind; 6] {
     ]
 }
 
-/// Runs a campaign and checks what holds whatever happens.
+/// Runs a campaign and checks the invariants.
 fn campaign(
     cell: &Cell,
     lockstep: bool,
@@ -117,7 +118,7 @@ fn undisturbed(cell: &Cell) -> Outcome {
     campaign(cell, true, Faults::default(), Way::ToController, 0..0, 0).unwrap()
 }
 
-/// What the runs were, but for the time that learning took.
+/// Returns the figures of the runs, except the learning time.
 fn figures(outcome: &Outcome) -> Vec<(u32, Figures)> {
     let still =
         |(run, figures): &(u32, Figures)| (*run, Figures { update_ms: 0.0, ..figures.clone() });
@@ -177,7 +178,7 @@ fn bring_up_comes_through_or_says_what_failed() {
     for (_, faults) in kinds(0.02).into_iter().chain(kinds(0.3)) {
         for way in [Way::ToController, Way::ToNodes] {
             for seed in 1..4 {
-                // All that holds is checked within.
+                // The invariants are checked inside.
                 let _ = campaign(&cell, true, faults, way, 0..50, seed);
             }
         }
@@ -186,7 +187,7 @@ fn bring_up_comes_through_or_says_what_failed() {
 
 #[test]
 fn by_the_clock_it_completes_or_stops_with_a_sentence() {
-    // The machine advances with SYNC, so that a host that stalls does not become a drive's fault.
+    // Simulated time advances with SYNC, so that a stalled host does not cause a fault of a drive.
     let text = ilc_tests::example_text(CELLS[0]);
     let (program, learning) =
         (text.find("[[program.segment]]").unwrap(), text.find("[learning]").unwrap());
@@ -204,8 +205,8 @@ fn by_the_clock_it_completes_or_stops_with_a_sentence() {
             scope.spawn(move || {
                 let end =
                     campaign(cell, false, faults, Way::ToController, 100..u32::MAX, 3).unwrap();
-                // A position that is another one is followed like any; all else is the truth, if not
-                // all of it or not in time.
+                // A corrupted position is followed like any other; all other measurements are true,
+                // if incomplete or late.
                 if end.status != EndStatus::Completed || name == "corruption" {
                     return;
                 }
@@ -215,7 +216,7 @@ fn by_the_clock_it_completes_or_stops_with_a_sentence() {
                         error_m <= 2.0 * clean_m,
                         "{name}, run {run}: {error_m} of {clean_m} m"
                     );
-                    // Had a disturbed run been learned from, the next one would be far beside.
+                    // If a disturbed run had been learned from, the next one would be far off.
                     if let (Some(is_m), Some(was_m)) = (figures.contour_inf_m, contour_m)
                         && figures.missing_samples == 0
                     {

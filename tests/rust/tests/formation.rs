@@ -1,5 +1,5 @@
-//! Coordinated learning of several agents: the printed tables of [barton2010], Appendix I, and what
-//! each objective does to the agents of that example.
+//! Coordinated learning of several agents: the printed tables of [barton2010], Appendix I, and the
+//! effect of each objective on the agents of that example.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -21,7 +21,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
-/// The six axes side by side, each `G / (1 + 0.425 G)` with `G = 1 / (m s^2 + b s)`.
+/// The six axes, block-diagonal, each `G / (1 + 0.425 G)` with `G = 1 / (m s^2 + b s)`.
 fn agents(golden: &Value) -> StateSpace {
     let dt_s = golden["dt_s"].as_f64().unwrap();
     let gain = golden["controller_gain"].as_f64().unwrap();
@@ -53,7 +53,7 @@ fn learn(golden: &Value, objective: &Objective, updates: usize) -> Learned {
     let (plant, reference) = (agents(golden), reference(golden));
     let formation = Formation::new(3, 2).unwrap();
     let number = |key: &str| golden[key].as_f64().unwrap();
-    // The effort is weighed agent by agent, whatever the error is weighed for.
+    // The effort is weighted agent by agent, whatever the error's weight.
     let effort = formation.weight(N_SAMPLES, &Objective::individual()).unwrap().at(0, 6);
     let cost = Cost {
         q: formation.weight(N_SAMPLES, objective).unwrap(),
@@ -104,7 +104,7 @@ fn the_printed_tables_come_out_to_the_last_digit() {
     }
 }
 
-/// Sums of the squares of tracking errors, of the centre's error, and of formation errors.
+/// Sums of squares of tracking errors, of the centre's error, and of formation errors.
 fn sums(learned: &Learned) -> [f64; 3] {
     let formation = Formation::new(3, 2).unwrap();
     let square = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
@@ -127,12 +127,13 @@ fn each_objective_serves_what_it_weighs() {
     let shape = of(&Objective::shape());
     let centred = of(&Objective::centred());
     let both = of(&Objective::individual().with_tracking_share(0.5));
-    // Equal references: doing nothing keeps the formation, and that is what the shape alone asks.
+    // Equal references: doing nothing keeps the formation, which is all that the shape objective
+    // asks for.
     assert!((shape[0] - none[0]).abs() < 1e-9 && shape[2] < 1e-20);
-    // Each is best at its own.
+    // Each objective is best at its own term.
     assert!(individual[0] < 1e-3 * none[0] && individual[0] < centred[0]);
     assert!(centred[1] < 1e-3 * none[1]);
-    // The mixture keeps the formation better than tracking alone, and tracks all the same.
+    // The mixture keeps the formation better than tracking alone, and still tracks.
     assert!(both[2] < individual[2] && both[0] < 1e-2 * none[0]);
 }
 

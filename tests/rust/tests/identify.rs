@@ -1,5 +1,5 @@
-//! Identification on the whole loop in lock-step: the numbers of a simulated axis are found again, and
-//! nothing moves beyond its limits.
+//! Identification with the whole loop in lock-step: the parameters of a simulated axis are
+//! recovered, and nothing moves beyond its limits.
 
 #![allow(
     clippy::unwrap_used,
@@ -17,7 +17,7 @@ use ilc_rt::record::EndStatus;
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::{Scratch, example};
 
-/// The gantry of the first example without friction and mode, with noise on its encoders.
+/// The gantry of the first example without friction and flexible mode, with encoder noise.
 fn bench() -> Cell {
     let mut cell = example("01_gantry.toml");
     cell.cell.cycle_us = 1000;
@@ -69,7 +69,7 @@ fn a_simulated_axis_is_found_again_within_two_percent() {
         let rows = library.list(Some(&outcome.campaign)).unwrap();
         let kept = library.load(rows[0].id).unwrap();
         assert_eq!(kept.meta.law, "excitation");
-        // The other axis holds still, but for the noise of its encoder.
+        // The other axis is at rest, apart from its encoder's noise.
         let still = kept.record.encoder_m.iter().step_by(2);
         assert!(still.map(|x| (x - cell.program.start_m[0]).abs()).fold(0.0, f64::max) < 3e-6);
 
@@ -87,7 +87,7 @@ fn a_simulated_axis_is_found_again_within_two_percent() {
     }
 }
 
-/// So slow that nothing but the size of the input is too much.
+/// So slow that only the size of the input is excessive.
 fn slow_and_large() -> Experiment {
     let mut large = experiment(Waveform::Multisine, 0.006);
     large.excitation.to_hz = 2.0;

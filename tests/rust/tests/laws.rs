@@ -1,5 +1,5 @@
-//! Every learning law that a cell description can name learns on the simulated machine, in lock-step; so
-//! does each with a ladder or a gate round it, and goes on after a break as if there had been none.
+//! Every law of the cell description learns on the simulated machine in lock-step, also inside a
+//! ladder or a gate, and continues after an interruption as if there had been none.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ use ilc_tests::{Scratch, example_text};
 const SERIES: &str = "01_gantry.toml";
 const PARALLEL: &str = "02_parallel.toml";
 
-/// An example with another `[learning]`.
+/// Returns an example with a different `[learning]`.
 fn cell(example: &str, learning: &str) -> Cell {
     let text = example_text(example);
     let end = text.find("[learning]").unwrap();
@@ -30,7 +30,7 @@ fn cell(example: &str, learning: &str) -> Cell {
     Cell::parse(&text, example).unwrap()
 }
 
-/// The same on two short moves.
+/// Same, with two short moves.
 fn short(example: &str, learning: &str) -> Cell {
     let mut cell = cell(example, learning);
     let mut segments = cell.program.segments[..2].to_vec();
@@ -46,7 +46,7 @@ fn rows(library: &Path) -> Vec<Row> {
     rows.iter().map(|row| library.load(row.id).unwrap()).collect()
 }
 
-/// Runs a campaign and reads back what the library has of it.
+/// Runs a campaign and reads the library back.
 fn run(cell: &Cell, iterations: u32) -> (Outcome, Vec<Row>) {
     let scratch = Scratch::new();
     let options = surrounded(scratch.file("library.db"), iterations);
@@ -64,8 +64,8 @@ fn microns(rms_m: &[f64]) -> String {
     rms_m.iter().map(|rms| format!("{:.1}", rms * 1e6)).collect::<Vec<_>>().join(" ")
 }
 
-/// A campaign's options, in surroundings as constant as the simulated machine is; only the laws that ask
-/// are told.
+/// Returns the options of a campaign with a constant disturbance, like the simulated machine's; only
+/// relevance-weighted laws use it.
 fn surrounded(library: PathBuf, iterations: u32) -> Options {
     Options {
         disturbance: Disturbance::measured(|_| Ok(vec![20.0])),
@@ -139,8 +139,8 @@ fn relevance_goes_on_from_the_runs_of_the_library_under_the_disturbance_of_a_fil
 }
 
 const CO_ILC: &str = "law = \"norm_optimal\"\n[learning.norm_optimal]\nrate = 6.0";
-/// A law that converges by the model, and makes the error of the real axes grow after two runs: it
-/// learns at the frequency of the mode that the model leaves out.
+/// A law that converges on the model, but diverges on the real axes after two runs: it learns at
+/// the frequency of a mode that the model omits.
 const GROWING: &str = "law = \"pd\"\n[learning.pd]\nkp = 1.5\nlead_samples = 8\ncutoff_hz = 25.0";
 
 #[test]
@@ -223,7 +223,7 @@ fn a_ladder_learns_from_the_mean_of_runs_with_the_same_input() {
     assert!(rows[6].record.input != rows[3].record.input && rms[6] < 0.5 * rms[3]);
 }
 
-/// Number of the best run, and those that the controller took back.
+/// Returns the number of the best run, and the runs that were rolled back.
 fn best_and_taken_back(outcome: &Outcome, rms: &[f64]) -> (usize, Vec<usize>) {
     let best = (0..rms.len()).min_by(|a, b| rms[*a].total_cmp(&rms[*b])).unwrap();
     let taken_back = outcome.runs.iter().filter(|(_, run)| run.rolled_back);
@@ -232,7 +232,7 @@ fn best_and_taken_back(outcome: &Outcome, rms: &[f64]) -> (usize, Vec<usize>) {
 
 #[test]
 fn with_a_gate_the_gate_alone_decides_when_the_error_grows() {
-    // The controller would take the first run back that is 1.5 times worse than the best one.
+    // The controller would roll back the first run that is 1.5 times worse than the best one.
     let (outcome, rows) = run(&short(SERIES, GROWING), 9);
     let rms = rms_m(&rows);
     let (_, taken_back) = best_and_taken_back(&outcome, &rms);
@@ -274,8 +274,8 @@ fn what_the_controller_takes_back_halves_the_steps_of_a_ladder() {
     assert!((0.45..0.55).contains(&ratio), "{ratio} {best}");
 }
 
-/// Stops a campaign in its run `broken`, goes on with it, and returns its rows and those of one that was
-/// never stopped.
+/// Interrupts a campaign in run `broken`, resumes it, and returns its rows and those of an
+/// uninterrupted one.
 fn broken_and_whole(cell: &Cell, broken: u32, iterations: u32) -> (Vec<Row>, Vec<Row>) {
     let scratch = Scratch::new();
     let first = surrounded(scratch.file("library.db"), iterations);
@@ -307,7 +307,7 @@ fn every_law_goes_on_after_a_break_with_the_input_that_would_have_followed() {
 
 #[test]
 fn ladder_and_gate_go_on_in_the_middle_of_what_they_did() {
-    // Broken in the second of three runs with the same input: two more belong to the step.
+    // Interrupted in the second of three runs with the same input: two more belong to the step.
     let ladder = format!("{CO_ILC}\n[learning.ladder]\nrepeats = 3");
     let (kept, whole) = broken_and_whole(&short(SERIES, &ladder), 4, 7);
     for index in 0..=5 {
@@ -318,7 +318,7 @@ fn ladder_and_gate_go_on_in_the_middle_of_what_they_did() {
         "the step comes when it would have come"
     );
 
-    // Broken while it rests.
+    // Interrupted while the gate is paused.
     let tolerance_m = 1.1 * rms_m(&run(&short(SERIES, CO_ILC), 3).1)[2];
     let gate = format!("{CO_ILC}\n[learning.gate]\ntolerance_m = {tolerance_m}");
     let (kept, whole) = broken_and_whole(&short(SERIES, &gate), 4, 6);
@@ -327,7 +327,7 @@ fn ladder_and_gate_go_on_in_the_middle_of_what_they_did() {
     }
     assert_eq!(kept[5].record.input, kept[2].record.input);
 
-    // Broken after it went back: it stays there.
+    // Interrupted after a rollback: it stays there.
     let gate = format!("{GROWING}\n[learning.gate]\ngrowth = 1.5\npatience = 1");
     let whole = run(&short(SERIES, &gate), 8).1;
     let back = (2..8)

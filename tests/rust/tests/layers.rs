@@ -1,4 +1,4 @@
-//! The arrows of the architecture point one way, and hot code is fenced.
+//! The dependencies of the architecture point one way, and hot code is fenced.
 //!
 //! Reads the table of `ARCHITECTURE.md` and every `crate::…` path in the controller's source.
 
@@ -14,9 +14,9 @@ use ilc_tests::source::{code, module_of, rust_files, test_modules};
 const FENCE: &str =
     "#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]";
 
-/// Files in hot modules that only set up, describe or refuse; none of them is called in a tick.
+/// Files in hot modules that only set up, describe or refuse; none is called in a tick.
 const COLD_FILES: [&str; 1] = [
-    // Sets the loop's thread up.
+    // Sets up the loop's thread.
     "rt/thread.rs",
 ];
 
@@ -25,7 +25,7 @@ struct Module {
     is_hot: bool,
 }
 
-/// `| 3 | `servo` | hot | the cycle … |` of the table of layers.
+/// Parses `| 3 | `servo` | hot | the cycle … |` in the table of layers.
 fn layers() -> BTreeMap<String, Module> {
     let text = std::fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
     let mut modules = BTreeMap::new();
@@ -43,11 +43,11 @@ fn layers() -> BTreeMap<String, Module> {
     modules
 }
 
-/// The top-level modules that `code` names after `crate::`, also in braces.
+/// Returns the top-level modules that `code` names after `crate::`, also in braces.
 fn imports(code: &str) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     for (at, _) in code.match_indices("crate::") {
-        // `$crate::` and `other_crate::` are not ours.
+        // `$crate::` and `other_crate::` are other paths.
         if code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
             continue;
         }
@@ -115,7 +115,7 @@ fn a_module_imports_only_from_rows_above_its_own() {
             continue;
         };
         for name in imports(&code(&std::fs::read_to_string(&file).unwrap())) {
-            // What is no module is an item of the crate's root.
+            // A name that is not a module is an item of the crate's root.
             let Some(other) = layers.get(&name).filter(|_| name != own) else { continue };
             n_imports += 1;
             if other.row >= layer.row {
@@ -148,7 +148,8 @@ fn python_and_the_simulator_stay_outside_the_controller() {
                 "ilc-sim" => folder == "crates/ilc-rt",
                 _ => false,
             };
-            // Its own name is `name = "…"`, so a line that begins with one is a dependency.
+            // The crate's own name is `name = "…"`, so a line that begins with a name is a
+            // dependency.
             if is_forbidden {
                 wrong.push(format!("{folder}/Cargo.toml: {line}"));
             }
@@ -176,7 +177,7 @@ fn every_hot_file_is_fenced() {
         let text = std::fs::read_to_string(file).unwrap();
         let code: Vec<&str> =
             text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
-        // Before any item: an inner attribute that comes later would not compile.
+        // Before any item: a later inner attribute would not compile.
         code.join("\n").trim_start().starts_with(FENCE)
     };
     let mut wrong = Vec::new();
@@ -188,7 +189,7 @@ fn every_hot_file_is_fenced() {
             continue;
         }
         let inside = file.strip_prefix(&source).unwrap().to_str().unwrap();
-        // The fence of a folder's head covers the folder.
+        // The fence in a folder's head covers the folder.
         let covers = file.ancestors().skip(1).take_while(|folder| *folder != source);
         let mut heads = covers.map(|folder| folder.join("mod.rs")).filter(|head| head.is_file());
         let is_fenced = fenced(&file) || heads.any(|head| fenced(&head));
@@ -211,7 +212,7 @@ fn every_hot_file_is_fenced() {
     assert!(n_fenced > 30, "only {n_fenced} fenced files were found");
 }
 
-/// Whether a file is in a folder whose head says in its first line that it is cold.
+/// Returns true if a file is in a folder whose head declares it cold in its first line.
 fn inside_of_cold_folder(file: &Path, source: &Path) -> bool {
     file.ancestors().skip(1).take_while(|folder| *folder != source).any(|folder| {
         std::fs::read_to_string(folder.join("mod.rs"))
@@ -219,7 +220,7 @@ fn inside_of_cold_folder(file: &Path, source: &Path) -> bool {
     })
 }
 
-/// Whether a file only declares modules, re-exports and constants.
+/// Returns true if a file only contains module declarations, re-exports and constants.
 fn is_only_declarations(text: &str) -> bool {
     let code = code(text);
     !["fn ", "struct ", "impl ", "enum "].iter().any(|item| code.contains(item))

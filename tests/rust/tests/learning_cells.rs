@@ -1,5 +1,6 @@
-//! `[learning]` of a cell description: what is out of range, contradicts itself or is not known is
-//! refused in one line; a law that would diverge does not start, and one that learns too far is warned of.
+//! `[learning]` of a cell description: values out of range, contradictions and unknown keys are
+//! refused in one line; a diverging law does not start, and a law that learns beyond its critical
+//! frequency causes a warning.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -12,14 +13,14 @@ const FILE: &str = "cell.toml";
 const SERIES: &str = "01_gantry.toml";
 const PARALLEL: &str = "02_parallel.toml";
 
-/// An example with another `[learning]`.
+/// Returns an example with a different `[learning]`.
 fn text(example: &str, learning: &str) -> String {
     let text = example_text(example);
     let end = text.find("[learning]").unwrap();
     format!("{}[learning]\n{learning}\n", &text[..end])
 }
 
-/// What a campaign does with a cell before anything moves.
+/// Returns the preparation of a cell before anything moves, as in a campaign.
 fn prepared(text: &str) -> Result<Prepared, String> {
     let cell = Cell::parse(text, FILE).map_err(|error| error.to_string())?;
     let plan = Plan::new(&cell, None, true).map_err(|error| error.to_string())?;
@@ -29,7 +30,7 @@ fn prepared(text: &str) -> Result<Prepared, String> {
 /// An example, its learning, and parts of the line that refuses it.
 type Refusal = (&'static str, &'static str, &'static [&'static str]);
 
-/// Keys and names that are not known, and types that are wrong.
+/// Unknown keys and names, and wrong types.
 const WRITTEN: &[Refusal] = &[
     (SERIES, "law = \"adjiont\"", &["law = \"adjiont\"", "`adjoint`", "`error_feedforward`"]),
     (SERIES, "[learning.gate]\ntolerance = 1.0", &["[learning.gate] tolerance", "`tolerance_m`"]),
@@ -147,7 +148,7 @@ const RANGES: &[Refusal] = &[
     (SERIES, "[learning.gate]\npatience = 0", &["[learning.gate] patience = 0", "allowed 1"]),
 ];
 
-/// What contradicts something else.
+/// Contradictions between values.
 const CONTRADICTIONS: &[Refusal] = &[
     (
         SERIES,
@@ -254,7 +255,7 @@ fn bounds_are_said_to_be_left_out_of_the_forecast() {
     assert!(found.verdict.contains("without its bounds"), "{}", found.verdict);
 }
 
-/// A law, what makes it diverge, and what makes it sound.
+/// A law, parameters with which it diverges, and parameters with which it converges.
 const DIVERGING: [(&str, &str, &str); 4] = [
     (SERIES, "pd", "kp = 5.0\ncutoff_hz = 100.0"),
     (PARALLEL, "pd", "kp = 500.0\ncutoff_hz = 50.0"),
@@ -288,7 +289,7 @@ fn a_low_pass_above_the_critical_frequency_starts_with_a_warning_that_names_both
         let lines = found.warnings.iter().filter(|line| line.contains("low-pass begins"));
         lines.cloned().collect::<Vec<_>>()
     };
-    // The axes lag by 90 degrees near 15 Hz, where a lead of ten samples has made up for it.
+    // The axes lag by 90 degrees near 15 Hz, where a lead of ten samples compensates for it.
     let sound = pd("kp = 0.3\nlead_samples = 10\ncutoff_hz = 4.0");
     assert!(about_cutoff(&sound).is_empty(), "{:?}", sound.warnings);
     let far = pd("kp = 0.3\nlead_samples = 1\ncutoff_hz = 12.0");
@@ -298,7 +299,7 @@ fn a_low_pass_above_the_critical_frequency_starts_with_a_warning_that_names_both
     let critical_hz: f64 =
         told[0].split("from ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!((1.0..12.0).contains(&critical_hz), "{}", told[0]);
-    // Just below the frequency that it names nothing is said any more.
+    // Just below the reported critical frequency there is no warning.
     let below = format!("kp = 0.3\nlead_samples = 1\ncutoff_hz = {}", 0.99 * critical_hz);
     assert!(about_cutoff(&pd(&below)).is_empty());
 }

@@ -1,5 +1,5 @@
-//! What an earlier master left in a drive: each wrong value is put right at bring-up, or the drive is
-//! refused with one line that names the object; the axes never move by it.
+//! Objects left over in a drive by an earlier master: each wrong value is corrected at bring-up, or
+//! the drive is refused with one line that names the object; the axes never move because of it.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -7,13 +7,14 @@ use ilc_rt::campaign;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::ObjectAddress;
+use ilc_rt::fieldbus::canopen::sdo::{Data, Expedited, SdoRequest};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::library::Library;
 use ilc_sim::Machine;
 use ilc_tests::campaign::{machine, options};
 use ilc_tests::{Scratch, short};
 
-/// A write by SDO, as any master could make it: index, sub-index, bytes.
+/// An SDO write, as any master could make it: index, sub-index, bytes.
 type Write = (u16, u8, Vec<u8>);
 
 fn u8(index: u16, sub: u8, value: u8) -> Write {
@@ -38,14 +39,11 @@ fn u16(index: u16, value: u16) -> Write {
 
 /// Writes an object of node 1 and checks that the node took it.
 fn leave(machine: &mut Machine, (index, sub, bytes): &Write) {
-    let [low, high] = index.to_le_bytes();
-    let unused = u8::try_from(4 - bytes.len()).unwrap();
-    let mut payload = vec![0x23 | unused << 2, low, high, *sub];
-    payload.extend(bytes);
-    payload.resize(8, 0);
+    let data = Data::Expedited(ObjectAddress::new(*index, *sub), Expedited::new(bytes).unwrap());
+    let request = SdoRequest::Download(data).encode();
     let mut answers = Vec::new();
-    machine
-        .receive(&Frame::new(0x601, &payload).unwrap(), &mut |answer: Frame| answers.push(answer));
+    let mut note = |answer: Frame| answers.push(answer);
+    machine.receive(&Frame::new(0x601, &request).unwrap(), &mut note);
     let answer = answers.iter().find(|answer| answer.id() == 0x581).unwrap();
     assert_eq!(answer.payload()[0], 0x60, "0x{index:04X}:{sub:02X} is not taken: {answer:?}");
 }
@@ -55,12 +53,12 @@ fn left_with(cell: &Cell, writes: &[Write]) -> Machine {
     for write in writes {
         leave(&mut machine, write);
     }
-    // Kept over a reset of the communication as well.
+    // Persistent across a reset of communication as well.
     leave(&mut machine, &u32(0x1010, 1, u32::from_le_bytes(*b"save")));
     machine
 }
 
-/// Digest of the only run, or the refusal.
+/// Returns the digest of the only run, or the refusal.
 fn run(cell: &Cell, machine: Machine) -> Result<String, String> {
     let scratch = Scratch::new();
     let library = scratch.file("library.db");
@@ -73,8 +71,7 @@ fn run(cell: &Cell, machine: Machine) -> Result<String, String> {
     Ok(library.load(rows[0].id).unwrap().digest)
 }
 
-/// Every object by itself, with a value with which the axis would go elsewhere, stop otherwise or not
-/// at all.
+/// Single objects, each with a value that would misplace the axis, change its stop or prevent it.
 fn wrong_values() -> Vec<Vec<Write>> {
     let mut all: Vec<Vec<Write>> = vec![
         vec![i32(0x60B0, 0, 500_000)],
@@ -133,7 +130,8 @@ fn wrong_values() -> Vec<Vec<Write>> {
     all
 }
 
-/// A PDO of node 1 (0x1401 for RPDO2) on an identifier, mapped to one object, as it is written.
+/// Returns the writes that move a PDO of node 1 (0x1401 for RPDO2) to an identifier and map it to
+/// one object.
 fn pdo(communication: u16, cob_id: u32, entry: u32) -> Vec<Write> {
     let mapping = communication + 0x200;
     vec![
@@ -161,14 +159,15 @@ fn foreign_process_data_is_switched_off() {
     let cell = short("01_gantry.toml");
     let clean = run(&cell, machine(&cell)).unwrap();
     for writes in [
-        // The command of the other axis, of this one, and a TPDO, taken for an offset or a target.
+        // The commands of the other axis and of this one, and a TPDO, taken for an offset or a
+        // target.
         pdo(0x1401, 0x202, 0x60B0_0020),
         pdo(0x1402, 0x201, 0x60FF_0020),
         pdo(0x1403, 0x282, 0x607A_0020),
-        // TPDOs where the other axis and the controller send.
+        // TPDOs on identifiers of the other axis and of the controller.
         pdo(0x1802, 0x182, 0x6064_0020),
         pdo(0x1803, 0x202, 0x6064_0020),
-        // The loop's own ones, elsewhere and with something else.
+        // The loop's own PDOs, on other identifiers and with another mapping.
         pdo(0x1400, 0x333, 0x60FF_0020),
         pdo(0x1800, 0x333, 0x6041_0010),
     ] {
@@ -202,7 +201,7 @@ fn what_cannot_be_put_right_without_asking_refuses_the_drive() {
 
 #[test]
 fn the_objects_of_the_table_are_those_that_the_simulated_drive_has() {
-    // A drive that ignored what was left in it would make the other tests pass by itself.
+    // With a drive that ignored left-over values the other tests would pass trivially.
     let cell = short("01_gantry.toml");
     let machine = left_with(&cell, &[i32(0x60B0, 0, 500_000), u32(0x6085, 0, 1)]);
     let dictionary = machine.dictionary(ilc_tests::rig::node(1)).unwrap();

@@ -1,5 +1,5 @@
-//! The whole campaign in lock-step: that it learns, from what, how well, and that it is the same
-//! campaign bit by bit, again and over every transport.
+//! The whole campaign in lock-step: that it learns, from which measurement, how well, and that it
+//! is bit-identical when repeated and over every transport.
 
 #![allow(
     clippy::unwrap_used,
@@ -20,9 +20,9 @@ use ilc_tests::campaign::{self, Kept, machine, run, run_on};
 use ilc_tests::far_side::FarSide;
 use ilc_tests::{example, example_text, short};
 
-/// Long enough for a loaded machine; no test that passes ever waits for it.
+/// Long enough for a loaded machine; a passing test never waits this long.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Runs of the campaigns that are compared over transports.
+/// Runs of the campaigns that are compared between transports.
 const COMPARED: u32 = 3;
 
 fn describe(kept: &Kept) -> String {
@@ -49,9 +49,10 @@ fn the_contour_error_at_the_tool_falls_by_four_fifths_in_ten_runs() {
     completed(&encoder, 10);
     let (tool_fall, encoder_fall) = (tool.contour_fall(9), encoder.contour_fall(9));
     assert!(tool_fall >= 0.8, "{tool_fall}");
-    // What the encoders do not see cannot be learned: orthogonality and the swinging crossbeam.
+    // Errors that encoders do not see cannot be learned from them: orthogonality and the swinging
+    // crossbeam.
     assert!(encoder_fall > 0.2 && encoder_fall < tool_fall - 0.2, "{encoder_fall}");
-    // Each is best at what it learns from.
+    // Each is best in the measurement it learns from.
     let last = |kept: &Kept| kept.outcome.runs[9].1.clone();
     assert!(last(&encoder).encoder_tracking_inf_m < last(&tool).encoder_tracking_inf_m);
     assert!(last(&tool).tool_tracking_inf_m < last(&encoder).tool_tracking_inf_m);
@@ -120,7 +121,7 @@ fn noise_with_a_seed_is_the_same_noise() {
     assert_ne!(first.digests, run(&cell, 3, None).digests);
 }
 
-/// The campaign on a bus whose far end is served by another thread.
+/// Runs the campaign on a bus whose far end is served by another thread.
 fn over(cell: &Cell, near: Box<dyn Bus>, far: Box<dyn Bus>) -> Vec<String> {
     let far_side = FarSide::serve(far, machine(cell));
     let kept = run_on(cell, near, COMPARED, None);
@@ -148,7 +149,7 @@ fn the_same_over_a_pair_of_threads() {
 
 #[test]
 fn the_same_over_udp() {
-    // Held until the end, so that the number stays this test's own.
+    // Held until the end, so that the port stays reserved for this test.
     let holder = UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = format!("udp:239.74.163.91:{}", holder.local_addr().unwrap().port());
     compare("udp", || (transport::open(&address).unwrap(), transport::open(&address).unwrap()));
@@ -158,7 +159,8 @@ fn the_same_over_udp() {
 fn the_same_over_zenoh() {
     compare("zenoh", || {
         for _ in 0..10 {
-            // Free when asked; if somebody takes it before Zenoh does, the next one will do.
+            // Free when queried; if another process takes it before Zenoh does, the next one will
+            // do.
             let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
             let open = |role: &str| {
                 let address = format!("zenoh:test/cell?{role}=tcp/127.0.0.1:{port}&scouting=off");
@@ -179,7 +181,7 @@ fn the_same_over_can() {
         eprintln!("SKIPPED: ILC_TEST_CAN is not set; see tests/vcan/run");
         return;
     };
-    // One test at a time on the interface, whoever runs them.
+    // One test at a time on the interface, across processes.
     let lock = std::fs::File::create(std::env::temp_dir().join("ilc-rt-can-test.lock")).unwrap();
     lock.lock().unwrap();
     let address = format!("can:{interface}");

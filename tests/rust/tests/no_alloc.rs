@@ -1,7 +1,7 @@
-//! A tick allocates nothing and frees nothing, whatever happens in it.
+//! A tick neither allocates nor frees memory, whatever happens in it.
 //!
-//! Every tick of whole campaigns is counted, phase by phase: with the simulated machine inside, which
-//! allocates nothing either once it is set up.
+//! Every tick of whole campaigns is counted, phase by phase, including the simulated machine, which
+//! does not allocate after set-up either.
 
 #![allow(
     clippy::unwrap_used,
@@ -25,7 +25,7 @@ static ALLOCATOR: Counting = Counting;
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 const MIDDLE: u32 = 150;
 
-/// A rig whose ticks are counted.
+/// A rig with counted ticks.
 struct Watched {
     rig: Rig,
     phases: BTreeSet<&'static str>,
@@ -75,7 +75,7 @@ fn name(phase: PhaseName) -> &'static str {
     }
 }
 
-/// A table that is worth swapping in.
+/// A valid table to swap in.
 fn table(n_samples: usize) -> Box<[f64]> {
     (0..2 * n_samples).map(|i| 1e-4 * (i as f64 * 0.01).sin()).collect()
 }
@@ -120,7 +120,7 @@ fn stops_of_every_kind() {
             watched.rig.tap.line().meddle(|machine, _| assert!(machine.mute(node(10))));
         }),
         ("drive fault", |watched| {
-            // A window of 10 um: the drive faults, with an emergency.
+            // A window of 10 um: following error, with an emergency.
             watched.rig.tap.line().meddle(|machine, _| write_object(1, 0x6065, 1000)(machine));
         }),
         ("node restarts", |watched| {
@@ -143,7 +143,7 @@ fn stops_of_every_kind() {
             watched.tick_into_run(0, MIDDLE);
             break_it(&mut watched);
             watched.tick_to_end();
-            // A velocity-commanded drive has no following error of its own.
+            // A velocity-commanded drive (CSV) has no following error of its own.
             let has_reason = !(what == "drive fault" && name == CELLS[1]);
             assert_eq!(watched.rig.reason.is_some(), has_reason, "{name} {what}");
             assert!(watched.phases.contains("stopping") == has_reason, "{name} {what}");

@@ -1,4 +1,4 @@
-//! A learning update allocates nothing, whatever the law: it may run while the axes return.
+//! A learning update does not allocate, whatever the law: it may run while the axes return.
 
 #![expect(clippy::unwrap_used, reason = "set-up shared by the tests must not fail")]
 
@@ -52,7 +52,7 @@ fn the_counter_counts() {
 #[test]
 fn no_law_allocates_in_an_update() {
     let separate = axis(1.0).append(&axis(0.6).delayed(1).unwrap()).unwrap();
-    // The second axis shows in the first one's output, so that neither can be solved alone.
+    // The second axis is coupled into the first one's output, so neither can be solved alone.
     let mut c = separate.c().clone();
     c[(0, 2)] = 0.1;
     let coupled = StateSpace::discrete(
@@ -79,7 +79,7 @@ fn no_law_allocates_in_an_update() {
         Box::new(NormOptimal::new(&separate, N_SAMPLES, weights).unwrap()),
         Box::new(NormOptimal::new(&coupled, N_SAMPLES, weights).unwrap()),
     ];
-    // The input at hand is twice as large as it may be, so that the search has work to do.
+    // The current input is twice the bound, so that the search has work to do.
     for model in [&separate, &coupled] {
         let bounds = Bounds { input: Some(Bound::within(-0.5, 0.5)), ..Bounds::default() };
         laws.push(Box::new(Constrained::new(model, N_SAMPLES, weights, bounds).unwrap()));
@@ -105,7 +105,7 @@ fn no_law_allocates_in_an_update() {
     }
 }
 
-/// A weight that couples the axes, another at every sample.
+/// A weight that couples the axes, different at every sample.
 fn contour() -> Cost {
     let block = |k: usize| {
         let (s, c) = (k as f64 * 0.01).sin_cos();

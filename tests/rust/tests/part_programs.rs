@@ -5,15 +5,19 @@
 use ilc_rt::config::Cell;
 use ilc_rt::design::Plan;
 use ilc_rt::record::EndStatus;
+use ilc_rt::trajectory::kind::{Key, PathKind};
 use ilc_tests::campaign::run;
 use ilc_tests::{Scratch, example, example_text};
 
 /// The first example with another `[program]`.
-fn cell_with(program: &str) -> Result<Plan, String> {
+fn cell_text(program: &str) -> String {
     let text = example_text("01_gantry.toml");
     let (begin, end) = (text.find("[program]").unwrap(), text.find("[learning]").unwrap());
-    let text = format!("{}{program}\n{}", &text[..begin], &text[end..]);
-    let cell = Cell::parse(&text, "cell.toml").map_err(|error| error.to_string())?;
+    format!("{}{program}\n{}", &text[..begin], &text[end..])
+}
+
+fn cell_with(program: &str) -> Result<Plan, String> {
+    let cell = Cell::parse(&cell_text(program), "cell.toml").map_err(|error| error.to_string())?;
     Plan::new(&cell, None, true).map_err(|error| error.to_string())
 }
 
@@ -32,7 +36,7 @@ fn a_part_program_goes_where_it_says() {
     let nearest = |x: f64, y: f64| {
         plan.reference_m.chunks(2).map(|p| (p[0] - x).hypot(p[1] - y)).fold(f64::INFINITY, f64::min)
     };
-    // The middle of the corner arcs and of the notch, to what the blend rounds off.
+    // The middle of the corner arcs and of the notch, to within the blend's rounding.
     let along = 0.02 * std::f64::consts::FRAC_1_SQRT_2;
     for (x, y) in [(0.06 + along, 0.02 - along), (0.06 + along, 0.04 + along), (0.04, 0.05)] {
         assert!(nearest(x, y) < 1e-4, "{x} {y}: {}", nearest(x, y));
@@ -43,31 +47,69 @@ fn a_part_program_goes_where_it_says() {
 
 #[test]
 fn every_kind_of_path_is_planned() {
-    let common = "[program]\nfeed_m_s = 0.02\n";
-    for program in [
-        "kind = \"butterfly\"\nstart_m = [0.04, 0.04]\ncurvature_acceleration_m_s2 = 0.02",
-        "kind = \"spiral\"\nstart_m = [0.04, 0.04]\n[program.spiral]\npitch_m = 0.004\nturns = 3.0",
-        "kind = \"raster\"\nstart_m = [0.0, 0.0]\n[program.raster]\nwidth_m = 0.02\npitch_m = 0.005\n\
-         rows = 3\nthere_and_back = true",
-        "kind = \"spline\"\nstart_m = [0.0, 0.0]\nsegment = [{ to_m = [0.03, 0.01] }, \
-         { to_m = [0.05, 0.05] }, { to_m = [0.0, 0.04] }]",
-        "kind = \"modulated\"\nstart_m = [0.0, 0.0]\nsegment = [{ to_m = [0.05, 0.0] }]\n\
-         [program.modulated]\namplitude_m = 0.0005\nfrequency_hz = 3.0",
-        "start_m = [0.02, 0.0]\nsegment = [{ to_m = [0.0, 0.02], center_m = [0.0, 0.0], dwell_s = 0.1 }]",
-    ] {
-        let plan = cell_with(&format!("{common}{program}")).unwrap();
-        assert!(plan.n_samples() > 500, "{program}");
+    let folder = Scratch::new();
+    for kind in PathKind::ALL {
+        let (entry, name) = (kind.entry(), kind.name());
+        let file = folder.file(&format!("{name}.toml"));
+        std::fs::write(&file, cell_text(&format!("[program]\n{}", entry.example))).unwrap();
+        std::fs::write(folder.file("example.txt"), entry.example_file).unwrap();
+        let cell = Cell::load(&file).unwrap();
+        assert_eq!(cell.program.kind, *kind);
+        let plan = Plan::new(&cell, None, true).unwrap();
+        assert!(plan.n_samples() > 500, "{name}");
+        // What it does not read is refused, and what it needs is asked for.
+        for (key, _, is_given) in cell.program.given() {
+            assert!(!is_given || entry.reads.contains(&key), "{name} {key:?}");
+        }
+        for needed in entry.needs {
+            let mut without = cell.clone();
+            match needed {
+                Key::Segments => without.program.segments.clear(),
+                Key::File => without.program.file = None,
+                Key::Spiral => without.program.spiral = None,
+                Key::Raster => without.program.raster = None,
+                Key::Modulated => without.program.modulated = None,
+                other => panic!("{other:?} is needed by no kind"),
+            }
+            let line = Plan::new(&without, None, true).unwrap_err().to_string();
+            assert!(line.contains("missing: needed by this kind of path"), "{line}");
+        }
     }
 }
 
 #[test]
+fn an_earlier_name_is_refused_with_the_new_one() {
+    let program = "[program]\nkind = \"butterfly\"\nfeed_m_s = 0.02\nstart_m = [0.04, 0.04]\n\
+                   curvature_acceleration_m_s2 = 0.02";
+    let line = cell_with(program).unwrap_err();
+    assert!(line.contains("curvature_acceleration_m_s2 = 0.02"), "{line}");
+    assert!(line.contains("it is now called curvature_acceleration_max_m_s2"), "{line}");
+}
+
+#[test]
+fn a_rotary_axis_is_refused_in_its_own_unit() {
+    let program = "[program]\nfeed_m_s = 0.1\nstart_m = [0.0, 0.0]\ncorner = \"blend\"\n\
+                   segment = [{ to_m = [0.05, 0.05] }, { to_m = [0.05, 0.0] }]\n";
+    let text = cell_text(program).replace("name = \"y\"", "name = \"y\"\nunit = \"rad\"");
+    let slow = |text: &str, axis: usize| {
+        let mut cell = Cell::parse(text, "cell.toml").unwrap();
+        cell.axes[axis].limits.acceleration_max_m_s2 = 0.1;
+        Plan::new(&cell, None, true).unwrap_err().to_string()
+    };
+    let line = slow(&text, 1);
+    assert!(line.contains("(axis 2 is y): axis 2: acceleration reaches"), "{line}");
+    assert!(line.contains(" rad/s^2, limit 0.1 rad/s^2: largest admissible feed"), "{line}");
+    assert!(line.contains(" m/s (every feed times"), "the feed is that of the linear axis: {line}");
+    assert!(slow(&text, 0).contains(" m/s^2, limit 0.1 m/s^2"), "the other axis is linear");
+    let both = text.replace("name = \"x\"", "name = \"x\"\nunit = \"rad\"");
+    assert!(slow(&both, 0).contains(" rad/s (every feed times"), "a path of angles");
+}
+
+#[test]
 fn a_butterfly_is_learned_in_lock_step() {
-    let text = example_text("01_gantry.toml");
-    let (begin, end) = (text.find("[program]").unwrap(), text.find("[learning]").unwrap());
     let program = "[program]\nkind = \"butterfly\"\nstart_m = [0.04, 0.04]\nfeed_m_s = 0.02\n\
-                   curvature_acceleration_m_s2 = 0.2\n\n";
-    let text = format!("{}{program}{}", &text[..begin], &text[end..]);
-    let kept = run(&Cell::parse(&text, "butterfly.toml").unwrap(), 4, None);
+                   curvature_acceleration_max_m_s2 = 0.2\n\n";
+    let kept = run(&Cell::parse(&cell_text(program), "butterfly.toml").unwrap(), 4, None);
     assert_eq!(kept.outcome.status, EndStatus::Completed, "{}", kept.outcome.reason);
     assert!(kept.contour_fall(3) > 0.3, "{:?}", kept.contour_m());
 }
@@ -104,7 +146,7 @@ fn a_bad_part_program_is_refused_with_its_line() {
     assert!(line.contains("04_gcode.ngc: line 2: G33: allowed G0 G1"), "{line}");
 }
 
-/// Largest differences of the set points over the cycle, with rest before and after.
+/// Largest differences of the set points per cycle, with rest before and after.
 fn peaks(reference_m: &[f64], n_axes: usize, cycle_s: f64) -> [f64; 3] {
     let mut peaks = [0.0_f64; 3];
     for axis in 0..n_axes {
@@ -141,13 +183,13 @@ fn with_exact_stops_a_feed_beyond_the_limits_is_refused() {
         )
     };
     let line = cell_with(&program(1.0)).unwrap_err();
-    // 0.8 of it is y's share, which may be 0.5 m/s.
+    // 0.8 of it is y's share, whose limit is 0.5 m/s.
     assert!(line.contains("(axis 2 is y)") && line.contains("velocity reaches 0.8"), "{line}");
     assert!(line.contains("largest admissible feed 0.625 m/s"), "{line}");
     assert!(cell_with(&program(0.625)).is_ok());
 }
 
-/// The G-code example with another part program beside it.
+/// Returns the plan of the G-code example with another part program.
 fn part_program(text: impl AsRef<[u8]>) -> Result<Plan, String> {
     let folder = Scratch::new();
     std::fs::write(folder.file("cell.toml"), example_text("04_gcode.toml")).unwrap();

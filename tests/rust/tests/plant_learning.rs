@@ -1,15 +1,13 @@
-//! Convex-optimisation ILC on the simulated gantry, in lock-step and without a bus: what the plant,
-//! the trajectory and the contour error must give together before any of it is put on a wire.
+//! Convex-optimisation ILC on the simulated gantry, in lock-step and without a bus: plant,
+//! trajectory and contour error together.
 //!
-//! The law here is its own: the normal equations of Haas et al. (2016), eq. 9 and 11, solved by
-//! conjugate gradients with nothing but model simulations.
+//! The law is an independent implementation: the normal equations of Haas et al. (2016), eq. 9 and
+//! 11, solved by conjugate gradients with nothing but model simulations.
 
 #![expect(clippy::expect_used, reason = "a test may fail where the example is not as it should be")]
 
-use ilc_rt::config::{Cell, Corner};
-use ilc_rt::trajectory::{
-    AxisLimits, CornerRule, Interpolator, PathSegment, PathSpec, contour_error_m,
-};
+use ilc_rt::config::Cell;
+use ilc_rt::trajectory::{AxisLimits, Interpolator, PathSegment, PathSpec, contour_error_m};
 use ilc_sim::plant::{Demand, Gantry, Plant};
 
 const RATE: f64 = 6.0;
@@ -27,10 +25,7 @@ fn plan(cell: &Cell) -> Interpolator {
     let spec = PathSpec {
         start_m: program.start_m.clone(),
         segments: program.segments.iter().map(segment).collect(),
-        corner: match program.corner {
-            Corner::ExactStop => CornerRule::ExactStop,
-            Corner::Blend => CornerRule::Blend { window_s: program.blend_s },
-        },
+        blend_s: program.window_s(),
         dwell_before_s: program.dwell_before_s,
         dwell_after_s: program.dwell_after_s,
     };
@@ -43,7 +38,8 @@ fn plan(cell: &Cell) -> Interpolator {
     Interpolator::plan(&spec, &limits, cell.cycle_s()).expect("the example is within its limits")
 }
 
-/// Impulse response of `w² / (s² + 2 d w s + w²)` under a zero-order hold, late by whole cycles.
+/// Impulse response of `w² / (s² + 2 d w s + w²)` under a zero-order hold, with a dead time of
+/// whole cycles.
 fn impulse_response(hz: f64, damping: f64, delay: usize, cycle_s: f64) -> Vec<f64> {
     let w = std::f64::consts::TAU * hz;
     let step = |k: usize| {
@@ -109,15 +105,15 @@ fn update(h: &[f64], e: &[f64]) -> Vec<f64> {
     v
 }
 
-/// What a run measured, time first.
+/// Measurements of a run, time first.
 #[derive(Default)]
 struct Run {
     encoder_m: Vec<f64>,
     tool_m: Vec<f64>,
 }
 
-/// A run in lock-step: each SYNC measures and sends a target, to which the drive goes linearly over
-/// the cycle that follows.
+/// A run in lock-step: each SYNC measures and sends a target, which the drive approaches linearly
+/// over the following cycle.
 fn run(cell: &Cell, gantry: &mut Gantry, target_m: &[f64]) -> Run {
     let n_axes = cell.n_axes();
     let steps = cell.cell.cycle_us / cell.simulation.step_us;
@@ -143,7 +139,7 @@ fn run(cell: &Cell, gantry: &mut Gantry, target_m: &[f64]) -> Run {
     measured
 }
 
-/// Goes from where the axes are to the start, and settles.
+/// Moves from the current positions to the start, and settles.
 fn settle(cell: &Cell, gantry: &mut Gantry, from_m: &[f64], to_m: &[f64]) {
     let mut targets = Vec::new();
     for k in 0..=500_u32 {
@@ -154,7 +150,8 @@ fn settle(cell: &Cell, gantry: &mut Gantry, from_m: &[f64], to_m: &[f64]) {
     run(cell, gantry, &targets);
 }
 
-/// Largest contour and tracking error at the tool for each iteration, the first without learning.
+/// Returns the largest contour and tracking error at the tool for each iteration, the first without
+/// learning.
 fn campaign(cell: &Cell, from_tool: bool, delay: usize, iterations: usize) -> Vec<[f64; 2]> {
     let n_axes = cell.n_axes();
     let reference = plan(cell).reference();

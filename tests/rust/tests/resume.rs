@@ -1,5 +1,5 @@
-//! A campaign that is interrupted goes on where it was, one that cannot go on says why, and a law that
-//! makes things worse is stopped from doing so.
+//! An interrupted campaign resumes where it was, or gives the reason why it cannot; a law that
+//! makes the error grow is stopped.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -51,7 +51,7 @@ fn an_interrupted_campaign_goes_on_where_it_was() {
         assert!(kept.iter().all(|row| row.meta.campaign == outcome.campaign));
         assert_eq!(kept.iter().map(|row| row.record.index).collect::<Vec<_>>(), indices);
 
-        // The input that follows is the one that would have followed, to the last bit.
+        // The next input is bit-identical to that of an uninterrupted campaign.
         run(&cell, &options(other.clone(), 6)).unwrap();
         let whole = rows(&other);
         for index in 0..=3 {
@@ -107,8 +107,8 @@ fn a_library_that_is_not_there_cannot_be_gone_on_with() {
     assert!(!library.exists());
 }
 
-/// Drives that were switched off begin elsewhere than where the last run left them: what they show first
-/// is not held against a law that has converged.
+/// Drives that were switched off start from a different position than the last run left them in:
+/// their first run is not held against a converged law.
 #[test]
 fn a_converged_campaign_goes_on_where_it_was() {
     let (cell, scratch) = (example("01_gantry.toml"), Scratch::new());
@@ -129,7 +129,7 @@ fn a_converged_campaign_goes_on_where_it_was() {
     }
 }
 
-/// `u + g e`, with a gain that turns against the error after some updates.
+/// `u + g e`, with a gain that changes sign after some updates.
 struct Fickle {
     n_good: u32,
     n_updates: u32,

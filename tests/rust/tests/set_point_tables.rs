@@ -1,4 +1,4 @@
-//! Programs that are tables of set points, in a cell of nine rotary axes: run, learned and refused.
+//! Programs as tables of set points, in a cell of nine rotary axes: run, learned and refused.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -33,7 +33,7 @@ fn cell_text(bus: &str, cycle_us: u32, jerk_max: f64) -> String {
             input_max_m = 0.5\n[learning.norm_optimal]\nrate = 0.5\n"
 }
 
-/// Each axis goes to its own number times 0.02 rad and back, as smooth as a raised cosine squared.
+/// Each axis moves to its own number times 0.02 rad and back, along a squared raised cosine.
 fn points() -> String {
     let mut text = String::from("# a move of its own for each\n");
     let names: Vec<String> = (1..=N_AXES).map(|axis| format!("a{axis}")).collect();

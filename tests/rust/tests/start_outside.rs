@@ -1,10 +1,10 @@
-//! An axis that stands outside its limits when its drive is switched on is refused, and nothing moves;
-//! limits are kept by braking ahead of them, never by a jump.
+//! An axis outside its limits when its drive is enabled is refused, and nothing moves; limits are
+//! kept by braking ahead of them, never by a jump.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use ilc_rt::campaign;
-use ilc_rt::config::{Cell, Interface};
+use ilc_rt::config::{Cell, Mode};
 use ilc_rt::record::EndStatus;
 use ilc_rt::servo::{PhaseName, StopReason};
 use ilc_tests::campaign::{in_process, options};
@@ -13,7 +13,7 @@ use ilc_tests::{Scratch, example_text, short};
 
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 
-/// The short cell with an axis standing somewhere.
+/// Returns the short cell with an axis at a given position.
 fn standing(name: &str, axis: usize, start_m: f64) -> Cell {
     let mut cell = short(name);
     cell.axes[axis].simulation.position_start_m = start_m;
@@ -37,7 +37,7 @@ fn an_axis_outside_its_limits_is_refused_and_nothing_moves() {
                 for number in 0..2 {
                     let plant_m = line.plant_m(number);
                     assert!(plant_m.iter().all(|m| m.to_bits() == plant_m[0].to_bits()));
-                    // Neither was enabled, nor was a place asked for that the axis is not at.
+                    // Neither drive was enabled, nor commanded to a position other than its own.
                     let spec = &cell.axes[number];
                     #[expect(clippy::cast_possible_truncation, reason = "a place in counts")]
                     let at = (plant_m[0] * spec.counts_per_m).round() as i32;
@@ -45,8 +45,8 @@ fn an_axis_outside_its_limits_is_refused_and_nothing_moves() {
                         assert_eq!(row.controlword[number] & 0x0F, 0, "{name}");
                         let target = row.target_counts[number];
                         match spec.interface {
-                            Interface::Csp => assert!(target == at || target == 0, "{target}"),
-                            Interface::Csv => assert_eq!(target, 0),
+                            Mode::Csp => assert!(target == at || target == 0, "{target}"),
+                            Mode::Csv => assert_eq!(target, 0),
                         }
                     }
                 }
@@ -108,20 +108,20 @@ fn a_start_that_is_no_number_is_refused_where_it_is_written() {
     }
 }
 
-/// A learned input that pushes an axis beyond its limit is held there without a jump, and let go of
+/// A learned input that pushes an axis beyond its limit is held there without a jump, and released
 /// without one.
 #[test]
 fn a_sum_beyond_the_limits_brakes_ahead_of_them() {
     for name in CELLS {
         let mut cell = short(name);
-        // The program goes to 80 mm; the limit is where the learned input carries it beyond.
+        // The program goes to 80 mm; the limit lies where the learned input exceeds it.
         cell.axes[0].limits.position_max_m = 0.0805;
         (cell.learning.input_max_m, cell.learning.input_max_m_s) = (0.005, 0.05);
         let mut rig = Rig::new(&cell, 1);
         let n_samples = rig.n_samples;
         let size = match cell.axes[0].interface {
-            Interface::Csp => 0.004,
-            Interface::Csv => 0.05,
+            Mode::Csp => 0.004,
+            Mode::Csv => 0.05,
         };
         let table = (0..2 * n_samples).map(|i| {
             let turn = (i / 2) as f64 / n_samples as f64 * std::f64::consts::TAU;
@@ -135,7 +135,7 @@ fn a_sum_beyond_the_limits_brakes_ahead_of_them() {
         let plant_m = line.plant_m(0);
         let farthest = plant_m.iter().fold(f64::MIN, |most, m| most.max(*m));
         assert!(farthest <= 0.0805 + 2e-4, "{name}: {farthest}");
-        if spec.interface == Interface::Csp {
+        if spec.interface == Mode::Csp {
             let target: Vec<f64> = line
                 .rows()
                 .filter(|row| row.controlword[0] == 0x0F)

@@ -1,5 +1,4 @@
-//! Everything that brings the axes to rest ahead of time: the reason that is told, and what the drives
-//! are told meanwhile, read off the bus.
+//! All causes of an early stop: the reported reason, and the commands on the bus meanwhile.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -8,26 +7,26 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use ilc_rt::campaign::{self, Outcome};
-use ilc_rt::config::{Cell, Interface};
+use ilc_rt::config::{Cell, Mode};
 use ilc_rt::fieldbus::canopen::{NmtCommand, emcy};
 use ilc_rt::fieldbus::cia402::State;
 use ilc_rt::fieldbus::transport::{Responder, loopback};
-use ilc_rt::record::{EndStatus, Event, StateName};
+use ilc_rt::record::{EndStatus, Event, FaultKind, StateName};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
 use ilc_tests::campaign::{machine, options};
 use ilc_tests::far_side::FarSide;
 use ilc_tests::rig::{Rig, Tap, node, write_object};
 use ilc_tests::{Scratch, short};
 
-/// Node of the axis that breaks, and of the tool's encoder.
+/// Node of the axis that fails, and of the tool's encoder.
 const X: u8 = 1;
 const TOOL: u8 = 10;
-/// Sample of run 1 at which things happen: in full motion.
+/// Sample of run 1 at which events happen: in full motion.
 const MIDDLE: u32 = 150;
 
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 
-/// A table that pushes both axes about, smoothly and well within bounds.
+/// A table that moves both axes smoothly and well within bounds.
 fn smooth_table(n_samples: usize, size: f64) -> Box<[f64]> {
     (0..2 * n_samples)
         .map(|i| {
@@ -39,12 +38,12 @@ fn smooth_table(n_samples: usize, size: f64) -> Box<[f64]> {
 
 fn size(cell: &Cell) -> f64 {
     match cell.axes[0].interface {
-        Interface::Csp => 0.001,
-        Interface::Csv => 0.02,
+        Mode::Csp => 0.001,
+        Mode::Csv => 0.02,
     }
 }
 
-/// A rig in the middle of run 1, in which a learned input is at work.
+/// A rig in the middle of run 1, with an active learned input.
 fn in_motion(cell: &Cell) -> Rig {
     let mut rig = Rig::new(cell, 3);
     rig.tick_until(|rig| rig.phase.0 == PhaseName::Running);
@@ -55,9 +54,9 @@ fn in_motion(cell: &Cell) -> Rig {
     rig
 }
 
-/// Checks the commands on the bus from the beginning of the enabled motion to the end: that no step is
-/// larger than the limits allow, and from the stop on, that every axis in `axes` decelerates within its
-/// limits and comes to rest.
+/// Checks the commands on the bus from enabling to the end: no step is larger than the limits
+/// allow, and from the stop on, every axis in `axes` decelerates within its limits and comes to
+/// rest.
 fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
     let dt_s = cell.cycle_s();
     let line = rig.tap.line();
@@ -72,7 +71,7 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
         let enabled = enabled.map_or(rows.len(), |row| row + 3);
         let (v_max, a_max) = (spec.limits.velocity_max_m_s, spec.limits.acceleration_max_m_s2);
         match spec.interface {
-            Interface::Csp => {
+            Mode::Csp => {
                 // Half a count of rounding at either end of a step.
                 let step_max = v_max * dt_s + 1.01 / scale;
                 for k in enabled..rows.len() {
@@ -91,13 +90,14 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
                 let rest = target.last().unwrap();
                 let tail = target.len().saturating_sub(20).max(stop_at);
                 assert!(target[tail..].iter().all(|p| p.to_bits() == rest.to_bits()));
-                // A stop from this speed with this jerk is short; it must not be a journey.
+                // The braking distance from this velocity with this jerk is short; the stop must
+                // not travel farther.
                 let journey = (rest - target[stop_at - 1]).abs();
                 assert!(journey < 0.01, "axis {axis} went on for {journey} m");
             }
-            Interface::Csv => {
-                // The velocity follows from a measured position, so it may move a little faster than
-                // the reference does, but never by a jump.
+            Mode::Csv => {
+                // The velocity follows from a measured position, so it may be slightly higher than
+                // the reference's, but never a jump.
                 for k in stop_at.max(enabled)..rows.len() {
                     let a = (target[k] - target[k - 1]).abs() / dt_s;
                     assert!(a <= 1.5 * a_max, "axis {axis}: {a} m/s2 at SYNC {k}");
@@ -105,13 +105,13 @@ fn check_commands(cell: &Cell, rig: &Rig, axes: &[usize]) {
                 assert!(target.iter().all(|v| v.abs() <= v_max + 1.0 / scale));
             }
         }
-        // The machine itself rests before its drive is switched off.
+        // The machine is at rest before its drive is disabled.
         let rest_m_s = rig.rest_m_s[axis];
         assert!(rest_m_s.abs() < 0.002, "axis {axis} still moves at {rest_m_s} m/s");
     }
 }
 
-/// Ticks to the end and checks that the drives of `axes` are off and were stopped gently.
+/// Ticks to the end and checks that the drives of `axes` are disabled and were stopped gently.
 fn finish(cell: &Cell, rig: &mut Rig, axes: &[usize]) {
     rig.tick_to_end();
     let states = rig.drive_states();
@@ -169,7 +169,7 @@ fn a_drive_that_falls_silent_stops_the_other() {
             matches!(rig.reason, Some(StopReason::SilentAxis { axis: 0, cycles: 1 })),
             "{rig:?}"
         );
-        // The lost drive is told to stop for as long as anybody speaks to it.
+        // The lost drive is commanded to stop for as long as the loop sends commands.
         let line = rig.tap.line();
         let last = line.rows().last().unwrap();
         assert_eq!(last.controlword[0], 0x02);
@@ -191,7 +191,7 @@ fn a_tool_that_falls_silent_stops_both() {
 fn a_drive_with_a_following_error_stops_the_other() {
     let cell = short(CELLS[0]);
     let mut rig = in_motion(&cell);
-    // A window of 10 um: the drive finds that it lags, as it would with a worn brake.
+    // A window of 10 um: the drive detects a following error, as with a worn brake.
     rig.tap.line().meddle(|machine, _| write_object(X, 0x6065, 1000)(machine));
     finish(&cell, &mut rig, &[1]);
     let Some(StopReason::DriveFault { axis: 0, code, following_error_m }) = rig.reason else {
@@ -206,7 +206,7 @@ fn a_drive_with_a_following_error_stops_the_other() {
 fn an_axis_that_cannot_follow_stops_both() {
     for name in CELLS {
         let mut cell = short(name);
-        // The motor of x is too weak for its own friction.
+        // The motor of x is too weak to overcome its friction.
         let simulation = &mut cell.axes[0].simulation;
         simulation.force_max_n = 60.0;
         (simulation.coulomb_n, simulation.static_n) = (60.0, 60.0);
@@ -250,8 +250,8 @@ fn an_absurd_table_is_bounded_and_never_steps() {
             rig.mail.send_table(1, table.collect()).unwrap();
             rig.tick_to_end();
             let (most, step_max) = match cell.axes[0].interface {
-                Interface::Csp => (cell.learning.input_max_m, 0.5 * cell.cycle_s()),
-                Interface::Csv => (cell.learning.input_max_m_s, 8.0 * cell.cycle_s()),
+                Mode::Csp => (cell.learning.input_max_m, 0.5 * cell.cycle_s()),
+                Mode::Csv => (cell.learning.input_max_m_s, 8.0 * cell.cycle_s()),
             };
             for pair in rig.samples.windows(2) {
                 for axis in 0..2 {
@@ -264,14 +264,14 @@ fn an_absurd_table_is_bounded_and_never_steps() {
             for (axis, spec) in cell.axes.iter().enumerate() {
                 let limits = &spec.limits;
                 let counts_max = match spec.interface {
-                    Interface::Csp => limits.velocity_max_m_s * cell.cycle_s() * spec.counts_per_m,
-                    Interface::Csv => limits.velocity_max_m_s * spec.counts_per_m,
+                    Mode::Csp => limits.velocity_max_m_s * cell.cycle_s() * spec.counts_per_m,
+                    Mode::Csv => limits.velocity_max_m_s * spec.counts_per_m,
                 };
                 for pair in rows.windows(2).filter(|pair| pair[0].controlword[axis] == 0x0F) {
                     let now = pair[1].target_counts[axis];
                     let moved = match spec.interface {
-                        Interface::Csp => now - pair[0].target_counts[axis],
-                        Interface::Csv => now,
+                        Mode::Csp => now - pair[0].target_counts[axis],
+                        Mode::Csv => now,
                     };
                     assert!(f64::from(moved).abs() <= counts_max + 1.01, "{name} {moved}");
                 }
@@ -314,7 +314,7 @@ fn a_node_that_restarts_stops_the_others() {
     }
 }
 
-/// A campaign in which `meddle` happens in the middle of run 1.
+/// Runs a campaign in which `meddle` happens in the middle of run 1.
 fn campaign_with(
     cell: &Cell,
     meddle: impl FnOnce(&mut ilc_sim::Machine, &mut dyn FnMut(ilc_rt::fieldbus::Frame)) + Send + 'static,
@@ -342,6 +342,7 @@ fn campaign_with(
 fn the_reason_is_told_in_one_sentence() {
     let cell = short(CELLS[0]);
     let fault = |meddle: fn(&mut ilc_sim::Machine, &mut dyn FnMut(ilc_rt::fieldbus::Frame)),
+                 kind: FaultKind,
                  parts: &[&str]| {
         let (outcome, events) = campaign_with(&cell, meddle);
         assert_eq!(outcome.status, EndStatus::Fault);
@@ -350,21 +351,38 @@ fn the_reason_is_told_in_one_sentence() {
             assert!(outcome.reason.contains(part), "{part:?} in {:?}", outcome.reason);
         }
         assert!(!outcome.reason.contains('\n'));
-        let told = Event::Fault { reason: outcome.reason.clone() };
-        assert_eq!(events.iter().filter(|event| **event == told).count(), 1);
+        let mut faults = events.iter().filter_map(|event| match event {
+            Event::Fault { reason, fault } if *reason == outcome.reason => Some(fault),
+            _ => None,
+        });
+        let fault = faults.next().expect("a fault in fields");
+        assert!(faults.next().is_none());
+        assert_eq!(fault.kind, kind);
+        assert!(fault.node.is_some_and(|node| outcome.reason.contains(&format!("node {node}"))));
+        assert_eq!(fault.cycles.encoder_m.len(), 32);
+        assert!(fault.cycles.reference_m.iter().all(|row| row.len() == cell.n_axes()));
+        // The last positions before the stop are those of a run under way.
+        assert!(fault.cycles.encoder_m[0] != fault.cycles.encoder_m[31]);
         assert!(matches!(events.last(), Some(Event::End { status: EndStatus::Fault, .. })));
     };
     fault(
         |machine, _| write_object(X, 0x6065, 1000)(machine),
+        FaultKind::DriveFault,
         &["axis x (node 1)", "0x8611", emcy::meaning(emcy::CODE_FOLLOWING_ERROR), "mm"],
     );
     fault(
         |machine, _| assert!(machine.mute(node(2))),
+        FaultKind::SilentDrive,
         &["axis y (node 2)", "silent", "no answer in 2 s"],
     );
-    fault(|machine, _| assert!(machine.mute(node(TOOL))), &["node 10", "silent"]);
+    fault(
+        |machine, _| assert!(machine.mute(node(TOOL))),
+        FaultKind::SilentTool,
+        &["node 10", "silent"],
+    );
     fault(
         |machine, reply| machine.receive(&NmtCommand::ResetNode.frame(Some(node(X))), reply),
+        FaultKind::NodeRestarted,
         &["node 1 restarted"],
     );
 }
@@ -392,7 +410,7 @@ fn a_silent_drive_on_a_real_bus_is_waited_for_once() {
     cell.safety.answer_timeout_s = 1.0;
     let scratch = Scratch::new();
     let (near, far) = loopback::pair(1024).unwrap();
-    // The far end has the wall clock only to fall silent by; everything before is lock-step.
+    // The far end uses the wall clock only to fall silent; everything before is lock-step.
     let (quiet, heard) = std::sync::mpsc::channel();
     let far_side = FarSide::serve_with(Box::new(far), machine(&cell), move |machine| {
         if heard.try_recv().is_ok() {
@@ -414,6 +432,6 @@ fn a_silent_drive_on_a_real_bus_is_waited_for_once() {
     .unwrap();
     drop(far_side);
     assert!(outcome.reason.contains("silent"), "{}", outcome.reason);
-    // A second of patience for the first missing answer, and not again for each of the stop's cycles.
+    // One second of timeout for the first missing answer, and not again for each cycle of the stop.
     assert!(began.elapsed() < Duration::from_secs(8), "{:?}", began.elapsed());
 }

@@ -1,39 +1,39 @@
-//! Stops while the measurement of an axis lies: it freezes, is lost, late, or false. No stop may trust
-//! it, so every axis comes to rest within the braking distance of what it was commanded.
+//! Stops while the measurement of an axis is wrong: frozen, lost, late, or false. No stop may trust
+//! it, so every axis comes to rest within the braking distance of its last command.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::collections::VecDeque;
 
-use ilc_rt::config::{Cell, Interface};
+use ilc_rt::config::{Cell, Mode};
 use ilc_rt::fieldbus::Frame;
-use ilc_rt::fieldbus::cia402::{Extra, Status};
+use ilc_rt::fieldbus::cia402::{DriveMotionTpdo2, StatusTpdo1};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
 use ilc_tests::rig::{Distort, Rig, node};
 use ilc_tests::short;
 
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
-/// Ticks after which a stop is asked for where the loop has seen no reason for one.
+/// Ticks after which the test requests a stop if the loop has not found a reason for one.
 const PATIENCE: u32 = 150;
 
-/// What becomes of the measurement of one axis.
+/// A fault of one axis's measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Lie {
-    /// The status stays what it was.
+    /// The status is frozen.
     Frozen,
     /// The status is lost.
     StatusLost,
-    /// What else the drive sends is lost.
+    /// The second TPDO is lost.
     ExtraLost,
     /// Both are lost.
     BothLost,
-    /// Both come so many cycles late.
+    /// Both are late by a number of cycles.
     Late(usize),
-    /// The position is so much too high, in counts.
+    /// The position has an offset, in counts.
     Offset(i32),
-    /// The position is so many times what it is.
+    /// The position is multiplied.
     Scaled(i32),
-    /// The position is too high by so much more in each cycle, in counts.
+    /// The position drifts per cycle, in counts.
     Drifting(i32),
 }
 
@@ -61,10 +61,10 @@ fn distort(lie: Lie, axis_node: u8) -> Distort {
         while waiting.front().is_some_and(|(due, _)| *due <= n_syncs) {
             out.push_back(waiting.pop_front().unwrap().1);
         }
-        let status = Status::decode(&frame, number);
-        let extra = Extra::decode(&frame, number).is_some();
-        let moved = |status: Status, position_counts: i32| {
-            Status { position_counts, ..status }.encode(number)
+        let status = StatusTpdo1::decode(&frame, number);
+        let extra = DriveMotionTpdo2::decode(&frame, number).is_some();
+        let moved = |status: StatusTpdo1, position_counts: i32| {
+            StatusTpdo1 { position_counts, ..status }.encode(number)
         };
         match (lie, status) {
             (Lie::Frozen, Some(_)) => out.push_back(*frozen.get_or_insert(frame)),
@@ -88,8 +88,8 @@ fn distort(lie: Lie, axis_node: u8) -> Distort {
     })
 }
 
-/// Checks, from the tick in which the stop began, that no command steps and that every axis is at rest
-/// within its braking distance.
+/// Checks, from the tick in which the stop began, that no command steps and that every axis is at
+/// rest within its braking distance.
 fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
     let dt_s = cell.cycle_s();
     let Some(began) = rig.stopping_at else { panic!("{what}: no stop") };
@@ -101,13 +101,13 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
         let target: Vec<f64> =
             rows.iter().map(|row| f64::from(row.target_counts[axis]) / spec.counts_per_m).collect();
         let velocity_m_s: Vec<f64> = match spec.interface {
-            Interface::Csp => std::iter::once(0.0)
+            Mode::Csp => std::iter::once(0.0)
                 .chain(target.windows(2).map(|pair| (pair[1] - pair[0]) / dt_s))
                 .collect(),
-            Interface::Csv => target,
+            Mode::Csv => target,
         };
         let rounding = 4.0 / spec.counts_per_m / (dt_s * dt_s);
-        // Where the drives are told nothing but to let go, the target means nothing.
+        // While drives are only told to disable, the target is meaningless.
         let held = |k: usize| rows[k].controlword[axis] == 0x0F;
         for k in began.max(1)..rows.len() {
             if held(k) && held(k - 1) {
@@ -118,17 +118,17 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
         let plant_m = line.plant_m(axis);
         let v = velocity_m_s[began - 1].abs();
         let a_0 = ((velocity_m_s[began - 1] - velocity_m_s[began - 2]) / dt_s).abs().min(a_max);
-        // What a jerk-limited ramp needs, and a cycle or two.
+        // The length of a jerk-limited ramp, plus a cycle or two.
         let w = v + a_0 * a_0 / (2.0 * jerk);
         let braking_m = w * w / (2.0 * a_max) + w * (a_max + a_0) / jerk + 3.0 * v * dt_s;
-        // A drive that closes the position loop itself comes up to its command.
+        // A drive that closes the position loop (CSP) catches up with its command.
         let lag_m = match spec.interface {
-            Interface::Csp => {
+            Mode::Csp => {
                 let at = f64::from(rows[began - 1].target_counts[axis]) / spec.counts_per_m;
                 (at - plant_m[began - 1]).abs()
             }
-            // One that closes the velocity loop is behind by its time constant.
-            Interface::Csv => 0.02 * v,
+            // One that closes the velocity loop (CSV) lags by its time constant.
+            Mode::Csv => 0.02 * v,
         };
         let way_m = (plant_m[plant_m.len() - 1] - plant_m[began - 1]).abs();
         assert!(
@@ -209,7 +209,7 @@ fn a_frozen_velocity_axis_is_not_driven_on() {
     rig.tick_to_end();
     assert!(matches!(rig.reason, Some(StopReason::FollowingError { axis: 0, .. })), "{rig:?}");
     check_stop(&cell, &rig, "frozen");
-    // The drive whose encoder failed is told to stop by itself, not to let go.
+    // The drive with the failed encoder is commanded to stop by itself, not to coast.
     let line = rig.tap.line();
     let last: Vec<u16> = line.rows().map(|row| row.controlword[0]).collect();
     assert!(last.iter().rev().take(3).any(|word| *word == 0x02), "{last:x?}");

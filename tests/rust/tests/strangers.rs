@@ -1,5 +1,5 @@
-//! Another master on the bus: SYNC, NMT, commands and requests that this controller did not send are
-//! noticed and named, and the axes come to rest, on every transport.
+//! A second master on the bus: foreign SYNC, NMT, commands and requests are detected and named, and
+//! the axes come to rest, on every transport.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use ilc_rt::campaign::{self, Outcome};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, Controlword};
+use ilc_rt::fieldbus::cia402::{CommandRpdo1, Controlword};
 use ilc_rt::fieldbus::transport::{self, Responder, ZenohBus, ZenohSettings, loopback};
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_rt::record::{EndStatus, Event, StateName};
@@ -26,8 +26,11 @@ fn request(node: u16) -> Frame {
 }
 
 fn command(to: u8) -> Frame {
-    let command =
-        Command { controlword: Controlword::ENABLE_OPERATION, target_counts: 0, torque_offset: 0 };
+    let command = CommandRpdo1 {
+        controlword: Controlword::ENABLE_OPERATION,
+        target_counts: 0,
+        torque_offset: 0,
+    };
     command.encode(node(to))
 }
 
@@ -53,7 +56,7 @@ fn what_only_a_master_sends_is_named_in_every_phase() {
                 rig.tick(0);
                 rig.tick_until(|rig| rig.phase.0 == phase);
                 rig.tap.line().meddle(|machine, reply| {
-                    // Everybody hears it: this controller and the drives.
+                    // All nodes receive it: this controller and the drives.
                     reply(frame);
                     machine.receive(&frame, reply);
                 });
@@ -83,7 +86,8 @@ fn what_is_for_other_nodes_is_nobodys_business() {
     assert_eq!(rig.reason, None);
 }
 
-/// A campaign in lock-step with the machine behind `far`; the stranger sends `frame` when run 1 begins.
+/// Runs a campaign in lock-step with the machine behind `far`; the second master sends `frame` when
+/// run 1 begins.
 fn campaign(
     near: Box<dyn Bus>,
     mut far: Box<dyn Bus>,
@@ -101,7 +105,7 @@ fn campaign(
         let has_own_end = stranger.is_some();
         scope.spawn(move || {
             while !told.load(Ordering::Relaxed) {
-                // Where the bus has two ends only, the stranger sits beside the drives.
+                // If the bus has two ends only, the second master sits beside the drives.
                 if !has_own_end && asked.swap(false, Ordering::Relaxed) {
                     far.send(&frame).unwrap();
                 }

@@ -25,8 +25,10 @@ use crate::argument::{Layout, read_disturbance};
 use crate::arguments::Arguments;
 use crate::error::OrRaise;
 use crate::guard::{Borrowed, Guarded};
+use crate::made::reduce_kind;
 use crate::python_law::{Channels, Frame, PythonLaw};
 use crate::signal::read_filter;
+use crate::whole::whole;
 pub(crate) use apart::{apart, is_python, samples_of};
 use exchange::{Given, exchange};
 pub(crate) use figure::Readable;
@@ -233,16 +235,8 @@ impl PyLaw {
 
     /// Announce a run before it begins: the first one, or one not learned from.
     ///
-    /// Parameters
-    /// ----------
-    /// disturbance : float or array_like of float64, shape (n_disturbances,)
-    ///     Measured disturbance of the run about to begin. `update` announces the
-    ///     coming run itself if it is given one.
-    ///
-    /// Raises
-    /// ------
-    /// ValueError, TypeError
-    ///     If it holds no number, or one that is not finite.
+    /// Its measured disturbance is a number or an array of shape (n_disturbances,). `update` announces the
+    /// coming run itself if it is given one.
     fn expect(&self, py: Python<'_>, disturbance: &Bound<'_, PyAny>) -> PyResult<()> {
         let values = read_disturbance("disturbance", disturbance)?;
         let mut state = self.state.borrow(py)?;
@@ -299,9 +293,7 @@ impl PyLaw {
         disturbance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let (u, e) = (Given::read("u", u)?, Given::read("e", e)?);
-        let given = disturbance.filter(|given| !given.is_none());
-        let told = given.map(|given| read_disturbance("disturbance", given)).transpose()?;
-        let told = told.unwrap_or_default();
+        let told = read_told("disturbance", disturbance)?;
         let mut state = self.state.borrow(py)?;
         self.fit(py, &mut state, u.layout(), e.layout(), Some(&told))?;
         state.law.remember(u.values()?, e.values()?, &told).or_raise()
@@ -313,13 +305,12 @@ impl PyLaw {
         py: Python<'_>,
         disturbance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(Vec<usize>, Vec<f64>)> {
-        let given = disturbance.filter(|given| !given.is_none());
-        let told = given.map(|given| read_disturbance("disturbance", given)).transpose()?;
+        let told = read_told("disturbance", disturbance)?;
         let state = self.state.borrow(py)?;
         if state.size.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
-        let found = state.law.relevant(&told.unwrap_or_default()).or_raise()?;
+        let found = state.law.relevant(&told).or_raise()?;
         Ok(found.into_iter().unzip())
     }
 
@@ -327,16 +318,16 @@ impl PyLaw {
     fn _trim(
         &self,
         py: Python<'_>,
-        #[pyo3(from_py_with = crate::whole::keep)] keep: usize,
+        keep: &Bound<'_, PyAny>,
         disturbances: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<usize>> {
-        let given = disturbances.filter(|given| !given.is_none());
-        let told = given.map(|given| read_disturbance("disturbances", given)).transpose()?;
+        let keep = whole("keep", keep)?;
+        let told = read_told("disturbances", disturbances)?;
         let mut state = self.state.borrow(py)?;
         if state.size.is_none() {
             return Ok(Vec::new());
         }
-        state.law.trim(keep, &told.unwrap_or_default()).or_raise()
+        state.law.trim(keep, &told).or_raise()
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
@@ -344,17 +335,16 @@ impl PyLaw {
         let class = slf.get_type().name()?.to_string();
         let made_by =
             optimal::METHODS.contains(&this.kind).then(|| format!("{class}.{}", this.kind));
-        let arguments = this.arguments.bind(slf.py());
-        Arguments::new(arguments).call(&made_by.unwrap_or(class))
+        let arguments = this.arguments.bind(slf.py()).copy()?;
+        // The runs that it has are not what the law is: a campaign resumes with another library.
+        let _ = arguments.del_item("library");
+        Arguments::new(&arguments).call(&made_by.unwrap_or(class))
     }
 
     /// Pickled and copied as it was made: what it has learned since is not in the copy.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let (py, this) = (slf.py(), slf.get());
-        let maker = py.import("ilc_rt._native")?.getattr("_law")?;
-        let parts = (slf.get_type(), this.kind, &this.arguments);
-        let attributes = slf.getattr_opt("__dict__")?;
-        Ok((maker, parts, attributes).into_pyobject(py)?.into_any())
+        let this = slf.get();
+        reduce_kind(slf.as_any(), "Law", this.kind, &this.arguments)
     }
 }
 
@@ -417,19 +407,12 @@ impl PyLaw {
     }
 }
 
-/// Makes a law again from its kind and its arguments, for copies and pickles.
-#[pyfunction]
-fn _law<'py>(
-    class: &Bound<'py, PyAny>,
-    kind: &str,
-    arguments: &Bound<'py, PyDict>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let native = class.py().get_type::<PyLaw>();
-    native.getattr("__new__")?.call((class, kind), Some(arguments))
+/// Reads disturbances; `None` is an empty one.
+fn read_told(name: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
+    given.map_or_else(|| Ok(Vec::new()), |given| read_disturbance(name, given))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyLaw>()?;
-    module.add_function(wrap_pyfunction!(_law, module)?)?;
     module.add_function(wrap_pyfunction!(recalled::check_relevance_weights, module)?)
 }

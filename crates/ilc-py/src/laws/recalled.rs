@@ -11,11 +11,11 @@ use pyo3::prelude::*;
 use super::figure::{Figure, Readable};
 use super::{Built, Call, Fits, Size};
 use crate::argument::read_disturbance;
-use crate::arguments::number;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::library::PyLibrary;
 use crate::python_law::Channels;
+use crate::whole::number;
 
 pub(super) fn relevance(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;

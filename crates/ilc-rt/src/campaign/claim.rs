@@ -1,4 +1,4 @@
-//! The claim to a campaign: two programs must not go on with the same one.
+//! The claim to a campaign: two programs must not continue the same one.
 //!
 //! A name in the kernel's own space, which is free again the moment its owner ends, however it ends:
 //! no file is left behind that could outlive a killed process.
@@ -8,7 +8,7 @@ use std::os::unix::fs::MetadataExt;
 use std::os::unix::net::{SocketAddr, UnixListener};
 use std::path::Path;
 
-use super::error::CampaignError;
+use super::error::{CampaignError, ResumeError};
 use crate::record::fingerprint;
 
 /// Held for as long as the campaign goes on; without a socket if the system has none to give.
@@ -36,9 +36,10 @@ pub(super) fn claim(library: &Path, campaign: &str) -> Result<Claim, CampaignErr
     let socket =
         SocketAddr::from_abstract_name(name).and_then(|address| UnixListener::bind_addr(&address));
     match socket {
-        Err(error) if error.kind() == std::io::ErrorKind::AddrInUse => Err(CampaignError::Resume(
-            format!("campaign {campaign} of {} is going on in another program", library.display()),
-        )),
+        Err(error) if error.kind() == std::io::ErrorKind::AddrInUse => {
+            let (campaign, library) = (campaign.to_owned(), library.to_owned());
+            Err(ResumeError::Claimed { campaign, library }.into())
+        }
         // What cannot be had for another reason must not keep anybody from working.
         socket => Ok(Claim { _socket: socket.ok() }),
     }

@@ -2,14 +2,15 @@
 
 use std::fmt::Write as _;
 
+use super::fault::{fault, last_cycles};
 use super::keeper::{StoreEvent, Stored};
 use super::learner::Learner;
 use super::options::{Options, Outcome};
 use super::pace::Pacer;
-use super::reason;
+use super::reason::sentence;
 use super::running::Running;
 use crate::config::Cell;
-use crate::record::{EndStatus, Event, IterationRecord, StateName};
+use crate::record::{EndStatus, Event, Fault, FaultKind, IterationRecord, StateName};
 use crate::servo::StopReason;
 
 impl Running<'_> {
@@ -29,7 +30,9 @@ impl Running<'_> {
     fn on_stored(&mut self, event: StoreEvent) {
         let Stored { record, asked, result } = match event {
             StoreEvent::Stored(stored) => *stored,
-            StoreEvent::NotAmended(error) => return self.fail(error.to_string()),
+            StoreEvent::NotAmended(error) => {
+                return self.fail(FaultKind::Library, error.to_string());
+            }
         };
         match result {
             Some(Ok(id)) => {
@@ -40,7 +43,7 @@ impl Running<'_> {
                 }
             }
             Some(Err(error)) => {
-                self.fail(error.to_string());
+                self.fail(FaultKind::Library, error.to_string());
                 self.unkept.push(record);
             }
             None => self.unkept.push(record),
@@ -80,14 +83,14 @@ impl Running<'_> {
             1 => "1 run is kept".to_owned(),
             n => format!("{n} runs are kept"),
         };
-        if let Some(why) = &mut self.failure {
+        if let Some((_, why)) = &mut self.failure {
             let _ = write!(why, "; run {first} {lost}, {kept}");
         }
     }
 
-    pub(super) fn fail(&mut self, why: String) {
+    pub(super) fn fail(&mut self, kind: FaultKind, why: String) {
         if self.failure.is_none() {
-            self.failure = Some(why);
+            self.failure = Some((kind, why));
             self.mail.stop(libc::SIGABRT);
         }
     }
@@ -102,21 +105,27 @@ impl Running<'_> {
             self.updates.push_back(update);
         }
         self.flush();
-        let (status, reason) = match (&self.failure, self.stopping, &result) {
-            (Some(why), _, _) => (EndStatus::Fault, why.clone()),
-            (None, Some(reason), _) => {
-                (reason::status(reason), reason::sentence(reason, cell, &options.session))
-            }
+        let stopped = self
+            .stopping
+            .map(|reason| (fault(reason, cell), sentence(reason, cell, &options.session)));
+        let (fault, reason) = match (&self.failure, stopped, &result) {
+            (Some((kind, why)), _, _) => (Some(Fault::new(*kind)), why.clone()),
+            (None, Some(stopped), _) => stopped,
             (None, None, None) => (
-                EndStatus::Fault,
+                Some(Fault::new(FaultKind::LoopDied)),
                 "the loop's thread died; the drives stop by themselves".to_owned(),
             ),
-            (None, None, Some(_)) => {
-                (EndStatus::Completed, format!("{} runs made and kept", options.iterations))
-            }
+            (None, None, Some(_)) => (None, format!("{} runs made and kept", options.iterations)),
         };
-        if status == EndStatus::Fault {
-            self.announcer.publish(&Event::Fault { reason: reason.clone() });
+        let status = match (&fault, self.stopping) {
+            (Some(_), _) => EndStatus::Fault,
+            (None, Some(_)) => EndStatus::Interrupted,
+            (None, None) => EndStatus::Completed,
+        };
+        if let Some(fault) = fault {
+            let cycles = last_cycles(&self.before, cell.n_axes());
+            let fault = Fault { cycles, ..fault };
+            self.announcer.publish(&Event::Fault { reason: reason.clone(), fault });
         }
         if let Some(result) = result {
             if let Err(error) = result.released {

@@ -1,16 +1,19 @@
 //! Refusals of a campaign; nothing has moved when one of these is returned.
 
+use std::path::PathBuf;
+
 use crate::config::ConfigError;
 use crate::design::DesignError;
 use crate::fieldbus::bring_up::BringUpError;
 use crate::fieldbus::transport::{OpenError, syntaxes};
 use crate::identification::IdentificationError;
+use crate::learning::LearningError;
 use crate::library::LibraryError;
 
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// The cell description cannot be worked out.
+    /// The cell description cannot be used.
     #[error(transparent)]
     Design(#[from] DesignError),
     /// The experiment is refused.
@@ -32,7 +35,7 @@ pub enum CampaignError {
     BringUp {
         /// Cell description.
         file: String,
-        /// Which node, as `[[axis]] x node = 1`.
+        /// The node, as `[[axis]] x node = 1`.
         key: String,
         /// Bus address.
         address: String,
@@ -65,9 +68,9 @@ pub enum CampaignError {
     /// The library.
     #[error("{0}")]
     Library(#[from] LibraryError),
-    /// There is nothing to go on with.
+    /// There is no campaign to resume.
     #[error("--resume: {0}")]
-    Resume(String),
+    Resume(#[from] ResumeError),
     /// A bus in one process was asked of a program that has no drives in it.
     #[error(
         "{place}: `{address}` has no drives in this program; allowed: {} (`ilc run` in Python runs \
@@ -91,7 +94,7 @@ pub enum CampaignError {
     /// A thread could not be started.
     #[error("the {what} thread could not be started: {source}")]
     Thread {
-        /// Which one.
+        /// Name of the thread.
         what: &'static str,
         /// Reason given by the system.
         source: std::io::Error,
@@ -102,4 +105,41 @@ impl From<ConfigError> for CampaignError {
     fn from(source: ConfigError) -> Self {
         Self::Design(source.into())
     }
+}
+
+/// Reason that a campaign is not resumed, or not begun beside another one.
+#[derive(Debug, thiserror::Error)]
+pub enum ResumeError {
+    /// The library is not there; opening it would leave an empty file where a name was mistyped.
+    #[error("there is no library {} to go on with", path.display())]
+    NoLibrary {
+        /// Its file.
+        path: PathBuf,
+    },
+    /// No campaign is like this one.
+    #[error("the library has no campaign of this cell, program, measurement and law")]
+    NoCampaign,
+    /// All runs are made.
+    #[error(
+        "campaign {campaign} has {made} of {iterations} runs already; ask for more with --iterations"
+    )]
+    Complete {
+        /// The campaign.
+        campaign: String,
+        /// Runs made.
+        made: u32,
+        /// Runs asked for.
+        iterations: u32,
+    },
+    /// Another program holds the campaign.
+    #[error("campaign {campaign} of {} is going on in another program", library.display())]
+    Claimed {
+        /// The campaign.
+        campaign: String,
+        /// Its library.
+        library: PathBuf,
+    },
+    /// The law refused a run of the campaign.
+    #[error("the law refused a run: {0}")]
+    Refused(LearningError),
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::announce::Announcer;
 use super::claim::{Claim, claim};
-use super::error::CampaignError;
+use super::error::{CampaignError, ResumeError};
 use super::keeper::Keeper;
 use super::learner::{Learner, set_disturbance};
 use super::nodes;
@@ -125,10 +125,8 @@ fn execute(
     };
     let first = resumed.next_index();
     if first >= options.iterations {
-        return Err(CampaignError::Resume(format!(
-            "campaign {} has {first} of {} runs already; ask for more with --iterations",
-            plan.meta.campaign, options.iterations
-        )));
+        let (campaign, iterations) = (plan.meta.campaign, options.iterations);
+        return Err(ResumeError::Complete { campaign, made: first, iterations }.into());
     }
     let telemetry = if session.telemetry && cell.telemetry.enabled {
         Some(Telemetry::start(cell)?)
@@ -185,9 +183,7 @@ fn execute(
 fn open_library(options: &Options) -> Result<Library, CampaignError> {
     let path = &options.session.library;
     if options.resume && !path.exists() {
-        // Opening it would leave an empty file where a name was mistyped.
-        let path = path.display();
-        return Err(CampaignError::Resume(format!("there is no library {path} to go on with")));
+        return Err(ResumeError::NoLibrary { path: path.clone() }.into());
     }
     Ok(Library::open(path)?)
 }

@@ -67,7 +67,7 @@ impl Keeper {
             .spawn(move || {
                 for request in received {
                     if let Some(came) = store.execute(request) {
-                        // Nobody listens after a panic of the campaign; the run is kept all the same.
+                        // There is no receiver after a panic of the campaign; the run is stored all the same.
                         let _ = done.send(came);
                     }
                 }

@@ -72,7 +72,7 @@ impl Learner {
                     match request {
                         LearningRequest::RollBack => law.on_rollback(),
                         LearningRequest::SetDisturbance { next_disturbance } => {
-                            set_disturbance(law.as_mut(), &next_disturbance)
+                            set_disturbance(law.as_mut(), &next_disturbance);
                         }
                         LearningRequest::Learn { input, error, next_disturbance } => {
                             set_disturbance(law.as_mut(), &next_disturbance);

@@ -11,6 +11,7 @@ mod disturbance;
 mod ending;
 mod error;
 mod execute;
+mod fault;
 mod keeper;
 mod learner;
 mod nodes;
@@ -23,7 +24,7 @@ mod running;
 mod telemetry;
 
 pub use disturbance::Disturbance;
-pub use error::CampaignError;
+pub use error::{CampaignError, ResumeError};
 pub use execute::{identify, run};
 pub use nodes::drive_setup;
 pub use options::{Options, Outcome, Session};

@@ -85,7 +85,7 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
     let deadline_ms = deadline_ms.ceil() as u16;
     Ok(DriveSetup {
         node: design::node(cell, axis.node)?,
-        mode: design::mode(axis),
+        mode: axis.interface,
         cycle_us: cell.cell.cycle_us,
         following_error_max_counts: unsigned(limits.following_error_max_m),
         position_min_counts: signed(limits.position_min_m),

@@ -107,7 +107,7 @@ fn iterations(text: &str) -> Result<u32, String> {
 /// End of a campaign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// How it ended.
+    /// Completed, interrupted or stopped by a fault.
     pub status: EndStatus,
     /// Reason, one sentence.
     pub reason: String,

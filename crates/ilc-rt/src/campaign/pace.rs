@@ -41,7 +41,7 @@ impl Pacer {
             .name("ilc-servo".to_owned())
             .spawn(move || {
                 let mut timing = Timing::default();
-                // Set-up of the thread is over before the first tick; nobody waits for the report.
+                // Set-up of the thread is over before the first tick; no tick waits for the report.
                 let _ = report.send(thread::enter(RtRequest::default()));
                 run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
                 // At once, and not when the campaign has put its things away: by then the nodes may have

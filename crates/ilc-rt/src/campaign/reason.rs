@@ -4,7 +4,6 @@ use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::config::{AxisUnit, Cell};
 use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
-use crate::record::EndStatus;
 use crate::servo::{StopReason, Stranger};
 
 /// The sentence for a reason to stop.
@@ -183,27 +182,4 @@ fn strange(stranger: Stranger) -> String {
 fn distance(cell: &Cell, axis: usize, distance: f64) -> String {
     let unit = cell.axes.get(axis).map_or(AxisUnit::M, |axis| axis.unit);
     format!("{:.3} m{}", distance * 1e3, unit.symbol())
-}
-
-/// Returns whether a reason is a request or a fault.
-pub(super) fn status(reason: StopReason) -> EndStatus {
-    match reason {
-        StopReason::Asked(_) => EndStatus::Interrupted,
-        StopReason::DriveFault { .. }
-        | StopReason::NotEnabled { .. }
-        | StopReason::SilentAxis { .. }
-        | StopReason::SilentPdo { .. }
-        | StopReason::WrongLength { .. }
-        | StopReason::SilentTool { .. }
-        | StopReason::NodeLeft { .. }
-        | StopReason::NodeStopped { .. }
-        | StopReason::OtherMaster(_)
-        | StopReason::FollowingError { .. }
-        | StopReason::OutsideLimits { .. }
-        | StopReason::Jump { .. }
-        | StopReason::NotFinite { .. }
-        | StopReason::Stalled { .. }
-        | StopReason::Overrun { .. }
-        | StopReason::Bus(_) => EndStatus::Fault,
-    }
 }

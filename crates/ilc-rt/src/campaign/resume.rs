@@ -1,7 +1,7 @@
 //! Resuming a campaign from the library.
 
 use super::disturbance::Disturbance;
-use super::error::CampaignError;
+use super::error::{CampaignError, ResumeError};
 use super::learner::{learn, set_disturbance};
 use super::rollback::{Decision, RollbackPolicy};
 use crate::design::Plan;
@@ -33,10 +33,7 @@ pub(super) fn to_resume(library: &Library, plan: &Plan) -> Result<String, Campai
         return Ok(campaign);
     }
     let older = library.newest_campaign(&plan.legacy_fingerprint)?;
-    let campaign = older.ok_or_else(|| {
-        let reason = "the library has no campaign of this cell, program, measurement and law";
-        CampaignError::Resume(reason.to_owned())
-    })?;
+    let campaign = older.ok_or(ResumeError::NoCampaign)?;
     tracing::info!("campaign {campaign} was begun by an older version; it goes on as it was");
     Ok(campaign)
 }
@@ -118,5 +115,5 @@ impl RollbackPolicy {
 
 #[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it on")]
 fn refused(error: LearningError) -> CampaignError {
-    CampaignError::Resume(format!("the law refused a run: {error}"))
+    ResumeError::Refused(error).into()
 }

@@ -13,8 +13,8 @@ use super::resume::Resumed;
 use super::rollback::{Decision, RollbackPolicy};
 use crate::config::Cell;
 use crate::design::Plan;
-use crate::record::{AxisKinds, Event, Figures, IterationRecord, StateName};
-use crate::servo::{Mailbox, Message, PhaseName, StopReason};
+use crate::record::{AxisKinds, Event, FaultKind, Figures, IterationRecord, StateName};
+use crate::servo::{Mailbox, Message, PhaseName, Sample, StopReason};
 
 /// Time between two progress events.
 const PROGRESS_S: f64 = 0.1;
@@ -40,6 +40,8 @@ pub(super) struct Running<'a> {
     iterations: u32,
     pub(super) mail: Mailbox,
     pub(super) stopping: Option<StopReason>,
+    /// Last cycles before the stop.
+    pub(super) before: Vec<Sample>,
     /// Runs that the law was asked about and has not answered yet, oldest first: key and place.
     pub(super) unjudged: VecDeque<(i64, usize)>,
     /// Updates from runs that are not stored yet, oldest first.
@@ -49,7 +51,7 @@ pub(super) struct Running<'a> {
     /// Latest remark of the law.
     remark: Option<String>,
     /// Reason why no more runs can be stored: the axes are stopped, as nothing may be lost.
-    pub(super) failure: Option<String>,
+    pub(super) failure: Option<(FaultKind, String)>,
     pub(super) phase_iteration: u32,
     progress_every: u32,
     n_samples: usize,
@@ -103,6 +105,7 @@ impl<'a> Running<'a> {
             iterations: options.iterations,
             mail: parts.mail,
             stopping: None,
+            before: Vec::new(),
             unjudged: VecDeque::new(),
             updates: VecDeque::new(),
             awaited: 0,
@@ -148,6 +151,7 @@ impl Running<'_> {
                 }
                 Message::RunEnded { run, .. } if run < self.first => {}
                 Message::RunEnded { overruns, .. } => self.run_ended(overruns),
+                Message::Before(sample) => self.before.push(sample),
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
         }
@@ -178,7 +182,9 @@ impl Running<'_> {
         }
         match std::mem::replace(&mut update.input, Ok(Vec::new())) {
             Ok(input) => self.policy.send(&mut self.mail, input, update.update_ms),
-            Err(error) => self.fail(format!("the law refused the last run: {error}")),
+            Err(error) => {
+                self.fail(FaultKind::Law, format!("the law refused the last run: {error}"));
+            }
         }
         update
     }
@@ -205,7 +211,8 @@ impl Running<'_> {
 
     fn run_ended(&mut self, overruns: u32) {
         let Some(mut record) = self.collector.end() else {
-            self.fail("samples of a run were lost on their way to the record".to_owned());
+            let why = "samples of a run were lost on their way to the record";
+            self.fail(FaultKind::SamplesLost, why.to_owned());
             return;
         };
         record.figures.overruns = overruns;
@@ -215,7 +222,7 @@ impl Running<'_> {
                 Ok(next_disturbance) => self.current_disturbance = next_disturbance,
                 Err(why) => {
                     self.keep(record, false);
-                    self.fail(why);
+                    self.fail(FaultKind::Disturbance, why);
                     return;
                 }
             }

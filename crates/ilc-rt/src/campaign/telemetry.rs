@@ -1,6 +1,6 @@
-//! What is seen from outside: the events and samples of a cell, on Zenoh.
+//! Telemetry: the events and samples of a cell, on Zenoh.
 //!
-//! A thread and a session of their own; the supervisor hands over finished text through a bounded
+//! A thread and a session of their own; the campaign hands over finished text through a bounded
 //! queue and drops what does not fit. Nothing here can hold up the loop, and nothing can command it.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
@@ -18,21 +18,21 @@ use crate::fieldbus::transport::opening::zenoh_reach::{self, Reach};
 
 /// Messages that may wait for the network.
 const QUEUE: usize = 1024;
-/// How long the end of a campaign waits for what is still in the queue, and for those who watch. One
-/// that no longer reads is left after a second.
+/// Time that the end of a campaign waits for the queue and for the subscribers. One that no longer reads
+/// is left after a second.
 const CLOSE_MAX: Duration = Duration::from_secs(6);
-/// How long those who watch may take to say that they have heard all.
+/// Time that subscribers may take to acknowledge the last message.
 const HEARD_MAX: Duration = Duration::from_secs(3);
 
-/// How long the token outlives the last message: Zenoh sends declarations before data that waits, and
-/// whoever watches leaves when the token goes.
+/// Time that the token outlives the last message: Zenoh sends declarations before data that waits, and a
+/// subscriber leaves when the token goes.
 const LINGER: Duration = Duration::from_millis(250);
 
 /// Something to publish.
 struct Message {
     key: &'static str,
     json: String,
-    /// Whether a late joiner is told it as the state.
+    /// A late subscriber gets it as the state.
     is_state: bool,
 }
 
@@ -65,8 +65,8 @@ impl Telemetry {
         Ok(Self { queue: Some(queue), thread: Some(thread), ended, dropped: 0 })
     }
 
-    /// Publishes under `ilc/<cell>/<key>`, unless the queue is full; `is_state` is what a late joiner
-    /// is told.
+    /// Publishes under `ilc/<cell>/<key>`, unless the queue is full; `is_state` marks what a late subscriber
+    /// gets.
     pub(super) fn send(&mut self, key: &'static str, json: String, is_state: bool) {
         let Some(queue) = &self.queue else { return };
         match queue.try_send(Message { key, json, is_state }) {
@@ -138,7 +138,7 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
     session.close().wait()
 }
 
-/// Waits until whoever watches has got all that was published: a monitor answers on `heard`, and its
+/// Waits until the subscribers have received all that was published: a monitor answers on `heard`, and its
 /// answer comes after what it was sent before. Those that do not answer get [`LINGER`].
 fn await_readers(session: &zenoh::Session, prefix: &str) -> zenoh::Result<()> {
     let asked = Instant::now();

@@ -1,11 +1,11 @@
 //! `ilc-rt check`: what a cell description would do, without touching a bus.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
-use crate::config::{AxisUnit, Cell, LawName, PathKind};
+use crate::config::{AxisUnit, Cell, LawName};
 use crate::design::{DesignError, Plan, Prepared};
 use crate::learning::gate::GateMeasure;
 use crate::record::AxisKinds;
@@ -118,18 +118,7 @@ fn learning(cell: &Cell) -> Vec<String> {
 
 /// Describes the path: kind, length, and largest speed.
 fn path(cell: &Cell, plan: &Plan) -> String {
-    let program = &cell.program;
-    let file = program.file.as_deref().unwrap_or(Path::new("")).display();
-    let kind = match program.kind {
-        PathKind::Points => format!("{} segments", program.segments.len()),
-        PathKind::Spline => format!("spline through {} points", program.segments.len() + 1),
-        PathKind::Butterfly => "butterfly".to_owned(),
-        PathKind::Spiral => "spiral".to_owned(),
-        PathKind::Raster => "raster".to_owned(),
-        PathKind::Modulated => format!("{} modulated legs", program.segments.len()),
-        PathKind::Gcode => format!("part program {file}"),
-        PathKind::Table => format!("set points of {file}"),
-    };
+    let kind = (cell.program.kind.entry().describe)(&cell.program);
     let units: Vec<String> = plan.meta.input_units.clone();
     let kinds = AxisKinds::new(&units, cell.n_axes());
     let parts = [("m", kinds.of_kind(false)), ("rad", kinds.of_kind(true))];

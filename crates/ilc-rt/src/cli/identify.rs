@@ -45,6 +45,13 @@ type Found = (Experiment, Identified);
 
 /// Identifies an axis; returns the exit status.
 pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
+    let cell = match Cell::load(&arguments.cell) {
+        Ok(cell) => cell,
+        Err(error) => {
+            show::complain(&error);
+            return EXIT_BAD_INPUT;
+        }
+    };
     let file = match &arguments.output.json {
         None => None,
         Some(path) => match FiguresFile::reserve(path, arguments.output.events) {
@@ -52,13 +59,15 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
             reserved => reserved,
         },
     };
-    match experiment(arguments) {
+    match experiment(arguments, &cell) {
         Ok((outcome, found)) => {
             let doubt = found.as_ref().and_then(|(_, identified)| identified.doubt);
             let axis = found.as_ref().map_or_else(String::new, |(made, _)| made.axis.clone());
             let written = match (&file, &found) {
                 // The measurement is written all the same: it shows what is wrong.
-                (Some(file), Some((made, identified))) => file.write(&figures(made, identified)),
+                (Some(file), Some((made, identified))) => {
+                    file.write(&figures(&cell, made, identified))
+                }
                 (Some(file), None) => {
                     file.give_up();
                     true
@@ -85,10 +94,10 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
 /// Executes experiments until a model fits; returns the end of the last one, and the model.
 fn experiment(
     arguments: &IdentifyArguments,
+    cell: &Cell,
 ) -> Result<(Option<Outcome>, Option<Found>), CampaignError> {
     let mut session = arguments.options.session.clone();
     session.stop = stop_on_signals(arguments.output.with_parent);
-    let cell = Cell::load(&arguments.cell)?;
     let mut last = None;
     let mut excite = |experiment: &Experiment| -> Result<Option<Signals>, CampaignError> {
         let (outcome, signals) = excite(arguments, &session, experiment)?;
@@ -99,7 +108,7 @@ fn experiment(
         show::say(&line);
     };
     let found =
-        identification::identify(&cell, &arguments.options.experiment, &mut excite, &mut report)?;
+        identification::identify(cell, &arguments.options.experiment, &mut excite, &mut report)?;
     if let Some((experiment, identified)) = &found {
         show::say(&describe(experiment, identified));
     }
@@ -120,7 +129,7 @@ fn excite(
         }
         if arguments.output.events {
             say_event(event, &session.stop);
-        } else if let Event::Fault { reason } = event {
+        } else if let Event::Fault { reason, .. } = event {
             show::say(reason);
         }
     };
@@ -174,12 +183,13 @@ fn describe(experiment: &Experiment, found: &Identified) -> String {
 }
 
 /// Returns the content of the file of `--json`, with the keys of that of `ilc identify`.
-fn figures(made: &Experiment, found: &Identified) -> serde_json::Value {
+fn figures(cell: &Cell, made: &Experiment, found: &Identified) -> serde_json::Value {
     let (fit, measured) = (&found.fit, &found.measured);
     serde_json::json!({
         "axis": made.axis,
         "waveform": waveform_name(made.excitation.waveform),
         "amplitude": made.excitation.amplitude,
+        "input_unit": made.input_unit(cell),
         "dt_s": fit.model.dt_s,
         "periods": made.excitation.periods,
         "frequency_hz": measured.frequency_hz,

@@ -1,4 +1,4 @@
-//! The table of runs, and what came of them in a sentence: the words and signs of `ilc`, in ASCII.
+//! The table of runs, and their outcome in a sentence: the words and signs of `ilc`, in ASCII.
 
 use std::fmt::Write as _;
 

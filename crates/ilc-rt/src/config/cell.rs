@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use super::error::ConfigError;
 use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
-use super::program::Program;
 use super::simulation::{AxisSimulation, Simulation};
+pub use crate::fieldbus::cia402::Mode;
 pub use crate::interpolate::AxisUnit;
 use crate::schema::field_order;
+use crate::trajectory::kind::Program;
 
 /// A whole cell description, validated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -83,16 +84,6 @@ fn default_load_max() -> f64 {
     0.8
 }
 
-/// Command interface of a drive, and the point where the learned input enters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Interface {
-    /// Cyclic synchronous position: the drive closes the position loop (series learning, input in m).
-    Csp,
-    /// Cyclic synchronous velocity: the position loop is here (parallel learning, input in m/s).
-    Csv,
-}
-
 /// `[[axis]]`: one drive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -107,7 +98,7 @@ pub struct Axis {
     /// Command interface. `csp`: the drive closes the position loop, the learned input (m) is added to
     /// the set point. `csv`: the position loop is in the controller, the learned input (m/s) is added to
     /// the velocity command.
-    pub interface: Interface,
+    pub interface: Mode,
     /// Unit of its coordinate; every quantity of a rotary axis whose name ends in `_m`,
     /// `_m_s`, … is in rad, rad/s, …
     #[serde(default)]

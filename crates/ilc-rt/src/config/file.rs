@@ -7,10 +7,6 @@ use std::path::{Component, Path};
 
 /// Largest cell description.
 pub const CELL_BYTES_MAX: u64 = 16 << 20;
-/// Largest part program.
-pub const GCODE_BYTES_MAX: u64 = 16 << 20;
-/// Largest table of set points.
-pub const TABLE_BYTES_MAX: u64 = 64 << 20;
 
 /// Reads a regular file of at most so many bytes.
 ///

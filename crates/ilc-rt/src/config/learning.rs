@@ -76,7 +76,7 @@ macro_rules! learning {
 every_law!(learning);
 
 impl Learning {
-    /// Returns the growth of the RMS error over the best run at which the supervisor restores the best
+    /// Returns the growth of the RMS error over the best run at which the campaign restores the best
     /// input, if no gate decides instead.
     pub fn rollback(&self) -> f64 {
         self.rollback_ratio.unwrap_or(ROLLBACK_RATIO)
@@ -90,8 +90,8 @@ impl Learning {
     /// Returns law and parameters as canonical JSON, which is the same if and only if they are: what a
     /// campaign that goes on must have in common with the one before.
     pub fn law_json(&self) -> serde_json::Value {
-        let parameters = |law: LawName| self.parameters(law).map(|found| found.json());
-        let core = self.parameters(self.law).and_then(|found| found.core());
+        let parameters = |law: LawName| self.parameters(law).map(Json::json);
+        let core = self.parameters(self.law).and_then(LawParameters::core);
         serde_json::json!({
             "law": self.law,
             "parameters": parameters(self.law),

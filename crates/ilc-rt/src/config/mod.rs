@@ -1,6 +1,6 @@
 //! The cell description (TOML): typed, validated, and refused in one clear line.
 //!
-//! Whoever starts a cell reads it through [`Cell::load`]: the supervisor, the binary, the simulator
+//! Whoever starts a cell reads it through [`Cell::load`]: design, the binary, the simulator
 //! and Python. It knows the numbers and their ranges, and nothing of how they are used.
 //!
 //! Family: `cell` and `validate` call each other, as a cell is checked where it is loaded.
@@ -9,20 +9,18 @@ mod cell;
 mod error;
 mod file;
 mod learning;
-mod path;
-mod program;
+pub mod mode;
 mod simulation;
 mod validate;
 
+pub use crate::trajectory::kind::{Corner, PathKind, Program, Segment};
 pub use cell::{
-    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Interface, Limits, PositionLoop,
-    Safety, TcpEncoder, Telemetry,
+    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Limits, Mode, PositionLoop, Safety,
+    TcpEncoder, Telemetry,
 };
 pub use error::ConfigError;
-pub use file::{CELL_BYTES_MAX, GCODE_BYTES_MAX, TABLE_BYTES_MAX, read_beside, read_file};
+pub use file::{CELL_BYTES_MAX, read_beside, read_file};
 pub use learning::{Learning, Measure};
-pub use path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
-pub use program::{Corner, Program, Segment};
 pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;
 

@@ -1,29 +1,29 @@
-//! The full cascade: proportional position control around proportional-integral velocity control.
+//! Cascaded control: a P position loop around a PI velocity loop.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::{Bounded, clamp_finite};
 
-/// The numbers of a cascade.
+/// Gains, feed-forward and limits of a [`Cascade`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CascadeGains {
-    /// Velocity per position error, `k_v`.
+    /// Position gain `k_v`: velocity per position error.
     pub position_gain_per_s: f64,
-    /// Force per velocity error, `k_p`.
+    /// Velocity gain `k_p`: force per velocity error.
     pub velocity_gain_n_s_m: f64,
-    /// Integral time of the velocity controller, `T_n`; infinite for none.
+    /// Integral time (reset time) `T_n` of the velocity loop; infinite switches the integral off.
     pub integral_time_s: f64,
-    /// Share of the reference velocity that is fed forward, 0 to 1.
+    /// Velocity feed-forward, 0 to 1: share of the reference velocity.
     pub velocity_feedforward: f64,
-    /// Force per reference acceleration: the mass that is fed forward.
+    /// Acceleration feed-forward: force per reference acceleration, i.e. the moving mass.
     pub acceleration_feedforward_kg: f64,
-    /// Largest velocity that is asked for.
+    /// Limit of the velocity command.
     pub velocity_max_m_s: f64,
-    /// Largest force.
+    /// Limit of the force.
     pub force_max_n: f64,
 }
 
-/// What the cascade shall follow in one tick.
+/// Reference of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CascadeReference {
     /// Position.
@@ -34,11 +34,12 @@ pub struct CascadeReference {
     pub acceleration_m_s2: f64,
 }
 
-/// A cascade of position and velocity control.
+/// A cascaded position and velocity controller.
 ///
 /// `v* = k_v (r - y) + f r'`, `F = k_p (v* - y') + k_p dt / T_n sum_{i<k} (v* - y')[i] + m r''`
 ///
-/// The force is cut to its limit; while it is, an error that would push it further is not summed up.
+/// The force saturates at its limit. Anti-windup: meanwhile the integral ignores errors that would
+/// drive it further into saturation (conditional integration).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cascade {
     gains: CascadeGains,
@@ -47,15 +48,15 @@ pub struct Cascade {
 }
 
 impl Cascade {
-    /// Starts at rest.
+    /// Creates the controller at rest.
     pub fn new(gains: CascadeGains, dt_s: f64) -> Self {
         Self { gains, dt_s, integral_n: 0.0 }
     }
 
-    /// Returns the force of this tick; `learned_n` is added before the limit.
+    /// Returns the force of this tick; `learned_n` is added before saturation.
     ///
     /// # Real Time
-    /// Hot. What is not finite gives a force of 0, flagged, and is not remembered.
+    /// Hot. A non-finite force is replaced by 0 and flagged, and leaves the integral unchanged.
     pub fn step(
         &mut self,
         reference: CascadeReference,
@@ -82,7 +83,7 @@ impl Cascade {
         output
     }
 
-    /// Starts again from rest.
+    /// Resets the controller to rest.
     pub fn reset(&mut self) {
         self.integral_n = 0.0;
     }
@@ -121,8 +122,8 @@ mod tests {
         assert!(!cascade.step(reference, f64::NAN, 0.0, 0.0).finite);
     }
 
-    /// Gains that make a mass follow as `omega^2 / (s^2 + 2 delta omega s + omega^2)`, but for the integral
-    /// part \[haas2016\]: `k_v = omega / (2 delta)`, `k_p = 2 delta omega m`.
+    /// Gains with which a mass follows as `omega^2 / (s^2 + 2 delta omega s + omega^2)`, apart from
+    /// the integral part \[haas2016\]: `k_v = omega / (2 delta)`, `k_p = 2 delta omega m`.
     fn second_order(omega: f64, damping: f64, mass_kg: f64, integral_time_s: f64) -> CascadeGains {
         CascadeGains {
             position_gain_per_s: omega / (2.0 * damping),

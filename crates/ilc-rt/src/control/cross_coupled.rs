@@ -1,4 +1,4 @@
-//! Cross-coupled control: two axes corrected together, across the path.
+//! Cross-coupled control (CCC): corrects two axes together, normal to the path.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -16,15 +16,15 @@ pub struct CrossCoupled {
 }
 
 impl CrossCoupled {
-    /// Makes the coupling from the controller of the contour error.
+    /// Creates the coupling from a controller of the contour error.
     pub fn new(controller: Pid) -> Self {
         Self { controller }
     }
 
-    /// Returns what to add to the commands of the two axes, and the contour error that was seen.
+    /// Returns the corrections of the two axes' commands, and the contour error they are based on.
     ///
     /// # Real Time
-    /// Hot. What is not finite adds nothing.
+    /// Hot. A non-finite correction is replaced by 0.
     pub fn step(&mut self, error_m: [f64; 2], gains: [f64; 2]) -> ([Bounded; 2], f64) {
         let contour_m = gains[0] * error_m[0] + gains[1] * error_m[1];
         let correction = self.controller.step(contour_m);
@@ -36,19 +36,20 @@ impl CrossCoupled {
         (gains.map(share), contour_m)
     }
 
-    /// Starts again from rest.
+    /// Resets the controller to rest.
     pub fn reset(&mut self) {
         self.controller.reset();
     }
 }
 
-/// Returns coupling gains that follow a curved path.
+/// Returns the variable-gain coupling coefficients of a curved path.
 ///
-/// `c_1 = -sin theta + kappa e_1 / 2`, `c_2 = cos theta + kappa e_2 / 2`: with them `c . e` is the distance
-/// from the osculating circle up to the square of its own size over the radius.
+/// `c_1 = -sin theta + kappa e_1 / 2`, `c_2 = cos theta + kappa e_2 / 2`: with them `c . e` is the
+/// distance from the osculating circle to second order, i.e. up to an error of the size of (square
+/// of that distance) / radius.
 ///
 /// # Units
-/// - `tangent` without unit, of length 1; curvature in 1/m, positive to the left
+/// - `tangent`: unit vector; curvature in 1/m, positive to the left
 /// # Real Time
 /// Hot.
 /// # Source
@@ -98,7 +99,8 @@ mod tests {
     fn on_a_circle_the_variable_gains_leave_a_cubic_error() {
         let radius = 0.05_f64;
         for (along, across) in [(1e-3, 2e-4), (2e-3, -1e-4), (-1e-3, 0.0)] {
-            // The reference at (radius, 0) going up, the centre to its left at the origin.
+            // Reference at (radius, 0) moving up; the centre of curvature is to its left, at the
+            // origin.
             let error = [across, along];
             let actual: [f64; 2] = [radius - error[0], -error[1]];
             let wanted = actual[0].hypot(actual[1]) - radius;

@@ -1,20 +1,20 @@
-//! Bounds of commands: clamping, and the flag for what is not a number.
+//! Saturation of commands, with a flag for non-finite values.
 
-/// A command within bounds, and what had to be done to it.
+/// A saturated command with flags.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounded {
     /// The command, always finite.
     pub value: f64,
-    /// Whether it was cut to a bound.
+    /// True if the command was cut to a bound.
     pub saturated: bool,
-    /// Whether it was a number at all; if not, `value` is 0.
+    /// False if the command was NaN or infinite; `value` is then 0.
     pub finite: bool,
 }
 
-/// Cuts a command to `-most..=most`, and flags one that is not finite.
+/// Saturates a command to `-most..=most`, and flags a non-finite one.
 ///
 /// # Real Time
-/// Hot; never panics, whatever the bound: one that is not a number of at least 0 counts as 0.
+/// Hot; never panics: a bound that is negative or NaN counts as 0.
 pub fn clamp_finite(value: f64, most: f64) -> Bounded {
     let most = if most >= 0.0 { most } else { 0.0 };
     if !value.is_finite() {

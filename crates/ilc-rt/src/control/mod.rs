@@ -1,6 +1,7 @@
-//! Controllers that run in the tick: PID, cascade, cross-coupled, and what keeps commands within bounds.
+//! Controllers that run in the tick: PID, cascade, cross-coupled control, saturation and rate
+//! limit.
 //!
-//! Hot from end to end: plain numbers in, plain numbers and Copy errors out. `servo` imports it; it
+//! Hot throughout: plain numbers in, plain numbers and Copy errors out. `servo` imports it; it
 //! imports nothing of the crate.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]

@@ -1,24 +1,24 @@
-//! PID control with a filtered derivative and an integral that does not wind up.
+//! PID control with derivative filter, output saturation and anti-windup.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::{Bounded, clamp_finite};
 
-/// How the error is differentiated.
+/// Discretisation of the derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Derivative {
     /// `(e[k] - e[k-1]) / dt`
     Difference,
     /// `(e[k-1] - e[k-2]) / dt`, one sample late: \[barton2010\], Eq. (8.3).
     DelayedDifference,
-    /// `s / (T s + 1)`, exact for an error that is held over the sample: \[dimarco2016\], Sect. 4.1.
+    /// `s / (T s + 1)`, discretised with a zero-order hold: \[dimarco2016\], Sect. 4.1.
     Filtered {
-        /// The time constant `T`.
+        /// Filter time constant `T`.
         time_constant_s: f64,
     },
 }
 
-/// The numbers of a PID controller.
+/// Gains and limit of a PID controller.
 ///
 /// # Units
 /// - output units per error unit (`kp`), times second (`kd_s`), per second (`ki_per_s`)
@@ -30,43 +30,44 @@ pub struct PidGains {
     pub ki_per_s: f64,
     /// Derivative gain.
     pub kd_s: f64,
-    /// How the error is differentiated.
+    /// Discretisation of the derivative.
     pub derivative: Derivative,
-    /// Largest output, either way; infinite for none.
+    /// Output limit, symmetric; infinite for unlimited.
     pub output_max: f64,
 }
 
 /// A PID controller.
 ///
-/// `u[k] = kp e[k] + ki dt sum_{i<k} e[i] + kd (de/dt)[k]`, cut to `-output_max..=output_max`. While the
-/// output is cut, an error that would push it further is not summed up.
+/// `u[k] = kp e[k] + ki dt sum_{i<k} e[i] + kd (de/dt)[k]`, saturated to
+/// `-output_max..=output_max`. Anti-windup: while the output saturates, the integral ignores errors
+/// that would drive it further (conditional integration).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pid {
     gains: PidGains,
     dt_s: f64,
-    /// Of the filtered derivative: what is left of its state after one sample.
+    /// Pole of the derivative filter: the factor by which its state decays in one sample.
     keep: f64,
     integral: f64,
     memory: [f64; 2],
 }
 
-/// A controller without its limit, as `x[k+1] = a x[k] + b e[k]`, `u[k] = c x[k] + d e[k]`.
+/// Unsaturated controller in state space: `x[k+1] = a x[k] + b e[k]`, `u[k] = c x[k] + d e[k]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PidMatrices {
-    /// By rows.
+    /// State matrix, row-major.
     pub a: [[f64; 3]; 3],
-    /// From the error.
+    /// Input matrix (from the error).
     pub b: [f64; 3],
-    /// To the output.
+    /// Output matrix.
     pub c: [f64; 3],
-    /// Direct.
+    /// Feedthrough.
     pub d: f64,
 }
 
 impl Pid {
-    /// Starts at rest. What is not finite or below 0 where it must not be counts as 0, and an
-    /// `output_max` that is not a number lets nothing through: a tick has nobody to complain to, so
-    /// whoever configures checks.
+    /// Creates the controller at rest. Non-finite parameters, and negative ones where that is not
+    /// allowed, count as 0; a NaN `output_max` gives an output of 0. A tick cannot report errors,
+    /// so the configuration checks them.
     pub fn new(gains: PidGains, dt_s: f64) -> Self {
         let keep = match gains.derivative {
             Derivative::Filtered { time_constant_s } if time_constant_s > 0.0 => {
@@ -80,7 +81,7 @@ impl Pid {
     /// Returns the output for the error of this tick.
     ///
     /// # Real Time
-    /// Hot. An error that is not finite gives an output of 0, flagged, and is not remembered.
+    /// Hot. A non-finite error gives an output of 0, flagged, and leaves the state unchanged.
     pub fn step(&mut self, error: f64) -> Bounded {
         if !error.is_finite() {
             return clamp_finite(error, self.gains.output_max);
@@ -95,17 +96,17 @@ impl Pid {
         output
     }
 
-    /// Starts again from rest.
+    /// Resets the controller to rest.
     pub fn reset(&mut self) {
         self.integral = 0.0;
         self.memory = [0.0; 2];
     }
 
-    /// Returns the controller without its limit, for analysis.
+    /// Returns the unsaturated controller in state space, for analysis.
     pub fn matrices(&self) -> PidMatrices {
         let PidGains { kp, ki_per_s, kd_s, derivative, .. } = self.gains;
         let slope = kd_s / self.dt_s;
-        // States: the integral part of the output, and what the derivative remembers.
+        // States: the integral part of the output, and the states of the derivative.
         let mut a = [[1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];
         let b_integral = ki_per_s * self.dt_s;
         match derivative {

@@ -1,21 +1,21 @@
-//! Proportional position control with velocity feed-forward, for drives that close the velocity loop.
+//! P position control with velocity feed-forward, for drives that close the velocity loop (CSV).
 
 /// `v_cmd = k_v (r − y) + f ṙ`
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionLoop {
-    /// Velocity per position error, `k_v`.
+    /// Position gain `k_v`: velocity per position error.
     pub gain_per_s: f64,
-    /// Share `f` of the reference velocity that is fed forward, 0 to 1.
+    /// Velocity feed-forward `f`, 0 to 1: share of the reference velocity.
     pub velocity_feedforward: f64,
 }
 
 impl PositionLoop {
-    /// The velocity to command.
+    /// Returns the velocity command.
     ///
     /// # Units
     /// - positions in metres, velocities in metres per second
     /// # Real Time
-    /// Hot. What is not finite stays so: pass the result through [`super::clamp_finite`].
+    /// Hot. Non-finite values pass through: saturate the result with [`super::clamp_finite`].
     pub fn command_m_s(&self, reference_m: f64, reference_m_s: f64, actual_m: f64) -> f64 {
         self.gain_per_s * (reference_m - actual_m) + self.velocity_feedforward * reference_m_s
     }

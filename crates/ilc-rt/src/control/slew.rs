@@ -1,9 +1,9 @@
-//! A bound on the change in one tick, for inputs that were computed elsewhere.
+//! Slew-rate limiter for inputs computed elsewhere.
 
-/// Follows a target by at most a step a tick.
+/// A rate limiter: follows a target by at most `step_max` per tick.
 ///
-/// A learned input is bounded and smooth when its law is sound; if it is not, the axis sees a ramp
-/// and not a step.
+/// A sound law gives a bounded, smooth input. Should it fail to, the axis sees a ramp instead of a
+/// step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlewLimiter {
     step_max: f64,
@@ -11,20 +11,20 @@ pub struct SlewLimiter {
 }
 
 impl SlewLimiter {
-    /// Starts at 0. `step_max` is the largest change in one tick, in the unit of the value; what is
-    /// not a number of at least 0 lets nothing through.
+    /// Starts at 0. `step_max` is the largest change in one tick, in the unit of the value; a
+    /// negative or NaN limit locks the output.
     pub fn new(step_max: f64) -> Self {
         Self { step_max: if step_max >= 0.0 { step_max } else { 0.0 }, value: 0.0 }
     }
 
-    /// The value of this tick; a target that is not finite is as if it were the last value.
+    /// Returns the value of this tick; a non-finite target keeps the last value.
     ///
     /// # Real Time
     /// Hot.
     pub fn next(&mut self, target: f64) -> f64 {
         if target.is_finite() {
             let step = target - self.value;
-            // The target itself and not value + step, so that it is reached exactly.
+            // The target itself rather than value + step, so that it is reached exactly.
             self.value = if step.abs() <= self.step_max {
                 target
             } else {
@@ -34,7 +34,7 @@ impl SlewLimiter {
         self.value
     }
 
-    /// Starts again from a value; one that is not finite counts as 0.
+    /// Resets to a value; a non-finite one counts as 0.
     pub fn reset(&mut self, value: f64) {
         self.value = if value.is_finite() { value } else { 0.0 };
     }

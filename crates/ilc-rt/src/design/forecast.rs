@@ -3,7 +3,7 @@
 
 use super::error::DesignError;
 use super::plan::model;
-use crate::config::{Cell, Interface};
+use crate::config::{Cell, mode};
 use crate::learning::analysis::{divergence, overreach};
 use crate::learning::{Law, LearningError};
 use crate::model::StateSpace;
@@ -30,16 +30,11 @@ pub fn first_error(cell: &Cell, reference_m: &[f64]) -> Result<Vec<f64>, DesignE
     let n_samples = reference_m.len() / n_axes.max(1);
     let mut drive = vec![0.0; reference_m.len()];
     for (i, axis) in cell.axes.iter().enumerate() {
+        let design = mode::of(axis.interface);
         for k in 0..n_samples {
             let ahead = way((k + 1).min(n_samples - 1), i);
-            drive[k * n_axes + i] = match (axis.interface, axis.position_loop) {
-                (Interface::Csv, Some(position_loop)) => {
-                    let velocity_m_s = (ahead - way(k, i)) / cell.cycle_s();
-                    position_loop.gain_per_s * way(k, i)
-                        + position_loop.velocity_feedforward * velocity_m_s
-                }
-                _ => way(k, i),
-            };
+            let velocity_m_s = (ahead - way(k, i)) / cell.cycle_s();
+            drive[k * n_axes + i] = design.feed(axis, way(k, i), velocity_m_s);
         }
     }
     let response = learning_model(cell)?

@@ -5,15 +5,13 @@ use std::time::Duration;
 use super::error::DesignError;
 use super::fingerprint;
 use super::law::{self, Prepared};
-use crate::config::{Axis, AxisUnit, Cell, ConfigError, Interface, Measure};
+use crate::config::{Axis, Cell, ConfigError, Measure, mode};
 use crate::control::PositionLoop;
 use crate::fieldbus::bring_up::load;
 use crate::fieldbus::canopen::NodeId;
-use crate::fieldbus::cia402::{Mode, Scale};
+use crate::fieldbus::cia402::Scale;
 use crate::fieldbus::transport::scheme_of;
-use crate::model::{
-    Method, ModelError, StateSpace, discretize, from_transfer_function, second_order,
-};
+use crate::model::{ModelError, StateSpace};
 use crate::record::Meta;
 use crate::rt::Nanos;
 use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
@@ -126,35 +124,11 @@ impl Plan {
 
 /// The model that learning uses: the axes' closed loops side by side.
 pub(super) fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
-    let mut models = cell.axes.iter().map(|axis| axis_model(axis, cell.cycle_s()));
+    let mut models =
+        cell.axes.iter().map(|axis| mode::of(axis.interface).nominal_model(axis, cell.cycle_s()));
     let first =
         models.next().unwrap_or_else(|| StateSpace::static_gain(nalgebra::dmatrix![1.0], None))?;
     models.try_fold(first, |all, next| all.append(&next?))
-}
-
-/// The closed loop of one axis from learned input to position.
-///
-/// csp: `w^2 / (s^2 + 2 d w s + w^2)`. csv: `G / (1 + kv z^-1 G)` with `G = a / (s (s + a))`, as the
-/// position that the loop here sees is one cycle old. Both sampled with a zero-order hold.
-fn axis_model(axis: &Axis, cycle_s: f64) -> Result<StateSpace, ModelError> {
-    let turn = std::f64::consts::TAU;
-    let hold = |model: &StateSpace| discretize(model, cycle_s, Method::ZeroOrderHold);
-    let n_delay = axis.model.delay_samples as usize;
-    match axis.interface {
-        Interface::Csp => {
-            let frequency_hz = axis.model.natural_frequency_hz.unwrap_or(1.0);
-            let damping = axis.model.damping.unwrap_or(1.0);
-            hold(&second_order(turn * frequency_hz, damping)?)?.delayed(n_delay)
-        }
-        Interface::Csv => {
-            let bandwidth = turn * axis.model.velocity_bandwidth_hz.unwrap_or(1.0);
-            let velocity = from_transfer_function(&[bandwidth], &[1.0, bandwidth, 0.0], None)?;
-            let gain = axis.position_loop.map_or(1.0, |position_loop| position_loop.gain_per_s);
-            let controller =
-                StateSpace::static_gain(nalgebra::dmatrix![gain], Some(cycle_s))?.delayed(1)?;
-            hold(&velocity)?.delayed(n_delay)?.feedback(&controller)
-        }
-    }
 }
 
 fn axis_limits(axis: &Axis) -> AxisLimits {
@@ -166,12 +140,7 @@ fn axis_limits(axis: &Axis) -> AxisLimits {
 }
 
 pub(crate) fn input_unit(axis: &Axis) -> &'static str {
-    match (axis.interface, axis.unit) {
-        (Interface::Csp, AxisUnit::M) => "m",
-        (Interface::Csv, AxisUnit::M) => "m/s",
-        (Interface::Csp, AxisUnit::Rad) => "rad",
-        (Interface::Csv, AxisUnit::Rad) => "rad/s",
-    }
+    mode::of(axis.interface).input_unit(axis.unit)
 }
 
 /// Cyclic frames: a command and two answers a drive, one answer of the tool, SYNC, and room for one
@@ -206,7 +175,7 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
             .map(|axis| {
                 Ok(AxisSpec {
                     node: node(cell, axis.node)?,
-                    mode: mode(axis),
+                    mode: axis.interface,
                     scale: scale(cell, axis.counts_per_m)?,
                     limits: axis_limits(axis),
                     position_min_m: axis.limits.position_min_m,
@@ -218,10 +187,7 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
                             .position_loop
                             .map_or(0.0, |p| p.velocity_feedforward),
                     },
-                    input_max: match axis.interface {
-                        Interface::Csp => cell.learning.input_max_m,
-                        Interface::Csv => cell.learning.input_max_m_s,
-                    },
+                    input_max: mode::of(axis.interface).input_max(&cell.learning),
                 })
             })
             .collect::<Result<_, ConfigError>>()?,
@@ -266,13 +232,5 @@ fn refused(cell: &Cell, key: &str, value: &dyn std::fmt::Display, allowed: &str)
         key: key.to_owned(),
         value: value.to_string(),
         allowed: allowed.to_owned(),
-    }
-}
-
-/// The command interface of an axis in the words of the drive profile.
-pub(crate) fn mode(axis: &Axis) -> Mode {
-    match axis.interface {
-        Interface::Csp => Mode::Csp,
-        Interface::Csv => Mode::Csv,
     }
 }

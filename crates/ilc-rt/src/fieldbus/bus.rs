@@ -1,4 +1,4 @@
-//! What every transport promises: frames out, frames in, never blocking longer than asked.
+//! The contract of every transport: frames out, frames in, never blocking longer than asked.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -36,7 +36,7 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
     }
 }
 
-/// Why a frame could not be sent or received. `Copy`, so that the tick may carry it.
+/// Reason that a frame was not sent or received. `Copy`, so that the tick may carry it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BusError {
     /// The transmit queue is full.

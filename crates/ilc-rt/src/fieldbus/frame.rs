@@ -39,6 +39,7 @@ impl Frame {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_methods, reason = "tests are cold")]
 mod tests {
     use super::*;
 

@@ -1,7 +1,7 @@
 //! The field bus: CAN frames, CANopen, CiA 402 drives and the transports that carry them.
 //!
 //! For the servo loop (hot: frames, PDOs, statusword) and for set-up (cold: `bring_up`,
-//! `transport::opening`). Imports nothing above row 0 of the layer table; `servo`, `supervisor` and the
+//! `transport::opening`). Imports nothing above row 0 of the layer table; `servo`, `campaign` and the
 //! simulator import it.
 
 pub mod bring_up;

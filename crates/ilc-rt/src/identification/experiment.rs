@@ -3,7 +3,8 @@
 use serde_json::json;
 
 use super::error::IdentificationError;
-use crate::config::{Axis, Cell, Interface, Measure};
+use crate::config::mode::{self, Demand, Peaks};
+use crate::config::{Axis, Cell, Measure};
 use crate::design::{DesignError, Plan, input_unit};
 use crate::model::ModelError;
 use crate::model::identify::{Excitation, ExcitationSignal};
@@ -138,6 +139,11 @@ impl Experiment {
         })
     }
 
+    /// Returns the unit of the input, which is that of the amplitude.
+    pub fn input_unit(&self, cell: &Cell) -> &'static str {
+        self.axis(cell).map_or("", |(_, axis)| input_unit(axis))
+    }
+
     /// Lays the excitation out on the servo cycle.
     pub(crate) fn signal(&self, cell: &Cell) -> Result<ExcitationSignal, IdentificationError> {
         self.excitation.signal(cell.cycle_s()).map_err(|source| {
@@ -169,36 +175,10 @@ impl Experiment {
         let (limits, center_m) = (&axis.limits, self.center_m(cell, index));
         let margin_m =
             (center_m - limits.position_min_m).min(limits.position_max_m - center_m).max(0.0);
+        let peaks = Peaks { value: peak, rate, curvature: curve };
+        let (travel_m, demands) = mode::of(axis.interface).demands(axis, &cell.learning, peaks);
         let demand = |what, needed, allowed, unit| Demand { what, needed, allowed, unit };
-        // A velocity input moves the axis by no more than it takes the position loop to hold against.
-        let (travel_m, mut demands) = match axis.interface {
-            Interface::Csp => (
-                peak,
-                vec![
-                    demand("learning.input_max_m", peak, cell.learning.input_max_m, "m"),
-                    demand("limits.velocity_max_m_s", rate, limits.velocity_max_m_s, "m/s"),
-                    demand(
-                        "limits.acceleration_max_m_s2",
-                        curve,
-                        limits.acceleration_max_m_s2,
-                        "m/s^2",
-                    ),
-                ],
-            ),
-            Interface::Csv => (
-                peak / axis.position_loop.map_or(1.0, |position_loop| position_loop.gain_per_s),
-                vec![
-                    demand("learning.input_max_m_s", peak, cell.learning.input_max_m_s, "m/s"),
-                    demand("limits.velocity_max_m_s", peak, limits.velocity_max_m_s, "m/s"),
-                    demand(
-                        "limits.acceleration_max_m_s2",
-                        rate,
-                        limits.acceleration_max_m_s2,
-                        "m/s^2",
-                    ),
-                ],
-            ),
-        };
+        let mut demands = demands.to_vec();
         demands.push(demand(
             "limits.following_error_max_m",
             travel_m,
@@ -232,20 +212,5 @@ impl Experiment {
             value: value.to_owned(),
             allowed: allowed.to_owned(),
         }
-    }
-}
-
-/// A limit, and the share of it that is needed.
-struct Demand {
-    what: &'static str,
-    needed: f64,
-    allowed: f64,
-    unit: &'static str,
-}
-
-impl Demand {
-    /// Returns the factor that the amplitude could grow by.
-    fn margin(&self) -> f64 {
-        self.allowed / self.needed
     }
 }

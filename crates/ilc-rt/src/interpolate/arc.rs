@@ -1,29 +1,29 @@
-//! A circular arc, or a helix, and what the axes' limits leave for a move along it.
+//! Circular arcs and helices, and the path limits that follow from the axes' limits.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::MAX_AXES;
 use super::limits::{AxisLimits, PathLimits};
 
-/// Share of the acceleration limit that the bend of an arc may take.
+/// Share of the acceleration limit available to the centripetal acceleration.
 const BEND_SHARE: f64 = 0.7;
-/// Shares of the jerk limit that turning at constant speed, and speeding up while turning, may take:
-/// with both used up, `√(1 - 0.6²) - 0.5 = 0.3` of it is left for the jerk along the arc.
+/// Shares of the jerk limit for turning at constant speed, and for accelerating while turning: with
+/// both used up, `√(1 - 0.6²) - 0.5 = 0.3` is left for the jerk along the arc.
 const TURN_SHARE: f64 = 0.5;
 const SPEED_UP_SHARE: f64 = 0.6;
 
-/// How far the ends of an arc may differ in their distance from the centre: this much, or this share
-/// of the radius; never more than half of the smaller one.
+/// Largest difference of the radii at start and end: this much, or this share of the radius; never
+/// more than half of the smaller one.
 const GAP_M: f64 = 1e-5;
 const GAP_SHARE: f64 = 1e-3;
-/// Ends that are as close as this, seen from the centre, are one: the arc is a full circle.
+/// Start and end closer than this, seen from the centre, coincide: the arc is a full circle.
 const FULL_M: f64 = 1e-11;
 
-/// An arc in the plane of two axes; the others go along in proportion.
+/// An arc in the plane of two axes; the other axes move in proportion (helix).
 ///
-/// The centre is where it is said to be. Ends that are not equally far from it, as rounded decimals
-/// make them, are joined by a radius that grows in proportion to the angle: no point of the arc is
-/// farther from either circle than the two are apart.
+/// The programmed centre is kept. If the ends are not equally far from it, as with rounded
+/// decimals, the radius changes in proportion to the angle: no point of the arc is farther from
+/// either circle than the circles are from each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Arc {
     pub(crate) from_m: [f64; MAX_AXES],
@@ -32,31 +32,31 @@ pub(crate) struct Arc {
     center_m: [f64; 2],
     /// Radius at the start.
     radius_m: f64,
-    /// What it grows by until the end.
+    /// Change of the radius from start to end.
     growth_m: f64,
     from_rad: f64,
-    /// Signed: anticlockwise is positive.
+    /// Signed: counter-clockwise is positive.
     sweep_rad: f64,
     pub(crate) length_m: f64,
-    /// Largest share of the length that is in the plane.
+    /// Largest in-plane share of the length.
     share: f64,
 }
 
-/// Whether both ends of an arc are as far from its centre as rounding explains.
+/// Returns true if the radii at start and end agree within rounding of the program.
 pub(crate) fn ends_agree(start_radius_m: f64, end_radius_m: f64) -> bool {
     let gap_m = (start_radius_m - end_radius_m).abs();
     let allowed_m =
         GAP_M.max(GAP_SHARE * start_radius_m).min(0.5 * start_radius_m.min(end_radius_m));
-    // The differences of decimals are rounded themselves.
+    // Differences of decimals are rounded, too.
     start_radius_m > 0.0 && end_radius_m > 0.0 && gap_m <= allowed_m * (1.0 + 1e-9)
 }
 
 impl Arc {
-    /// The arc around a centre; `None` if a radius is 0, or the ends are not equally far from the
-    /// centre (to a thousandth, or 10 µm).
+    /// Returns the arc around a centre; `None` if a radius is 0, or the radii at start and end
+    /// disagree (by more than a thousandth, or 10 µm).
     ///
-    /// An arc that ends where it starts is a full circle; otherwise the direction alone decides how
-    /// far round it goes, however near the ends are.
+    /// An arc that ends at its start is a full circle; otherwise the direction alone decides the
+    /// sweep, however near the ends are.
     pub(crate) fn new(
         from_m: [f64; MAX_AXES],
         to_m: [f64; MAX_AXES],
@@ -72,7 +72,7 @@ impl Arc {
             return None;
         }
         let from_rad = start[1].atan2(start[0]);
-        // From the products of both: differences of angles near a turn would lose their last digits.
+        // From both products: a difference of angles near a full turn would lose its last digits.
         let turned_rad =
             (start[0] * end[1] - start[1] * end[0]).atan2(start[0] * end[0] + start[1] * end[1]);
         let direction = if clockwise { -1.0 } else { 1.0 };
@@ -103,7 +103,7 @@ impl Arc {
         })
     }
 
-    /// The point at `s_m` from the start; exactly the start and the end there.
+    /// Returns the point at `s_m` from the start; exact at both ends.
     pub(crate) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
         if s_m >= self.length_m {
             return self.to_m;
@@ -123,7 +123,8 @@ impl Arc {
         point_m
     }
 
-    /// The tangent at `s_m` from the start, times `scale`; its length is 1 where the radius is largest.
+    /// Returns the tangent at `s_m` from the start times `scale`; its length is 1 where the radius
+    /// is largest.
     pub(crate) fn along(&self, s_m: f64, scale: f64) -> [f64; MAX_AXES] {
         let part = (s_m / self.length_m).clamp(0.0, 1.0);
         let mut tangent = [0.0; MAX_AXES];
@@ -137,12 +138,12 @@ impl Arc {
         tangent
     }
 
-    /// The largest share of the path's speed that an axis has somewhere on the arc.
+    /// Returns the largest share of the path speed that an axis takes anywhere on the arc.
     pub(crate) fn share(&self, axis: usize) -> f64 {
         if !self.plane.contains(&axis) {
             return (self.to_m[axis] - self.from_m[axis]).abs() / self.length_m;
         }
-        // The tangent lies along an axis where the radius is across it, twice a turn.
+        // The tangent is parallel to an axis where the radius is normal to it, twice a turn.
         let first = if self.plane[1] == axis { 0.0 } else { FRAC_PI_2 };
         let to_rad = self.from_rad + self.sweep_rad;
         let (low, high) = (self.from_rad.min(to_rad), self.from_rad.max(to_rad));
@@ -153,13 +154,13 @@ impl Arc {
         begin.max(end)
     }
 
-    /// What the axes leave for a jerk-limited move along the arc.
+    /// Returns the path limits of a jerk-limited move along the arc.
     ///
-    /// By the distance, the derivatives of the point in the plane are at most `c`, `k` and `w`: of a
-    /// circle of radius `r` the share `c`, `c²/r` and `c³/r²`, the second across the others. Then
-    /// the acceleration has the parts `c a` along and `k v²` across, the jerk `c j + w v³` along and
-    /// `3 k v a` across; their sum stays within each limit in whichever direction the axes lie. Where
-    /// the radius grows, along and across are not at right angles, and `lean` is the cosine.
+    /// With respect to the distance, the in-plane derivatives of the point are at most `c`, `k` and
+    /// `w`: for a circle of radius `r` the share `c`, `c²/r` and `c³/r²`, the second normal to the
+    /// others. The acceleration then has the parts `c a` along and `k v²` across, the jerk `c j + w
+    /// v³` along and `3 k v a` across; their sum stays within each limit for any direction of the
+    /// axes. Where the radius grows, the two are not orthogonal, and `lean` is the cosine.
     pub(crate) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
         let outside = self.outside();
         let mut path = PathLimits::along(&outside, limits, feed_m_s);
@@ -176,7 +177,8 @@ impl Arc {
         let k = turn.powi(2) * largest.hypot(2.0 * slope);
         let w = turn.powi(3) * largest.hypot(3.0 * slope);
         let lean = (slope.abs() / first.min(last)).min(0.5);
-        // The longest vector that stays within `limit` together with one of length `across`.
+        // The longest vector whose sum with an orthogonal one of length `across` stays within
+        // `limit`.
         let rest = |limit: f64, across: f64| {
             (limit * limit - across * across * (1.0 - lean * lean)).sqrt() - lean * across
         };
@@ -193,7 +195,7 @@ impl Arc {
         path
     }
 
-    /// The direction of the axes that are not in the plane.
+    /// The direction of the out-of-plane axes.
     fn outside(&self) -> [f64; MAX_AXES] {
         let mut direction = [0.0; MAX_AXES];
         for (axis, share) in direction.iter_mut().enumerate() {
@@ -223,7 +225,7 @@ mod tests {
         point
     }
 
-    /// Farthest that the arc is from the circle through its start, and how long it is as a polyline.
+    /// Largest distance of the arc from the circle through its start, and its length as a polyline.
     fn walked(arc: &Arc, center: [f64; 2], radius: f64) -> (f64, f64) {
         let n = 20_000;
         let mut before = arc.point_m(0.0);
@@ -248,7 +250,7 @@ mod tests {
             let arc = Arc::new(from, to, [0, 1], center, clockwise).unwrap();
             let radius = (from[0] - center[0]).hypot(from[1] - center[1]);
             let (off, found) = walked(&arc, center, radius);
-            // The ends themselves are up to 1.5 um apart in their radius.
+            // The radii at the ends differ by up to 1.5 um.
             assert!(off < 1.51e-6, "{to:?}: {off}");
             assert!((found - length).abs() < 1e-5, "{to:?}: {found}");
         }
@@ -262,7 +264,7 @@ mod tests {
             let center = [random.signed(), random.signed()];
             let begin = std::f64::consts::PI * random.signed();
             let clockwise = round % 2 == 0;
-            // From almost nothing to almost a full turn, most of them near either.
+            // From almost nothing to almost a full turn, mostly near either.
             let small = random.log(1e-9 / radius, 3.0);
             let sweep = if round % 4 < 2 { small } else { TAU - small };
             let rounded = |value: f64| (value * 1e6).round() / 1e6;
@@ -273,7 +275,7 @@ mod tests {
             let signed = if clockwise { -sweep } else { sweep };
             let mut to = point(begin + signed, radius);
             if round % 3 == 0 {
-                // To the micrometre, as in most programs.
+                // Rounded to a micrometre, as in most programs.
                 (to[0], to[1]) = (rounded(to[0]), rounded(to[1]));
             }
             let arc = Arc::new(from, to, [0, 1], center, clockwise).unwrap();
@@ -298,7 +300,7 @@ mod tests {
                 assert_eq!(arc.sweep_rad > 0.0, !clockwise);
             }
         }
-        // A nanometre is told by its direction.
+        // For an end a nanometre away, the direction decides.
         let arc =
             |y: f64| Arc::new(from, at(0.11, 0.2 + y), [0, 1], center, false).unwrap().length_m;
         assert!((arc(1e-9) - 1e-9).abs() < 1e-13 && (arc(-1e-9) - 0.01 * TAU).abs() < 1e-8);

@@ -1,17 +1,17 @@
-//! The tick of a blended path: the polyline at its feed, through two cascaded moving averages.
+//! Tick of a blended path: the polyline at its feed, through two cascaded moving averages.
 //!
-//! The first average turns a step of velocity into a ramp (acceleration), the second rounds the
-//! ramp's ends (jerk). Positions are summed as integers of 2⁻⁵⁰ m, so that the running sums are
-//! exact however long the run is: no drift, and the end is the programmed end.
+//! The first average turns a step of velocity into a ramp (limited acceleration), the second rounds
+//! the ramp's ends (limited jerk: an S-curve). Positions are summed as integers of 2⁻⁵⁰ m, so the
+//! running sums are exact however long the run is: no drift, and the end is the programmed end.
 
 use super::MAX_AXES;
 use super::element::{Element, Leg};
 use super::setpoint::Setpoint;
 
-/// Fixed-point units in one metre; 2⁵⁰, so that 4096 m fit 63 bits.
+/// Fixed-point units per metre; 2⁵⁰, so that 4096 m fit 63 bits.
 const UNITS_PER_M: f64 = 1_125_899_906_842_624.0;
 
-/// A leg at constant speed, laid out in time.
+/// A leg at constant speed with its time span.
 #[derive(Clone, Debug)]
 struct TimedLeg {
     element: Element,
@@ -20,7 +20,7 @@ struct TimedLeg {
     end_s: f64,
 }
 
-/// The sum over the last values of one axis.
+/// Moving sum of one axis.
 #[derive(Clone, Debug)]
 struct MovingSum {
     ring: Box<[i128]>,
@@ -61,13 +61,13 @@ pub(crate) struct Blend {
     filters: Box<[(MovingSum, MovingSum)]>,
     units_per_m: f64,
     cycle_s: f64,
-    /// Set points of the tick before, of this tick and of the next: their slope is the velocity.
+    /// Set points of the previous, this and the next tick: their slope is the velocity.
     around_m: [[f64; MAX_AXES]; 3],
     ticks_ahead: u64,
 }
 
 impl Blend {
-    /// Lays the legs out in time from `start_s` on, and sizes the filters. Cold.
+    /// Schedules the legs from `start_s` on, and sizes the filters. Cold.
     pub(crate) fn plan(
         legs: &[Leg],
         n_axes: usize,
@@ -96,17 +96,18 @@ impl Blend {
         plan
     }
 
-    /// When the unfiltered polyline ends.
+    /// Returns the end time of the unfiltered polyline.
     pub(crate) fn end_s(&self) -> f64 {
         self.legs.last().map_or(0.0, |last| last.end_s)
     }
 
-    /// Ticks by which filters and slope are late: after `end_s` and these, the path is at rest.
+    /// Returns the delay of filters and slope in ticks: that long after `end_s`, the path is at
+    /// rest.
     pub(crate) fn ticks_late(&self) -> usize {
         self.filters.first().map_or(0, |(first, second)| first.ring.len() + second.ring.len())
     }
 
-    /// Goes back to the start, at rest.
+    /// Restarts at the beginning, at rest.
     pub(crate) fn restart(&mut self) {
         self.current = 0;
         self.ticks_ahead = 0;
@@ -120,7 +121,7 @@ impl Blend {
         self.look_ahead();
     }
 
-    /// The set point of this tick; then looks one tick further ahead.
+    /// Returns the set point of this tick, and advances the look-ahead by one tick.
     pub(crate) fn next(&mut self) -> Setpoint {
         let [before_m, now_m, after_m] = self.around_m;
         let mut setpoint = Setpoint::at_rest(now_m);
@@ -131,13 +132,13 @@ impl Blend {
         setpoint
     }
 
-    /// Shifts the neighbours by one tick and filters the next one.
+    /// Shifts the neighbours by one tick and filters the next set point (look-ahead).
     fn look_ahead(&mut self) {
         if self.ticks_ahead > 0 {
             self.around_m[0] = self.around_m[1];
             self.around_m[1] = self.around_m[2];
         }
-        // One tick behind, so that the slope at the first tick is 0.
+        // Delayed by one tick, so that the slope at the first tick is 0.
         let raw_m = self.polyline_m(self.ticks_ahead as f64 * self.cycle_s);
         self.ticks_ahead += 1;
         for ((averaged, rounded), position_m) in self.filters.iter_mut().zip(raw_m) {
@@ -146,7 +147,7 @@ impl Blend {
         self.around_m[2] = self.read_out();
     }
 
-    /// The sums of the second filters in metres.
+    /// Returns the sums of the second filters in metres.
     fn read_out(&self) -> [f64; MAX_AXES] {
         let mut position_m = [0.0; MAX_AXES];
         for (position_m, (_, rounded)) in position_m.iter_mut().zip(&self.filters) {
@@ -155,7 +156,7 @@ impl Blend {
         position_m
     }
 
-    /// The unfiltered polyline at a time that is not before that of the last call.
+    /// Returns the unfiltered polyline at a time not earlier than that of the previous call.
     fn polyline_m(&mut self, t_s: f64) -> [f64; MAX_AXES] {
         while self.current + 1 < self.legs.len() && t_s >= self.legs[self.current].end_s {
             self.current += 1;
@@ -169,7 +170,7 @@ impl Blend {
     }
 }
 
-/// A position in whole fixed-point units.
+/// Converts a position to fixed-point units.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "planning holds positions within 4096 m, which is 2^62 units"

@@ -1,4 +1,4 @@
-//! A piece of a path, straight or round, as the ticks of exact stop and blend walk along it.
+//! Element of a path, a line or an arc, as exact-stop and blended motion traverse it.
 
 use super::MAX_AXES;
 use super::arc::Arc;
@@ -34,7 +34,7 @@ impl Element {
         }
     }
 
-    /// The point at `s_m` from the start; exactly the end at the end.
+    /// Returns the point at `s_m` from the start; exact at the end.
     pub(crate) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
         match self {
             Self::Line(line) => line.point_m(s_m),
@@ -42,7 +42,7 @@ impl Element {
         }
     }
 
-    /// The unit tangent at `s_m` from the start, times `scale`.
+    /// Returns the unit tangent at `s_m` from the start times `scale`.
     pub(crate) fn along(&self, s_m: f64, scale: f64) -> [f64; MAX_AXES] {
         match self {
             Self::Line(line) => line.along(scale),
@@ -50,7 +50,7 @@ impl Element {
         }
     }
 
-    /// The largest share of the path's speed that an axis has anywhere on it.
+    /// Returns the largest share of the path speed that an axis takes anywhere on it.
     pub(crate) fn share(&self, axis: usize) -> f64 {
         match self {
             Self::Line(line) => line.direction[axis].abs(),
@@ -58,7 +58,7 @@ impl Element {
         }
     }
 
-    /// What the axes' limits and the feed leave for a jerk-limited move.
+    /// Returns the path limits of a jerk-limited move, from the axes' limits and the feed.
     pub(crate) fn limits(&self, limits: &[AxisLimits], feed_m_s: f64) -> PathLimits {
         match self {
             Self::Line(line) => PathLimits::along(&line.direction, limits, feed_m_s),
@@ -67,7 +67,7 @@ impl Element {
     }
 }
 
-/// An element with the speed along it, and the rest at its end.
+/// An element, the speed along it, and the dwell at its end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Leg {
     pub(crate) element: Element,

@@ -1,5 +1,5 @@
-//! Refusals of a single move. Copy, as moves are also planned between two ticks; the sentence is made
-//! where it is shown, by `trajectory`.
+//! Errors of a single move. Copy, as moves are also planned between two ticks; `trajectory` makes
+//! the sentence where it is shown.
 
 use super::quantity::Quantity;
 
@@ -13,16 +13,16 @@ pub enum MoveError {
     },
     /// A limit along the path, or the feed, is not a positive number.
     Limit {
-        /// Which limit.
+        /// The limited quantity.
         quantity: Quantity,
         /// The value given.
         value: f64,
     },
     /// A limit of an axis is not a positive number.
     AxisLimit {
-        /// Which axis.
+        /// Index of the axis.
         axis: usize,
-        /// Which limit.
+        /// The limited quantity.
         quantity: Quantity,
         /// The value given.
         value: f64,
@@ -34,24 +34,24 @@ pub enum MoveError {
         /// The duration computed.
         duration_s: f64,
     },
-    /// No axes, or more than a set point holds.
+    /// No axes, or more than [`super::MAX_AXES`].
     Axes {
         /// The number given.
         n_axes: usize,
     },
-    /// A coordinate is not finite, or too far away.
+    /// A coordinate that is not finite, or too far from the origin.
     Position {
-        /// Which axis.
+        /// Index of the axis.
         axis: usize,
         /// The value given.
         position: f64,
-        /// The farthest allowed.
+        /// Largest distance allowed.
         limit: f64,
     },
 }
 
 impl MoveError {
-    /// The axis of the refusal, if it concerns a single one.
+    /// Returns the axis concerned, if it is a single one.
     pub fn axis(&self) -> Option<usize> {
         match *self {
             Self::AxisLimit { axis, .. } | Self::Position { axis, .. } => Some(axis),

@@ -1,7 +1,7 @@
-//! The tick of a path that comes to rest at every corner: one jerk-limited move a segment.
+//! Tick of a path with exact stops: one jerk-limited move per segment, at rest at each corner.
 //!
-//! Moves are not rounded to ticks: each is evaluated on the time of the whole run, so that a set
-//! point never waits for the grid and the limits hold between set points as well as on them.
+//! Moves are not rounded to ticks: each is evaluated at the time of the whole run, so no set point
+//! waits for the grid, and the limits hold between set points as well as at them.
 
 use super::MAX_AXES;
 use super::element::{Element, Leg};
@@ -10,7 +10,7 @@ use super::limits::AxisLimits;
 use super::profile::JerkLimited;
 use super::setpoint::Setpoint;
 
-/// One segment: its line, its profile, and when it starts.
+/// One segment: its element, its profile and its start time.
 #[derive(Clone, Debug)]
 struct Move {
     element: Element,
@@ -19,7 +19,7 @@ struct Move {
     end_s: f64,
 }
 
-/// The segments of a run, and the one that the run is in.
+/// The segments of a run, and the current one.
 #[derive(Clone, Debug)]
 pub(crate) struct ExactStop {
     moves: Box<[Move]>,
@@ -27,7 +27,7 @@ pub(crate) struct ExactStop {
 }
 
 impl ExactStop {
-    /// Plans one move a leg; the first begins at `start_s`. Cold.
+    /// Plans one move per leg; the first begins at `start_s`. Cold.
     pub(crate) fn plan(
         legs: &[Leg],
         mut start_s: f64,
@@ -45,17 +45,17 @@ impl ExactStop {
         Ok(Self { moves, current: 0 })
     }
 
-    /// When the last move ends.
+    /// Returns the end time of the last move.
     pub(crate) fn end_s(&self) -> f64 {
         self.moves.last().map_or(0.0, |last| last.end_s)
     }
 
-    /// Goes back to the first move.
+    /// Restarts at the first move.
     pub(crate) fn restart(&mut self) {
         self.current = 0;
     }
 
-    /// The set point at a time that is not before that of the last call.
+    /// Returns the set point at a time not earlier than that of the previous call.
     pub(crate) fn at(&mut self, t_s: f64) -> Setpoint {
         while self.current + 1 < self.moves.len() && t_s >= self.moves[self.current].end_s {
             self.current += 1;

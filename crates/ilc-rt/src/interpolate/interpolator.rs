@@ -1,11 +1,11 @@
-//! The set points of a run, one a tick.
+//! The set points of a run, one per tick.
 
 use super::blend::Blend;
 use super::exact_stop::ExactStop;
 use super::setpoint::Setpoint;
 use super::table::Table;
 
-/// How the corners of this run are taken.
+/// Planned motion of a run, by its treatment of corners.
 #[derive(Clone, Debug)]
 pub(crate) enum Motion {
     ExactStop(ExactStop),
@@ -14,7 +14,7 @@ pub(crate) enum Motion {
     Table(Table),
 }
 
-/// A planned run: rest, path, rest.
+/// A planned run: dwell, path, dwell.
 #[derive(Clone, Debug)]
 pub struct Interpolator {
     motion: Motion,
@@ -25,15 +25,15 @@ pub struct Interpolator {
 }
 
 impl Interpolator {
-    /// Starts a planned motion at its first tick.
+    /// Creates the interpolator at its first tick.
     pub(crate) fn new(motion: Motion, n_axes: usize, cycle_s: f64, n_samples: usize) -> Self {
         Self { motion, n_axes, cycle_s, n_samples, tick: 0 }
     }
 
-    /// Goes back to the first set point.
+    /// Restarts at the first set point.
     ///
     /// # Real Time
-    /// Hot; a blended path refills its filters, in the order of the windows.
+    /// Hot; a blended path refills its filters, at a cost proportional to the windows.
     pub fn restart(&mut self) {
         self.tick = 0;
         match &mut self.motion {
@@ -43,8 +43,8 @@ impl Interpolator {
         }
     }
 
-    /// The set point of the next tick; the first call gives the start, and the last set point, which
-    /// says `done`, is repeated for ever.
+    /// Returns the set point of the next tick; the first call returns the start. The last set
+    /// point, marked `done`, is repeated indefinitely.
     ///
     /// # Real Time
     /// Hot, allocates nothing.
@@ -66,22 +66,22 @@ impl Interpolator {
         Setpoint { done, ..setpoint }
     }
 
-    /// Number of samples of the run, the first and the last included.
+    /// Returns the number of samples of the run, first and last included.
     pub fn n_samples(&self) -> usize {
         self.n_samples
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     pub fn n_axes(&self) -> usize {
         self.n_axes
     }
 
-    /// The servo cycle for which the run was planned.
+    /// Returns the servo cycle that the run was planned for.
     pub fn cycle_s(&self) -> f64 {
         self.cycle_s
     }
 
-    /// All set points of the run, by running a copy: the same numbers bit by bit as in the loop.
+    /// Returns all set points of the run, from a copy: bit-identical to those in the loop.
     ///
     /// # Shapes
     /// - returns `n_samples * n_axes`, time first, in metres

@@ -1,22 +1,22 @@
-//! Limits of the axes, and what they leave for a straight move along a path.
+//! Limits of the axes, and the resulting limits along a straight path.
 
 use super::MAX_AXES;
 use super::error::MoveError;
 use super::quantity::Quantity;
 
-/// What the set points of one axis never exceed.
+/// Limits of one axis's set points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisLimits {
-    /// Highest speed.
+    /// Velocity limit.
     pub velocity_max_m_s: f64,
-    /// Highest acceleration.
+    /// Acceleration limit.
     pub acceleration_max_m_s2: f64,
-    /// Highest jerk.
+    /// Jerk limit.
     pub jerk_max_m_s3: f64,
 }
 
 impl AxisLimits {
-    /// Limits of a few axes in an array for all; the axes that are not there get limits of 1.
+    /// Pads the limits to an array of all axes; missing axes get limits of 1.
     pub fn padded(limits: &[Self]) -> [Self; MAX_AXES] {
         let unused = Self { velocity_max_m_s: 1.0, acceleration_max_m_s2: 1.0, jerk_max_m_s3: 1.0 };
         let mut all = [unused; MAX_AXES];
@@ -39,7 +39,7 @@ impl AxisLimits {
         Ok(())
     }
 
-    /// The three limits, each with its name.
+    /// Returns the three limits with their names.
     pub(crate) fn named(&self) -> [(Quantity, f64); 3] {
         [
             (Quantity::Velocity, self.velocity_max_m_s),
@@ -49,24 +49,25 @@ impl AxisLimits {
     }
 }
 
-/// What a straight move may do along its path.
+/// Limits along a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathLimits {
-    /// Highest speed along the path.
+    /// Velocity limit along the path.
     pub velocity_m_s: f64,
-    /// Highest acceleration along the path.
+    /// Acceleration limit along the path.
     pub acceleration_m_s2: f64,
-    /// Highest jerk along the path.
+    /// Jerk limit along the path.
     pub jerk_m_s3: f64,
 }
 
 impl PathLimits {
-    /// Limits along a unit direction: the tightest `limit_i / |d_i|` of all axes, and the feed.
+    /// Returns the limits along a unit direction: the tightest `limit_i / |d_i|` over all axes, and
+    /// the feed.
     ///
     /// # Shapes
-    /// - `direction`, `limits`: one entry an axis; the shorter of the two counts.
+    /// - `direction`, `limits`: one entry per axis; the shorter of the two counts.
     pub fn along(direction: &[f64], limits: &[AxisLimits], feed_m_s: f64) -> Self {
-        // `f64::min` would lose a feed that is not a number, and with it the refusal of the move.
+        // `f64::min` would drop a NaN feed, and with it the refusal of the move.
         let tighter = |so_far: f64, limit: f64| if limit < so_far { limit } else { so_far };
         let mut path = Self {
             velocity_m_s: feed_m_s,
@@ -85,7 +86,7 @@ impl PathLimits {
     }
 }
 
-/// Whether a value is finite and above 0.
+/// Returns true if a value is finite and above 0.
 pub(crate) fn is_positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }

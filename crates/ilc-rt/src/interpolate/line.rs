@@ -1,8 +1,8 @@
-//! A straight line, and the points along it.
+//! Straight line elements.
 
 use super::MAX_AXES;
 
-/// A straight line from one point to another, its direction a unit vector.
+/// A straight line between two points with its unit direction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
     pub(crate) from_m: [f64; MAX_AXES],
@@ -12,13 +12,13 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// Unused axes are 0 in both points; a line without length has no direction (all 0).
+    /// Creates a line. Unused axes are 0 in both points; a line of length 0 has the direction 0.
     pub(crate) fn new(from_m: [f64; MAX_AXES], to_m: [f64; MAX_AXES]) -> Self {
         let mut direction = [0.0; MAX_AXES];
         for (axis, share) in direction.iter_mut().enumerate() {
             *share = to_m[axis] - from_m[axis];
         }
-        // Scaled by the largest share, so that the squares of tiny moves do not vanish.
+        // Scaled by the largest component, so that the squares of tiny moves do not underflow.
         let largest = direction.iter().fold(0.0_f64, |most, share| most.max(share.abs()));
         if largest == 0.0 {
             return Self { from_m, to_m, direction, length_m: 0.0 };
@@ -31,7 +31,7 @@ impl Line {
         Self { from_m, to_m, direction, length_m }
     }
 
-    /// The point at `s_m` from the start; exactly the end at the end.
+    /// Returns the point at `s_m` from the start; exact at the end.
     pub(crate) fn point_m(&self, s_m: f64) -> [f64; MAX_AXES] {
         if s_m >= self.length_m {
             return self.to_m;
@@ -43,7 +43,7 @@ impl Line {
         point_m
     }
 
-    /// The direction times `scale`.
+    /// Returns the direction times `scale`.
     pub(crate) fn along(&self, scale: f64) -> [f64; MAX_AXES] {
         self.direction.map(|share| share * scale)
     }

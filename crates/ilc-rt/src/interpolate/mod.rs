@@ -1,8 +1,9 @@
-//! The set points of a run, one a tick: line and arc elements, jerk-limited moves, controlled stops.
+//! The set points of a run, one per tick: line and arc elements, jerk-limited moves (S-curve
+//! profiles), controlled stops.
 //!
-//! A planned run gives one set point a tick without allocating, and moves and stops are planned
-//! between two ticks. It stands on row 0 and imports nothing of the crate: `trajectory` plans what is
-//! played here, and `servo` plays it.
+//! A planned run yields one set point per tick without allocating; moves and stops are planned
+//! between two ticks. It belongs to row 0 and imports nothing of the crate: `trajectory` plans the
+//! runs and `servo` executes them.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -32,5 +33,5 @@ pub use quantity::{AxisUnit, Quantity};
 pub use setpoint::Setpoint;
 pub use stop::ControlledStop;
 
-/// Most axes that move together; every array of the tick has this length.
+/// Largest number of axes that move together; every array of the tick has this length.
 pub const MAX_AXES: usize = 12;

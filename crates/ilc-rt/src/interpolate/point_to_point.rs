@@ -7,20 +7,20 @@ use super::line::Line;
 use super::profile::JerkLimited;
 use super::setpoint::Setpoint;
 
-/// A move to a target, as the return to the start between two runs.
+/// A move to a target, e.g. the return to the start between two runs.
 #[derive(Clone, Copy, Debug)]
 pub struct PointToPoint {
     line: Line,
-    /// None if the axes are at the target already.
+    /// `None` if the axes are at the target already.
     profile: Option<JerkLimited>,
     time_s: f64,
 }
 
 impl PointToPoint {
-    /// Plans the move; entries beyond `n_axes` are not read.
+    /// Plans the move; entries beyond `n_axes` are ignored.
     ///
     /// # Real Time
-    /// Hot: allocates nothing, a few roots.
+    /// Hot: does not allocate; computes a few roots.
     /// # Errors
     /// [`MoveError`] if a position is not finite, or a limit or the feed not positive.
     pub fn new(
@@ -59,13 +59,13 @@ impl PointToPoint {
         Ok(Self { line, profile, time_s: 0.0 })
     }
 
-    /// How long the move lasts.
+    /// Returns the duration of the move.
     pub fn duration_s(&self) -> f64 {
         self.profile.map_or(0.0, |profile| profile.duration_s())
     }
 
-    /// The set point one `dt_s` later; the first call gives the point after the start. At the end it
-    /// is exactly the target, says `done`, and stays.
+    /// Returns the set point one `dt_s` later; the first call gives the point after the start. The
+    /// last one is exactly the target, is marked `done`, and is repeated.
     ///
     /// # Real Time
     /// Hot, allocates nothing.

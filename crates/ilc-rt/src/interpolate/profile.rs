@@ -1,13 +1,13 @@
-//! The seven-phase jerk-limited profile from rest to rest, in closed form.
+//! The seven-phase jerk-limited profile (S-curve) from rest to rest, in closed form.
 //!
 //! Jerk is `+J 0 -J 0 -J 0 +J`: up to the acceleration limit, up to the velocity limit, cruise, and
-//! the mirror image. A short move drops the phases that it has no room for.
+//! the mirror image. A short move omits the phases that do not fit.
 
 use super::error::MoveError;
 use super::limits::{PathLimits, is_positive};
 use super::quantity::Quantity;
 
-/// Where a move along its path is at one time.
+/// Motion along the path at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathState {
     /// Distance from the start.
@@ -16,14 +16,14 @@ pub struct PathState {
     pub v_m_s: f64,
     /// Acceleration.
     pub a_m_s2: f64,
-    /// Jerk; at a switch, of the phase that ends there.
+    /// Jerk; at a switching time, that of the phase that ends.
     pub j_m_s3: f64,
 }
 
 /// A time-optimal move from rest to rest under limits of velocity, acceleration and jerk.
 ///
 /// The first half is computed from the start and the second as its mirror image from the end, so
-/// that the move ends exactly at its length.
+/// the move ends exactly at its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JerkLimited {
     length_m: f64,
@@ -44,10 +44,10 @@ impl JerkLimited {
     /// `T_j = ∛(length / 2j)`.
     ///
     /// # Real Time
-    /// Allocates nothing; a few roots.
+    /// Does not allocate; computes a few roots.
     /// # Errors
-    /// [`MoveError::Length`] or [`MoveError::Limit`] for what is not finite and above 0,
-    /// [`MoveError::Duration`] if the numbers are too far apart to compute with.
+    /// [`MoveError::Length`] or [`MoveError::Limit`] for a value that is not finite and positive,
+    /// [`MoveError::Duration`] if the duration overflows.
     pub fn plan(
         length_m: f64,
         velocity_m_s: f64,
@@ -107,36 +107,15 @@ impl JerkLimited {
         Self::plan(length_m, limits.velocity_m_s, limits.acceleration_m_s2, limits.jerk_m_s3)
     }
 
-    /// How long the move lasts.
+    /// Returns the duration of the move.
     pub fn duration_s(&self) -> f64 {
         2.0 * self.rise_time_s() + self.cruise_time_s
-    }
-
-    /// How long it is.
-    pub fn length_m(&self) -> f64 {
-        self.length_m
-    }
-
-    /// The highest speed that it reaches.
-    pub fn peak_velocity_m_s(&self) -> f64 {
-        self.peak_velocity_m_s
-    }
-
-    /// The highest acceleration that it reaches.
-    pub fn peak_acceleration_m_s2(&self) -> f64 {
-        self.peak_acceleration_m_s2
-    }
-
-    /// Durations of the seven phases.
-    pub fn phases_s(&self) -> [f64; 7] {
-        let (j, h, c) = (self.jerk_time_s, self.hold_time_s, self.cruise_time_s);
-        [j, h, j, c, j, h, j]
     }
 
     /// State at a time from the start; at rest before it and, exactly at the end, after the move.
     ///
     /// # Real Time
-    /// Allocates nothing; no roots, no branches that depend on history.
+    /// Does not allocate; no roots, no dependence on previous calls.
     pub fn at(&self, t_s: f64) -> PathState {
         let duration_s = self.duration_s();
         let half_m = 0.5 * self.length_m;
@@ -162,7 +141,7 @@ impl JerkLimited {
         2.0 * self.jerk_time_s + self.hold_time_s
     }
 
-    /// The first three phases and the cruise.
+    /// Returns the state in the first three phases and the cruise.
     fn rise(&self, t_s: f64) -> PathState {
         let (j, a, v) = (self.jerk_m_s3, self.peak_acceleration_m_s2, self.peak_velocity_m_s);
         let rise_s = self.rise_time_s();
@@ -208,12 +187,18 @@ mod tests {
     use super::*;
     use crate::interpolate::random::Random;
 
+    /// Durations of the seven phases.
+    fn phases_s(plan: &JerkLimited) -> [f64; 7] {
+        let (j, h, c) = (plan.jerk_time_s, plan.hold_time_s, plan.cruise_time_s);
+        [j, h, j, c, j, h, j]
+    }
+
     #[test]
     fn hand_computed_move_reaches_every_limit() {
         // v = 1, a = 2, j = 8: T_j = 0.25, hold 0.25, rise 0.75 s and 0.375 m; cruise 1.25 s.
         let plan = JerkLimited::plan(2.0, 1.0, 2.0, 8.0).unwrap();
         for (found, wanted) in
-            plan.phases_s().iter().zip([0.25, 0.25, 0.25, 1.25, 0.25, 0.25, 0.25])
+            phases_s(&plan).iter().zip([0.25, 0.25, 0.25, 1.25, 0.25, 0.25, 0.25])
         {
             assert!((found - wanted).abs() < 1e-15);
         }
@@ -233,8 +218,8 @@ mod tests {
             (jerk_only.duration_s() - 0.5).abs() < 1e-15,
             "an eighth of the way in half the time"
         );
-        assert!(jerk_only.phases_s()[1].abs() < 1e-15);
-        assert!((jerk_only.peak_acceleration_m_s2() - 1.0).abs() < 1e-15);
+        assert!(phases_s(&jerk_only)[1].abs() < 1e-15);
+        assert!((jerk_only.peak_acceleration_m_s2 - 1.0).abs() < 1e-15);
     }
 
     #[test]
@@ -250,18 +235,18 @@ mod tests {
             let plan = JerkLimited::plan(length, v, a, j).unwrap();
             let duration = plan.duration_s();
             let bound = 1.0 + 1e-9;
-            assert!(plan.peak_velocity_m_s() <= v * bound, "{plan:?}");
-            assert!(plan.peak_acceleration_m_s2() <= a * bound, "{plan:?}");
-            let sum: f64 = plan.phases_s().iter().sum();
+            assert!(plan.peak_velocity_m_s <= v * bound, "{plan:?}");
+            assert!(plan.peak_acceleration_m_s2 <= a * bound, "{plan:?}");
+            let sum: f64 = phases_s(&plan).iter().sum();
             assert!((sum / duration - 1.0).abs() < 1e-12, "{plan:?}");
-            assert!(plan.phases_s().iter().all(|phase| *phase >= 0.0), "{plan:?}");
+            assert!(phases_s(&plan).iter().all(|phase| *phase >= 0.0), "{plan:?}");
             // Time-optimal: a phase below its limit leaves no phase that waits.
-            let [ramp, hold, _, cruise, ..] = plan.phases_s();
+            let [ramp, hold, _, cruise, ..] = phases_s(&plan);
             if cruise > 1e-9 * duration {
-                assert!(plan.peak_velocity_m_s() >= v * (1.0 - 1e-9), "{plan:?}");
+                assert!(plan.peak_velocity_m_s >= v * (1.0 - 1e-9), "{plan:?}");
             }
             if hold > 1e-9 * ramp {
-                assert!(plan.peak_acceleration_m_s2() >= a * (1.0 - 1e-9), "{plan:?}");
+                assert!(plan.peak_acceleration_m_s2 >= a * (1.0 - 1e-9), "{plan:?}");
             }
             let lower = (length / v).max(2.0 * (length / a).sqrt()).max((32.0 * length / j).cbrt());
             assert!(duration >= lower * (1.0 - 1e-9), "{plan:?}");
@@ -292,14 +277,14 @@ mod tests {
             )
             .unwrap();
             let t = plan.duration_s() * random.unit();
-            let h = 1e-4 * plan.phases_s()[0];
+            let h = 1e-4 * phases_s(&plan)[0];
             let (low, mid, high) = (plan.at(t - h), plan.at(t), plan.at(t + h));
-            let peak_v = plan.peak_velocity_m_s();
+            let peak_v = plan.peak_velocity_m_s;
             let slope = (high.s_m - low.s_m) / (2.0 * h);
             assert!((slope - mid.v_m_s).abs() < 1e-3 * peak_v, "{plan:?} at {t}");
             let bend = (high.v_m_s - low.v_m_s) / (2.0 * h);
             assert!(
-                (bend - mid.a_m_s2).abs() < 1e-3 * plan.peak_acceleration_m_s2(),
+                (bend - mid.a_m_s2).abs() < 1e-3 * plan.peak_acceleration_m_s2,
                 "{plan:?} at {t}"
             );
         }

@@ -1,11 +1,13 @@
-//! The quantities of an axis that limits are set on, and the units that they are stated in.
+//! The limited quantities of an axis and their units.
+
+#![allow(clippy::disallowed_methods, reason = "the calls of the derived schema are cold")]
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A quantity that a limit is set on.
+/// A quantity that a limit applies to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// First derivative of the position.
@@ -17,7 +19,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// The unit of the quantity, for an axis that is measured in `unit`.
+    /// Returns the unit of the quantity for an axis measured in `unit`.
     pub const fn unit(self, unit: AxisUnit) -> &'static str {
         match (self, unit) {
             (Self::Velocity, AxisUnit::M) => "m/s",
@@ -52,7 +54,7 @@ pub enum AxisUnit {
 }
 
 impl AxisUnit {
-    /// The unit as it is written.
+    /// Returns the unit symbol.
     pub const fn symbol(self) -> &'static str {
         match self {
             Self::M => "m",
@@ -60,7 +62,7 @@ impl AxisUnit {
         }
     }
 
-    /// The unit of a distance along a path of several axes: radians where all of them are rotary.
+    /// Returns the unit of a path length over several axes: radians if all of them are rotary.
     pub fn along(units: &[Self]) -> Self {
         if !units.is_empty() && units.iter().all(|unit| *unit == Self::Rad) {
             Self::Rad

@@ -1,4 +1,4 @@
-//! A controlled stop: every axis to rest from whatever it is doing, within its limits.
+//! Controlled stop: brings every axis to rest from any state of motion, within its limits.
 
 use super::MAX_AXES;
 use super::limits::AxisLimits;
@@ -12,14 +12,14 @@ struct AxisStop {
     position_m: f64,
     velocity_m_s: f64,
     acceleration_m_s2: f64,
-    /// Where it comes to rest.
+    /// Rest position.
     rest_m: f64,
 }
 
 impl AxisStop {
-    /// `v_0` is the velocity that would remain if the acceleration were taken back at once,
-    /// `v + a|a|/2j`; deceleration goes against it, to the peak `p = √(j(|v| + a²/2j))` or to the
-    /// limit.
+    /// Plans the stop. `v_0` is the velocity that would remain if the acceleration were ramped down
+    /// at once, `v + a|a|/2j`; the deceleration opposes it, up to the peak `p = √(j(|v| + a²/2j))`
+    /// or the limit.
     fn plan(
         position_m: f64,
         velocity_m_s: f64,
@@ -57,7 +57,7 @@ impl AxisStop {
         self.phases.iter().map(|phase| phase.0).sum()
     }
 
-    /// Position and velocity at a time; exactly at rest at the end.
+    /// Returns position and velocity at a time; exactly at rest at the end.
     fn at(&self, t_s: f64) -> (f64, f64) {
         if t_s < self.duration_s() { self.walk(t_s) } else { (self.rest_m, 0.0) }
     }
@@ -76,10 +76,10 @@ impl AxisStop {
     }
 }
 
-/// Every axis to rest, each as fast as its own limits allow.
+/// Brings every axis to rest, each as fast as its own limits allow.
 ///
-/// An axis goes back only if it must: when it is decelerating so hard that the jerk limit does not
-/// let it ease off before the velocity has passed 0.
+/// An axis reverses only if it must: when it decelerates so hard that the jerk limit prevents it
+/// from easing off before the velocity crosses 0.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlledStop {
     axes: [Option<AxisStop>; MAX_AXES],
@@ -88,12 +88,12 @@ pub struct ControlledStop {
 }
 
 impl ControlledStop {
-    /// Plans the stop; entries beyond `n_axes` are not read. It cannot fail, as nothing better is
-    /// left to do: an acceleration beyond the limit is taken as the limit, one that is not a number
-    /// as 0, and an unusable limit as none.
+    /// Plans the stop; entries beyond `n_axes` are ignored. Never fails, as there is no better
+    /// fallback: an acceleration beyond the limit is cut to the limit, a NaN one counts as 0, and
+    /// an unusable limit as unlimited.
     ///
     /// # Real Time
-    /// Hot: allocates nothing, one root an axis.
+    /// Hot: does not allocate; one root per axis.
     pub fn new(
         position_m: &[f64; MAX_AXES],
         velocity_m_s: &[f64; MAX_AXES],
@@ -115,12 +115,13 @@ impl ControlledStop {
         stop
     }
 
-    /// How long until the last axis rests.
+    /// Returns the time until the last axis is at rest.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// The set point one `dt_s` later; says `done` when all axes rest, and stays there.
+    /// Returns the set point one `dt_s` later; marked `done` once all axes are at rest, and
+    /// repeated.
     ///
     /// # Real Time
     /// Hot, allocates nothing.
@@ -198,7 +199,7 @@ mod tests {
             let duration = stop.duration_s();
             let n_ticks = 200;
             let dt = duration / f64::from(n_ticks) * 1.000_000_1;
-            // Easing off at once leaves this velocity; the stop may turn back only if it must.
+            // Easing off at once leaves this velocity; the stop may reverse only if it must.
             let eased = v_0 + a_0 * a_0.abs() / (2.0 * jerk);
             let peak = v_0.abs() + a_0 * a_0 / (2.0 * jerk);
             let (mut p, mut v, mut a) = (0.1, v_0, a_0);
@@ -220,7 +221,7 @@ mod tests {
                 assert_eq!(now.done, tick == n_ticks);
             }
             assert_eq!(v, 0.0);
-            // The analytic end does not jump.
+            // The analytic end is continuous.
             let axis = stop.axes[0].unwrap();
             assert!(axis.walk(duration).1.abs() <= 1e-12 * peak.max(1e-3), "{stop:?}");
         }

@@ -1,9 +1,9 @@
-//! The tick of a motion that was worked out beforehand: one row of set points a tick.
+//! Tick of a precomputed motion: one row of set points per tick.
 
 use super::MAX_AXES;
 use super::setpoint::Setpoint;
 
-/// Positions and velocities, with a rest before them; the last row is held.
+/// Positions and velocities, with a dwell before them; the last row is held.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     rows: Box<[[[f64; MAX_AXES]; 2]]>,
@@ -11,7 +11,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Copies positions and velocities, `n_axes` a row. Cold.
+    /// Copies positions and velocities, one row of `n_axes` per tick. Cold.
     pub(crate) fn new(
         position_m: &[f64],
         velocity_m_s: &[f64],
@@ -29,12 +29,12 @@ impl Table {
         Self { rows: rows.map(row).collect(), rest_ticks }
     }
 
-    /// The tick from which it rests at its end.
+    /// Returns the tick from which the motion is at rest at its end.
     pub(crate) fn rest_tick(&self) -> usize {
         self.rest_ticks + self.rows.len().saturating_sub(1)
     }
 
-    /// The set point of a tick.
+    /// Returns the set point of a tick.
     pub(crate) fn at(&self, tick: usize) -> Setpoint {
         let last = self.rows.len().saturating_sub(1);
         let Some([position_m, velocity_m_s]) =

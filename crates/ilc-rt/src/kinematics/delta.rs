@@ -1,4 +1,4 @@
-//! The three-leg parallel mechanism (delta).
+//! The delta mechanism: a parallel robot with three legs.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::error::{KinematicsError, finite};
 use super::spheres::{NoPoint, upper_meeting_point};
 
-/// Below this sine between rod and its surroundings a pose counts as singular.
+/// A pose counts as singular if the sine between a rod and the plane or crank concerned is smaller.
 const SINGULAR: f64 = 1e-6;
 
 /// Three cranks at 0, 120 and 240 degrees around a base, each with a rod to the tool.
@@ -18,8 +18,8 @@ const SINGULAR: f64 = 1e-6;
 /// # Shapes
 /// - joint angles and positions have three coordinates; Jacobians are row by row
 /// # Units
-/// - metres and radians; `base_m` is the radius at which the cranks turn, less the radius at which
-///   the rods are fixed to the tool
+/// - metres and radians; `base_m` is the radius of the crank pivots minus the radius of the rod
+///   joints on the tool
 /// # Source
 /// - \[barton2010\], Eq. (7.1) to (7.11) with `tan(theta / 2)` for the printed `tan(theta / b)`, App. C and
 ///   F for the default lengths.
@@ -40,11 +40,11 @@ impl Default for Delta {
 }
 
 impl Delta {
-    /// Makes a mechanism.
+    /// Creates a mechanism.
     ///
     /// # Errors
-    /// - [`KinematicsError::Length`] for a crank or a rod that is not longer than zero, a base radius
-    ///   below zero, and rods too short to close the mechanism anywhere above the base.
+    /// - [`KinematicsError::Length`] for a crank or rod of length 0 or less, a negative base
+    ///   radius, or rods too short to close the mechanism anywhere above the base.
     pub fn new(base_m: f64, crank_m: f64, rod_m: f64) -> Result<Self, KinematicsError> {
         for (what, value_m, least_m, allowed) in [
             ("base_m", base_m, 0.0, "it must be finite and not negative"),
@@ -73,14 +73,15 @@ impl Delta {
         [self.base_m, self.crank_m, self.rod_m]
     }
 
-    /// Returns where the tool is.
+    /// Returns the tool position (forward kinematics).
     ///
     /// # Real Time
     /// Hot.
     /// # Errors
     /// - [`KinematicsError::Open`] if the rods do not meet above the knees.
     /// # Source
-    /// - \[barton2010\], Eq. (7.5): three spheres, met geometrically instead of by elimination.
+    /// - \[barton2010\], Eq. (7.5): three spheres, intersected geometrically instead of by
+    ///   elimination.
     pub fn forward(&self, joints_rad: [f64; 3]) -> Result<[f64; 3], KinematicsError> {
         finite("joints_rad", &joints_rad)?;
         let point = upper_meeting_point(&self.knees_m(joints_rad), self.rod_m);
@@ -94,12 +95,12 @@ impl Delta {
         Ok(point.into())
     }
 
-    /// Returns the crank angles that bring the tool to a position, knees outward.
+    /// Returns the crank angles for a tool position, knees outward (inverse kinematics).
     ///
     /// # Real Time
     /// Hot.
     /// # Errors
-    /// - [`KinematicsError::Unreachable`] with the pose and the leg that does not reach it, or if the
+    /// - [`KinematicsError::Unreachable`] with the pose and the leg that cannot reach it, or if the
     ///   mechanism would assemble below its knees there.
     /// # Source
     /// - \[barton2010\], Eq. (7.8): the same quadratic, solved for the angle itself.
@@ -121,11 +122,12 @@ impl Delta {
                 let reason = if wanted > 0.0 { "too far" } else { "too near" };
                 return Err(KinematicsError::Unreachable { pose_m, leg, reason });
             }
-            // Of the two angles the one that turns the knee outward.
+            // Of the two solutions, the one with the knee outward.
             let turned = along.atan2(across) - room.sqrt().atan2(wanted);
             *joint_rad = wrapped(turned);
         }
-        // The same joints put together above the knees: elsewhere is another assembly.
+        // The same joints assembled above the knees: a different result means another assembly
+        // mode.
         let closed = self.forward(joints_rad).map(Vector3::from);
         let there = Vector3::from(pose_m);
         if !closed.is_ok_and(|closed| (closed - there).norm() <= 1e-6 * self.rod_m) {
@@ -135,7 +137,7 @@ impl Delta {
         Ok(joints_rad)
     }
 
-    /// Returns how joint velocities become tool velocities, in m/rad: `dp = J dtheta`.
+    /// Returns the Jacobian from joint to tool velocities, in m/rad: `dp = J dtheta`.
     ///
     /// From `(p - k_i) . dp = (p - k_i) . k_i' dtheta_i`, so `J = S^-1 diag(s_i . k_i')` with the rods
     /// `s_i = p - k_i` as the rows of `S`.
@@ -143,10 +145,11 @@ impl Delta {
     /// # Real Time
     /// Hot.
     /// # Errors
-    /// - as [`Delta::forward`], and [`KinematicsError::Singular`] where the rods lie in one plane (the
-    ///   tool moves freely) or a crank points along its rod (the joint cannot move the tool).
+    /// - as [`Delta::forward`], and [`KinematicsError::Singular`] where the rods lie in one plane
+    ///   (the tool moves freely) or a crank is aligned with its rod (the joint cannot move the
+    ///   tool).
     /// # Source
-    /// - \[barton2010\], Sect. 7.2.3, where it is a difference quotient over a large step.
+    /// - \[barton2010\], Sect. 7.2.3, which uses a difference quotient over a large step.
     pub fn jacobian(&self, joints_rad: [f64; 3]) -> Result<[[f64; 3]; 3], KinematicsError> {
         let point = Vector3::from(self.forward(joints_rad)?);
         let knees = self.knees_m(joints_rad);
@@ -172,7 +175,7 @@ impl Delta {
         Ok(std::array::from_fn(|row| std::array::from_fn(|col| jacobian[(row, col)])))
     }
 
-    /// Returns whether the tool can be at a position and move from it in every direction.
+    /// Returns true if the tool can reach a position and move from it in every direction.
     ///
     /// # Real Time
     /// Hot.
@@ -180,8 +183,8 @@ impl Delta {
         self.inverse(pose_m).is_ok_and(|joints_rad| self.jacobian(joints_rad).is_ok())
     }
 
-    /// Returns how unevenly the joints move the tool: largest over smallest singular value of the
-    /// Jacobian. 1 is even; towards a singularity it grows without bound.
+    /// Returns the condition number of the Jacobian: largest over smallest singular value. 1 is
+    /// isotropic; it grows without bound towards a singularity.
     ///
     /// # Errors
     /// - as [`Delta::jacobian`]
@@ -202,7 +205,7 @@ impl Delta {
     }
 }
 
-/// The same angle between -pi and pi.
+/// Wraps an angle to (-pi, pi].
 fn wrapped(angle_rad: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     if angle_rad <= -PI {
@@ -240,7 +243,8 @@ mod tests {
 
     #[test]
     fn the_printed_jacobian_is_a_pose_of_this_mechanism() {
-        // The print gives -44.71, 22.36, 38.72 and 14.56 mm/rad for equal angles, from a coarse step.
+        // The source prints -44.71, 22.36, 38.72 and 14.56 mm/rad for equal angles, from a coarse
+        // step.
         let rows = Delta::default().jacobian([1.05; 3]).unwrap();
         assert!((rows[0][0] + 2.0 * rows[0][1]).abs() < 1e-12, "{rows:?}");
         assert!((rows[1][2] + rows[1][1]).abs() < 1e-12 && rows[1][0].abs() < 1e-12);
@@ -276,7 +280,7 @@ mod tests {
 
     #[test]
     fn a_crank_along_its_rod_is_singular() {
-        // Knees fold until the crank of each leg points at the tool on the axis.
+        // Knees fold in until the crank of each leg points at the tool on the axis.
         let delta = Delta::new(0.1, 0.06, 0.2).unwrap();
         // Base, crank and rod in one line: crank at the angle whose cosine is -base / (crank + rod).
         let angle = (-0.1_f64 / 0.26).acos();

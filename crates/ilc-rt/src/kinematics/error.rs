@@ -1,46 +1,46 @@
-//! What a mechanism cannot do.
+//! Errors of kinematics.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use thiserror::Error;
 
-/// Why a mechanism, a pose or joint angles were refused.
+/// A refused mechanism, pose or set of joint angles.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum KinematicsError {
-    /// A length that no mechanism has.
+    /// A length outside its range.
     #[error("{what} = {value_m} m; {allowed}")]
     Length {
-        /// Which length.
+        /// Name of the length.
         what: &'static str,
         /// The value given.
         value_m: f64,
         /// The rule, as a sentence.
         allowed: &'static str,
     },
-    /// A coordinate that is not a number.
+    /// A coordinate that is infinite or NaN.
     #[error("{what}[{index}] = {value}; only finite values are allowed")]
     NotFinite {
-        /// Which quantity.
+        /// Name of the quantity.
         what: &'static str,
-        /// Which coordinate of it.
+        /// Index of the coordinate.
         index: usize,
         /// The value given.
         value: f64,
     },
-    /// No joint angles reach the pose.
+    /// A pose out of reach.
     #[error(
         "pose ({:.6}, {:.6}, {:.6}) m is out of reach of leg {leg}: {reason}",
         pose_m[0], pose_m[1], pose_m[2]
     )]
     Unreachable {
-        /// The pose asked for.
+        /// The requested pose.
         pose_m: [f64; 3],
-        /// The leg that does not reach it, from 0.
+        /// The leg that cannot reach it, from 0.
         leg: usize,
-        /// What is in the way.
+        /// Reason.
         reason: &'static str,
     },
-    /// The rods do not meet.
+    /// Joint angles for which the rods do not meet.
     #[error(
         "joint angles ({:.6}, {:.6}, {:.6}) rad do not close the mechanism: {reason}",
         joints_rad[0], joints_rad[1], joints_rad[2]
@@ -48,10 +48,10 @@ pub enum KinematicsError {
     Open {
         /// The angles given.
         joints_rad: [f64; 3],
-        /// What is in the way.
+        /// Reason.
         reason: &'static str,
     },
-    /// The mechanism can move without its joints, or its joints without it.
+    /// A singular pose: the tool can move with locked joints, or a joint cannot move the tool.
     #[error(
         "joint angles ({:.6}, {:.6}, {:.6}) rad are singular: {reason}",
         joints_rad[0], joints_rad[1], joints_rad[2]
@@ -59,12 +59,12 @@ pub enum KinematicsError {
     Singular {
         /// The angles given.
         joints_rad: [f64; 3],
-        /// Which freedom is lost or gained.
+        /// The degree of freedom gained or lost.
         reason: &'static str,
     },
 }
 
-/// Refuses a coordinate that is infinite or not a number.
+/// Refuses infinite and NaN coordinates.
 pub(super) fn finite(what: &'static str, values: &[f64]) -> Result<(), KinematicsError> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),

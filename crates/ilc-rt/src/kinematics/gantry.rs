@@ -1,54 +1,55 @@
-//! Two or three axes at almost right angles.
+//! A gantry of two axes that are slightly out of square.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::error::{KinematicsError, finite};
 
-/// A gantry whose second axis is out of square.
+/// A gantry with an orthogonality error between its axes.
 ///
-/// `x_tool = x + orthogonality_rad y`, `y_tool = y`, as calibrations of machine tools state it.
+/// `x_tool = x + orthogonality_rad y`, `y_tool = y`, the usual form of a machine tool's squareness
+/// calibration.
 ///
 /// # Units
-/// - metres, and radians for the error of the right angle
+/// - metres; radians for the orthogonality error
 /// # Source
-/// - \[haas2016\], Sect. 4: the error that an encoder cannot see.
+/// - \[haas2016\], Sect. 4: an error that the encoders cannot see.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gantry {
     orthogonality_rad: f64,
 }
 
 impl Gantry {
-    /// Makes the mechanism.
+    /// Creates the mechanism.
     ///
     /// # Errors
-    /// - [`KinematicsError::NotFinite`] for an angle that is not a number.
+    /// - [`KinematicsError::NotFinite`] for a non-finite angle.
     pub fn new(orthogonality_rad: f64) -> Result<Self, KinematicsError> {
         finite("orthogonality_rad", &[orthogonality_rad])?;
         Ok(Self { orthogonality_rad })
     }
 
-    /// Returns the error of the right angle.
+    /// Returns the orthogonality error.
     pub fn orthogonality_rad(&self) -> f64 {
         self.orthogonality_rad
     }
 
-    /// Returns where the tool is for axis positions.
+    /// Returns the tool position for axis positions (forward kinematics).
     ///
     /// # Real Time
-    /// Hot; what is not finite stays so.
+    /// Hot; non-finite values pass through.
     pub fn forward(&self, axes_m: [f64; 2]) -> [f64; 2] {
         [axes_m[0] + self.orthogonality_rad * axes_m[1], axes_m[1]]
     }
 
-    /// Returns the axis positions that bring the tool to a place.
+    /// Returns the axis positions for a tool position (inverse kinematics).
     ///
     /// # Real Time
-    /// Hot; what is not finite stays so.
+    /// Hot; non-finite values pass through.
     pub fn inverse(&self, tool_m: [f64; 2]) -> [f64; 2] {
         [tool_m[0] - self.orthogonality_rad * tool_m[1], tool_m[1]]
     }
 
-    /// Returns how axis velocities become tool velocities, row by row: constant.
+    /// Returns the Jacobian from axis to tool velocities, row-major; it is constant.
     pub fn jacobian(&self) -> [[f64; 2]; 2] {
         [[1.0, self.orthogonality_rad], [0.0, 1.0]]
     }

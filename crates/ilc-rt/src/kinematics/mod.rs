@@ -1,7 +1,7 @@
-//! Between the drives and the tool: mechanisms, forward and inverse, and how small motions map.
+//! Kinematics between drives and tool: forward, inverse and Jacobian of each mechanism.
 //!
-//! Hot from end to end: plain numbers in, plain numbers and Copy errors out. `learning`, `servo` and
-//! the Python bindings may import it; it imports nothing of the crate.
+//! Hot throughout: plain numbers in, plain numbers and Copy errors out. `learning`, `servo` and the
+//! Python bindings may import it; it imports nothing of the crate.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 

@@ -1,13 +1,13 @@
-//! Where three spheres of one radius meet.
+//! Intersection of three spheres of equal radius.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use nalgebra::Vector3;
 
-/// Below this sine of the angle at a corner the centres count as one line.
+/// The centres count as collinear if the sine of the angle at a corner is smaller.
 const COLLINEAR: f64 = 1e-9;
 
-/// Why three spheres do not meet in one point above their centres.
+/// Reason for three spheres not meeting in one point above their centres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NoPoint {
     /// The centres lie on one line.
@@ -18,11 +18,11 @@ pub(super) enum NoPoint {
 
 /// Returns the upper of the two points at distance `radius` from three centres.
 ///
-/// It stands on the circumcentre of the triangle of centres, as high as the radius leaves:
+/// It lies above the circumcentre of the triangle of centres, at the height that the radius leaves:
 /// `p = c + n sqrt(radius^2 - |c - c_0|^2)` with
-/// `c - c_0 = (|u|^2 (v x n) + |v|^2 (n x u)) / (2 |n|^2)`, `n = u x v`. No difference of large numbers
-/// appears, so the result is as exact as the triangle is well shaped. "Upper" is the side from which
-/// the centres run counter-clockwise.
+/// `c - c_0 = (|u|^2 (v x n) + |v|^2 (n x u)) / (2 |n|^2)`, `n = u x v`. There is no cancellation of
+/// large numbers, so the result is as accurate as the triangle is well shaped. "Upper" is the side
+/// from which the centres run counter-clockwise.
 pub(super) fn upper_meeting_point(
     centres: &[Vector3<f64>; 3],
     radius: f64,
@@ -52,7 +52,7 @@ mod tests {
         let centres =
             [Vector3::new(0.0, 0.0, 1.0), Vector3::new(6.0, 0.0, 1.0), Vector3::new(0.0, 8.0, 1.0)];
         let top = upper_meeting_point(&centres, 13.0).unwrap();
-        // The circumcentre of a right triangle halves its longest side: (3, 4), radius 5, height 12.
+        // The circumcentre of a right triangle bisects its hypotenuse: (3, 4), radius 5, height 12.
         assert!((top - Vector3::new(3.0, 4.0, 13.0)).norm() < 1e-14);
         assert_eq!(upper_meeting_point(&centres, 4.9), Err(NoPoint::Apart));
     }

@@ -6,13 +6,13 @@ use crate::learning::law::constrained::BoundsError;
 use crate::model::ModelError;
 use crate::signal::SignalError;
 
-/// Values of a signal, samples times channels: as many as a trajectory may have.
+/// Largest number of values of a signal, samples times channels: that of a trajectory.
 pub(crate) const MAX_VALUES: usize = 10_000_000;
 
 /// A refused law or signal.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum LearningError {
-    /// A signal has the wrong number of values.
+    /// A signal of the wrong length.
     #[error("{what} holds {found} values; {n_samples} samples of {n_channels} channels are needed")]
     Length {
         /// Name of the signal: `input`, `error` or `next`.
@@ -24,7 +24,7 @@ pub enum LearningError {
         /// Channels of this signal.
         n_channels: usize,
     },
-    /// A signal holds a value that is infinite or not a number.
+    /// A signal with a value that is infinite or NaN.
     #[error(
         "{what} is {value} at sample {sample}, channel {channel}; only finite values are allowed"
     )]
@@ -38,12 +38,12 @@ pub enum LearningError {
         /// The offending value.
         value: f64,
     },
-    /// A disturbance with the wrong number of values, or none where one is needed.
+    /// A disturbance of the wrong length, or a missing one.
     #[error("the disturbance of a run holds {found} numbers; {expected} needed")]
     Disturbance {
-        /// Numbers given; 0 if it was never announced.
+        /// Values given; 0 if none was set.
         found: usize,
-        /// Numbers that describe a disturbance.
+        /// Values expected.
         expected: usize,
     },
     /// A law from outside this crate refused, or returned no valid input.
@@ -64,12 +64,12 @@ pub enum LearningError {
         /// The rule, as a sentence.
         allowed: &'static str,
     },
-    /// A weight that is no weight, or does not fit.
+    /// An invalid weight, or one of the wrong shape.
     #[error("{what} at sample {sample}: {reason}")]
     Weight {
         /// Name of the weight.
         what: &'static str,
-        /// The first sample at which it is wrong.
+        /// The first sample concerned.
         sample: usize,
         /// Reason, and what is allowed.
         reason: String,
@@ -80,7 +80,7 @@ pub enum LearningError {
         /// Name of the count.
         what: &'static str,
     },
-    /// The weights leave part of the input undetermined.
+    /// Weights that leave part of the input undetermined (singular problem).
     #[error(
         "with {weights} the model does not determine the input at sample \
          {sample}; give r, s or rate a value above 0"
@@ -88,10 +88,10 @@ pub enum LearningError {
     Undetermined {
         /// The weights of input, change and rate, as text.
         weights: String,
-        /// The last sample at which this happens.
+        /// The last sample concerned.
         sample: usize,
     },
-    /// The update itself is an unstable filter.
+    /// Weights for which the update is an unstable filter.
     #[error(
         "with {weights} the input would grow without bound along the run: \
          the model has a zero outside the unit circle; give r or s a value above 0"
@@ -100,7 +100,7 @@ pub enum LearningError {
         /// The weights of input, change and rate, as text.
         weights: String,
     },
-    /// A gain at which learning diverges.
+    /// A gain for which learning diverges.
     #[error(
         "gain = {gain}; it must be less than 2 / |P|^2 = {limit} for this model, or the error grows \
          from run to run unless a Q filter takes that part away"
@@ -108,10 +108,10 @@ pub enum LearningError {
     GainBound {
         /// The gain given.
         gain: f64,
-        /// The gain from which on the error grows.
+        /// The gain above which the error grows.
         limit: f64,
     },
-    /// A model with another number of inputs than outputs.
+    /// A model with different numbers of inputs and outputs.
     #[error(
         "the model has {n_inputs} inputs and {n_outputs} outputs; only one with as many inputs as \
          outputs can be inverted"
@@ -122,13 +122,13 @@ pub enum LearningError {
         /// Outputs of the model.
         n_outputs: usize,
     },
-    /// A model that cannot be inverted.
+    /// A model without inverse.
     #[error("the model has no inverse: {reason}")]
     NoInverse {
         /// Reason.
         reason: &'static str,
     },
-    /// A model whose inverse is unstable.
+    /// A model with an unstable inverse (non-minimum phase).
     #[error(
         "the model has a zero at {re:.6} {im:+.6}i, {radius:.6} from the origin: its inverse is stable only \
          if all lie inside the unit circle; use norm-optimal learning with r above 0"
@@ -141,10 +141,10 @@ pub enum LearningError {
         /// Its distance from the origin.
         radius: f64,
     },
-    /// The bounds contradict each other.
+    /// Contradictory bounds.
     #[error(transparent)]
     Bounds(#[from] BoundsError),
-    /// The analysis of the law says that it will not converge.
+    /// A law that the analysis predicts to diverge.
     #[error(
         "this law will not converge: {why}; change the law, or allow it with allow_divergent = true"
     )]
@@ -152,7 +152,7 @@ pub enum LearningError {
         /// The figures, as a sentence.
         why: String,
     },
-    /// A law that cannot be analysed because it is not linear.
+    /// A nonlinear law, which cannot be analysed.
     #[error(
         "the law is not linear: two updates differ from their sum's by {difference:.3e} of it; \
          only linear laws can be analysed"
@@ -161,7 +161,7 @@ pub enum LearningError {
         /// Difference relative to the update.
         difference: f64,
     },
-    /// A run too long for any memory.
+    /// A number above its limit, e.g. a run too long for memory.
     #[error("{what} = {value}; at most {allowed} are allowed here")]
     TooMany {
         /// Name of the count.
@@ -171,7 +171,7 @@ pub enum LearningError {
         /// Largest count allowed.
         allowed: usize,
     },
-    /// An eigenvalue or a fixed point could not be computed.
+    /// An eigenvalue or fixed point that could not be computed.
     #[error("{what} could not be computed: {reason}")]
     Numerics {
         /// Name of the figure.
@@ -179,10 +179,10 @@ pub enum LearningError {
         /// Reason.
         reason: &'static str,
     },
-    /// The model was refused.
+    /// A refused model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The filter was refused.
+    /// A refused filter.
     #[error(transparent)]
     Signal(#[from] SignalError),
 }
@@ -207,10 +207,10 @@ pub(crate) fn check(
     })
 }
 
-/// Returns whether every value is finite.
+/// Returns true if every value is finite.
 pub(crate) fn is_finite(signal: &[f64]) -> bool {
-    // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
-    // In several sums at a time, because each would wait for its last addition.
+    // One pass without branches: a sum of `x * 0` is 0 unless an `x` is infinite or NaN. Several
+    // partial sums, because each addition would wait for the previous one.
     let chunks = signal.chunks_exact(16);
     let rest = chunks.remainder();
     let mut poison = [0.0; 16];
@@ -261,7 +261,7 @@ pub(crate) fn check_length(
     Err(LearningError::Length { what, found: signal.len(), n_samples, n_channels })
 }
 
-/// Refuses counts that are zero, or runs too long for any memory: the first count is the samples, the
+/// Refuses zero counts, and runs too long for memory: the first count is the number of samples, the
 /// others are channels.
 pub(crate) fn check_counts(counts: &[(&'static str, usize)]) -> Result<(), LearningError> {
     if let Some((what, _)) = counts.iter().find(|(_, count)| *count == 0) {

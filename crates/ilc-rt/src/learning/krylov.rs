@@ -1,25 +1,24 @@
-//! Largest eigenvalues and fixed points of maps that are only known by what they do to a signal.
+//! Matrix-free eigenvalues and fixed points (Krylov methods).
 //!
-//! Lanczos for symmetric maps, Arnoldi for the others, GMRES for fixed points; nothing of the square
-//! of the run's length is ever stored. [`analysis`](super::analysis) and the norm of
-//! the lifted operator are found with it.
+//! Lanczos for symmetric maps, Arnoldi for others, GMRES for fixed points; no `N x N` matrix of the
+//! run's length is stored. [`analysis`](super::analysis) and the norm of the lifted system use it.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::learning::LearningError;
 
-/// A figure with how far off it may be.
+/// A value with an error estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// The figure.
+    /// The value.
     pub value: f64,
-    /// Its error, at most about this.
+    /// Estimate of its largest error.
     pub error: f64,
 }
 
 impl Estimate {
-    /// A figure that is exact up to rounding.
+    /// Returns a value that is exact up to rounding.
     pub(in crate::learning) fn exact(value: f64) -> Self {
         Self { value, error: value.abs() * 1e-12 }
     }
@@ -29,8 +28,8 @@ type Map<'a> = dyn FnMut(&[f64], &mut [f64]) -> Result<(), LearningError> + 'a;
 
 /// Returns the largest eigenvalue of a symmetric, positive semidefinite map.
 ///
-/// Lanczos with full orthogonalisation, restarted with the best vectors. The error is the residual of
-/// the eigenvector, within which an eigenvalue lies.
+/// Thick-restarted Lanczos with full orthogonalisation. The error is the residual of the
+/// eigenvector, within which an eigenvalue lies.
 pub(in crate::learning) fn largest_symmetric(
     n: usize,
     map: &mut Map,
@@ -57,7 +56,7 @@ pub(in crate::learning) fn largest_symmetric(
             left = norm(&next);
             at += 1;
             if left <= 1e-14 * small[(0, 0)].abs().max(f64::MIN_POSITIVE) {
-                // The basis is closed: what is in it is exact.
+                // The subspace is invariant: its eigenvalues are exact.
                 break;
             }
             basis.push(unit(next));
@@ -89,9 +88,9 @@ pub(in crate::learning) fn largest_symmetric(
     }
 }
 
-/// Returns the largest absolute eigenvalue of a map, by Arnoldi after some plain steps.
+/// Returns the spectral radius of a map, by Arnoldi after some power iterations.
 ///
-/// The error is how much the estimate still moved over the last sixth of the basis.
+/// The error is the change of the estimate over the last sixth of the basis.
 pub(in crate::learning) fn spectral_radius(
     n: usize,
     map: &mut Map,
@@ -105,7 +104,7 @@ pub(in crate::learning) fn spectral_radius(
         map(&start, &mut next)?;
         let size = norm(&next);
         if size == 0.0 {
-            // A map whose powers vanish, as that of a law that inverts at once.
+            // A nilpotent map, as that of a law that inverts in one step.
             return Ok(Estimate { value: 0.0, error: 0.0 });
         }
         for (value, from) in start.iter_mut().zip(&next) {
@@ -196,7 +195,7 @@ pub(in crate::learning) fn fixed_point(
     Ok((x, left))
 }
 
-/// Returns the largest absolute eigenvalue of a small matrix.
+/// Returns the spectral radius of a small matrix.
 pub(in crate::learning) fn radius(matrix: &DMatrix<f64>) -> Result<f64, LearningError> {
     let (rows, cols) = matrix.shape();
     let values = Mat::from_fn(rows, cols, |i, j| matrix[(i, j)]).eigenvalues().map_err(|_| {
@@ -208,7 +207,7 @@ pub(in crate::learning) fn radius(matrix: &DMatrix<f64>) -> Result<f64, Learning
     Ok(values.iter().map(|value| value.re.hypot(value.im)).fold(0.0, f64::max))
 }
 
-/// Removes the basis from `next`, twice for the rounding of the first time; returns its parts.
+/// Orthogonalises `next` against the basis, twice because of rounding; returns the coefficients.
 fn orthogonalise(basis: &[Vec<f64>], next: &mut [f64]) -> Vec<f64> {
     let mut parts = vec![0.0; basis.len()];
     for _ in 0..2 {
@@ -248,7 +247,7 @@ pub(in crate::learning) fn norm(x: &[f64]) -> f64 {
     x.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
-/// Returns numbers without pattern between -1 and 1, the same each time.
+/// Returns pseudo-random numbers between -1 and 1, reproducible.
 pub(in crate::learning) fn noise(count: usize, seed: u64) -> Vec<f64> {
     let mut word = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     (0..count)

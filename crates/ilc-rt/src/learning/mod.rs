@@ -1,10 +1,10 @@
 //! Learning laws: from one run's error to the next run's input.
 //!
-//! This folder holds the [`Law`] trait, one law a file under [`law`], the linear-time solver
-//! ([`sweep`]) that the optimal ones share, and what goes round any law: when to stop ([`gate`]) and
-//! how many runs to average ([`ladder`]); [`analysis`] says before the first run whether a law will
-//! converge, and [`tune`] proposes weights. It runs between iterations, never in the tick; `config`,
-//! `supervisor` and the Python bindings may import it.
+//! This folder holds the [`Law`] trait, one law per file under [`law`], the linear-time solver
+//! ([`sweep`]) shared by the norm-optimal laws, and wrappers of any law: when to stop ([`gate`]) and
+//! how many runs to average ([`ladder`]). [`analysis`] predicts convergence before the first run, and
+//! [`tune`] proposes weights. It runs between iterations, never in the tick; `config`, `design` and
+//! the Python bindings may import it.
 //!
 //! Family: `error`, `krylov`, `law`, `operator`, `structure` and `weights` share the error of the folder,
 //! which carries that of the bounds, and a law answers with the structure that the analysis asks for.
@@ -26,7 +26,7 @@ pub use error::LearningError;
 pub use repeatability::{Repeatability, repeatability};
 pub use structure::{LowPass, Structure, Surrogate};
 
-/// A rule that turns the error of one run into the input of the next.
+/// A learning law: computes the input of the next run from the error of the last.
 ///
 /// # Shapes
 /// - all signals time first, sample `k` of channel `i` at `k * n_channels + i`: `input` and `next`
@@ -38,9 +38,10 @@ pub trait Law: Send {
     /// Computes the input of the next run.
     ///
     /// # Real Time
-    /// Cold path, but allocates nothing: it may run while the axes return to the start.
+    /// Cold path, but does not allocate: it may run while the axes return to the start.
     /// # Errors
-    /// - [`LearningError::Length`] or [`LearningError::NotFinite`]; `next` is then not to be used.
+    /// - [`LearningError::Length`] or [`LearningError::NotFinite`]; the content of `next` is then
+    ///   undefined.
     fn update(
         &mut self,
         input: &[f64],
@@ -48,20 +49,18 @@ pub trait Law: Send {
         next: &mut [f64],
     ) -> Result<(), LearningError>;
 
-    /// Tells the law what is known of the coming run before [`Law::update`] computes its input: one
-    /// number for each disturbance that is measured, as a temperature. Most laws have no use for it.
+    /// Passes the measured disturbance of the coming run, e.g. a temperature, before
+    /// [`Law::update`] computes its input: one number per disturbance. Most laws ignore it.
     fn set_disturbance(&mut self, disturbance: &[f64]) {
         let _ = disturbance;
     }
 
-    /// Returns how many numbers describe the disturbance of a run, for a law that must be told;
-    /// `None` for one that has no use for it.
+    /// Returns the number of disturbances that the law needs; `None` for a law that ignores them.
     fn n_disturbances(&self) -> Option<usize> {
         None
     }
 
-    /// Learns from a run that was made earlier, under a disturbance like those announced; returns
-    /// whether the law has use for it.
+    /// Learns from an earlier run under a disturbance like those set; returns true if the law uses it.
     ///
     /// # Errors
     /// - as [`Law::update`], or [`LearningError::Disturbance`].
@@ -75,10 +74,11 @@ pub trait Law: Send {
         Ok(false)
     }
 
-    /// Applies the transpose of the update's linear part: `to_input = L_u' dual`,
+    /// Applies the adjoint (transpose) of the update's linear part: `to_input = L_u' dual`,
     /// `to_error = L_e' dual`, where the update is `next = L_u input + L_e error`.
     ///
-    /// Returns whether the law can; one that cannot is analysed by its columns, in short runs only.
+    /// Returns true if the law implements it; otherwise it is analysed by columns, in short runs
+    /// only.
     ///
     /// # Errors
     /// - as [`Law::update`].
@@ -92,17 +92,17 @@ pub trait Law: Send {
         Ok(false)
     }
 
-    /// Returns what is known of the law beyond its update; [`analysis`] uses it where it can.
+    /// Returns the declared structure of the law; [`analysis`] uses it where it can.
     fn structure(&self) -> Structure<'_> {
         Structure::Unknown
     }
 
-    /// Returns the law that [`analysis`] looks at where this one is not linear itself.
+    /// Returns the linear law that [`analysis`] uses in place of a nonlinear one.
     fn linear_surrogate(&mut self) -> Surrogate<'_> {
         Surrogate::Itself
     }
 
-    /// Returns the law's low-pass for a sample time, if it has one that can be told from the rest.
+    /// Returns the law's low-pass (Q-filter) for a sample time, if it is separable from the law.
     fn low_pass(&self, dt_s: f64) -> Option<LowPass> {
         let _ = dt_s;
         None
@@ -118,17 +118,17 @@ pub trait Law: Send {
         false
     }
 
-    /// Returns what a person should know of the last update, as a sentence; most have nothing to say.
+    /// Returns a status message about the last update; most laws have none.
     fn status(&self) -> Option<String> {
         None
     }
 
-    /// Returns whether the law goes on learning after the last update.
+    /// Returns whether the law keeps learning after the last update.
     fn standing(&self) -> Standing {
         Standing::Learns
     }
 
-    /// Forgets everything that earlier runs taught the law itself.
+    /// Resets the law's memory of earlier runs.
     fn reset(&mut self);
 
     /// Returns the law and its parameters as one line of JSON, for the record of the run.
@@ -138,14 +138,14 @@ pub trait Law: Send {
 /// Outcome of the last update of a law that may also rest.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
-    /// It learned.
+    /// Learning.
     #[default]
     Learns,
-    /// It keeps the input, as the error is good enough.
+    /// Paused, with the input kept: the error is good enough.
     Holds,
-    /// The error had grown: it restored the best input, and rests.
+    /// Rolled back: the error had grown, and the best input was restored; paused.
     GoesBack,
-    /// It rests with the best input.
+    /// Paused, with the best input.
     Rests,
 }
 

@@ -1,4 +1,4 @@
-//! The lifted operator of a model and its transpose, applied in linear time and never formed.
+//! The lifted system of a model and its adjoint, applied in linear time and matrix-free.
 
 use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 
@@ -6,9 +6,9 @@ use super::LearningError;
 use super::krylov::{Estimate, largest_symmetric};
 use crate::model::StateSpace;
 
-/// Inputs up to which the norm is found to [`TOLERANCE`], whatever it takes.
+/// Largest number of inputs for which the norm is always computed to [`TOLERANCE`].
 const SHORT: usize = 2000;
-/// Residual, relative to the square of the norm, at which it is found.
+/// Target residual, relative to the square of the norm.
 const TOLERANCE: f64 = 1e-12;
 
 /// `y = P u` and `v = P' e` for runs of a fixed number of samples.
@@ -16,7 +16,7 @@ const TOLERANCE: f64 = 1e-12;
 /// `P` is block lower-triangular Toeplitz, its blocks the Markov parameters of the model.
 ///
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Operator::forward`] or [`Operator::transposed`].
+/// Cold path. Allocates at creation, never in [`Operator::forward`] or [`Operator::transposed`].
 #[derive(Debug, Clone)]
 pub(crate) struct Operator {
     a: DMatrix<f64>,
@@ -71,18 +71,18 @@ impl Operator {
         }
     }
 
-    /// Returns the largest singular value for runs of `n_samples`: approached from below, with a bound
-    /// on what is missing. Infinite where the model answers without bound.
+    /// Returns the largest singular value for runs of `n_samples`, estimated from below with an
+    /// error bound. Infinite if the model's response is unbounded.
     ///
-    /// The value plus its error lies on the safe side wherever a gain must stay below it. In short runs
-    /// the value is exact up to rounding; in long ones, in which many singular values lie close to the
-    /// largest, the error is about one part in 1000.
+    /// Value plus error is the safe side where a gain must stay below it. In short runs the value
+    /// is exact up to rounding; in long ones, where many singular values lie close to the largest,
+    /// the error is about one part in 1000.
     pub(crate) fn norm(&mut self, n_samples: usize) -> Estimate {
         let infinite = Estimate { value: f64::INFINITY, error: 0.0 };
         let (m, p) = (self.b.ncols(), self.c.nrows());
         let size = n_samples * m;
         let mut output = vec![0.0; n_samples * p];
-        // Fewer vectors in long runs: they are what takes the memory and the time.
+        // A smaller basis in long runs: it dominates memory and time.
         let n_basis = if size <= SHORT { 150 } else { (6_000_000 / size).clamp(20, 100) };
         let n_products = if size <= SHORT { 3000 } else { n_basis.max(100) };
         let square = largest_symmetric(
@@ -101,7 +101,7 @@ impl Operator {
         );
         let Ok(square) = square else { return infinite };
         let value = square.value.max(0.0).sqrt();
-        // sqrt(value^2 + error) - value, without cancelling.
+        // sqrt(value^2 + error) - value, without cancellation.
         let above = (square.value.max(0.0) + square.error).sqrt();
         let error = square.error / (above + value).max(f64::MIN_POSITIVE);
         if above.is_finite() { Estimate { value, error } } else { infinite }
@@ -152,7 +152,7 @@ mod tests {
         }
     }
 
-    /// Two hundred operators of every kind, each against its dense singular values.
+    /// Two hundred varied operators, each against its dense singular values.
     #[test]
     fn the_norm_and_its_bound_hold_for_many_operators() {
         let lag = |pole: f64, gain: f64| {
@@ -164,11 +164,11 @@ mod tests {
             let sizes = [1 + seed % 3, 1 + seed / 3 % 3, 1 + seed / 9 % 3];
             let drawn = model(&draws, sizes.map(|size| usize::try_from(size).unwrap()));
             let (model, n_samples) = match seed % 4 {
-                // Equal axes: every singular value twice.
+                // Equal axes: every singular value is double.
                 0 => (lag(0.9, 0.1).append(&lag(0.9, 0.1)).unwrap(), 150),
-                // A pure gain with delay: all singular values are the same.
+                // A pure gain with dead time: all singular values are equal.
                 1 => (lag(0.0, 3.0), 200),
-                // A long plateau: a crowd of singular values just below the largest.
+                // A long plateau: a cluster of singular values just below the largest.
                 2 => (lag(0.05 + 0.9 * draws[0].abs(), 1.0), 260),
                 _ => (drawn, 1 + usize::try_from(seed).unwrap() % 90),
             };

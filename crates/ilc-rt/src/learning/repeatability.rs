@@ -6,25 +6,25 @@ use super::error::{check, check_counts};
 /// Common part of several runs with the same input.
 ///
 /// # Units
-/// - those of the error; `ratio` and `learnable` are without unit
+/// - those of the error; `ratio` and `learnable` are dimensionless
 #[derive(Debug, Clone, PartialEq)]
 pub struct Repeatability {
     /// Mean error of the runs, sample by sample, time first.
     pub mean: Vec<f64>,
     /// Standard deviation from run to run, sample by sample.
     pub spread: Vec<f64>,
-    /// Root mean square of the mean error: what learning can take away.
+    /// RMS of the mean error: the part that learning can remove.
     pub mean_rms: f64,
-    /// Root mean square of the standard deviation: what it cannot.
+    /// RMS of the standard deviation: the part that it cannot.
     pub spread_rms: f64,
     /// `spread_rms / mean_rms`; infinite if the mean is zero and the spread is not, 0 if both are.
     pub ratio: f64,
-    /// Share of the mean square of one run's error that repeats, from 0 to 1, the noise left in the
-    /// mean of the runs taken away.
+    /// Repeatable share of the mean square error of one run, from 0 to 1, corrected for the noise
+    /// left in the mean of the runs.
     pub learnable: f64,
-    /// Smallest root mean square of any run.
+    /// Smallest RMS of any run.
     pub least_rms: f64,
-    /// Largest root mean square of any run.
+    /// Largest RMS of any run.
     pub largest_rms: f64,
 }
 
@@ -33,18 +33,18 @@ pub struct Repeatability {
 /// `m = mean_j e_j`, `s^2[k] = sum_j (e_j[k] - m[k])^2 / (n - 1)`,
 /// `learnable = (ms(m) - ms(s)/n) / (ms(m) - ms(s)/n + ms(s))`
 ///
-/// A ratio well below 1 says that learning applies; the error cannot fall below `spread_rms` in any
-/// one run, whatever the law.
+/// A ratio well below 1 means that learning is worthwhile; whatever the law, the error of a run
+/// does not fall below `spread_rms`.
 ///
 /// # Shapes
 /// - `errors`: run after run, each time first, `n_samples` x `n_channels`
 /// # Errors
 /// - [`LearningError::Parameter`] for fewer than two runs.
-/// - [`LearningError::Empty`] for no samples or channels.
+/// - [`LearningError::Empty`] for 0 samples or channels.
 /// - [`LearningError::Length`] or [`LearningError::NotFinite`].
 /// # Source
-/// - \[filter-based\], Section 6.1: verification that the system repeats, there by the
-///   range of the root mean square over ten runs.
+/// - \[filter-based\], Section 6.1: check of the system's repeatability, there by the range of the
+///   RMS over ten runs.
 pub fn repeatability(
     errors: &[f64],
     n_runs: usize,

@@ -8,16 +8,16 @@ use crate::model::StateSpace;
 /// Structure of a law beyond its update.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Structure<'a> {
-    /// Nothing: analysis tries whether it is linear.
+    /// Unknown: the analysis tests for linearity.
     Unknown,
-    /// Proportional-derivative learning with a filter or without.
+    /// PD-type ILC with or without filter.
     Pd(PdGains),
-    /// Each update minimises a quadratic cost with this model. Whatever the weights, learning then
-    /// converges if the model is right.
+    /// Norm-optimal: each update minimises a quadratic cost with this model. For any weights,
+    /// learning then converges if the model is exact.
     Optimal {
         /// Nominal model of the axes.
         model: &'a StateSpace,
-        /// The weights of the cost; `None` if they change along the run or tie channels together.
+        /// Weights of the cost; `None` if they vary along the run or couple channels.
         weights: Option<Weights>,
     },
 }
@@ -27,17 +27,17 @@ pub enum Structure<'a> {
 pub enum Surrogate<'a> {
     /// The law itself.
     Itself,
-    /// The law inside one that only says when to learn, or from which runs.
+    /// The inner law of a wrapper that decides when to learn, or from which runs.
     Inside(&'a mut (dyn Law + 'a)),
-    /// The law as it is as long as none of its bounds is reached.
+    /// The law without its bounds.
     Unbounded(Box<dyn Law>),
 }
 
-/// The low-pass of a law, and the law without it.
+/// The low-pass (Q-filter) of a law, and the law without it.
 #[expect(missing_debug_implementations, reason = "laws need not have one")]
 pub struct LowPass {
-    /// Highest frequency that one pass of the filter lets through with `1 / sqrt 2` or more.
+    /// Highest frequency with a gain of `1 / sqrt 2` or more in one pass of the filter.
     pub cutoff_hz: f64,
-    /// The same law without filter and without bounds.
+    /// The same law without filter and bounds.
     pub unfiltered: Box<dyn Law>,
 }

@@ -1,7 +1,7 @@
-//! Weights for norm-optimal learning, proposed from what is known of a machine.
+//! Tuning: proposes the weights of norm-optimal ILC.
 //!
-//! The guidelines s1 to s4 of \[barton2010\], Sec. 3.3.4, as a procedure whose every step says why; the
-//! command line and the Python bindings import it.
+//! The guidelines s1 to s4 of \[barton2010\], Sec. 3.3.4, as a procedure that states the reason for
+//! every step; the command line and the Python bindings import it.
 
 use super::analysis::{Analysis, Question, Spectrum, Uncertainty, analyze};
 use super::error::check;
@@ -9,25 +9,25 @@ use super::law::norm_optimal::{NormOptimal, Weights};
 use super::{Law, LearningError};
 use crate::model::StateSpace;
 
-/// Fluctuation above that of the measurement itself with which the choice of `r` is content.
+/// Fluctuation that the choice of `r` accepts, relative to the measurement noise.
 const FLUCTUATION: f64 = 1.05;
 /// Start of `s` relative to the squared gain of the model.
 const INPUT_START: f64 = 0.01;
 /// Safety factor of `s`.
 const SAFETY: f64 = 2.0;
-/// Most runs that are computed for a proposal: what is not learned by then never will be.
+/// Largest number of runs computed for a proposal.
 const RUNS_MAX: usize = 10_000;
 
-/// What is known of the machine.
+/// Known properties of the machine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Knowledge {
-    /// How far the axes may be from the model.
+    /// Uncertainty of the model.
     pub uncertainty: Option<Uncertainty>,
-    /// Standard deviation of white noise in the measurement.
+    /// Standard deviation of white measurement noise.
     pub noise_std: Option<f64>,
     /// Error of a run with input zero, `n_samples` x `n_outputs`.
     pub reference: Option<Vec<f64>>,
-    /// Runs in which learning should be done.
+    /// Number of runs within which learning should be finished.
     pub n_runs: usize,
 }
 
@@ -42,15 +42,15 @@ impl Default for Knowledge {
 pub struct TuningStep {
     /// Name of the guideline: `s1` to `s4`, and `smoothing`.
     pub name: &'static str,
-    /// What was chosen: `q`, `s`, `r`, `smoothing_hz` or `check`.
+    /// Name of the quantity: `q`, `s`, `r`, `smoothing_hz` or `check`.
     pub what: &'static str,
     /// The value chosen.
     pub value: f64,
-    /// Why, with the figures.
+    /// The reason, with figures.
     pub why: String,
 }
 
-/// Weights with the reasons for them.
+/// Proposed weights with reasons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tuning {
     /// Weight of the error.
@@ -59,38 +59,38 @@ pub struct Tuning {
     pub s: f64,
     /// Weight of the input's change.
     pub r: f64,
-    /// Bandwidth beyond which the learned input holds little but noise; `None` if there is no such.
+    /// Bandwidth above which the learned input is mostly noise; `None` if there is none.
     pub smoothing_hz: Option<f64>,
     /// The steps in order.
     pub steps: Vec<TuningStep>,
-    /// What the law with these weights will do.
+    /// Analysis of the law with these weights.
     pub analysis: Analysis,
 }
 
 impl Tuning {
-    /// The weights as the law takes them.
+    /// Returns the weights as the law takes them.
     pub fn weights(&self) -> Weights {
         Weights { q: self.q, s: self.s, r: self.r, rate: 0.0 }
     }
 }
 
-/// Proposes the weights of norm-optimal learning.
+/// Proposes the weights of norm-optimal ILC.
 ///
 /// - s1: `q = 1`, all errors alike.
-/// - s2: the smallest `s` with which every plant `P (I + W Delta)` converges without `r`,
-///   `q |P|^2 |W| < q |P|^2 + s` at all frequencies, times 2. Without an uncertainty
-///   `s = 0.01 |P|^2`, where the guideline starts.
-/// - s3: `r` grows from zero until the error does not get smaller: with a reference the one with the
-///   least expected error after `n_runs` runs, without one the first with which past noise adds less
-///   than 5 % to the noise of the measurement.
-/// - s4: the figures of the result; `s` is doubled while it is not robust.
+/// - s2: the smallest `s` for which every plant `P (I + W Delta)` converges without `r` (robust
+///   monotone convergence), `q |P|^2 |W| < q |P|^2 + s` at all frequencies, times 2. Without an
+///   uncertainty `s = 0.01 |P|^2`, the guideline's starting value.
+/// - s3: `r` grows from zero as long as that reduces the error: with a reference, to the smallest
+///   expected error after `n_runs` runs; without one, to the first value with which past noise adds
+///   less than 5 % to the measurement noise.
+/// - s4: the figures of the result; `s` is doubled until it is robust.
 ///
 /// # Shapes
 /// - `knowledge.reference`: `n_samples` x `n_outputs`, time first
 /// # Real Time
 /// Cold path.
 /// # Errors
-/// - as [`analyze`]; [`LearningError::Empty`] for no runs.
+/// - as [`analyze`]; [`LearningError::Empty`] for 0 runs.
 /// # Source
 /// - \[barton2010\], Sec. 3.3.4. There `S` is compared with `|P|`; here with `|P|^2`, its counterpart in
 ///   the cost, which is the same for an axis of gain 1.
@@ -260,7 +260,7 @@ fn change_weight(
     Ok((r, why))
 }
 
-/// RMS of the repeated part of the error after some runs without noise.
+/// RMS of the repeatable error after some runs without noise.
 fn repeated_rms(
     law: &mut NormOptimal,
     model: &StateSpace,
@@ -282,8 +282,8 @@ fn repeated_rms(
     Ok((error.iter().map(|e| e * e).sum::<f64>() / n_samples as f64).sqrt())
 }
 
-/// The frequency above which the law learns less than half of an error, or the model may be wrong by
-/// all of it.
+/// The frequency above which the law learns less than half of an error, or the model uncertainty
+/// exceeds 100 %.
 fn smoothing(
     model: &StateSpace,
     weights: Weights,
@@ -315,7 +315,7 @@ mod tests {
         discretize(&second_order(94.2, 0.7).unwrap(), 2e-3, Method::ZeroOrderHold).unwrap()
     }
 
-    /// 20 % at rest, 300 % at half the sample rate.
+    /// 20 % at frequency zero, 300 % at the Nyquist frequency.
     fn growing() -> Uncertainty {
         Uncertainty::Shaped((0..=100).map(|k| 0.2 + 2.8 * f64::from(k) / 100.0).collect())
     }
@@ -368,7 +368,7 @@ mod tests {
         let r = |noise_std, n_runs| tune(&axis(), 300, &knowledge(noise_std, n_runs)).unwrap().r;
         assert!(r(1e-3, 10) > r(1e-6, 10), "more noise, slower learning");
         assert!(r(1e-4, 40) >= r(1e-4, 4), "more runs, more time to learn in");
-        // The choice is the best: the expected error with ten times more or less is not smaller.
+        // The choice is optimal: with ten times more or less the expected error is not smaller.
         let found = tune(&axis(), 300, &knowledge(1e-4, 10)).unwrap();
         let expected = |r: f64| {
             let w = Weights { r, ..found.weights() };

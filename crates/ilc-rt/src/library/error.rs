@@ -1,8 +1,8 @@
-//! Why a library could not be used, in one line that says what is allowed.
+//! Reasons that a library cannot be used, in one line that says what is allowed.
 
 use rusqlite::ErrorCode;
 
-/// Why the library could not be used.
+/// Reason that the library cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
     /// SQLite refused.
@@ -10,10 +10,10 @@ pub enum LibraryError {
     Sqlite {
         /// File.
         path: String,
-        /// What SQLite said.
+        /// Error of SQLite.
         source: rusqlite::Error,
     },
-    /// Somebody else is writing, and went on for longer than was waited.
+    /// Another program is writing, and did so for longer than the time-out.
     #[error("library {path}: locked by another program that is writing to it")]
     Locked {
         /// File.
@@ -27,10 +27,10 @@ pub enum LibraryError {
     Open {
         /// File.
         path: String,
-        /// What SQLite said.
+        /// Error of SQLite.
         source: rusqlite::Error,
     },
-    /// The file is there and is none of this program's libraries.
+    /// The file is there and is not a library of this program.
     #[error(
         "library {path}: {found}; allowed: a library of this program, or a new file in a folder \
          that exists and can be written"
@@ -38,7 +38,7 @@ pub enum LibraryError {
     Foreign {
         /// File.
         path: String,
-        /// What it is instead.
+        /// Its state instead.
         found: String,
     },
     /// The file, or the folder of a library that is to grow, cannot be written.
@@ -46,7 +46,7 @@ pub enum LibraryError {
     ReadOnly {
         /// File.
         path: String,
-        /// What stands in the way.
+        /// Obstacle.
         found: &'static str,
     },
     /// There is no such file.
@@ -103,7 +103,7 @@ pub enum LibraryError {
     Disturbance {
         /// File.
         path: String,
-        /// What is wrong, and what is allowed.
+        /// Problem, and allowed values.
         what: String,
     },
     /// The stored arrays do not have the digest that was stored with them.
@@ -124,7 +124,7 @@ pub enum LibraryError {
         path: String,
         /// Runs deleted.
         n_deleted: usize,
-        /// What SQLite said.
+        /// Error of SQLite.
         source: rusqlite::Error,
     },
 }

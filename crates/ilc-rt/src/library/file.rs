@@ -1,6 +1,6 @@
 //! The file of a library: what it is before anything is written to it, and whether it is still there.
 //!
-//! A file that somebody else's program keeps its data in must never be changed, not even by switching
+//! A file that another program keeps its data in must never be changed, not even by switching
 //! its journal on. So it is looked at through a connection that cannot write, and only what has the mark
 //! and the table of this program is opened for more.
 
@@ -13,15 +13,17 @@ use std::time::Duration;
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 
 use super::error::{LibraryError, told};
+use super::row::{ARRAYS, COLUMNS};
 use super::schema;
+use crate::record::figure_fields;
 
-/// How long to wait for another process that is writing: a run that cannot be kept has to stop the axes.
+/// Time-out for another process that is writing: a run that cannot be kept has to stop the axes.
 pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// The name that stands for a library in memory.
 pub(super) const IN_MEMORY: &str = ":memory:";
 
-/// What a path leads to.
+/// Target of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found {
     /// Nothing, or a file without a byte.
@@ -82,7 +84,7 @@ pub(super) fn writer(path: &Path) -> Result<Connection, LibraryError> {
     Ok(connection)
 }
 
-/// Which file a path leads to: device and number; `None` if it leads nowhere.
+/// Identity of the file that a path leads to: device and number; `None` if it leads nowhere.
 pub(super) fn identity(path: &Path) -> Option<(u64, u64)> {
     std::fs::metadata(path).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
@@ -94,7 +96,7 @@ pub(super) fn beside(path: &Path, ending: &str) -> PathBuf {
     name.into()
 }
 
-/// What a path leads to, if that is a regular file. Only looked at, as opening a pipe would wait.
+/// Target of a path, if it is a regular file. Only looked at, as opening a pipe would wait.
 fn metadata(path: &Path) -> Result<Option<Metadata>, LibraryError> {
     let name = || path.display().to_string();
     let foreign = |found: &str| LibraryError::Foreign { path: name(), found: found.to_owned() };
@@ -112,7 +114,7 @@ fn metadata(path: &Path) -> Result<Option<Metadata>, LibraryError> {
 
 /// Connects for reading and looks at what is there. Where no writer has left a log, nothing beside the
 /// file is made or asked for, so that an archive that cannot be written is read as well; and what is
-/// somebody else's is not even asked for its log.
+/// that of another program is not even asked for its log.
 fn look(path: &Path) -> Result<(Connection, Found), LibraryError> {
     let at_rest = connect(path, true).and_then(|connection| tell(connection, path));
     let log = std::fs::metadata(beside(path, "-wal"));
@@ -169,7 +171,7 @@ pub(super) fn found(connection: &Connection, path: &Path) -> Result<Found, Libra
     if mark == 0 && version == 0 && n_objects == 0 {
         return Ok(Found::Empty);
     }
-    // Libraries of before had no mark; their table tells them from somebody else's database.
+    // Libraries of before had no mark; their table distinguishes them from other databases.
     let may_be_ours = mark == schema::MARK
         || mark == 0 && (n_objects == 0 || has_columns(connection).map_err(fail)?);
     if may_be_ours && version > schema::VERSION {
@@ -192,8 +194,13 @@ fn has_columns(connection: &Connection) -> rusqlite::Result<bool> {
     let mut statement = connection.prepare("SELECT name FROM pragma_table_info('iteration')")?;
     let names: Vec<String> =
         statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
-    let mut wanted = super::row::COLUMNS.split(',').chain(super::row::ARRAYS.split(','));
-    Ok(wanted.all(|column| names.iter().any(|name| name == column.trim())))
+    let figures = figure_fields().iter().filter(|field| field.is_required);
+    let mut wanted = COLUMNS
+        .iter()
+        .chain(&ARRAYS)
+        .map(|(name, _)| *name)
+        .chain(figures.map(|field| field.name.as_str()));
+    Ok(wanted.all(|column| names.iter().any(|name| name == column)))
 }
 
 /// A path that SQLite takes as it is: an absolute one is no address, whatever its letters.
@@ -201,7 +208,7 @@ fn plain(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// The address of a file that nobody changes while it is read.
+/// The address of a file that no program changes while it is read.
 fn immutable(path: &Path) -> String {
     let path = plain(path);
     let mut address = "file://".to_owned();
@@ -222,7 +229,7 @@ fn immutable(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::Library;
-    use super::super::store::tests::{meta, record};
+    use super::super::tests::{meta, record};
     use super::*;
 
     /// A folder of its own, gone when dropped.

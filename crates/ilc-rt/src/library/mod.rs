@@ -1,14 +1,17 @@
 //! The iteration library: every run of every campaign, in one SQLite file.
 //!
-//! The supervisor appends the moment a run ends; Python and `--resume` read. Writers and readers of
+//! The campaign appends the moment a run ends; Python and `--resume` read. Writers and readers of
 //! several processes may share a file (write-ahead log); a killed process loses nothing it appended.
 
 mod error;
+mod figures;
 mod file;
 mod recall;
 mod row;
 mod schema;
 mod store;
+#[cfg(test)]
+mod tests;
 mod trim;
 
 pub use error::LibraryError;

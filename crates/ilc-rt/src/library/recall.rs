@@ -7,7 +7,7 @@ use super::row::{Row, as_integer, numbers};
 use super::schema;
 use super::store::Library;
 
-/// Which runs belong to the same task; without a name, all that a library holds.
+/// Runs of the same task; without a name, all that a library holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Task {
     /// Name of the cell.
@@ -112,7 +112,7 @@ impl Library {
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::tests::{meta, record};
+    use super::super::tests::{meta, record};
     use super::*;
     use crate::record::IterationRecord;
 

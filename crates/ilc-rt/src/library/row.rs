@@ -1,6 +1,7 @@
 //! One row of the table, as it is written and read.
 
-use crate::record::{AxisKinds, Figures, IterationRecord, Meta, distances_m};
+use super::figures;
+use crate::record::{AxisKinds, IterationRecord, Meta, distances_m};
 
 /// One kept run with its provenance.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,7 +10,7 @@ pub struct Row {
     pub id: i64,
     /// When it was appended, UTC.
     pub created_utc: String,
-    /// Where it comes from.
+    /// Provenance.
     pub meta: Meta,
     /// SHA-256 of the arrays, as they were appended.
     pub digest: String,
@@ -19,13 +20,36 @@ pub struct Row {
     pub record: IterationRecord,
 }
 
-pub(super) const COLUMNS: &str = "id, created_utc, cell, campaign, fingerprint, iteration, program, law, \
-    law_parameters, measure, cycle_s, n_axes, n_samples, digest, tracking_inf_m, tracking_rms_m, \
-    contour_inf_m, contour_rms_m, encoder_tracking_inf_m, tool_tracking_inf_m, overruns, \
-    missing_samples, late_updates, update_ms, rolled_back, axis_names, input_units, \
-    disturbance";
+/// Columns of a run beside its arrays and its figures, with their types.
+pub(super) const COLUMNS: [(&str, &str); 17] = [
+    ("id", "INTEGER PRIMARY KEY"),
+    ("created_utc", "TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))"),
+    ("cell", "TEXT NOT NULL"),
+    ("campaign", "TEXT NOT NULL"),
+    ("fingerprint", "TEXT NOT NULL"),
+    ("iteration", "INTEGER NOT NULL"),
+    ("program", "TEXT NOT NULL"),
+    ("law", "TEXT NOT NULL"),
+    ("law_parameters", "TEXT NOT NULL"),
+    ("measure", "TEXT NOT NULL"),
+    ("cycle_s", "REAL NOT NULL"),
+    ("n_axes", "INTEGER NOT NULL"),
+    ("axis_names", "TEXT NOT NULL"),
+    ("input_units", "TEXT NOT NULL"),
+    ("n_samples", "INTEGER NOT NULL"),
+    ("disturbance", "TEXT"),
+    ("digest", "TEXT NOT NULL"),
+];
 
-pub(super) const ARRAYS: &str = "reference_m, input, encoder_m, tool_m, error_m, contour_m";
+/// Columns of the arrays of a run, with their types.
+pub(super) const ARRAYS: [(&str, &str); 6] = [
+    ("reference_m", "BLOB NOT NULL"),
+    ("input", "BLOB NOT NULL"),
+    ("encoder_m", "BLOB NOT NULL"),
+    ("tool_m", "BLOB"),
+    ("error_m", "BLOB NOT NULL"),
+    ("contour_m", "BLOB NOT NULL"),
+];
 
 pub(super) fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row> {
     let count = |name: &str| row.get::<_, i64>(name).map(|n| usize::try_from(n).unwrap_or(0));
@@ -66,37 +90,17 @@ pub(super) fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::
             error_m: array("error_m")?,
             contour_m: array("contour_m")?,
             disturbance: numbers(row.get::<_, Option<String>>("disturbance")?.as_deref()),
-            figures: Figures {
-                tracking_inf_m: row.get("tracking_inf_m")?,
-                tracking_rms_m: row.get("tracking_rms_m")?,
-                contour_inf_m: row.get("contour_inf_m")?,
-                contour_rms_m: row.get("contour_rms_m")?,
-                encoder_tracking_inf_m: row.get("encoder_tracking_inf_m")?,
-                tool_tracking_inf_m: row.get("tool_tracking_inf_m")?,
-                overruns: row.get("overruns")?,
-                missing_samples: row.get("missing_samples")?,
-                late_updates: row.get("late_updates")?,
-                update_ms: row.get("update_ms")?,
-                rolled_back: row.get("rolled_back")?,
-                axes_tracking_inf_m: numbers(
-                    row.get::<_, Option<String>>("axes_tracking_inf_m")?.as_deref(),
-                ),
-                axes_tracking_rms_m: numbers(
-                    row.get::<_, Option<String>>("axes_tracking_rms_m")?.as_deref(),
-                ),
-                learning_off: row.get::<_, Option<bool>>("learning_off")?.unwrap_or(false),
-                remark: row.get("remark")?,
-            },
+            figures: figures::read(row)?,
         },
     })
 }
 
-/// Whether a row was written before each axis had figures of its own.
+/// Returns whether a row was written before each axis had figures of its own.
 pub(super) fn is_old(row: &Row) -> bool {
     row.record.figures.axes_tracking_inf_m.is_empty() && row.meta.n_axes > 0
 }
 
-/// Works out the figures of a run that was kept before each axis had its own: from its arrays, which the
+/// Computes the figures of a run that was kept before each axis had its own: from its arrays, which the
 /// row must have.
 pub(super) fn refresh(row: &mut Row) {
     let kinds = AxisKinds::new(&row.meta.input_units, row.meta.n_axes);
@@ -122,7 +126,7 @@ pub(super) fn json_numbers(values: &[f64]) -> String {
     serde_json::Value::from(values.to_vec()).to_string()
 }
 
-/// Reads a disturbance; one that cannot be read is none.
+/// Reads a list of numbers; a text that is not one is an empty list.
 pub(super) fn numbers(text: Option<&str>) -> Vec<f64> {
     text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
 }

@@ -1,6 +1,12 @@
 //! The tables, how they come to be, and how older ones are brought up to date.
 
+use std::fmt::Write as _;
+
 use rusqlite::Connection;
+
+use super::figures;
+use super::row::{ARRAYS, COLUMNS};
+use crate::record::{Field, figure_fields};
 
 /// Mark of this program's files, in SQLite's `application_id`: "ILCL".
 pub(super) const MARK: i64 = 0x494C_434C;
@@ -15,54 +21,25 @@ pub(super) const VERSION: i64 = 3;
 /// every run, also for paths without a contour, no figures for single axes, and no word on the learning.
 pub(super) const OLDEST: i64 = 1;
 
-/// Arrays are little-endian float64, time first; lists of names, figures of axes and disturbances are JSON;
-/// times are UTC in ISO 8601.
-const CREATE: &str = "
-CREATE TABLE IF NOT EXISTS iteration (
-    id              INTEGER PRIMARY KEY,
-    created_utc     TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now')),
-    cell            TEXT NOT NULL,
-    campaign        TEXT NOT NULL,
-    fingerprint     TEXT NOT NULL,
-    iteration       INTEGER NOT NULL,
-    program         TEXT NOT NULL,
-    law             TEXT NOT NULL,
-    law_parameters  TEXT NOT NULL,
-    measure         TEXT NOT NULL,
-    cycle_s         REAL NOT NULL,
-    n_axes          INTEGER NOT NULL,
-    axis_names      TEXT NOT NULL,
-    input_units     TEXT NOT NULL,
-    n_samples       INTEGER NOT NULL,
-    reference_m     BLOB NOT NULL,
-    disturbance     TEXT,
-    input           BLOB NOT NULL,
-    encoder_m       BLOB NOT NULL,
-    tool_m          BLOB,
-    error_m         BLOB NOT NULL,
-    contour_m       BLOB NOT NULL,
-    digest          TEXT NOT NULL,
-    tracking_inf_m          REAL NOT NULL,
-    tracking_rms_m          REAL NOT NULL,
-    contour_inf_m           REAL,
-    contour_rms_m           REAL,
-    encoder_tracking_inf_m  REAL NOT NULL,
-    tool_tracking_inf_m     REAL,
-    overruns                INTEGER NOT NULL,
-    missing_samples         INTEGER NOT NULL,
-    late_updates            INTEGER NOT NULL,
-    update_ms               REAL NOT NULL,
-    rolled_back             INTEGER NOT NULL,
-    axes_tracking_inf_m     TEXT,
-    axes_tracking_rms_m     TEXT,
-    learning_off            INTEGER,
-    remark                  TEXT,
-    UNIQUE (campaign, iteration)
-);
+/// Indices, made where they are not there.
+const INDICES: &str = "
 CREATE INDEX IF NOT EXISTS iteration_by_fingerprint ON iteration (fingerprint, id);
 CREATE INDEX IF NOT EXISTS iteration_by_disturbance ON iteration (cell, disturbance)
     WHERE disturbance IS NOT NULL;
 ";
+
+/// The table of runs. Arrays are little-endian float64, time first; lists of names, figures of axes and
+/// disturbances are JSON; times are UTC in ISO 8601.
+fn table() -> String {
+    let figures =
+        figure_fields().iter().map(|field| (field.name.as_str(), figures::column_type(field)));
+    let columns = COLUMNS.into_iter().chain(ARRAYS).chain(figures);
+    let mut table = "CREATE TABLE IF NOT EXISTS iteration (\n".to_owned();
+    for (name, kind) in columns {
+        let _ = writeln!(table, "    {name:<24}{kind},");
+    }
+    table + "    UNIQUE (campaign, iteration)\n);"
+}
 
 /// Sets what must be said before the first page of a file is written: the pages of runs that are deleted
 /// can be given back to the system.
@@ -70,22 +47,16 @@ pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")
 }
 
-/// Columns that older versions do not have, with their types.
-const ADDED: [(&str, &str); 4] = [
-    ("axes_tracking_inf_m", "TEXT"),
-    ("axes_tracking_rms_m", "TEXT"),
-    ("learning_off", "INTEGER"),
-    ("remark", "TEXT"),
-];
-
 /// Makes the tables of a new file, or gives those of an older version what they lack: all or nothing.
 ///
-/// No run is rewritten: what older runs lack is worked out when they are read.
+/// No run is rewritten: what older runs lack is computed when they are read.
 pub(super) fn bring_up_to_date(connection: &Connection) -> rusqlite::Result<()> {
     let transaction =
         rusqlite::Transaction::new_unchecked(connection, rusqlite::TransactionBehavior::Immediate)?;
-    transaction.execute_batch(CREATE)?;
-    for (name, kind) in missing(&transaction)? {
+    transaction.execute_batch(&table())?;
+    transaction.execute_batch(INDICES)?;
+    for field in missing(&transaction)? {
+        let (name, kind) = (&field.name, figures::column_type(field));
         transaction.execute_batch(&format!("ALTER TABLE iteration ADD COLUMN {name} {kind}"))?;
     }
     allow_no_contour(&transaction)?;
@@ -111,22 +82,21 @@ fn allow_no_contour(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch("PRAGMA writable_schema = RESET")
 }
 
-fn missing(connection: &Connection) -> rusqlite::Result<Vec<(&'static str, &'static str)>> {
+/// Figures that a file does not have, as it was made before them.
+pub(super) fn missing(connection: &Connection) -> rusqlite::Result<Vec<&'static Field>> {
     let mut statement = connection.prepare("SELECT name FROM pragma_table_info('iteration')")?;
     let there: Vec<String> =
         statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
-    Ok(ADDED.into_iter().filter(|(name, _)| !there.iter().any(|known| known == name)).collect())
+    Ok(figure_fields().iter().filter(|field| !there.contains(&field.name)).collect())
 }
 
-/// The columns of a run without its arrays, also in a file of an older version that can only be read.
+/// The columns of a run without its arrays, also in an older file that can only be read.
 pub(super) fn columns(connection: &Connection) -> rusqlite::Result<String> {
     let missing = missing(connection)?;
-    let added = ADDED.iter().map(|(name, _)| {
-        if missing.iter().any(|(lacking, _)| lacking == name) {
-            format!(", NULL AS {name}")
-        } else {
-            format!(", {name}")
-        }
-    });
-    Ok(super::row::COLUMNS.to_owned() + &added.collect::<String>())
+    let mut columns: Vec<String> = COLUMNS.map(|(name, _)| name.to_owned()).into();
+    columns.extend(figure_fields().iter().map(|field| {
+        let name = &field.name;
+        if missing.contains(&field) { format!("NULL AS {name}") } else { name.clone() }
+    }));
+    Ok(columns.join(", "))
 }

@@ -144,7 +144,7 @@ fn positive(scale: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::tests::{meta, record};
+    use super::super::tests::{meta, record};
     use super::*;
     use crate::record::IterationRecord;
 

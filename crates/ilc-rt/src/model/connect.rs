@@ -1,14 +1,14 @@
-//! Connection of models: side by side, in series, delayed, in feedback.
+//! Connection of models: block-diagonal, series, delay (dead time), feedback.
 
 use nalgebra::DMatrix;
 
 use super::{ModelError, StateSpace};
 
-/// States up to which a delay is added: its matrix has the square of them.
+/// Largest number of states of a delayed model: the size of its matrix is their square.
 const MAX_STATES: usize = 2000;
 
 impl StateSpace {
-    /// Returns the block-diagonal model of two sets of axes side by side.
+    /// Returns the block-diagonal model of two sets of axes (parallel, not coupled).
     ///
     /// # Errors
     /// - [`ModelError::TimeMismatch`] unless both have the same sample time.
@@ -23,11 +23,11 @@ impl StateSpace {
         )
     }
 
-    /// Returns the model whose output goes through `next`: `y = next(self(u))`.
+    /// Returns the series connection: `y = next(self(u))`.
     ///
     /// # Errors
     /// - [`ModelError::TimeMismatch`] unless both have the same sample time.
-    /// - [`ModelError::SignalMismatch`] unless `next` has an input for each output.
+    /// - [`ModelError::SignalMismatch`] unless `next` has one input per output of this model.
     pub fn series(&self, next: &Self) -> Result<Self, ModelError> {
         let dt_s = self.same_time("connect in series", next)?;
         if self.n_outputs() != next.n_inputs() {
@@ -47,7 +47,8 @@ impl StateSpace {
         )
     }
 
-    /// Returns the model with every input delayed by `n_delay` samples, as a bus does.
+    /// Returns the model with every input delayed by `n_delay` samples, e.g. the dead time of a
+    /// bus.
     ///
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
@@ -62,7 +63,7 @@ impl StateSpace {
         if n_delay == 0 || m == 0 {
             return Ok(self.clone());
         }
-        // A chain of holds, the one that takes the input first, and the model behind the last.
+        // A chain of unit delays, first the one fed by the input; the model follows the last.
         let (held, whole) = (n_delay * m, n_delay * m + n);
         let (mut a, mut b) = (DMatrix::zeros(whole, whole), DMatrix::zeros(whole, m));
         let mut c = DMatrix::zeros(self.n_outputs(), whole);
@@ -85,7 +86,7 @@ impl StateSpace {
     ///
     /// # Errors
     /// - [`ModelError::TimeMismatch`] unless both have the same sample time.
-    /// - [`ModelError::SignalMismatch`] unless the controller maps the outputs to the inputs.
+    /// - [`ModelError::SignalMismatch`] unless the controller maps outputs to inputs.
     /// - [`ModelError::AlgebraicLoop`] if `I + D_K D_P` is singular.
     pub fn feedback(&self, controller: &Self) -> Result<Self, ModelError> {
         let action = "close the loop";
@@ -119,7 +120,8 @@ impl StateSpace {
     }
 
     fn same_time(&self, action: &'static str, other: &Self) -> Result<Option<f64>, ModelError> {
-        // A ratio, because sample times are often computed (1.0 / 1000.0) on one side only.
+        // Compared as a ratio, because sample times are often computed (1.0 / 1000.0) on one side
+        // only.
         let same = match (self.dt_s, other.dt_s) {
             (None, None) => true,
             (Some(first), Some(second)) => (first - second).abs() <= 1e-9 * first,

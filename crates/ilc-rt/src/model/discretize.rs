@@ -1,19 +1,19 @@
-//! From continuous to sampled time.
+//! Discretisation of continuous models.
 
 use nalgebra::DMatrix;
 
 use super::{ModelError, StateSpace};
 
-/// How a continuous model is brought to sampled time.
+/// Discretisation method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Zero-order hold: exact for an input that is constant between samples.
     ZeroOrderHold,
-    /// Tustin's bilinear rule: keeps the shape of a frequency response.
+    /// Tustin's bilinear transform: preserves the shape of a frequency response.
     Tustin,
 }
 
-/// Returns the sampled form of a continuous model.
+/// Returns the discretised model.
 ///
 /// Zero-order hold: `exp([A B; 0 0] T) = [A_d B_d; 0 I]`. Tustin: `s = 2/T (z - 1)/(z + 1)`.
 ///
@@ -22,9 +22,10 @@ pub enum Method {
 /// # Units
 /// - `dt_s` in seconds
 /// # Errors
-/// - [`ModelError::Discrete`] if `model` is sampled already.
+/// - [`ModelError::Discrete`] if `model` is discrete already.
 /// - [`ModelError::SampleTime`] unless `dt_s` is finite and positive.
-/// - [`ModelError::Numerics`] if Tustin's rule meets a pole at `2/T`, or the exponential overflows.
+/// - [`ModelError::Numerics`] if the model has a pole at `2/T` (Tustin), or the exponential
+///   overflows.
 /// # Source
 /// - \[franklin1998\], Ch. 4 and 6.
 pub fn discretize(model: &StateSpace, dt_s: f64, method: Method) -> Result<StateSpace, ModelError> {
@@ -48,7 +49,7 @@ fn zero_order_hold(model: &StateSpace, dt_s: f64) -> Result<StateSpace, ModelErr
     let mut generator = DMatrix::zeros(n + m, n + m);
     generator.view_mut((0, 0), (n, n)).copy_from(&(&model.a * dt_s));
     generator.view_mut((0, n), (n, m)).copy_from(&(&model.b * dt_s));
-    // Scaling by powers of two does not end for what is not finite.
+    // Scaling by powers of two does not terminate for non-finite values.
     let is_finite = generator.iter().all(|value| value.is_finite());
     let transition = if is_finite { generator.exp() } else { generator };
     if transition.iter().any(|value| !value.is_finite()) {

@@ -1,11 +1,11 @@
-//! What can be wrong with a model.
+//! Errors of models.
 
 use thiserror::Error;
 
-/// Why a model was refused.
+/// A refused model.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ModelError {
-    /// A matrix does not fit the others.
+    /// A matrix whose shape does not match the others.
     #[error(
         "matrix {matrix} has shape ({found_rows}, {found_cols}); ({rows}, {cols}) is needed to fit \
          the other matrices"
@@ -13,19 +13,19 @@ pub enum ModelError {
     Shape {
         /// Name of the matrix: `a`, `b`, `c` or `d`.
         matrix: &'static str,
-        /// Rows needed.
+        /// Rows required.
         rows: usize,
-        /// Columns needed.
+        /// Columns required.
         cols: usize,
         /// Rows given.
         found_rows: usize,
         /// Columns given.
         found_cols: usize,
     },
-    /// A coefficient is infinite or not a number.
+    /// A coefficient that is infinite or NaN.
     #[error("{what} holds {value} at ({row}, {col}); only finite numbers are allowed")]
     NotFinite {
-        /// Which matrix or polynomial.
+        /// Name of the matrix or polynomial.
         what: &'static str,
         /// Row of the offending number.
         row: usize,
@@ -40,78 +40,78 @@ pub enum ModelError {
         /// The sample time given, in seconds.
         dt_s: f64,
     },
-    /// A discrete model was needed.
+    /// A discrete model is required.
     #[error("{action} needs a discrete model, but this one is continuous: discretize it first")]
     Continuous {
-        /// What was asked for.
+        /// Requested operation.
         action: &'static str,
     },
-    /// A continuous model was needed.
+    /// A continuous model is required.
     #[error("{action} needs a continuous model, but this one is sampled at dt_s = {dt_s} s")]
     Discrete {
-        /// What was asked for.
+        /// Requested operation.
         action: &'static str,
         /// Sample time of the model given, in seconds.
         dt_s: f64,
     },
-    /// Two models with different time bases were connected.
+    /// Connection of models with different time bases.
     #[error("cannot {action} models of different time: {first} and {second}")]
     TimeMismatch {
-        /// The connection asked for.
+        /// Requested connection.
         action: &'static str,
         /// Time base of the first model.
         first: String,
         /// Time base of the second model.
         second: String,
     },
-    /// Two models whose numbers of signals do not match were connected.
+    /// Connection of models whose numbers of signals do not match.
     #[error("cannot {action}: {first} signals meet {second}")]
     SignalMismatch {
-        /// The connection asked for.
+        /// Requested connection.
         action: &'static str,
         /// Signals on the first side.
         first: usize,
         /// Signals on the second side.
         second: usize,
     },
-    /// A signal has the wrong number of values.
+    /// A signal of the wrong length.
     #[error("{what} holds {found} values; {allowed}")]
     Length {
-        /// Which signal.
+        /// Name of the signal.
         what: &'static str,
         /// Values given.
         found: usize,
         /// The rule, as a sentence.
         allowed: String,
     },
-    /// The model of one sample does not fit the others.
+    /// A time-varying model whose sample has other sizes than the first.
     #[error("at sample {sample}: {source}")]
     AtSample {
-        /// The first such sample.
+        /// Index of the first such sample.
         sample: usize,
-        /// What is wrong there.
+        /// Error of that sample.
         source: Box<ModelError>,
     },
-    /// More was asked for than is given.
+    /// A number above its limit.
     #[error("{what} = {value}; at most {allowed} are allowed here")]
     TooMany {
-        /// What was asked for.
+        /// Name of the number.
         what: &'static str,
-        /// How many.
+        /// Number requested.
         value: usize,
-        /// How many there may be.
+        /// Largest number allowed.
         allowed: usize,
     },
-    /// The model's answer leaves the range of floating-point numbers.
+    /// The model's response overflows.
     #[error("{what} is not finite: the model's answer grows beyond all numbers")]
     Overflow {
-        /// What was computed.
+        /// Name of the result.
         what: &'static str,
     },
-    /// The instantaneous loop has no solution.
+    /// A singular algebraic loop.
     #[error("the feedback loop is not well posed: I + D_c D_p is singular")]
     AlgebraicLoop,
-    /// A transfer function that no state-space model has.
+    /// An improper transfer function, which has no state-space model.
     #[error(
         "numerator of degree {numerator} over denominator of degree {denominator}; a proper transfer function is needed"
     )]
@@ -121,7 +121,7 @@ pub enum ModelError {
         /// Degree of the denominator.
         denominator: usize,
     },
-    /// A denominator that is zero, or a model coefficient outside its range.
+    /// A zero denominator, or a parameter outside its range.
     #[error("{what} = {value}; {allowed}")]
     Parameter {
         /// Name of the parameter.
@@ -131,12 +131,12 @@ pub enum ModelError {
         /// The rule, as a sentence.
         allowed: &'static str,
     },
-    /// An iteration of the linear algebra gave no result.
+    /// A linear-algebra iteration that did not converge.
     #[error("{what} could not be computed: {reason}")]
     Numerics {
-        /// What was computed.
+        /// Name of the result.
         what: &'static str,
-        /// Why it failed.
+        /// Reason.
         reason: &'static str,
     },
 }

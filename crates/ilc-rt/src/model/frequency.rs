@@ -1,29 +1,29 @@
-//! The frequency response of a model, and its static gain.
+//! Frequency response and static gain of a model.
 
 use nalgebra::{Complex, DMatrix};
 
 use super::{ModelError, StateSpace};
 
-/// Magnitude and phase of one channel, as a Bode diagram shows them.
+/// Magnitude and phase of one channel (Bode plot).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bode {
     /// Absolute value at each frequency.
     pub magnitude: Vec<f64>,
-    /// Phase at each frequency, without jumps.
+    /// Unwrapped phase at each frequency.
     pub phase_rad: Vec<f64>,
 }
 
 impl StateSpace {
-    /// Returns the response to sinusoids.
+    /// Returns the frequency response.
     ///
-    /// `G(w) = C (q I - A)^-1 B + D`, `q = j w` (continuous) or `exp(j w T)` (sampled)
+    /// `G(w) = C (q I - A)^-1 B + D`, `q = j w` (continuous) or `exp(j w T)` (discrete)
     ///
     /// # Shapes
     /// - one matrix (`n_outputs`, `n_inputs`) for each frequency
     /// # Units
     /// - `w_rad_s` in rad/s
     /// # Errors
-    /// - [`ModelError::NotFinite`] for a frequency that is not a number.
+    /// - [`ModelError::NotFinite`] for a NaN or infinite frequency.
     /// - [`ModelError::Numerics`] at a frequency that is a pole.
     pub fn frequency_response(
         &self,
@@ -51,15 +51,15 @@ impl StateSpace {
             }
             match resolvent.lu().solve(&b).map(|states| &c * states + &d) {
                 Some(found) if is_finite(&found) => response.push(found),
-                // A pole, unless nothing reaches it or nothing sees it.
+                // A pole, unless it is uncontrollable or unobservable.
                 _ => response.push(self.without_hidden(w)?),
             }
         }
         Ok(response)
     }
 
-    /// Returns the response at a frequency at which some state is not determined: that of the model
-    /// without the states that no input reaches or no output sees.
+    /// Returns the response at a frequency where `q I - A` is singular: that of the minimal
+    /// realisation.
     fn without_hidden(&self, w: f64) -> Result<DMatrix<Complex<f64>>, ModelError> {
         let is_a_pole = ModelError::Numerics {
             what: "the frequency response",
@@ -75,10 +75,10 @@ impl StateSpace {
     /// Returns magnitude and phase of the channel from one input to one output.
     ///
     /// # Units
-    /// - `w_rad_s` in rad/s, phase in rad, without jumps of a turn from one frequency to the next
+    /// - `w_rad_s` in rad/s; unwrapped phase in rad
     /// # Errors
-    /// - as [`StateSpace::frequency_response`], and [`ModelError::Parameter`] for a channel that the
-    ///   model does not have.
+    /// - as [`StateSpace::frequency_response`], and [`ModelError::Parameter`] for a channel that
+    ///   does not exist.
     pub fn bode(&self, w_rad_s: &[f64], output: usize, input: usize) -> Result<Bode, ModelError> {
         for (what, value, count) in
             [("output", output, self.n_outputs()), ("input", input, self.n_inputs())]
@@ -100,14 +100,14 @@ impl StateSpace {
         })
     }
 
-    /// Returns the static gain.
+    /// Returns the static (DC) gain.
     ///
-    /// `G(0) = D - C A^-1 B` (continuous), `G(1) = D + C (I - A)^-1 B` (sampled)
+    /// `G(0) = D - C A^-1 B` (continuous), `G(1) = D + C (I - A)^-1 B` (discrete)
     ///
     /// # Shapes
     /// - (`n_outputs`, `n_inputs`)
     /// # Errors
-    /// - [`ModelError::Numerics`] if the model integrates.
+    /// - [`ModelError::Numerics`] if the model has a pole at zero frequency (integrator).
     pub fn dc_gain(&self) -> Result<DMatrix<f64>, ModelError> {
         let n = self.n_states();
         if n == 0 {
@@ -119,7 +119,7 @@ impl StateSpace {
         };
         let size = system.amax();
         let lu = system.full_piv_lu();
-        // The last pivot tells how near the pole at rest is.
+        // The last pivot shows how near a pole is to zero frequency.
         if size > 0.0
             && lu.u()[(n - 1, n - 1)].abs() > f64::EPSILON * size
             && let Some(states) = lu.solve(&self.b)
@@ -129,7 +129,7 @@ impl StateSpace {
                 return Ok(gain);
             }
         }
-        // A state that no input reaches or no output sees may do what it likes.
+        // An uncontrollable or unobservable state is free to integrate.
         let minimal = self.minimal()?;
         if minimal.n_states() < n {
             return minimal.dc_gain();
@@ -145,7 +145,7 @@ fn is_finite(matrix: &DMatrix<Complex<f64>>) -> bool {
     matrix.iter().all(|value| value.re.is_finite() && value.im.is_finite())
 }
 
-/// Takes the jumps of a turn out of a phase, in place.
+/// Unwraps a phase in place.
 ///
 /// # Units
 /// - `phase_rad` in rad
@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn states_that_nothing_reaches_or_nothing_sees_do_not_integrate() {
         let one = |value: f64| DMatrix::from_element(1, 1, value);
-        // What SciPy makes of a gain: a state at rest that nothing moves.
+        // SciPy's realisation of a gain: a state at rest that no input excites.
         for (b, c) in [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0)] {
             for (pole, dt_s) in [(0.0, None), (1.0, Some(0.01))] {
                 let gain = StateSpace::new(one(pole), one(b), one(c), one(2.0), dt_s).unwrap();
@@ -200,12 +200,12 @@ mod tests {
                 assert!((response[0][(0, 0)] - Complex::new(2.0, 0.0)).norm() < 1e-15);
             }
         }
-        // Beside an axis that has a gain of its own.
+        // Appended to an axis with a static gain.
         let lag = from_transfer_function(&[0.5], &[1.0, -0.5], Some(1e-3)).unwrap();
         let hidden = StateSpace::discrete(one(1.0), one(0.0), one(1.0), one(3.0), 1e-3).unwrap();
         let both = lag.append(&hidden).unwrap().dc_gain().unwrap();
         assert!((both - DMatrix::from_diagonal(&nalgebra::dvector![1.0, 3.0])).amax() < 1e-12);
-        // Dead beat: all poles at the origin.
+        // Deadbeat: all poles at the origin.
         assert!((gain_of(3.0).delayed(4).unwrap().dc_gain().unwrap()[(0, 0)] - 3.0).abs() < 1e-15);
     }
 
@@ -218,7 +218,7 @@ mod tests {
         let gain = StateSpace::static_gain(DMatrix::from_element(1, 1, 2.0), None).unwrap();
         assert!((gain.dc_gain().unwrap()[(0, 0)] - 2.0).abs() < 1e-15);
         assert!((gain.frequency_response(&[1.0]).unwrap()[0][(0, 0)].re - 2.0).abs() < 1e-15);
-        // A double integrator, one behind a gain of two axes, and one that forgets too little.
+        // A double integrator, one behind a gain of two axes, and an almost-integrator.
         let double = from_transfer_function(&[1.0], &[1.0, -2.0, 1.0], Some(1e-3)).unwrap();
         assert!(
             double.dc_gain().is_err() && double.append(&gain_of(2.0)).unwrap().dc_gain().is_err()

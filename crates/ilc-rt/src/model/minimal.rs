@@ -1,19 +1,19 @@
-//! Transfer matrices, and models without states that nothing reaches or nothing sees.
+//! Minimal realisations: transfer matrices, and removal of uncontrollable and unobservable states.
 
 use nalgebra::DMatrix;
 
 use super::{ModelError, StateSpace, from_transfer_function};
 
-/// Directions shorter than this part of the model's size count as not reached.
+/// Directions shorter than this, relative to the model's size, count as unreachable.
 const REACHED: f64 = 1e-10;
 
-/// Returns the model of a matrix of transfer functions, without superfluous states.
+/// Returns a minimal realisation of a matrix of transfer functions.
 ///
 /// `y_i = sum_j (numerator_ij / denominator_ij) u_j`
 ///
 /// # Shapes
-/// - `entries`: one row for each output, in it one pair (numerator, denominator) for each input,
-///   highest power first
+/// - `entries`: one row per output, with one pair (numerator, denominator) per input, highest power
+///   first
 /// # Units
 /// - `dt_s` in seconds
 /// # Errors
@@ -51,7 +51,7 @@ pub fn from_transfer_matrix(
     let Some(apart) = whole else {
         return StateSpace::static_gain(DMatrix::zeros(0, 0), dt_s);
     };
-    // Entry (i, j) is channel i m + j of the models side by side.
+    // Entry (i, j) is channel i m + j of the block-diagonal model.
     let p = entries.len();
     let spread = DMatrix::from_fn(p * m, m, |row, col| f64::from(u8::from(row % m == col)));
     let gather = DMatrix::from_fn(p, p * m, |row, col| f64::from(u8::from(col / m == row)));
@@ -66,13 +66,13 @@ pub fn from_transfer_matrix(
 }
 
 impl StateSpace {
-    /// Returns a model of the same response without states that no input reaches or no output sees.
+    /// Returns a minimal realisation: keeps the controllable and observable states.
     ///
-    /// The states are turned into an orthonormal basis of what is reachable, then of what is
-    /// observable; directions that are reached 1e-10 times as strongly as others are dropped.
+    /// The states are projected onto an orthonormal basis of the reachable, then of the observable
+    /// subspace; directions less than 1e-10 times as strong as others are dropped.
     ///
     /// # Errors
-    /// - [`ModelError::NotFinite`] if the model's numbers overflow on the way.
+    /// - [`ModelError::NotFinite`] if intermediate numbers overflow.
     pub fn minimal(&self) -> Result<Self, ModelError> {
         let q = reachable(&self.a, &self.b);
         let (a, b, c) = (q.transpose() * &self.a * &q, q.transpose() * &self.b, &self.c * &q);
@@ -81,13 +81,15 @@ impl StateSpace {
     }
 }
 
-/// Returns an orthonormal basis of what `B`, `A B`, `A^2 B`, ... span.
+/// Returns an orthonormal basis of the reachable (Krylov) subspace: the span of `B`, `A B`, `A^2
+/// B`, ...
 fn reachable(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let n = a.nrows();
     let mut basis = DMatrix::zeros(n, 0);
     let (mut newest, mut size) = (b.clone(), b.norm());
     while basis.ncols() < n && size > 0.0 {
-        // Twice, as what is left after the first time is small against what was taken away.
+        // Orthogonalised twice, as the remainder of the first pass is small against what was
+        // subtracted.
         for _ in 0..2 {
             newest -= &basis * (basis.transpose() * &newest);
         }
@@ -144,7 +146,8 @@ mod tests {
                 assert!((found[(row, col)] - expected).norm() < 1e-12);
             }
         }
-        // lag twice in one row's inputs cannot be shared, fast in one column can.
+        // Within one row the inputs cannot share the repeated lag; within one column they can share
+        // `fast`.
         assert_eq!(model.n_states(), 3);
         let ragged = from_transfer_matrix(&[vec![lag.clone(), lag.clone()], vec![lag]], None);
         assert!(ragged.is_err() && from_transfer_matrix(&[], None).is_err());

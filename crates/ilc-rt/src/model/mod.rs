@@ -3,7 +3,7 @@
 //!
 //! This folder turns what is known about an axis into the discrete state-space model that the
 //! learning laws work on. It runs when things are set up, never in the tick; `learning`, `servo`'s
-//! set-up code, `config`, `supervisor` and the Python bindings may import it.
+//! set-up code, `config`, `design` and the Python bindings may import it.
 
 mod connect;
 mod discretize;

@@ -1,34 +1,34 @@
-//! How late a model answers: relative degrees and delays, from the Markov parameters.
+//! Relative degrees and delays (dead time) of a model, from its Markov parameters.
 
 use nalgebra::DMatrix;
 
 use super::{ModelError, StateSpace};
 
-/// A Markov parameter counts as zero below this part of the magnitudes that were added up for it.
+/// A Markov parameter counts as zero below this share of the sum of magnitudes of its terms.
 const ROUNDING: f64 = 1e-13;
 
-/// Returns, for each output, its relative degree: the index of its first Markov parameter that is
-/// not zero for some input, or `None` if the output answers to nothing.
+/// Returns the relative degree of each output: the index of its first Markov parameter that is
+/// non-zero for any input, or `None` if no input affects the output.
 ///
-/// `l_i = min { l : (D, C B, C A B, ...)_l has a row i that is not zero }`
+/// `l_i = min { l : row i of (D, C B, C A B, ...)_l is non-zero }`
 ///
-/// Of a sampled model it is the number of samples after which an input shows; of a continuous one,
-/// the number of times that the output must be differentiated before an input shows.
+/// For a discrete model it is the delay in samples from input to output; for a continuous one, the
+/// number of times the output must be differentiated until the input appears.
 ///
 /// # Shapes
-/// - one entry for each output
+/// - one entry per output
 /// # Errors
 /// - [`ModelError::Numerics`] if a Markov parameter overflows.
 /// # Source
-/// - \[barton2010\], section 3.1: the shift of the lifted system by the relative degree.
+/// - \[barton2010\], section 3.1: the lifted system shifted by the relative degree.
 pub fn relative_degrees(model: &StateSpace) -> Result<Vec<Option<usize>>, ModelError> {
     Ok(delays(model)?.into_iter().map(|row| row.into_iter().flatten().min()).collect())
 }
 
-/// Returns, for each output and each input, the index of the first Markov parameter that is not
-/// zero, or `None` if this output never answers to this input.
+/// Returns the delay of each output and input: the index of the first non-zero Markov parameter, or
+/// `None` if the input does not affect the output.
 ///
-/// By Cayley and Hamilton `n_states + 1` parameters decide.
+/// By the Cayley-Hamilton theorem, `n_states + 1` parameters suffice.
 ///
 /// # Shapes
 /// - `n_outputs` rows of `n_inputs` entries

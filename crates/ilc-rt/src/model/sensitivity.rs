@@ -1,4 +1,4 @@
-//! The closed loops of a plant and a controller that analysis asks for, by their names.
+//! The closed loops of a plant and a controller: sensitivity functions.
 
 use nalgebra::DMatrix;
 
@@ -33,8 +33,8 @@ impl StateSpace {
         controller.series(self)?.feedback(&self.unity()?)
     }
 
-    /// Returns the process sensitivity, from an input added to the controller's to the output: what
-    /// parallel learning works on.
+    /// Returns the process sensitivity, from a disturbance (or learned input) at the plant input to
+    /// the output: the plant of parallel ILC.
     ///
     /// `P S = P (I + K P)^-1`
     ///

@@ -1,10 +1,11 @@
-//! The state-space model and what can be asked of it.
+//! The linear time-invariant state-space model: simulation, Markov parameters, lifted system,
+//! poles.
 
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 
 use super::ModelError;
 
-/// Numbers of all Markov parameters together.
+/// Largest number of values of all Markov parameters together.
 const MAX_MARKOV: usize = 10_000_000;
 /// Entries of a lifted operator, 400 MB.
 const MAX_LIFTED: usize = 50_000_000;
@@ -32,11 +33,11 @@ pub struct StateSpace {
 }
 
 impl StateSpace {
-    /// Makes a discrete model with sample time `dt_s`.
+    /// Creates a discrete model with sample time `dt_s`.
     ///
     /// # Errors
-    /// - [`ModelError::Shape`] if the matrices do not fit each other.
-    /// - [`ModelError::NotFinite`] if a coefficient is infinite or not a number.
+    /// - [`ModelError::Shape`] if the shapes of the matrices do not match.
+    /// - [`ModelError::NotFinite`] if a coefficient is infinite or NaN.
     /// - [`ModelError::SampleTime`] unless `dt_s` is finite and positive.
     pub fn discrete(
         a: DMatrix<f64>,
@@ -48,11 +49,11 @@ impl StateSpace {
         Self::new(a, b, c, d, Some(dt_s))
     }
 
-    /// Makes a continuous model.
+    /// Creates a continuous model.
     ///
     /// # Errors
-    /// - [`ModelError::Shape`] if the matrices do not fit each other.
-    /// - [`ModelError::NotFinite`] if a coefficient is infinite or not a number.
+    /// - [`ModelError::Shape`] if the shapes of the matrices do not match.
+    /// - [`ModelError::NotFinite`] if a coefficient is infinite or NaN.
     pub fn continuous(
         a: DMatrix<f64>,
         b: DMatrix<f64>,
@@ -62,7 +63,7 @@ impl StateSpace {
         Self::new(a, b, c, d, None)
     }
 
-    /// Makes a model that is discrete if it has a sample time and continuous otherwise.
+    /// Creates a discrete model if a sample time is given, else a continuous one.
     ///
     /// # Errors
     /// - as [`StateSpace::discrete`] and [`StateSpace::continuous`].
@@ -98,7 +99,7 @@ impl StateSpace {
         Ok(Self { a, b, c, d, dt_s })
     }
 
-    /// Makes a model without memory: `y = gain u`.
+    /// Creates a model without states: `y = gain u`.
     ///
     /// # Errors
     /// - [`ModelError::NotFinite`] or [`ModelError::SampleTime`].
@@ -147,15 +148,15 @@ impl StateSpace {
         self.c.nrows()
     }
 
-    /// Returns the output that an input and an initial state produce.
+    /// Returns the output for an input and an initial state.
     ///
     /// # Shapes
     /// - `input`: `n_samples` x `n_inputs`, time first; `x0`: `n_states` (zero if `None`); the
     ///   result: `n_samples` x `n_outputs`, time first
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
-    /// - [`ModelError::Length`] if `input` is no whole number of samples or `x0` does not fit.
-    /// - [`ModelError::Overflow`] if the output leaves the range of floating-point numbers.
+    /// - [`ModelError::Length`] if `input` is not a whole number of samples or `x0` does not match.
+    /// - [`ModelError::Overflow`] if the output overflows.
     pub fn simulate(&self, input: &[f64], x0: Option<&[f64]>) -> Result<Vec<f64>, ModelError> {
         self.sampled("simulate")?;
         let m = self.n_inputs();
@@ -179,7 +180,7 @@ impl StateSpace {
             }
         };
         let mut output = Vec::with_capacity(input.len() / m * self.n_outputs());
-        // In place: a vector made anew for each product would take longer than the product.
+        // In place: allocating a vector for each product would take longer than the product.
         let (mut next, mut u) = (DVector::zeros(n), DVector::zeros(m));
         let mut y = DVector::zeros(self.n_outputs());
         for sample in input.chunks_exact(m) {
@@ -225,7 +226,7 @@ impl StateSpace {
         }
     }
 
-    /// Returns the dense lifted operator of `n_samples` samples, for analysis and as test oracle.
+    /// Returns the dense lifted system of `n_samples` samples, for analysis and as a test oracle.
     ///
     /// `y = P u` with `P` block lower-triangular Toeplitz, block (i, j) being Markov parameter
     /// `i - j`.
@@ -236,7 +237,7 @@ impl StateSpace {
     /// - [`ModelError::Continuous`] for a continuous model.
     /// - [`ModelError::TooMany`] for more than 50 000 000 entries.
     /// # Source
-    /// - \[haas2016\], Eq. (3), which leaves out the first block row and the last block column.
+    /// - \[haas2016\], Eq. (3), which omits the first block row and the last block column.
     pub fn lifted(&self, n_samples: usize) -> Result<DMatrix<f64>, ModelError> {
         let (p, m) = (self.n_outputs(), self.n_inputs());
         self.sampled("lifted")?;
@@ -257,7 +258,7 @@ impl StateSpace {
     /// Returns the poles, the eigenvalues of `A`.
     ///
     /// # Errors
-    /// - [`ModelError::Numerics`] if the eigenvalue iteration does not end.
+    /// - [`ModelError::Numerics`] if the eigenvalue iteration does not converge.
     pub fn poles(&self) -> Result<Vec<Complex<f64>>, ModelError> {
         const MAX_SWEEPS: usize = 10_000;
         if self.n_states() == 0 {
@@ -269,7 +270,7 @@ impl StateSpace {
         Ok(schur.complex_eigenvalues().iter().copied().collect())
     }
 
-    /// Refuses more samples than `max` numbers of all channels.
+    /// Refuses a number of samples if all channels together exceed `max` numbers.
     fn bounded(&self, what: &'static str, value: usize, max: usize) -> Result<(), ModelError> {
         let allowed = max / (self.n_outputs() * self.n_inputs()).max(1);
         if value > allowed {
@@ -278,7 +279,7 @@ impl StateSpace {
         Ok(())
     }
 
-    /// Returns the sample time, or the error that `action` cannot do without one.
+    /// Returns the sample time, or an error for a continuous model; `action` names the operation.
     pub(super) fn sampled(&self, action: &'static str) -> Result<f64, ModelError> {
         self.dt_s.ok_or(ModelError::Continuous { action })
     }

@@ -1,4 +1,4 @@
-//! Models whose matrices change along the run, as those linearised about a motion.
+//! Linear time-varying (LTV) models, e.g. linearised along a motion.
 
 use nalgebra::DVector;
 
@@ -9,7 +9,7 @@ use super::{ModelError, StateSpace};
 /// `x[k+1] = A[k] x[k] + B[k] u[k]`, `y[k] = C[k] x[k] + D[k] u[k]`
 ///
 /// # Shapes
-/// - one model a sample, all of the same sizes and with the same sample time
+/// - one model per sample, all of the same sizes and sample time
 /// # Units
 /// - sample time in seconds; inputs and outputs in the units of the axis (SI)
 #[derive(Debug, Clone, PartialEq)]
@@ -18,12 +18,12 @@ pub struct TimeVarying {
 }
 
 impl TimeVarying {
-    /// Makes a model from one discrete model a sample.
+    /// Creates a model from one discrete model per sample.
     ///
     /// # Errors
-    /// - [`ModelError::Length`] if there is no sample.
+    /// - [`ModelError::Length`] for an empty list.
     /// - [`ModelError::Continuous`] if one is continuous.
-    /// - [`ModelError::AtSample`] if one has other sizes or another sample time than the first.
+    /// - [`ModelError::AtSample`] if one has a different size or sample time than the first.
     pub fn new(samples: Vec<StateSpace>) -> Result<Self, ModelError> {
         let Some(first) = samples.first() else {
             return Err(ModelError::Length {
@@ -59,10 +59,10 @@ impl TimeVarying {
         Ok(Self { samples })
     }
 
-    /// Returns the model of one sample.
+    /// Returns the model at one sample.
     ///
     /// # Panics
-    /// If `k` lies beyond the run.
+    /// If `k` is beyond the end of the run.
     pub fn at(&self, k: usize) -> &StateSpace {
         &self.samples[k]
     }
@@ -97,14 +97,14 @@ impl TimeVarying {
         self.samples[0].dt_s()
     }
 
-    /// Returns the output that an input and an initial state produce.
+    /// Returns the output for an input and an initial state.
     ///
     /// # Shapes
     /// - `input`: `n_samples` x `n_inputs`, time first; `x0`: `n_states` (zero if `None`); the
     ///   result: `n_samples` x `n_outputs`, time first
     /// # Errors
-    /// - [`ModelError::Length`] if `input` or `x0` does not fit.
-    /// - [`ModelError::Overflow`] if the output leaves the range of floating-point numbers.
+    /// - [`ModelError::Length`] if `input` or `x0` does not match.
+    /// - [`ModelError::Overflow`] if the output overflows.
     pub fn simulate(&self, input: &[f64], x0: Option<&[f64]>) -> Result<Vec<f64>, ModelError> {
         let (n, m) = (self.n_states(), self.n_inputs());
         let (n_samples, found) = (self.n_samples(), input.len());

@@ -1,10 +1,10 @@
-//! State-space models of transfer functions.
+//! State-space realisations of transfer functions.
 
 use nalgebra::DMatrix;
 
 use super::{ModelError, StateSpace};
 
-/// The most coefficients of a polynomial: far more than any has whose zeros can still be told apart.
+/// Largest number of polynomial coefficients: beyond it, zeros are numerically indistinguishable.
 const MAX_COEFFICIENTS: usize = 1000;
 
 /// Returns the controllable canonical form of a transfer function with one input and one output.
@@ -13,7 +13,7 @@ const MAX_COEFFICIENTS: usize = 1000;
 /// `dt_s` is given.
 ///
 /// # Shapes
-/// - `numerator`: at most as long as `denominator` once leading zeros are gone
+/// - `numerator`: at most as long as `denominator`, leading zeros aside
 /// # Units
 /// - `dt_s` in seconds
 /// # Errors
@@ -21,7 +21,7 @@ const MAX_COEFFICIENTS: usize = 1000;
 /// - [`ModelError::Parameter`] if the denominator is zero.
 /// - [`ModelError::Length`] for an empty polynomial, [`ModelError::TooMany`] for more than 1000
 ///   coefficients.
-/// - [`ModelError::NotFinite`] for an infinite coefficient or one that is not a number.
+/// - [`ModelError::NotFinite`] for a coefficient that is infinite or NaN.
 pub fn from_transfer_function(
     numerator: &[f64],
     denominator: &[f64],
@@ -71,12 +71,12 @@ pub fn from_transfer_function(
     StateSpace::new(a, input, c, DMatrix::from_element(1, 1, direct), dt_s)
 }
 
-/// Returns the continuous model of a position loop with the given bandwidth and damping.
+/// Returns the continuous second-order model of a position loop.
 ///
 /// `G(s) = w0^2 / (s^2 + 2 delta w0 s + w0^2)`
 ///
 /// # Units
-/// - `natural_frequency_rad_s` (`w0`) in rad/s; `damping` (`delta`) without unit
+/// - `natural_frequency_rad_s` (`w0`) in rad/s; `damping` (`delta`) is dimensionless
 /// # Errors
 /// - [`ModelError::Parameter`] unless the frequency is positive and the damping is not negative.
 /// # Source

@@ -1,24 +1,24 @@
-//! Invariant zeros: where an input and a state cancel in every output.
+//! Invariant (transmission) zeros of a model.
 
 use nalgebra::{Complex, DMatrix, Schur};
 
 use super::{ModelError, StateSpace};
 
-/// Singular values below this part of the largest entry, times the size, count as zero.
+/// Singular values below this share of the largest entry, times the size, count as zero.
 const RANK: f64 = 1e-13;
-/// Most sweeps of the eigenvalue iteration.
+/// Largest number of sweeps of the eigenvalue iteration.
 const SWEEPS_MAX: usize = 10_000;
 
 impl StateSpace {
     /// Returns the invariant zeros.
     ///
     /// `z` where `[A - z I, B; C, D]` loses rank. The pencil is reduced by orthogonal transforms to
-    /// one whose `D` is square and invertible; what is left has the finite zeros as eigenvalues of
-    /// `A - B D^-1 C`. No zero at infinity can turn up as a large finite one.
+    /// one with a square, invertible `D`; its finite zeros are the eigenvalues of `A - B D^-1 C`.
+    /// No zero at infinity appears as a large finite one.
     ///
     /// # Errors
-    /// - [`ModelError::Numerics`] if the model has no rank (some inputs do the same, or some outputs
-    ///   are the same, at every frequency), or the eigenvalue iteration does not end.
+    /// - [`ModelError::Numerics`] if the transfer matrix is rank-deficient at every frequency
+    ///   (redundant inputs or outputs), or the eigenvalue iteration does not converge.
     /// # Source
     /// - \[emami1982\].
     pub fn zeros(&self) -> Result<Vec<Complex<f64>>, ModelError> {
@@ -57,7 +57,7 @@ impl StateSpace {
     }
 }
 
-/// The four matrices on their way to a `D` of full rank.
+/// The system pencil during the reduction to a `D` of full rank.
 struct Pencil {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
@@ -79,7 +79,7 @@ impl Pencil {
         }
     }
 
-    /// Takes states away until `D` has full row rank; the finite zeros stay.
+    /// Removes states until `D` has full row rank; the finite zeros remain.
     fn with_full_row_rank(mut self, tolerance: f64) -> Self {
         loop {
             let (n, m, p) = (self.a.nrows(), self.b.ncols(), self.c.nrows());
@@ -89,7 +89,7 @@ impl Pencil {
             }
             let (c, d) = (&rows * &self.c, &rows * &self.d);
             let dead = c.rows(rank_d, p - rank_d).into_owned();
-            // Columns of V: first what the dead rows do not see, then what they do.
+            // Columns of V: first the null space of the dead rows, then its complement.
             let (across, rank_c) = row_compression(&dead.transpose(), tolerance);
             let kept = n - rank_c;
             let mut v = DMatrix::zeros(n, n);
@@ -127,7 +127,7 @@ fn row_compression(matrix: &DMatrix<f64>, tolerance: f64) -> (DMatrix<f64>, usiz
     if matrix.is_empty() {
         return (DMatrix::identity(rows, rows), 0);
     }
-    // Square, so that all left singular vectors come out.
+    // Square, so that all left singular vectors are computed.
     let width = rows.max(matrix.ncols());
     let mut padded = DMatrix::zeros(rows, width);
     padded.view_mut((0, 0), matrix.shape()).copy_from(matrix);

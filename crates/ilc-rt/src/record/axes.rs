@@ -1,4 +1,4 @@
-//! What the axes of a record are measured in, and what may be compared: lengths with lengths, angles with
+//! Units of the axes of a record, and the comparison of like with like: lengths with lengths, angles with
 //! angles.
 
 /// Range of a coordinate from which on an axis moves: below it there is rounding, and no machine.
@@ -22,12 +22,12 @@ impl AxisKinds {
         self.rotary.len()
     }
 
-    /// Whether every axis is rotary.
+    /// Returns whether every axis is rotary.
     pub fn all_rotary(&self) -> bool {
         !self.rotary.is_empty() && self.rotary.iter().all(|rotary| *rotary)
     }
 
-    /// Whether there are linear and rotary axes side by side.
+    /// Returns whether there are linear and rotary axes side by side.
     pub fn is_mixed(&self) -> bool {
         self.rotary.contains(&true) && self.rotary.contains(&false)
     }
@@ -43,9 +43,9 @@ impl AxisKinds {
         self.of_kind(self.all_rotary())
     }
 
-    /// Whether a path has a contour to leave: two linear axes or more move along it.
+    /// Returns whether a path has a contour to leave: two linear axes or more move along it.
     ///
-    /// Where one axis alone moves, what is across the path is the position of axes that stand still, and
+    /// If one axis alone moves, the distance across the path is the position of axes that stand still, and
     /// what is left of the distance is rounding, or over-travel at an end.
     ///
     /// # Shapes

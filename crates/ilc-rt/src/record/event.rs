@@ -1,12 +1,16 @@
-//! What a running campaign tells the world: the same objects on standard output and on Zenoh.
+//! Events of a running campaign: the same objects on standard output and on Zenoh.
+//!
+//! Their JSON schema is `docs/events.schema.json`, which the Python classes are tested against.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::fault::Fault;
 use super::figures::Figures;
 use crate::rt::{LatencyFigures, RtReport};
 
 /// One thing that happened; JSON with the field `event` naming it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
     /// A campaign begins.
@@ -37,7 +41,8 @@ pub enum Event {
         bus: String,
         /// `realtime` or `lockstep`.
         mode: &'static str,
-        /// What the system granted the loop; absent in lock-step.
+        /// Real-time settings granted to the thread of the loop; absent in lock-step.
+        #[schemars(with = "Option<serde_json::Value>")]
         rt: Option<RtReport>,
     },
     /// The cell entered a state.
@@ -47,7 +52,7 @@ pub enum Event {
         /// The run it belongs to.
         iteration: u32,
     },
-    /// Where the running run is; about ten a second.
+    /// Progress of the current run; about ten per second.
     Progress {
         /// Number of the run.
         iteration: u32,
@@ -68,34 +73,39 @@ pub enum Event {
         #[serde(flatten)]
         figures: Figures,
     },
-    /// What the law decided on a run that is told and kept already, as it computed meanwhile.
+    /// The law decided on a run that was published before, as it computed meanwhile.
     Judged {
         /// Row in the library.
         id: i64,
         /// Number of the run.
         index: u32,
-        /// Whether the best input was restored after it.
+        /// True if the best input was restored after it.
         rolled_back: bool,
-        /// Whether learning is off.
+        /// True if learning is off.
         learning_off: bool,
-        /// Why; one sentence.
+        /// Reason; one sentence.
         remark: Option<String>,
     },
     /// Timing of the loop over the whole campaign; in real time only.
     Latency {
-        /// How late the loop woke on its grid.
+        /// Lateness of the loop on its grid.
+        #[schemars(with = "serde_json::Value")]
         wake_late_us: LatencyFigures,
-        /// How long a tick took.
+        /// Execution time of a tick.
+        #[schemars(with = "serde_json::Value")]
         execution_us: LatencyFigures,
     },
     /// Something stopped the axes.
     Fault {
         /// One sentence.
         reason: String,
+        /// The same in fields.
+        #[serde(flatten)]
+        fault: Fault,
     },
     /// The campaign is over and the axes are at rest.
     End {
-        /// How.
+        /// Outcome.
         status: EndStatus,
         /// One sentence.
         reason: String,
@@ -105,7 +115,7 @@ pub enum Event {
 }
 
 /// States of a cell as others see them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StateName {
     /// Nodes are reset, checked and configured.
@@ -124,8 +134,8 @@ pub enum StateName {
     Stopped,
 }
 
-/// How a campaign ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+/// Outcome of a campaign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EndStatus {
     /// All runs were made.

@@ -1,8 +1,10 @@
 //! The figures of one run, and the two norms they are made of.
 
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::axes::AxisKinds;
+use crate::schema::field_order;
 use crate::trajectory::contour_error_m;
 
 /// Farthest that a tool is looked for along the path, before or after its own time.
@@ -10,41 +12,55 @@ const CONTOUR_WINDOW_S: f64 = 0.25;
 /// Distance below which there is rounding of positions, and nothing that was measured: a picometre.
 const ROUNDING_M: f64 = 1e-12;
 
-/// Figures of one run; metres unless the name says otherwise.
+/// Figures of one run; lengths in metres, angles in radians.
 ///
-/// Lengths and angles are never put into one figure: what is over several axes is over the linear ones,
-/// or, where all are rotary, over all of them and in radians.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+/// Lengths and angles are never combined in one figure: one over several axes is over the linear ones, or,
+/// where all are rotary, over all of them and in radians.
+///
+/// This struct is the one description of the figures: columns of the library, events, JSON files and the
+/// Python class derive from it. A new field is a new figure everywhere; give it `#[serde(default)]`, as
+/// runs that are stored do not have it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Figures {
     /// Largest absolute tracking error of any axis, in the measurement learned from.
     pub tracking_inf_m: f64,
-    /// Root of the mean over time of the squared length of the tracking error.
+    /// RMS over time of the Euclidean norm of the tracking error.
     pub tracking_rms_m: f64,
     /// Largest distance of the tool from the reference path; absent where the path has no contour.
     pub contour_inf_m: Option<f64>,
-    /// Root mean square of that distance.
+    /// RMS of that distance.
     pub contour_rms_m: Option<f64>,
     /// Largest absolute tracking error of each axis, in its own unit.
+    #[serde(default)]
     pub axes_tracking_inf_m: Vec<f64>,
-    /// Root-mean-square tracking error of each axis, in its own unit.
+    /// RMS tracking error of each axis, in its own unit.
+    #[serde(default)]
     pub axes_tracking_rms_m: Vec<f64>,
     /// Largest absolute tracking error of any axis at the encoders.
+    #[serde(default)]
     pub encoder_tracking_inf_m: f64,
     /// Largest absolute tracking error of any axis at the tool; absent without such a measurement.
     pub tool_tracking_inf_m: Option<f64>,
     /// Servo cycles that began a whole cycle late or more.
+    #[serde(default)]
     pub overruns: u32,
     /// Samples whose measurement never arrived; the last one known stands in for them.
+    #[serde(default)]
     pub missing_samples: u32,
-    /// Runs that had to repeat the old input because the learning update was late, so far.
+    /// Runs so far that repeated the old input because the learning update was late.
+    #[serde(default)]
     pub late_updates: u32,
-    /// Time the learning took to compute this run's input; 0 where it computed none.
+    /// Time of the learning update that made the input of this run; 0 without one.
+    #[serde(default)]
     pub update_ms: f64,
-    /// Whether this run's error had grown so far that the best input was restored after it.
+    /// True if the error had grown so far that the best input was restored after this run.
+    #[serde(default)]
     pub rolled_back: bool,
-    /// Whether nothing was learned from this run and learning is off, as the error had grown.
+    /// True if nothing was learned from this run and learning is off, as the error had grown.
+    #[serde(default)]
     pub learning_off: bool,
-    /// What decided on the next input, where it was not the law's lesson alone; one sentence.
+    /// Reason of the decision on the next input, where the law alone did not decide; one sentence.
     pub remark: Option<String>,
 }
 
@@ -87,7 +103,7 @@ impl Figures {
         self.contour_rms_m = there.then(|| measured(rms(contour_m, 1)));
     }
 
-    /// What a run is judged by, all axes together: a number to compare runs with, without a unit of its
+    /// Returns the figure that a run is judged by, all axes together: a number to compare runs with, without a unit of its
     /// own where axes differ in theirs.
     pub fn judged_by(&self) -> f64 {
         if self.axes_tracking_rms_m.is_empty() {

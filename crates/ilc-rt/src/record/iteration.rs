@@ -4,7 +4,7 @@ use sha2::{Digest, Sha256};
 
 use super::figures::Figures;
 
-/// Where a record comes from: the same for all runs of a campaign.
+/// Provenance of a record: the same for all runs of a campaign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Meta {
     /// Name of the cell.
@@ -55,7 +55,7 @@ pub struct IterationRecord {
     /// Distance of the tool (of the encoders, without a tool measurement) from the reference path, in the
     /// linear axes.
     pub contour_m: Vec<f64>,
-    /// What was measured of the run's surroundings before it, as a temperature; empty if nothing.
+    /// Measured disturbance before the run, e.g. a temperature; empty if none was measured.
     pub disturbance: Vec<f64>,
     /// Figures.
     pub figures: Figures,

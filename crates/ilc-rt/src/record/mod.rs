@@ -1,16 +1,20 @@
-//! What remains of an iteration: its arrays, its figures, and the events that tell of it.
+//! Records of iterations: their arrays, their figures, and the events that report them.
 //!
-//! The supervisor fills it, the library keeps it, telemetry and Python read it. Imports signal,
+//! The campaign fills it, the library keeps it, telemetry and Python read it. Imports signal,
 //! trajectory and models at most; never the loop, the library or the bus.
 
 mod axes;
 mod event;
+mod fault;
+mod fields;
 mod figures;
 mod iteration;
 mod text;
 
 pub use axes::AxisKinds;
 pub use event::{EndStatus, Event, StateName};
+pub use fault::{Fault, FaultKind, LastCycles};
+pub use fields::{Field, FieldKind, figure_fields};
 pub use figures::{Figures, distances_m, infinity_norm, rms};
 pub use iteration::{IterationRecord, Meta, fingerprint};
 pub use text::{NAME_MAX, TEXT_MAX, is_hidden, printable, printable_json, printable_lines};

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 /// Most characters of a name.
 pub const NAME_MAX: usize = 64;
-/// Most characters of a text of somebody else's in a line for people.
+/// Largest number of characters of a foreign text in a line for people.
 pub const TEXT_MAX: usize = 400;
 
 /// Format characters of Unicode: among them those that turn the direction of writing around.
@@ -25,7 +25,7 @@ const FORMAT: [(char, char); 14] = [
     ('\u{e0000}', '\u{e0fff}'),
 ];
 
-/// Whether a character is a control or format character, or separates lines.
+/// Returns whether a character is a control or format character, or separates lines.
 pub fn is_hidden(character: char) -> bool {
     character.is_control()
         || FORMAT.iter().any(|(first, last)| (*first..=*last).contains(&character))

@@ -1,31 +1,31 @@
-//! Integer time and the machine's monotonic clock.
+//! Integer time, and the monotonic clock of the machine.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use std::time::Duration;
 
-/// A time or a span in nanoseconds; integer, so that a grid of ticks never drifts.
+/// A time or time span in nanoseconds; integer, so that a grid of ticks never drifts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Nanos(pub u64);
 
 impl Nanos {
-    /// A span given in microseconds.
+    /// Converts microseconds.
     pub const fn from_micros(micros: u32) -> Self {
         Self(micros as u64 * 1000)
     }
 
-    /// The span in seconds.
+    /// Returns the span in seconds.
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 * 1e-9
     }
 
-    /// This time moved on by `span`.
+    /// Returns this time plus `span`.
     #[must_use]
     pub const fn plus(self, span: Self) -> Self {
         Self(self.0.saturating_add(span.0))
     }
 
-    /// The span since `earlier`; zero if `earlier` is later.
+    /// Returns the span since `earlier`; zero if `earlier` is later.
     #[must_use]
     pub const fn since(self, earlier: Self) -> Self {
         Self(self.0.saturating_sub(earlier.0))
@@ -38,24 +38,24 @@ impl From<Duration> for Nanos {
     }
 }
 
-/// `CLOCK_MONOTONIC`, sleeping on its absolute grid and spinning the last stretch. Logic takes it as an
-/// argument and never asks the system itself.
+/// `CLOCK_MONOTONIC`: sleeps to an absolute deadline, and busy-waits the last stretch. Passed as an
+/// argument; other code never reads the system clock.
 ///
 /// # Real Time
-/// The kernel wakes a thread tens of microseconds late; spinning the last `spin` of each wait
-/// removes that at the price of processor time.
+/// The kernel wakes a thread tens of microseconds late. Busy-waiting the last `spin` of each wait
+/// removes this jitter at the price of processor time.
 #[derive(Clone, Copy, Debug)]
 pub struct MonotonicClock {
     spin: Nanos,
 }
 
 impl MonotonicClock {
-    /// Returns the clock; `spin` is how long before a deadline to stop sleeping and spin.
+    /// Creates the clock; it stops sleeping `spin` before a deadline and busy-waits.
     pub const fn new(spin: Nanos) -> Self {
         Self { spin }
     }
 
-    /// Returns the time now.
+    /// Returns the current time.
     #[expect(unsafe_code, reason = "clock_gettime has no safe wrapper in the standard library")]
     pub fn now(&self) -> Nanos {
         let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -73,8 +73,8 @@ impl MonotonicClock {
                 tv_sec: (wake / 1_000_000_000).cast_signed(),
                 tv_nsec: (wake % 1_000_000_000).cast_signed(),
             };
-            // SAFETY: `until` outlives the call, and a null remainder is allowed for absolute sleeps.
-            // An early return by a signal is harmless: the spin below waits out the rest.
+            // SAFETY: `until` outlives the call, and a null remainder is allowed for absolute
+            // sleeps. An early return on a signal is harmless: the busy-wait below covers the rest.
             unsafe {
                 libc::clock_nanosleep(
                     libc::CLOCK_MONOTONIC,

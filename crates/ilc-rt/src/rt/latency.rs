@@ -1,4 +1,4 @@
-//! Histograms of the loop's timing, filled without allocation and read as figures afterwards.
+//! Histograms of the loop's timing (latency, jitter), filled without allocation.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::clock::Nanos;
 
-/// Longest span that is told apart; longer ones count as this.
+/// Longest span that is resolved; longer ones are counted as this.
 const LONGEST_NS: u64 = 10_000_000_000;
 
 /// A histogram of spans from 1 ns to 10 s, to two significant digits.
@@ -29,12 +29,12 @@ impl Latency {
     /// Counts one span.
     ///
     /// # Real Time
-    /// Allocates nothing: the bounds are fixed and longer spans saturate.
+    /// Does not allocate: the bounds are fixed and longer spans saturate.
     pub fn record(&mut self, span: Nanos) {
         self.histogram.saturating_record(span.0);
     }
 
-    /// The figures in microseconds. Cold.
+    /// Returns the quantiles in microseconds. Cold.
     pub fn figures(&self) -> LatencyFigures {
         let micros = |nanos: u64| nanos as f64 * 1e-3;
         let quantile = |q: f64| micros(self.histogram.value_at_quantile(q));
@@ -58,15 +58,15 @@ impl Latency {
 pub struct LatencyFigures {
     /// Number of spans.
     pub count: u64,
-    /// Median.
+    /// Median (50th percentile).
     pub p50: f64,
-    /// 99 %.
+    /// 99th percentile.
     pub p99: f64,
-    /// 99.9 %.
+    /// 99.9th percentile.
     pub p999: f64,
-    /// Longest.
+    /// Maximum.
     pub max: f64,
-    /// Upper edge in microseconds, and count.
+    /// Histogram bins: upper edge in microseconds, and count.
     pub bins: Vec<(f64, u64)>,
 }
 

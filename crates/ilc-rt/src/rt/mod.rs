@@ -1,7 +1,7 @@
-//! Real-time ground: integer time, clocks, the set-up of the loop's thread and its latency figures.
+//! Real-time basics: integer time, clocks, thread set-up and latency histograms.
 //!
-//! For whoever runs something on an absolute time grid (`servo`, the simulator, the latency test).
-//! Imports nothing of the project; everything may import it.
+//! For code that runs on an absolute time grid (`servo`, the simulator, the latency test). Imports
+//! nothing of the project; every module may import it.
 
 pub mod clock;
 pub mod latency;

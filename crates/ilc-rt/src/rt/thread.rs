@@ -1,13 +1,13 @@
-//! Asks the system for real-time treatment of this thread, and says honestly what was granted.
+//! Requests real-time scheduling of the calling thread and reports what was granted.
 
 use serde::Serialize;
 
-/// What to ask for.
+/// Requested scheduling and memory locking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RtRequest {
     /// `SCHED_FIFO` priority, 1 to 98; kernel threads need the rest.
     pub priority: i32,
-    /// Whether to keep all memory of the process resident.
+    /// Lock all memory of the process (`mlockall`).
     pub lock_memory: bool,
 }
 
@@ -17,24 +17,24 @@ impl Default for RtRequest {
     }
 }
 
-/// What was granted, and what of this machine stands in the way of punctuality.
+/// Granted scheduling, and known obstacles to punctuality on this machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RtReport {
     /// `SCHED_FIFO` or `SCHED_OTHER`.
     pub policy: String,
     /// Priority granted; 0 for `SCHED_OTHER`.
     pub priority: i32,
-    /// Whether memory is locked.
+    /// True if memory is locked.
     pub mlock: bool,
-    /// Kernel release, and whether it is a real-time one.
+    /// Kernel release, and whether it is a real-time kernel (`PREEMPT_RT`).
     pub kernel: String,
-    /// One sentence for each thing that was refused or is known to cost punctuality.
+    /// One sentence for each request that was refused and each setting known to add latency.
     pub notes: Vec<String>,
 }
 
 /// Applies `request` to the calling thread (priority) and the process (memory).
 ///
-/// Never fails: what is refused is reported, and the loop runs degraded.
+/// Never fails: refusals are reported, and the loop runs with what it has.
 #[expect(unsafe_code, reason = "the scheduler and mlockall have no safe wrapper")]
 pub fn enter(request: RtRequest) -> RtReport {
     let mut notes = Vec::new();
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_refused_priority_is_reported_not_hidden() {
-        // Runs in a thread of its own, as the policy would stick to the test runner's.
+        // Runs in its own thread, as the policy would persist in the test runner's.
         let report = std::thread::spawn(|| enter(RtRequest { priority: 1000, lock_memory: false }))
             .join()
             .unwrap();

@@ -27,7 +27,7 @@ pub fn fill(document: &str, schema: &Value) -> Result<String, String> {
             _ => continue,
         };
         let table = table.ok_or_else(|| format!("{line}: the schema has no such table"))?;
-        let _ = write!(text, "{table}{END}\n");
+        let _ = writeln!(text, "{table}{END}");
         if !lines.any(|line| line == END) {
             return Err(format!("{line}: no {END} follows"));
         }

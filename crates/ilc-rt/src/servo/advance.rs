@@ -4,13 +4,14 @@
 
 use super::cycle::Cycle;
 use super::mailbox::StopReason;
+use super::mode;
 use super::phase::Phase;
-use crate::fieldbus::cia402::{Mode, State};
+use crate::fieldbus::cia402::State;
 use crate::interpolate::PointToPoint;
 
-/// How long the axes shall rest after a stop before the drives are switched off.
+/// Rest of the axes after a stop before the drives are switched off.
 const REST_S: f64 = 0.1;
-/// How long the drives may take to switch off.
+/// Longest time of the drives to switch off.
 const DISABLE_S: f64 = 0.5;
 
 impl Cycle {
@@ -96,10 +97,7 @@ impl Cycle {
 
     /// Takes it that an axis has been commanded to stand at a place for long.
     fn hold(&mut self, axis: usize, position_m: f64) {
-        let command = match self.spec.axes[axis].mode {
-            Mode::Csp => position_m,
-            Mode::Csv => 0.0,
-        };
+        let command = mode::of(self.spec.axes[axis].mode).hold(position_m);
         for past in &mut self.commanded {
             past[axis] = command;
         }

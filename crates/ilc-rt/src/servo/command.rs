@@ -3,12 +3,13 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::cycle::Cycle;
-use super::gate::{Bounds, Gate};
+use super::gate::Bounds;
 use super::mailbox::StopReason;
+use super::mode::{self, Moment};
 use super::phase::Phase;
 use crate::fieldbus::Bus;
 use crate::fieldbus::canopen::sync;
-use crate::fieldbus::cia402::{Controlword, Mode, State, next_command};
+use crate::fieldbus::cia402::{Controlword, State, next_command};
 
 impl Cycle {
     /// Sends every drive its command, then SYNC. A frame that the bus has no room for is one that
@@ -17,24 +18,21 @@ impl Cycle {
         let mut newest = self.commanded[0];
         let mut fault = None;
         for axis in 0..self.n_axes() {
-            let scale = self.spec.axes[axis].scale;
+            let mode = mode::of(self.spec.axes[axis].mode);
             let mut target = self.target(axis);
             if !target.is_finite() {
                 fault = fault.or(Some(StopReason::NotFinite { axis }));
-                // On as before for this cycle; the stop begins from there.
-                let [last, before, _] = self.commanded;
-                target = match self.spec.axes[axis].mode {
-                    Mode::Csp => 2.0 * last[axis] - before[axis],
-                    Mode::Csv => last[axis],
-                };
+                // The stop begins from there.
+                let last = self.commanded.map(|command| command[axis]);
+                target = mode.extrapolate(last);
             }
             newest[axis] = target;
-            if let Some(counts) = scale.to_counts(target) {
-                self.drives[axis].target_counts = counts;
-            }
             let controlword = self.controlword(axis);
-            self.drives[axis].controlword = controlword;
-            let frame = self.drives[axis].command(controlword).encode(self.spec.axes[axis].node);
+            let spec = &self.spec.axes[axis];
+            let sent = &mut self.drives[axis].sent;
+            sent.controlword = controlword;
+            mode.write(target, spec.scale, sent);
+            let frame = sent.encode(spec.node);
             let _ = self.bus.send(&frame);
         }
         self.commanded = [newest, self.commanded[0], self.commanded[1]];
@@ -46,42 +44,27 @@ impl Cycle {
         }
     }
 
-    /// The bounded target of an axis: m (position-commanded) or m/s (velocity-commanded).
+    /// The bounded target of an axis, in the unit of its mode.
     fn target(&mut self, axis: usize) -> f64 {
         let spec = &self.spec.axes[axis];
         let drive = &self.drives[axis];
-        let bounds = Bounds {
-            limits: spec.limits,
-            position_min_m: spec.position_min_m,
-            position_max_m: spec.position_max_m,
-            dt_s: self.spec.cycle.as_secs_f64(),
-        };
-        let input = self.input.value()[axis];
-        match spec.mode {
-            // Until it follows, an axis is commanded to where it is, wherever that may be.
-            Mode::Csp if matches!(self.phase, Phase::Enabling { .. }) && !drive.enabled() => {
-                drive.encoder_m
-            }
-            Mode::Csp => {
-                let last = [self.commanded[0][axis], self.commanded[1][axis]];
-                let wanted_m = self.reference.position_m[axis] + input;
-                self.gates[axis].position_m(wanted_m, last, &bounds)
-            }
-            Mode::Csv => match self.phase {
-                Phase::Enabling { .. } | Phase::Disabling { .. } | Phase::Stopped => 0.0,
-                // Open loop: what is measured may be what failed.
-                Phase::Stopping { .. } => self.reference.velocity_m_s[axis],
-                Phase::Returning(_) | Phase::Settling { .. } | Phase::Running { .. } => {
-                    let control = spec.position_loop.command_m_s(
-                        self.reference.position_m[axis],
-                        self.reference.velocity_m_s[axis],
-                        drive.encoder_m,
-                    );
-                    let last_m_s = self.commanded[0][axis];
-                    Gate::velocity_m_s(control + input, last_m_s, drive.encoder_m, &bounds)
-                }
+        let now = Moment {
+            spec,
+            phase: &self.phase,
+            enabled: drive.enabled(),
+            encoder_m: drive.encoder_m,
+            reference_m: self.reference.position_m[axis],
+            reference_m_s: self.reference.velocity_m_s[axis],
+            input: self.input.value()[axis],
+            last: [self.commanded[0][axis], self.commanded[1][axis]],
+            bounds: Bounds {
+                limits: spec.limits,
+                position_min_m: spec.position_min_m,
+                position_max_m: spec.position_max_m,
+                dt_s: self.spec.cycle.as_secs_f64(),
             },
-        }
+        };
+        mode::of(spec.mode).target(&now, &mut self.gates[axis])
     }
 
     fn controlword(&self, axis: usize) -> Controlword {
@@ -96,7 +79,7 @@ impl Cycle {
             // No drive is switched on before all are known to stand where they may.
             Phase::Enabling { .. } if !self.all_heard() => Controlword::DISABLE_VOLTAGE,
             Phase::Enabling { .. } if state == State::Fault => {
-                Controlword::fault_reset_after(drive.controlword)
+                Controlword::fault_reset_after(drive.sent.controlword)
             }
             Phase::Enabling { .. }
             | Phase::Returning(_)
@@ -118,7 +101,7 @@ impl Cycle {
         }
     }
 
-    /// Whether every drive has told its state and position.
+    /// Returns whether every drive has told its state and position.
     fn all_heard(&self) -> bool {
         self.drives[..self.n_axes()].iter().all(|drive| drive.heard)
     }

@@ -5,20 +5,20 @@
 use super::gate::Gate;
 use super::input::LearnedInput;
 use super::mailbox::{LoopSide, Message, Sample, StopReason, Table};
+use super::mode;
 use super::node::Drive;
-use super::pending::Slots;
+use super::pending::PendingCycles;
 use super::phase::Phase;
 use super::spec::ServoSpec;
 use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::Bus;
-use crate::fieldbus::cia402::Mode;
 use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
 use crate::rt::Nanos;
 
 /// Longest fade of the learned input after a run.
 const FADE_MAX_S: f64 = 0.2;
 
-/// Whether the loop has more to do.
+/// True if the loop has more to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TickStatus {
     /// Tick on.
@@ -39,7 +39,7 @@ pub struct Cycle {
     pub(super) tool_m: [f64; MAX_AXES],
     /// Length of the tool's last PDO that could not be read, if there was one.
     pub(super) tool_unreadable: Option<u8>,
-    pub(super) slots: Slots,
+    pub(super) pending: PendingCycles,
     pub(super) interpolator: Interpolator,
     pub(super) input: LearnedInput,
     pub(super) phase: Phase,
@@ -79,15 +79,12 @@ impl Cycle {
     ) -> Self {
         let dt_s = spec.cycle.as_secs_f64();
         let n_axes = spec.axes.len();
-        let (mut most, mut step_max) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
+        let (mut input_max, mut step_max) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
         let limits: Vec<AxisLimits> = spec.axes.iter().map(|axis| axis.limits).collect();
         let mut start_m = [0.0; MAX_AXES];
         for (i, axis) in spec.axes.iter().enumerate().take(MAX_AXES) {
-            most[i] = axis.input_max;
-            step_max[i] = match axis.mode {
-                Mode::Csp => axis.limits.velocity_max_m_s * dt_s,
-                Mode::Csv => axis.limits.acceleration_max_m_s2 * dt_s,
-            };
+            input_max[i] = axis.input_max;
+            step_max[i] = mode::of(axis.mode).input_step_max(&axis.limits, dt_s);
             start_m[i] = spec.start_m.get(i).copied().unwrap_or(0.0);
         }
         #[expect(
@@ -102,9 +99,9 @@ impl Cycle {
             drives: [Drive::default(); MAX_AXES],
             tool_m: [0.0; MAX_AXES],
             tool_unreadable: None,
-            slots: Slots::new(n_axes, spec.tool.is_some()),
+            pending: PendingCycles::new(n_axes, spec.tool.is_some()),
             interpolator,
-            input: LearnedInput::new(most, step_max, fade_ticks),
+            input: LearnedInput::new(input_max, step_max, fade_ticks),
             phase: Phase::Enabling { ticks: 0 },
             reference: Setpoint {
                 position_m: [0.0; MAX_AXES],
@@ -134,7 +131,7 @@ impl Cycle {
         self.stall.note(missed);
         self.run_overruns = self.run_overruns.saturating_add(missed);
         let received = self.receive();
-        let nodes_wait = self.slots.waits(HOLD_AFTER);
+        let nodes_wait = self.pending.waits(HOLD_AFTER);
         if received.is_ok() && self.stall.holds(nodes_wait, self.spec.hold_cycles_max) {
             self.run_overruns = self.run_overruns.saturating_add(1);
             return TickStatus::Running;
@@ -166,7 +163,7 @@ impl Cycle {
             sample.encoder_m[axis] = drive.encoder_m;
         }
         let last_of_run = at.is_some_and(|(_, k)| k as usize + 1 == self.interpolator.n_samples());
-        self.slots.send(sample, self.commanded_position_m(), last_of_run);
+        self.pending.send(sample, self.commanded_position_m(), last_of_run);
         TickStatus::Running
     }
 
@@ -184,9 +181,8 @@ impl Cycle {
     pub(super) fn commanded_position_m(&self) -> [f64; MAX_AXES] {
         let mut position_m = self.reference.position_m;
         for (axis, spec) in self.spec.axes.iter().enumerate().take(MAX_AXES) {
-            if spec.mode == Mode::Csp {
-                position_m[axis] = self.commanded[0][axis];
-            }
+            let command = self.commanded[0][axis];
+            position_m[axis] = mode::of(spec.mode).position_m(command, position_m[axis]);
         }
         position_m
     }
@@ -210,8 +206,8 @@ impl Cycle {
 
     /// Passes on every cycle that is complete.
     fn give_out(&mut self) {
-        self.slots.watch_lag();
-        while let Some((sample, last_of_run)) = self.slots.take() {
+        self.pending.watch_lag();
+        while let Some((sample, last_of_run)) = self.pending.take() {
             self.mail.tell(Message::Sample(sample));
             if let (true, Some((run, _))) = (last_of_run, sample.at) {
                 self.mail.tell(Message::RunEnded { run, overruns: self.run_overruns });

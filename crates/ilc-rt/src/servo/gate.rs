@@ -10,13 +10,14 @@
 
 use crate::interpolate::AxisLimits;
 
-/// How much faster than the axis' own limit a command may change while it keeps all other limits.
+/// Multiple of the acceleration limit of the axis at which a command may change while it keeps all other
+/// limits.
 ///
 /// The program keeps the acceleration limit. What is learned on top of it makes up for the lag of the
 /// drive, and so changes faster than the axis will ever move: that shall pass.
 const LEARNED_SHARE: f64 = 4.0;
 
-/// What a gate has to keep.
+/// Limits that a gate keeps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     pub(super) limits: AxisLimits,
@@ -38,9 +39,9 @@ impl Bounds {
 /// The gate of an axis.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gate {
-    /// What was asked for last.
+    /// Last position asked for.
     asked_m: f64,
-    /// Whether the command is not yet what is asked for.
+    /// True if the command is not yet what is asked for.
     behind: bool,
 }
 
@@ -165,8 +166,8 @@ mod tests {
             let wanted = |t: f64| 0.06 + amplitude_m * t.min(1.0) * (TAU * frequency_hz * t).sin();
             let out = commands(0.06, 5000, wanted);
             assert!(out.iter().all(|m| (-0.02..=0.08).contains(m)));
-            let most = largest_acceleration(&out);
-            assert!(most <= 1.15 * 8.0, "{amplitude_m} {frequency_hz}: {most} m/s2");
+            let max = largest_acceleration(&out);
+            assert!(max <= 1.15 * 8.0, "{amplitude_m} {frequency_hz}: {max} m/s2");
         }
     }
 

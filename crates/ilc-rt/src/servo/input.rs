@@ -8,7 +8,7 @@ use crate::interpolate::MAX_AXES;
 /// The learned input of all axes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LearnedInput {
-    most: [f64; MAX_AXES],
+    max: [f64; MAX_AXES],
     slew: [SlewLimiter; MAX_AXES],
     value: [f64; MAX_AXES],
     fade_from: [f64; MAX_AXES],
@@ -17,10 +17,10 @@ pub(super) struct LearnedInput {
 }
 
 impl LearnedInput {
-    /// `most` bounds the input, `step_max` its change in a tick; a fade takes `fade_ticks`.
-    pub(super) fn new(most: [f64; MAX_AXES], step_max: [f64; MAX_AXES], fade_ticks: u32) -> Self {
+    /// `max` bounds the input, `step_max` its change in a tick; a fade takes `fade_ticks`.
+    pub(super) fn new(max: [f64; MAX_AXES], step_max: [f64; MAX_AXES], fade_ticks: u32) -> Self {
         Self {
-            most,
+            max,
             slew: step_max.map(SlewLimiter::new),
             value: [0.0; MAX_AXES],
             fade_from: [0.0; MAX_AXES],
@@ -41,7 +41,7 @@ impl LearnedInput {
     pub(super) fn follow(&mut self, row: &[f64]) -> Result<(), usize> {
         let mut bad = Ok(());
         for (axis, &wanted) in row.iter().enumerate().take(MAX_AXES) {
-            let bounded = clamp_finite(wanted, self.most[axis]);
+            let bounded = clamp_finite(wanted, self.max[axis]);
             if bounded.finite {
                 self.value[axis] = self.slew[axis].next(bounded.value);
             } else {
@@ -75,7 +75,7 @@ impl LearnedInput {
         self.fade_tick = self.fade_ticks;
     }
 
-    /// Whether no input is left.
+    /// Returns whether no input is left.
     pub(super) fn faded(&self) -> bool {
         self.fade_tick >= self.fade_ticks
     }

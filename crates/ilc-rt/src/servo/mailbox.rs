@@ -1,4 +1,4 @@
-//! What passes between the servo cycle and the rest, without locks and without allocation.
+//! Messages between the servo cycle and its owner, without locks and without allocation.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -27,11 +27,11 @@ pub struct Sample {
     pub encoder_m: [f64; MAX_AXES],
     /// Tool centre point; zeros without such a measurement.
     pub tool_m: [f64; MAX_AXES],
-    /// Whether a measurement never came and an older one stands here.
+    /// True if a measurement never came and an older one stands here.
     pub missing: bool,
 }
 
-/// Why the axes were brought to rest ahead of time.
+/// Reason of a stop ahead of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StopReason {
     /// Asked to, with the number of the signal.
@@ -91,10 +91,10 @@ pub enum StopReason {
     NodeStopped {
         /// CANopen node.
         node: u8,
-        /// What it is instead.
+        /// Its state instead.
         state: NmtState,
     },
-    /// Somebody else commands on the bus.
+    /// Another master commands on the bus.
     OtherMaster(Stranger),
     /// Command and encoder came too far apart.
     FollowingError {
@@ -107,7 +107,7 @@ pub enum StopReason {
     OutsideLimits {
         /// Axis.
         axis: usize,
-        /// Where it stands.
+        /// Its position.
         position_m: f64,
     },
     /// A position jumped farther than the axis can move.
@@ -138,7 +138,7 @@ pub enum StopReason {
     Bus(BusError),
 }
 
-/// What another master was seen to send.
+/// Traffic of another master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stranger {
     /// SYNC.
@@ -177,8 +177,7 @@ impl StopReason {
     }
 }
 
-/// What the loop reports.
-#[expect(clippy::large_enum_variant, reason = "a box would be allocated in the tick")]
+/// A message of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message {
     /// A cycle.
@@ -199,6 +198,8 @@ pub enum Message {
         /// Cycles in it that began a whole cycle late.
         overruns: u32,
     },
+    /// A cycle before a stop, complete or not; they come oldest first, and then the stop.
+    Before(Sample),
     /// The axes are being stopped.
     Stopping(StopReason),
 }
@@ -210,7 +211,7 @@ pub(super) struct Table {
     pub(super) input: Box<[f64]>,
 }
 
-/// The supervisor's side.
+/// The campaign's side.
 #[derive(Debug)]
 pub struct Mailbox {
     messages: Consumer<Message>,
@@ -271,7 +272,7 @@ impl Mailbox {
 }
 
 impl LoopSide {
-    /// Reports; counts what nobody has room for.
+    /// Reports; counts messages without room.
     #[expect(clippy::large_types_passed_by_value, reason = "it moves into the ring")]
     pub(super) fn tell(&mut self, message: Message) {
         if self.messages.push(message).is_err() {

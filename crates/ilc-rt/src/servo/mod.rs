@@ -1,7 +1,7 @@
 //! The servo cycle: receive, measure, control, add the learned input, limit, send.
 //!
 //! Hot from end to end and ignorant of learning: it is handed a table of inputs and gives back
-//! samples. The supervisor sets it up, paces it (on the clock or in lock-step) and reads its mailbox.
+//! samples. The campaign sets it up, paces it (on the clock or in lock-step) and reads its mailbox.
 
 mod advance;
 mod command;
@@ -9,6 +9,7 @@ mod cycle;
 mod gate;
 mod input;
 mod mailbox;
+mod mode;
 mod node;
 mod pending;
 mod phase;

@@ -1,13 +1,13 @@
-//! What the loop knows of one drive: its last answer, and what it was last told.
+//! State of one drive in the loop: its last answer, and the last command to it.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use crate::fieldbus::cia402::{Command, Controlword, State, Status, Statusword};
+use crate::fieldbus::cia402::{CommandRpdo1, Controlword, State, StatusTpdo1, Statusword};
 
 /// One drive as last heard.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Drive {
-    /// Whether it has answered at all.
+    /// True if it has answered at all.
     pub(super) heard: bool,
     /// Last statusword.
     pub(super) statusword: u16,
@@ -17,18 +17,16 @@ pub(super) struct Drive {
     pub(super) following_error_m: f64,
     /// Last emergency code since it was switched on.
     pub(super) emergency: Option<u16>,
-    /// Whether it is lost and shall only be told to stop.
+    /// True if it is lost and shall only be told to stop.
     pub(super) lost: bool,
-    /// Whether what it measures is not to be trusted any more.
+    /// True if what it measures is not to be trusted any more.
     pub(super) distrusted: bool,
     /// Distance of the last two positions, if it is farther than the axis can move.
     pub(super) jump_m: Option<f64>,
     /// Length of the last TPDO1 and TPDO2 that could not be read, if there was one.
     pub(super) unreadable: [Option<u8>; 2],
-    /// Last controlword sent.
-    pub(super) controlword: Controlword,
-    /// Last target sent.
-    pub(super) target_counts: i32,
+    /// Last command sent.
+    pub(super) sent: CommandRpdo1,
 }
 
 impl Default for Drive {
@@ -43,15 +41,18 @@ impl Default for Drive {
             distrusted: false,
             jump_m: None,
             unreadable: [None; 2],
-            controlword: Controlword::DISABLE_VOLTAGE,
-            target_counts: 0,
+            sent: CommandRpdo1 {
+                controlword: Controlword::DISABLE_VOLTAGE,
+                target_counts: 0,
+                torque_offset: 0,
+            },
         }
     }
 }
 
 impl Drive {
     /// Takes over a status, its position already in metres.
-    pub(super) fn status(&mut self, status: Status, encoder_m: f64) {
+    pub(super) fn status(&mut self, status: StatusTpdo1, encoder_m: f64) {
         let was_enabled = self.enabled();
         self.heard = true;
         self.statusword = status.statusword.0;
@@ -67,18 +68,13 @@ impl Drive {
         Statusword(self.statusword).state()
     }
 
-    /// Whether it follows commands.
+    /// Returns whether it follows commands.
     pub(super) fn enabled(&self) -> bool {
         self.heard && self.state() == Some(State::OperationEnabled)
     }
 
-    /// Whether it has stopped itself.
+    /// Returns whether it has stopped itself.
     pub(super) fn faulted(&self) -> bool {
         matches!(self.state(), Some(State::Fault | State::FaultReactionActive))
-    }
-
-    /// The command with this controlword and the last target.
-    pub(super) fn command(&self, controlword: Controlword) -> Command {
-        Command { controlword, target_counts: self.target_counts, torque_offset: 0 }
     }
 }

@@ -26,25 +26,25 @@ const PARTS_MAX: usize = 2 * MAX_AXES + 1;
 pub(super) enum Part {
     /// State and position of an axis.
     Status(usize),
-    /// What else the drive of an axis sends.
-    Extra(usize),
+    /// Velocity and following error of an axis.
+    DriveMotion(usize),
     /// The tool.
     Tool,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Slot {
+struct PendingCycle {
     sample: Sample,
     /// Position that each axis was commanded to, m.
     commanded_m: [f64; MAX_AXES],
     last_of_run: bool,
     /// SYNCs sent when each part came; 0 if it has not.
     came: [u64; PARTS_MAX],
-    /// Whether something in this cycle makes its measurement worthless.
+    /// True if something in this cycle makes its measurement worthless.
     spoiled: bool,
 }
 
-/// How far one part is.
+/// Progress of one part of the answers.
 #[derive(Clone, Copy, Debug, Default)]
 struct Lag {
     answers: u64,
@@ -52,7 +52,7 @@ struct Lag {
     settled: u64,
     /// Ticks with an answer since then, and the smallest lag in them.
     ticks: u32,
-    least: u64,
+    min: u64,
     /// SYNCs since the last answer.
     silent: u64,
     came: bool,
@@ -61,8 +61,8 @@ struct Lag {
 
 /// The cycles under way.
 #[derive(Clone, Debug)]
-pub(super) struct Slots {
-    ring: [Slot; DEPTH],
+pub(super) struct PendingCycles {
+    ring: [PendingCycle; DEPTH],
     lags: [Lag; PARTS_MAX],
     n_axes: usize,
     n_parts: usize,
@@ -71,12 +71,12 @@ pub(super) struct Slots {
     spoil_next: bool,
 }
 
-impl Slots {
+impl PendingCycles {
     #[expect(clippy::large_stack_arrays, reason = "made once, before the loop starts")]
     pub(super) fn new(n_axes: usize, has_tool: bool) -> Self {
         let n_axes = n_axes.min(MAX_AXES);
         Self {
-            ring: [Slot::default(); DEPTH],
+            ring: [PendingCycle::default(); DEPTH],
             lags: [Lag::default(); PARTS_MAX],
             n_axes,
             n_parts: 2 * n_axes + usize::from(has_tool),
@@ -98,7 +98,7 @@ impl Slots {
         sample.sync = self.sent;
         let spoiled = std::mem::take(&mut self.spoil_next);
         self.ring[index(self.sent)] =
-            Slot { sample, commanded_m, last_of_run, came: [0; PARTS_MAX], spoiled };
+            PendingCycle { sample, commanded_m, last_of_run, came: [0; PARTS_MAX], spoiled };
         self.sent += 1;
         for lag in &mut self.lags[..self.n_parts] {
             lag.silent += 1;
@@ -115,7 +115,7 @@ impl Slots {
         let Some(number) = self.number(part) else { return };
         let lag = &mut self.lags[number];
         if lag.answers >= self.sent {
-            // Nothing asked for it: of two answers to one SYNC nobody knows which is the right one.
+            // Nothing asked for it: of two answers to one SYNC it is not known which is right.
             if self.sent > self.given {
                 self.ring[index(self.sent - 1)].spoiled = true;
             }
@@ -126,10 +126,20 @@ impl Slots {
         lag.silent = 0;
         lag.came = true;
         if sync >= self.given {
-            let slot = &mut self.ring[index(sync)];
-            slot.came[number] = self.sent;
-            write(&mut slot.sample, part, value);
+            let cycle = &mut self.ring[index(sync)];
+            cycle.came[number] = self.sent;
+            write(&mut cycle.sample, part, value);
         }
+    }
+
+    /// The last cycles that were sent, oldest first, also those that wait for answers.
+    pub(super) fn last(&self, n_cycles: u64) -> impl Iterator<Item = Sample> + '_ {
+        let first = self.sent.saturating_sub(n_cycles.min(DEPTH as u64));
+        (first..self.sent).map(|sync| {
+            let cycle = &self.ring[index(sync)];
+            let missing = cycle.spoiled || cycle.came[..self.n_parts].contains(&0);
+            Sample { missing, ..cycle.sample }
+        })
     }
 
     /// Position that an axis had been commanded to at the SYNC that its newest answer belongs to, m.
@@ -149,12 +159,12 @@ impl Slots {
         self.number(part).map_or(0, |number| self.lags[number].silent)
     }
 
-    /// Whether a part that is not given up has stayed away for the last `n_cycles` SYNCs.
+    /// Returns whether a part that is not given up has stayed away for the last `n_cycles` SYNCs.
     pub(super) fn waits(&self, n_cycles: u64) -> bool {
         self.lags[..self.n_parts].iter().any(|lag| !lag.given_up && lag.silent >= n_cycles)
     }
 
-    /// Whether a part is no longer waited for.
+    /// Returns whether a part is no longer waited for.
     pub(super) fn is_given_up(&self, part: Part) -> bool {
         self.number(part).is_some_and(|number| self.lags[number].given_up)
     }
@@ -166,7 +176,7 @@ impl Slots {
         }
     }
 
-    /// Whether every part that is not given up has answered every SYNC.
+    /// Returns whether every part that is not given up has answered every SYNC.
     pub(super) fn all_answered(&self) -> bool {
         self.lags[..self.n_parts].iter().all(|lag| lag.given_up || lag.answers == self.sent)
     }
@@ -185,10 +195,10 @@ impl Slots {
             if !came {
                 continue;
             }
-            lag.least = if lag.ticks == 0 { behind } else { lag.least.min(behind) };
+            lag.min = if lag.ticks == 0 { behind } else { lag.min.min(behind) };
             lag.ticks += 1;
             if lag.ticks >= LAG_TICKS {
-                let lost = lag.least;
+                let lost = lag.min;
                 self.skip(number, lost);
             }
         }
@@ -210,9 +220,9 @@ impl Slots {
             clear &= own < newer;
             newer = own;
             let value = read(&self.ring[index(sync)].sample, part);
-            let slot = &mut self.ring[index(own)];
-            slot.came[number] = came;
-            write(&mut slot.sample, part, value);
+            let cycle = &mut self.ring[index(own)];
+            cycle.came[number] = came;
+            write(&mut cycle.sample, part, value);
         }
         if !clear {
             // Two came at once, so that it is not known which SYNC each belongs to.
@@ -233,25 +243,25 @@ impl Slots {
         if self.given == self.sent {
             return None;
         }
-        let slot = &mut self.ring[index(self.given)];
+        let cycle = &mut self.ring[index(self.given)];
         let complete = self.lags[..self.n_parts]
             .iter()
-            .zip(&slot.came)
+            .zip(&cycle.came)
             .all(|(lag, came)| *came > 0 && self.given < lag.settled);
         // What is settled and has not come never will.
         let hopeless = self.lags[..self.n_parts].iter().all(|lag| self.given < lag.settled);
         if !complete && !hopeless && self.sent - self.given <= PATIENCE {
             return None;
         }
-        slot.sample.missing = !complete || slot.spoiled;
+        cycle.sample.missing = !complete || cycle.spoiled;
         self.given += 1;
-        Some((slot.sample, slot.last_of_run))
+        Some((cycle.sample, cycle.last_of_run))
     }
 
     fn number(&self, part: Part) -> Option<usize> {
         let number = match part {
             Part::Status(axis) => 2 * axis,
-            Part::Extra(axis) => 2 * axis + 1,
+            Part::DriveMotion(axis) => 2 * axis + 1,
             Part::Tool => 2 * self.n_axes,
         };
         (number < self.n_parts).then_some(number)
@@ -261,7 +271,7 @@ impl Slots {
         match (number / 2, number % 2) {
             (axis, _) if axis >= self.n_axes => Part::Tool,
             (axis, 0) => Part::Status(axis),
-            (axis, _) => Part::Extra(axis),
+            (axis, _) => Part::DriveMotion(axis),
         }
     }
 }
@@ -269,7 +279,7 @@ impl Slots {
 fn write(sample: &mut Sample, part: Part, value: [f64; 2]) {
     match part {
         Part::Status(axis) => sample.encoder_m[axis] = value[0],
-        Part::Extra(_) => {}
+        Part::DriveMotion(_) => {}
         Part::Tool => sample.tool_m[..2].copy_from_slice(&value),
     }
 }
@@ -277,7 +287,7 @@ fn write(sample: &mut Sample, part: Part, value: [f64; 2]) {
 fn read(sample: &Sample, part: Part) -> [f64; 2] {
     match part {
         Part::Status(axis) => [sample.encoder_m[axis], 0.0],
-        Part::Extra(_) => [0.0; 2],
+        Part::DriveMotion(_) => [0.0; 2],
         Part::Tool => [sample.tool_m[0], sample.tool_m[1]],
     }
 }
@@ -295,159 +305,4 @@ fn index(sync: u64) -> usize {
     clippy::float_cmp,
     reason = "tests are cold, and exact where exactness is promised"
 )]
-mod tests {
-    use std::collections::BTreeSet;
-
-    use super::*;
-
-    /// Both PDOs of an axis.
-    fn answer(slots: &mut Slots, axis: usize, value: f64) {
-        slots.answer(Part::Status(axis), [value, 0.0]);
-        slots.answer(Part::Extra(axis), [0.0; 2]);
-    }
-
-    #[test]
-    fn a_late_answer_lands_in_its_own_cycle() {
-        let mut slots = Slots::new(2, false);
-        slots.send(Sample::default(), [0.0; MAX_AXES], false);
-        answer(&mut slots, 0, 10.0);
-        slots.watch_lag();
-        assert!(slots.take().is_none(), "node 1 has not answered");
-        slots.send(Sample::default(), [0.0; MAX_AXES], true);
-        answer(&mut slots, 1, 20.0);
-        answer(&mut slots, 1, 21.0);
-        answer(&mut slots, 0, 11.0);
-        slots.watch_lag();
-        let (first, last) = slots.take().unwrap();
-        assert_eq!((first.encoder_m[0], first.encoder_m[1], last), (10.0, 20.0, false));
-        let (second, last) = slots.take().unwrap();
-        assert_eq!((second.encoder_m[0], second.encoder_m[1], last), (11.0, 21.0, true));
-        assert!(slots.all_answered());
-    }
-
-    /// Lets `n` cycles pass; `deliver` says which answers of PDO 1 come in the tick after each SYNC.
-    fn pass(n: u64, mut deliver: impl FnMut(u64, &mut Vec<u64>)) -> Vec<Sample> {
-        let mut slots = Slots::new(1, false);
-        let mut out = Vec::new();
-        let mut coming = Vec::new();
-        for sync in 0..n {
-            slots.send(Sample::default(), [0.0; MAX_AXES], false);
-            deliver(sync, &mut coming);
-            for of in coming.drain(..) {
-                slots.answer(Part::Status(0), [of as f64, 0.0]);
-            }
-            slots.answer(Part::Extra(0), [0.0; 2]);
-            slots.watch_lag();
-            while let Some((sample, _)) = slots.take() {
-                out.push(sample);
-            }
-        }
-        out
-    }
-
-    /// Cycles whose measurement is missing; no other may be wrong.
-    fn missing(samples: &[Sample]) -> BTreeSet<u64> {
-        for sample in samples.iter().filter(|sample| !sample.missing) {
-            assert_eq!(sample.encoder_m[0], sample.sync as f64, "in the wrong cycle");
-        }
-        samples.iter().filter(|sample| sample.missing).map(|sample| sample.sync).collect()
-    }
-
-    #[test]
-    fn lost_answers_are_missing_and_shift_nothing() {
-        for n_lost in [1, 2, 10, 19] {
-            let out = pass(200, |sync, coming| {
-                if !(50..50 + n_lost).contains(&sync) {
-                    coming.push(sync);
-                }
-            });
-            assert_eq!(missing(&out), (50..50 + n_lost).collect(), "{n_lost}");
-            assert!(out.len() > 190);
-        }
-    }
-
-    #[test]
-    fn late_answers_are_not_missing() {
-        for n_late in [1, 2, 10, 19] {
-            let out = pass(200, |sync, coming| {
-                if !(50..50 + n_late).contains(&sync) {
-                    coming.extend((50..50 + n_late).filter(|_| sync == 50 + n_late));
-                    coming.push(sync);
-                }
-            });
-            assert_eq!(missing(&out), BTreeSet::new(), "{n_late}");
-        }
-    }
-
-    #[test]
-    fn a_doubled_answer_makes_its_cycle_missing() {
-        let out = pass(100, |sync, coming| {
-            coming.push(sync);
-            if sync == 50 {
-                coming.push(sync);
-            }
-        });
-        assert_eq!(missing(&out), BTreeSet::from([50]));
-    }
-
-    #[test]
-    fn whatever_comes_and_does_not_nothing_is_put_in_the_wrong_cycle_for_long() {
-        let mut state = 7_u64;
-        let mut random = move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            state >> 33
-        };
-        // Losses far enough from each other to be told apart.
-        let lost: BTreeSet<u64> = (1..40).map(|n| n * 50 + random() % 20).collect();
-        let out = pass(2100, |sync, coming| {
-            if !lost.contains(&sync) {
-                coming.push(sync);
-            }
-        });
-        assert_eq!(missing(&out), lost);
-        // Losses at random, close to each other: missing at least, and never believed to be right.
-        let out = pass(5000, |sync, coming| {
-            if random() % 12 > 0 {
-                coming.push(sync);
-            }
-        });
-        assert!(missing(&out).len() > 300);
-    }
-
-    #[test]
-    fn a_late_position_belongs_to_the_command_that_it_answers() {
-        let mut slots = Slots::new(1, false);
-        assert_eq!(slots.answered_command_m(0), None);
-        for n in 0..4 {
-            slots.send(Sample::default(), [f64::from(n); MAX_AXES], false);
-        }
-        answer(&mut slots, 0, 0.0);
-        assert_eq!(slots.answered_command_m(0), Some(0.0));
-        for n in 1..4 {
-            answer(&mut slots, 0, f64::from(n));
-            assert_eq!(slots.answered_command_m(0), Some(f64::from(n)));
-        }
-    }
-
-    #[test]
-    fn one_pdo_of_two_is_not_enough() {
-        let mut slots = Slots::new(1, true);
-        for _ in 0..60 {
-            slots.send(
-                Sample { encoder_m: [7.0; MAX_AXES], ..Default::default() },
-                [0.0; MAX_AXES],
-                false,
-            );
-            slots.answer(Part::Extra(0), [0.0; 2]);
-            slots.answer(Part::Tool, [1.0, 2.0]);
-            slots.watch_lag();
-        }
-        assert_eq!((slots.lag(Part::Status(0)), slots.silence(Part::Status(0))), (60, 60));
-        assert_eq!((slots.lag(Part::Extra(0)), slots.lag(Part::Tool)), (0, 0));
-        let (sample, _) = slots.take().unwrap();
-        assert!(sample.missing && (sample.encoder_m[0] - 7.0).abs() < 1e-15);
-        assert_eq!(sample.tool_m[..2], [1.0, 2.0]);
-    }
-}
+mod tests;

@@ -1,4 +1,4 @@
-//! What the axes are doing.
+//! Phases of the motion.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 

@@ -5,7 +5,7 @@
 use super::cycle::{Cycle, TickStatus};
 use crate::rt::{Latency, MonotonicClock, Nanos};
 
-/// How punctual the loop was.
+/// Timing of the loop.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
     /// From a tick's place on the grid to its beginning.

@@ -11,8 +11,8 @@ use super::phase::Phase;
 use super::silence::saturate;
 use super::spec::Pace;
 use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
-use crate::fieldbus::cia402::pdo_map::{ENCODER_PDO, EXTRA_PDO, STATUS_PDO};
-use crate::fieldbus::cia402::{EncoderSample, Extra, State, Status};
+use crate::fieldbus::cia402::pdo_map::{DRIVE_MOTION_PDO, ENCODER_PDO, STATUS_PDO};
+use crate::fieldbus::cia402::{DriveMotionTpdo2, EncoderSample, State, StatusTpdo1};
 use crate::fieldbus::{Bus, Frame};
 
 /// Most frames taken in one tick, so that a babbling bus cannot hold the loop.
@@ -33,7 +33,7 @@ impl Cycle {
         let mut left = Ok(());
         for _ in 0..FRAMES_MAX {
             let timeout = match self.spec.pace {
-                Pace::Answers(patience) if !self.slots.all_answered() => patience,
+                Pace::Answers(patience) if !self.pending.all_answered() => patience,
                 _ => Duration::ZERO,
             };
             match self.bus.recv(timeout) {
@@ -43,7 +43,7 @@ impl Cycle {
             }
         }
         // Answers may lie behind the flood.
-        self.slots.spoil_next();
+        self.pending.spoil_next();
         left
     }
 
@@ -78,10 +78,10 @@ impl Cycle {
         for axis in 0..self.n_axes() {
             let spec = &self.spec.axes[axis];
             let drive = &mut self.drives[axis];
-            if let Some(status) = Status::decode(frame, spec.node) {
+            if let Some(status) = StatusTpdo1::decode(frame, spec.node) {
                 let encoder_m = spec.scale.to_si(status.position_counts);
                 #[expect(clippy::cast_precision_loss, reason = "a count of cycles")]
-                let cycles = self.slots.silence(Part::Status(axis)).max(1) as f64;
+                let cycles = self.pending.silence(Part::Status(axis)).max(1) as f64;
                 let way_m = spec.limits.velocity_max_m_s * self.spec.cycle.as_secs_f64() * cycles;
                 let step_m = encoder_m - drive.encoder_m;
                 if drive.heard
@@ -90,18 +90,18 @@ impl Cycle {
                     drive.jump_m = drive.jump_m.or(Some(step_m));
                 }
                 drive.status(status, encoder_m);
-                self.slots.answer(Part::Status(axis), [encoder_m, 0.0]);
+                self.pending.answer(Part::Status(axis), [encoder_m, 0.0]);
                 return true;
             }
-            if let Some(extra) = Extra::decode(frame, spec.node) {
+            if let Some(extra) = DriveMotionTpdo2::decode(frame, spec.node) {
                 // In a fault it has no demand any more; what led there is the last one before.
                 if !drive.faulted() {
                     drive.following_error_m = spec.scale.to_si(extra.following_error_counts);
                 }
-                self.slots.answer(Part::Extra(axis), [0.0; 2]);
+                self.pending.answer(Part::DriveMotion(axis), [0.0; 2]);
                 return true;
             }
-            let unreadable = [STATUS_PDO, EXTRA_PDO]
+            let unreadable = [STATUS_PDO, DRIVE_MOTION_PDO]
                 .iter()
                 .position(|pdo| frame.id() == pdo.default_cob_id(spec.node));
             if let Some(pdo) = unreadable {
@@ -113,7 +113,7 @@ impl Cycle {
         if let Some(measured) = EncoderSample::decode(frame, tool.node) {
             self.tool_m[0] = tool.scale.to_si(measured.x_counts);
             self.tool_m[1] = tool.scale.to_si(measured.y_counts);
-            self.slots.answer(Part::Tool, [self.tool_m[0], self.tool_m[1]]);
+            self.pending.answer(Part::Tool, [self.tool_m[0], self.tool_m[1]]);
             return true;
         }
         if frame.id() == ENCODER_PDO.default_cob_id(tool.node) {
@@ -123,7 +123,7 @@ impl Cycle {
         false
     }
 
-    /// Whether a node belongs to this cell.
+    /// Returns whether a node belongs to this cell.
     pub(super) fn is_ours(&self, node: NodeId) -> bool {
         self.spec.axes.iter().any(|axis| axis.node == node)
             || self.spec.tool.is_some_and(|tool| tool.node == node)
@@ -167,7 +167,7 @@ impl Cycle {
                 return None;
             }
             if !drive.heard {
-                return Some(self.silent_axis(axis, self.slots.silence(Part::Status(axis))));
+                return Some(self.silent_axis(axis, self.pending.silence(Part::Status(axis))));
             }
             return Some(StopReason::NotEnabled { axis, statusword: drive.statusword });
         }
@@ -192,9 +192,9 @@ impl Cycle {
         }
         // A position that came late answers an earlier command; one that has not come for long is held
         // against the newest.
-        let silence = self.slots.silence(Part::Status(axis));
+        let silence = self.pending.silence(Part::Status(axis));
         let stale = silence > STALE_CYCLES;
-        let commanded_m = match self.slots.answered_command_m(axis) {
+        let commanded_m = match self.pending.answered_command_m(axis) {
             Some(commanded_m) if !stale => commanded_m,
             _ => self.commanded_position_m()[axis],
         };

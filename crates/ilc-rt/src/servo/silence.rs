@@ -4,10 +4,10 @@
 
 use super::cycle::Cycle;
 use super::mailbox::StopReason;
+use super::mode;
 use super::pending::Part;
 use super::phase::Phase;
 use super::spec::Pace;
-use crate::fieldbus::cia402::Mode;
 
 /// Cycles that a position may be old when a velocity is computed from it in a run that counts.
 const OLD_CYCLES: u64 = 2;
@@ -16,31 +16,31 @@ impl Cycle {
     /// The first part that has been silent for too long, each one told once.
     pub(super) fn find_silence(&mut self) -> Option<StopReason> {
         // Paced by answers, the wait is over when this is asked: one unanswered SYNC is silence.
-        let most = match self.spec.pace {
+        let max = match self.spec.pace {
             Pace::Answers(_) => 0,
             Pace::Clock => u64::from(self.spec.silent_cycles_max),
         };
         let mut found = None;
         for axis in 0..self.n_axes() {
-            for part in [Part::Status(axis), Part::Extra(axis)] {
-                let silence = self.slots.silence(part);
-                if silence <= most || self.slots.is_given_up(part) {
+            for part in [Part::Status(axis), Part::DriveMotion(axis)] {
+                let silence = self.pending.silence(part);
+                if silence <= max || self.pending.is_given_up(part) {
                     continue;
                 }
                 found = found.or(Some(self.silent_part(axis, part, silence)));
-                self.slots.give_up(part);
+                self.pending.give_up(part);
                 if part == Part::Status(axis) {
                     // Its state is not known any more, so that it can only be told to stop.
                     self.drives[axis].lost = true;
                 }
             }
         }
-        let silence = self.slots.silence(Part::Tool);
+        let silence = self.pending.silence(Part::Tool);
         if let Some(tool) = self.spec.tool
-            && silence > most
-            && !self.slots.is_given_up(Part::Tool)
+            && silence > max
+            && !self.pending.is_given_up(Part::Tool)
         {
-            self.slots.give_up(Part::Tool);
+            self.pending.give_up(Part::Tool);
             let reason = match self.tool_unreadable {
                 Some(n_bytes) => StopReason::WrongLength { node: tool.node.get(), pdo: 1, n_bytes },
                 None => StopReason::SilentTool { cycles: saturate(silence) },
@@ -50,18 +50,18 @@ impl Cycle {
         found
     }
 
-    /// Why a part of an axis stays away, as far as that can be told.
+    /// Returns the reason that a part of an axis stays away, as far as it is known.
     fn silent_part(&self, axis: usize, part: Part, silence: u64) -> StopReason {
         let (pdo, other) = match part {
-            Part::Extra(_) => (2, Part::Status(axis)),
-            Part::Status(_) | Part::Tool => (1, Part::Extra(axis)),
+            Part::DriveMotion(_) => (2, Part::Status(axis)),
+            Part::Status(_) | Part::Tool => (1, Part::DriveMotion(axis)),
         };
         if let Some(n_bytes) = self.drives[axis].unreadable[usize::from(pdo - 1)] {
             let node = self.spec.axes[axis].node.get();
             return StopReason::WrongLength { node, pdo, n_bytes };
         }
         // Both fall silent together if the node does; a cycle between them is chance.
-        if 2 * self.slots.silence(other) > silence {
+        if 2 * self.pending.silence(other) > silence {
             return self.silent_axis(axis, silence);
         }
         StopReason::SilentPdo { axis, pdo, cycles: saturate(silence) }
@@ -82,11 +82,11 @@ impl Cycle {
             return;
         }
         let is_old = (0..self.n_axes()).any(|axis| {
-            self.spec.axes[axis].mode == Mode::Csv
-                && self.slots.lag(Part::Status(axis)) > OLD_CYCLES
+            mode::of(self.spec.axes[axis].mode).closes_position_loop()
+                && self.pending.lag(Part::Status(axis)) > OLD_CYCLES
         });
         if is_old {
-            self.slots.spoil_next();
+            self.pending.spoil_next();
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What the servo cycle is told once: its nodes, their limits, and its own patience.
+//! Configuration of the servo cycle: its nodes, their limits, and its time-outs.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -42,7 +42,7 @@ pub struct ToolSpec {
     pub scale: Scale,
 }
 
-/// What sets the pace.
+/// Source of the pace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// The clock; answers that are not there are late.
@@ -60,7 +60,7 @@ pub struct ServoSpec {
     pub tool: Option<ToolSpec>,
     /// Servo cycle.
     pub cycle: Nanos,
-    /// What sets the pace.
+    /// Source of the pace.
     pub pace: Pace,
     /// Number of the first run, and of the run after the last one.
     pub runs: std::ops::Range<u32>,
@@ -70,7 +70,7 @@ pub struct ServoSpec {
     pub return_feed_m_s: f64,
     /// Rest between the arrival at the start and the run.
     pub settle_ticks: u32,
-    /// How long a drive may take to be switched on.
+    /// Longest time of a drive to be switched on.
     pub enable_ticks: u32,
     /// Consecutive unanswered cycles at which a node is lost.
     pub silent_cycles_max: u32,

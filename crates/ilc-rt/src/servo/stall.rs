@@ -12,7 +12,7 @@ pub(super) const HOLD_AFTER: u64 = 5;
 /// Cycles for which a stall is remembered as the cause of what a drive reports.
 const BLAMED_FOR: u32 = 25;
 
-/// What the loop knows of its own stalls.
+/// Stalls of the loop itself.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stall {
     /// Cycles missed in a row, up to now.
@@ -45,13 +45,13 @@ impl Stall {
         (self.last > 1 && self.since <= BLAMED_FOR).then_some(self.last)
     }
 
-    /// Whether to hold still in this tick, as nodes do not answer and patience is left.
-    pub(super) fn holds(&mut self, nodes_wait: bool, most: u32) -> bool {
+    /// Returns whether to hold still in this tick, as nodes do not answer and patience is left.
+    pub(super) fn holds(&mut self, nodes_wait: bool, max: u32) -> bool {
         if !nodes_wait {
             self.held = 0;
             return false;
         }
-        if self.held >= most {
+        if self.held >= max {
             return false;
         }
         self.held += 1;

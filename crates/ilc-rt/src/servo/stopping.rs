@@ -1,4 +1,4 @@
-//! How a stop begins: every axis to rest from what it was commanded, whatever has failed.
+//! Begin of a stop: every axis to rest from what it was commanded, whatever has failed.
 //!
 //! A stop is open loop in both modes. Its set points start from the last commands, learned input
 //! included, so that nothing steps; and no measurement takes part in it, so that one that froze, is
@@ -9,9 +9,12 @@
 
 use super::cycle::Cycle;
 use super::mailbox::{Message, StopReason};
+use super::mode;
 use super::phase::Phase;
-use crate::fieldbus::cia402::Mode;
 use crate::interpolate::{ControlledStop, MAX_AXES};
+
+/// Cycles before a stop that are reported with it.
+pub(super) const CYCLES_TOLD: u64 = 32;
 
 impl Cycle {
     /// Begins a controlled stop of all axes, unless one is under way or nothing moves any more.
@@ -26,6 +29,9 @@ impl Cycle {
             return;
         }
         self.stopping = Some(reason);
+        for sample in self.pending.last(CYCLES_TOLD) {
+            self.mail.tell(Message::Before(sample));
+        }
         self.mail.tell(Message::Stopping(reason));
         if let Some(axis) = reason.distrusted() {
             self.drives[axis.min(MAX_AXES - 1)].distrusted = true;
@@ -35,23 +41,14 @@ impl Cycle {
             return;
         }
         let dt_s = self.spec.cycle.as_secs_f64();
-        let [newest, middle, oldest] = self.commanded;
         let mut position_m = self.reference.position_m;
         let mut velocity_m_s = [0.0; MAX_AXES];
         let mut acceleration_m_s2 = [0.0; MAX_AXES];
         for axis in 0..self.n_axes() {
-            match self.spec.axes[axis].mode {
-                Mode::Csp => {
-                    position_m[axis] = newest[axis];
-                    velocity_m_s[axis] = (newest[axis] - middle[axis]) / dt_s;
-                    acceleration_m_s2[axis] =
-                        (newest[axis] - 2.0 * middle[axis] + oldest[axis]) / (dt_s * dt_s);
-                }
-                Mode::Csv => {
-                    velocity_m_s[axis] = newest[axis];
-                    acceleration_m_s2[axis] = (newest[axis] - middle[axis]) / dt_s;
-                }
-            }
+            let mode = mode::of(self.spec.axes[axis].mode);
+            let last = self.commanded.map(|command| command[axis]);
+            position_m[axis] = mode.position_m(last[0], position_m[axis]);
+            [velocity_m_s[axis], acceleration_m_s2[axis]] = mode.motion(last, dt_s);
         }
         // It is part of the last commands, from which the stop goes on.
         self.input.absorb();

@@ -1,4 +1,4 @@
-//! Another master on the bus: what this controller alone may send, seen coming from somebody else.
+//! Another master on the bus: what this controller alone may send, seen coming from another node.
 //!
 //! No transport hands a sender its own frames, so each of these that is received was sent by another.
 
@@ -13,7 +13,7 @@ use crate::fieldbus::canopen::{NmtCommand, NodeId, cob_id, sync};
 const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
 
 impl Cycle {
-    /// What a frame tells of another master, if it does. Traffic with nodes that are not of this cell is
+    /// Returns what a frame shows of another master, if anything. Traffic with nodes that are not of this cell is
     /// no business of this controller.
     pub(super) fn stranger(&self, frame: &Frame) -> Option<Stranger> {
         if sync::is_sync(frame) {
@@ -31,7 +31,7 @@ impl Cycle {
         RPDOS.iter().find_map(|base| to(*base)).map(Stranger::Command)
     }
 
-    /// What a stop was for, when something that comes in it says why: a drive that was silent tells
+    /// Returns the cause of a stop if a later frame names it: a drive that was silent reports
     /// that it was stopped or restarted, or a command to it is seen.
     pub(super) fn better_reason(&self, later: StopReason) -> Option<StopReason> {
         let silent: NodeId = match self.stopping? {

@@ -6,29 +6,29 @@ use nalgebra::Complex;
 
 use super::{Section, SignalError};
 
-/// The highest order that [`butterworth`] designs.
+/// Highest order that [`butterworth`] designs.
 pub const MAX_ORDER: usize = 12;
 
-/// Lowest cut-off, as part of the sampling rate: with it the static gain is 1 to six digits.
+/// Lowest cut-off as a share of the sampling rate: there, the static gain is 1 to six digits.
 const LOWEST: f64 = 1e-5;
-/// The same for the first order.
+/// The same for a first-order filter.
 const LOWEST_SINGLE: f64 = 1e-10;
 
 /// Returns a Butterworth low-pass as second-order sections.
 ///
-/// Analogue poles on the circle of radius `(2/T) tan(pi f_c T)`, brought to sampled time by the
-/// bilinear rule, so that the gain at `cutoff_hz` is exactly `1/sqrt(2)`.
+/// Analogue poles on the circle of radius `(2/T) tan(pi f_c T)`, mapped by the bilinear (Tustin)
+/// transform with pre-warping, so that the gain at `cutoff_hz` is exactly `1/sqrt(2)`.
 ///
 /// # Shapes
-/// - `(order + 1) / 2` sections; those with the least damped poles come last, and each pole takes
-///   the nearest zeros, which keeps intermediate values small
+/// - `(order + 1) / 2` sections, the least damped poles last; each pole is paired with the nearest
+///   zeros, which keeps intermediate values small
 /// # Units
 /// - `cutoff_hz` in hertz, `dt_s` in seconds
 /// # Errors
 /// - [`SignalError::Order`], [`SignalError::Cutoff`], [`SignalError::CutoffTooLow`] or
 ///   [`SignalError::SampleTime`].
 /// # Source
-/// - \[oppenheim2009\], Ch. 7: Butterworth poles and the bilinear rule.
+/// - \[oppenheim2009\], Ch. 7: Butterworth poles and the bilinear transform.
 pub fn butterworth(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Vec<Section>, SignalError> {
     if !(1..=MAX_ORDER).contains(&order) {
         return Err(SignalError::Order { order, max: MAX_ORDER });
@@ -40,13 +40,13 @@ pub fn butterworth(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Vec<Sectio
     if !(cutoff_hz > 0.0 && cutoff_hz < limit_hz) {
         return Err(SignalError::Cutoff { cutoff_hz, limit_hz });
     }
-    // `1 + a1 + a2` is about the square of the ratio: below this one it is rounding. One real pole has
-    // only the ratio itself in it.
+    // `1 + a1 + a2` is about the square of the ratio: below this limit it is rounding noise. With
+    // one real pole it is about the ratio itself.
     let lowest_hz = if order == 1 { LOWEST_SINGLE } else { LOWEST } / dt_s;
     if cutoff_hz < lowest_hz {
         return Err(SignalError::CutoffTooLow { cutoff_hz, order, lowest_hz });
     }
-    // Everything is scaled by T/2, so that the bilinear rule is z = (1 + s) / (1 - s).
+    // Everything is scaled by T/2, so that the bilinear transform is z = (1 + s) / (1 - s).
     let radius = (PI * cutoff_hz * dt_s).tan();
     let one = Complex::new(1.0, 0.0);
     let mut gain = one;
@@ -67,8 +67,8 @@ pub fn butterworth(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Vec<Sectio
     }
     upper_poles.sort_by(|p, q| q.norm().total_cmp(&p.norm()));
 
-    // An odd order is filled up by a pole and a zero at the origin; the zero goes to the first pole
-    // that is nearer to it than to the other zeros, all at -1.
+    // An odd order is filled up with a pole and a zero at the origin; the zero goes to the first
+    // pole that is nearer to it than to the other zeros, all at -1.
     let mut origin_zero = real_pole.is_some();
     let mut zeros_for = |pole: Complex<f64>, last: bool| {
         if origin_zero && (last || pole.norm() < (pole + one).norm()) {
@@ -117,7 +117,7 @@ mod tests {
                     let sections = butterworth(order, share / dt_s, dt_s).unwrap();
                     let gain: f64 = sections.iter().map(Section::static_gain).product();
                     assert!((gain - 1.0).abs() < 1e-4, "order {order}, {share}: {gain}");
-                    // Bounded and finite, whatever comes in: here the loudest input there is.
+                    // Bounded and finite for any input; this is the loudest one.
                     let mut filter = super::super::SosFilter::new(sections);
                     let largest = (0..2000)
                         .map(|k| filter.step(if k % 2 == 0 { 1.0 } else { -1.0 }).abs())

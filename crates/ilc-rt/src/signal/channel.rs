@@ -1,8 +1,8 @@
-//! One channel of an interleaved signal, checked once for every filter of whole signals.
+//! Checks of an interleaved signal and one of its channels, shared by all whole-signal filters.
 
 use super::SignalError;
 
-/// Refuses a signal that has not `expected` samples of `n_channels` channels.
+/// Refuses a signal that does not have `expected` samples of `n_channels` channels.
 pub(super) fn check_channel(
     signal: &[f64],
     channel: usize,
@@ -16,7 +16,7 @@ pub(super) fn check_channel(
     Ok(())
 }
 
-/// Refuses a sample time that is not a positive number, and returns half the sampling rate in hertz.
+/// Refuses a sample time that is not a positive number; returns the Nyquist frequency in hertz.
 pub(super) fn check_sample_time(dt_s: f64) -> Result<f64, SignalError> {
     let limit_hz = 0.5 / dt_s;
     if dt_s > 0.0 && limit_hz > 0.0 && limit_hz.is_finite() {
@@ -26,7 +26,7 @@ pub(super) fn check_sample_time(dt_s: f64) -> Result<f64, SignalError> {
     }
 }
 
-/// Refuses a frequency that is not above zero and below half the sampling rate.
+/// Refuses a frequency outside 0 to the Nyquist frequency, both excluded.
 pub(super) fn check_frequency(
     what: &'static str,
     value_hz: f64,

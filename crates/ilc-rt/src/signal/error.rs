@@ -1,19 +1,19 @@
-//! What can be wrong with a filter or the signal it is given.
+//! Errors of filters and their signals.
 
 use thiserror::Error;
 
-/// Why a filter or a signal was refused.
+/// A refused filter or signal.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum SignalError {
-    /// A filter order that is not offered.
+    /// An unsupported filter order.
     #[error("order = {order}; a Butterworth filter has an order of 1 to {max}")]
     Order {
         /// The order given.
         order: usize,
-        /// The highest order offered.
+        /// Highest order supported.
         max: usize,
     },
-    /// A cut-off that the sample time does not allow.
+    /// A cut-off outside 0 to the Nyquist frequency.
     #[error(
         "cutoff_hz = {cutoff_hz} Hz; it must lie above 0 Hz and below half the sampling rate, \
          {limit_hz} Hz"
@@ -21,10 +21,10 @@ pub enum SignalError {
     Cutoff {
         /// The cut-off given, in hertz.
         cutoff_hz: f64,
-        /// Half the sampling rate, in hertz.
+        /// Nyquist frequency, in hertz.
         limit_hz: f64,
     },
-    /// A cut-off so low that the coefficients of the filter have no digits left for it.
+    /// A cut-off so low that rounding ruins the filter's coefficients.
     #[error(
         "cutoff_hz = {cutoff_hz} Hz; at this sample time a filter of order {order} needs at least \
          {lowest_hz} Hz, below which its coefficients have no digits left"
@@ -37,33 +37,33 @@ pub enum SignalError {
         /// The lowest cut-off of that order, in hertz.
         lowest_hz: f64,
     },
-    /// A section without a static gain: it has a pole at frequency zero or holds no numbers.
+    /// A section without a finite static gain: it has a pole at frequency zero or NaN coefficients.
     #[error(
         "section {index} has the gain {gain} at frequency 0; a filter that starts settled needs a \
          finite one"
     )]
     StaticGain {
-        /// Which section.
+        /// Index of the section.
         index: usize,
         /// Its gain.
         gain: f64,
     },
-    /// A filtered signal that is not finite.
+    /// A non-finite filtered signal.
     #[error(
         "sample {sample} of the filtered signal is {value}: the filter is unstable or the signal too large"
     )]
     Overflow {
-        /// The first such sample.
+        /// Index of the first such sample.
         sample: usize,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
-    /// More taps than a signal is ever filtered with.
+    /// Too many taps.
     #[error("{found} taps; at most {max} are allowed")]
     TooManyTaps {
-        /// Taps asked for.
+        /// Taps requested.
         found: usize,
-        /// How many there may be.
+        /// Largest number allowed.
         max: usize,
     },
     /// A sample time that is not a positive number.
@@ -80,7 +80,7 @@ pub enum SignalError {
         /// Samples of extension at either end.
         padding: usize,
     },
-    /// A frequency that the sample time does not allow.
+    /// A frequency outside 0 to the Nyquist frequency.
     #[error(
         "{what} = {value_hz} Hz; it must lie above 0 Hz and below half the sampling rate, \
          {limit_hz} Hz"
@@ -90,10 +90,10 @@ pub enum SignalError {
         what: &'static str,
         /// The frequency given, in hertz.
         value_hz: f64,
-        /// Half the sampling rate, in hertz.
+        /// Nyquist frequency, in hertz.
         limit_hz: f64,
     },
-    /// A time that is negative or no number.
+    /// A time that is negative or NaN.
     #[error("{what} = {value_s} s; a time must be finite and not negative")]
     Time {
         /// Name of the parameter.
@@ -109,58 +109,58 @@ pub enum SignalError {
         /// The higher cut-off given, in hertz.
         high_hz: f64,
     },
-    /// Segments that do not follow each other.
+    /// Segments out of order.
     #[error(
         "segment {index} starts at sample {start}; the first one starts at 0 and each other one \
          after the one before"
     )]
     SegmentOrder {
-        /// Which segment.
+        /// Index of the segment.
         index: usize,
-        /// Where it starts.
+        /// Its first sample.
         start: usize,
     },
-    /// No segment at all.
+    /// An empty list of segments.
     #[error("0 segments; a switched filter has at least 1")]
     NoSegment,
     /// A segment that starts after the end of the signal.
     #[error("segment {index} starts at sample {start}; the signal has {n_samples} samples")]
     SegmentBeyondEnd {
-        /// Which segment.
+        /// Index of the segment.
         index: usize,
-        /// Where it starts.
+        /// Its first sample.
         start: usize,
         /// Samples of the signal.
         n_samples: usize,
     },
-    /// Taps without a middle.
+    /// An even number of taps: there is no middle one.
     #[error("{found} taps; a symmetric filter has an odd number of them")]
     TapCount {
         /// Taps given.
         found: usize,
     },
-    /// A tap that is infinite or not a number.
+    /// A tap that is infinite or NaN.
     #[error("tap {index} = {value}; only finite numbers are allowed")]
     TapValue {
-        /// Which tap.
+        /// Index of the tap.
         index: usize,
         /// The value given.
         value: f64,
     },
-    /// Taps that would shift the signal.
+    /// Asymmetric taps, which would shift the signal.
     #[error(
         "tap {index} = {value} but its mirror image = {mirrored}; only symmetric taps filter \
          without lag"
     )]
     TapSymmetry {
-        /// Which tap.
+        /// Index of the tap.
         index: usize,
         /// The value given.
         value: f64,
         /// The tap at the same distance from the other end.
         mirrored: f64,
     },
-    /// A signal of another length than the filter was set up for.
+    /// A signal of a different length than the filter was set up for.
     #[error("the signal has {found} samples; this filter was set up for {expected}")]
     Length {
         /// Samples given.

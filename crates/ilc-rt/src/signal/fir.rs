@@ -1,23 +1,23 @@
-//! Smoothing with symmetric taps that somebody gives.
+//! Symmetric (zero-phase) FIR smoothing with given taps.
 
 use super::SignalError;
 use super::symmetric::{Ends, Symmetric};
 
-/// The most taps: each costs a multiplication a sample.
+/// Largest number of taps: each costs a multiplication per sample.
 const MAX_TAPS: usize = 20_001;
 
-/// How far the two halves of the taps may differ, as part of the largest tap.
+/// Largest difference of mirrored taps, relative to the largest tap.
 const ASYMMETRY: f64 = 1e-12;
 
-/// A symmetric smoother of finite length, without lag.
+/// A symmetric, zero-phase FIR filter.
 ///
-/// `y[k] = sum_i h[i] x[k + i - r]`, `2 r + 1` taps, `h[i] = h[2 r - i]`; beyond its ends the signal
-/// is held
+/// `y[k] = sum_i h[i] x[k + i - r]`, `2 r + 1` taps, `h[i] = h[2 r - i]`; the end values are held
+/// beyond the ends
 ///
 /// # Shapes
 /// - `taps`: an odd number
 /// # Source
-/// - \[dimarco2016\], Eq. (3.2), needs such a filter and names none; `[-1, 4, 10, 4, -1] / 16`
+/// - \[dimarco2016\], Eq. (3.2), needs such a filter and gives no taps; `[-1, 4, 10, 4, -1] / 16`
 ///   convolved six times, 25 taps, serves.
 /// # Examples
 /// ```
@@ -33,13 +33,13 @@ pub struct FirFilter {
 }
 
 impl FirFilter {
-    /// Takes the taps.
+    /// Creates the filter from its taps.
     ///
     /// # Errors
     /// - [`SignalError::TapCount`] for an even number of taps, [`SignalError::TooManyTaps`] for more
     ///   than 20 001.
-    /// - [`SignalError::TapValue`] for a tap that is infinite or not a number.
-    /// - [`SignalError::TapSymmetry`] for taps that are not their own mirror image.
+    /// - [`SignalError::TapValue`] for a tap that is infinite or NaN.
+    /// - [`SignalError::TapSymmetry`] for asymmetric taps.
     pub fn new(taps: &[f64]) -> Result<Self, SignalError> {
         if taps.len() > MAX_TAPS {
             return Err(SignalError::TooManyTaps { found: taps.len(), max: MAX_TAPS });
@@ -60,20 +60,20 @@ impl FirFilter {
         Ok(Self { taps: taps.to_vec() })
     }
 
-    /// Returns the filter that does in one pass what this one does in `times`.
+    /// Returns the filter that equals `times` passes of this one.
     ///
-    /// The ends of the signal are held once, not before each pass.
+    /// The signal's ends are extended once, not before each pass.
     ///
     /// # Errors
-    /// - [`SignalError::TapCount`] for no pass at all.
-    /// - [`SignalError::TapValue`] if the product overflows.
-    /// - [`SignalError::TooManyTaps`] if it would have more than 20 001 taps.
+    /// - [`SignalError::TapCount`] for `times` = 0.
+    /// - [`SignalError::TapValue`] if a product overflows.
+    /// - [`SignalError::TooManyTaps`] if the result would have more than 20 001 taps.
     pub fn repeated(&self, times: usize) -> Result<Self, SignalError> {
         if times == 0 {
             return Err(SignalError::TapCount { found: 0 });
         }
         let found = (self.taps.len() - 1).saturating_mul(times).saturating_add(1);
-        // One tap makes the filter no longer, only its product longer to compute.
+        // With a single tap the product never grows; `times` bounds the work.
         if found > MAX_TAPS || times > MAX_TAPS {
             return Err(SignalError::TooManyTaps { found: found.max(times), max: MAX_TAPS });
         }

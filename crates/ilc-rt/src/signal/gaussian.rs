@@ -1,4 +1,4 @@
-//! The Gaussian low-pass: symmetric, no lag, no overshoot, named by its bandwidth.
+//! Gaussian low-pass: symmetric, zero-phase, without overshoot, specified by its bandwidth.
 
 use std::f64::consts::{LN_2, PI};
 
@@ -6,7 +6,7 @@ use super::SignalError;
 use super::channel::{check_frequency, check_sample_time};
 use super::symmetric::{Ends, Symmetric};
 
-/// Where the bell is cut off, in standard deviations: it then holds 99.99 % of its area.
+/// Truncation of the kernel in standard deviations: 99.99 % of its area.
 const REACH: f64 = 3.8906;
 
 /// A Gaussian low-pass filter.
@@ -14,15 +14,15 @@ const REACH: f64 = 3.8906;
 /// `w[i] = exp(-(i T / sigma)^2 / 2) / sum`, `sigma = sqrt(ln 2) / (2 pi f)`, so that the gain at the
 /// bandwidth `f` is `1/sqrt(2)` and the static gain is exactly 1
 ///
-/// Beyond its ends the signal is mirrored between two samples. The bell is cut off where 99.99 % of
-/// its area are inside; the bandwidth holds as long as the bell spans several samples, that is well
-/// below half the sampling rate.
+/// The signal is mirrored at its ends, between two samples. The kernel is truncated to 99.99 % of
+/// its area; the bandwidth is accurate as long as the kernel spans several samples, i.e. well below
+/// the Nyquist frequency.
 ///
 /// # Units
 /// - `bandwidth_hz` in hertz, `dt_s` in seconds
 /// # Source
-/// - \[barton2010\], H.3: the bell, its bandwidth and the ends. H.1 filters a doubled vector with it,
-///   which doubles the bandwidth; here it is what it says.
+/// - \[barton2010\], H.3: kernel, bandwidth and ends. H.1 applies it to a doubled vector, which
+///   doubles the bandwidth; here the bandwidth is the true one.
 /// # Examples
 /// ```
 /// use ilc_rt::signal::GaussianFilter;
@@ -51,7 +51,7 @@ impl GaussianFilter {
         if filter.sigma_samples().is_finite() {
             Ok(filter)
         } else {
-            // So low that its bell is wider than any number.
+            // So low that the kernel's width overflows.
             Err(SignalError::Frequency { what: "bandwidth_hz", value_hz: bandwidth_hz, limit_hz })
         }
     }
@@ -66,7 +66,7 @@ impl GaussianFilter {
         self.dt_s
     }
 
-    /// Returns the standard deviation of the bell, in samples.
+    /// Returns the standard deviation of the kernel, in samples.
     pub fn sigma_samples(&self) -> f64 {
         LN_2.sqrt() / (2.0 * PI * self.bandwidth_hz * self.dt_s)
     }
@@ -74,11 +74,12 @@ impl GaussianFilter {
     /// Sets the filter up for signals of `n_samples` samples.
     ///
     /// # Errors
-    /// - [`SignalError::TooShort`] if half the bell is longer than the signal.
+    /// - [`SignalError::TooShort`] if half the kernel is longer than the signal.
     pub fn for_samples(&self, n_samples: usize) -> Result<Symmetric, SignalError> {
         let sigma = self.sigma_samples();
         let reach = (REACH * sigma).ceil();
-        // Compared as numbers, because the reach of a tiny bandwidth fits in no memory.
+        // Compared as floating-point numbers, as the reach of a tiny bandwidth overflows an
+        // integer.
         if reach > n_samples as f64 {
             #[expect(
                 clippy::cast_possible_truncation,
@@ -142,7 +143,7 @@ mod tests {
         assert!(matches!(GaussianFilter::new(1.0, 0.0), Err(SignalError::SampleTime { .. })));
         let slow = GaussianFilter::new(1e-300, 2e-3).unwrap();
         assert!(matches!(slow.for_samples(100), Err(SignalError::TooShort { .. })));
-        // Half the bell is 52 samples long at 10 Hz and 1 ms.
+        // Half the kernel is 52 samples long at 10 Hz and 1 ms.
         let filter = GaussianFilter::new(10.0, 1e-3).unwrap();
         assert!(filter.for_samples(52).is_ok());
         let error = filter.for_samples(51).unwrap_err();

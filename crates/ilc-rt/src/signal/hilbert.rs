@@ -1,4 +1,4 @@
-//! The analytic signal, and with it the frequency that a signal has at each moment.
+//! Analytic signal (Hilbert transform) and instantaneous frequency.
 
 use std::f64::consts::PI;
 
@@ -13,8 +13,8 @@ use super::channel::check_sample_time;
 /// `a = x + i H(x)`: the spectrum of `x` with its negative frequencies removed and its positive ones
 /// doubled
 ///
-/// The signal is taken as one period of a periodic one; where its ends do not meet, the first and
-/// last samples are disturbed.
+/// The signal is treated as one period of a periodic one; if its ends do not match, the first and
+/// last samples are distorted.
 ///
 /// # Shapes
 /// - `x`: one channel; the result has as many samples
@@ -31,7 +31,7 @@ pub fn analytic(x: &[f64]) -> Vec<Complex<f64>> {
     let mut planner = FftPlanner::new();
     planner.plan_fft_forward(n).process(&mut signal);
     for (k, value) in signal.iter_mut().enumerate() {
-        // Frequency zero, and for an even length the highest one, are their own mirror image.
+        // The zero and, for an even length, the Nyquist frequency are their own mirror images.
         *value *= match (2 * k).cmp(&n) {
             _ if k == 0 => 1.0,
             std::cmp::Ordering::Less => 2.0,
@@ -43,13 +43,13 @@ pub fn analytic(x: &[f64]) -> Vec<Complex<f64>> {
     signal
 }
 
-/// Returns the frequency of a signal between each sample and the next, in hertz.
+/// Returns the instantaneous frequency between each sample and the next, in hertz.
 ///
-/// `f[k] = wrap(arg a[k+1] - arg a[k]) / (2 pi T)`, `a` the analytic signal, the difference of the
-/// angles taken into -pi to pi
+/// `f[k] = wrap(arg a[k+1] - arg a[k]) / (2 pi T)`, `a` the analytic signal, the phase difference
+/// wrapped to -pi to pi
 ///
-/// It is meaningful for a signal that swings about zero: take the mean of a position away first, or
-/// use the velocity. Where the amplitude is small it is noise, and it can be negative.
+/// Meaningful for a signal that oscillates about zero: subtract the mean of a position first, or
+/// use the velocity. Where the amplitude is small it is noisy, and may be negative.
 ///
 /// # Shapes
 /// - `x`: one channel of `n` samples; the result has `n - 1`
@@ -71,7 +71,7 @@ pub fn instantaneous_frequency(x: &[f64], dt_s: f64) -> Result<Vec<f64>, SignalE
         .collect())
 }
 
-/// Returns the angle brought into -pi to pi.
+/// Wraps an angle to -pi to pi.
 fn wrapped(angle: f64) -> f64 {
     if angle.abs() <= PI { angle } else { angle - 2.0 * PI * angle.signum() }
 }

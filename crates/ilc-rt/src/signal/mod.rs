@@ -1,9 +1,9 @@
-//! Filters of signals, and the frequency that a signal has at each moment.
+//! Filters and the instantaneous frequency of a signal.
 //!
 //! Butterworth low-pass as second-order sections, causal, zero-phase or switched along the run;
-//! Gaussian and symmetric smoothers. This folder designs filters when things are set up and runs
-//! them without allocating. It knows nothing of axes or learning; every other module may import it,
-//! the hot ones only [`SosFilter`].
+//! Gaussian and symmetric FIR smoothers. Filters are designed at set-up and run without allocation.
+//! This folder knows nothing of axes or learning; every other module may import it, hot ones only
+//! [`SosFilter`].
 
 mod butterworth;
 mod channel;

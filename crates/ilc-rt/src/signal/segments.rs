@@ -1,37 +1,37 @@
-//! Where a motion is fast: the segments of a switched filter, from the reference itself.
+//! Design of a switched filter: segments of fast motion, found from the reference.
 
 use super::channel::{check_frequency, check_sample_time};
 use super::hilbert::analytic;
 use super::{Segment, SignalError, SwitchedFilter};
 
-/// Below this part of its largest amplitude a signal is at rest and has no frequency.
+/// A signal below this share of its peak amplitude is at rest and has no frequency.
 const REST: f64 = 1e-3;
 
-/// When a switched filter opens.
+/// Rule for the segments of a [`SwitchedFilter`].
 ///
 /// # Units
 /// - frequencies in hertz, times in seconds
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwitchRule {
-    /// Order of one pass.
+    /// Butterworth order of one pass.
     pub order: usize,
-    /// Cut-off where the motion is slow.
+    /// Cut-off for slow motion.
     pub low_hz: f64,
-    /// Cut-off where it is fast.
+    /// Cut-off for fast motion.
     pub high_hz: f64,
-    /// Instantaneous frequency of the motion above which it is fast.
+    /// Instantaneous frequency above which the motion is fast.
     pub threshold_hz: f64,
-    /// Span over which the instantaneous frequency is averaged.
+    /// Averaging window of the instantaneous frequency.
     pub window_s: f64,
-    /// How long before and after a fast stretch the filter is open already, and still.
+    /// Margin by which a fast segment is extended on either side.
     pub margin_s: f64,
-    /// Within what time it goes over.
+    /// Duration of the cross-fade between segments.
     pub blend_s: f64,
 }
 
 impl SwitchRule {
-    /// Returns the rule with second-order filters, a window of one period of the threshold, and a
-    /// margin and blend of one period of the lower cut-off.
+    /// Returns a rule with second-order filters, a window of one period of the threshold, and a
+    /// margin and cross-fade of one period of the lower cut-off.
     pub fn new(low_hz: f64, high_hz: f64, threshold_hz: f64) -> Self {
         Self {
             order: 2,
@@ -47,14 +47,14 @@ impl SwitchRule {
     /// Designs the filter for a motion.
     ///
     /// A sample is fast where `sum(a^2 f) / sum(a^2)` over the window around it exceeds the
-    /// threshold in any channel, `f` being the instantaneous frequency and `a` the amplitude of the
-    /// signal less its mean. Weighting by the amplitude takes away the spikes that the plain
-    /// frequency has where the amplitude passes by zero. Fast stretches are widened by the margin,
-    /// and joined where they then touch.
+    /// threshold in any channel; `f` is the instantaneous frequency and `a` the amplitude of the
+    /// signal minus its mean. Weighting by the amplitude removes the spikes of the unweighted
+    /// frequency where the amplitude passes through zero. Fast segments are extended by the margin,
+    /// and merged where they then touch.
     ///
     /// # Shapes
-    /// - `signal`: time first, `n_samples` x `n_channels`; a velocity shows the fast stretches better
-    ///   than a position, which is dominated by its slow sweep
+    /// - `signal`: time first, `n_samples` x `n_channels`; fast segments show better in a velocity
+    ///   than in a position, which its slow sweep dominates
     /// # Errors
     /// - [`SignalError::CutoffOrder`], [`SignalError::Frequency`], [`SignalError::Time`] or
     ///   [`SignalError::SampleTime`] for the rule.
@@ -90,7 +90,7 @@ impl SwitchRule {
         if n_samples * n_channels != signal.len() {
             return Err(SignalError::Length { found: n_samples + 1, expected: n_samples });
         }
-        // No span is longer than the signal, so that none overflows.
+        // Spans are bounded by the length of the signal, so none overflows.
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -107,7 +107,7 @@ impl SwitchRule {
         SwitchedFilter::new(self.order, &segments, samples(self.blend_s), dt_s)
     }
 
-    /// Returns the segments of a run whose fast samples are marked.
+    /// Returns the segments for a mask of fast samples.
     fn segments(&self, fast: &[bool], margin: usize) -> Vec<Segment> {
         let mut open = fast.to_vec();
         widen(fast.iter().zip(open.iter_mut()), margin);
@@ -123,7 +123,7 @@ impl SwitchRule {
     }
 }
 
-/// Opens the `margin` samples that follow each fast one.
+/// Marks the `margin` samples after each fast one.
 fn widen<'a>(samples: impl Iterator<Item = (&'a bool, &'a mut bool)>, margin: usize) {
     let mut left = 0;
     for (is_fast, is_open) in samples {
@@ -132,13 +132,13 @@ fn widen<'a>(samples: impl Iterator<Item = (&'a bool, &'a mut bool)>, margin: us
     }
 }
 
-/// Marks the samples of one channel whose averaged frequency, in turns a sample, exceeds the
+/// Marks the samples of one channel whose averaged frequency, in cycles per sample, exceeds the
 /// threshold.
 fn mark_fast(x: &[f64], half_window: usize, threshold: f64, fast: &mut [bool]) {
     let mean = x.iter().sum::<f64>() / x.len() as f64;
     let swing: Vec<f64> = x.iter().map(|value| value - mean).collect();
     let signal = analytic(&swing);
-    // Sums from the start, so that the sum over any window is one difference.
+    // Cumulative sums, so that the sum over any window is one difference.
     let (mut energy, mut turned) = (vec![0.0], vec![0.0]);
     let (mut energy_sum, mut turned_sum) = (0.0, 0.0);
     for pair in signal.windows(2) {

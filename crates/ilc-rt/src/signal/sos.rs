@@ -1,7 +1,7 @@
-//! A filter as a cascade of second-order sections, run sample by sample.
+//! Cascade of second-order sections (biquads), run sample by sample.
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-/// One second-order section.
+/// One second-order section (biquad).
 ///
 /// `H(z) = (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2)`
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +18,7 @@ impl Section {
         (self.b[0] + self.b[1] + self.b[2]) / (1.0 + self.a[0] + self.a[1])
     }
 
-    /// Returns the memory that a constant input of 1 leaves once the section has settled.
+    /// Returns the state after a constant input of 1, in steady state.
     ///
     /// Transposed direct form II at rest: `s2 = b2 - a2 g`, `s1 = b1 - a1 g + s2`, `g` the static
     /// gain.
@@ -38,12 +38,12 @@ impl Section {
     }
 }
 
-/// A causal filter: sections and their memory.
+/// A causal filter: second-order sections with their state.
 ///
 /// # Shapes
-/// - one channel; give each channel its own filter
+/// - one channel; each channel needs its own filter
 /// # Real Time
-/// Hot path once it is made: [`SosFilter::step`] costs a few nanoseconds a section.
+/// Hot once created: [`SosFilter::step`] costs a few nanoseconds per section.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SosFilter {
     sections: Vec<Section>,
@@ -51,7 +51,7 @@ pub struct SosFilter {
 }
 
 impl SosFilter {
-    /// Makes a filter at rest.
+    /// Creates a filter at rest.
     #[expect(clippy::disallowed_macros, reason = "cold: set-up")]
     pub fn new(sections: Vec<Section>) -> Self {
         let memory = vec![[0.0; 2]; sections.len()];
@@ -68,14 +68,14 @@ impl SosFilter {
         value
     }
 
-    /// Forgets the past: the filter is at rest.
+    /// Resets the filter to rest.
     pub fn reset(&mut self) {
         for memory in &mut self.memory {
             *memory = [0.0; 2];
         }
     }
 
-    /// Behaves from now on as if `level` had been the input for ever.
+    /// Sets the state to the steady state of a constant input `level`.
     pub fn settle(&mut self, level: f64) {
         let mut level = level;
         for (section, memory) in self.sections.iter().zip(&mut self.memory) {
@@ -85,7 +85,7 @@ impl SosFilter {
         }
     }
 
-    /// Returns the sections, in the order in which they act.
+    /// Returns the sections in order of execution.
     pub fn sections(&self) -> &[Section] {
         &self.sections
     }

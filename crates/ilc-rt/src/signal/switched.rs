@@ -1,12 +1,11 @@
-//! A low-pass whose cut-off changes along the run: low where only noise is fast, high where the
-//! motion itself is.
+//! Time-varying low-pass: a cut-off that is low in slow motion and high in fast motion.
 
 use std::f64::consts::PI;
 
 use super::channel::{check_channel, check_sample_time};
 use super::{SignalError, ZeroPhase, butterworth};
 
-/// A stretch of the run with one cut-off; it lasts until the next one starts.
+/// A segment of the run with one cut-off; it lasts until the next segment starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment {
     /// First sample.
@@ -15,18 +14,18 @@ pub struct Segment {
     pub cutoff_hz: f64,
 }
 
-/// A zero-phase Butterworth low-pass with another cut-off on each segment of the run.
+/// A zero-phase Butterworth low-pass with a different cut-off for each segment of the run.
 ///
 /// `y[k] = sum_i w_i[k] (Q_i x)[k]`, `sum_i w_i[k] = 1`
 ///
-/// Each filter `Q_i` sees the whole signal, so that none starts in the middle of it; between two
-/// segments the weight goes over from one to the other along half a cosine, so that nothing jumps.
+/// Each filter `Q_i` runs over the whole signal, so none starts in the middle of it; at a segment's
+/// boundary the weights cross-fade along half a cosine, so the switch is bumpless.
 ///
 /// # Units
 /// - cut-offs in hertz, `dt_s` in seconds, starts and blend in samples
 /// # Source
-/// - \[filter-based\], Eq. (12): cut-offs of 10, 50 and 10 Hz. It switches at once and
-///   says nothing of the filter's state; the cross-fade is ours.
+/// - \[filter-based\], Eq. (12): cut-offs of 10, 50 and 10 Hz. The source switches abruptly and
+///   does not describe the filter's state; the cross-fade is ours.
 /// # Examples
 /// ```
 /// use ilc_rt::signal::{Segment, SwitchedFilter};
@@ -48,8 +47,8 @@ pub struct SwitchedFilter {
 }
 
 impl SwitchedFilter {
-    /// Designs the filter: Butterworth of the given order, going over from segment to segment within
-    /// `blend` samples, half of them before the start of the later one.
+    /// Designs the filter: Butterworth of the given order, with a cross-fade of `blend` samples
+    /// between segments, half of them before the later one starts.
     ///
     /// # Errors
     /// - [`SignalError::NoSegment`] or [`SignalError::SegmentOrder`].
@@ -82,12 +81,12 @@ impl SwitchedFilter {
         self.order
     }
 
-    /// Returns the segments, in the order of time.
+    /// Returns the segments in order of time.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// Returns within how many samples it goes over from one segment to the next.
+    /// Returns the length of the cross-fade in samples.
     pub fn blend(&self) -> usize {
         self.blend
     }
@@ -139,9 +138,10 @@ impl SwitchedFilter {
         })
     }
 
-    /// Returns by how much sample `k` lies in a segment that starts at `start`: 0 before, 1 after.
+    /// Returns the weight at sample `k` of a segment that starts at `start`: 0 before, 1 after.
     fn begun(&self, start: usize, k: usize) -> f64 {
-        // Measured from half-way between the last sample before and the first one of the segment.
+        // Relative to the boundary, half-way between the last sample before the segment and its
+        // first.
         let after = k as f64 + 0.5 - start as f64;
         let half = 0.5 * self.blend as f64;
         if after >= half {
@@ -154,7 +154,7 @@ impl SwitchedFilter {
     }
 }
 
-/// One filter and where it counts.
+/// One filter and its weights along the run.
 #[derive(Debug, Clone)]
 struct Band {
     filter: ZeroPhase,
@@ -166,7 +166,7 @@ struct Band {
 /// # Shapes
 /// - one channel of a signal of fixed length, possibly interleaved with others
 /// # Real Time
-/// Allocates when it is made, never in [`Switched::apply`].
+/// Allocates at creation, never in [`Switched::apply`].
 #[derive(Debug, Clone)]
 pub struct Switched {
     bands: Vec<Band>,
@@ -211,7 +211,7 @@ impl Switched {
         Ok(())
     }
 
-    /// Applies the transpose of [`Switched::apply`]: each band's share first, then its filter.
+    /// Applies the transpose (adjoint) of [`Switched::apply`]: weights first, then each filter.
     ///
     /// # Shapes
     /// - as [`Switched::apply`]
@@ -297,7 +297,8 @@ mod tests {
 
     #[test]
     fn a_blended_switch_does_not_jump() {
-        // The largest step between neighbours: a hard switch has one that the blend has not.
+        // Largest step between neighbouring samples: abrupt switching has one, the cross-fade has
+        // not.
         let alternating: Vec<f64> =
             (0..600).map(|k| (2.0 * PI * 25.0 * DT_S * f64::from(k)).cos()).collect();
         let step_at = |blend| {

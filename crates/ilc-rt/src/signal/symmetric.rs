@@ -1,28 +1,28 @@
-//! Convolution of a whole signal with symmetric weights: no lag, a finite reach.
+//! Convolution of a whole signal with symmetric weights: zero-phase, with a finite reach.
 
 use super::SignalError;
 use super::channel::check_channel;
 
-/// How a signal goes on beyond its ends.
+/// Extension of a signal beyond its ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ends {
-    /// At its first and its last value.
+    /// Holds the first and last value.
     Held,
     /// Mirrored between two samples: `.. x[1] x[0] | x[0] x[1] ..`.
     Mirrored,
 }
 
-/// A symmetric moving average with its workspace.
+/// A symmetric (zero-phase) FIR filter with its workspace.
 ///
 /// `y[k] = w[0] x[k] + sum_{i=1}^{r} w[i] (x[k+i] + x[k-i])`
 ///
 /// # Shapes
 /// - one channel of a signal of fixed length, possibly interleaved with others
 /// # Real Time
-/// Allocates when it is made, never in [`Symmetric::apply`]; `O(n_samples r)`.
+/// Allocates at creation, never in [`Symmetric::apply`]; `O(n_samples r)`.
 #[derive(Debug, Clone)]
 pub struct Symmetric {
-    /// From the middle outwards.
+    /// From the centre outwards.
     weights: Vec<f64>,
     ends: Ends,
     extended: Vec<f64>,
@@ -35,7 +35,7 @@ impl Symmetric {
         n_samples: usize,
     ) -> Result<Self, SignalError> {
         let reach = weights.len().saturating_sub(1);
-        // A mirror image can be no longer than the signal.
+        // The mirrored extension cannot be longer than the signal.
         if n_samples == 0 || ends == Ends::Mirrored && n_samples < reach {
             return Err(SignalError::TooShort { n_samples, padding: reach.saturating_sub(1) });
         }
@@ -84,8 +84,8 @@ impl Symmetric {
         Ok(())
     }
 
-    /// Applies the transpose of [`Symmetric::apply`], the ends included: what an end was held or mirrored
-    /// from gets its share back.
+    /// Applies the transpose (adjoint) of [`Symmetric::apply`], extension included: the samples
+    /// that an end was extended from collect its share.
     ///
     /// # Shapes
     /// - as [`Symmetric::apply`]
@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn ends_are_held_or_mirrored_as_by_hand() {
         let x = [1.0, 2.0, 4.0];
-        // Weights 1, 10, 100: the digits of a sum say which samples were added.
+        // Weights 1, 10, 100: the digits of a sum show which samples were added.
         let weights = vec![0.0, 1.0, 10.0];
         let mut held = x;
         Symmetric::new(weights.clone(), Ends::Held, 3).unwrap().apply(&mut held, 0, 1).unwrap();

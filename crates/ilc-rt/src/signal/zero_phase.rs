@@ -1,4 +1,4 @@
-//! Filtering forward and backward: no lag, the square of the gain.
+//! Forward-backward (zero-phase) filtering: no lag, squared gain.
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::channel::check_channel;
@@ -7,15 +7,15 @@ use super::{Section, SignalError, SosFilter};
 /// A zero-phase filter with its workspace.
 ///
 /// The signal is extended at either end by its point reflection (`2 x[0] - x[i]`), filtered forward
-/// and then backward; each pass starts settled on its first sample. The gain is `|H|^2`: half at the
-/// cut-off of a Butterworth filter.
+/// and then backward; each pass starts in the steady state of its first sample. The gain is
+/// `|H|^2`: one half at the cut-off of a Butterworth filter.
 ///
 /// # Shapes
 /// - one channel of a signal of fixed length, possibly interleaved with others
 /// # Real Time
-/// Allocates when it is made, never in [`ZeroPhase::apply`].
+/// Allocates at creation, never in [`ZeroPhase::apply`].
 /// # Source
-/// - \[gustafsson1996\]: forward-backward filtering and its initial states.
+/// - \[gustafsson1996\]: forward-backward filtering and its initial state.
 #[derive(Debug, Clone)]
 pub struct ZeroPhase {
     filter: SosFilter,
@@ -24,12 +24,12 @@ pub struct ZeroPhase {
 }
 
 impl ZeroPhase {
-    /// Makes the filter and its workspace for signals of `n_samples` samples.
+    /// Creates the filter and its workspace for signals of `n_samples` samples.
     ///
     /// # Errors
-    /// - [`SignalError::TooShort`] unless the signal is longer than the extension of its ends,
+    /// - [`SignalError::TooShort`] unless the signal is longer than the extension at each end,
     ///   three times the length of the filter's polynomials.
-    /// - [`SignalError::StaticGain`] for a section on which a pass cannot start settled.
+    /// - [`SignalError::StaticGain`] for a section that has no steady state to start from.
     #[expect(clippy::disallowed_macros, reason = "cold: set-up")]
     pub fn new(sections: Vec<Section>, n_samples: usize) -> Result<Self, SignalError> {
         for (index, section) in sections.iter().enumerate() {
@@ -61,7 +61,7 @@ impl ZeroPhase {
     /// - `signal`: time first, `n_samples` x `n_channels`; only `channel` is read and written
     /// # Errors
     /// - [`SignalError::Length`] if the signal has another length.
-    /// - [`SignalError::Overflow`] if what comes out is not finite; the signal is then as it was.
+    /// - [`SignalError::Overflow`] if the result is not finite; the signal is then unchanged.
     pub fn apply(
         &mut self,
         signal: &mut [f64],
@@ -101,10 +101,11 @@ impl ZeroPhase {
         Ok(())
     }
 
-    /// Applies the transpose of [`ZeroPhase::apply`], for the analysis of laws that filter.
+    /// Applies the transpose (adjoint) of [`ZeroPhase::apply`], for the analysis of laws with a
+    /// filter.
     ///
-    /// The filter itself is symmetric; its ends are not, as each sample of the extension is made of
-    /// two samples of the signal.
+    /// The filter is symmetric, but its ends are not: each sample of the extension is made of two
+    /// samples of the signal.
     ///
     /// # Shapes
     /// - as [`ZeroPhase::apply`]
@@ -127,8 +128,8 @@ impl ZeroPhase {
         for k in 0..expected {
             self.extended[padding + k] = signal[at(k)];
         }
-        // A pass that starts settled on x[0] is `H x + (g - H 1) x[0]`: its transpose runs the other
-        // way from rest and puts what the constants took back on the first sample.
+        // A pass that starts in the steady state of x[0] is `H x + (g - H 1) x[0]`: its transpose
+        // runs backward from rest and adds the share of the constants to the first sample.
         let gain: f64 = self.filter.sections().iter().map(super::Section::static_gain).product();
         let before: f64 = self.extended.iter().sum();
         self.filter.reset();
@@ -180,8 +181,8 @@ mod tests {
         let mut line: Vec<f64> = (0..200).map(|k| 3.0 - 0.25 * f64::from(k)).collect();
         let original = line.clone();
         filter(200).apply(&mut line, 0, 1).unwrap();
-        // The first pass lags a ramp by a constant which the second one takes back, except where
-        // the start of the extension has not yet died away.
+        // The first pass lags a ramp by a constant, which the second one cancels, except where the
+        // transient at the start of the extension has not yet decayed.
         for k in 60..140 {
             assert!((line[k] - original[k]).abs() < 1e-3, "sample {k}");
         }

@@ -1,7 +1,7 @@
 //! From a program of segments to set points, and the geometry of contours. Cold.
 //!
 //! Planning answers with a [`TrajectoryError`] or with an [`Interpolator`], which gives one set point
-//! a tick. It stands on row 1: `supervisor` and the Python glue import it, and it imports only
+//! a tick. It stands on row 1: `design` and the Python bindings import it, and it imports only
 //! `interpolate`, the cell description included.
 
 pub mod contour;
@@ -10,13 +10,13 @@ mod error;
 pub mod exponential;
 mod grid;
 mod jet;
+pub mod kind;
 mod linear;
 mod motion;
 mod path;
 mod plan;
 pub mod program;
 mod refusal;
-mod shape;
 #[cfg(test)]
 mod tests;
 mod verify;
@@ -27,9 +27,8 @@ pub use crate::interpolate::{
 };
 pub use contour::{contour_error_m, path_tangents};
 pub use error::TrajectoryError;
-pub use exponential::{ExponentialSigmoid, ModulatedSegment};
+pub use exponential::{ExponentialSigmoid, ModulatedSegment, POINTS_A_PERIOD, points_program};
 pub use linear::{Linear, LinearSetting};
 pub use motion::{MotionState, SampledMotion, TrackingIndex, set_points};
-pub use path::{ArcSpec, CornerRule, PathSegment, PathSpec};
+pub use path::{ArcSpec, PathSegment, PathSpec};
 pub use refusal::Refusal;
-pub use shape::{POINTS_A_PERIOD, points_program, raster};

@@ -6,7 +6,7 @@
 use super::error::TrajectoryError;
 use super::grid::{CYCLE_S, DWELL_MAX_S, check_time, n_ticks, n_ticks_after};
 use super::motion::SampledMotion;
-use super::path::{BlendedPath, CornerRule, PathSpec, point};
+use super::path::{BlendedPath, PathSpec, point};
 use super::verify::Verification;
 use crate::interpolate::exact_stop::ExactStop;
 use crate::interpolate::interpolator::Motion;
@@ -35,13 +35,13 @@ impl Interpolator {
     ) -> Result<Self, TrajectoryError> {
         let legs = spec.legs(limits, cycle_s)?;
         let (start_s, n_axes) = (spec.dwell_before_s, spec.start_m.len());
-        let (motion, rest_tick) = match spec.corner {
-            CornerRule::ExactStop => {
+        let (motion, rest_tick) = match spec.blend_s {
+            None => {
                 let moves = ExactStop::plan(&legs, start_s, limits)?;
                 let rest_tick = n_ticks_after(moves.end_s(), cycle_s)?;
                 (Motion::ExactStop(moves), rest_tick)
             }
-            CornerRule::Blend { window_s } => {
+            Some(window_s) => {
                 let path = BlendedPath { legs: &legs, start_s, limits, cycle_s };
                 let (blend, rest_tick) = path.plan(window_s)?;
                 (Motion::Blend(blend), rest_tick)
@@ -50,7 +50,7 @@ impl Interpolator {
         let n_samples = rest_tick + n_ticks(spec.dwell_after_s, cycle_s)? + 1;
         let plan = Self::new(motion, n_axes, cycle_s, n_samples);
         // A blended path has been through its proof already.
-        if spec.corner == CornerRule::ExactStop { plan.verified(limits) } else { Ok(plan) }
+        if spec.blend_s.is_none() { plan.verified(limits) } else { Ok(plan) }
     }
 
     /// Rests at a point for some samples, as while an axis is identified.

@@ -8,7 +8,7 @@ use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::bring_up::{DriveSetup, SdoClient, bring_up};
 use ilc_rt::fieldbus::canopen::{Emergency, NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{
-    self, Command, Controlword, Extra, Mode, State, Status, next_command,
+    self, CommandRpdo1, Controlword, DriveMotionTpdo2, Mode, State, StatusTpdo1, next_command,
 };
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
@@ -78,7 +78,7 @@ to_m = [0.01, 0.01]
     Cell::parse(&text, "bench.toml").unwrap()
 }
 
-/// Axes that follow every demand at once, up to a speed; a stuck one does not move at all.
+/// Axes that follow every demand at once, up to a velocity; a stuck one does not move at all.
 pub(crate) struct Ideal {
     position_m: [f64; 2],
     velocity_m_s: [f64; 2],
@@ -123,11 +123,11 @@ impl Plant for Ideal {
     }
 }
 
-/// What drive 1 sent in one cycle.
+/// Frames of drive 1 in one cycle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Answer {
-    pub(crate) status: Option<Status>,
-    pub(crate) extra: Option<Extra>,
+    pub(crate) status: Option<StatusTpdo1>,
+    pub(crate) extra: Option<DriveMotionTpdo2>,
     pub(crate) emergencies: Vec<u16>,
     pub(crate) frames: Vec<Frame>,
 }
@@ -159,7 +159,7 @@ impl Bench {
         Self { bus: InProcess::new(machine, 4096), is_stuck }
     }
 
-    /// Drive 1 brought up and operational, not yet enabled.
+    /// Creates a bench with drive 1 brought up and operational, not yet enabled.
     pub(crate) fn started(mode: Mode) -> Self {
         let mut bench = Self::new(ClockMode::LockStep);
         bring_up(&mut bench.bus, &setup(mode)).unwrap();
@@ -167,7 +167,7 @@ impl Bench {
         bench
     }
 
-    /// Drive 1 enabled, holding where it is.
+    /// Creates a bench with drive 1 enabled, holding its position.
     pub(crate) fn enabled(mode: Mode) -> Self {
         let mut bench = Self::started(mode);
         bench.enable(if mode == Mode::Csp { counts(START_M) } else { 0 });
@@ -185,19 +185,19 @@ impl Bench {
         panic!("not enabled but {state}");
     }
 
-    /// One cycle: command first, then SYNC, as the drive takes over at SYNC what came before it.
+    /// Runs one cycle: command first, then SYNC, at which the drive takes over the last command.
     pub(crate) fn cycle(&mut self, controlword: Controlword, target_counts: i32) -> Answer {
-        let command = Command { controlword, target_counts, torque_offset: 0 };
+        let command = CommandRpdo1 { controlword, target_counts, torque_offset: 0 };
         self.bus.send(&command.encode(node(1))).unwrap();
         self.sync()
     }
 
-    /// One cycle of an enabled drive.
+    /// Runs one cycle of an enabled drive.
     pub(crate) fn follow(&mut self, target_counts: i32) -> Answer {
         self.cycle(Controlword::ENABLE_OPERATION, target_counts)
     }
 
-    /// One cycle without a command.
+    /// Runs one cycle without a command.
     pub(crate) fn sync(&mut self) -> Answer {
         self.bus.send(&sync::frame()).unwrap();
         self.collect()
@@ -206,10 +206,10 @@ impl Bench {
     pub(crate) fn collect(&mut self) -> Answer {
         let mut answer = Answer::default();
         while let Some(frame) = self.bus.recv(Duration::ZERO).unwrap() {
-            if let Some(status) = Status::decode(&frame, node(1)) {
+            if let Some(status) = StatusTpdo1::decode(&frame, node(1)) {
                 answer.status = Some(status);
             }
-            if let Some(extra) = Extra::decode(&frame, node(1)) {
+            if let Some(extra) = DriveMotionTpdo2::decode(&frame, node(1)) {
                 answer.extra = Some(extra);
             }
             if let Some(emergency) = Emergency::decode(&frame) {

@@ -1,4 +1,4 @@
-//! Bring-up against the simulated nodes: what it finds, what it refuses, what it survives.
+//! Bring-up against the simulated nodes: findings, refusals, robustness.
 
 use std::time::Duration;
 
@@ -106,7 +106,7 @@ fn texts_go_both_ways_in_segments() {
     }
 }
 
-/// A bus on which other nodes talk all the time.
+/// A bus with constant traffic of other nodes.
 struct Crowded {
     inner: InProcess<Machine>,
     foreign: Vec<Frame>,
@@ -179,7 +179,7 @@ fn node_numbers_are_1_to_127() {
     assert_eq!(NodeId::new(127).map(NodeId::get), Some(127));
 }
 
-/// A bus on which frames on the node's own answer channel come before each true answer.
+/// A bus on which stray frames on the node's answer channel precede each true answer.
 struct Disturbed {
     inner: InProcess<Machine>,
     strays: Vec<[u8; 8]>,
@@ -203,20 +203,20 @@ impl Bus for Disturbed {
     }
 }
 
-/// Answers that belong to no question of the client: of other objects, other requests, other transfers.
+/// Answers that match no request of the client: of other objects, other requests, other transfers.
 const STRAYS: [[u8; 8]; 9] = [
-    // 0x2030 read, and written; 0x6502:01, whose index alone is right.
+    // 0x2030 read, and written; 0x6502:01, of which only the index matches.
     [0x43, 0x30, 0x20, 0x01, 0x11, 0x22, 0x33, 0x44],
     [0x60, 0x30, 0x20, 0x01, 0, 0, 0, 0],
     [0x43, 0x02, 0x65, 0x01, 0xFF, 0xFF, 0xFF, 0xFF],
-    // Aborts of others.
+    // Aborts of other transfers.
     [0x80, 0x30, 0x20, 0x01, 0x00, 0x00, 0x02, 0x06],
     [0x80, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x08],
-    // A segmented read of another object begins.
+    // The start of a segmented read of another object.
     [0x41, 0x08, 0x10, 0x05, 0xFF, 0, 0, 0],
-    // A segment that was taken, with the toggle that no first one has.
+    // A segment acknowledgement with the wrong toggle bit for a first one.
     [0x30, 0, 0, 0, 0, 0, 0, 0],
-    // No SDO message at all, and a block transfer.
+    // Not an SDO message, and a block transfer.
     [0xFF, 1, 2, 3, 4, 5, 6, 7],
     [0xC2, 0x08, 0x10, 0, 0, 0, 0, 0],
 ];
@@ -262,7 +262,7 @@ fn a_node_that_answers_other_questions_only_is_silent() {
 
 #[test]
 fn a_segment_that_comes_twice_is_taken_once() {
-    /// Sends each answer of the node twice.
+    /// Duplicates each answer of the node.
     struct Twice(InProcess<Machine>, Option<Frame>);
 
     impl Bus for Twice {
@@ -280,7 +280,7 @@ fn a_segment_that_comes_twice_is_taken_once() {
     }
 
     let mut bus = Twice(Bench::new(ClockMode::LockStep).bus, None);
-    // To the bring-up, a node all of whose answers come twice is two nodes.
+    // To the bring-up, a node whose answers all come twice is two nodes.
     let line = bring_up(&mut bus, &setup(Mode::Csv)).unwrap_err().to_string();
     assert!(line.starts_with("two nodes answer as node 1: "), "{line}");
     let client = SdoClient::new(node(1), ANSWER);
@@ -289,7 +289,7 @@ fn a_segment_that_comes_twice_is_taken_once() {
     assert_eq!(client.upload(&mut bus, 0x2000, 0).unwrap(), text);
 }
 
-/// A drive that says of some objects that it does not have them.
+/// A drive that reports some objects as missing.
 struct Without {
     inner: InProcess<Machine>,
     absent: Vec<u16>,

@@ -1,4 +1,5 @@
-//! In lock-step the same commands give the same frames, to the last bit, on the gantry with friction.
+//! Determinism: in lock-step the same commands give bit-identical frames, on the gantry with
+//! friction.
 
 use std::time::Duration;
 
@@ -6,7 +7,7 @@ use ilc_rt::campaign::drive_setup;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::bring_up::{DriveSetup, bring_up};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
-use ilc_rt::fieldbus::cia402::{Command, Status, next_command};
+use ilc_rt::fieldbus::cia402::{CommandRpdo1, StatusTpdo1, next_command};
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
 use ilc_sim::{ClockMode, Machine};
@@ -25,13 +26,13 @@ fn run() -> Vec<Frame> {
     }
     bus.send(&NmtCommand::Start.frame(None)).unwrap();
     let mut frames = Vec::new();
-    let mut status = [Status::default(); 2];
+    let mut status = [StatusTpdo1::default(); 2];
     let mut start: [Option<i32>; 2] = [None; 2];
     for cycle in 0..1000 {
         bus.send(&sync::frame()).unwrap();
         while let Some(frame) = bus.recv(Duration::ZERO).unwrap() {
             for (axis, &node) in nodes.iter().enumerate() {
-                status[axis] = Status::decode(&frame, node).unwrap_or(status[axis]);
+                status[axis] = StatusTpdo1::decode(&frame, node).unwrap_or(status[axis]);
             }
             frames.push(frame);
         }
@@ -40,7 +41,7 @@ fn run() -> Vec<Frame> {
             let phase = f64::from(cycle) * 0.02;
             #[expect(clippy::cast_possible_truncation, reason = "a small count")]
             let swing = (1e6 * (1.0 - phase.cos())) as i32;
-            let command = Command {
+            let command = CommandRpdo1 {
                 controlword: next_command(status[axis].statusword.state().unwrap()),
                 target_counts: if cycle < 20 { start } else { start + swing },
                 torque_offset: 0,
@@ -57,7 +58,7 @@ fn two_runs_are_one_run() {
     assert!(first.len() > 4000);
     let positions: Vec<i32> = first
         .iter()
-        .filter_map(|frame| Status::decode(frame, NodeId::new(1).unwrap()))
+        .filter_map(|frame| StatusTpdo1::decode(frame, NodeId::new(1).unwrap()))
         .map(|status| status.position_counts)
         .collect();
     let spread = positions.iter().max().unwrap() - positions.iter().min().unwrap();

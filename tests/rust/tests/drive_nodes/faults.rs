@@ -1,4 +1,4 @@
-//! Faults of drives: following error, reset, lost power, lost controller.
+//! Faults of drives: following error, reset, loss of power, loss of the controller.
 
 use std::sync::atomic::Ordering;
 
@@ -9,7 +9,7 @@ use ilc_sim::{Change, ClockMode};
 
 use crate::bench::{Bench, START_M, counts, node};
 
-/// Drive 1 in fault: stuck while it was told to move.
+/// Returns drive 1 in fault: stuck while commanded to move.
 fn faulted() -> (Bench, Vec<u16>) {
     let mut bench = Bench::enabled(Mode::Csp);
     bench.is_stuck.store(true, Ordering::Relaxed);
@@ -36,7 +36,8 @@ fn an_axis_that_does_not_follow_faults_in_time() {
         }
         assert!(n_cycles < 100);
     }
-    // 5000 counts at 200 a cycle are 25 cycles, then 10 ms of patience, and the latency of a target.
+    // 5000 counts at 200 a cycle are 25 cycles, then the timeout of 10 ms, and the latency of a
+    // target.
     assert!((35..=38).contains(&n_cycles), "after {n_cycles} cycles");
 }
 

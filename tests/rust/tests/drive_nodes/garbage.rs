@@ -1,4 +1,4 @@
-//! Random traffic: nothing panics, no state is undefined, the axis never jumps.
+//! Random traffic: no panic, no undefined state, no jump of the axis.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::bench::{Bench, CYCLE_US, VELOCITY_MAX_M_S, node};
 
-/// Frames that reach the inner parts more often than chance would.
+/// Draws frames that reach inner parts more often than purely random ones.
 fn frame() -> impl Strategy<Value = Frame> {
     let id = prop_oneof![
         Just(0x000_u16),
@@ -61,7 +61,7 @@ proptest! {
         let mode = if is_velocity { Mode::Csv } else { Mode::Csp };
         let mut bench = Bench::enabled(mode);
         let limit_m = VELOCITY_MAX_M_S * f64::from(CYCLE_US) * 1e-6 + 1e-9;
-        // 0x607F may itself be overwritten, so the limit holds only while it was not.
+        // 0x607F may be overwritten, so the limit holds only until then.
         let touches_limit =
             |frame: &Frame| frame.id() == 0x601 && frame.payload().get(1..3) == Some(&[0x7F, 0x60]);
         let is_free = frames.iter().any(touches_limit);
@@ -77,7 +77,7 @@ proptest! {
             prop_assert!(word.state().is_some(), "statusword 0x{:04X}", word.0);
             let now_m = machine.plant().encoder_m(0);
             prop_assert!(now_m.is_finite());
-            // A frame may itself be a SYNC: two cycles at most have passed.
+            // A frame may be a SYNC: at most two cycles have passed.
             prop_assert!(is_free || (now_m - before_m).abs() <= 2.0 * limit_m);
             before_m = now_m;
         }

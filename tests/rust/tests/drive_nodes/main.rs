@@ -1,4 +1,4 @@
-//! Controller against simulated drives, over a bus in memory and in lock-step unless said otherwise.
+//! Controller against simulated drives, over an in-memory bus and in lock-step unless noted.
 
 #![expect(
     clippy::unwrap_used,

@@ -11,7 +11,7 @@ use crate::bench::{
     setup,
 };
 
-/// Furthest that the shaft may move in a cycle, in counts.
+/// Largest movement of the shaft in a cycle, in counts.
 fn reach_counts() -> i32 {
     counts(VELOCITY_MAX_M_S * f64::from(CYCLE_US) * 1e-6) + 1
 }
@@ -19,7 +19,7 @@ fn reach_counts() -> i32 {
 #[test]
 fn enabling_holds_the_axis_where_it_is_whatever_the_old_target() {
     let mut bench = Bench::started(Mode::Csp);
-    // Targets that arrive before the drive is enabled must not count.
+    // Targets that arrive before the drive is enabled must be ignored.
     for _ in 0..3 {
         bench.cycle(Controlword::SHUTDOWN, 0);
     }
@@ -34,12 +34,12 @@ fn enabling_holds_the_axis_where_it_is_whatever_the_old_target() {
 fn a_target_is_reached_two_syncs_after_the_one_it_answers() {
     let mut bench = Bench::enabled(Mode::Csp);
     let target = counts(START_M) - 300;
-    // Taken over at this SYNC, interpolated over the cycle that follows, met at the next.
+    // Taken over at this SYNC, interpolated over the following cycle, reached at the next.
     assert_eq!(bench.follow(target).position(), counts(START_M));
     let answer = bench.follow(target);
     assert_eq!(answer.position(), target);
     assert!(answer.status.unwrap().statusword.has(Statusword::FOLLOWS_TARGET));
-    // The velocity of the last step shows that the way was covered evenly, not at once.
+    // The velocity of the last step shows that the motion was uniform, not a jump.
     let velocity = answer.extra.unwrap().velocity_counts_s;
     assert!((velocity + 300_000).abs() < 100, "{velocity}");
 }
@@ -102,7 +102,7 @@ fn velocity_mode_moves_at_the_velocity() {
     assert_eq!(bench.follow(0).position(), at_rest);
 }
 
-/// Brings drive 1 to a steady velocity and returns it, in counts a cycle.
+/// Brings drive 1 to a constant velocity and returns it, in counts per cycle.
 fn moving() -> (Bench, i32, i32) {
     let mut bench = Bench::enabled(Mode::Csp);
     let mut target = counts(START_M);
@@ -139,7 +139,7 @@ fn quick_stop_brakes_on_its_ramp_and_holds() {
         let answer = bench.cycle(Controlword::QUICK_STOP, target);
         assert_eq!((answer.state(), answer.position()), (State::QuickStopActive, before));
     }
-    // Transition 16: back to operation from where it stands.
+    // Transition 16: re-enabled at its current position.
     assert_eq!(bench.follow(before).state(), State::OperationEnabled);
     assert_eq!(bench.follow(before).position(), before);
 }
@@ -168,7 +168,7 @@ fn halt_brakes_and_its_end_does_not_jump_to_the_target() {
     assert_eq!(bench.follow(held.position()).position(), held.position());
 }
 
-/// A drive with a deadline on its commands, in lock-step, moving 200 counts a cycle.
+/// A drive with a command timeout, in lock-step, moving 200 counts per cycle.
 fn moving_with_deadline() -> (Bench, i32) {
     let mut bench = Bench::new(ClockMode::LockStep);
     let with_deadline = DriveSetup { rpdo_deadline_ms: 20, ..setup(Mode::Csp) };
@@ -227,7 +227,7 @@ fn a_silent_controller_in_velocity_mode_ends_in_a_ramp() {
 
 #[test]
 fn a_silent_controller_is_survived_whatever_an_earlier_master_left() {
-    // Each of these by itself would let the axis run on, or coast.
+    // Each of these alone would let the axis run on, or coast.
     let left: [(u16, &[u8]); 6] = [
         (0x6085, &1_u32.to_le_bytes()),
         (0x6084, &1_u32.to_le_bytes()),
@@ -248,7 +248,7 @@ fn a_silent_controller_is_survived_whatever_an_earlier_master_left() {
         }
         let answers: Vec<_> = (0..80).map(|_| bench.sync()).collect();
         let way = answers[0].position() - answers[79].position();
-        // 20 ms at 0.2 m/s and a ramp of 2 mm; a cycle or two to take notice.
+        // 20 ms at 0.2 m/s and a ramp of 2 mm; a cycle or two of latency.
         assert!((5_000..7_000).contains(&way), "0x{index:04X}: {way} counts");
         assert_eq!(answers[79].position(), answers[60].position(), "0x{index:04X}");
         let ramps = answers.iter().any(|answer| answer.state() == State::FaultReactionActive);
@@ -259,7 +259,7 @@ fn a_silent_controller_is_survived_whatever_an_earlier_master_left() {
 #[test]
 fn a_drive_left_under_power_is_brought_to_rest_before_anything_is_set() {
     let mut bench = Bench::enabled(Mode::Csv);
-    // Nothing happens to it when it is reset: the master before wanted it so.
+    // A reset leaves it alone: the previous master wanted it so.
     bench.write(0x6007, 0, &0_i16.to_le_bytes());
     bench.write(0x6085, 0, &1_u32.to_le_bytes());
     for _ in 0..5 {
@@ -272,7 +272,7 @@ fn a_drive_left_under_power_is_brought_to_rest_before_anything_is_set() {
 
 #[test]
 fn option_codes_have_their_ramps() {
-    // 0.2 m/s: at 10 m/s2 over after 20 ms, at 2 m/s2 after 100 ms.
+    // 0.2 m/s: at 10 m/s2 at rest after 20 ms, at 2 m/s2 after 100 ms.
     for (option, n_cycles, ends_in) in [
         (0, 0_usize, State::SwitchOnDisabled),
         (1, 100, State::SwitchOnDisabled),

@@ -1,4 +1,4 @@
-//! The object dictionary of a drive: what it refuses, and that its data sheet tells the truth.
+//! The object dictionary of a drive: its refusals, and its agreement with the data sheet.
 
 use ilc_rt::fieldbus::Bus;
 use ilc_rt::fieldbus::bring_up::{SdoClient, SdoError};

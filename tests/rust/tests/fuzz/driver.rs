@@ -1,8 +1,8 @@
-//! Tries what is kept, then what is drawn: mutations of it, until their number or the time is over.
+//! Runs a target on the corpus, then on mutations of it, up to their number or the time limit.
 //!
-//! `make test` replays the corpus, `tests/fuzz/corpus`, and draws a fixed number of mutations from a
-//! fixed seed; `make fuzz` draws from another seed for a while (`ILC_FUZZ_S`). An input that panics or
-//! takes too long is written to the corpus, where it is tried first from then on.
+//! `make test` replays the corpus, `tests/fuzz/corpus`, and draws a fixed number of mutations from
+//! a fixed seed; `make fuzz` draws from another seed for some time (`ILC_FUZZ_S`). An input that
+//! panics or takes too long is written to the corpus, from which later runs try it first.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -11,14 +11,14 @@ use std::time::{Duration, Instant};
 
 use ilc_tests::faulty::Draws;
 
-/// Seconds that a target has under `make fuzz`.
+/// Environment variable with the seconds per target under `make fuzz`.
 const SECONDS_VARIABLE: &str = "ILC_FUZZ_S";
 /// An input that takes longer is a hang.
 const HANG: Duration = Duration::from_secs(45);
 /// Longest input.
 const LENGTH_MAX: usize = 1 << 16;
 
-/// Numbers at which readers break.
+/// Numbers that often break parsers.
 const NUMBERS: [&str; 16] = [
     "0",
     "-0",
@@ -52,7 +52,7 @@ fn kept(target: &str) -> Vec<(PathBuf, Vec<u8>)> {
     found
 }
 
-/// Writes an input to the corpus, and says what to do with it.
+/// Writes an input to the corpus, and prints what to do with it.
 fn keep(target: &str, input: &[u8], what: &str) -> String {
     let hash = input.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
@@ -70,10 +70,10 @@ fn keep(target: &str, input: &[u8], what: &str) -> String {
     format!("{target}, seed {}: {what}; the input is {place}", ilc_cases::seed())
 }
 
-/// Says which input hangs, from a thread of its own, and ends the test.
+/// Reports a hanging input from its own thread, and aborts the test.
 struct Watchdog(Arc<Mutex<Option<Trial>>>);
 
-/// When it began, and the input.
+/// Start time and input.
 type Trial = (Instant, Vec<u8>);
 
 impl Watchdog {
@@ -81,7 +81,7 @@ impl Watchdog {
         let now = Arc::new(Mutex::new(None::<Trial>));
         let watched = Arc::clone(&now);
         std::thread::spawn(move || {
-            // Ends with the test's last owner.
+            // Ends with the test's last reference.
             while Arc::strong_count(&watched) > 1 {
                 std::thread::sleep(Duration::from_millis(500));
                 let running = watched.lock().unwrap().clone();
@@ -107,7 +107,7 @@ impl Watchdog {
     }
 }
 
-/// Tries a target on what is kept and on `n` mutations of that and of `seeds`.
+/// Runs a target on the corpus and on `n` mutations of it and of `seeds`.
 pub(crate) fn fuzz(name: &'static str, seeds: &[Vec<u8>], n: usize, target: impl Fn(&[u8])) {
     let watchdog = Watchdog::new(name);
     let kept = kept(name);
@@ -133,7 +133,7 @@ pub(crate) fn fuzz(name: &'static str, seeds: &[Vec<u8>], n: usize, target: impl
     println!("{name}: {} kept, {tried} drawn from seed {}", kept.len(), ilc_cases::seed());
 }
 
-/// A member of the pool after a few changes, or random bytes.
+/// Returns a member of the pool after a few mutations, or random bytes.
 fn mutated(pool: &[&[u8]], draws: &mut Draws) -> Vec<u8> {
     if pool.is_empty() || draws.chance(0.05) {
         return (0..draws.below(64)).map(|_| draws.byte()).collect();
@@ -169,7 +169,7 @@ fn change(bytes: &mut Vec<u8>, pool: &[&[u8]], draws: &mut Draws) {
     }
 }
 
-/// Puts another number in the place of the first one after `at`.
+/// Replaces the first number after `at`.
 fn exchange_number(bytes: &mut Vec<u8>, at: usize, draws: &mut Draws) {
     let Some(begin) = bytes.iter().skip(at).position(u8::is_ascii_digit).map(|n| n + at) else {
         return;
@@ -179,7 +179,7 @@ fn exchange_number(bytes: &mut Vec<u8>, at: usize, draws: &mut Draws) {
     bytes.splice(begin..end, NUMBERS[draws.below(NUMBERS.len())].bytes());
 }
 
-/// Lets two lines change places, or says one twice.
+/// Swaps two lines, or duplicates one.
 fn exchange_lines(bytes: &mut Vec<u8>, draws: &mut Draws) {
     let mut lines: Vec<Vec<u8>> = bytes.split(|byte| *byte == b'\n').map(<[u8]>::to_vec).collect();
     let (a, b) = (draws.below(lines.len()), draws.below(lines.len()));

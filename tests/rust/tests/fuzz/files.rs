@@ -1,4 +1,4 @@
-//! What stands in files: cells, part programs, tables of set points, libraries.
+//! Fuzzing of files: cells, part programs, tables of set points, libraries.
 
 use std::fmt::Write as _;
 
@@ -29,7 +29,8 @@ fn a_cell_is_read_or_refused_in_one_line() {
     });
 }
 
-/// Plans a cell whose program is such a file; what is planned holds the limits of every axis.
+/// Plans a cell whose program is the given file; a planned program respects the limits of every
+/// axis.
 fn plan(kind: &str, name: &str, input: &[u8]) {
     let scratch = Scratch::new();
     let text = example_text("04_gcode.toml")

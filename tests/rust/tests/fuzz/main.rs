@@ -1,4 +1,5 @@
-//! Whatever bytes come, from a wire or a file: no panic, no hang, and a refusal is one line.
+//! Fuzzing: for any bytes from a wire or a file there is no panic, no hang, and a refusal is one
+//! line.
 
 #![allow(
     clippy::unwrap_used,

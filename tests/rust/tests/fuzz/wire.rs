@@ -1,4 +1,4 @@
-//! What comes over a bus: frames, the two sides of SDO, bring-up, datagrams.
+//! Fuzzing of bus traffic: frames, both sides of SDO, bring-up, datagrams.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -7,7 +7,7 @@ use ilc_rt::campaign::drive_setup;
 use ilc_rt::fieldbus::bring_up::{SdoClient, bring_up};
 use ilc_rt::fieldbus::canopen::sdo::{SdoRequest, SdoResponse};
 use ilc_rt::fieldbus::canopen::{Emergency, Heartbeat, NmtCommand, sync};
-use ilc_rt::fieldbus::cia402::{Command, EncoderSample, Extra, Status};
+use ilc_rt::fieldbus::cia402::{CommandRpdo1, DriveMotionTpdo2, EncoderSample, StatusTpdo1};
 use ilc_rt::fieldbus::transport::{InProcess, Responder, udp_codec};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_tests::campaign::machine;
@@ -18,7 +18,7 @@ use crate::driver::fuzz;
 
 const CELL: &str = "01_gantry.toml";
 
-/// Frames from bytes: an identifier, a length, a payload.
+/// Decodes bytes to frames: an identifier, a length, a payload.
 fn frames(input: &[u8]) -> Vec<Frame> {
     let mut found = Vec::new();
     let mut rest = input;
@@ -31,7 +31,7 @@ fn frames(input: &[u8]) -> Vec<Frame> {
     found
 }
 
-/// Bytes that [`frames`] makes such frames of.
+/// Encodes frames as bytes that [`frames`] decodes.
 fn bytes(frames: &[(u16, &[u8])]) -> Vec<u8> {
     let mut found = Vec::new();
     for (id, payload) in frames {
@@ -65,14 +65,14 @@ fn frames_are_decoded_or_passed_over() {
                 assert_eq!(Heartbeat::decode(&found.encode()), Some(found));
             }
             for node in [1, 2, 10, 127].map(node) {
-                if let Some(found) = Command::decode(&frame, node) {
-                    assert_eq!(Command::decode(&found.encode(node), node), Some(found));
+                if let Some(found) = CommandRpdo1::decode(&frame, node) {
+                    assert_eq!(CommandRpdo1::decode(&found.encode(node), node), Some(found));
                 }
-                if let Some(found) = Status::decode(&frame, node) {
-                    assert_eq!(Status::decode(&found.encode(node), node), Some(found));
+                if let Some(found) = StatusTpdo1::decode(&frame, node) {
+                    assert_eq!(StatusTpdo1::decode(&found.encode(node), node), Some(found));
                 }
-                if let Some(found) = Extra::decode(&frame, node) {
-                    assert_eq!(Extra::decode(&found.encode(node), node), Some(found));
+                if let Some(found) = DriveMotionTpdo2::decode(&frame, node) {
+                    assert_eq!(DriveMotionTpdo2::decode(&found.encode(node), node), Some(found));
                 }
                 if let Some(found) = EncoderSample::decode(&frame, node) {
                     assert_eq!(EncoderSample::decode(&found.encode(node), node), Some(found));
@@ -88,7 +88,7 @@ fn frames_are_decoded_or_passed_over() {
     });
 }
 
-/// A node that answers whatever it is asked with what comes next.
+/// A node that answers every request with the next frame of a script.
 struct Scripted(VecDeque<Frame>);
 
 impl Bus for Scripted {
@@ -150,7 +150,7 @@ fn the_nodes_answer_or_pass_over_whatever_comes() {
             (0x201, &[0x0F, 0, 0, 0, 0, 0]),
             (0x080, &[]),
         ]),
-        // A PDO switched off, mapped anew and on again.
+        // A PDO disabled, remapped and re-enabled.
         bytes(&[
             (0x601, &[0x23, 0x00, 0x18, 1, 0x81, 1, 0, 0x80]),
             (0x601, &[0x2F, 0x00, 0x1A, 0, 0, 0, 0, 0]),

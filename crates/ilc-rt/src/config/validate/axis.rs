@@ -1,7 +1,7 @@
 //! Contradictions within `[[axis]]`.
 
 use super::checker::Checker;
-use crate::config::{Axis, Cell, ConfigError, Interface};
+use crate::config::{Axis, Cell, ConfigError, Mode, mode};
 use crate::record::{NAME_MAX, is_hidden};
 
 /// Highest CANopen node number.
@@ -79,14 +79,9 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
         &l.velocity_max_m_s,
         "counts_per_m times velocity_max_m_s must fit 32 bits",
     )?;
-    let m = &axis.model;
-    let of_csp = [("natural_frequency_hz", m.natural_frequency_hz), ("damping", m.damping)];
-    let of_csv = [("velocity_bandwidth_hz", m.velocity_bandwidth_hz)];
-    let (wanted, unwanted): (&[_], &[_]) = match axis.interface {
-        Interface::Csp => (&of_csp, &of_csv),
-        Interface::Csv => (&of_csv, &of_csp),
-    };
-    for (key, value) in wanted {
+    let design = mode::of(axis.interface);
+    let wanted = design.model_keys(&axis.model);
+    for (key, value) in &wanted {
         v.that(
             value.is_some(),
             &at(&format!("model.{key}")),
@@ -94,6 +89,8 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
             "needed by this interface",
         )?;
     }
+    let all = Mode::ALL.into_iter().flat_map(|other| mode::of(other).model_keys(&axis.model));
+    let unwanted = all.filter(|(key, _)| wanted.iter().all(|(needed, _)| needed != key));
     for (key, value) in unwanted {
         if let Some(value) = value {
             return Err(v.refuse(
@@ -103,19 +100,15 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
             ));
         }
     }
-    match (axis.interface, &axis.position_loop) {
-        (Interface::Csv, None) => Err(v.refuse(
-            &at("position_loop"),
-            &"missing",
-            "interface \"csv\" needs [axis.position_loop] gain_per_s",
-        )),
-        (Interface::Csp, Some(_)) => Err(v.refuse(
-            &at("position_loop"),
-            &"given",
-            "interface \"csp\" has its position loop in the drive; remove it",
-        )),
-        (Interface::Csv, Some(_)) | (Interface::Csp, None) => Ok(()),
-    }?;
+    let name = axis.interface.name();
+    if design.closes_position_loop() != axis.position_loop.is_some() {
+        let (found, allowed) = if design.closes_position_loop() {
+            ("missing", format!("interface \"{name}\" needs [axis.position_loop] gain_per_s"))
+        } else {
+            ("given", format!("interface \"{name}\" has its position loop in the drive; remove it"))
+        };
+        return Err(v.refuse(&at("position_loop"), &found, &allowed));
+    }
     check_simulation(axis, v)
 }
 

@@ -1,7 +1,7 @@
 //! Contradictions within `[learning]`, its laws, and what goes round them.
 
 use super::checker::Checker;
-use crate::config::{Cell, ConfigError, Interface, LawName, Measure};
+use crate::config::{Cell, ConfigError, LawName, Measure, mode};
 use crate::learning::law::{LawAxis, LawCell, LawTables};
 
 /// Contradictions of the learning; those of the other laws' tables too, so that a slip shows at once.
@@ -50,11 +50,8 @@ impl Cell {
                 .iter()
                 .map(|axis| LawAxis {
                     name: &axis.name,
-                    corrects_set_point: axis.interface == Interface::Csp,
-                    input_max: match axis.interface {
-                        Interface::Csp => self.learning.input_max_m,
-                        Interface::Csv => self.learning.input_max_m_s,
-                    },
+                    corrects_set_point: !mode::of(axis.interface).closes_position_loop(),
+                    input_max: mode::of(axis.interface).input_max(&self.learning),
                     position_min: axis.limits.position_min_m,
                     position_max: axis.limits.position_max_m,
                     velocity_max: axis.limits.velocity_max_m_s,

@@ -12,6 +12,10 @@ use crate::trajectory::MAX_AXES;
 
 use checker::Checker;
 
+/// Keys of earlier versions, and their names of today.
+const RENAMED: [(&str, &str); 1] =
+    [("curvature_acceleration_m_s2", "curvature_acceleration_max_m_s2")];
+
 /// Turns a TOML error into one line that names the place.
 pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     let at = error.span().map_or(0, |span| span.start).min(text.len());
@@ -33,7 +37,13 @@ pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigE
         _ if row.starts_with('[') => row.split('#').next().unwrap_or("").trim().to_owned(),
         _ => table.to_owned(),
     };
-    let reason = printable(&error.message().replace('\n', " "), TEXT_MAX);
+    let message = error.message().replace('\n', " ");
+    let renamed =
+        RENAMED.iter().find(|(old, _)| message.contains(&format!("unknown field `{old}`")));
+    let reason = match renamed {
+        Some((_, new)) => format!("it is now called {new}"),
+        None => printable(&message, TEXT_MAX),
+    };
     let (file, key) = (printable(file, TEXT_MAX), printable(&key, TEXT_MAX));
     ConfigError::Syntax { file, line, key, reason }
 }

@@ -1,7 +1,7 @@
-//! What is allowed in `[program]`.
+//! Checks of `[program]` that its schema does not express.
 
 use super::checker::Checker;
-use crate::config::{Cell, ConfigError, PathKind};
+use crate::config::{Cell, ConfigError};
 
 /// Ranges of the program, and what its kind of path needs.
 pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
@@ -15,68 +15,29 @@ pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// What each kind of path needs, and what it would not read.
+/// Refuses keys that the kind of path does not read, and the lack of those that it needs.
 fn check_kind(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let program = &cell.program;
-    let kind = program.kind;
-    let by_segments = matches!(kind, PathKind::Points | PathKind::Spline | PathKind::Modulated);
-    v.that(
-        by_segments != program.segments.is_empty(),
-        "[program] kind, [[program.segment]] count",
-        &program.segments.len(),
-        if by_segments { "at least one segment" } else { "0, as this kind has none" },
-    )?;
-    let sections = [
-        (
-            "[program] file",
-            program.file.is_some(),
-            matches!(kind, PathKind::Gcode | PathKind::Table),
-            true,
-        ),
-        ("[program] rapid_m_s", program.rapid_m_s.is_some(), kind == PathKind::Gcode, false),
-        ("[program] block_delete", program.block_delete, kind == PathKind::Gcode, false),
-        ("[program.butterfly]", program.butterfly.is_some(), kind == PathKind::Butterfly, false),
-        ("[program.spiral]", program.spiral.is_some(), kind == PathKind::Spiral, true),
-        ("[program.raster]", program.raster.is_some(), kind == PathKind::Raster, true),
-        ("[program.modulated]", program.modulated.is_some(), kind == PathKind::Modulated, true),
-        (
-            "[program] curvature_acceleration_m_s2",
-            program.curvature_acceleration_m_s2.is_some(),
-            matches!(kind, PathKind::Spline | PathKind::Butterfly | PathKind::Spiral),
-            false,
-        ),
-    ];
-    for (key, given, used, needed) in sections {
-        v.that(used || !given, key, &"given", "not used by this kind of path; remove it")?;
-        v.that(given || !(used && needed), key, &"missing", "needed by this kind of path")?;
+    let kind = program.kind.entry();
+    for (key, name, is_given) in program.given() {
+        let (is_read, is_needed) = (kind.reads.contains(&key), kind.needs.contains(&key));
+        v.that(is_read || !is_given, name, &"given", "not used by this kind of path; remove it")?;
+        v.that(is_given || !is_needed, name, &"missing", "needed by this kind of path")?;
     }
-    let plane = matches!(kind, PathKind::Butterfly | PathKind::Spiral | PathKind::Raster);
     v.that(
-        !plane || cell.n_axes() == 2,
+        !kind.is_plane || cell.n_axes() == 2,
         "[program] kind",
         &"a plane shape",
         "needs a cell of 2 axes",
     )?;
-    if let Some(file) = &program.file {
-        let name = file.to_string_lossy();
-        v.that(
-            !name.contains(char::is_control) && (1..=255).contains(&name.len()),
-            "[program] file",
-            &format!("{:?}", name.chars().take(60).collect::<String>()),
-            "a name of 1 to 255 bytes without control characters",
-        )?;
-    }
-    for (number, segment) in program.segments.iter().enumerate() {
-        let key = |name: &str| format!("[[program.segment]] {} {name}", number + 1);
-        let extra = segment.center_m.is_some() || segment.clockwise || segment.dwell_s > 0.0;
-        v.that(
-            kind == PathKind::Points || !extra,
-            &key("center_m, clockwise, dwell_s"),
-            &"given",
-            "only with kind = \"points\"",
-        )?;
-    }
-    Ok(())
+    let Some(file) = &program.file else { return Ok(()) };
+    let name = file.to_string_lossy();
+    v.that(
+        !name.contains(char::is_control) && (1..=255).contains(&name.len()),
+        "[program] file",
+        &format!("{:?}", name.chars().take(60).collect::<String>()),
+        "a name of 1 to 255 bytes without control characters",
+    )
 }
 
 fn check_point(cell: &Cell, v: &Checker, key: &str, point_m: &[f64]) -> Result<(), ConfigError> {

@@ -10,20 +10,20 @@ use crate::fieldbus::Bus;
 use crate::fieldbus::canopen::{Heartbeat, NmtCommand, NmtState, NodeId};
 use crate::fieldbus::cia402::{Controlword, Mode, State, Statusword, objects, pdo_map};
 
-/// How long the following error may exceed its window before the drive faults (object 0x6066), in ms.
+/// Time that the following error may exceed its window before the drive faults (object 0x6066), in ms.
 pub const FOLLOWING_ERROR_TIME_MS: u16 = 10;
 
-/// How long a drive that was left moving may take to come to rest before its power is taken.
+/// Time for a drive that was left moving to come to rest before its power is taken.
 const REST: Duration = Duration::from_millis(500);
-/// How often a question is asked again whose answer takes time.
+/// Period at which a question is repeated whose answer takes time.
 const ASK_EVERY: Duration = Duration::from_millis(1);
 
-/// How often a question must be answered twice until two nodes are the reason.
+/// Number of questions answered twice that proves two nodes.
 const TWIN_QUESTIONS: u32 = 4;
-/// How long after an answer a second one is waited for.
+/// Time after an answer for which a second one is awaited.
 const TWIN_WAIT: Duration = Duration::from_millis(20);
 
-/// What a drive is set up to.
+/// Configuration of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveSetup {
     /// The drive.
@@ -48,14 +48,14 @@ pub struct DriveSetup {
     pub velocity_unit: Option<u32>,
     /// Period of the drive's heartbeat, in milliseconds; 0: none (lock-step).
     pub heartbeat_ms: u16,
-    /// How long the drive goes on without a command before it stops, in milliseconds; 0: for ever
+    /// Time without a command after which the drive stops, in milliseconds; 0: never
     /// (lock-step).
     pub rpdo_deadline_ms: u16,
-    /// How long the drive may take to boot, and to answer each question.
+    /// Longest time of the drive to boot, and to answer each question.
     pub answer_timeout: Duration,
 }
 
-/// Who a drive says it is.
+/// Identity of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveIdentity {
     /// Device type, object 0x1000.
@@ -66,7 +66,7 @@ pub struct DriveIdentity {
     pub identity: [u32; 4],
 }
 
-/// Who an encoder node says it is.
+/// Identity of an encoder node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderIdentity {
     /// Device type, object 0x1000.
@@ -79,7 +79,7 @@ pub struct EncoderIdentity {
 ///
 /// Reset communication, boot-up, identity (0x1000 profile 402, 0x6502), power off, PDOs (all switched
 /// off, then those of the loop mapped), and every object that shapes motion or the stop after a fault:
-/// read, put right where it is wrong, read again. NMT start is the caller's, for all nodes at once.
+/// read, corrected where it is wrong, read again. NMT start is the caller's, for all nodes at once.
 /// Frames of others that arrive meanwhile are discarded.
 ///
 /// # Errors
@@ -110,7 +110,7 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
         setup.rpdo_deadline_ms,
     )?;
     process_data::open(&mut remote, pdo_map::STATUS_PDO, &pdo_map::STATUS_MAP, 0)?;
-    process_data::open(&mut remote, pdo_map::EXTRA_PDO, &pdo_map::EXTRA_MAP, 0)?;
+    process_data::open(&mut remote, pdo_map::DRIVE_MOTION_PDO, &pdo_map::DRIVE_MOTION_MAP, 0)?;
 
     scaling::check(&mut remote, setup)?;
     remote.ensure_all(&settings::interpolation(period))?;
@@ -217,7 +217,7 @@ impl Remote<'_> {
         if !has_power(self.state()?.1) {
             return Ok(());
         }
-        // How to brake may have been left wrong as well. What is refused now is told later, when the
+        // How to brake may have been left wrong as well. What is refused now is reported later, when the
         // whole list is gone through.
         for setting in settings::reactions(setup) {
             match self.ensure(&setting) {
@@ -230,11 +230,7 @@ impl Remote<'_> {
         if !has_power(state) {
             return Ok(());
         }
-        Err(BringUpError::UnderPower {
-            node: self.node,
-            statusword: word.0,
-            state: state.map_or_else(|| "no known state".to_owned(), |state| state.to_string()),
-        })
+        Err(BringUpError::UnderPower { node: self.node, statusword: word })
     }
 
     /// Writes a controlword and waits until the drive has no power any more, or the time is over.
@@ -279,7 +275,7 @@ impl Remote<'_> {
     }
 }
 
-/// Whether a drive in this state may move its axis.
+/// Returns whether a drive in this state may move its axis.
 fn has_power(state: Option<State>) -> bool {
     match state {
         Some(

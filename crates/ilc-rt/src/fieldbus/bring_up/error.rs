@@ -1,13 +1,13 @@
-//! Why a node could not be brought up, in one line.
+//! Reasons that a node cannot be brought up, in one line.
 
 use std::time::Duration;
 
 use super::sdo_client::SdoError;
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
-use crate::fieldbus::cia402::Mode;
+use crate::fieldbus::cia402::{Mode, Statusword};
 
-/// Why a node could not be brought up: node, step, expected and found.
+/// Reason that a node cannot be brought up: node, step, expected and found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BringUpError {
     /// Nothing came after the reset.
@@ -17,7 +17,7 @@ pub enum BringUpError {
     NoBootUp {
         /// The node.
         node: NodeId,
-        /// How long was waited.
+        /// Time waited.
         timeout: Duration,
     },
     /// Two nodes have the same number.
@@ -66,7 +66,7 @@ pub enum BringUpError {
         mode: Mode,
         /// Object 0x6061.
         found: i8,
-        /// How long was waited.
+        /// Time waited.
         timeout: Duration,
     },
     /// 0x60C2 cannot hold the cycle.
@@ -88,11 +88,11 @@ pub enum BringUpError {
         object: ObjectAddress,
         /// Its name.
         name: &'static str,
-        /// What it holds.
+        /// Value found.
         found: String,
-        /// What it must hold.
+        /// Value needed.
         needed: String,
-        /// Why the node did not take another value, if it was asked to and said why.
+        /// Reason of the node not to take another value, if it was asked to and gave one.
         refusal: Option<AbortCode>,
     },
     /// An object that is needed is not there.
@@ -104,28 +104,28 @@ pub enum BringUpError {
         object: ObjectAddress,
         /// Its name.
         name: &'static str,
-        /// What for.
+        /// Purpose.
         purpose: &'static str,
     },
     /// The drive keeps its power.
     #[error(
-        "node {node}: the drive was left under power and does not let go: found {state} \
-         (0x6041 = 0x{statusword:04X}), needed switch on disabled; switch it off and on again"
+        "node {node}: the drive was left under power and does not let go: found {} \
+         (0x6041 = 0x{:04X}), needed switch on disabled; switch it off and on again",
+        statusword.state().map_or_else(|| "no known state".to_owned(), |state| state.to_string()),
+        statusword.0
     )]
     UnderPower {
         /// The node.
         node: NodeId,
         /// Object 0x6041.
-        statusword: u16,
-        /// Its state in words.
-        state: String,
+        statusword: Statusword,
     },
     /// A question to the node failed.
     #[error("{source} (step: {step})")]
     Sdo {
-        /// What was being done.
+        /// Step.
         step: &'static str,
-        /// What went wrong, with node and object.
+        /// Error, with node and object.
         source: SdoError,
     },
     /// The bus failed.
@@ -133,9 +133,9 @@ pub enum BringUpError {
     Bus {
         /// The node.
         node: NodeId,
-        /// What was being done.
+        /// Step.
         step: &'static str,
-        /// What went wrong.
+        /// Error.
         source: BusError,
     },
 }

@@ -1,4 +1,4 @@
-//! Listens before anything is sent: whether somebody else commands this bus. Cold: it waits.
+//! Listening before anything is sent: traffic of another master on this bus. Cold: it waits.
 
 use std::time::{Duration, Instant};
 
@@ -6,10 +6,10 @@ use crate::fieldbus::canopen::pdo::PdoNumber;
 use crate::fieldbus::canopen::{NmtCommand, NodeId, cob_id, sync};
 use crate::fieldbus::{Bus, BusError, Frame};
 
-/// How long a bus is listened to: several cycles of any servo loop, and two heartbeats of 100 ms.
+/// Time that a bus is listened to: several cycles of any servo loop, and two heartbeats of 100 ms.
 pub const LISTEN: Duration = Duration::from_millis(250);
 
-/// What only a master sends.
+/// Traffic that only a master sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// SYNC.
@@ -52,9 +52,9 @@ impl Command {
     }
 }
 
-/// Listens for a while and returns the first command of somebody else, if one comes.
+/// Listens for a while and returns the first command of another master, if one comes.
 ///
-/// A bus in memory has nobody else on it, and nothing comes: it is not waited for.
+/// A bus in memory has no other master on it: nothing is awaited.
 ///
 /// # Errors
 /// [`BusError`] if the bus fails.

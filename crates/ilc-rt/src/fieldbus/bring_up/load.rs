@@ -1,4 +1,4 @@
-//! Whether the frames of one cycle fit on a classical CAN bus.
+//! Bus load of the frames of one cycle on classical CAN.
 //!
 //! Checked when a cell is loaded: a bus that is too full shows up on the machine as late set-points and
 //! lost drives, long after the mistake was made. The counts are the worst case of bit stuffing, so that
@@ -13,7 +13,7 @@ const EMPTY_FRAME_BITS: u64 = 55;
 /// Bits that one byte of payload adds: 8 and at most 2 stuff bits.
 const BITS_PER_BYTE: u64 = 10;
 
-/// What the frames of one cycle ask of the bus.
+/// Bus load of the frames of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     /// Worst-case bits on the bus in one cycle.
@@ -29,7 +29,7 @@ impl Load {
     }
 }
 
-/// Why the frames of a cycle do not fit.
+/// Reason that the frames of a cycle do not fit.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LoadError {
     /// More bits than the limit allows.

@@ -90,7 +90,7 @@ pub(super) fn open(
     Err(remote.unfit_words(&setting, found, needed, None))
 }
 
-/// Whether the node has this very mapping already.
+/// Returns whether the node has this very mapping already.
 fn is_mapped(
     remote: &mut Remote<'_>,
     step: &'static str,

@@ -65,7 +65,7 @@ impl Remote<'_> {
     /// Sees to it that an object holds what is needed, and returns what it holds; `None` if the node
     /// has no such object and needs none.
     ///
-    /// What is right is not written again: some drives wear their memory by every write.
+    /// A right value is not written again: some drives wear their memory by every write.
     ///
     /// # Errors
     /// [`BringUpError::Value`] if it holds something else and keeps it, [`BringUpError::Missing`] if it
@@ -156,7 +156,7 @@ impl Remote<'_> {
     }
 }
 
-/// Whether the node said that it has no such object.
+/// Returns whether the node said that it has no such object.
 pub(super) fn is_absent(code: AbortCode) -> bool {
     matches!(code, AbortCode::NoObject | AbortCode::NoSubIndex)
 }

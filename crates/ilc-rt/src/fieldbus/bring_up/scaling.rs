@@ -10,7 +10,7 @@ use crate::fieldbus::cia402::objects;
 const UNITY: [u32; 2] = [1, 1];
 
 /// Checks that a drive counts as its encoder does, and that its velocities are of the same counts; then
-/// sees to the speed limit of the motor, which is told in revolutions.
+/// sees to the speed limit of the motor, which is in revolutions.
 ///
 /// `position = increments * feed constant / (encoder resolution * gear ratio)`
 ///
@@ -51,7 +51,7 @@ pub(super) fn check(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), B
     let home = Setting::new(objects::HOME_OFFSET, 0, Kind::I32, Need::Exactly(0));
     match remote.find(home.name(), objects::HOME_OFFSET, 0)? {
         // Written, it would move the coordinates of an axis that was set up with it, at once or at
-        // the next homing: nobody can tell which.
+        // the next homing: it is not known which.
         Some(found) if found != 0 => {
             let found = home.shown(found.cast_signed().into());
             let needed = "0; positions would be shifted against the cell description".to_owned();

@@ -3,18 +3,18 @@
 use std::time::{Duration, Instant};
 
 use crate::fieldbus::canopen::sdo::{
-    Expedited, ObjectAddress, SEGMENT_MAX, SdoRequest, SdoResponse, Segment,
+    Data, Expedited, ObjectAddress, SEGMENT_MAX, SdoRequest, SdoResponse, Segment, Turn,
 };
 use crate::fieldbus::canopen::{AbortCode, NodeId, cob_id};
 use crate::fieldbus::{Bus, BusError};
 
-/// How often a transfer is begun before the node counts as silent.
+/// Attempts at a transfer before the node counts as silent.
 pub const TRIES: u32 = 2;
 
 /// Longest object accepted from a node: a wrong size must not fill the memory.
 const UPLOAD_MAX: usize = 65_536;
 
-/// Why an object could not be read or written.
+/// Reason that an object was not read or written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SdoError {
     /// The node refused.
@@ -37,9 +37,9 @@ pub enum SdoError {
         node: NodeId,
         /// The object.
         address: ObjectAddress,
-        /// How long each try waited.
+        /// Time-out of each attempt.
         timeout: Duration,
-        /// What came from the node instead, last.
+        /// Last frame from the node instead.
         other: Option<Stray>,
     },
     /// The node answered against the protocol.
@@ -49,9 +49,9 @@ pub enum SdoError {
         node: NodeId,
         /// The object.
         address: ObjectAddress,
-        /// What the protocol asks for.
+        /// Demand of the protocol.
         expected: &'static str,
-        /// What came.
+        /// Frame or data found.
         found: String,
     },
     /// The bus failed.
@@ -145,7 +145,7 @@ impl SdoClient {
     ) -> usize {
         let address = ObjectAddress::new(index, 0);
         if self.drain(bus, address).is_err()
-            || self.send(bus, address, SdoRequest::UploadInitiate(address)).is_err()
+            || self.send(bus, address, SdoRequest::Upload(Turn::Initiate(address))).is_err()
         {
             return 0;
         }
@@ -185,7 +185,7 @@ impl SdoClient {
         })
     }
 
-    /// Runs a transfer; begins anew after a time-out, as one lost frame must not stop a machine.
+    /// Runs a transfer, and again after a time-out, as one lost frame must not stop a machine.
     fn with_retry<T>(
         &self,
         bus: &mut dyn Bus,
@@ -216,21 +216,26 @@ impl SdoClient {
 
     fn upload_once(&self, bus: &mut dyn Bus, address: ObjectAddress) -> Result<Vec<u8>, SdoError> {
         self.drain(bus, address)?;
-        let first = self.ask(bus, address, SdoRequest::UploadInitiate(address), |answer| {
-            matches!(answer, SdoResponse::UploadExpedited(..) | SdoResponse::UploadInitiate(..))
-        })?;
+        let first =
+            self.ask(bus, address, SdoRequest::Upload(Turn::Initiate(address)), |answer| {
+                matches!(answer, SdoResponse::Upload(Data::Expedited(..) | Data::Initiate(..)))
+            })?;
         let size = match first {
-            SdoResponse::UploadExpedited(_, data) => return Ok(data.data().to_vec()),
-            SdoResponse::UploadInitiate(_, size) => size,
+            SdoResponse::Upload(Data::Expedited(_, data)) => return Ok(data.data().to_vec()),
+            SdoResponse::Upload(Data::Initiate(_, size)) => size,
             _ => None,
         };
         let mut bytes = Vec::new();
         let mut toggle = false;
         loop {
-            let next = self.ask(bus, address, SdoRequest::UploadSegment(toggle), |answer| {
-                matches!(answer, SdoResponse::UploadSegment(segment) if segment.toggle == toggle)
-            })?;
-            let SdoResponse::UploadSegment(segment) = next else { continue };
+            let next =
+                self.ask(bus, address, SdoRequest::Upload(Turn::Segment(toggle)), |answer| {
+                    matches!(
+                        answer,
+                        SdoResponse::Upload(Data::Segment(segment)) if segment.toggle == toggle
+                    )
+                })?;
+            let SdoResponse::Upload(Data::Segment(segment)) = next else { continue };
             bytes.extend_from_slice(segment.data());
             if bytes.len() > UPLOAD_MAX {
                 let found = format!("{} bytes and more", bytes.len());
@@ -258,11 +263,13 @@ impl SdoClient {
     ) -> Result<(), SdoError> {
         self.drain(bus, address)?;
         let first = match Expedited::new(bytes) {
-            Some(data) => SdoRequest::DownloadExpedited(address, data),
-            None => SdoRequest::DownloadInitiate(address, u32::try_from(bytes.len()).ok()),
+            Some(data) => Data::Expedited(address, data),
+            None => Data::Initiate(address, u32::try_from(bytes.len()).ok()),
         };
-        self.ask(bus, address, first, |answer| matches!(answer, SdoResponse::DownloadInitiate(_)))?;
-        if matches!(first, SdoRequest::DownloadExpedited(..)) {
+        self.ask(bus, address, SdoRequest::Download(first), |answer| {
+            matches!(answer, SdoResponse::Download(Turn::Initiate(_)))
+        })?;
+        if matches!(first, Data::Expedited(..)) {
             return Ok(());
         }
         let n_segments = bytes.len().div_ceil(SEGMENT_MAX).max(1);
@@ -273,8 +280,8 @@ impl SdoClient {
             let Some(segment) = Segment::new(toggle, number + 1 == n_segments, data) else {
                 return Err(self.protocol(address, "segments of at most 7 bytes", String::new()));
             };
-            self.ask(bus, address, SdoRequest::DownloadSegment(segment), |answer| {
-                *answer == SdoResponse::DownloadSegment(toggle)
+            self.ask(bus, address, SdoRequest::Download(Data::Segment(segment)), |answer| {
+                *answer == SdoResponse::Download(Turn::Segment(toggle))
             })?;
         }
         Ok(())
@@ -324,7 +331,8 @@ impl SdoClient {
                                 return Err(SdoError::Aborted { node: self.node, address, code });
                             }
                             answer if answers(&answer) => return Ok(answer),
-                            SdoResponse::UploadSegment(_) | SdoResponse::DownloadSegment(_) => {
+                            SdoResponse::Upload(Data::Segment(_))
+                            | SdoResponse::Download(Turn::Segment(_)) => {
                                 other = Some(Stray::Segment);
                             }
                             _ => other = Some(Stray::Request),
@@ -332,7 +340,7 @@ impl SdoClient {
                     },
                 }
             }
-            // A bus that babbles must not hold the question for ever.
+            // A bus that babbles must not hold the question indefinitely.
             if frame.is_none() || left.is_zero() {
                 let (node, timeout) = (self.node, self.timeout);
                 return Err(SdoError::Timeout { node, address, timeout, other });
@@ -352,10 +360,9 @@ impl SdoClient {
 /// The object that an answer names, if it is of a kind that names one.
 fn named(answer: &SdoResponse) -> Option<ObjectAddress> {
     match *answer {
-        SdoResponse::UploadExpedited(address, _)
-        | SdoResponse::UploadInitiate(address, _)
-        | SdoResponse::DownloadInitiate(address)
+        SdoResponse::Upload(Data::Expedited(address, _) | Data::Initiate(address, _))
+        | SdoResponse::Download(Turn::Initiate(address))
         | SdoResponse::Abort(address, _) => Some(address),
-        SdoResponse::UploadSegment(_) | SdoResponse::DownloadSegment(_) => None,
+        SdoResponse::Upload(Data::Segment(_)) | SdoResponse::Download(Turn::Segment(_)) => None,
     }
 }

@@ -46,7 +46,7 @@ impl Kind {
     }
 }
 
-/// Which values an object may hold, and which one it is given if it holds another.
+/// Allowed values of an object, and the one that is written if it holds another.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Need {
     /// This one.
@@ -76,7 +76,7 @@ impl Need {
         }
     }
 
-    /// Whether the object may stay as it is.
+    /// Returns whether the object may stay as it is.
     pub(super) fn admits(&self, found: i64) -> bool {
         match self {
             Self::Exactly(value) => found == *value,
@@ -91,16 +91,16 @@ impl Need {
         }
     }
 
-    /// Whether the node may run with what it holds after it was asked to hold the best.
+    /// Returns whether the node may run with what it holds after it was asked to hold the best.
     pub(super) fn bears(&self, found: i64) -> bool {
         match self {
-            Self::Ample(_, least) => found >= *least,
+            Self::Ample(_, min) => found >= *min,
             _ => self.admits(found),
         }
     }
 }
 
-/// What is done if the node does not have the object.
+/// Reaction to a node without the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Absence {
     /// It has no such feature, so that there is nothing to be set.
@@ -141,7 +141,7 @@ impl Setting {
         shown(self.address, self.kind, value)
     }
 
-    /// What is needed, in words.
+    /// Returns the need in words.
     pub(super) fn needed_words(&self) -> String {
         match &self.need {
             Need::Exactly(value) | Need::Near(value) => self.shown(*value),

@@ -1,8 +1,8 @@
-//! What every node and every drive must hold before it may run: the tables, and why.
+//! Values that every node and every drive must hold before it may run: the tables, and their reasons.
 //!
 //! A drive keeps what an earlier master wrote: offsets that shift each target, limits that clip it, a
 //! deceleration so low that a quick stop never ends. So each object that shapes motion is read at
-//! bring-up, put right where it is wrong and can be, and is a reason to refuse the drive otherwise.
+//! bring-up, corrected where it is wrong and can be, and is a reason to refuse the drive otherwise.
 
 use super::drive::{DriveSetup, FOLLOWING_ERROR_TIME_MS};
 use super::setting::{Kind, Need, Setting};
@@ -17,7 +17,7 @@ const EMCY_INHIBIT_MAX: i64 = 100;
 /// interpolates linearly changes its speed within one step of its loop, a small part of a cycle.
 const ACCELERATION_AMPLE: i64 = 100;
 /// Multiple that a drive must allow at least, as the learned input comes on top of the set points.
-const ACCELERATION_LEAST: i64 = 2;
+const ACCELERATION_MIN: i64 = 2;
 /// The unit of positions: counts, as CiA 303-2 codes increments.
 const UNIT_COUNTS: i64 = 0x00B5_0000;
 /// The unit of velocities: counts per second.
@@ -81,7 +81,7 @@ pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
     let times = |multiple: i64| {
         (i64::from(setup.acceleration_max_counts_s2) * multiple).min(i64::from(u32::MAX))
     };
-    let room = Need::Ample(times(ACCELERATION_AMPLE), times(ACCELERATION_LEAST));
+    let margin = Need::Ample(times(ACCELERATION_AMPLE), times(ACCELERATION_MIN));
     let velocity = i64::from(setup.velocity_max_counts_s);
     let (min, max) = (i64::from(setup.position_min_counts), i64::from(setup.position_max_counts));
     let limit = |sub, value| Setting::new(objects::POSITION_LIMIT, sub, I32, Need::Exactly(value));
@@ -93,8 +93,8 @@ pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
         Setting::new(objects::POSITION_RANGE_LIMIT, 1, I32, Need::AtMost(i32::MIN.into())),
         Setting::new(objects::POSITION_RANGE_LIMIT, 2, I32, Need::AtLeast(i32::MAX.into())),
         at_least(objects::MAX_VELOCITY, U32, velocity),
-        Setting::new(objects::MAX_ACCELERATION, 0, U32, room.clone()),
-        Setting::new(objects::MAX_DECELERATION, 0, U32, room),
+        Setting::new(objects::MAX_ACCELERATION, 0, U32, margin.clone()),
+        Setting::new(objects::MAX_DECELERATION, 0, U32, margin),
         at_least(objects::MAX_TORQUE, U16, RATED),
         at_least(objects::MAX_CURRENT, U16, RATED),
         at_least(objects::POSITIVE_TORQUE_LIMIT, U16, RATED),

@@ -24,7 +24,7 @@ pub const CODE_FOLLOWING_ERROR: u16 = 0x8611;
 /// An emergency message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emergency {
-    /// Who sent it.
+    /// Sender.
     pub node: NodeId,
     /// Error code, as in object 0x603F.
     pub code: u16,
@@ -42,7 +42,7 @@ impl Emergency {
         cob_id::frame(cob_id::EMCY, self.node, &[low, high, self.register, a, b, c, d, e])
     }
 
-    /// Returns the message, or `None` if `frame` is none (SYNC has the same base identifier).
+    /// Returns the message, or `None` if `frame` is not one (SYNC has the same base identifier).
     pub fn decode(frame: &Frame) -> Option<Self> {
         let node = cob_id::node_of(cob_id::EMCY, frame.id())?;
         let &[low, high, register, a, b, c, d, e] = frame.payload() else { return None };
@@ -50,7 +50,7 @@ impl Emergency {
         Some(Self { node, code, register, vendor: [a, b, c, d, e] })
     }
 
-    /// What the code means, in words.
+    /// Returns the meaning of the code in words.
     pub fn meaning(self) -> &'static str {
         meaning(self.code)
     }
@@ -157,7 +157,7 @@ fn device(code: u16) -> &'static str {
     }
 }
 
-/// What belongs to the drive beyond its own hardware: brake, motor, sensors, communication.
+/// Codes of the drive beyond its own hardware: brake, motor, sensors, communication.
 fn additional(code: u16) -> &'static str {
     match code {
         0x7111 => "brake chopper failed",

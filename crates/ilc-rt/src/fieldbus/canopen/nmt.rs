@@ -76,7 +76,7 @@ impl std::fmt::Display for NmtState {
 /// A boot-up or heartbeat message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heartbeat {
-    /// Who sent it.
+    /// Sender.
     pub node: NodeId,
     /// The sender's state.
     pub state: NmtState,
@@ -88,7 +88,7 @@ impl Heartbeat {
         cob_id::frame(cob_id::HEARTBEAT, self.node, &[self.state as u8])
     }
 
-    /// Returns the message, or `None` if `frame` is none.
+    /// Returns the message, or `None` if `frame` is not one.
     pub fn decode(frame: &Frame) -> Option<Self> {
         let node = cob_id::node_of(cob_id::HEARTBEAT, frame.id())?;
         let &[byte] = frame.payload() else { return None };

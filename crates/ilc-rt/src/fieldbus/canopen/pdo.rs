@@ -25,7 +25,7 @@ pub enum Direction {
 /// One of the four PDOs of a direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PdoNumber {
-    /// Who sends.
+    /// Direction.
     pub direction: Direction,
     /// 0 to 3: the first is RPDO1 or TPDO1.
     pub offset: u8,
@@ -79,7 +79,7 @@ impl std::fmt::Display for PdoNumber {
 /// One object in a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MappedObject {
-    /// Which object.
+    /// Object.
     pub address: ObjectAddress,
     /// Its length in bits; whole bytes here.
     pub bits: u8,

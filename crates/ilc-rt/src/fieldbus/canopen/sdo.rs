@@ -55,7 +55,7 @@ impl Expedited {
         &self.bytes[..usize::from(self.len)]
     }
 
-    /// Whether the sender said how many bytes count.
+    /// Returns whether the sender said how many bytes count.
     pub fn size_indicated(&self) -> bool {
         self.size_indicated
     }
@@ -114,19 +114,65 @@ impl Segment {
     }
 }
 
+/// The side of a transfer that carries its data: a download of the client, an upload of the server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Data {
+    /// All 1 to 4 bytes of an object.
+    Expedited(ObjectAddress, Expedited),
+    /// The object comes in segments, with the number of bytes if it was given.
+    Initiate(ObjectAddress, Option<u32>),
+    /// One segment of the object.
+    Segment(Segment),
+}
+
+impl Data {
+    fn encode(self, initiate: u8) -> [u8; 8] {
+        match self {
+            Self::Expedited(address, data) => {
+                addressed(initiate | data.command_bits(), address, data.bytes)
+            }
+            Self::Initiate(address, size) => sized(initiate, address, size),
+            Self::Segment(segment) => segment.encode(0x00),
+        }
+    }
+
+    fn decode_initiate(message: [u8; 8]) -> Self {
+        let (address, data) = split(message);
+        match message[0] {
+            command if command & 2 != 0 => {
+                Self::Expedited(address, Expedited::decode(command, data))
+            }
+            command => Self::Initiate(address, indicated_size(command, data)),
+        }
+    }
+}
+
+/// The side of a transfer that asks for data or confirms them: an upload of the client, a download of the
+/// server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// The object may be sent.
+    Initiate(ObjectAddress),
+    /// A segment, by its toggle: the next one to be sent, or the one that was taken.
+    Segment(bool),
+}
+
+impl Turn {
+    fn encode(self, initiate: u8, segment: u8) -> [u8; 8] {
+        match self {
+            Self::Initiate(address) => addressed(initiate, address, [0; 4]),
+            Self::Segment(toggle) => [segment | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0],
+        }
+    }
+}
+
 /// A message from client to server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SdoRequest {
-    /// Write 1 to 4 bytes.
-    DownloadExpedited(ObjectAddress, Expedited),
-    /// Begin to write in segments, with the number of bytes if it was given.
-    DownloadInitiate(ObjectAddress, Option<u32>),
-    /// One segment of the object being written.
-    DownloadSegment(Segment),
-    /// Begin to read.
-    UploadInitiate(ObjectAddress),
-    /// Ask for the next segment, with its toggle.
-    UploadSegment(bool),
+    /// Write.
+    Download(Data),
+    /// Read.
+    Upload(Turn),
     /// Give up.
     Abort(ObjectAddress, AbortCode),
 }
@@ -134,16 +180,10 @@ pub enum SdoRequest {
 /// A message from server to client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SdoResponse {
-    /// The 1 to 4 bytes that were asked for.
-    UploadExpedited(ObjectAddress, Expedited),
-    /// The object comes in segments, with the number of bytes if it was given.
-    UploadInitiate(ObjectAddress, Option<u32>),
-    /// One segment of the object being read.
-    UploadSegment(Segment),
-    /// A write was taken, or may go on in segments.
-    DownloadInitiate(ObjectAddress),
-    /// A segment was taken, with its toggle.
-    DownloadSegment(bool),
+    /// Data of a read.
+    Upload(Data),
+    /// Confirmation of a write, or permission to send its segments.
+    Download(Turn),
     /// Refused.
     Abort(ObjectAddress, AbortCode),
 }
@@ -152,13 +192,8 @@ impl SdoRequest {
     /// The message of 8 bytes.
     pub fn encode(self) -> [u8; 8] {
         match self {
-            Self::DownloadExpedited(address, data) => {
-                addressed(0x20 | data.command_bits(), address, data.bytes)
-            }
-            Self::DownloadInitiate(address, size) => sized(0x20, address, size),
-            Self::DownloadSegment(segment) => segment.encode(0x00),
-            Self::UploadInitiate(address) => addressed(0x40, address, [0; 4]),
-            Self::UploadSegment(toggle) => [0x60 | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0],
+            Self::Download(data) => data.encode(0x20),
+            Self::Upload(turn) => turn.encode(0x40, 0x60),
             Self::Abort(address, code) => addressed(0x80, address, code.code().to_le_bytes()),
         }
     }
@@ -166,17 +201,15 @@ impl SdoRequest {
     /// The request, or `None` if `payload` is not 8 bytes or of a service not spoken here.
     pub fn decode(payload: &[u8]) -> Option<Self> {
         let message: [u8; 8] = payload.try_into().ok()?;
-        let (address, data) = split(message);
-        let command = message[0];
-        Some(match command >> 5 {
-            0 => Self::DownloadSegment(Segment::decode(message)),
-            1 if command & 2 != 0 => {
-                Self::DownloadExpedited(address, Expedited::decode(command, data))
+        Some(match message[0] >> 5 {
+            0 => Self::Download(Data::Segment(Segment::decode(message))),
+            1 => Self::Download(Data::decode_initiate(message)),
+            2 => Self::Upload(Turn::Initiate(split(message).0)),
+            3 => Self::Upload(Turn::Segment(message[0] & 0x10 != 0)),
+            4 => {
+                let (address, code) = abort(message);
+                Self::Abort(address, code)
             }
-            1 => Self::DownloadInitiate(address, indicated_size(command, data)),
-            2 => Self::UploadInitiate(address),
-            3 => Self::UploadSegment(command & 0x10 != 0),
-            4 => Self::Abort(address, AbortCode::from_code(u32::from_le_bytes(data))),
             _ => return None,
         })
     }
@@ -186,13 +219,8 @@ impl SdoResponse {
     /// The message of 8 bytes.
     pub fn encode(self) -> [u8; 8] {
         match self {
-            Self::UploadExpedited(address, data) => {
-                addressed(0x40 | data.command_bits(), address, data.bytes)
-            }
-            Self::UploadInitiate(address, size) => sized(0x40, address, size),
-            Self::UploadSegment(segment) => segment.encode(0x00),
-            Self::DownloadInitiate(address) => addressed(0x60, address, [0; 4]),
-            Self::DownloadSegment(toggle) => [0x20 | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0],
+            Self::Upload(data) => data.encode(0x40),
+            Self::Download(turn) => turn.encode(0x60, 0x20),
             Self::Abort(address, code) => addressed(0x80, address, code.code().to_le_bytes()),
         }
     }
@@ -200,20 +228,23 @@ impl SdoResponse {
     /// The response, or `None` if `payload` is not 8 bytes or of a service not spoken here.
     pub fn decode(payload: &[u8]) -> Option<Self> {
         let message: [u8; 8] = payload.try_into().ok()?;
-        let (address, data) = split(message);
-        let command = message[0];
-        Some(match command >> 5 {
-            0 => Self::UploadSegment(Segment::decode(message)),
-            1 => Self::DownloadSegment(command & 0x10 != 0),
-            2 if command & 2 != 0 => {
-                Self::UploadExpedited(address, Expedited::decode(command, data))
+        Some(match message[0] >> 5 {
+            0 => Self::Upload(Data::Segment(Segment::decode(message))),
+            1 => Self::Download(Turn::Segment(message[0] & 0x10 != 0)),
+            2 => Self::Upload(Data::decode_initiate(message)),
+            3 => Self::Download(Turn::Initiate(split(message).0)),
+            4 => {
+                let (address, code) = abort(message);
+                Self::Abort(address, code)
             }
-            2 => Self::UploadInitiate(address, indicated_size(command, data)),
-            3 => Self::DownloadInitiate(address),
-            4 => Self::Abort(address, AbortCode::from_code(u32::from_le_bytes(data))),
             _ => return None,
         })
     }
+}
+
+fn abort(message: [u8; 8]) -> (ObjectAddress, AbortCode) {
+    let (address, code) = split(message);
+    (address, AbortCode::from_code(u32::from_le_bytes(code)))
 }
 
 fn addressed(command: u8, address: ObjectAddress, data: [u8; 4]) -> [u8; 8] {
@@ -254,16 +285,16 @@ mod tests {
     fn known_messages_have_their_known_bytes() {
         let data = Expedited::new(&[0x34, 0x12]).unwrap();
         let table = [
-            (SdoRequest::UploadInitiate(STATUSWORD), [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]),
+            (SdoRequest::Upload(Turn::Initiate(STATUSWORD)), [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]),
             (
-                SdoRequest::DownloadExpedited(ObjectAddress::new(0x6040, 0), data),
+                SdoRequest::Download(Data::Expedited(ObjectAddress::new(0x6040, 0), data)),
                 [0x2B, 0x40, 0x60, 0, 0x34, 0x12, 0, 0],
             ),
             (
-                SdoRequest::DownloadInitiate(ObjectAddress::new(0x1008, 0), Some(10)),
+                SdoRequest::Download(Data::Initiate(ObjectAddress::new(0x1008, 0), Some(10))),
                 [0x21, 0x08, 0x10, 0, 10, 0, 0, 0],
             ),
-            (SdoRequest::UploadSegment(true), [0x70, 0, 0, 0, 0, 0, 0, 0]),
+            (SdoRequest::Upload(Turn::Segment(true)), [0x70, 0, 0, 0, 0, 0, 0, 0]),
         ];
         for (request, bytes) in table {
             assert_eq!(request.encode(), bytes, "{request:?}");
@@ -294,7 +325,19 @@ mod tests {
             .prop_map(|(toggle, last, data)| Segment::new(toggle, last, &data).unwrap())
     }
 
-    fn abort() -> impl Strategy<Value = AbortCode> {
+    fn data() -> impl Strategy<Value = Data> {
+        prop_oneof![
+            (address(), expedited()).prop_map(|(a, d)| Data::Expedited(a, d)),
+            (address(), any::<Option<u32>>()).prop_map(|(a, s)| Data::Initiate(a, s)),
+            segment().prop_map(Data::Segment),
+        ]
+    }
+
+    fn turn() -> impl Strategy<Value = Turn> {
+        prop_oneof![address().prop_map(Turn::Initiate), any::<bool>().prop_map(Turn::Segment),]
+    }
+
+    fn code() -> impl Strategy<Value = AbortCode> {
         any::<u32>().prop_map(AbortCode::from_code)
     }
 
@@ -303,24 +346,18 @@ mod tests {
 
         #[test]
         fn requests_round_trip(request in prop_oneof![
-            (address(), expedited()).prop_map(|(a, d)| SdoRequest::DownloadExpedited(a, d)),
-            (address(), any::<Option<u32>>()).prop_map(|(a, s)| SdoRequest::DownloadInitiate(a, s)),
-            segment().prop_map(SdoRequest::DownloadSegment),
-            address().prop_map(SdoRequest::UploadInitiate),
-            any::<bool>().prop_map(SdoRequest::UploadSegment),
-            (address(), abort()).prop_map(|(a, c)| SdoRequest::Abort(a, c)),
+            data().prop_map(SdoRequest::Download),
+            turn().prop_map(SdoRequest::Upload),
+            (address(), code()).prop_map(|(a, c)| SdoRequest::Abort(a, c)),
         ]) {
             prop_assert_eq!(SdoRequest::decode(&request.encode()), Some(request));
         }
 
         #[test]
         fn responses_round_trip(response in prop_oneof![
-            (address(), expedited()).prop_map(|(a, d)| SdoResponse::UploadExpedited(a, d)),
-            (address(), any::<Option<u32>>()).prop_map(|(a, s)| SdoResponse::UploadInitiate(a, s)),
-            segment().prop_map(SdoResponse::UploadSegment),
-            address().prop_map(SdoResponse::DownloadInitiate),
-            any::<bool>().prop_map(SdoResponse::DownloadSegment),
-            (address(), abort()).prop_map(|(a, c)| SdoResponse::Abort(a, c)),
+            data().prop_map(SdoResponse::Upload),
+            turn().prop_map(SdoResponse::Download),
+            (address(), code()).prop_map(|(a, c)| SdoResponse::Abort(a, c)),
         ]) {
             prop_assert_eq!(SdoResponse::decode(&response.encode()), Some(response));
         }

@@ -1,4 +1,4 @@
-//! Why an SDO transfer was aborted.
+//! Abort codes of SDO transfers.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -32,7 +32,7 @@ macro_rules! abort_codes {
                 }
             }
 
-            /// What it means, in words.
+            /// Returns its meaning in words.
             pub const fn meaning(self) -> &'static str {
                 match self {
                     $(Self::$name => $meaning,)*

@@ -1,6 +1,6 @@
 //! CiA 402 drive profile: states, objects, modes, process data and units.
 //!
-//! Imported by `servo`, `bring_up`, `supervisor` and the simulator. Imports `canopen` and the frame only.
+//! Imported by `servo`, `bring_up`, `campaign` and the simulator. Imports `canopen` and the frame only.
 
 pub mod mode;
 pub mod objects;
@@ -9,6 +9,6 @@ pub mod state;
 pub mod units;
 
 pub use mode::Mode;
-pub use pdo_map::{Command, EncoderSample, Extra, Status};
+pub use pdo_map::{CommandRpdo1, DriveMotionTpdo2, EncoderSample, StatusTpdo1};
 pub use state::{Controlword, State, Statusword, next_command};
 pub use units::Scale;

@@ -18,12 +18,12 @@ use crate::fieldbus::Frame;
 use crate::fieldbus::canopen::pdo::{MappedObject, PdoNumber};
 use crate::fieldbus::canopen::{NodeId, ObjectAddress};
 
-/// The PDO that carries [`Command`].
+/// The PDO that carries [`CommandRpdo1`].
 pub const COMMAND_PDO: PdoNumber = PdoNumber::receive(0);
-/// The PDO that carries [`Status`].
+/// The PDO that carries [`StatusTpdo1`].
 pub const STATUS_PDO: PdoNumber = PdoNumber::transmit(0);
-/// The PDO that carries [`Extra`].
-pub const EXTRA_PDO: PdoNumber = PdoNumber::transmit(1);
+/// The PDO that carries [`DriveMotionTpdo2`].
+pub const DRIVE_MOTION_PDO: PdoNumber = PdoNumber::transmit(1);
 /// The PDO of an encoder node that carries [`EncoderSample`].
 pub const ENCODER_PDO: PdoNumber = PdoNumber::transmit(0);
 
@@ -33,8 +33,8 @@ pub const STATUS_MAP: [MappedObject; 3] = [
     mapped(objects::POSITION_ACTUAL, 0, 32),
     mapped(objects::TORQUE_ACTUAL, 0, 16),
 ];
-/// The mapping of [`EXTRA_PDO`].
-pub const EXTRA_MAP: [MappedObject; 2] =
+/// The mapping of [`DRIVE_MOTION_PDO`].
+pub const DRIVE_MOTION_MAP: [MappedObject; 2] =
     [mapped(objects::VELOCITY_ACTUAL, 0, 32), mapped(objects::FOLLOWING_ERROR_ACTUAL, 0, 32)];
 /// The mapping of [`ENCODER_PDO`].
 pub const ENCODER_MAP: [MappedObject; 2] =
@@ -42,24 +42,17 @@ pub const ENCODER_MAP: [MappedObject; 2] =
 
 /// Returns the mapping of [`COMMAND_PDO`] in `mode`.
 pub const fn command_map(mode: Mode) -> [MappedObject; 3] {
-    let target = match mode {
-        Mode::Csp => objects::TARGET_POSITION,
-        Mode::Csv => objects::TARGET_VELOCITY,
-    };
-    [
-        mapped(objects::CONTROLWORD, 0, 16),
-        mapped(target, 0, 32),
-        mapped(objects::TORQUE_OFFSET, 0, 16),
-    ]
+    let [word, long, last] = mode.command_objects();
+    [mapped(word, 0, 16), mapped(long, 0, 32), mapped(last, 0, 16)]
 }
 
 const fn mapped(index: u16, sub: u8, bits: u8) -> MappedObject {
     MappedObject { address: ObjectAddress::new(index, sub), bits }
 }
 
-/// What the controller sends to a drive every cycle.
+/// RPDO1 of a drive: the command of every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Command {
+pub struct CommandRpdo1 {
     /// Controlword.
     pub controlword: Controlword,
     /// Target: position in counts (CSP), velocity in counts/s (CSV).
@@ -68,9 +61,9 @@ pub struct Command {
     pub torque_offset: i16,
 }
 
-/// What a drive sends every cycle.
+/// TPDO1 of a drive: its status in every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Status {
+pub struct StatusTpdo1 {
     /// Statusword.
     pub statusword: Statusword,
     /// Position, in counts.
@@ -79,16 +72,16 @@ pub struct Status {
     pub torque: i16,
 }
 
-/// What a drive also sends every cycle.
+/// TPDO2 of a drive: its motion in every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Extra {
+pub struct DriveMotionTpdo2 {
     /// Velocity, in counts/s.
     pub velocity_counts_s: i32,
     /// Demand minus actual position, in counts.
     pub following_error_counts: i32,
 }
 
-/// What an encoder node sends every cycle.
+/// TPDO1 of an encoder node: its positions in every cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct EncoderSample {
     /// First coordinate, in counts.
@@ -97,7 +90,7 @@ pub struct EncoderSample {
     pub y_counts: i32,
 }
 
-impl Command {
+impl CommandRpdo1 {
     /// Returns the frame of this command to `node`.
     pub fn encode(self, node: NodeId) -> Frame {
         frame(
@@ -115,7 +108,7 @@ impl Command {
     }
 }
 
-impl Status {
+impl StatusTpdo1 {
     /// Returns the frame of this status from `node`.
     pub fn encode(self, node: NodeId) -> Frame {
         frame(
@@ -133,16 +126,20 @@ impl Status {
     }
 }
 
-impl Extra {
+impl DriveMotionTpdo2 {
     /// Returns the frame of this data from `node`.
     pub fn encode(self, node: NodeId) -> Frame {
-        frame(EXTRA_PDO, node, two_longs(self.velocity_counts_s, self.following_error_counts))
+        frame(
+            DRIVE_MOTION_PDO,
+            node,
+            two_longs(self.velocity_counts_s, self.following_error_counts),
+        )
     }
 
     /// Returns the data if `frame` is such data from `node`.
     pub fn decode(frame: &Frame, node: NodeId) -> Option<Self> {
         let (velocity_counts_s, following_error_counts) =
-            split_two_longs(payload(frame, EXTRA_PDO, node)?);
+            split_two_longs(payload(frame, DRIVE_MOTION_PDO, node)?);
         Some(Self { velocity_counts_s, following_error_counts })
     }
 }
@@ -210,7 +207,7 @@ mod tests {
         assert_eq!(bits(&command_map(Mode::Csp)), 64);
         assert_eq!(bits(&command_map(Mode::Csv)), 64);
         assert_eq!(bits(&STATUS_MAP), 64);
-        assert_eq!(bits(&EXTRA_MAP), 64);
+        assert_eq!(bits(&DRIVE_MOTION_MAP), 64);
         assert_eq!(bits(&ENCODER_MAP), 64);
         assert_eq!(command_map(Mode::Csp)[1].entry(), 0x607A_0020);
         assert_eq!(command_map(Mode::Csv)[1].entry(), 0x60FF_0020);
@@ -218,7 +215,7 @@ mod tests {
 
     #[test]
     fn a_known_command_has_its_known_bytes() {
-        let command = Command {
+        let command = CommandRpdo1 {
             controlword: Controlword::ENABLE_OPERATION,
             target_counts: -2,
             torque_offset: 0x0102,
@@ -235,13 +232,13 @@ mod tests {
         fn all_round_trip(id in 1_u8..=127, word: u16, a: i32, b: i32, last: i16) {
             let node = NodeId::new(id).unwrap();
             let command =
-                Command { controlword: Controlword(word), target_counts: a, torque_offset: last };
-            prop_assert_eq!(Command::decode(&command.encode(node), node), Some(command));
+                CommandRpdo1 { controlword: Controlword(word), target_counts: a, torque_offset: last };
+            prop_assert_eq!(CommandRpdo1::decode(&command.encode(node), node), Some(command));
             let status =
-                Status { statusword: Statusword(word), position_counts: a, torque: last };
-            prop_assert_eq!(Status::decode(&status.encode(node), node), Some(status));
-            let extra = Extra { velocity_counts_s: a, following_error_counts: b };
-            prop_assert_eq!(Extra::decode(&extra.encode(node), node), Some(extra));
+                StatusTpdo1 { statusword: Statusword(word), position_counts: a, torque: last };
+            prop_assert_eq!(StatusTpdo1::decode(&status.encode(node), node), Some(status));
+            let extra = DriveMotionTpdo2 { velocity_counts_s: a, following_error_counts: b };
+            prop_assert_eq!(DriveMotionTpdo2::decode(&extra.encode(node), node), Some(extra));
             let sample = EncoderSample { x_counts: a, y_counts: b };
             prop_assert_eq!(EncoderSample::decode(&sample.encode(node), node), Some(sample));
         }
@@ -253,10 +250,10 @@ mod tests {
             let node = NodeId::new(7).unwrap();
             let frame = Frame::new(id, &payload).unwrap();
             prop_assert_eq!(
-                Status::decode(&frame, node).is_some(), id == 0x187 && payload.len() == 8
+                StatusTpdo1::decode(&frame, node).is_some(), id == 0x187 && payload.len() == 8
             );
             prop_assert_eq!(
-                Extra::decode(&frame, node).is_some(), id == 0x287 && payload.len() == 8
+                DriveMotionTpdo2::decode(&frame, node).is_some(), id == 0x287 && payload.len() == 8
             );
         }
     }

@@ -99,7 +99,7 @@ impl Statusword {
         })
     }
 
-    /// Whether all bits of `bits` are set.
+    /// Returns whether all bits of `bits` are set.
     pub const fn has(self, bits: u16) -> bool {
         self.0 & bits == bits
     }
@@ -124,7 +124,7 @@ impl Controlword {
     /// The command that resets a fault, given the controlword sent before: bit 7 must rise, so it
     /// is lowered for one command if it is up.
     ///
-    /// Sent every cycle until the drive leaves [`State::Fault`], it tries anew every second cycle.
+    /// Sent every cycle until the drive leaves [`State::Fault`], it tries again every second cycle.
     pub const fn fault_reset_after(previous: Self) -> Self {
         if previous.0 & Self::FAULT_RESET.0 == 0 {
             Self::FAULT_RESET
@@ -136,7 +136,7 @@ impl Controlword {
 
 /// Returns the command that takes a drive in `state` one step nearer to operation enabled.
 ///
-/// A fault is not reset on the way, as nobody has looked at it: in [`State::Fault`] the command is
+/// A fault is not reset on the way, as no person has looked at it: in [`State::Fault`] the command is
 /// [`Controlword::DISABLE_VOLTAGE`], which also arms the edge of [`Controlword::fault_reset_after`].
 /// A quick stop is left through switch-on disabled.
 pub const fn next_command(state: State) -> Controlword {

@@ -1,7 +1,7 @@
 //! Wakes a receiver that waits for a ring buffer to fill.
 //!
 //! A ring buffer alone can only be asked again and again. The bell lets the receiver sleep meanwhile and
-//! costs the sender one atomic exchange, plus one non-blocking system call if somebody does sleep. A
+//! costs the sender one atomic exchange, plus one non-blocking system call if a receiver does sleep. A
 //! socket pair rather than a condition variable: no lock on either side.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
@@ -48,7 +48,7 @@ impl Ringer {
         // one of the two sides is bound to see the other.
         fence(Ordering::SeqCst);
         if self.waiting.load(Ordering::Relaxed) && self.waiting.swap(false, Ordering::AcqRel) {
-            // A full socket has rung already; a closed one has nobody to wake.
+            // A full socket has rung already; a closed one has no receiver to wake.
             let _ = (&self.socket).write(&[0]);
         }
     }

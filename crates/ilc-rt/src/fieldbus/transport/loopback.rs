@@ -62,7 +62,7 @@ impl Bus for Loopback {
     }
 }
 
-/// What answers on the far side of an [`InProcess`] bus.
+/// The far side of an [`InProcess`] bus.
 pub trait Responder: Send {
     /// Takes a frame that was sent and hands each answer to `reply`, in order.
     fn receive(&mut self, frame: &Frame, reply: &mut dyn FnMut(Frame));

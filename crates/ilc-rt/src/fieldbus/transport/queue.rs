@@ -33,7 +33,7 @@ impl Outbox {
 
 /// The end that frames are taken from, and the bell that tells of them.
 ///
-/// The fields are dropped in this order, so that whoever fills the queue finds it given up first.
+/// The fields are dropped in this order, so that the thread that fills the queue finds it given up first.
 #[derive(Debug)]
 pub(super) struct Inbox {
     frames: Consumer<Frame>,

@@ -89,7 +89,7 @@ impl SocketCan {
     }
 }
 
-/// What a look at the socket gave.
+/// Result of a look at the socket.
 enum Next {
     Frame(Frame),
     /// Nothing is there.

@@ -3,7 +3,7 @@
 //! Two sockets: one bound to the group, shared with every other process on the port, and one with a port
 //! of its own to send from, by which its frames are known when they come back. With a time-to-live of 0
 //! (the default) everything goes through the loopback interface, which needs no network and cannot leave
-//! the host: a simulated bus must not command somebody else's drives.
+//! the host: a simulated bus must not command the drives of another machine.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -40,7 +40,7 @@ const DATAGRAM_MAX_BYTES: usize = 512;
 pub struct UdpMulticast {
     receiver: UdpSocket,
     sender: UdpSocket,
-    /// Where own frames come from.
+    /// Source address of own frames.
     own: SocketAddr,
 }
 
@@ -65,7 +65,7 @@ impl UdpMulticast {
         Ok(Self { receiver, sender, own })
     }
 
-    /// The next frame of somebody else that is there already.
+    /// Returns the next frame of another sender that is there already.
     fn next(&self) -> Result<Next, BusError> {
         for _ in 0..SKIP_MAX {
             let mut datagram = [0; DATAGRAM_MAX_BYTES];
@@ -85,7 +85,7 @@ impl UdpMulticast {
     }
 }
 
-/// What a look at the socket gave.
+/// Result of a look at the socket.
 enum Next {
     Frame(Frame),
     /// Nothing is there.

@@ -26,7 +26,7 @@ impl Deadline {
         Self { end: Instant::now().checked_add(timeout) }
     }
 
-    /// What is left, or `None` if the deadline has passed.
+    /// Returns the remaining time, or `None` if the deadline has passed.
     #[expect(
         clippy::disallowed_methods,
         reason = "a time-out is system time; no value depends on it"

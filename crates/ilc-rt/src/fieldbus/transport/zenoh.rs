@@ -3,7 +3,7 @@
 //! Each endpoint publishes under `KEY/<its own random id>` and subscribes to `KEY/*`; a frame is two
 //! bytes of identifier, little endian, and its payload. Zenoh never runs in the caller's thread: a ring
 //! buffer each way stands between. Unless the address names endpoints, sessions listen on the host's own
-//! address only: a simulated bus must not command somebody else's drives.
+//! address only: a simulated bus must not command the drives of another machine.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -18,7 +18,7 @@ use super::queue::{Inbox, Outbox};
 /// Bytes of the identifier in front of the payload.
 const ID_BYTES: usize = 2;
 
-/// How long [`ZenohBus::open`] waits for an endpoint that the address says to connect to.
+/// Time that [`ZenohBus::open`] waits for an endpoint that the address says to connect to.
 const CONNECT_WAIT: Duration = Duration::from_secs(3);
 
 /// An endpoint on a Zenoh key expression.
@@ -31,8 +31,8 @@ pub struct ZenohBus {
 impl ZenohBus {
     /// Opens a session of its own and joins the bus.
     ///
-    /// If the settings name an endpoint to connect to, waits up to three seconds until somebody on the
-    /// other side listens to this bus, and goes on without if nobody does.
+    /// If the settings name an endpoint to connect to, waits up to three seconds until an endpoint on the
+    /// other side listens to this bus, and goes on without if none does.
     ///
     /// # Real Time
     /// Cold: starts threads.

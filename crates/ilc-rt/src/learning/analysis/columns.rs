@@ -1,9 +1,9 @@
-//! The iteration of a law that has no transpose, column by column.
+//! The iteration matrix of a law without adjoint, column by column.
 
 use super::iteration::Iteration;
 use crate::learning::LearningError;
 
-/// Up to this many inputs a law without transpose is looked at column by column.
+/// Largest number of inputs for which a law without adjoint is analysed column by column.
 pub const COLUMNS_MAX: usize = 3000;
 
 /// `T` as columns, for products with it and with its transpose.
@@ -13,7 +13,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Tries each input by itself.
+    /// Computes the columns by one update per unit input.
     pub(super) fn new(iteration: &mut Iteration) -> Result<Self, LearningError> {
         let n = iteration.n_u();
         let mut values = vec![0.0; n * n];

@@ -1,34 +1,33 @@
-//! The condition by which gains of proportional-derivative learning are often chosen.
+//! The common convergence condition for the gains of PD-type ILC.
 
 use super::plant::first_effects;
 use crate::learning::LearningError;
 use crate::learning::law::pd::PdGains;
 use crate::model::StateSpace;
 
-/// `|1 - (kp + kd) p_1| < 1` for each channel, `p_1` being the first Markov parameter that the law's
-/// lead meets.
+/// `|1 - (kp + kd) p_1| < 1` for each channel, `p_1` being the Markov parameter at the law's lead.
 ///
-/// It makes the error die out sooner or later if no filter is used. It does **not** make it fall from
-/// run to run: that takes a [`monotonic_factor`](super::Analysis::monotonic_factor) below 1, and the
-/// error can grow beyond all measure before it falls.
+/// Without a filter it guarantees asymptotic convergence. It does **not** guarantee monotone
+/// convergence: that takes a [`monotonic_factor`](super::Analysis::monotonic_factor) below 1, and
+/// the error may grow by orders of magnitude before it falls.
 ///
 /// # Source
-/// - \[dimarco2016\], Eq. (3.4), which calls it sufficient for monotonic convergence; the lifted norm
-///   shows that it is not.
+/// - \[dimarco2016\], Eq. (3.4), which calls it sufficient for monotonic convergence; the norm of
+///   the lifted system shows that it is not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PdCondition {
-    /// Markov parameter at the law's lead, of each channel.
+    /// Markov parameter of each channel at the law's lead.
     pub markov: Vec<f64>,
     /// `|1 - (kp + kd) p_1|`, the largest of all channels.
     pub factor: f64,
-    /// Range of `kp + kd` in which the condition holds for all channels; `None` if there is none.
+    /// Range of `kp + kd` for which the condition holds in all channels; `None` if it is empty.
     pub gain_range: Option<(f64, f64)>,
-    /// The lead at which the first effect of each channel's input is met.
+    /// Lead that matches the relative degree of each channel.
     pub leads: Vec<Option<usize>>,
 }
 
 impl PdCondition {
-    /// Works the condition out for a model with as many outputs as inputs.
+    /// Evaluates the condition for a square model.
     ///
     /// # Errors
     /// - [`LearningError::Model`] for a continuous model.

@@ -1,4 +1,4 @@
-//! The same figures from whole matrices, for runs that are short enough.
+//! The figures of the analysis from dense matrices, for short runs.
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
@@ -7,7 +7,7 @@ use super::iteration::Iteration;
 use crate::learning::LearningError;
 use crate::learning::krylov::{Estimate, radius};
 
-/// The matrices of one iteration, without the inputs that have no part in convergence.
+/// The matrices of one iteration, without the inputs that do not affect convergence.
 #[derive(Debug)]
 pub(super) struct Dense {
     /// `T`
@@ -16,13 +16,13 @@ pub(super) struct Dense {
     pub(super) learn: Mat<f64>,
     /// `P`
     pub(super) plant: Mat<f64>,
-    /// Index among all inputs of each one that was kept.
+    /// Indices of the inputs that were kept.
     pub(super) kept: Vec<usize>,
     n_inputs: usize,
 }
 
 impl Dense {
-    /// Forms the matrices, one column an update.
+    /// Computes the matrices by one update per column.
     pub(super) fn new(iteration: &mut Iteration) -> Result<Self, LearningError> {
         let (n_u, n_e) = (iteration.n_u(), iteration.n_e());
         let kept: Vec<usize> = (0..n_u).filter(|i| !iteration.free().contains(i)).collect();
@@ -59,9 +59,9 @@ impl Dense {
 
     /// Returns the spectral radius.
     ///
-    /// A law that looks back only has a block lower-triangular `T`: its eigenvalues are those of the
-    /// blocks on the diagonal, while a general eigenvalue solver finds the spectrum that rounding
-    /// makes of it.
+    /// A law without look-ahead has a block lower-triangular `T`: its eigenvalues are those of the
+    /// diagonal blocks, whereas a general eigenvalue solver would return the spectrum of the
+    /// rounding errors (`T` is far from normal).
     pub(super) fn spectral_radius(&self) -> Result<Estimate, LearningError> {
         let n = self.t.nrows();
         if n == 0 {
@@ -102,12 +102,12 @@ impl Dense {
         largest_singular_value(&self.t).map(Estimate::exact)
     }
 
-    /// Returns the largest singular value of `L_e P`, what uncertainty of the model multiplies.
+    /// Returns the largest singular value of `L_e P`, the factor of the model uncertainty.
     pub(super) fn learned_share(&self) -> Result<f64, LearningError> {
         largest_singular_value(&(&self.learn * &self.plant))
     }
 
-    /// Returns the largest norm among `T, T^2, T^4, ...`: how far the error may first grow.
+    /// Returns the largest norm among `T, T^2, T^4, ...`: the transient growth of the error.
     pub(super) fn transient_growth(&self) -> Result<f64, LearningError> {
         const DOUBLINGS: usize = 10;
         let mut power = self.t.clone();
@@ -126,7 +126,7 @@ impl Dense {
         Ok(largest)
     }
 
-    /// Solves `(I - T) u = right`; the inputs that were left out stay zero.
+    /// Solves `(I - T) u = right`; the omitted inputs stay zero.
     pub(super) fn fixed_point(&self, right: &[f64]) -> Vec<f64> {
         let n = self.t.nrows();
         let system = Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j)) - self.t[(i, j)]);
@@ -139,9 +139,10 @@ impl Dense {
         input
     }
 
-    /// Returns `tr(P Sigma_j P')` for the runs `0..n_runs` and, if learning converges, in the limit.
+    /// Returns `tr(P Sigma_j P')` for the runs `0..n_runs` and, if learning converges, the limit.
     ///
-    /// `Sigma_{j+1} = T Sigma_j T' + L_e L_e'`, from zero: white noise of variance 1 in every error.
+    /// `Sigma_{j+1} = T Sigma_j T' + L_e L_e'`, from zero: white measurement noise of variance 1 in
+    /// every run.
     pub(super) fn noise(&self, n_runs: usize, converges: bool) -> (Vec<f64>, Option<f64>) {
         const DOUBLINGS: usize = 48;
         let gram = self.plant.transpose() * &self.plant;

@@ -1,4 +1,4 @@
-//! Every law is analysed: with its transpose, through what goes round it, and without its bounds.
+//! Tests of the analysis over all laws: through their adjoints, wrappers, and without bounds.
 
 use super::{Question, analyze, divergence, overreach, refuse_divergent};
 use crate::learning::gate::{Gate, GateRule};
@@ -58,7 +58,7 @@ fn transposes_are_those_of_the_update() {
     }
 }
 
-/// A law that would diverge, and one that will not.
+/// A diverging law and a converging one.
 fn pair(n: usize) -> [Pd; 2] {
     [2.5, 0.5]
         .map(|kp| Pd::new(PdGains { kp, kd: 0.0, lead_samples: 9 }, n, 1, low_pass(8.0)).unwrap())
@@ -140,7 +140,7 @@ fn weights_that_vary_do_not_cost_the_certainty_of_the_own_model() {
     assert!(found.converges && found.spectral_radius.value < 1.0 + 1e-9, "{}", found.why);
 }
 
-/// A pure delay: `1 - gain z^(lead - delay)`, which reaches 1 at a frequency known by hand.
+/// A pure delay: `1 - gain z^(lead - delay)`, which reaches 1 at a known frequency.
 #[test]
 fn a_low_pass_above_the_critical_frequency_is_told_with_both() {
     // y[k] = u[k - 4], lead 1: |1 - g z^-3| = 1 where cos(3 w) = g / 2.
@@ -181,7 +181,7 @@ fn a_low_pass_above_the_critical_frequency_is_told_with_both() {
             }
         }
     }
-    // The inverse of a right model learns at every frequency.
+    // The inverse of a correct model learns at every frequency.
     let mut inverse = ModelInverse::new(&model, n, 0.5, low_pass(200.0)).unwrap();
     assert_eq!(overreach(&mut inverse, &model, n).unwrap(), None);
 }

@@ -5,74 +5,74 @@ use serde::Serialize;
 use super::condition::PdCondition;
 use crate::learning::krylov::Estimate;
 
-/// How figures were found.
+/// Method of computation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// From whole matrices.
+    /// Dense matrices.
     Dense,
-    /// From products with signals; no matrix of the run's length.
+    /// Matrix-free: products with signals.
     Structured,
 }
 
-/// What a law will do with a model.
+/// Convergence and performance of a law on a model, predicted.
 ///
 /// # Units
-/// - errors in the units of the reference and of the noise; frequencies in hertz; factors without
-///   unit
+/// - errors in the units of the reference and of the noise; frequencies in hertz; factors are
+///   dimensionless
 /// # Source
-/// - \[barton2010\], Eq. (3.16) to (3.23); filter-based open-loop learning, its Eq. (9), for the
-///   frequencies.
+/// - \[barton2010\], Eq. (3.16) to (3.23); \[filter-based\], Eq. (9), for the frequencies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
     /// Samples of a run.
     pub n_samples: usize,
-    /// How the figures were found.
+    /// Method of computation.
     pub method: Method,
-    /// Whether the error converges, without growing beyond all measure before.
+    /// True if the error converges without excessive transient growth.
     pub converges: bool,
-    /// Whether it converges and the distance to the final input is known to fall in every run.
+    /// True if convergence is monotone: the distance to the final input falls in every run.
     pub monotonic: bool,
-    /// The verdict with its figures, as a sentence.
+    /// The verdict and its figures, as a sentence.
     pub why: String,
-    /// Largest absolute eigenvalue of `T`: the factor of each iteration in the long run.
+    /// Spectral radius of `T`: the asymptotic factor per iteration.
     pub spectral_radius: Estimate,
-    /// Largest singular value of `T`: the worst factor of a single iteration, never below the spectral
-    /// radius. `None` where the law has no transpose and the run is longer than
+    /// Largest singular value of `T`: the worst factor of a single iteration, at least the spectral
+    /// radius. `None` if the law has no adjoint and the run is longer than
     /// [`COLUMNS_MAX`](super::COLUMNS_MAX).
     pub monotonic_factor: Option<Estimate>,
-    /// How far an error may grow before it falls: the largest norm of a power of `T` (with
-    /// [`Method::Structured`] the largest growth seen from a start without pattern).
+    /// Transient growth of the error before it falls: the largest norm of a power of `T` (with
+    /// [`Method::Structured`] the largest growth from a random start).
     pub transient_growth: f64,
-    /// Frequencies of [`Analysis::contraction`]; empty for a law that changes along the run, or that
-    /// looks farther than the run is long.
+    /// Frequencies of [`Analysis::contraction`]; empty for a time-varying law, or one whose impulse
+    /// response is longer than the run.
     pub frequency_hz: Vec<f64>,
     /// Largest singular value of `T` at each frequency.
     pub contraction: Vec<f64>,
-    /// First frequency at which an iteration makes the error grow; `None` if there is none.
+    /// First frequency at which an iteration amplifies the error; `None` if there is none.
     pub critical_frequency_hz: Option<f64>,
-    /// The same for the law without its filter: content above it must be filtered out.
+    /// The same for the law without its Q-filter, which must suppress everything above.
     pub learnable_frequency_hz: Option<f64>,
-    /// Largest `|T| + |W| |L_e P|` over frequency: below 1, every plant `P (I + W Delta)` with
-    /// `|Delta| <= 1` converges monotonically, run ends left aside.
+    /// Robustness: largest `|T| + |W| |L_e P|` over frequency. Below 1, every plant `P (I + W
+    /// Delta)` with `|Delta| <= 1` converges monotonically, apart from effects at the ends of the
+    /// run.
     pub robust_factor: Option<f64>,
-    /// Largest uncertainty, the same at all frequencies, for which that factor would stay below 1.
+    /// Largest frequency-independent uncertainty for which that factor stays below 1.
     pub uncertainty_allowed: Option<f64>,
-    /// `|T| + w |L_e P|` of the whole run, for uncertainty that may also change along the run; short
-    /// runs only.
+    /// `|T| + w |L_e P|` of the lifted system, for uncertainty that may also vary along the run;
+    /// short runs only.
     pub robust_lifted: Option<f64>,
-    /// RMS error before learning, for the reference given.
+    /// RMS error before learning, for the given reference.
     pub initial_error_rms: Option<f64>,
-    /// Input to which learning converges, time first; inputs that reach nothing are zero.
+    /// Converged input, time first; inputs without effect are zero.
     pub converged_input: Option<Vec<f64>>,
-    /// Error that stays, time first.
+    /// Converged error, time first.
     pub converged_error: Option<Vec<f64>>,
-    /// Its RMS: root of the mean over time of the squared length.
+    /// RMS of the converged error: over time, of its Euclidean norm.
     pub converged_error_rms: Option<f64>,
-    /// Expected RMS error of each run under white noise, from a first run with input zero.
+    /// Expected RMS error of each run under white measurement noise; the first run has input zero.
     pub expected_rms: Vec<f64>,
-    /// Expected RMS error in the limit.
+    /// Limit of the expected RMS error.
     pub expected_rms_limit: Option<f64>,
-    /// The usual condition for the gains of proportional-derivative learning.
+    /// The common gain condition of PD-type ILC.
     pub pd_condition: Option<PdCondition>,
 }

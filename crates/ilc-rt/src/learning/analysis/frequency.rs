@@ -1,8 +1,8 @@
-//! What one iteration does to each frequency, in the middle of a run.
+//! Frequency-domain analysis of one iteration, in the middle of a run.
 //!
-//! An impulse in the middle of an empty run, through the law, has everything of a law that is the
-//! same at every sample: its spectrum is the law's frequency response. So a law written in Python is
-//! seen in the same way as one that comes with the controller.
+//! The response of a time-invariant law to an impulse in the middle of an empty run determines the
+//! law: its spectrum is the law's frequency response. So a law written in Python is analysed like a
+//! built-in one.
 
 use nalgebra::{Complex, DMatrix};
 use rustfft::FftPlanner;
@@ -14,13 +14,13 @@ use crate::model::{ModelError, StateSpace};
 
 type Matrix = DMatrix<Complex<f64>>;
 
-/// Part of its peak that a response may have left at the ends of the run.
+/// Largest response left at the ends of the run, relative to its peak.
 const CUT_OFF: f64 = 1e-4;
-/// Part of its size by which a response may change with the sample of the impulse.
+/// Largest change of the response with the sample of the impulse, relative to its size.
 const VARYING: f64 = 1e-4;
-/// A filter passes nothing below this gain.
+/// A filter counts as blocking below this gain.
 const SILENT: f64 = 1e-6;
-/// Contraction above which a frequency counts as growing.
+/// A frequency counts as growing above this contraction.
 const GROWING: f64 = 1.0 + 1e-9;
 
 /// Law and plant at one frequency.
@@ -37,14 +37,14 @@ pub(in crate::learning) struct Bin {
     pub(super) t: Matrix,
 }
 
-/// Law and plant over frequency.
+/// Frequency responses of law and plant.
 #[derive(Debug)]
 pub(in crate::learning) struct Spectrum {
     pub(in crate::learning) bins: Vec<Bin>,
 }
 
 impl Spectrum {
-    /// Returns `None` for a law that changes along the run, or whose memory is longer than the run.
+    /// Returns `None` for a time-varying law, or one whose impulse response is longer than the run.
     pub(super) fn new(
         iteration: &mut Iteration,
         model: &StateSpace,
@@ -56,7 +56,8 @@ impl Spectrum {
         let shift = n_samples / 2 - n_samples / 3;
         let largest = |part: &[f64]| part.iter().fold(0.0_f64, |peak, value| peak.max(value.abs()));
         for (late, early) in [(&keep, &keep_early), (&learn, &learn_early)] {
-            // Of all channels together: one that does not act on another leaves nothing but rounding.
+            // Relative to all channels together: a channel that does not act on another leaves only
+            // rounding.
             let peak = late.iter().map(|response| largest(response)).fold(0.0, f64::max);
             let edge = n_samples / 16;
             for (late, early) in late.iter().zip(early) {
@@ -86,7 +87,7 @@ impl Spectrum {
             let frequency_hz = at as f64 / (n_fft as f64 * dt_s);
             let Some(plant) = response(model, std::f64::consts::TAU * at as f64 / n_fft as f64)
             else {
-                // A pole on the unit circle: nothing finite can be said of this frequency.
+                // A pole on the unit circle: the response is infinite there.
                 continue;
             };
             let keep = Matrix::from_fn(m, m, |row, col| keep[col * m + row][at]);
@@ -97,9 +98,8 @@ impl Spectrum {
         Ok(Some(Self { bins }))
     }
 
-    /// Returns the spectrum of an optimal law, from its equation:
-    /// `L_e = (q P*P + s + h)^-1 q P*`, `L_u = (q P*P + s + h)^-1 (q P*P + h)`, with
-    /// `h = r + rate^2 |1 - z^-1|^2`.
+    /// Returns the spectrum of a norm-optimal law in closed form: `L_e = (q P*P + s + h)^-1 q P*`,
+    /// `L_u = (q P*P + s + h)^-1 (q P*P + h)`, with `h = r + rate^2 |1 - z^-1|^2`.
     ///
     /// # Errors
     /// - [`ModelError::Continuous`] for a continuous model.
@@ -141,13 +141,13 @@ impl Spectrum {
         self.bins.iter().map(|bin| gain(&bin.t)).collect()
     }
 
-    /// Returns the first frequency at which an iteration makes the error grow.
+    /// Returns the first frequency at which an iteration amplifies the error.
     pub(super) fn critical_hz(&self) -> Option<f64> {
         crossing(self.bins.iter().map(|bin| (bin.frequency_hz, Some(gain(&bin.t)))))
     }
 
-    /// Returns the first frequency at which the law without its filter `L_u` makes the error grow,
-    /// `|1 - L P| >= 1` with `L_e = L_u L`: what lies above must be kept out by a filter.
+    /// Returns the first frequency at which the law without its filter `L_u` amplifies the error,
+    /// `|1 - L P| >= 1` with `L_e = L_u L`: a Q-filter must suppress everything above.
     pub(super) fn learnable_hz(&self) -> Option<f64> {
         crossing(self.bins.iter().map(|bin| {
             if gain(&bin.keep) < SILENT {
@@ -162,8 +162,8 @@ impl Spectrum {
         }))
     }
 
-    /// Returns the largest `|T| + |W| |L_e P|` over frequency, and the largest uncertainty `w`, the
-    /// same at all frequencies, for which that sum would stay below 1.
+    /// Returns the largest `|T| + |W| |L_e P|` over frequency, and the largest
+    /// frequency-independent uncertainty `w` for which that sum stays below 1.
     pub(in crate::learning) fn robust(&self, weight: impl Fn(f64) -> f64) -> (f64, f64) {
         let (mut factor, mut allowed) = (0.0_f64, f64::INFINITY);
         for bin in &self.bins {
@@ -176,15 +176,15 @@ impl Spectrum {
         (factor, allowed)
     }
 
-    /// Returns `tr(P Sigma_j P')` for a sample, averaged over frequency, for white noise of variance 1:
-    /// for the runs `0..n_runs`, and in the limit if there is one.
+    /// Returns `tr(P Sigma_j P')` per sample, averaged over frequency, for white noise of variance
+    /// 1: for the runs `0..n_runs`, and the limit if it exists.
     pub(in crate::learning) fn noise(&self, n_runs: usize) -> (Vec<f64>, Option<f64>) {
         const DOUBLINGS: usize = 40;
         let mut shares = vec![0.0; n_runs];
         let (mut limit, mut weights) = (0.0, 0.0);
         let mut settles = true;
         for (i, bin) in self.bins.iter().enumerate() {
-            // Trapezia: the two ends count half.
+            // Trapezoidal rule: the two ends count half.
             let weight = if i == 0 || i + 1 == self.bins.len() { 0.5 } else { 1.0 };
             weights += weight;
             let share = |sigma: &Matrix| (&bin.plant * sigma * bin.plant.adjoint()).trace().re;
@@ -210,8 +210,8 @@ impl Spectrum {
     }
 }
 
-/// The responses of the law to impulses of each input and of each error at one sample, column by
-/// column, one signal for each input.
+/// Responses of the law to impulses of each input and of each error at one sample: one signal per
+/// impulse.
 type Responses = (Vec<Vec<f64>>, Vec<Vec<f64>>);
 
 fn responses(iteration: &mut Iteration, at: usize) -> Result<Responses, LearningError> {
@@ -254,7 +254,7 @@ fn response(model: &StateSpace, omega_rad: f64) -> Option<Matrix> {
     found.iter().all(|value| value.norm() < 1e9).then_some(found)
 }
 
-/// How many frequencies are looked at: fewer for models with many states.
+/// Number of frequencies: fewer for models with many states.
 fn n_bins(model: &StateSpace) -> usize {
     let n = model.n_states().max(4);
     (4_000_000 / (n * n * n)).clamp(64, 1024)
@@ -269,10 +269,11 @@ fn gain(matrix: &Matrix) -> f64 {
     }
 }
 
-/// Returns where a contraction first reaches 1 from below, between the bins by a straight line.
+/// Returns the frequency at which a contraction first reaches 1 from below, interpolated linearly
+/// between the bins.
 ///
-/// What comes before the first bin that contracts is passed over: at the very first frequencies a
-/// plant that integrates or differentiates learns nothing, and loses nothing.
+/// Bins before the first contracting one are skipped: at the lowest frequencies a plant that
+/// integrates or differentiates learns nothing, and loses nothing.
 fn crossing(contractions: impl Iterator<Item = (f64, Option<f64>)>) -> Option<f64> {
     let mut before: Option<(f64, f64)> = None;
     for (frequency_hz, contraction) in contractions {

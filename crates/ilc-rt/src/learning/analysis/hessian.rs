@@ -1,20 +1,20 @@
-//! The transpose of an optimal law's iteration, from the equation of its cost.
+//! The adjoint of a norm-optimal law's iteration, from its normal equations.
 
 use super::plant::Plant;
 use crate::learning::LearningError;
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
 use crate::model::StateSpace;
 
-/// The transpose of an optimal law's iteration.
+/// The adjoint of a norm-optimal law's iteration.
 ///
-/// With `P` what the law believes of the axes, `P_true` the axes and `H = P'QP + S + R + W`,
-/// `T = H^-1 (R + W + P'Q (P - P_true))`, so `T' = (R + W + (P - P_true)'QP) H^-1`. Written like this
-/// nothing cancels where the law is right, whatever the weights.
+/// With `P` the law's model, `P_true` the axes and `H = P'QP + S + R + W`, `T = H^-1 (R + W + P'Q
+/// (P - P_true))`, so `T' = (R + W + (P - P_true)'QP) H^-1`. In this form nothing cancels where the
+/// model is exact, whatever the weights.
 pub(super) struct Hessian {
     law: NormOptimal,
     own: Plant,
     weights: Weights,
-    /// Whether the axes are what the law believes.
+    /// True if the law's model equals the axes.
     is_right: bool,
     n_inputs: usize,
     solved: Vec<f64>,
@@ -29,7 +29,7 @@ impl std::fmt::Debug for Hessian {
 }
 
 impl Hessian {
-    /// Takes what a law believes of the axes, its weights, and the axes themselves.
+    /// Creates the adjoint from the law's model, its weights, and the axes.
     pub(super) fn new(
         own: &StateSpace,
         model: &StateSpace,

@@ -7,43 +7,43 @@ use crate::learning::krylov::{noise, norm};
 use crate::learning::{Law, LearningError, Structure};
 use crate::model::StateSpace;
 
-/// Difference from linearity, relative to the update, that rounding is granted.
+/// Tolerance of linearity, relative to the update: rounding.
 const LINEAR: f64 = 1e-6;
 /// The same for `<T u, v>` and `<u, T' v>`.
 const ADJOINT: f64 = 1e-6;
 
-/// Inputs up to which a run is analysed: more of them take minutes.
+/// Largest number of inputs that is analysed: beyond it the analysis takes minutes.
 const INPUTS_MAX: usize = 1_000_000;
 
-/// What [`lift`] puts in place of zero.
+/// Replacement for zero in [`lift`].
 pub(super) const FLOOR: f64 = 1e-60;
 
-/// How the transpose of the law is applied.
+/// Source of the law's adjoint.
 #[derive(Debug)]
 enum Transpose {
-    /// The law knows it.
+    /// Implemented by the law.
     Law,
-    /// The law is optimal; see [`Hessian`].
+    /// From the cost of a norm-optimal law; see [`Hessian`].
     Optimal(Box<Hessian>),
-    /// Not at all.
+    /// Not available.
     None,
 }
 
-/// A law with its plant: `T = L_u - L_e P`, `u` and `e` being whole runs.
+/// A law with its plant: `T = L_u - L_e P`, with `u` and `e` whole runs.
 ///
-/// The law is used as it is, through [`Law::update`]: whatever it does at the ends of the run is in
-/// the figures. Inputs at the end of the run that reach no output and that the law keeps apart from
-/// the others have no part in convergence; they are left out.
+/// The law is used through [`Law::update`], so that its behaviour at the ends of the run is
+/// included. Inputs at the end of the run that affect no output and that the law does not couple to
+/// the others do not affect convergence; they are omitted.
 pub(super) struct Iteration<'a> {
     law: &'a mut dyn Law,
     pub(super) plant: Plant,
     pub(super) n_samples: usize,
     pub(super) n_inputs: usize,
     pub(super) n_outputs: usize,
-    /// What the law makes of nothing.
+    /// The law's output for zero input and error.
     offset: Vec<f64>,
     transpose: Transpose,
-    /// Indices of inputs that are left out.
+    /// Indices of omitted inputs.
     free: Vec<usize>,
     error: Vec<f64>,
     dual: Vec<f64>,
@@ -103,7 +103,7 @@ impl<'a> Iteration<'a> {
         Ok(iteration)
     }
 
-    /// Refuses a law that is not linear, by trying.
+    /// Refuses a nonlinear law, by trial.
     pub(super) fn check_linear(&mut self) -> Result<(), LearningError> {
         let (n_u, n_e) = (self.n_u(), self.n_e());
         let signals = [noise(n_u, 1), noise(n_u, 2), noise(n_e, 3), noise(n_e, 4)];
@@ -125,10 +125,10 @@ impl<'a> Iteration<'a> {
         Err(LearningError::NotLinear { difference })
     }
 
-    /// Does without a transpose that is not that of `T`, found by trying: `<T u, v> = <u, T' v>`.
+    /// Discards an adjoint that fails the test `<T u, v> = <u, T' v>`.
     ///
-    /// A figure from such a transpose would be none of the law's. Without one the law is looked at by
-    /// its columns.
+    /// Figures from a wrong adjoint would not be those of the law. Without one the law is analysed
+    /// by columns.
     fn check_transpose(&mut self) -> Result<(), LearningError> {
         if !self.has_transpose() {
             return Ok(());
@@ -158,12 +158,12 @@ impl<'a> Iteration<'a> {
         self.n_samples * self.n_outputs
     }
 
-    /// Indices of inputs that have no part in convergence.
+    /// Returns the indices of the inputs that do not affect convergence.
     pub(super) fn free(&self) -> &[usize] {
         &self.free
     }
 
-    /// Whether [`Iteration::apply_transposed`] works.
+    /// Returns true if [`Iteration::apply_transposed`] is available.
     pub(super) fn has_transpose(&self) -> bool {
         !matches!(self.transpose, Transpose::None)
     }
@@ -248,8 +248,8 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Finds the inputs that reach no output within the run, and leaves them out if the law carries
-    /// nothing of them over to the others.
+    /// Finds the inputs that affect no output within the run, and omits them if the law does not
+    /// couple them to the others.
     fn leave_out(&mut self, model: &StateSpace) -> Result<(), LearningError> {
         let effects = first_effects(model)?;
         let mut free = Vec::new();
@@ -266,7 +266,7 @@ impl<'a> Iteration<'a> {
         let mut out = vec![0.0; self.n_u()];
         let zero = vec![0.0; self.n_e()];
         for (place, index) in free.iter().enumerate() {
-            // Without pattern, so that no two of them cancel in what they reach.
+            // Irregular values, so that no two effects cancel.
             probe[*index] = 1.0 + 0.37 * ((place * 7919) % 101) as f64 / 101.0;
         }
         self.law_linear(&probe, &zero, &mut out)?;
@@ -281,8 +281,9 @@ impl<'a> Iteration<'a> {
     }
 }
 
-/// Keeps a signal of about unit size away from zero by less than any rounding: what decays along a
-/// long silent stretch would otherwise end in denormal numbers, which are a hundred times slower.
+/// Keeps a signal of about unit size away from zero by less than rounding: a signal that decays
+/// over a long quiet stretch would otherwise reach denormal numbers, which are a hundred times
+/// slower.
 pub(super) fn lift(signal: &mut [f64]) {
     for value in signal {
         if value.abs() < FLOOR {

@@ -1,6 +1,6 @@
-//! Every law on axes that are not what it believes, against dense singular values.
+//! Tests over all laws under model mismatch, against dense singular values.
 //!
-//! The dense matrices are made of the law's own updates and of the model's Markov parameters, and share
+//! The dense matrices come from the law's own updates and the model's Markov parameters, and share
 //! nothing else with the analysis.
 
 use nalgebra::{DMatrix, DVector};
@@ -40,7 +40,7 @@ fn low_pass(cutoff_hz: f64) -> QFilter {
     QFilter::ZeroPhase(butterworth(2, cutoff_hz, DT_S).unwrap())
 }
 
-/// A law that says nothing of itself.
+/// A law without declared structure.
 struct Silent(Box<dyn Law>);
 
 impl Law for Silent {
@@ -143,7 +143,7 @@ fn laws(model: &StateSpace, n: usize) -> Vec<(&'static str, Box<dyn Law>)> {
     ]
 }
 
-/// Axes that are not the model: gain, sign, frequency and damping, delay.
+/// Axes that differ from the model: gain, sign, frequency and damping, delay.
 fn axes(model: &StateSpace) -> Vec<(&'static str, StateSpace)> {
     vec![
         ("itself", model.clone()),
@@ -154,7 +154,7 @@ fn axes(model: &StateSpace) -> Vec<(&'static str, StateSpace)> {
     ]
 }
 
-/// `T = L_u - L_e P` by the law's updates, without the inputs that are left out.
+/// `T = L_u - L_e P` from the law's updates, without the omitted inputs.
 fn dense(law: &mut dyn Law, plant: &StateSpace, n: usize, free: &[usize]) -> DMatrix<f64> {
     const SMALL: f64 = 1e-9;
     let (m, p) = (plant.n_inputs(), plant.n_outputs());
@@ -220,7 +220,7 @@ fn every_law_on_other_axes_has_the_norm_of_its_dense_matrix() {
             let found = analyze(law.as_mut(), &plant, n, &Question::default()).unwrap();
             assert_eq!(found.method, Method::Dense);
             check(&name, &found, expected, found.spectral_radius.value);
-            // The way of long runs, on the same run.
+            // The method for long runs, applied to the same run.
             let products = by_products(law.as_mut(), &plant, n);
             let apart = (products - expected).abs();
             assert!(apart <= 1e-6 * expected, "{name}: {products}, dense {expected}");
@@ -228,7 +228,7 @@ fn every_law_on_other_axes_has_the_norm_of_its_dense_matrix() {
     }
 }
 
-/// What the analysis looks at in place of the law.
+/// Runs a closure on the law's linear surrogate.
 fn with_stand_in<T>(law: &mut dyn Law, look: &mut dyn FnMut(&mut dyn Law) -> T) -> T {
     match law.linear_surrogate() {
         Surrogate::Itself => {}
@@ -266,7 +266,7 @@ fn no_law_of_this_package_is_without_a_transpose() {
     }
 }
 
-/// The run in which the method changes, and the one after.
+/// The longest run with dense matrices, and the next one.
 #[test]
 fn nothing_changes_where_whole_matrices_end() {
     let model = axis(46.0, 0.05);
@@ -289,7 +289,7 @@ fn nothing_changes_where_whole_matrices_end() {
     }
 }
 
-/// Two coupled axes, of which the law knows neither the coupling nor the delay.
+/// Two coupled axes; the law's model has neither the coupling nor the delay.
 #[test]
 fn coupled_axes_that_the_law_takes_for_separate_ones_are_seen() {
     let model = axis(46.0, 0.2).append(&axis(25.0, 0.4)).unwrap();
@@ -318,7 +318,7 @@ fn coupled_axes_that_the_law_takes_for_separate_ones_are_seen() {
     }
 }
 
-/// Weights over many powers of ten, for the right model and for another one.
+/// Weights over many powers of ten, for the correct model and for a wrong one.
 #[test]
 fn small_and_large_weights_keep_their_digits() {
     let (model, n) = (axis(46.0, 0.3), 120);
@@ -344,7 +344,7 @@ fn small_and_large_weights_keep_their_digits() {
     }
 }
 
-/// Where learning ends, what it costs in noise and how sure it is, all on the axes as they are.
+/// Converged error, noise and robustness, all with the true axes.
 #[test]
 fn the_other_figures_are_those_of_the_axes_too() {
     let (model, n) = (axis(46.0, 0.3), 200);

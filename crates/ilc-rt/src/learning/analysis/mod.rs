@@ -1,9 +1,10 @@
-//! What a law will do, said before the first run.
+//! Convergence analysis of a learning law before the first run: monotone convergence, robustness,
+//! transient growth, noise.
 //!
 //! A linear law and a model make each iteration a linear map of the input,
-//! `u_{j+1} = T u_j + L_e r` with `T = L_u - L_e P`; this folder works its figures out, from whole
-//! matrices in short runs and from products with signals in long ones. `supervisor` (which refuses a
-//! law that diverges), [`tune`](super::tune) and the Python bindings import it.
+//! `u_{j+1} = T u_j + L_e r` with `T = L_u - L_e P` (the lifted system). This folder computes its
+//! figures, from dense matrices in short runs and matrix-free in long ones. `design` (which refuses
+//! a diverging law), [`tune`](super::tune) and the Python bindings import it.
 
 mod columns;
 mod condition;

@@ -1,7 +1,7 @@
-//! Whether a law's low-pass lets through what the law cannot learn.
+//! Check of a law's low-pass (Q-filter) against the critical frequency.
 //!
 //! A filter keeps out the frequencies at which each update would make the error grow; this file says
-//! whether it begins to do so early enough. `supervisor` and the Python bindings warn with it.
+//! whether it begins to do so early enough. `design` and the Python bindings warn with it.
 
 use std::fmt;
 
@@ -10,12 +10,12 @@ use super::iteration::Iteration;
 use crate::learning::{Law, LearningError, LowPass, Surrogate};
 use crate::model::StateSpace;
 
-/// A low-pass that begins above the critical frequency of its law.
+/// A low-pass whose cut-off lies above the critical frequency of its law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Overreach {
-    /// Cut-off of one pass, the highest one if it changes along the run.
+    /// Cut-off of one pass; the highest one if it varies along the run.
     pub cutoff_hz: f64,
-    /// First frequency at which the law without filter makes the error grow.
+    /// First frequency at which the law without its filter amplifies the error.
     pub critical_hz: f64,
 }
 
@@ -30,14 +30,15 @@ impl fmt::Display for Overreach {
     }
 }
 
-/// Says whether the low-pass of a law begins above the frequency up to which the law can learn.
+/// Returns the cut-off and the critical frequency if the law's low-pass starts above the frequency
+/// up to which the law can learn.
 ///
-/// That is the first frequency at which `|1 - L P| >= 1`, `L` being the law without its filter and
-/// without its bounds. `None` if it does not, if the law has no low-pass, or if the law without it
-/// looks farther than the run is long.
+/// The critical frequency is the first with `|1 - L P| >= 1`, `L` being the law without filter and
+/// bounds. `None` if the cut-off is below it, if the law has no low-pass, or if the unfiltered
+/// law's impulse response is longer than the run.
 ///
 /// # Errors
-/// - whatever the law itself refuses.
+/// - any error of the law.
 /// # Source
 /// - \[filter-based\], Eq. (9): the critical frequency.
 pub fn overreach(

@@ -1,11 +1,11 @@
-//! A model as a linear map of whole runs, and its transpose, without a matrix of the run's length.
+//! A model as a matrix-free linear map of whole runs (lifted system), and its adjoint.
 
 use nalgebra::DMatrix;
 
 use crate::learning::LearningError;
 use crate::model::{ModelError, StateSpace};
 
-/// The entries of a matrix that are not zero, row by row: delays make most of them zero.
+/// The non-zero entries of a matrix, row by row: delays make most entries zero.
 #[derive(Debug, Clone)]
 struct Sparse {
     starts: Vec<usize>,
@@ -35,7 +35,7 @@ impl Sparse {
     }
 }
 
-/// The lifted operator `P` of a model, applied sample by sample.
+/// The lifted system `P` of a model, applied sample by sample.
 #[derive(Debug, Clone)]
 pub(super) struct Plant {
     direct: [Sparse; 4],
@@ -99,10 +99,10 @@ impl Plant {
     }
 }
 
-/// For each input, after how many samples it first shows in an output; `None` if never.
+/// Returns, for each input, the delay until it first affects an output; `None` if it never does.
 ///
-/// By Cayley and Hamilton `n + 1` Markov parameters decide. One counts as zero below rounding of the
-/// magnitudes that were added up for it.
+/// By the Cayley-Hamilton theorem `n + 1` Markov parameters suffice. One counts as zero if it is
+/// below the rounding error of its terms.
 pub(super) fn first_effects(model: &StateSpace) -> Result<Vec<Option<usize>>, ModelError> {
     const ROUNDING: f64 = 1e-13;
     let parameters = model.markov(model.n_states() + 1)?;

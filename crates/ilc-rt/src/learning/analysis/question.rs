@@ -1,4 +1,4 @@
-//! The analysis of a law: which figure is found how.
+//! Entry point of the analysis: selects the method for each figure.
 
 use super::columns::{COLUMNS_MAX, Columns};
 use super::condition::PdCondition;
@@ -15,20 +15,20 @@ use crate::learning::law::norm_optimal::{NormOptimal, Weights};
 use crate::learning::{Law, LearningError, Structure, Surrogate};
 use crate::model::StateSpace;
 
-/// Up to this many inputs (samples times channels) whole matrices are formed.
+/// Largest number of inputs (samples times channels) for which dense matrices are used.
 pub const DENSE_MAX: usize = 640;
 
-/// What else is known, and asked.
+/// Optional inputs of the analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
-    /// How far the axes may be from the model.
+    /// Uncertainty of the model.
     pub uncertainty: Option<Uncertainty>,
-    /// Error of a run with input zero, `n_samples` x `n_outputs`: the reference itself where nothing
-    /// but the learned input moves the axis, reference minus response where it follows the reference.
+    /// Error of a run with input zero, `n_samples` x `n_outputs`: the reference itself if only the
+    /// learned input moves the axis, reference minus response if the axis follows the reference.
     pub reference: Option<Vec<f64>>,
-    /// Standard deviation of white noise in the measurement.
+    /// Standard deviation of white measurement noise.
     pub noise_std: Option<f64>,
-    /// Runs for which the expected error is told.
+    /// Number of runs for which the expected error is computed.
     pub n_runs: usize,
 }
 
@@ -38,25 +38,26 @@ impl Default for Question {
     }
 }
 
-/// Says what a law will do with a model.
+/// Predicts convergence and performance of a law on a model.
 ///
 /// With `u_{j+1} = L_u u_j + L_e e_j` and `e_j = r - P u_j - d_j`,
 /// `u_{j+1} = T u_j + L_e (r - d_j)`, `T = L_u - L_e P`.
 ///
-/// The law is used through [`Law::update`] and is reset before each use. A law of which nothing is
-/// known is tried for linearity first. Of a gate or a ladder the law inside is analysed, with gain 1,
-/// of a law with bounds the same law without them: a bound that is reached only holds the input there.
+/// The law is used through [`Law::update`] and is reset before each use. A law without declared
+/// structure is tested for linearity first. For a gate or ladder the inner law is analysed, with
+/// gain 1; for a law with bounds the same law without them: an active bound only holds the input.
 ///
 /// # Shapes
 /// - `question.reference`: `n_samples` x `n_outputs`, time first
 /// # Real Time
-/// Cold path. `O(n^3)` in `n = n_samples n_inputs` up to [`DENSE_MAX`]; beyond, some hundred products
-/// of `O(n)`, and for a law without [transpose](Law::apply_adjoint) up to [`COLUMNS_MAX`] `n` of them.
+/// Cold path. `O(n^3)` in `n = n_samples n_inputs` up to [`DENSE_MAX`]; beyond, some hundred
+/// products of `O(n)`, and for a law without [adjoint](Law::apply_adjoint) up to [`COLUMNS_MAX`]
+/// `n` of them.
 /// # Errors
-/// - [`LearningError::NotLinear`] for a law that is not linear.
-/// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Parameter`] for a
-///   question that does not fit.
-/// - whatever the law itself refuses.
+/// - [`LearningError::NotLinear`] for a nonlinear law.
+/// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Parameter`] for an
+///   invalid question.
+/// - any error of the law.
 /// # Source
 /// - \[barton2010\], Eq. (3.16) to (3.23).
 pub fn analyze(
@@ -173,12 +174,12 @@ fn refuse_question(
     Ok(())
 }
 
-/// The three factors from products with signals.
+/// Returns the three factors, matrix-free.
 pub(super) fn structured(
     iteration: &mut Iteration,
 ) -> Result<(Estimate, Option<Estimate>, f64), LearningError> {
     let n = iteration.n_u();
-    // Fewer vectors in long runs: they are what takes the memory.
+    // A smaller basis in long runs: it dominates the memory.
     let n_basis = if n <= 1000 { 200 } else { (6_000_000 / n).clamp(20, 60) };
     let radius = spectral_radius(n, &mut |u, out| iteration.apply(u, out), 20, n_basis)?;
     let products = (10_000_000 / n).clamp(60, 1500);
@@ -210,8 +211,8 @@ pub(super) fn structured(
     Ok((radius, factor, growth))
 }
 
-/// Raises the norm to the spectral radius, which no norm lies below; both are found to within their
-/// errors, from below.
+/// Raises the norm to the spectral radius, its lower bound; both are estimates from below with an
+/// error.
 fn above_radius(factor: Estimate, radius: Estimate) -> Result<Estimate, LearningError> {
     let (highest, lowest) = (factor.value + factor.error, radius.value - radius.error);
     if lowest > highest * (1.0 + 1e-6) + 1e-9 {
@@ -223,7 +224,7 @@ fn above_radius(factor: Estimate, radius: Estimate) -> Result<Estimate, Learning
     Ok(Estimate { value: factor.value.max(radius.value), ..factor })
 }
 
-/// Input and error to which learning converges.
+/// Returns the converged input and error.
 fn converged(
     analysis: &mut Analysis,
     iteration: &mut Iteration,
@@ -245,7 +246,7 @@ fn converged(
         right[index] = 0.0;
     }
     let direct = match weights {
-        // Where an optimal law ends does not depend on how slowly it goes there.
+        // The fixed point of a norm-optimal law does not depend on the weight of the change.
         Some(weights) if dense.is_none() => {
             let ends = Weights { r: 0.0, rate: 0.0, ..weights };
             NormOptimal::new(model, n_samples, ends).ok().and_then(|mut law| {
@@ -278,8 +279,8 @@ fn converged(
     Ok(())
 }
 
-/// Expected errors under white noise: what repeats, what the input has learned of past noise, and the
-/// noise of the run itself.
+/// Returns the expected errors under white noise: the repeatable part, past noise learned by the
+/// input, and the noise of the run itself.
 ///
 /// `E |e_j|^2 = |r - P u_j|^2 + tr(P Sigma_j P') + tr(I) sigma^2`
 fn expected(
@@ -331,7 +332,7 @@ fn expected(
     Ok(())
 }
 
-/// Root of the mean over time of the squared length.
+/// RMS over time of the Euclidean norm.
 fn rms(signal: &[f64], n_samples: usize) -> f64 {
     norm(signal) / (n_samples as f64).sqrt()
 }

@@ -1,4 +1,4 @@
-//! Whether a law may start: the quick part of the analysis.
+//! The quick part of the analysis: refuses a diverging law before the first run.
 
 use super::iteration::Iteration;
 use super::verdict::{GROWTH_MAX, converges, with_bounds};
@@ -6,34 +6,33 @@ use crate::learning::krylov::{Estimate, noise, norm, spectral_radius};
 use crate::learning::{Law, LearningError, Structure, Surrogate};
 use crate::model::StateSpace;
 
-/// Inputs (samples times channels) above which a run counts as long.
+/// A run with more inputs (samples times channels) counts as long.
 const LONG: usize = 20_000;
 
-/// What is known before a law starts.
+/// Convergence of a law, predicted before it starts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// Whether the error will converge.
+    /// True if the error converges.
     pub converges: bool,
-    /// Factor of a run in the long run.
+    /// Spectral radius: asymptotic factor per run.
     pub spectral_radius: f64,
-    /// Largest growth of an error without pattern on its way.
+    /// Largest transient growth of a random error.
     pub transient_growth: f64,
-    /// Whether that error grew in any run.
+    /// True if that error grew in any run.
     pub rises: bool,
     /// The figures as a sentence.
     pub why: String,
 }
 
-/// Says whether a law will converge with a model; `None` for a law that is not linear, of which
-/// nothing can be said. Of gates, ladders and bounds the law within is looked at, as in
-/// [`analyze`](super::analyze).
+/// Predicts convergence of a law on a model; `None` for a nonlinear law, which is not analysed. For
+/// gates, ladders and bounds the inner law is analysed, as in [`analyze`](super::analyze).
 ///
-/// Up to a run of 60 000 samples this takes less than a second: a law that minimises a cost of this
-/// very model converges whatever its weights, and of others only as many products are formed as the
-/// verdict takes.
+/// Up to runs of 60 000 samples this takes less than a second: a law that is norm-optimal for this
+/// very model converges for any weights, and for others only as many products are computed as the
+/// verdict needs.
 ///
 /// # Errors
-/// - whatever the law itself refuses.
+/// - any error of the law.
 pub fn divergence(
     law: &mut dyn Law,
     model: &StateSpace,
@@ -69,7 +68,7 @@ pub fn divergence(
         }
     }
     let n = iteration.n_u();
-    // In long runs the time of a product counts, and fewer of them still tell growth from decay.
+    // In long runs each product takes time, and fewer of them suffice to tell growth from decay.
     let (n_runs, n_plain, n_basis) = if n > LONG { (16, 4, 14) } else { (30, 10, 24) };
     let (growth, rises) = transient_growth(&mut iteration, n_runs)?;
     let radius = if growth < GROWTH_MAX {
@@ -92,13 +91,13 @@ pub fn divergence(
     }))
 }
 
-/// Refuses a law that will not converge with the model.
+/// Refuses a law that is predicted to diverge on the model.
 ///
-/// A law of which nothing can be said is let through.
+/// A law that cannot be analysed is accepted.
 ///
 /// # Errors
 /// - [`LearningError::Divergent`] with the figures.
-/// - whatever the law itself refuses.
+/// - any error of the law.
 pub fn refuse_divergent(
     law: &mut dyn Law,
     model: &StateSpace,
@@ -110,8 +109,8 @@ pub fn refuse_divergent(
     }
 }
 
-/// Returns the largest growth over some runs of a start without pattern, at least 1, and whether any
-/// run made it grow; infinite as soon as nothing can save it.
+/// Returns the largest growth of a random start over some runs, at least 1, and whether any run
+/// amplified it; infinite as soon as the growth exceeds all bounds.
 pub(super) fn transient_growth(
     iteration: &mut Iteration,
     n_runs: usize,

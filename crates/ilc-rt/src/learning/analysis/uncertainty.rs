@@ -1,18 +1,18 @@
-//! How far the axes may be from their model.
+//! Multiplicative uncertainty of a model.
 
 use crate::learning::LearningError;
 
-/// How far the axes may be from their model, `P_true = P (I + W Delta)` with `|Delta| <= 1`.
+/// Multiplicative model uncertainty, `P_true = P (I + W Delta)` with `|Delta| <= 1`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Uncertainty {
-    /// The same at all frequencies, 0.2 for 20 %.
+    /// Frequency-independent; 0.2 is 20 %.
     Scalar(f64),
-    /// Gain at equally spaced frequencies from zero to half the sample rate, both included.
+    /// Gain at equally spaced frequencies from zero to the Nyquist frequency, both included.
     Shaped(Vec<f64>),
 }
 
 impl Uncertainty {
-    /// Returns the gain at a frequency, between the given ones by a straight line.
+    /// Returns the gain at a frequency, interpolated linearly.
     pub fn at(&self, frequency_hz: f64, dt_s: f64) -> f64 {
         match self {
             Self::Scalar(gain) => *gain,
@@ -39,11 +39,11 @@ impl Uncertainty {
         }
     }
 
-    /// Refuses gains that are none.
+    /// Refuses invalid gains.
     ///
     /// # Errors
-    /// - [`LearningError::Parameter`] for a gain that is negative or not finite, [`LearningError::Empty`]
-    ///   for none at all.
+    /// - [`LearningError::Parameter`] for a gain that is negative or not finite,
+    ///   [`LearningError::Empty`] for an empty list.
     pub fn check(&self) -> Result<(), LearningError> {
         let gains = match self {
             Self::Scalar(gain) => std::slice::from_ref(gain),

@@ -1,35 +1,35 @@
-//! From figures to a verdict, in words.
+//! The verdict of an analysis, as a sentence.
 
 use super::columns::COLUMNS_MAX;
 use super::figures::{Analysis, Method};
 use crate::learning::krylov::Estimate;
 
-/// Growth of an error beyond which no machine waits for it to fall again.
+/// Largest transient growth that counts as convergence.
 pub(super) const GROWTH_MAX: f64 = 1e3;
-/// What a spectral radius may lie above 1 by rounding alone.
+/// Tolerance above a spectral radius of 1, for rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Whether the error dies out, without growing beyond all measure before.
+/// Returns true if the error converges without excessive transient growth.
 ///
-/// A law whose eigenvalues promise convergence after a growth of many powers of ten does not converge
-/// on any machine, nor in floating-point numbers.
+/// A law whose eigenvalues promise convergence after transient growth by many orders of magnitude
+/// converges neither on a machine nor in floating-point numbers.
 pub(super) fn converges(radius: Estimate, growth: f64) -> bool {
     radius.value < 1.0 + ROUNDING && growth < GROWTH_MAX
 }
 
-/// The verdict on a law with bounds, from that on the law without them.
+/// Returns the verdict on a law with bounds, from that on the law without them.
 pub(super) fn with_bounds(why: &str) -> String {
     format!("without its bounds, which can only hold the input where they are reached: {why}")
 }
 
-/// Fills in the verdict.
+/// Sets the verdict.
 pub(super) fn tell(analysis: &mut Analysis, certain: bool) {
     let radius = analysis.spectral_radius.value;
     let factor = analysis.monotonic_factor;
     let growing = analysis.critical_frequency_hz.map_or_else(String::new, |hz| {
         format!("; from {hz:.3} Hz on the error grows (largest contraction {:.4})", peak(analysis))
     });
-    // On the safe side of what is known of the factor: "in every run" is a promise.
+    // The upper bound of the factor counts: "in every run" is a guarantee.
     analysis.monotonic = analysis.converges
         && factor.is_some_and(|factor| factor.value + factor.error < 1.0 + ROUNDING);
     let worst = factor.map(said);
@@ -79,7 +79,7 @@ pub(super) fn tell(analysis: &mut Analysis, certain: bool) {
     };
 }
 
-/// A factor in words: with what it may be at most where that is not the same to six digits.
+/// Formats a factor, with its upper bound if that differs within six digits.
 fn said(factor: Estimate) -> String {
     let Estimate { value, error } = factor;
     if error < 5e-7 * value.max(1.0) {

@@ -1,6 +1,6 @@
 //! Context in which a law is built and its parameters are checked: cell, model, set points of a run.
 //!
-//! `config` and `supervisor` fill it in from a cell description; the laws read it.
+//! `config` and `design` fill it in from a cell description; the laws read it.
 
 use std::fmt::Debug;
 
@@ -165,6 +165,7 @@ impl From<Violation> for BuildError {
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "most values are made for the call")]
 pub(super) fn violation(key: &str, value: impl ToString, allowed: impl Into<String>) -> Violation {
     Violation { key: key.to_owned(), value: value.to_string(), allowed: allowed.into() }
 }

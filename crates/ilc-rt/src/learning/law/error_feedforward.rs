@@ -89,7 +89,7 @@ impl LawParameters for ErrorFeedforwardParameters {
 /// - `gain_per_s`: input units per error unit; `input_max` in input units
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Feedforward {
-    /// Learning gain_per_s, in the paper phi.
+    /// Learning gain, in the paper phi.
     pub gain_per_s: f64,
     /// Samples by which the error is taken ahead: 1 for an axis without delay.
     pub lead_samples: usize,

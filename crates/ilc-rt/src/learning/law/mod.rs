@@ -1,5 +1,7 @@
 //! The laws, one a file: a [`Law`](super::Law) and the parameters that a cell description gives it,
-//! listed in [`catalogue`]. `config`, `supervisor` and the Python bindings import them.
+//! listed in [`catalogue`]. `config`, `design` and the Python bindings import them.
+//!
+//! Family: every file here, as the catalogue lists the laws, and a law is built from what the catalogue gives.
 
 pub mod adjoint;
 pub mod catalogue;

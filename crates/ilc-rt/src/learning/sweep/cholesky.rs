@@ -1,27 +1,27 @@
-//! Cholesky factor of a small matrix that may be singular, in place and without allocating.
+//! In-place Cholesky factorisation of a small, possibly singular matrix, without allocation.
 //!
-//! A direction in which the matrix vanishes costs nothing, so its share of every solution is set to
-//! zero: of all minimisers this is one, and the one that leaves that input as it was.
+//! In a null direction of the matrix the cost is flat; the solution's component there is set to
+//! zero: of all minimisers, the one that leaves that input unchanged.
 
-/// Below this part of a diagonal entry, what is left of it after elimination is rounding.
+/// A pivot below this share of its diagonal entry is rounding noise.
 pub(super) const VANISHED: f64 = 1e-13;
 
-/// What the pivots of a factor say.
+/// Statistics of the pivots of a factorisation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pivots {
-    /// Whether some direction vanished.
+    /// True if a pivot vanished.
     pub(super) vanished: bool,
-    /// Smallest pivot that did not vanish.
+    /// Smallest non-zero pivot.
     pub(super) min: f64,
     /// Largest pivot.
     pub(super) max: f64,
 }
 
 impl Pivots {
-    /// Before any pivot.
+    /// Initial value.
     pub(super) const NONE: Self = Self { vanished: false, min: f64::INFINITY, max: 0.0 };
 
-    /// Counts one pivot and returns whether it stands.
+    /// Counts one pivot and returns true if it is non-zero.
     #[inline]
     pub(super) fn count(&mut self, pivot: f64, diagonal: f64) -> bool {
         if pivot <= VANISHED * diagonal || pivot <= 0.0 {
@@ -34,9 +34,9 @@ impl Pivots {
     }
 }
 
-/// Replaces the lower triangle of `h` (m x m, by columns) by `L` with `h = L L'`.
+/// Replaces the lower triangle of `h` (m x m, column-major) by `L` with `h = L L'`.
 ///
-/// The column of a direction that vanished is zero. Only the first `counted` pivots are reported.
+/// The column of a null direction is zero. Only the first `counted` pivots are reported.
 #[inline]
 pub(super) fn factorize(h: &mut [f64], m: usize, counted: usize) -> Pivots {
     let (mut pivots, mut others) = (Pivots::NONE, Pivots::NONE);
@@ -65,8 +65,8 @@ pub(super) fn factorize(h: &mut [f64], m: usize, counted: usize) -> Pivots {
     pivots
 }
 
-/// Replaces each entry of the diagonal by its reciprocal, or 0 where the direction vanished: the
-/// form that [`solve`] takes, because a product is much quicker than a quotient.
+/// Replaces each diagonal entry by its reciprocal, or 0 in a null direction: the form that
+/// [`solve`] takes, because multiplication is much faster than division.
 #[inline]
 pub(super) fn invert_diagonal(lower: &mut [f64], m: usize) {
     for j in 0..m {
@@ -75,7 +75,7 @@ pub(super) fn invert_diagonal(lower: &mut [f64], m: usize) {
     }
 }
 
-/// Replaces `x` by `H^-1 x`, zero in the directions that vanished; `lower` by columns, its diagonal
+/// Replaces `x` by `H^-1 x`, zero in null directions; `lower` is column-major, its diagonal
 /// [inverted](invert_diagonal).
 #[inline]
 pub(super) fn solve(lower: &[f64], m: usize, x: &mut [f64]) {
@@ -89,7 +89,7 @@ pub(super) fn solve(lower: &[f64], m: usize, x: &mut [f64]) {
     solve_transposed(lower, m, x);
 }
 
-/// Replaces `x` by `L'^-1 x`, zero in the directions that vanished.
+/// Replaces `x` by `L'^-1 x`, zero in null directions.
 #[inline]
 pub(super) fn solve_transposed(lower: &[f64], m: usize, x: &mut [f64]) {
     for row in (0..m).rev() {

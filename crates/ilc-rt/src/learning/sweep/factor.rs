@@ -7,35 +7,36 @@ use super::record::{Record, Sizes};
 use super::recursion::Recursion;
 use super::{Stage, Stages};
 
-/// The closed loop counts as settled once its transition over the samples passed is below this ...
+/// The recursion has reached steady state once the closed-loop transition over the samples passed
+/// is below this ...
 const SETTLED_TRANSITION: f64 = 1e-9;
-/// ... and one more sample changes the cost by less than this part of it.
+/// ... and one more sample changes the cost by less than this share.
 const SETTLED_CHANGE: f64 = 1e-13;
-/// Growth of a settled closed loop over a run that is refused.
+/// Growth of the steady-state closed loop over a run above which it is refused.
 const UNBOUNDED_GROWTH: f64 = 1e12;
 
-/// The same for gains that vary: higher, because here scales of the states may differ as well.
+/// The same for time-varying gains: higher, because the scales of the states may differ as well.
 const UNBOUNDED_PRODUCT: f64 = 1e16;
 
-/// How the recursion is written; all forms have the same solution.
+/// Numerical form of the recursion; all have the same solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Form {
-    /// The cost as a sum of squares, Joseph's form.
+    /// Cost as a sum of squares (Joseph form).
     #[default]
     Joseph,
-    /// A square root of the cost, by a Cholesky factor of the sample's whole cost.
+    /// Square root of the cost, by Cholesky factorisation of the sample's whole cost.
     Cholesky,
-    /// A square root of the cost, by orthogonal reflections: nothing is squared, at twice the time.
+    /// Square root of the cost, by Householder reflections: nothing is squared, at twice the time.
     SquareRoot,
 }
 
-/// Why a problem has no usable solution.
+/// Reason why a problem has no usable solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum FactorError {
-    /// Some direction of the input costs nothing long before the end of the run.
+    /// A direction of the input is without cost long before the end of the run.
     #[error("the input at sample {sample} is not determined by model and weights")]
     Undetermined {
-        /// The last sample at which this happens.
+        /// The last sample concerned.
         sample: usize,
     },
     /// The solution grows without bound along the run.
@@ -45,39 +46,41 @@ pub enum FactorError {
 
 /// The gains along a run.
 ///
-/// Where the stages are constant the gains settle while the recursion comes from the end; one set
-/// then serves all earlier samples, so that memory and set-up time do not depend on the run's length.
+/// If the stages are constant, the gains reach a steady state as the recursion comes from the end;
+/// one set then serves all earlier samples, so memory and set-up time do not depend on the run's
+/// length.
 #[derive(Debug, Clone)]
 pub struct Gains {
     n_samples: usize,
     free_samples: usize,
     sizes: Sizes,
     /// [`Record::back`] and [`Record::fore`] of each set, in the order of the recursion: those of
-    /// the last samples, the settled one, those of the first samples.
+    /// the last samples, the steady-state one, those of the first samples.
     back: Vec<f64>,
     fore: Vec<f64>,
     n_stored: usize,
-    /// Sets before the settled one, and for how many samples that one serves; 0 if there is none.
+    /// Number of sets before the steady-state one, and the number of samples that one serves; 0 if
+    /// there is none.
     n_tail: usize,
     n_settled: usize,
     pivots: Pivots,
     stage: Stage,
     recursion: Recursion,
-    /// The closed loop over the samples passed, and room for its product with one more; where the
-    /// stages vary only one row of it.
+    /// Closed-loop transition over the samples passed, and workspace for its product with one more;
+    /// for varying stages only one row of it.
     passed: Vec<f64>,
     product: Vec<f64>,
 }
 
 impl Gains {
-    /// Runs the recursion from the end of the run to its start, in Joseph's form.
+    /// Runs the recursion from the end of the run to its start, in Joseph form.
     ///
     /// `free_samples` at the end of the run may be undetermined by model and weights, because the
-    /// run ends before their effect shows; their input then stays as it was.
+    /// run ends before they take effect; their input is then unchanged.
     ///
     /// # Errors
-    /// - [`FactorError::Undetermined`] if an earlier sample is not determined.
-    /// - [`FactorError::Unbounded`] if the solution would grow beyond all measure along the run.
+    /// - [`FactorError::Undetermined`] if an earlier sample is undetermined.
+    /// - [`FactorError::Unbounded`] if the solution grows without bound along the run.
     pub fn new(stages: &impl Stages, free_samples: usize) -> Result<Self, FactorError> {
         Self::with_form(stages, free_samples, Form::default())
     }
@@ -125,13 +128,13 @@ impl Gains {
         Ok(gains)
     }
 
-    /// Runs the recursion again, for other matrices of the same shapes.
+    /// Runs the recursion again, for other matrices of the same shapes (re-factorisation).
     ///
     /// # Real Time
-    /// Cold path. Without a constant range of stages it allocates nothing, unless
+    /// Cold path. Does not allocate without a constant range of stages, unless
     /// [`Stages::stage_into`] does.
     /// # Errors
-    /// - as [`Gains::new`]; the gains are then not to be used.
+    /// - as [`Gains::new`]; the gains are then invalid.
     pub fn refactor(&mut self, stages: &impl Stages) -> Result<(), FactorError> {
         let (n_samples, n) = (self.n_samples, self.sizes.n);
         let constant = stages.constant();
@@ -152,7 +155,7 @@ impl Gains {
         let mut k = n_samples;
         while k > 0 {
             k -= 1;
-            // The stages of the constant range are read once, and so is a plant that does not vary.
+            // The stages of the constant range are read once, and so is a constant plant.
             if !constant.contains(&k) || k + 1 == constant.end {
                 if has_constant_plant && k + 1 < n_samples {
                     stages.weights_into(k, &mut self.stage);
@@ -195,7 +198,7 @@ impl Gains {
         self.n_samples
     }
 
-    /// Returns the number of states, those of penalties included.
+    /// Returns the number of states, including those of penalties.
     pub fn n_states(&self) -> usize {
         self.sizes.n
     }
@@ -210,13 +213,13 @@ impl Gains {
         self.sizes.targets
     }
 
-    /// Returns how many sets of gains are kept.
+    /// Returns the number of stored sets of gains.
     pub fn n_stored(&self) -> usize {
         self.n_stored
     }
 
-    /// Returns how well the input is determined: the smallest part of any `H` that is left after
-    /// elimination, over the largest. Below about `1e-12` digits of the input are noise.
+    /// Returns a measure of the conditioning: the smallest over the largest pivot of any `H`. Below
+    /// about `1e-12`, digits of the input are noise.
     pub fn conditioning(&self) -> f64 {
         if self.pivots.max > 0.0 { self.pivots.min / self.pivots.max } else { 0.0 }
     }
@@ -225,7 +228,7 @@ impl Gains {
         self.sizes
     }
 
-    /// Returns a set, counted from the end of the run, and for how many samples it serves.
+    /// Returns a set, counted from the end of the run, and the number of samples it serves.
     pub(super) fn set(&self, place: usize) -> (usize, Record<'_>) {
         let (back, fore) = (self.sizes.back(), self.sizes.fore());
         let count = if self.n_settled > 0 && place == self.n_tail { self.n_settled } else { 1 };
@@ -236,7 +239,7 @@ impl Gains {
         (count, record)
     }
 
-    /// Goes one sample back, with the stage that was read last.
+    /// Goes back one sample, with the stage last read.
     fn step(&mut self) -> Pivots {
         self.n_stored += 1;
         let (back, fore) = (self.back.len(), self.fore.len());
@@ -259,7 +262,7 @@ impl Gains {
         std::mem::swap(&mut self.passed, &mut self.product);
     }
 
-    /// Takes one row of `passed` along and refuses growth beyond all measure since it was smallest.
+    /// Updates one row of `passed` and refuses unbounded growth since its minimum.
     fn grow(&mut self) -> Result<(), FactorError> {
         let n = self.sizes.n;
         let (row, next) = (&mut self.passed[..n], &mut self.product[..n]);
@@ -283,7 +286,7 @@ impl Gains {
         Ok(())
     }
 
-    /// Refuses a closed loop whose slowest pole grows beyond all measure over the run.
+    /// Refuses a closed loop whose slowest pole grows without bound over the run.
     fn bounded(&self, n_samples: usize) -> Result<(), FactorError> {
         const MAX_SWEEPS: usize = 10_000;
         let n = self.sizes.n;

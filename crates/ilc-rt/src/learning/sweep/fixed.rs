@@ -1,10 +1,10 @@
-//! The two sweeps for sizes that the compiler knows: everything but the gains stays in registers.
+//! The two sweeps for sizes known at compile time: everything but the gains stays in registers.
 
 use super::factor::Gains;
 use super::record::Sizes;
 use super::{Channels, Run};
 
-/// Solves if there is code for the sizes, otherwise touches nothing and returns `false`.
+/// Solves if the sizes are supported; otherwise leaves everything unchanged and returns `false`.
 pub(super) fn solve(gains: &Gains, channels: &Channels, kappa: &mut [f64], run: &mut Run) -> bool {
     let Sizes { n, m, targets, .. } = gains.sizes();
     macro_rules! choose {
@@ -46,7 +46,7 @@ fn sweep<const N: usize, const M: usize, const P: usize>(
             let (mut earlier, mut drive) = ([0.0; N], [0.0; M]);
             let mut columns = fresh.chunks_exact(rows);
             for (i, column) in (0..P).zip(columns.by_ref()) {
-                // Past the end of the run the weight is zero: any finite value will do.
+                // Beyond the end of the run the weight is zero: any finite value will do.
                 let sample = (k + shifts[i]).min(last);
                 add(
                     &mut earlier,
@@ -93,7 +93,7 @@ fn sweep<const N: usize, const M: usize, const P: usize>(
     }
 }
 
-/// Adds a column times a factor, its first rows to one sum and the others to another.
+/// Adds a multiple of a column, its first rows to one sum and the others to another.
 #[inline]
 fn add<const N: usize, const M: usize>(
     first: &mut [f64; N],

@@ -1,4 +1,4 @@
-//! One step of the backward recursion in Joseph's form for sizes that the compiler knows.
+//! One step of the backward recursion in Joseph form for sizes known at compile time.
 
 #![expect(
     clippy::needless_range_loop,
@@ -10,7 +10,7 @@ use super::Stage;
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
 
-/// What a step reads and writes besides the gains; by columns.
+/// Workspace of a step besides the gains; column-major.
 pub(super) struct Room<'a> {
     /// `Pi` one sample later (n x n).
     pub(super) later: &'a [f64],
@@ -22,7 +22,7 @@ pub(super) struct Room<'a> {
     pub(super) weighted_c: &'a mut [f64],
 }
 
-/// Steps if there is code for the sizes, otherwise touches nothing.
+/// Takes the step if the sizes are supported; otherwise leaves everything unchanged.
 pub(super) fn step(
     sizes: Sizes,
     stage: &Stage,
@@ -43,7 +43,7 @@ pub(super) fn step(
     )(8, 2, 2)(4, 2, 4)(6, 2, 4)(6, 3, 3))
 }
 
-/// A matrix by columns.
+/// A column-major matrix.
 type Columns<const R: usize, const C: usize> = [[f64; R]; C];
 
 fn sized<const N: usize, const M: usize, const P: usize>(

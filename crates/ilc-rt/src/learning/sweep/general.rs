@@ -4,10 +4,10 @@ use super::factor::Gains;
 use super::record::Sizes;
 use super::{Channels, Run, Sweep, fixed};
 
-/// The solver for coupled axes, and for gains that vary along the run.
+/// The solver for coupled axes, and for time-varying gains.
 ///
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Sweep::solve`]; each sample costs about
+/// Cold path. Allocates at creation, never in [`Sweep::solve`]; each sample costs about
 /// `(n + m)(n + p + m) + (n + m)(n + m)` multiply-adds.
 #[derive(Debug, Clone)]
 pub struct General {
@@ -19,7 +19,7 @@ pub struct General {
 }
 
 impl General {
-    /// Makes the solver for the given channels.
+    /// Creates the solver for the given channels.
     pub fn new(gains: Gains, channels: Channels) -> Self {
         let Sizes { n, m, targets, .. } = gains.sizes();
         let (kappa, work) =
@@ -27,8 +27,8 @@ impl General {
         Self { gains, channels, kappa, work }
     }
 
-    /// Makes the solver for signals that are its own: every input, and a target for every output
-    /// that has one, already paired.
+    /// Creates the solver for signals that consist of this problem's channels only: every input,
+    /// and a target for every output that has one, already paired.
     pub fn alone(gains: Gains) -> Self {
         let channels = Channels {
             inputs: (0..gains.n_inputs()).collect(),
@@ -43,7 +43,7 @@ impl General {
         &self.gains
     }
 
-    /// Returns the gains to [refactor](Gains::refactor) them.
+    /// Returns the gains, for [`Gains::refactor`].
     pub fn gains_mut(&mut self) -> &mut Gains {
         &mut self.gains
     }
@@ -68,7 +68,7 @@ impl General {
             for _ in 0..count {
                 k -= 1;
                 for i in 0..p {
-                    // Past the end of the run the weight is zero: any finite value will do.
+                    // Beyond the end of the run the weight is zero: any finite value will do.
                     let sample = (k + shifts[i]).min(last);
                     error[i] = run.error[sample * run.n_outputs + outputs[i]];
                 }
@@ -108,7 +108,7 @@ impl General {
     }
 }
 
-/// Adds each column times its factor.
+/// Adds multiples of the columns.
 #[inline]
 fn add(sum: &mut [f64], columns: &mut std::slice::ChunksExact<f64>, factors: &[f64]) {
     for (factor, column) in factors.iter().zip(columns) {

@@ -1,4 +1,4 @@
-//! The inverse of a tracking problem's Hessian and the transpose of its update.
+//! The inverse Hessian of a tracking problem and the adjoint of its update.
 
 use std::ops::Range;
 
@@ -9,14 +9,14 @@ use super::general::General;
 use super::{Channels, Run, Stage, Stages, Sweep};
 
 /// Weight of the targets that carry a right-hand side into the recursion: a power of two, so that
-/// multiplying and dividing by it is exact, and so small that it adds to no weight.
+/// multiplication and division are exact, and too small to change any weight.
 const TINY: f64 = 1.0 / (1_u128 << 100) as f64 / (1_u128 << 100) as f64;
 
-/// The problem whose solution is `H^-1 g`, `H` being the Hessian of another one.
+/// The problem whose solution is `H^-1 g`, with `H` the Hessian of another problem.
 ///
-/// `m` targets of weight [`TINY`] on the change itself stand before the outputs, which thereby become
-/// penalties with target 0: with `g / TINY` as target the recursion reads `g` as linear term. The same
-/// is taken off the effort, so that what costs nothing still costs nothing.
+/// `m` targets of weight [`TINY`] on the change itself precede the outputs, which become penalties
+/// with target 0: with `g / TINY` as target the recursion reads `g` as linear term. The same weight
+/// is subtracted from the effort, so that what costs nothing still costs nothing.
 struct Solving<'a>(&'a dyn Stages);
 
 impl Stages for Solving<'_> {
@@ -60,14 +60,14 @@ impl Stages for Solving<'_> {
     }
 }
 
-/// The inverse of the Hessian of a tracking problem, and the transpose of the update that it asks for.
+/// The inverse Hessian of a tracking problem, and the adjoint of its update.
 ///
-/// The change that a problem asks for is `v = H^-1 (P'Q e - S u)`, `H = P'QP + S + R` with what its
-/// penalties add. So with `z = H^-1 x` the transpose of `u + v` is `x - S z` towards the input and
-/// `Q P z` towards the error.
+/// The change that a problem asks for is `v = H^-1 (P'Q e - S u)`, `H = P'QP + S + R` plus its
+/// penalties. So with `z = H^-1 x` the adjoint of `u + v` is `x - S z` towards the input and `Q P
+/// z` towards the error.
 ///
 /// # Real Time
-/// Cold path; `O(n_samples)` a product.
+/// Cold path; `O(n_samples)` per product.
 pub struct Inverse {
     stages: Box<dyn Stages + Send>,
     solver: General,
@@ -139,8 +139,8 @@ impl Inverse {
         });
     }
 
-    /// Writes the transpose's share of this problem's inputs to `to_input` and adds that of its outputs
-    /// to `to_error`, for a machine with so many inputs and outputs.
+    /// Writes the adjoint's share of this problem's inputs to `to_input`, and adds that of its
+    /// outputs to `to_error`, for a machine with the given numbers of inputs and outputs.
     pub fn transposed(
         &mut self,
         dual: &[f64],

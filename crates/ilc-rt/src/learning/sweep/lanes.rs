@@ -1,11 +1,11 @@
-//! The two sweeps with constant gains, several stretches of the run at a time.
+//! The two sweeps with constant gains, several segments of the run in parallel (SIMD).
 //!
-//! A sweep is a recursion: each sample waits for the one before, and the processor with it. But what
-//! lies far enough away along the run has no influence that could be seen in a double, so the run may
-//! be cut anywhere if each stretch begins with a warm-up over its neighbour's samples. [`LANES`]
-//! stretches side by side keep the processor busy, and the run is taken a block at a time so that
-//! what the backward sweep leaves for the forward one stays in the cache. Where it is cut depends on
-//! the gains and the length of the run alone, never on the processor.
+//! A sweep is a recursion: each sample waits for the one before, and the processor idles. But
+//! samples far enough away have no influence within double precision, so the run may be cut
+//! anywhere if each segment begins with a warm-up over its neighbour's samples. [`LANES`] segments
+//! side by side keep the processor busy, and the run is processed in blocks so that the backward
+//! sweep's results stay in the cache for the forward one. The cuts depend on the gains and the
+//! length of the run alone, never on the processor.
 
 #![expect(
     clippy::inline_always,
@@ -17,14 +17,14 @@ use super::Run;
 use super::single::Fixed;
 use super::wide::{LANES, Lanes, Wide};
 
-/// Samples that are fetched at a time: a line of the cache for each lane.
+/// Samples fetched at a time: one cache line per lane.
 const TILE: usize = LANES;
-/// What is left of a state after the warm-up.
+/// Remainder of a state after the warm-up.
 const FORGOTTEN: f64 = 1e-18;
-/// Samples of a stretch: with its `LANES` neighbours it fits the second cache.
+/// Samples per segment: with its `LANES` neighbours it fits the second-level cache.
 const STRETCH: usize = 2048;
 
-/// Where the channel's samples lie.
+/// Position of the channel's samples in the signals.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub(super) input: usize,
@@ -32,36 +32,36 @@ pub(super) struct Place {
     pub(super) shift: usize,
 }
 
-/// The constant part of a run, cut into stretches.
+/// The constant part of a run, cut into segments.
 #[derive(Debug)]
 pub(super) struct Cut {
     /// Both in tiles.
     warm_up: usize,
     stretch: usize,
-    /// `kappa` of one block, sample by sample, lane by lane, behind one row that is not used.
+    /// `kappa` of one block, sample by sample, lane by lane, after one unused row.
     kappa: Vec<Lanes>,
 }
 
 impl Cut {
-    /// Returns how to cut `n_samples` samples, or `None` if that is not worthwhile.
+    /// Returns the cut of `n_samples` samples, or `None` if it does not pay.
     pub(super) fn new<const N: usize>(gains: &Fixed<N>, n_samples: usize) -> Option<Self> {
-        // Eight stretches at a time are worth a warm-up as long as each.
+        // Eight segments at a time are worth a warm-up of up to their own length.
         let warm_up = gains.memory(n_samples / LANES)?.max(1).div_ceil(TILE);
-        // As few blocks as possible, all of about the same size.
+        // As few blocks as possible, of about equal size.
         let n_blocks = n_samples.div_ceil(LANES * STRETCH.max(4 * warm_up * TILE));
         let stretch = n_samples / (LANES * TILE * n_blocks);
         let kappa = vec![Lanes::default(); 1 + stretch * TILE];
         (stretch >= warm_up).then_some(Self { warm_up, stretch, kappa })
     }
 
-    /// Samples of one block.
+    /// Returns the number of samples per block.
     pub(super) fn block(&self) -> usize {
         self.stretch * TILE * LANES
     }
 
     /// Solves the block that begins at sample `first` and returns the state after it.
     ///
-    /// `last` is the costate after the last block; `meanwhile` is told the costate at the start of
+    /// `last` is the costate after the last block; `meanwhile` receives the costate at the start of
     /// this one and returns the state there.
     #[inline(always)]
     pub(super) fn solve<const HELD: bool, const N: usize>(
@@ -76,7 +76,7 @@ impl Cut {
         let Self { warm_up, stretch, kappa } = self;
         let length = *stretch * TILE;
         let starts: [usize; LANES] = std::array::from_fn(|lane| first + lane * length);
-        // Where the stretch that a lane warms up over begins; the very last one has none.
+        // Start of the warm-up segment of each lane; the very last one has none.
         let mut beyond = starts.map(|start| start + length);
         if last.is_some() {
             beyond[LANES - 1] = starts[LANES - 1];
@@ -105,8 +105,8 @@ impl Cut {
         }
         let exact = meanwhile(run, lane(wide, &costate, 0));
 
-        // Each lane warms up over the end of the lane before, one place earlier in memory; what the
-        // first one finds there does not count.
+        // Each lane warms up over the end of the previous lane, one place earlier in memory; what
+        // the first one reads there is ignored.
         let mut state = [zero; N];
         for pair in kappa[length - *warm_up * TILE..].windows(2) {
             let [before, now] = pair else { break };
@@ -127,7 +127,7 @@ impl Cut {
     }
 }
 
-/// Returns the numbers of one lane.
+/// Returns the values of one lane.
 #[inline(always)]
 fn lane<W: Wide, const N: usize>(wide: W, rows: &[W::Row; N], lane: usize) -> [f64; N] {
     let mut found = [0.0; N];
@@ -137,7 +137,7 @@ fn lane<W: Wide, const N: usize>(wide: W, rows: &[W::Row; N], lane: usize) -> [f
     found
 }
 
-/// Replaces the numbers of one lane.
+/// Replaces the values of one lane.
 #[inline(always)]
 fn replace<W: Wide, const N: usize>(wide: W, rows: &mut [W::Row; N], lane: usize, exact: [f64; N]) {
     for i in 0..N {
@@ -147,7 +147,7 @@ fn replace<W: Wide, const N: usize>(wide: W, rows: &mut [W::Row; N], lane: usize
     }
 }
 
-/// What the backward sweep reads.
+/// Inputs of the backward sweep.
 #[derive(Clone, Copy)]
 struct Fetch<const HELD: bool> {
     errors: Channel,
@@ -180,7 +180,7 @@ struct Channel {
 }
 
 impl Channel {
-    /// Fetches a tile for each lane, `ahead` of where it starts; returns it sample by sample.
+    /// Fetches a tile per lane, `ahead` of its start; returns it sample by sample.
     #[inline(always)]
     fn load<W: Wide>(
         self,
@@ -294,11 +294,11 @@ fn forward<const N: usize, W: Wide>(
 }
 
 impl<const N: usize> Fixed<N> {
-    /// Returns after how many samples a state is forgotten, if at most `longest`.
+    /// Returns the number of samples after which a state is forgotten, if at most `longest`.
     fn memory(&self, longest: usize) -> Option<usize> {
         let mut power: [[f64; N]; N] =
             std::array::from_fn(|col| std::array::from_fn(|row| f64::from(u8::from(row == col))));
-        // Relative to the largest so far, as the units of the states may differ.
+        // Relative to the largest so far, as the states may have different units.
         let mut largest = 0.0_f64;
         for k in 0..=longest {
             let size = power.iter().flatten().fold(0.0_f64, |size, value| size.max(value.abs()));

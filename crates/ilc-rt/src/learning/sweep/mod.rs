@@ -1,7 +1,7 @@
 //! The linear-time solver of the tracking problem behind every norm-optimal law.
 //!
-//! One backward and one forward sweep along the run solve exactly what textbooks write as a dense
-//! `N x N` system; the laws under [`super::law`] describe their stages here and import nothing else.
+//! One backward and one forward sweep along the run solve exactly the dense `N x N` system of the
+//! textbooks; the laws under [`super::law`] describe their stages here and import nothing else.
 //!
 //! With `v_k` the change of the input, `x_k` the deviation it causes (`x_0 = 0`) and `e_k` the error
 //! before it,
@@ -10,9 +10,9 @@
 //!
 //! `J = sum_k |z_k|^2_Q + |u_k + v_k|^2_S + |v_k|^2_R -> min`.
 //!
-//! [`Stages`] says what the matrices are at each sample, [`Gains`] are the result of the backward
-//! Riccati recursion (they depend on model and weights alone), and [`Sweep`] applies them to one
-//! run's input and error without allocating.
+//! [`Stages`] gives the matrices at each sample, [`Gains`] are the result of the backward Riccati
+//! recursion (they depend on model and weights alone), and [`Sweep`] applies them to one run's
+//! input and error without allocating.
 //!
 //! Family: `factor`, `recursion` and `square_root` are one backward sweep in its two forms.
 //!
@@ -41,14 +41,14 @@ pub use stage::{Stage, Stages};
 
 use wide::Instructions;
 
-/// Where the signals of a solver lie among those of the whole machine.
+/// Indices of a solver's signals among those of the whole machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Channels {
     /// Index of each of its inputs.
     pub inputs: Vec<usize>,
     /// Index of each of its outputs.
     pub outputs: Vec<usize>,
-    /// For each output, after how many samples it first answers to an input.
+    /// Delay of each output: samples until it first responds to an input.
     pub shifts: Vec<usize>,
 }
 
@@ -76,7 +76,7 @@ pub trait Sweep: Send + std::fmt::Debug {
     fn solve(&mut self, run: &mut Run);
 }
 
-/// Returns the quickest solver for the given channels.
+/// Returns the fastest solver for the given channels.
 pub fn solver(gains: Gains, channels: Channels) -> Box<dyn Sweep> {
     match single::single(&gains, &channels, Instructions::best()) {
         Some(solver) => solver,

@@ -1,4 +1,4 @@
-//! The penalty on how fast the input's change varies.
+//! Penalty on the rate of the input's change.
 
 use std::ops::Range;
 
@@ -6,11 +6,11 @@ use nalgebra::DMatrix;
 
 use super::{Stage, Stages};
 
-/// A problem with a penalty on how fast the input's change varies.
+/// A problem with a penalty on the rate of the input's change.
 ///
-/// Adds `sum_{k>=1} |v_k - v_{k-1}|^2_W`. The change one sample ago joins the state, and `m` more
-/// outputs with target 0 carry the penalty:
-/// `A~ = [A 0; 0 0]`, `B~ = [B; I]`, `C~ = [C 0; 0 -I]`, `D~ = [D; I]`, `Q~ = diag(Q, W)`, `W_0 = 0`.
+/// Adds `sum_{k>=1} |v_k - v_{k-1}|^2_W`. The previous change is appended to the state, and `m`
+/// more outputs with target 0 carry the penalty: `A~ = [A 0; 0 0]`, `B~ = [B; I]`, `C~ = [C 0; 0
+/// -I]`, `D~ = [D; I]`, `Q~ = diag(Q, W)`, `W_0 = 0`.
 ///
 /// # Source
 /// - \[haas2016\], Eq. (7) and (10).
@@ -18,7 +18,7 @@ use super::{Stage, Stages};
 pub struct Rate<S> {
     /// The problem without the penalty.
     pub inner: S,
-    /// The weight `W` of each input, the square of `d` in the source.
+    /// Weight `W` of each input, the square of `d` in the source.
     pub weight: f64,
 }
 

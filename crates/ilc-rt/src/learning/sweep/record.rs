@@ -1,4 +1,4 @@
-//! How the gains of one sample lie in memory.
+//! Memory layout of the gains of one sample.
 
 /// The sizes of a problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -7,23 +7,23 @@ pub(super) struct Sizes {
     pub(super) n: usize,
     /// Inputs.
     pub(super) m: usize,
-    /// Outputs, those of penalties included.
+    /// Outputs, including those of penalties.
     pub(super) p: usize,
     /// Outputs with a target.
     pub(super) targets: usize,
-    /// Inputs whose value itself costs: `m`, or 0 where no sample has an `S`.
+    /// Inputs with a cost of their value: `m`, or 0 if no sample has an `S`.
     pub(super) held: usize,
 }
 
-/// The gains of one sample as two matrices, each by columns, that one product a sweep applies:
+/// The gains of one sample as two column-major matrices, so that each sweep is one product:
 ///
 /// `[p_k; kappa_k] = back [p_{k+1}; e_k; u_k]`, `[x_{k+1}; v_k] = fore [x_k; kappa_k]`
 ///
 /// with `back = [(A-BK)' (C-DK)'Q K'S; H^-1 B' H^-1 D'Q -H^-1 S]` and
-/// `fore = [A-BK B; -K I]`, of which the identity is not stored.
+/// `fore = [A-BK B; -K I]`, whose identity is not stored.
 ///
-/// By columns, because then each column times one number is added to all rows at once, and what does
-/// not wait for the sample before can be added first.
+/// Column-major, because each column times a scalar is added to all rows at once, and the terms
+/// that do not depend on the previous sample can be added first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Record<'a> {
     /// (n + m) x (n + targets + held).

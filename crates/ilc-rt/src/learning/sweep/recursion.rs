@@ -1,13 +1,13 @@
-//! One step of the backward recursion, in three forms, each on memory that is kept.
+//! One step of the backward recursion, in three forms, in preallocated memory.
 
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
 use super::square_root::SquareRoot;
 use super::{Form, Stage, fixed_step};
 
-/// The cost of the samples to come, and the room that one step needs.
+/// The cost-to-go, and the workspace of one step.
 ///
-/// All matrices by columns.
+/// All matrices are column-major.
 #[derive(Debug, Clone)]
 pub(super) struct Recursion {
     form: Form,
@@ -60,12 +60,12 @@ impl Recursion {
         }
     }
 
-    /// Starts again from the end of the run, where nothing is left to cost.
+    /// Restarts from the end of the run, where the cost-to-go is zero.
     pub(super) fn restart(&mut self) {
         self.cost.fill(0.0);
     }
 
-    /// Goes from sample `k + 1` to sample `k` and writes its gains.
+    /// Steps from sample `k + 1` to sample `k` and writes its gains.
     ///
     /// `H = S + R + D'QD + B'Pi B`, `K = H^-1 (D'QC + B'Pi A)`.
     pub(super) fn step(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
@@ -78,7 +78,7 @@ impl Recursion {
         self.any(stage, back, fore)
     }
 
-    /// What a step of fixed size reads and writes.
+    /// Returns the workspace of a step of fixed size.
     fn room(&mut self) -> fixed_step::Room<'_> {
         let Self { later, cost, transition, weighted_c, .. } = self;
         fixed_step::Room { later, cost, transition, weighted_c }
@@ -132,8 +132,8 @@ impl Recursion {
         subtract(left, d, feedback, p, m, n);
         multiply(weighted_left, q, left, p, p, n);
         if self.form == Form::Joseph {
-            // Joseph's form, `(C-DK)'Q(C-DK) + K'(S+R)K + (A-BK)'Pi(A-BK)`: a sum of squares, that
-            // keeps its sign under rounding.
+            // Joseph form, `(C-DK)'Q(C-DK) + K'(S+R)K + (A-BK)'Pi(A-BK)`: a sum of squares, which
+            // stays positive semidefinite under rounding.
             let moved = &mut self.cost_a[..n * n];
             multiply(moved, &self.later[..n * n], transition, n, n, n);
             let weighted = &mut self.weighted_feedback[..m * n];
@@ -211,7 +211,7 @@ impl Recursion {
         pairs.map(|(new, old)| (new - old).abs()).fold(0.0, f64::max)
     }
 
-    /// Returns the size of the cost, that of the sample itself included.
+    /// Returns the size of the cost, including that of the sample itself.
     pub(super) fn scale(&self, stage: &Stage) -> f64 {
         let p = self.sizes.p;
         let own = (0..self.sizes.n)

@@ -8,14 +8,14 @@ use super::record::Record;
 use super::wide::{Instructions, Wide, Work};
 use super::{Channels, Run, Sweep};
 
-/// The most states, that of a rate penalty included, for which [`single`] has a solver.
+/// Largest number of states, including that of a rate penalty, that [`single`] supports.
 #[cfg(test)]
 const MAX_STATES: usize = 6;
 
-/// Returns the solver for one axis by itself.
+/// Returns the solver for a single axis.
 ///
-/// `None` unless the gains are for one input, one output and 1 to 6 states: the caller
-/// then takes [`super::General`].
+/// `None` unless the gains are for one input, one output and 1 to 6 states: the caller then uses
+/// [`super::General`].
 pub(super) fn single(
     gains: &Gains,
     channels: &Channels,
@@ -38,10 +38,10 @@ pub(super) fn single(
     })
 }
 
-/// The gains of one sample with its sizes known to the compiler.
+/// The gains of one sample with sizes known at compile time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fixed<const N: usize> {
-    /// By columns: column `j` is what state `j` becomes.
+    /// Column-major: column `j` is the effect of state `j`.
     pub(super) transition: [[f64; N]; N],
     pub(super) feedback: [f64; N],
     pub(super) from_error: [f64; N],
@@ -75,7 +75,8 @@ impl<const N: usize> Fixed<N> {
         let hold = |gain: f64| if HELD { gain * input } else { 0.0 };
         let kappa = dot(self.error * error - hold(self.input), &self.costate, costate);
         let earlier = std::array::from_fn(|i| {
-            // The part that does not wait for the previous sample first: it shortens the chain.
+            // Terms that do not wait for the previous sample come first: they shorten the
+            // dependency chain.
             let fresh = self.from_error[i] * error + hold(self.from_input[i]);
             dot(fresh, &self.transition[i], costate)
         });
@@ -105,12 +106,12 @@ fn dot<const N: usize>(mut sum: f64, left: &[f64; N], right: &[f64; N]) -> f64 {
     sum
 }
 
-/// Gains in order of time, each with the number of samples that it serves.
+/// Gains in order of time, each with the number of samples it serves.
 type Sets<const N: usize> = Vec<(usize, Fixed<N>)>;
 
 #[derive(Debug)]
 struct Single<const N: usize> {
-    /// The samples before and after those that are cut into stretches.
+    /// The samples before and after the segments.
     before: Sets<N>,
     cut: Option<(Fixed<N>, Cut, usize)>,
     after: Sets<N>,
@@ -131,7 +132,7 @@ impl<const N: usize> Single<N> {
             let (count, record) = gains.set(index);
             let fixed = Fixed::new(record, is_held);
             match Cut::new(&fixed, count) {
-                // The samples that fill no stretch come last, where the costate is exact.
+                // The samples left over from the segments come last, where the costate is exact.
                 Some(stretches) if count > 1 => {
                     let n_blocks = count / stretches.block();
                     before = std::mem::take(&mut after);
@@ -173,7 +174,7 @@ impl<const N: usize> Single<N> {
     }
 }
 
-/// A solver with the run that it is to solve.
+/// A solver with the run to solve.
 struct Solve<'a, 'r, const N: usize>(&'a mut Single<N>, &'a mut Run<'r>);
 
 impl<const N: usize> Work for Solve<'_, '_, N> {
@@ -196,7 +197,7 @@ impl<const N: usize> Sweep for Single<N> {
     }
 }
 
-/// Goes back over the samples from `first` on and returns the costate at their start.
+/// Sweeps backward over the samples from `first` on and returns the costate at their start.
 #[inline(always)]
 fn backward<const HELD: bool, const N: usize>(
     sets: &Sets<N>,
@@ -212,7 +213,7 @@ fn backward<const HELD: bool, const N: usize>(
         let gains = *gains;
         for _ in 0..*count {
             k -= 1;
-            // Past the end of the run the weight is zero: any finite value will do.
+            // Beyond the end of the run the weight is zero: any finite value will do.
             let sample = (first + k + place.shift).min(last);
             let error = run.error[sample * run.n_outputs + place.output];
             let input =
@@ -223,7 +224,7 @@ fn backward<const HELD: bool, const N: usize>(
     costate
 }
 
-/// Goes over the samples from `first` on and returns the state at their end.
+/// Sweeps forward over the samples from `first` on and returns the state at their end.
 #[inline(always)]
 fn forward<const N: usize>(
     sets: &Sets<N>,
@@ -291,7 +292,7 @@ mod tests {
 
     #[test]
     fn stretches_agree_with_the_plain_sweep_on_every_processor() {
-        // From runs too short for a single stretch to several blocks with samples left over.
+        // From runs too short for a single segment to several blocks with samples left over.
         let short = (64..700).step_by(53).chain([3, 1301]);
         let lengths: Vec<usize> = short.chain([5000, 40_000, 100_003]).collect();
         for n in 1..=MAX_STATES {
@@ -304,7 +305,7 @@ mod tests {
         }
     }
 
-    /// Solves the same problem in every way, with the axis' signals among those of `width` axes.
+    /// Solves the same problem by every method, with the axis' signals among those of `width` axes.
     fn agree(gains: &Gains, n_samples: usize, width: usize) {
         let channels = Channels { inputs: vec![width - 1], outputs: vec![0], shifts: vec![1] };
         let wave = |seed: usize| -> Vec<f64> {

@@ -4,18 +4,18 @@ use super::cholesky::{self, Pivots, VANISHED};
 use super::record::Sizes;
 use super::{Form, Stage};
 
-/// The room for one step in [`Form::Cholesky`] or [`Form::SquareRoot`].
+/// Workspace of one step in [`Form::Cholesky`] or [`Form::SquareRoot`].
 ///
-/// With `W = [(S+R)^(1/2) 0; Q^(1/2)[D C]; U[B A]]` both find the upper triangular
-/// `R = [R11 R12; 0 U_k]` with `R'R = W'W`: one as a Cholesky factor of `W'W`, the other by
-/// Householder reflections of `W`, so that nothing is ever squared. Then `H = R11'R11`,
-/// `K = R11^-1 R12` and `Pi_k = U_k'U_k`.
+/// With `W = [(S+R)^(1/2) 0; Q^(1/2)[D C]; U[B A]]` both compute the upper triangular `R = [R11
+/// R12; 0 U_k]` with `R'R = W'W`: one as a Cholesky factor of `W'W`, the other by Householder
+/// reflections of `W` (QR), so that nothing is squared. Then `H = R11'R11`, `K = R11^-1 R12` and
+/// `Pi_k = U_k'U_k`.
 #[derive(Debug, Clone)]
 pub(super) struct SquareRoot {
     sizes: Sizes,
-    /// `W`, (m + p + n) x (m + n) by columns.
+    /// `W`, (m + p + n) x (m + n), column-major.
     stacked: Vec<f64>,
-    /// `W'W` or `R'`, (m + n) x (m + n) by columns: its lower triangle counts.
+    /// `W'W` or `R'`, (m + n) x (m + n), column-major: only its lower triangle is used.
     lower: Vec<f64>,
     /// Factors of `S + R` (m x m) and `Q` (p x p).
     effort: Vec<f64>,
@@ -30,7 +30,7 @@ impl SquareRoot {
         Self { sizes, stacked, lower, effort: room(m * m), error: room(p * p) }
     }
 
-    /// Writes the earlier `U`, the Cholesky factor of `H` and `K`.
+    /// Writes the `U` of the previous sample, the Cholesky factor of `H` and `K`.
     pub(super) fn step(
         &mut self,
         form: Form,
@@ -103,9 +103,9 @@ impl SquareRoot {
         }
     }
 
-    /// Writes the transpose of the triangular factor of `W`, its diagonal not negative.
+    /// Writes the transpose of the triangular factor of `W`, with a non-negative diagonal.
     ///
-    /// A column that has nothing left takes no row, so that what the row holds is not lost.
+    /// A column with nothing left consumes no row, so that the row's content is kept.
     fn reflect(&mut self) -> Pivots {
         let Sizes { n, m, p, .. } = self.sizes;
         let (rows, w) = (m + p + n, m + n);

@@ -1,4 +1,4 @@
-//! What the tracking problem looks like at each sample.
+//! The tracking problem, stage by stage.
 
 use std::ops::Range;
 
@@ -38,7 +38,7 @@ impl Stage {
         self.b.ncols()
     }
 
-    /// Returns the number of outputs, those of penalties included.
+    /// Returns the number of outputs, including those of penalties.
     pub fn n_outputs(&self) -> usize {
         self.c.nrows()
     }
@@ -48,40 +48,42 @@ impl Stage {
 ///
 /// All stages of a problem have the same shapes.
 pub trait Stages {
-    /// Number of samples of a run.
+    /// Returns the number of samples of a run.
     fn n_samples(&self) -> usize;
 
-    /// Number of outputs that have a target; any further rows of `c` are penalties with target 0.
+    /// Returns the number of outputs that have a target; further rows of `c` are penalties with
+    /// target 0.
     fn n_targets(&self) -> usize;
 
-    /// The matrices at sample `k`.
+    /// Returns the matrices at sample `k`.
     fn stage(&self, k: usize) -> Stage;
 
     /// Overwrites `stage`, one of this problem's, with the matrices at sample `k`.
     ///
-    /// Whoever factorises often writes this without allocating; by default it replaces the stage.
+    /// Implement this without allocation for repeated factorisation; by default it replaces the
+    /// stage.
     fn stage_into(&self, k: usize, stage: &mut Stage) {
         *stage = self.stage(k);
     }
 
     /// Overwrites the weights in `stage`, which holds the matrices of another sample, with those of
-    /// sample `k`; asked for only if the plant is [constant](Stages::has_constant_plant).
+    /// sample `k`; called only if the plant is [constant](Stages::has_constant_plant).
     ///
     /// By default it overwrites everything.
     fn weights_into(&self, k: usize, stage: &mut Stage) {
         self.stage_into(k, stage);
     }
 
-    /// A range of samples at which all stages are equal; empty if there is none.
+    /// Returns a range of samples at which all stages are equal; empty if there is none.
     fn constant(&self) -> Range<usize>;
 
-    /// Whether the input itself costs anything at any sample: whether an `s` is not zero.
+    /// Returns true if the input itself has a cost at any sample: some `s` is non-zero.
     fn holds_input(&self) -> bool {
         true
     }
 
-    /// Whether `a` and `b` are the same at every sample, and the rows with a target of `c` and `d`
-    /// as well, so that only weights and penalties vary.
+    /// Returns true if `a`, `b`, and the rows of `c` and `d` with a target are the same at every
+    /// sample, so that only weights and penalties vary.
     fn has_constant_plant(&self) -> bool {
         self.constant() == (0..self.n_samples())
     }

@@ -1,27 +1,27 @@
-//! Eight numbers at a time, with the widest instructions that the processor at hand has.
+//! SIMD rows of eight numbers, with the widest instructions of the processor.
 //!
-//! Written for the constant-gain sweep ([`super::lanes`], [`super::single`]). A product and a sum are
-//! always rounded one by one, never fused, so every processor finds the same bits.
+//! For the constant-gain sweep ([`super::lanes`], [`super::single`]). Products and sums are rounded
+//! separately, never fused, so results are bit-identical on every processor.
 
 #![expect(
     clippy::inline_always,
     reason = "single instructions, and what takes over the instructions of its caller"
 )]
 
-/// Numbers in a row.
+/// Numbers per row.
 pub(super) const LANES: usize = 8;
 
-/// Eight numbers as they lie in memory.
+/// Eight numbers in memory.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(64))]
 pub(super) struct Lanes(pub(super) [f64; LANES]);
 
-/// The instructions for rows of eight numbers.
+/// Instructions for rows of eight numbers.
 pub(super) trait Wide: Copy {
     /// Eight numbers in registers.
     type Row: Copy;
 
-    /// Returns the row of these numbers.
+    /// Loads a row.
     fn row(self, values: &[f64; LANES]) -> Self::Row;
 
     /// Returns the numbers of a row.
@@ -40,28 +40,28 @@ pub(super) trait Wide: Copy {
     fn transpose(self, rows: [Self::Row; LANES]) -> [Self::Row; LANES];
 }
 
-/// Something to do with rows of numbers.
+/// Work to be compiled for each instruction set.
 pub(super) trait Work {
-    /// What comes out of it.
+    /// Its result.
     type Output;
 
-    /// Does it. Marked `#[inline(always)]`, as everything that it calls, so that it is compiled for
-    /// the instructions at hand.
+    /// Runs the work. Marked `#[inline(always)]`, like everything it calls, so that it is compiled
+    /// for the selected instructions.
     fn with(self, wide: impl Wide) -> Self::Output;
 }
 
-/// The instructions that a processor has.
+/// Instruction set of the processor.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Instructions {
-    /// Those of every processor that the program runs on.
+    /// The baseline that every supported processor has.
     Portable,
-    /// AVX2 as well.
+    /// AVX2 in addition.
     #[cfg(target_arch = "x86_64")]
     Avx(pulp::x86::V3),
 }
 
 impl Instructions {
-    /// Returns the best of the processor at hand.
+    /// Returns the best instruction set of this processor.
     pub(super) fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = pulp::x86::V3::try_new() {
@@ -70,7 +70,7 @@ impl Instructions {
         Self::Portable
     }
 
-    /// Does the work with these instructions.
+    /// Runs the work with these instructions.
     pub(super) fn run<T: Work>(self, work: T) -> T::Output {
         match self {
             Self::Portable => work.with(Portable),
@@ -80,7 +80,7 @@ impl Instructions {
     }
 }
 
-/// What every processor has.
+/// The baseline instructions.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Portable;
 
@@ -128,7 +128,7 @@ mod avx {
 
     use super::{LANES, Wide, Work};
 
-    /// Work with the proof that the processor has the instructions for it.
+    /// Work with the proof that the processor has the instructions.
     pub(super) struct Call<T>(pub(super) V3, pub(super) T);
 
     impl<T: Work> NullaryFnOnce for Call<T> {
@@ -140,7 +140,7 @@ mod avx {
         }
     }
 
-    /// The low halves of one row after the other, then the high ones.
+    /// The low halves of two rows, then the high ones.
     const LOW: i32 = 0x20;
     const HIGH: i32 = 0x31;
 
@@ -178,7 +178,7 @@ mod avx {
 
         #[inline(always)]
         fn transpose(self, rows: [Self::Row; LANES]) -> [Self::Row; LANES] {
-            // Four by four; the two quarters off the diagonal change places.
+            // Four by four; the two off-diagonal quarters are swapped.
             let mut columns = rows;
             for row in [0, 4] {
                 for half in 0..2 {

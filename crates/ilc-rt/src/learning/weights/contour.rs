@@ -1,4 +1,4 @@
-//! Contour weights: the error across the path counts more than the error along it.
+//! Contour weights: the error normal to the path counts more than the error along it.
 
 use nalgebra::DMatrix;
 
@@ -6,17 +6,17 @@ use super::tangent::tangents;
 use super::{Coupled, Gain, Weight};
 use crate::learning::LearningError;
 
-/// The geometry of a reference path, as seen by a cost.
+/// The geometry of a reference path, for a cost.
 ///
-/// With the unit tangent `t_k` of the path, `I - t_k t_k'` keeps of an error what lies across the
+/// With the unit tangent `t_k` of the path, `I - t_k t_k'` projects an error onto the normal of the
 /// path: to first order the contour error. For two axes it is `c_k c_k'` with the coupling gains
-/// `c_k = (-sin theta, cos theta)`. Where the path rests the nearest tangent holds.
+/// `c_k = (-sin theta, cos theta)`. Where the path rests the nearest tangent is used.
 ///
 /// # Shapes
-/// - of `n_outputs` channels only `axes` make the path (two, three or more); the others, as a rotary
-///   axis, are left out of it
+/// - of `n_outputs` channels only `axes` form the path (two, three or more); the others, e.g. a
+///   rotary axis, are excluded
 /// # Units
-/// - the axes of the path in the same unit, as metres
+/// - the axes of the path in the same unit, e.g. metres
 /// # Source
 /// - \[barton2010\], Eq. (4.1) to (4.3), (5.9) to (5.11).
 #[derive(Debug, Clone, PartialEq)]
@@ -27,19 +27,19 @@ pub struct Contour {
     tangents: Vec<f64>,
 }
 
-/// What a contour weight is made of: `Q_k = q I + contour (I - t t') + along t t'`.
+/// Terms of a contour weight: `Q_k = q I + contour (I - t t') + along t t'`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContourTerms {
-    /// Weight of every channel by itself.
+    /// Weight of every individual channel.
     pub q: Weight,
-    /// Weight of the error across the path.
+    /// Weight of the error normal to the path.
     pub contour: Gain,
     /// Weight of the error along the path.
     pub along: Gain,
 }
 
 impl Contour {
-    /// Makes the geometry of a path on which every channel is an axis.
+    /// Creates the geometry of a path with every channel as an axis.
     ///
     /// # Errors
     /// - as [`Contour::of_axes`].
@@ -48,15 +48,16 @@ impl Contour {
         Self::of_axes(reference, n_outputs, &axes)
     }
 
-    /// Makes the geometry of the path that some of the channels make.
+    /// Creates the geometry of a path formed by some of the channels.
     ///
     /// # Shapes
     /// - `reference`: `n_samples` x `n_outputs`, time first; `axes`: indices of the path's channels
     /// # Errors
-    /// - [`LearningError::Length`] for a reference that is no whole number of samples, or fewer than
-    ///   two axes.
-    /// - [`LearningError::NotFinite`] for a coordinate that is infinite or not a number.
-    /// - [`LearningError::Weight`] for a path that never moves, or an axis given twice or not there.
+    /// - [`LearningError::Length`] for a reference that is not a whole number of samples, or fewer
+    ///   than two axes.
+    /// - [`LearningError::NotFinite`] for a coordinate that is infinite or NaN.
+    /// - [`LearningError::Weight`] for a path that never moves, or an axis that is repeated or does
+    ///   not exist.
     pub fn of_axes(
         reference: &[f64],
         n_outputs: usize,
@@ -94,13 +95,13 @@ impl Contour {
         &self.tangents
     }
 
-    /// Returns the coupling at sample `k`: what an error contributes to the contour error.
+    /// Returns the coupling at sample `k`: the map from an error to the contour error.
     ///
-    /// One row `c_k = (-sin theta, cos theta)` for two axes, whose sign tells the side of the path;
+    /// One row `c_k = (-sin theta, cos theta)` for two axes, whose sign gives the side of the path;
     /// the projection `I - t t'` for more. In both cases `C' C = I - t t'` on the axes of the path.
     ///
     /// # Panics
-    /// If `k` lies beyond the run.
+    /// If `k` is beyond the end of the run.
     pub fn coupling(&self, k: usize) -> DMatrix<f64> {
         let t = self.tangent(k);
         if let [cosine, sine] = *t {
@@ -225,7 +226,7 @@ mod tests {
     proptest! {
         #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
 
-        /// Printed: theta from the angle of the tangent, `C'C` from the sines and cosines.
+        /// As printed: theta from the angle of the tangent, `C'C` from sines and cosines.
         #[test]
         fn two_axes_give_the_printed_coupling(
             angles in prop::collection::vec(-3.1..3.1_f64, 3..20),

@@ -1,16 +1,16 @@
-//! Weights that divide one signal between its channels and a coupled signal made of them.
+//! Weights that are divided between the individual channels and a coupled signal.
 
 use nalgebra::DMatrix;
 
 use super::{Gain, Weight};
 use crate::learning::LearningError;
 
-/// How much counts, and of what: of each channel by itself or of the coupled signal.
+/// Overall weight, and its division between the individual channels and the coupled signal.
 ///
 /// `Q_k = sigma_k (gamma_k I + (1 - gamma_k) C_k' C_k)`
 ///
-/// `gamma = 1` weights the channels alone (time and place), `gamma = 0` the coupled signal alone, as
-/// the contour error. The same form serves for the error, the input and the input's change.
+/// `gamma = 1` weights the channels alone (time and place), `gamma = 0` the coupled signal alone,
+/// e.g. the contour error. The same form applies to the error, the input and the input's change.
 ///
 /// # Source
 /// - \[barton2010\], Eq. (5.2) to (5.7); also (6.1) and (J.17).
@@ -18,7 +18,7 @@ use crate::learning::LearningError;
 pub struct Coupled {
     /// Overall weight `sigma`, not negative.
     pub sigma: Gain,
-    /// Share `gamma` of the channels by themselves, from 0 to 1.
+    /// Share `gamma` of the individual channels, from 0 to 1.
     pub gamma: Gain,
 }
 
@@ -26,10 +26,10 @@ impl Coupled {
     /// Returns the weight for the coupling `C_k`.
     ///
     /// # Shapes
-    /// - `coupling`: one matrix (any, `p`) a sample, or a single one for all samples; the result: `p`
-    ///   channels
+    /// - `coupling`: one matrix (any, `p`) per sample, or a single one for all samples; the result:
+    ///   `p` channels
     /// # Errors
-    /// - [`LearningError::Weight`] for a number out of range, a length that is not `n_samples`, or
+    /// - [`LearningError::Weight`] for a number out of range, a length other than `n_samples`, or
     ///   matrices of different widths.
     pub fn weight(
         &self,
@@ -51,7 +51,7 @@ impl Coupled {
     }
 }
 
-/// Refuses a coupling that does not fit the run; returns its width.
+/// Refuses a coupling that does not match the run; returns its width.
 fn check_coupling(coupling: &[DMatrix<f64>], n_samples: usize) -> Result<usize, LearningError> {
     let refused =
         |sample: usize, reason: String| LearningError::Weight { what: "coupling", sample, reason };

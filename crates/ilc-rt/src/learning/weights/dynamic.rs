@@ -1,4 +1,4 @@
-//! Weights with memory: the error passes a filter before it is weighed.
+//! Dynamic (frequency-dependent) weights: the error is filtered before it is weighted.
 
 use nalgebra::DMatrix;
 
@@ -6,38 +6,38 @@ use super::Weight;
 use crate::learning::LearningError;
 use crate::model::StateSpace;
 
-/// A pole counts as stable up to this magnitude: an integrator does, whatever its rounding.
+/// A pole counts as stable up to this magnitude, so that integrators do in spite of rounding.
 const STABLE: f64 = 1.0 + 1e-9;
 
-/// A filter that the error passes before it is weighed.
+/// A filter applied to the error before weighting.
 ///
 /// `J_e = sum_k |w_k|^2_Q + |z_k|^2_plain`, `w = F (G z)`, `z` the predicted error
 ///
-/// So a band of frequencies counts more than another, or one axis takes over what another is too
-/// slow for. `G` couples the channels at each sample, as contour gains do; `F` is causal, so that it
-/// can run along with the plant. A filter that runs backwards too (zero-phase) has no state to add
-/// to the plant's: take the causal one of the same magnitude.
+/// One band of frequencies can thus count more than another, or one axis can take over what another
+/// is too slow for. `G` couples the channels at each sample, like contour gains; `F` is causal, so
+/// that it can run along with the plant. A zero-phase filter has no state to append to the plant's:
+/// use the causal one of the same magnitude.
 ///
 /// # Shapes
 /// - for `p` outputs of the plant, `g` inputs and `f` outputs of the filter: `G` (`g`, `p`) at each
-///   sample, the identity if none is given; `w` `f` channels
+///   sample, the identity by default; `w` `f` channels
 /// # Source
 /// - \[barton2010\], Eq. (J.10) to (J.13), (J.17) to (J.19).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamic {
     filter: StateSpace,
-    /// None, or one a sample.
+    /// Empty, or one per sample.
     coupling: Vec<DMatrix<f64>>,
     plain: Option<Weight>,
 }
 
 impl Dynamic {
-    /// Makes a weight of what comes out of a filter.
+    /// Creates a weight of a filter's output.
     ///
     /// # Errors
     /// - [`LearningError::Model`] for a continuous filter.
-    /// - [`LearningError::Parameter`] for a filter with a pole outside the unit circle, as one has
-    ///   that is meant to run backwards.
+    /// - [`LearningError::Parameter`] for a filter with a pole outside the unit circle, e.g. one
+    ///   meant to run backward.
     /// - [`LearningError::Empty`] for a filter without inputs or outputs.
     pub fn new(filter: StateSpace) -> Result<Self, LearningError> {
         if filter.n_inputs() == 0 {
@@ -60,14 +60,14 @@ impl Dynamic {
         Ok(Self { filter, coupling: Vec::new(), plain: None })
     }
 
-    /// Makes the weight of one signal that unlike axes contribute to, each through its own filter:
-    /// `w = sum_i W_i(q) c_i[k] z_i[k]`, the contour error of a fast and a slow axis.
+    /// Creates the weight of one signal that unlike axes contribute to, each through its own
+    /// filter: `w = sum_i W_i(q) c_i[k] z_i[k]`, e.g. the contour error of a fast and a slow axis.
     ///
     /// # Shapes
-    /// - `filters`: one of one input and one output for each output of the plant; `gains`: one row
-    ///   (1, `p`) a sample, as [`Contour::couplings`](super::Contour::couplings) of two axes
+    /// - `filters`: one single-input, single-output filter per output of the plant; `gains`: one
+    ///   row (1, `p`) per sample, as [`Contour::couplings`](super::Contour::couplings) of two axes
     /// # Errors
-    /// - as [`Dynamic::new`]; [`LearningError::Weight`] for gains that do not fit.
+    /// - as [`Dynamic::new`]; [`LearningError::Weight`] for gains of the wrong shape.
     /// # Source
     /// - \[barton2010\], Eq. (J.12): with `W_fast = T_fast / T_slow F_lowpass`, `W_slow = 1`.
     pub fn unlike_axes(
@@ -98,11 +98,11 @@ impl Dynamic {
         Self::new(all.series(&sum)?)?.with_coupling(apart)
     }
 
-    /// Couples the channels before the filter, differently at each sample.
+    /// Couples the channels before the filter, sample by sample.
     ///
     /// # Errors
-    /// - [`LearningError::Weight`] unless there is at least one matrix, all have the same shape with
-    ///   one row for each input of the filter, and all entries are finite.
+    /// - [`LearningError::Weight`] unless there is at least one matrix, all have the same shape
+    ///   with one row per input of the filter, and all entries are finite.
     pub fn with_coupling(mut self, coupling: Vec<DMatrix<f64>>) -> Result<Self, LearningError> {
         let refused = |sample: usize, reason: String| {
             Err(LearningError::Weight { what: "coupling", sample, reason })
@@ -124,35 +124,35 @@ impl Dynamic {
         Ok(self)
     }
 
-    /// Weighs the error itself as well.
+    /// Weights the unfiltered error as well.
     #[must_use]
     pub fn with_plain(mut self, plain: Weight) -> Self {
         self.plain = Some(plain);
         self
     }
 
-    /// Returns whether the filter is the same at every sample.
+    /// Returns true if the filter is the same at every sample.
     pub fn is_constant(&self) -> bool {
         self.coupling.is_empty()
     }
 
-    /// Returns the outputs of the plant that it looks at.
+    /// Returns the number of plant outputs it takes.
     pub fn n_outputs(&self) -> usize {
         self.coupling.first().map_or(self.filter.n_inputs(), DMatrix::ncols)
     }
 
-    /// Returns the channels that the filter gives.
+    /// Returns the number of filtered channels.
     pub fn n_filtered(&self) -> usize {
         self.filter.n_outputs()
     }
 
-    /// Returns what stands behind the plant at sample `k`: its outputs are all that is weighed, the
-    /// error itself first, if it is, and then what the filter makes of it.
+    /// Returns the model to append to the plant at sample `k`: its outputs are all weighted
+    /// signals, first the unfiltered error, if it is weighted, and then the filtered one.
     ///
     /// # Errors
-    /// - [`LearningError::Model`] for numbers beyond all measure.
+    /// - [`LearningError::Model`] if a number overflows.
     /// # Panics
-    /// If the coupling varies and `k` lies beyond the run.
+    /// If the coupling varies and `k` is beyond the end of the run.
     pub fn at(&self, k: usize) -> Result<StateSpace, LearningError> {
         let (a, c) = (self.filter.a().clone(), self.filter.c());
         let (b, d) = match self.coupling.get(k) {
@@ -169,10 +169,10 @@ impl Dynamic {
         Ok(StateSpace::new(a, b, all_c, all_d, self.filter.dt_s())?)
     }
 
-    /// Returns the weight of all that is weighed, with `q` the weight of what the filter gives.
+    /// Returns the weight of all weighted signals, with `q` the weight of the filtered ones.
     ///
     /// # Errors
-    /// - [`LearningError::Weight`] for a part, or a coupling, that does not fit the run.
+    /// - [`LearningError::Weight`] for a part, or a coupling, that does not match the run.
     pub fn weight(&self, n_samples: usize, q: &Weight) -> Result<Weight, LearningError> {
         let (p, f) = (self.n_outputs(), self.filter.n_outputs());
         let count = self.coupling.len();
@@ -197,7 +197,7 @@ impl Dynamic {
         Ok(Weight::Blocks((0..n_samples).map(at).collect()))
     }
 
-    /// Returns what turns a run's error into the error of all that is weighed.
+    /// Returns the filter from a run's error to all weighted signals.
     pub fn error_filter(&self) -> ErrorFilter {
         let n = self.filter.n_states();
         ErrorFilter {
@@ -212,10 +212,10 @@ impl Dynamic {
     }
 }
 
-/// The filter that a run's error passes before the law sees it.
+/// The filter applied to a run's error before the law receives it.
 ///
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`ErrorFilter::run`].
+/// Cold path. Allocates at creation, never in [`ErrorFilter::run`].
 #[derive(Debug, Clone)]
 pub struct ErrorFilter {
     filter: StateSpace,
@@ -228,12 +228,12 @@ pub struct ErrorFilter {
 }
 
 impl ErrorFilter {
-    /// Returns the channels it takes.
+    /// Returns the number of input channels.
     pub fn n_inputs(&self) -> usize {
         self.n_inputs
     }
 
-    /// Returns the channels it gives.
+    /// Returns the number of output channels.
     pub fn n_outputs(&self) -> usize {
         self.filter.n_outputs() + if self.passes { self.n_inputs } else { 0 }
     }
@@ -241,8 +241,8 @@ impl ErrorFilter {
     /// Filters a whole run from rest.
     ///
     /// # Shapes
-    /// - `error`: `n_samples` x `n_inputs`; `filtered`: `n_samples` x `n_outputs`, overwritten; of
-    ///   unequal lengths the shorter counts
+    /// - `error`: `n_samples` x `n_inputs`; `filtered`: `n_samples` x `n_outputs`, overwritten; the
+    ///   shorter one determines the number of samples
     pub fn run(&mut self, error: &[f64], filtered: &mut [f64]) {
         let n_outputs = self.n_outputs();
         let Self { filter, coupling, n_inputs, passes, coupled, state, next } = self;
@@ -268,10 +268,10 @@ impl ErrorFilter {
         }
     }
 
-    /// Applies the transpose of [`ErrorFilter::run`]: the same recursion from the end of the run.
+    /// Applies the adjoint of [`ErrorFilter::run`]: the same recursion from the end of the run.
     ///
     /// # Shapes
-    /// - as [`ErrorFilter::run`], `error` being overwritten
+    /// - as [`ErrorFilter::run`]; `error` is overwritten
     pub fn run_transposed(&mut self, filtered: &[f64], error: &mut [f64]) {
         let n_outputs = self.n_outputs();
         let Self { filter, coupling, n_inputs, passes, coupled, state, next } = self;
@@ -413,7 +413,7 @@ mod tests {
             let dynamic = Dynamic::new(filter).unwrap().with_coupling(coupling).unwrap();
             let mut found = vec![f64::NAN; 18];
             let mut error_filter = dynamic.error_filter();
-            // Twice: the second run starts from rest too.
+            // Twice: the second run starts from rest, too.
             error_filter.run(&error, &mut found);
             error_filter.run(&error, &mut found);
             for (found, expected) in found.iter().zip(lifted.iter()) {

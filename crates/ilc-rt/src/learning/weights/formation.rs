@@ -1,21 +1,21 @@
-//! Weights for several agents that keep a formation.
+//! Weights for several agents in formation.
 
 use nalgebra::DMatrix;
 
 use super::{Objective, Weight};
 use crate::learning::LearningError;
 
-/// Which agents there are, and what of their errors is a formation error or the centre's.
+/// The agents, and the maps from their errors to formation errors and to the centre's error.
 ///
-/// An agent is a machine, or a group of axes, with its own reference. All agents' errors stand one
-/// behind the other in each sample: `e = (e_1x, e_1y, e_2x, ...)`. The formation error of two agents
-/// is the difference of their errors, `e_j - e_i = (r_j - r_i) - (y_j - y_i)`: the wanted offset, as
-/// the references have it, less the actual one. So nothing but references says what the formation
-/// is ([`Formation::follow`] makes them from a leader's), and any drift that all agents share costs
-/// nothing in it.
+/// An agent is a machine, or a group of axes, with its own reference. The errors of all agents are
+/// stacked in each sample: `e = (e_1x, e_1y, e_2x, ...)`. The formation error of two agents is the
+/// difference of their errors, `e_j - e_i = (r_j - r_i) - (y_j - y_i)`: the desired offset, given
+/// by the references, minus the actual one. So the references alone define the formation
+/// ([`Formation::follow`] makes them from a leader's), and a drift common to all agents has no cost
+/// in it.
 ///
 /// # Shapes
-/// - every signal of the whole: `n_samples` x (`n_agents` * `n_axes`), time first
+/// - every stacked signal: `n_samples` x (`n_agents` * `n_axes`), time first
 /// # Source
 /// - \[barton2010\], Eq. (4.4), (6.4), (6.14), (6.15).
 #[derive(Debug, Clone, PartialEq)]
@@ -29,24 +29,25 @@ pub struct Formation {
 }
 
 impl Formation {
-    /// Makes a formation of equal agents in which every pair keeps its offset in every axis.
+    /// Creates a formation of equal agents in which every pair keeps its offset in every axis.
     ///
     /// # Errors
-    /// - [`LearningError::Empty`] for no agents or no axes.
+    /// - [`LearningError::Empty`] for 0 agents or axes.
     pub fn new(n_agents: usize, n_axes: usize) -> Result<Self, LearningError> {
         let axes: Vec<usize> = (0..n_axes).collect();
         Self::of_pairs(n_agents, n_axes, &Self::all_pairs(n_agents), &axes)
     }
 
-    /// Makes a formation in which the given pairs of agents keep their offset in the given axes.
+    /// Creates a formation in which the given pairs of agents keep their offset in the given axes.
     ///
-    /// For each axis one row for each pair `(i, j)`: -1 at agent `i` and 1 at agent `j`. With three
-    /// agents of two axes and all pairs this is the `F` of the source. The centre is the mean of the
-    /// agents.
+    /// Each axis has one row per pair `(i, j)`: -1 at agent `i` and 1 at agent `j`. With three
+    /// agents of two axes and all pairs this is the `F` of the source. The centre is the mean of
+    /// the agents.
     ///
     /// # Errors
-    /// - [`LearningError::Empty`] for no agents or no axes.
-    /// - [`LearningError::Weight`] for an agent or axis that is not there, or a pair of one agent.
+    /// - [`LearningError::Empty`] for 0 agents or axes.
+    /// - [`LearningError::Weight`] for an agent or axis that does not exist, or a pair of equal
+    ///   agents.
     pub fn of_pairs(
         n_agents: usize,
         n_axes: usize,
@@ -87,7 +88,7 @@ impl Formation {
         (1..n_agents).flat_map(|gap| (0..n_agents - gap).map(move |i| (i, i + gap))).collect()
     }
 
-    /// Takes another definition of the formation errors: any linear map of all errors.
+    /// Replaces the formation errors by any linear map of all errors.
     ///
     /// # Errors
     /// - [`LearningError::Weight`] unless the map has one column for each axis of each agent and
@@ -98,7 +99,8 @@ impl Formation {
         Ok(self)
     }
 
-    /// Takes another centre than the mean: any linear map of all errors to those of one agent.
+    /// Replaces the centre (by default the mean) by any linear map of all errors to those of one
+    /// agent.
     ///
     /// # Errors
     /// - [`LearningError::Weight`] unless the map is `n_axes` x (`n_agents` * `n_axes`) and finite.
@@ -117,12 +119,12 @@ impl Formation {
         self.n_agents
     }
 
-    /// Returns the axes of one agent.
+    /// Returns the number of axes of one agent.
     pub fn n_axes(&self) -> usize {
         self.n_axes
     }
 
-    /// Returns the channels of all agents together.
+    /// Returns the number of channels of all agents together.
     pub fn n_channels(&self) -> usize {
         self.n_agents * self.n_axes
     }
@@ -153,13 +155,13 @@ impl Formation {
             .collect())
     }
 
-    /// Returns the references of all agents from the leader's and each agent's offset to it.
+    /// Returns the references of all agents from the leader's and each agent's offset from it.
     ///
     /// # Shapes
     /// - `leader`: `n_samples` x `n_axes`; `offsets`: `n_agents` x `n_axes`; the result:
     ///   `n_samples` x (`n_agents` * `n_axes`)
     /// # Errors
-    /// - [`LearningError::Length`] if one of them does not fit.
+    /// - [`LearningError::Length`] for a wrong length.
     pub fn follow(&self, leader: &[f64], offsets: &[f64]) -> Result<Vec<f64>, LearningError> {
         check_signal("leader", leader, self.n_axes)?;
         if offsets.len() != self.n_channels() {
@@ -184,7 +186,7 @@ impl Formation {
     /// [`Objective`].
     ///
     /// # Errors
-    /// - [`LearningError::Weight`] for a term that is out of range or does not fit.
+    /// - [`LearningError::Weight`] for a term that is out of range or of the wrong shape.
     /// # Source
     /// - \[barton2010\], Eq. (6.3), (6.6), (6.8), (6.9).
     pub fn weight(&self, n_samples: usize, objective: &Objective) -> Result<Weight, LearningError> {
@@ -197,7 +199,7 @@ impl Formation {
     }
 }
 
-/// Refuses a signal that is no whole number of samples.
+/// Refuses a signal that is not a whole number of samples.
 fn check_signal(
     what: &'static str,
     signal: &[f64],
@@ -250,7 +252,7 @@ mod tests {
 
     #[test]
     fn errors_are_wanted_offsets_less_actual_ones() {
-        // Agent 1 is to stay 2 above agent 0; it is 1.5 above and 0.25 beside.
+        // Agent 1 should stay 2 above agent 0; it is 1.5 above and 0.25 to the side.
         let formation = Formation::new(2, 2).unwrap();
         let reference = formation.follow(&[5.0, 7.0], &[0.0, 0.0, 0.0, 2.0]).unwrap();
         assert_eq!(reference, [5.0, 7.0, 5.0, 9.0]);

@@ -1,16 +1,16 @@
-//! A number along the run: the share or the scale of one term of a weight.
+//! A scalar along the run: the share or scale of one term of a weight.
 
 use crate::learning::LearningError;
 
-/// A number that is the same throughout the run or given for each sample.
+/// A scalar that is constant or given for each sample.
 ///
 /// # Shapes
 /// - `PerSample`: `n_samples` numbers
 #[derive(Debug, Clone, PartialEq)]
 pub enum Gain {
-    /// The same number throughout.
+    /// Constant along the run.
     Constant(f64),
-    /// One number a sample, as a [`Schedule`](super::Schedule) gives them.
+    /// One number per sample, e.g. from a [`Schedule`](super::Schedule).
     PerSample(Vec<f64>),
 }
 
@@ -18,7 +18,7 @@ impl Gain {
     /// Returns the number at sample `k`.
     ///
     /// # Panics
-    /// If `k` lies beyond the run; the builders check the lengths first.
+    /// If `k` is beyond the end of the run; the builders check the lengths first.
     pub fn at(&self, k: usize) -> f64 {
         match self {
             Self::Constant(value) => *value,
@@ -26,12 +26,12 @@ impl Gain {
         }
     }
 
-    /// Returns whether it is the same throughout.
+    /// Returns true if it is constant along the run.
     pub fn is_constant(&self) -> bool {
         matches!(self, Self::Constant(_))
     }
 
-    /// Refuses a wrong length and numbers outside 0 to `highest`.
+    /// Refuses a wrong length, and numbers outside 0 to `highest`.
     ///
     /// # Errors
     /// - [`LearningError::Weight`] naming `what` and the sample.

@@ -1,7 +1,7 @@
-//! What a good run is, as the matrices of a quadratic cost along the run.
+//! Weights of a quadratic cost along the run.
 //!
-//! A [`Weight`] says what one term of the cost is at each sample; the other files build such weights
-//! from what they mean (contour, formation, dynamic filters). Laws, analysis and tuning import it.
+//! A [`Weight`] is one term of the cost at each sample; the other files build weights from their
+//! meaning (contour, formation, dynamic filters). Laws, analysis and tuning import it.
 //!
 //! Family: `formation` and `objective` convert into each other.
 

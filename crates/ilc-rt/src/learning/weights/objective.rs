@@ -1,21 +1,22 @@
-//! What several agents are to do: each its own task, the centre's, the leaders', the formation's.
+//! Objectives of several agents: own tracking, centre tracking, leader following, formation
+//! keeping.
 
 use nalgebra::DMatrix;
 
 use super::{Formation, Gain, Weight};
 use crate::learning::LearningError;
 
-/// The objective of several agents, each term of it possibly different along the run.
+/// The objective of several agents; each term may vary along the run.
 ///
 /// `Q = Sigma (X1 (B1 diag(Q_1, .., Q_p) + B2 K' Q_c K) + X2 F' F)`, `X2 = I - X1`
 ///
-/// `Sigma`, `B1`, `B2` and `X1` hold one number an agent. As printed the products are symmetric, and
-/// so a weight, only while that number is the same for all agents that a term couples. Otherwise
-/// the symmetric form is taken that the printed one is then a case of: `G^1/2 K' Q_c K G^1/2` for
-/// the centre, and for each row of `F` the geometric mean of the gains of the agents in it, so that
-/// a formation error weighs what it does to both and what all agents share still costs nothing.
+/// `Sigma`, `B1`, `B2` and `X1` hold one number per agent. The products as printed are symmetric,
+/// and thus a weight, only if that number is the same for all agents coupled by a term. Otherwise a
+/// symmetric form that contains the printed one as a special case is used: `G^1/2 K' Q_c K G^1/2`
+/// for the centre, and for each row of `F` the geometric mean of the gains of its agents, so that a
+/// formation error weighs equally on both, and an error common to all agents still costs nothing.
 ///
-/// Each list holds one entry for all agents or one for each.
+/// Each list holds one entry for all agents, or one per agent.
 ///
 /// # Shapes
 /// - `own`, `centre`: weights of the axes of one agent, (`n_axes`, `n_axes`)
@@ -27,18 +28,18 @@ pub struct Objective {
     pub own: Vec<Weight>,
     /// `Q_c`: weight of the error of the formation's centre.
     pub centre: Weight,
-    /// `B1`: share of its own error in what an agent tracks, 0 to 1.
+    /// `B1`: share of its own error in an agent's tracking, 0 to 1.
     pub own_share: Vec<Gain>,
-    /// `B2`: share of the centre's error in what an agent tracks, 0 to 1.
+    /// `B2`: share of the centre's error in an agent's tracking, 0 to 1.
     pub centre_share: Vec<Gain>,
-    /// `X1`: share of tracking, 0 to 1; the rest is the formation's.
+    /// `X1`: share of tracking, 0 to 1; the remainder goes to the formation.
     pub tracking_share: Vec<Gain>,
     /// `Sigma`: overall weight, not negative.
     pub sigma: Vec<Gain>,
 }
 
 impl Objective {
-    /// Every agent tracks its own reference.
+    /// Returns the objective in which every agent tracks its own reference.
     pub fn individual() -> Self {
         Self {
             own: vec![Weight::Scalar(1.0)],
@@ -50,15 +51,17 @@ impl Objective {
         }
     }
 
-    /// The centre of the formation tracks its reference; the agents may be anywhere about it.
+    /// Returns the objective in which the formation's centre tracks its reference; the agents are
+    /// free around it.
     pub fn centred() -> Self {
         Self { own_share: vec![0.0.into()], centre_share: vec![1.0.into()], ..Self::individual() }
     }
 
-    /// The leaders alone track their references. Several of them are the neighbours of the others.
+    /// Returns the objective in which only the leaders track their references. Several leaders are
+    /// the neighbours of the others.
     ///
     /// # Errors
-    /// - [`LearningError::Weight`] for a leader that is not among the agents.
+    /// - [`LearningError::Weight`] for a leader that is not one of the agents.
     pub fn led_by(n_agents: usize, leaders: &[usize]) -> Result<Self, LearningError> {
         if let Some(leader) = leaders.iter().find(|leader| **leader >= n_agents) {
             let reason = format!("agent {leader}; there are {n_agents} from 0");
@@ -68,8 +71,8 @@ impl Objective {
         Ok(Self { own_share: (0..n_agents).map(share).collect(), ..Self::individual() })
     }
 
-    /// The formation alone counts. Agents with equal references then learn nothing from tracking:
-    /// an error that all share costs nothing.
+    /// Returns the objective in which only the formation counts. Agents with equal references then
+    /// learn nothing from tracking: an error common to all costs nothing.
     pub fn shape() -> Self {
         Self::individual().with_tracking_share(0.0)
     }
@@ -80,7 +83,7 @@ impl Objective {
         Self { tracking_share: vec![share.into()], ..self }
     }
 
-    /// Returns whether the weight is the same at every sample.
+    /// Returns true if the weight is the same at every sample.
     pub(super) fn is_constant(&self) -> bool {
         let weights = self.own.iter().chain([&self.centre]);
         let gains = [&self.own_share, &self.centre_share, &self.tracking_share, &self.sigma];
@@ -156,7 +159,7 @@ fn shared(row: &[f64], gains: &[f64]) -> f64 {
         .collect();
     match &taking_part[..] {
         [] => 0.0,
-        // Exact where all are equal, as they mostly are.
+        // Exact if all are equal, the usual case.
         [first, others @ ..] if others.iter().all(|gain| gain.total_cmp(first).is_eq()) => *first,
         all => all.iter().map(|gain| gain.powf(1.0 / all.len() as f64)).product(),
     }
@@ -189,7 +192,7 @@ mod tests {
         // The leader tracks, the other keeps its distance.
         let led = Objective::led_by(2, &[0]).unwrap().with_tracking_share(0.5);
         near(weight(&led), [1.0, -0.5, -0.5, 0.5]);
-        // An agent that does not count takes no part in the formation either.
+        // An agent of weight 0 takes no part in the formation either.
         let alone = Objective { sigma: vec![4.0.into(), 0.0.into()], ..Objective::shape() };
         near(weight(&alone), [0.0; 4]);
         let uneven = Objective { sigma: vec![4.0.into(), 1.0.into()], ..Objective::shape() };
@@ -225,7 +228,7 @@ mod tests {
         assert!(led.contains("agent 3"), "{led}");
     }
 
-    /// The printed equations in the printed, lifted order, entry by entry.
+    /// The equations as printed, in lifted order, entry by entry.
     fn printed(
         (n, p, d): (usize, usize, usize),
         formation: &Formation,
@@ -319,7 +322,7 @@ mod tests {
             let formation = Formation::new(p, d).unwrap();
             let weight = formation.weight(2, &objective).unwrap();
             prop_assert!(weight.check("q", 2, p * d).is_ok());
-            // What all agents share costs nothing where only the formation counts.
+            // An error common to all agents costs nothing if only the formation counts.
             let free = Objective { sigma: of(3), ..Objective::shape() };
             let weight = formation.weight(2, &free).unwrap().at(0, p * d);
             let error: Vec<f64> = (0..p * d).map(|i| drift[i % d]).collect();

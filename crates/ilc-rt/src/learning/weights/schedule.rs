@@ -1,14 +1,14 @@
-//! Numbers that switch from one part of the run to the next without a step.
+//! Smooth (bumpless) schedules of a scalar along the run.
 
 use super::Gain;
 use crate::learning::LearningError;
 use crate::signal::GaussianFilter;
 
-/// Values that hold from given samples on, with transitions that a Gaussian filter makes smooth.
+/// A piecewise constant schedule, smoothed by a Gaussian filter.
 ///
 /// # Units
 /// - starts in samples; bandwidth in Hz: the frequency at which a ripple keeps `1 / sqrt 2` of its
-///   height. A transition from 10 % to 90 % takes `0.34 / bandwidth_hz` seconds.
+///   amplitude. A transition from 10 % to 90 % takes `0.34 / bandwidth_hz` seconds.
 /// # Source
 /// - \[barton2010\], sections 5.4.2 and 5.4.3 and listing H.3.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,12 +18,12 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Makes a schedule that steps from one value to the next.
+    /// Creates a schedule that steps from one value to the next.
     ///
     /// # Shapes
     /// - `segments`: first sample and value of each, the first at sample 0
     /// # Errors
-    /// - [`LearningError::Weight`] unless the starts rise from 0 and the values are finite.
+    /// - [`LearningError::Weight`] unless the starts increase from 0 and the values are finite.
     pub fn new(segments: &[(usize, f64)]) -> Result<Self, LearningError> {
         let refused = |sample: usize, reason: String| {
             Err(LearningError::Weight { what: "schedule", sample, reason })
@@ -47,18 +47,19 @@ impl Schedule {
         Ok(Self { segments: segments.to_vec(), filter: None })
     }
 
-    /// Makes the transitions smooth.
+    /// Smooths the transitions.
     ///
     /// # Errors
-    /// - [`LearningError::Signal`] unless the bandwidth lies between 0 and half the sampling rate.
+    /// - [`LearningError::Signal`] unless the bandwidth lies between 0 and the Nyquist frequency.
     pub fn smoothed(self, bandwidth_hz: f64, dt_s: f64) -> Result<Self, LearningError> {
         Ok(Self { filter: Some(GaussianFilter::new(bandwidth_hz, dt_s)?), ..self })
     }
 
-    /// Returns the value at each sample; all lie between the lowest and the highest value given.
+    /// Returns the value at each sample; all lie between the lowest and the highest value of the
+    /// schedule.
     ///
-    /// The run is continued beyond its ends by its mirror image (half-sample reflection), so that
-    /// the ends keep their values.
+    /// The run is extended by its mirror image (half-sample reflection), so that the ends keep
+    /// their values.
     ///
     /// # Errors
     /// - [`LearningError::Weight`] if a segment starts after the end of the run.
@@ -77,7 +78,7 @@ impl Schedule {
         }
         if let Some(filter) = &self.filter {
             filter.for_samples(n_samples)?.apply(&mut steps, 0, 1)?;
-            // Rounding alone could carry a weight of 0 below 0.
+            // Rounding could push a weight of 0 below 0.
             let values = self.segments.iter().map(|(_, value)| *value);
             let lowest = values.clone().fold(f64::INFINITY, f64::min);
             let highest = values.fold(f64::NEG_INFINITY, f64::max);

@@ -1,20 +1,20 @@
-//! The tangents of a contour's reference, or why it has none.
+//! Tangents of a contour's reference.
 
 use crate::learning::LearningError;
 use crate::learning::error::check;
 use crate::trajectory::path_tangents;
 
-/// Returns the unit tangent of a path at each of its samples.
+/// Returns the unit tangent of a path at each sample.
 ///
-/// That of [`path_tangents`]; a path that never moves is refused, as nothing lies across it.
+/// That of [`path_tangents`]; a path that never moves is refused, as it has no tangent.
 ///
 /// # Shapes
 /// - `reference`: `n_samples` x `n_axes`, time first; the result alike
 /// # Units
-/// - `reference` in the same unit for all axes, as metres; the result without unit
+/// - `reference` in the same unit for all axes, e.g. metres; the result is dimensionless
 /// # Errors
 /// - [`LearningError::Length`] unless `reference` holds whole samples of at least 2 axes.
-/// - [`LearningError::NotFinite`] for a coordinate that is infinite or not a number.
+/// - [`LearningError::NotFinite`] for a coordinate that is infinite or NaN.
 /// - [`LearningError::Weight`] if the path never moves.
 /// # Source
 /// - \[barton2010\], Eq. (4.3): theta is the angle of this tangent.

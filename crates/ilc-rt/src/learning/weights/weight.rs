@@ -1,10 +1,10 @@
-//! One weight along the run.
+//! A weight along the run.
 
 use nalgebra::DMatrix;
 
 use crate::learning::LearningError;
 
-/// A symmetric, positive semidefinite weight of the channels of one signal at each sample.
+/// A symmetric, positive semidefinite weight of the channels of a signal, at each sample.
 ///
 /// # Shapes
 /// - for `p` channels and runs of `n` samples: `PerSample` `n` numbers, `Block` `(p, p)`, `Blocks` `n`
@@ -13,11 +13,11 @@ use crate::learning::LearningError;
 pub enum Weight {
     /// The same number for every channel and every sample.
     Scalar(f64),
-    /// One number a sample, the same for every channel.
+    /// One number per sample, the same for every channel.
     PerSample(Vec<f64>),
     /// One matrix for all samples.
     Block(DMatrix<f64>),
-    /// One matrix a sample.
+    /// One matrix per sample.
     Blocks(Vec<DMatrix<f64>>),
 }
 
@@ -25,7 +25,7 @@ impl Weight {
     /// Returns the weight at sample `k` of a signal with `p` channels.
     ///
     /// # Panics
-    /// If `k` lies beyond the run; [`Weight::check`] has been passed before.
+    /// If `k` is beyond the end of the run; [`Weight::check`] rules this out.
     pub fn at(&self, k: usize, p: usize) -> DMatrix<f64> {
         match self {
             Self::Scalar(weight) => DMatrix::identity(p, p) * *weight,
@@ -35,7 +35,7 @@ impl Weight {
         }
     }
 
-    /// Returns whether the weight is the same at every sample.
+    /// Returns true if the weight is the same at every sample.
     pub fn is_constant(&self) -> bool {
         matches!(self, Self::Scalar(_) | Self::Block(_))
     }
@@ -43,7 +43,7 @@ impl Weight {
     /// Returns one entry of the weight at sample `k`.
     ///
     /// # Panics
-    /// If `k` lies beyond the run; [`Weight::check`] has been passed before.
+    /// If `k` is beyond the end of the run; [`Weight::check`] rules this out.
     pub fn entry(&self, k: usize, row: usize, col: usize) -> f64 {
         match self {
             Self::Block(block) => block[(row, col)],
@@ -54,7 +54,7 @@ impl Weight {
         }
     }
 
-    /// Returns the weight of some of the channels only.
+    /// Returns the weight of a subset of the channels.
     #[must_use]
     pub fn select(&self, channels: &[usize]) -> Self {
         let pick = |block: &DMatrix<f64>| {
@@ -68,7 +68,7 @@ impl Weight {
         }
     }
 
-    /// Returns whether two channels cost anything together at any sample.
+    /// Returns true if the weight couples two channels at any sample.
     pub fn couples(&self, row: usize, col: usize) -> bool {
         match self {
             Self::Block(block) => block[(row, col)] != 0.0,
@@ -77,7 +77,7 @@ impl Weight {
         }
     }
 
-    /// Returns whether nothing costs anything at any sample.
+    /// Returns true if the weight is zero at every sample.
     pub fn is_zero(&self) -> bool {
         match self {
             Self::Scalar(weight) => *weight == 0.0,
@@ -87,12 +87,12 @@ impl Weight {
         }
     }
 
-    /// Returns whether the weight ties any of `p` channels to another.
+    /// Returns true if the weight couples any two of `p` channels.
     pub fn is_mixed(&self, p: usize) -> bool {
         (0..p).any(|row| (0..row).any(|col| self.couples(row, col)))
     }
 
-    /// Refuses a weight that does not fit or is not positive semidefinite.
+    /// Refuses a weight of the wrong shape, or one that is not positive semidefinite.
     ///
     /// # Errors
     /// - [`LearningError::Weight`] naming the weight `what`, the sample and the rule.
@@ -131,7 +131,7 @@ impl Weight {
     }
 }
 
-/// How far below zero the smallest eigenvalue may lie, as a part of the largest entry: rounding.
+/// Tolerance below zero of the smallest eigenvalue, relative to the largest entry: rounding.
 const SEMIDEFINITE: f64 = 1e-10;
 
 fn check_block(block: &DMatrix<f64>, p: usize) -> Result<(), String> {

@@ -38,7 +38,7 @@ pub enum Doubt {
     /// A cell description does not take such a model.
     #[error("the fit has {what} {value:.4}, a cell takes {low} to {high}")]
     BeyondCell {
-        /// Which figure, with its unit.
+        /// Name of the figure, with its unit.
         what: &'static str,
         /// The figure.
         value: f64,

@@ -48,7 +48,7 @@ pub struct RationalFit {
 /// - [`ModelError::Parameter`] for degrees out of range, [`ModelError::SampleTime`], and as
 ///   [`super::fit_second_order`] for the response.
 /// - [`ModelError::Numerics`] if the linear fit has no solution; [`ModelError::Parameter`] with the
-///   residual if what comes out has nothing of the response.
+///   residual if the result has nothing of the response.
 /// # Source
 /// - \[sanathanan1963\]; \[pintelon2012\], section 9.8.
 pub fn fit_rational(

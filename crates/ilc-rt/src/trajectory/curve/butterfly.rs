@@ -1,6 +1,6 @@
 //! The butterfly contour, `r = e^{cos t} - 2 cos 4t - sin⁵(t/12)`.
 
-use super::run::flat;
+use super::frame::flat;
 use super::{Curve, Derivatives};
 use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;

@@ -26,6 +26,26 @@ pub(super) fn norm(a: &[f64; MAX_AXES]) -> f64 {
 }
 
 impl Frame {
+    /// The frame between two places, as far along as the fraction.
+    pub(super) fn between(frames: &[Self], at: f64) -> Self {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "places on the curve"
+        )]
+        let i = (at.max(0.0) as usize).min(frames.len().saturating_sub(2));
+        let (a, b, share) = (&frames[i], &frames[i + 1], (at - i as f64).clamp(0.0, 1.0));
+        let mix = |of: fn(&Frame) -> &[f64; MAX_AXES]| -> [f64; MAX_AXES] {
+            std::array::from_fn(|axis| of(a)[axis] + share * (of(b)[axis] - of(a)[axis]))
+        };
+        Self {
+            point_m: mix(|frame| &frame.point_m),
+            tangent: mix(|frame| &frame.tangent),
+            bend: mix(|frame| &frame.bend),
+            twist: mix(|frame| &frame.twist),
+        }
+    }
+
     /// `T = r'/q`, `K = (r'' - T (T·r''))/q²` and `dK/ds`, with `q = |r'|`.
     pub(super) fn new([point_m, first, second, third]: Derivatives) -> Self {
         let q = norm(&first);
@@ -49,4 +69,13 @@ impl Frame {
         let (t, k, w) = (self.tangent[axis], self.bend[axis], self.twist[axis]);
         [t * v, t * a + k * v * v, t * j + 3.0 * k * v * a + w * v * v * v]
     }
+}
+
+/// Axes of a shape that lies in a plane.
+pub(super) fn flat(values: [[f64; 2]; 4]) -> Derivatives {
+    values.map(|[x, y]| {
+        let mut point = [0.0; MAX_AXES];
+        (point[0], point[1]) = (x, y);
+        point
+    })
 }

@@ -5,15 +5,18 @@
 
 mod arc_length;
 mod butterfly;
+mod excess;
 mod frame;
 mod run;
+mod speed;
 mod spiral;
 mod spline;
 mod time_law;
 mod turn;
 
 pub use butterfly::Butterfly;
-pub use run::{Run, RunLimits};
+pub use run::Run;
+pub use speed::RunLimits;
 pub use spiral::Spiral;
 pub use spline::Spline;
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::run::flat;
+use super::frame::flat;
 use super::{Curve, Derivatives};
 use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;

@@ -12,7 +12,8 @@ use crate::trajectory::jet::Jet;
 /// - `slope_m_s` in m/s, `offset_m` in m, `alpha` in s⁻³
 /// # Source
 /// - [dimarco2016], Eq. 2.2 to 2.5
-pub fn startup_linear(t_s: f64, slope_m_s: f64, offset_m: f64, alpha: f64) -> Jet {
+#[cfg(test)]
+pub(super) fn startup_linear(t_s: f64, slope_m_s: f64, offset_m: f64, alpha: f64) -> Jet {
     let t = Jet::line(t_s, 1.0);
     Jet::line(slope_m_s * t_s + offset_m, slope_m_s) * (t.cubed() * alpha).rise()
 }
@@ -23,7 +24,8 @@ pub fn startup_linear(t_s: f64, slope_m_s: f64, offset_m: f64, alpha: f64) -> Je
 /// - `amplitude_m` in m, `omega_rad_s` in rad/s, `alpha` in s⁻²
 /// # Source
 /// - [dimarco2016], Eq. 2.7 to 2.10
-pub fn startup_sine(t_s: f64, amplitude_m: f64, omega_rad_s: f64, alpha: f64) -> Jet {
+#[cfg(test)]
+pub(super) fn startup_sine(t_s: f64, amplitude_m: f64, omega_rad_s: f64, alpha: f64) -> Jet {
     let t = Jet::line(t_s, 1.0);
     (t * omega_rad_s).sin() * (t.squared() * alpha).rise() * amplitude_m
 }
@@ -35,7 +37,7 @@ pub fn startup_sine(t_s: f64, amplitude_m: f64, omega_rad_s: f64, alpha: f64) ->
 ///
 /// # Source
 /// - [dimarco2016], Eq. 2.12 and 2.17
-pub fn weight_before(t_s: f64, ratio: f64, alpha: f64) -> Jet {
+pub(super) fn weight_before(t_s: f64, ratio: f64, alpha: f64) -> Jet {
     (-(Jet::line(alpha * t_s - ratio.ln(), alpha))).logistic()
 }
 
@@ -43,7 +45,7 @@ pub fn weight_before(t_s: f64, ratio: f64, alpha: f64) -> Jet {
 ///
 /// # Source
 /// - [dimarco2016], Eq. 2.13 and 2.18
-pub fn weight_after(t_s: f64, ratio: f64, alpha: f64) -> Jet {
+pub(super) fn weight_after(t_s: f64, ratio: f64, alpha: f64) -> Jet {
     Jet::line(alpha * t_s - ratio.ln(), alpha).logistic()
 }
 
@@ -52,7 +54,7 @@ pub fn weight_after(t_s: f64, ratio: f64, alpha: f64) -> Jet {
 ///
 /// # Source
 /// - [dimarco2016], Eq. 2.15 and the listing of Appendix A
-pub fn blending_ratio(before_m_s: f64, after_m_s: f64) -> f64 {
+pub(super) fn blending_ratio(before_m_s: f64, after_m_s: f64) -> f64 {
     if before_m_s * after_m_s < 0.0 { (after_m_s / before_m_s).abs() } else { 1.0 }
 }
 

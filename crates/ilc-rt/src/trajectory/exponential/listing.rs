@@ -40,7 +40,8 @@ pub struct Listing {
 
 impl Listing {
     /// The numbers printed in the listing.
-    pub fn printed() -> Self {
+    #[cfg(test)]
+    fn printed() -> Self {
         Self {
             legs: [
                 ListedLeg {

@@ -8,12 +8,14 @@
 
 mod alpha;
 mod choice;
-pub mod equations;
+mod equations;
 mod leg;
 pub mod listing;
 mod peaks;
 mod plan;
+mod points_program;
 
 pub use alpha::AlphaInterval;
 pub use choice::{AlphaChoice, AlphaMax};
 pub use plan::{ExponentialSigmoid, ModulatedSegment};
+pub use points_program::{POINTS_A_PERIOD, points_program};

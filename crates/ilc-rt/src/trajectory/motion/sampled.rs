@@ -93,6 +93,15 @@ impl SampledMotion {
         Ok(self)
     }
 
+    /// Adds a motion that begins where the other one rests.
+    pub(in crate::trajectory) fn append(&mut self, next: &Self) {
+        let skipped = if self.position_m.is_empty() { 0 } else { next.n_axes };
+        self.position_m.extend_from_slice(&next.position_m[skipped..]);
+        self.velocity_m_s.extend_from_slice(&next.velocity_m_s[skipped..]);
+        self.acceleration_m_s2.extend_from_slice(&next.acceleration_m_s2[skipped..]);
+        self.programmed_m.extend_from_slice(&next.programmed_m[skipped..]);
+    }
+
     /// Number of samples.
     pub fn n_samples(&self) -> usize {
         self.position_m.len() / self.n_axes.max(1)

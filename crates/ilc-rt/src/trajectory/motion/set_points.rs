@@ -1,6 +1,6 @@
 //! A motion that is given set point by set point, and the proof that it holds the limits. Cold.
 //!
-//! For programs that come as a table instead of a path. The supervisor calls it.
+//! For programs that come as a table instead of a path. The campaign calls it.
 
 use crate::interpolate::AxisLimits;
 use crate::interpolate::{MAX_AXES, MoveError};

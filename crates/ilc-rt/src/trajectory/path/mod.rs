@@ -4,5 +4,5 @@ mod blended;
 mod spec;
 
 pub(in crate::trajectory) use blended::BlendedPath;
-pub use spec::{ArcSpec, CornerRule, PathSegment, PathSpec};
+pub use spec::{ArcSpec, PathSegment, PathSpec};
 pub(in crate::trajectory) use spec::{POSITION_MAX_M, check_limits, checked_lines, point};

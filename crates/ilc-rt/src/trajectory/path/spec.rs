@@ -43,18 +43,6 @@ pub struct ArcSpec {
     pub clockwise: bool,
 }
 
-/// How corners are taken.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum CornerRule {
-    /// Come to rest at every corner; the feed is an upper bound.
-    ExactStop,
-    /// Keep the feed and round each corner within an averaging window.
-    Blend {
-        /// Length of the window, rounded up to whole cycles.
-        window_s: f64,
-    },
-}
-
 /// A run from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathSpec {
@@ -62,8 +50,9 @@ pub struct PathSpec {
     pub start_m: Vec<f64>,
     /// Moves in order.
     pub segments: Vec<PathSegment>,
-    /// How corners are taken.
-    pub corner: CornerRule,
+    /// Length of the window within which corners are rounded at the feed, in whole cycles rounded up;
+    /// `None` to come to rest at every corner, with the feed as an upper bound.
+    pub blend_s: Option<f64>,
     /// Rest at the start that belongs to the run.
     pub dwell_before_s: f64,
     /// Rest at the end that belongs to the run.

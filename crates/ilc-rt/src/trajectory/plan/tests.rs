@@ -18,12 +18,12 @@ fn segment(to_m: &[f64], feed_m_s: f64) -> PathSegment {
     PathSegment::line(to_m.to_vec(), feed_m_s)
 }
 
-fn contour(corner: CornerRule, feed: f64) -> PathSpec {
+fn contour(blend_s: Option<f64>, feed: f64) -> PathSpec {
     let corners = [[0.08, 0.04], [0.06, 0.06], [0.0, 0.06], [0.0, 0.0], [0.08, 0.0]];
     PathSpec {
         start_m: vec![0.08, 0.0],
         segments: corners.iter().map(|to| segment(to, feed)).collect(),
-        corner,
+        blend_s,
         dwell_before_s: 0.1,
         dwell_after_s: 0.2,
     }
@@ -61,9 +61,7 @@ fn assert_holds(plan: &Interpolator, limits: &[AxisLimits], what: &str) {
 
 #[test]
 fn the_example_contour_is_blended_at_its_feed() {
-    let plan =
-        Interpolator::plan(&contour(CornerRule::Blend { window_s: 0.04 }, 0.1), &gantry(), CYCLE_S)
-            .unwrap();
+    let plan = Interpolator::plan(&contour(Some(0.04), 0.1), &gantry(), CYCLE_S).unwrap();
     assert_holds(&plan, &gantry(), "contour");
     // 268.28 mm at 0.1 m/s, two rests, and a little more than the window.
     let motion_s = 0.268_284_27 / 0.1 + 0.3 + 0.04;
@@ -99,14 +97,12 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
             segments: (0..5)
                 .map(|_| PathSegment::line(point(&mut random), random.log(0.08, 0.4)))
                 .collect(),
-            corner: CornerRule::ExactStop,
+            blend_s: None,
             dwell_before_s: 0.03 * random.unit(),
             dwell_after_s: if round % 3 == 0 { 0.0 } else { 0.05 * random.unit() },
         };
-        for corner in
-            [CornerRule::ExactStop, CornerRule::Blend { window_s: random.log(0.004, 0.3) }]
-        {
-            spec.corner = corner;
+        for blend_s in [None, Some(random.log(0.004, 0.3))] {
+            spec.blend_s = blend_s;
             let mut plan = match Interpolator::plan(&spec, &axes, CYCLE_S) {
                 Ok(plan) => plan,
                 Err(TrajectoryError::Exceeds { .. }) => {
@@ -115,7 +111,7 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
                 }
                 Err(other) => panic!("{other}"),
             };
-            assert_holds(&plan, &axes, &format!("round {round} {corner:?}"));
+            assert_holds(&plan, &axes, &format!("round {round} {blend_s:?}"));
             let first = plan.next();
             assert_eq!(first.velocity_m_s, [0.0; crate::interpolate::MAX_AXES]);
             for (position, start) in first.position_m.iter().zip(&spec.start_m) {
@@ -139,8 +135,8 @@ fn random_paths_hold_the_limits_and_end_exactly_under_both_rules() {
 
 #[test]
 fn a_run_repeats_bit_by_bit_and_is_the_reference() {
-    for corner in [CornerRule::ExactStop, CornerRule::Blend { window_s: 0.04 }] {
-        let mut plan = Interpolator::plan(&contour(corner, 0.1), &gantry(), CYCLE_S).unwrap();
+    for blend_s in [None, Some(0.04)] {
+        let mut plan = Interpolator::plan(&contour(blend_s, 0.1), &gantry(), CYCLE_S).unwrap();
         let reference = plan.reference();
         assert_eq!(reference.len(), 2 * plan.n_samples());
         for stop_at in [plan.n_samples() / 3, plan.n_samples(), plan.n_samples() + 50] {
@@ -157,8 +153,8 @@ fn a_run_repeats_bit_by_bit_and_is_the_reference() {
 
 #[test]
 fn velocities_are_the_slope_of_the_positions() {
-    for corner in [CornerRule::ExactStop, CornerRule::Blend { window_s: 0.04 }] {
-        let mut plan = Interpolator::plan(&contour(corner, 0.1), &gantry(), CYCLE_S).unwrap();
+    for blend_s in [None, Some(0.04)] {
+        let mut plan = Interpolator::plan(&contour(blend_s, 0.1), &gantry(), CYCLE_S).unwrap();
         let setpoints: Vec<Setpoint> = (0..plan.n_samples()).map(|_| plan.next()).collect();
         for around in setpoints.windows(3) {
             let slope = (around[2].position_m[0] - around[0].position_m[0]) / (2.0 * CYCLE_S);
@@ -170,7 +166,7 @@ fn velocities_are_the_slope_of_the_positions() {
 
 #[test]
 fn exact_stops_rest_at_every_corner_and_pass_through_it() {
-    let spec = contour(CornerRule::ExactStop, 0.1);
+    let spec = contour(None, 0.1);
     let mut plan = Interpolator::plan(&spec, &gantry(), 1e-4).unwrap();
     let setpoints: Vec<Setpoint> = (0..plan.n_samples()).map(|_| plan.next()).collect();
     for corner in &spec.segments {
@@ -193,7 +189,7 @@ fn a_long_run_does_not_drift() {
     let spec = PathSpec {
         start_m: vec![0.0, 0.0],
         segments,
-        corner: CornerRule::Blend { window_s: 0.2 },
+        blend_s: Some(0.2),
         dwell_before_s: 0.0,
         dwell_after_s: 0.0,
     };
@@ -207,7 +203,7 @@ fn a_long_run_does_not_drift() {
 
 #[test]
 fn a_blend_beyond_the_limits_is_refused_with_what_would_do() {
-    let spec = contour(CornerRule::Blend { window_s: 0.04 }, 0.1);
+    let spec = contour(Some(0.04), 0.1);
     let weak = [limits(0.5, 8.0, 1000.0), limits(0.5, 1.0, 1000.0)];
     let error = Interpolator::plan(&spec, &weak, CYCLE_S).unwrap_err();
     let TrajectoryError::Exceeds {
@@ -232,18 +228,16 @@ fn a_blend_beyond_the_limits_is_refused_with_what_would_do() {
     assert!(line.starts_with("axis 2: acceleration reaches 2.5 m/s^2, limit 1 m/s^2"), "{line}");
     assert!(!line.contains('\n'));
 
-    let slower = contour(CornerRule::Blend { window_s: 0.04 }, feed_admissible);
+    let slower = contour(Some(0.04), feed_admissible);
     assert_holds(&Interpolator::plan(&slower, &weak, CYCLE_S).unwrap(), &weak, "slower");
-    let wider = contour(CornerRule::Blend { window_s }, 0.1);
+    let wider = contour(Some(window_s), 0.1);
     assert_holds(&Interpolator::plan(&wider, &weak, CYCLE_S).unwrap(), &weak, "wider");
 }
 
 #[test]
 fn a_feed_beyond_an_axis_is_refused_and_no_window_is_offered() {
     let slow = [limits(0.05, 8.0, 1000.0), limits(0.5, 8.0, 1000.0)];
-    let error =
-        Interpolator::plan(&contour(CornerRule::Blend { window_s: 0.04 }, 0.1), &slow, CYCLE_S)
-            .unwrap_err();
+    let error = Interpolator::plan(&contour(Some(0.04), 0.1), &slow, CYCLE_S).unwrap_err();
     let TrajectoryError::Exceeds { axis, quantity, feed_factor, window_admissible_s, .. } = error
     else {
         panic!("{error}");
@@ -254,7 +248,7 @@ fn a_feed_beyond_an_axis_is_refused_and_no_window_is_offered() {
 
 #[test]
 fn bad_values_are_refused_one_at_a_time() {
-    let good = contour(CornerRule::Blend { window_s: 0.04 }, 0.1);
+    let good = contour(Some(0.04), 0.1);
     let plan = |spec: &PathSpec| Interpolator::plan(spec, &gantry(), CYCLE_S).map(|_| ());
     assert!(plan(&good).is_ok());
     let broken = |change: &dyn Fn(&mut PathSpec)| {
@@ -277,8 +271,8 @@ fn bad_values_are_refused_one_at_a_time() {
     );
     assert!(broken(&|s| s.dwell_before_s = -0.1).contains("dwell before"));
     assert!(broken(&|s| s.dwell_after_s = f64::NAN).contains("dwell after"));
-    assert!(broken(&|s| s.corner = CornerRule::Blend { window_s: 0.0 }).contains("blend window"));
-    assert!(broken(&|s| s.corner = CornerRule::Blend { window_s: 11.0 }).contains("blend window"));
+    assert!(broken(&|s| s.blend_s = Some(0.0)).contains("blend window"));
+    assert!(broken(&|s| s.blend_s = Some(11.0)).contains("blend window"));
     assert!(broken(&|s| s.segments[0].feed_m_s = 1e-7).contains("samples"));
     assert!(Interpolator::plan(&good, &gantry(), f64::NAN).is_err());
     assert!(Interpolator::plan(&good, &gantry(), 0.0).is_err());

@@ -1,6 +1,6 @@
 //! Set points as text: one row a servo cycle, one column an axis, separated by commas. Cold.
 //!
-//! The supervisor reads the file of `kind = "table"` with it. A head line is optional; where there is
+//! The campaign reads the file of `kind = "table"` with it. A head line is optional; where there is
 //! one it must name the axes in order, so that exchanged columns are refused instead of driven.
 
 use super::text::{shown, without_mark};

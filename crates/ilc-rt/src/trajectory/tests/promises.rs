@@ -4,7 +4,7 @@
 use crate::interpolate::random::Random;
 use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
 use crate::trajectory::{
-    AxisLimits, CornerRule, ExponentialSigmoid, Interpolator, JerkLimited, Linear, LinearSetting,
+    AxisLimits, ExponentialSigmoid, Interpolator, JerkLimited, Linear, LinearSetting,
     ModulatedSegment, MotionState, PathSegment, PathSpec, TrajectoryError,
 };
 
@@ -43,7 +43,7 @@ fn a_million_profiles() {
             random.log(1e-2, 1e5),
         ];
         let plan = JerkLimited::plan(length, v, a, j).unwrap();
-        assert!(plan.duration_s() > 0.0 && plan.phases_s().iter().all(|phase| *phase >= 0.0));
+        assert!(plan.duration_s() > 0.0);
         for share in [random.unit(), random.unit(), 0.5] {
             let state = plan.at(share * plan.duration_s());
             assert!((0.0..=length).contains(&state.s_m), "{plan:?}");
@@ -188,7 +188,7 @@ fn random_curves() {
     for round in 0..30 {
         let limits = RunLimits {
             feed_m_s: random.log(0.03, 0.2),
-            curvature_acceleration_m_s2: if round % 2 == 0 {
+            curvature_acceleration_max_m_s2: if round % 2 == 0 {
                 f64::INFINITY
             } else {
                 random.log(0.05, 5.0)
@@ -238,7 +238,7 @@ fn random_paths_of_lines_and_arcs_with_exact_stops() {
                 },
                 PathSegment::line(vec![0.0, 0.0], random.log(0.01, 1.0)),
             ],
-            corner: CornerRule::ExactStop,
+            blend_s: None,
             dwell_before_s: 0.01,
             dwell_after_s: 0.01,
         };

@@ -20,7 +20,7 @@ impl Address {
         self.scheme
     }
 
-    /// Whether no frame leaves this host.
+    /// Returns whether no frame leaves this host.
     pub fn stays_on_host(&self) -> bool {
         self.place.stays_on_host()
     }

@@ -1,11 +1,11 @@
-//! Why a bus could not be opened, in one line that names the address and what is allowed.
+//! Reasons that a bus cannot be opened, in one line that names the address and what is allowed.
 
 use std::fmt;
 use std::io;
 
 use super::address::syntaxes;
 
-/// Why a bus could not be opened.
+/// Reason that a bus cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// Not the address of any kind of bus.
@@ -19,11 +19,11 @@ pub enum OpenError {
     Part {
         /// The address as given.
         address: String,
-        /// Which part: group, port, option, ...
+        /// Part of the address: group, port, option, ...
         part: &'static str,
         /// The value as given.
         value: String,
-        /// What the part may be.
+        /// Allowed values of the part.
         allowed: &'static str,
     },
     /// A bus in one process, by its address.
@@ -60,9 +60,9 @@ pub enum OpenError {
     Os {
         /// The address, as far as it is known.
         address: String,
-        /// What was tried.
+        /// Failed action.
         action: &'static str,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
     /// Zenoh refused.
@@ -70,9 +70,9 @@ pub enum OpenError {
     Zenoh {
         /// Key expression of the bus.
         key: String,
-        /// What was tried.
+        /// Failed action.
         action: &'static str,
-        /// What Zenoh said.
+        /// Error of Zenoh.
         reason: String,
     },
 }

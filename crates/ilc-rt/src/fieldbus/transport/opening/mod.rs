@@ -1,8 +1,10 @@
 //! Cold: the kinds of bus there are, their addresses, and the opening of the bus that an address names.
 //!
-//! For `supervisor`, the programs and the Python bindings, which know the address and nothing else of a
+//! For `campaign`, the programs and the Python bindings, which know the address and nothing else of a
 //! transport. A new transport is an endpoint beside this folder, a file in it that describes and opens
 //! it, and a line in [`SCHEMES`].
+//!
+//! Family: `address`, `error` and `scheme`: an address is read by its scheme, and refused with the list of them.
 
 mod address;
 mod can;

@@ -13,12 +13,12 @@ pub struct Scheme {
     pub syntax: &'static str,
     /// An address that is allowed.
     pub example: &'static str,
-    /// What carries the frames, in a few words of Markdown.
+    /// Carrier of the frames, in a few words of Markdown.
     pub summary: &'static str,
-    /// Whether the bus carries a number of bits in a cycle: its load is checked, and its drives are taken
+    /// True if the bus carries a number of bits in a cycle: its load is checked, and its drives are taken
     /// for real ones.
     pub has_bits: bool,
-    /// Whether both ends are in one process, so that an address alone opens nothing.
+    /// True if both ends are in one process, so that an address alone opens nothing.
     pub in_process: bool,
     /// Reads an address of this kind.
     pub(super) parse: fn(&Parts<'_>) -> Result<Box<dyn Place>, OpenError>,
@@ -35,7 +35,7 @@ pub(super) trait Place: fmt::Debug {
     /// Opens the bus.
     fn open(&self) -> Result<Box<dyn Bus>, OpenError>;
 
-    /// Whether no frame leaves this host.
+    /// Returns whether no frame leaves this host.
     fn stays_on_host(&self) -> bool;
 }
 

@@ -20,14 +20,14 @@ pub(super) static SCHEME: Scheme = Scheme {
 };
 
 #[derive(Debug, PartialEq, Eq)]
-struct Group {
+struct Multicast {
     group: Ipv4Addr,
     port: u16,
     /// Routers that the frames may cross, plus one; 0 keeps them on this host.
     ttl: u8,
 }
 
-impl Place for Group {
+impl Place for Multicast {
     fn open(&self) -> Result<Box<dyn Bus>, OpenError> {
         Ok(Box::new(UdpMulticast::open(self.group, self.port, self.ttl)?))
     }
@@ -41,7 +41,7 @@ fn parse(parts: &Parts<'_>) -> Result<Box<dyn Place>, OpenError> {
     Ok(Box::new(read(parts)?))
 }
 
-fn read(parts: &Parts<'_>) -> Result<Group, OpenError> {
+fn read(parts: &Parts<'_>) -> Result<Multicast, OpenError> {
     let place = parts.place;
     // In brackets or without, with a port or without: only IPv6 has two colons.
     if place.starts_with('[') || place.matches(':').count() > 1 {
@@ -68,7 +68,7 @@ fn read(parts: &Parts<'_>) -> Result<Group, OpenError> {
         let allowed = "0 (this host only) to 255, 1 for the local network";
         ttl = value.parse().map_err(|_| parts.refuse("ttl", value, allowed))?;
     }
-    Ok(Group { group, port, ttl })
+    Ok(Multicast { group, port, ttl })
 }
 
 #[cfg(test)]
@@ -79,7 +79,7 @@ mod tests {
     fn port_and_ttl_have_defaults() {
         let group = Ipv4Addr::new(239, 74, 163, 2);
         let of = |rest: &str| read(&Parts::new(rest, rest)).unwrap();
-        assert_eq!(of("239.74.163.2"), Group { group, port: 43113, ttl: 0 });
-        assert_eq!(of("239.74.163.2:5000?ttl=1"), Group { group, port: 5000, ttl: 1 });
+        assert_eq!(of("239.74.163.2"), Multicast { group, port: 43113, ttl: 0 });
+        assert_eq!(of("239.74.163.2:5000?ttl=1"), Multicast { group, port: 5000, ttl: 1 });
     }
 }

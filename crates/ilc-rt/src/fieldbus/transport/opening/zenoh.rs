@@ -29,7 +29,7 @@ pub struct ZenohSettings {
     pub listen: Vec<String>,
     /// Zenoh endpoints to connect to.
     pub connect: Vec<String>,
-    /// Whether to look for other endpoints on this host by multicast.
+    /// True if to look for other endpoints on this host by multicast.
     pub scouting: bool,
 }
 
@@ -97,7 +97,7 @@ impl ZenohSettings {
     }
 }
 
-/// Whether Zenoh takes a text for one key, and `KEY/*` for the keys under it.
+/// Returns whether Zenoh takes a text for one key, and `KEY/*` for the keys under it.
 fn is_key(text: &str) -> bool {
     let is_part = |part: &str| {
         !part.is_empty()

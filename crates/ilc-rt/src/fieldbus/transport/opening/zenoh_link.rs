@@ -25,10 +25,10 @@ use crate::fieldbus::transport::zenoh::{decode, encode};
 /// Frames that a ring buffer holds each way.
 const RING_FRAMES: usize = 4096;
 
-/// How often [`Link::wait_for_peer`] looks.
+/// Period at which [`Link::wait_for_peer`] looks.
 const POLL: Duration = Duration::from_millis(1);
 
-/// How long a peer may leave its frames lying before they are dropped.
+/// Time that a peer may leave its frames unread before they are dropped.
 const STALL_US: u32 = 100_000;
 
 /// Multicast group in which endpoints of buses look for each other. Not the one of all Zenoh programs: a
@@ -49,7 +49,7 @@ pub(in crate::fieldbus::transport) struct Link {
     shared: Arc<Shared>,
 }
 
-/// What the threads of a link tell each other.
+/// Flags between the threads of a link.
 #[derive(Debug, Default)]
 struct Shared {
     closing: AtomicBool,
@@ -149,7 +149,7 @@ fn config(settings: &ZenohSettings) -> zenoh::Result<zenoh::Config> {
     let mut config = reach.configuration()?;
     let mut set =
         |key: &str, value: serde_json::Value| config.insert_json5(key, &value.to_string());
-    // Express frames travel one by one, so the queue counts frames; 16 is the most that Zenoh takes.
+    // Express frames travel one by one, so the queue counts frames; Zenoh takes 16 at most.
     set("transport/link/tx/queue/size/real_time", 16.into())?;
     // The publisher's thread may wait where the caller's may not. Beyond this a peer has stalled, and its
     // frames are dropped so that the others get theirs.

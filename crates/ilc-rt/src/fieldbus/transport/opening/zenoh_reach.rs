@@ -1,4 +1,4 @@
-//! How far a Zenoh session reaches, and how much it lets strangers take: the settings that every
+//! Reach of a Zenoh session, and bounds on what strangers may take: the settings that every
 //! session of this program has in common. Cold.
 //!
 //! By default nothing leaves the host: a session listens on the host's own address, and looks for others
@@ -17,21 +17,21 @@ const MESSAGE_MAX: usize = 1 << 16;
 const SESSIONS_MAX: usize = 64;
 /// Connections at a time that have not said who they are.
 const PENDING_MAX: usize = 16;
-/// How long such a connection may take.
+/// Longest time of such a connection.
 const ACCEPT_MAX_MS: u64 = 2_000;
-/// How long a peer that does not read may hold up what must not be lost, before it is left.
+/// Time that a peer that does not read may hold up reliable data before it is dropped.
 const BLOCK_MAX_US: u64 = 1_000_000;
 
-/// What a session is asked to reach.
+/// Reach of a session.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach<'a> {
     /// Endpoints to listen on; if empty, a free port of the host's own address.
     pub(crate) listen: &'a [String],
     /// Endpoints to connect to.
     pub(crate) connect: &'a [String],
-    /// Whether to look for others by multicast.
+    /// True if to look for others by multicast.
     pub(crate) scouting: bool,
-    /// Whether multicast may leave the host where endpoints are named.
+    /// True if multicast may leave the host where endpoints are named.
     pub(crate) scouting_off_host: bool,
     /// Multicast group, if not that of all Zenoh programs.
     pub(crate) group: Option<&'a str>,
@@ -41,7 +41,7 @@ impl Reach<'_> {
     /// Returns the configuration of the session.
     ///
     /// # Errors
-    /// Zenoh's, for an endpoint that is none.
+    /// Zenoh's, for a text that is not an endpoint.
     pub(crate) fn configuration(&self) -> zenoh::Result<zenoh::Config> {
         let is_named = !(self.listen.is_empty() && self.connect.is_empty());
         let mut config = zenoh::Config::default();
@@ -72,7 +72,7 @@ impl Reach<'_> {
     }
 }
 
-/// Whether only programs of this host can reach an endpoint.
+/// Returns whether only programs of this host can reach an endpoint.
 pub(crate) fn stays_on_host(endpoint: &str) -> bool {
     let (protocol, rest) = endpoint.split_once('/').unwrap_or(("", endpoint));
     if protocol.starts_with("unix") {

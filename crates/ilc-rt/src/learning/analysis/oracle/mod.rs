@@ -1,4 +1,4 @@
-//! The figures against dense linear algebra that shares nothing with them, and against simulation.
+//! Tests of the figures against independent dense linear algebra, and against simulation.
 
 mod refusals;
 
@@ -37,7 +37,7 @@ fn close(found: f64, expected: f64, tolerance: f64) -> bool {
     (found - expected).abs() <= tolerance * expected.abs().max(1e-3)
 }
 
-/// `L_u`, `L_e` and `P` of an optimal law, from its equations; only inputs that reach something.
+/// `L_u`, `L_e` and `P` of a norm-optimal law in closed form; only inputs with an effect.
 fn lifted_optimal(model: &StateSpace, n: usize, w: Weights) -> [DMatrix<f64>; 3] {
     let m = model.n_inputs();
     let p = model.lifted(n).unwrap();
@@ -54,7 +54,7 @@ fn lifted_optimal(model: &StateSpace, n: usize, w: Weights) -> [DMatrix<f64>; 3]
     [h.solve(&kept), learn, p]
 }
 
-/// `L_u`, `L_e` of a law by its columns.
+/// `L_u` and `L_e` of a law, by columns.
 fn columns(law: &mut dyn Law, n_u: usize, n_e: usize) -> [DMatrix<f64>; 2] {
     let mut next = vec![0.0; n_u];
     let mut part = |count: usize, is_input: bool| {
@@ -86,7 +86,7 @@ fn largest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
     matrix.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
 }
 
-/// Cuts the last `late` inputs off.
+/// Removes the last `late` inputs.
 fn without(matrix: &DMatrix<f64>, late: usize) -> DMatrix<f64> {
     let n = matrix.nrows() - late;
     matrix.view((0, 0), (n, n)).into_owned()
@@ -110,7 +110,7 @@ fn the_servo_example_agrees_with_its_equations() {
         assert_eq!(found.method, Method::Dense);
         let [keep, learn, p] = lifted_optimal(&model, n, w);
         let t = &keep - &learn * &p;
-        // s > 0: what reaches nothing is driven to zero, apart from the others.
+        // s > 0: inputs without effect decay to zero, decoupled from the others.
         let cut = without(&t, 1);
         let factor = found.monotonic_factor.unwrap().value;
         assert!(close(factor, largest_singular(&cut), 1e-9));
@@ -125,7 +125,7 @@ fn the_servo_example_agrees_with_its_equations() {
         let error = found.converged_error.unwrap();
         let worst = stays.iter().zip(&error).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-9, "{worst:e}");
-        // The covariance, run by run.
+        // Covariance, run by run.
         let (mut sigma, mut u) = (DMatrix::zeros(n, n), DVector::zeros(n));
         for run in 0..6 {
             let e = &r - &p * &u;
@@ -142,7 +142,7 @@ fn the_servo_example_agrees_with_its_equations() {
 
 #[test]
 fn more_weight_of_the_error_and_less_of_the_input_leave_less_error() {
-    // What figures 3.5 and 3.6 of the source show.
+    // The results of figures 3.5 and 3.6 of the source.
     let (model, n) = (servo(), 401);
     let stays = |w: Weights| {
         let question = Question { reference: Some(triangle()), ..Question::default() };
@@ -221,7 +221,7 @@ fn the_usual_condition_does_not_make_the_error_fall() {
     assert!(found.critical_frequency_hz.is_some());
 }
 
-/// A law for each kind of transpose.
+/// One law for each source of the adjoint.
 fn laws(model: &StateSpace, n: usize) -> Vec<(&'static str, Box<dyn Law>)> {
     let m = model.n_inputs();
     let dt_s = model.dt_s().unwrap();
@@ -256,7 +256,7 @@ fn products_with_signals_give_what_whole_matrices_give() {
         assert!(close(factor.value, expected, 1e-9), "{name}: {factor:?} {expected}");
         assert!((factor.value - expected).abs() <= factor.error + 1e-12, "{name}: {factor:?}");
         if name != "pd" && name != "pd, causal" {
-            // The others are far from normal: their eigenvalues are rounding's.
+            // The others are far from normal: their computed eigenvalues are dominated by rounding.
             let expected = largest_eigenvalue(&cut);
             assert!(
                 (radius.value - expected).abs() <= (10.0 * radius.error).max(1e-9),
@@ -270,7 +270,7 @@ fn products_with_signals_give_what_whole_matrices_give() {
 
 #[test]
 fn long_runs_agree_with_short_ones_of_the_same_law() {
-    // Above the limit of whole matrices the same law has nearly the same figures.
+    // Beyond the limit of dense matrices the same law has nearly the same figures.
     let model = axis(2e-3);
     let reference =
         |n: usize| -> Vec<f64> { (0..n).map(|k| 0.01 * (1.0 - (k as f64 / 60.0).cos())).collect() };
@@ -295,7 +295,7 @@ fn long_runs_agree_with_short_ones_of_the_same_law() {
     ] {
         assert!(close(left, right, tolerance), "{name}: {left} {right}");
     }
-    // The fixed point of the long run is one.
+    // The result for the long run is a fixed point.
     let mut law = NormOptimal::new(&model, 1200, w).unwrap();
     let (input, error) = (long.converged_input.unwrap(), long.converged_error.unwrap());
     let mut next = vec![0.0; 1200];
@@ -350,7 +350,7 @@ fn the_critical_frequency_is_where_the_equation_crosses_one() {
     assert!(low > 5.0);
     let critical = found.critical_frequency_hz.unwrap();
     assert!((low - 0.6..low + 0.1).contains(&critical), "{critical} {low}");
-    // With a filter below it the law is safe, and the learnable frequency stays what it was.
+    // With a filter below it the law is safe, and the learnable frequency is unchanged.
     let filter = QFilter::ZeroPhase(butterworth(2, 0.4 * low, dt_s).unwrap());
     let mut law = Pd::new(gains, n, 1, filter).unwrap();
     let filtered = analyze(&mut law, &model, n, &Question::default()).unwrap();

@@ -2,7 +2,7 @@
 //!
 //! The cost of norm-optimal learning, minimised over the inputs that the machine can take: bounds of
 //! the input, of its change and steps, of the set-point's position, velocity and acceleration and of
-//! the predicted output. `supervisor` and the Python bindings may import it.
+//! the predicted output. `design` and the Python bindings may import it.
 //!
 //! Family: `bounds` and `solver`: the solver refuses with the error of the bounds that it is given.
 

@@ -156,45 +156,6 @@ impl NormOptimal {
         Ok(law)
     }
 
-    /// Makes the law of any tracking problem, with all channels of the machine in one group.
-    ///
-    /// `shifts` says for each output how many samples ahead of the input its error is taken;
-    /// `free_samples` as in [`Gains::new`]; `told` describes the weights, for errors.
-    ///
-    /// # Errors
-    /// - [`LearningError::Empty`], [`LearningError::Undetermined`] or [`LearningError::Unbounded`].
-    pub fn from_stages(
-        stages: &impl Stages,
-        shifts: &[usize],
-        free_samples: usize,
-        told: &str,
-    ) -> Result<Self, LearningError> {
-        if stages.n_samples() == 0 {
-            return Err(LearningError::Empty { what: "n_samples" });
-        }
-        let n_inputs = stages.stage(0).n_inputs();
-        let n_outputs = stages.n_targets();
-        let channels = Channels {
-            inputs: (0..n_inputs).collect(),
-            outputs: (0..n_outputs).collect(),
-            shifts: shifts.to_vec(),
-        };
-        let mut law = Self {
-            n_samples: stages.n_samples(),
-            n_inputs,
-            n_outputs,
-            weights: format!(r#""weights":{told:?}"#),
-            invariant: None,
-            scalars: None,
-            conditioning: 1.0,
-            parts: Vec::new(),
-            n_unread: 0,
-            inverses: Inverses::None,
-        };
-        law.add(stages, channels, free_samples, Form::default(), told)?;
-        Ok(law)
-    }
-
     /// Factorises one group of channels.
     fn add(
         &mut self,

@@ -1,11 +1,11 @@
-//! `[program]`: the sections of a cell description that concern the path.
+//! `[program]` of a cell description: the keys that every kind of path reads, and those of some.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::path::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
+use super::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
 use crate::schema::field_order;
 
 /// `[program]`: where the tool goes.
@@ -18,7 +18,7 @@ pub struct Program {
     /// Speed along the path where a segment names none.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub feed_m_s: f64,
-    /// What kind of path it is.
+    /// Kind of path.
     #[serde(default)]
     pub kind: PathKind,
     /// Part program of `kind = "gcode"`, set points of `kind = "table"`; in the folder of the cell
@@ -27,12 +27,12 @@ pub struct Program {
     /// Speed of G0; `feed_m_s` if it is not given.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub rapid_m_s: Option<f64>,
-    /// Whether blocks of the part program that begin with `/` are left out.
+    /// Leaves out blocks of the part program that begin with `/`.
     #[serde(default)]
     pub block_delete: bool,
     /// Highest acceleration across a smooth curve; the axes' own limits if it is not given.
     #[schemars(range(min = 1e-6, max = 1e4))]
-    pub curvature_acceleration_m_s2: Option<f64>,
+    pub curvature_acceleration_max_m_s2: Option<f64>,
     /// `[program.butterfly]`
     pub butterfly: Option<ButterflySection>,
     /// `[program.spiral]`
@@ -41,7 +41,7 @@ pub struct Program {
     pub raster: Option<RasterSection>,
     /// `[program.modulated]`
     pub modulated: Option<ModulatedSection>,
-    /// How corners are taken; not read where there are none.
+    /// The way in which corners are taken; not read where there are none.
     #[serde(default = "default_corner")]
     pub corner: Corner,
     /// Length of the averaging window of `corner = "blend"`.
@@ -63,6 +63,62 @@ pub struct Program {
     /// `[[program.segment]]`, moves in order.
     #[serde(rename = "segment", default)]
     pub segments: Vec<Segment>,
+}
+
+/// A key or table of `[program]` that not every kind of path reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Key {
+    /// `[[program.segment]]`
+    Segments,
+    /// `center_m`, `clockwise` and `dwell_s` of a segment.
+    Arcs,
+    /// `file`
+    File,
+    /// `rapid_m_s`
+    Rapid,
+    /// `block_delete`
+    BlockDelete,
+    /// `[program.butterfly]`
+    Butterfly,
+    /// `[program.spiral]`
+    Spiral,
+    /// `[program.raster]`
+    Raster,
+    /// `[program.modulated]`
+    Modulated,
+    /// `curvature_acceleration_max_m_s2`
+    CurvatureAcceleration,
+}
+
+impl Program {
+    /// Every key that not every kind reads, its name in a cell description, and true if it is given.
+    pub fn given(&self) -> [(Key, &'static str, bool); 10] {
+        let is_extra = |s: &Segment| s.center_m.is_some() || s.clockwise || s.dwell_s > 0.0;
+        let extra = self.segments.iter().any(is_extra);
+        let across = self.curvature_acceleration_max_m_s2.is_some();
+        [
+            (Key::Segments, "[[program.segment]]", !self.segments.is_empty()),
+            (Key::File, "[program] file", self.file.is_some()),
+            (Key::Rapid, "[program] rapid_m_s", self.rapid_m_s.is_some()),
+            (Key::BlockDelete, "[program] block_delete", self.block_delete),
+            (Key::Butterfly, "[program.butterfly]", self.butterfly.is_some()),
+            (Key::Spiral, "[program.spiral]", self.spiral.is_some()),
+            (Key::Raster, "[program.raster]", self.raster.is_some()),
+            (Key::Modulated, "[program.modulated]", self.modulated.is_some()),
+            (Key::CurvatureAcceleration, "[program] curvature_acceleration_max_m_s2", across),
+            (Key::Arcs, "[[program.segment]] center_m, clockwise, dwell_s", extra),
+        ]
+    }
+
+    /// The averaging window of blended corners; `None` for exact stops.
+    pub fn window_s(&self) -> Option<f64> {
+        (self.corner == Corner::Blend).then_some(self.blend_s)
+    }
+
+    /// `file`; empty if there is none.
+    pub fn file_name(&self) -> &Path {
+        self.file.as_deref().unwrap_or(Path::new(""))
+    }
 }
 
 fn default_corner() -> Corner {
@@ -97,7 +153,7 @@ pub struct Segment {
     pub feed_m_s: Option<f64>,
     /// Centre of an arc, in the first two axes.
     pub center_m: Option<[f64; 2]>,
-    /// Which way round the arc is.
+    /// Clockwise instead of anticlockwise.
     #[serde(default)]
     pub clockwise: bool,
     /// Rest at its end.
@@ -106,7 +162,7 @@ pub struct Segment {
     pub dwell_s: f64,
 }
 
-/// How corners are taken.
+/// The way in which corners are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Corner {

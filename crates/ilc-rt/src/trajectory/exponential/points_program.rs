@@ -3,9 +3,9 @@
 //! A feed with an oscillation along it breaks chips. As a program it is a row of straight moves,
 //! usually six a period. Cold.
 
+use super::plan::ModulatedSegment;
 use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;
-use crate::trajectory::exponential::ModulatedSegment;
 use crate::trajectory::path::PathSegment;
 
 /// Points a period of the customary program.

@@ -1,0 +1,107 @@
+//! A fault in its fields: what happened, where, with which numbers, and the cycles before it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The cause of a controlled stop that was not asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FaultKind {
+    /// A drive reported a fault; `code` is its emergency code, `value` its following error.
+    DriveFault,
+    /// A drive did not reach, or left, operation enabled; `code` is its statusword.
+    NotEnabled,
+    /// A drive did not answer; `value` is the number of cycles.
+    SilentDrive,
+    /// One of the PDOs of a drive did not come; `code` is its number, `value` the number of cycles.
+    SilentPdo,
+    /// A PDO has another length than its mapping; `code` is its number, `value` its bytes, `limit` 8.
+    WrongLength,
+    /// The tool measurement did not answer; `value` is the number of cycles.
+    SilentTool,
+    /// A node restarted.
+    NodeRestarted,
+    /// A node left operation; `code` is its NMT state.
+    NodeStopped,
+    /// Another master commands on the bus.
+    OtherMaster,
+    /// Command and encoder came too far apart.
+    FollowingError,
+    /// An axis stands outside its limits before its drive is switched on; `limit` is the nearer one.
+    OutsideLimits,
+    /// A position jumped farther than the axis can move.
+    PositionJump,
+    /// A number in the command was not finite.
+    NotFinite,
+    /// A drive missed its commands because this computer stalled; `value` is the number of cycles.
+    Stall,
+    /// The loop could not keep its cycle; `value` is the number of cycles missed.
+    Overrun,
+    /// The bus failed; `code` is the error number of the system, if there is one.
+    Bus,
+    /// A run could not be stored.
+    Library,
+    /// The law refused a run.
+    Law,
+    /// The disturbance of a run could not be measured.
+    Disturbance,
+    /// Samples of a run were lost on their way to the record.
+    SamplesLost,
+    /// The thread of the loop died.
+    LoopDied,
+}
+
+/// A fault.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Fault {
+    /// Cause.
+    pub kind: FaultKind,
+    /// Name of the axis, if it is one axis.
+    pub axis: Option<String>,
+    /// CANopen node, if it is one node.
+    pub node: Option<u8>,
+    /// Number that the kind says.
+    pub code: Option<u32>,
+    /// Quantity that was found.
+    pub value: Option<f64>,
+    /// Limit that it exceeds.
+    pub limit: Option<f64>,
+    /// Unit of both.
+    pub unit: Option<String>,
+    /// Last servo cycles before the stop.
+    pub cycles: LastCycles,
+}
+
+/// Servo cycles in a row, oldest first; one row per cycle, one column per axis.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct LastCycles {
+    /// Count of SYNCs at the first one; absent without cycles.
+    pub first_sync: Option<u64>,
+    /// Set points without the learned input.
+    pub reference_m: Vec<Vec<f64>>,
+    /// Learned input as it was applied.
+    pub input: Vec<Vec<f64>>,
+    /// Encoders.
+    pub encoder_m: Vec<Vec<f64>>,
+    /// Tool centre point; zeros without such a measurement.
+    pub tool_m: Vec<Vec<f64>>,
+    /// True for a cycle whose measurement has not come: the last one known stands in for it.
+    pub missing: Vec<bool>,
+}
+
+impl Fault {
+    /// A fault without further fields.
+    pub fn new(kind: FaultKind) -> Self {
+        let cycles = LastCycles::default();
+        Self {
+            kind,
+            axis: None,
+            node: None,
+            code: None,
+            value: None,
+            limit: None,
+            unit: None,
+            cycles,
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Modes of operation in the loop, one a file: target, step of the learned input, begin of a stop.
+//!
+//! For the other files of `servo`, which ask [`of`] and never what mode it is. The cold half, from the unit
+//! of the input to the nominal model, is `config::mode`.
+
+#![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
+
+mod csp;
+mod csv;
+
+use super::gate::{Bounds, Gate};
+use super::phase::Phase;
+use super::spec::AxisSpec;
+use crate::fieldbus::cia402::{CommandRpdo1, Mode, Scale};
+use crate::interpolate::AxisLimits;
+
+/// An axis in a tick.
+pub(super) struct Moment<'a> {
+    pub(super) spec: &'a AxisSpec,
+    pub(super) phase: &'a Phase,
+    /// True if the drive follows its commands.
+    pub(super) enabled: bool,
+    pub(super) encoder_m: f64,
+    pub(super) reference_m: f64,
+    pub(super) reference_m_s: f64,
+    /// Learned input.
+    pub(super) input: f64,
+    /// The last two commands, newest first.
+    pub(super) last: [f64; 2],
+    pub(super) bounds: Bounds,
+}
+
+/// The behaviour of a mode; commands are in its own unit.
+pub(super) trait AxisMode: Sync {
+    /// Largest change of the learned input in a cycle.
+    fn input_step_max(&self, limits: &AxisLimits, dt_s: f64) -> f64;
+
+    /// Command of an axis at rest.
+    fn hold(&self, position_m: f64) -> f64;
+
+    /// Bounded command of a tick; one that is not finite stays so.
+    fn target(&self, now: &Moment<'_>, gate: &mut Gate) -> f64;
+
+    /// Command of a tick without a finite one: on as before. `last` are the last three, newest first.
+    fn extrapolate(&self, last: [f64; 3]) -> f64;
+
+    /// Writes a command into the frame of the drive; what is not a number leaves the last one there.
+    fn write(&self, command: f64, scale: Scale, frame: &mut CommandRpdo1) {
+        if let Some(counts) = scale.to_counts(command) {
+            frame.target_counts = counts;
+        }
+    }
+
+    /// Position that an axis is commanded to.
+    fn position_m(&self, command: f64, reference_m: f64) -> f64;
+
+    /// Velocity and acceleration of the last three commands: a stop begins with them.
+    fn motion(&self, last: [f64; 3], dt_s: f64) -> [f64; 2];
+
+    /// Returns whether the command is computed from the measured position.
+    fn closes_position_loop(&self) -> bool;
+}
+
+/// The behaviour of a mode.
+pub(super) fn of(mode: Mode) -> &'static dyn AxisMode {
+    match mode {
+        Mode::Csp => &csp::Csp,
+        Mode::Csv => &csv::Csv,
+    }
+}

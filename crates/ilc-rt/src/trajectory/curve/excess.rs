@@ -1,0 +1,117 @@
+//! Excesses of a planned run over its limits, tick by tick, and how much slower it has to be for them.
+
+use super::frame::{Frame, norm};
+use super::speed::RunLimits;
+use super::time_law::Tick;
+use crate::interpolate::{AxisLimits, Quantity};
+use crate::trajectory::motion::SampledMotion;
+use crate::trajectory::verify::Verification;
+
+/// What the search asks for, on frames between the places, and the proof, on exact ones; the rest is
+/// for what lies between two ticks.
+pub(super) const SOUGHT: f64 = 1.0 - 2e-3;
+pub(super) const KEPT: f64 = 1.0 - 5e-4;
+
+/// A value beyond its limit, and the factor on the speed that brings it back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Excess {
+    pub(super) slower: f64,
+    pub(super) reached: f64,
+    pub(super) limit: f64,
+    pub(super) axis: usize,
+    pub(super) quantity: Quantity,
+}
+
+/// The worst excess of every tick over its share of the limits.
+pub(super) fn of_ticks(
+    ticks: &[Tick],
+    frames: &[Frame],
+    limits: &RunLimits,
+    kept: f64,
+) -> Vec<Option<Excess>> {
+    let mut before_j = 0.0;
+    let quantities = [Quantity::Velocity, Quantity::Acceleration, Quantity::Jerk];
+    ticks
+        .iter()
+        .zip(frames)
+        .map(|(tick, frame)| {
+            let mut worst: Option<Excess> = None;
+            let mut note = |reached: f64, limit: f64, order: usize, axis: usize| {
+                let ratio = reached / limit;
+                let slower = (kept / ratio).powf(1.0 / (order + 1) as f64);
+                if ratio > kept && worst.is_none_or(|worst| slower < worst.slower) {
+                    let quantity = quantities[order];
+                    worst = Some(Excess { slower, reached, limit, axis, quantity });
+                }
+            };
+            for (axis, limit) in limits.axes.iter().enumerate() {
+                for jerk in [before_j, tick.j] {
+                    let values = frame.axis(axis, tick.v, tick.a, jerk);
+                    for (order, (_, most)) in limit.named().into_iter().enumerate() {
+                        note(values[order].abs(), most, order, axis);
+                    }
+                }
+            }
+            let across = tick.v * tick.v * norm(&frame.bend);
+            note(across, limits.curvature_acceleration_max_m_s2, 1, 0);
+            before_j = tick.j;
+            worst
+        })
+        .collect()
+}
+
+/// The worst excess of the set points at every tick, by their differences.
+pub(super) fn of_set_points(motion: &SampledMotion, limits: &[AxisLimits]) -> Vec<Option<Excess>> {
+    let mut found: Vec<Option<Excess>> = vec![None; motion.n_samples()];
+    let last = motion.n_samples() - 1;
+    let rows = &motion.position_m;
+    Verification::of_motion(rows, limits, motion.dt_s).each_excess(rows, |excess| {
+        let order = match excess.quantity {
+            Quantity::Velocity => 1.0,
+            Quantity::Acceleration => 2.0,
+            Quantity::Jerk => 3.0,
+        };
+        let worst = Excess {
+            slower: (KEPT * excess.limit / excess.reached.abs()).powf(1.0 / order),
+            reached: excess.reached.abs(),
+            limit: excess.limit,
+            axis: excess.axis,
+            quantity: excess.quantity,
+        };
+        let here = &mut found[excess.row.min(last)];
+        if here.is_none_or(|here| worst.slower < here.slower) {
+            *here = Some(worst);
+        }
+        true
+    });
+    found
+}
+
+/// Lowers the speed limit around every tick that is too fast.
+pub(super) fn slow_down(
+    speed: &mut [f64],
+    ticks: &[Tick],
+    found: &[Option<Excess>],
+    step_m: f64,
+    window: usize,
+) {
+    let mut factor = vec![1.0_f64; speed.len()];
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "places on the curve"
+    )]
+    let place = |s_m: f64| ((s_m / step_m).max(0.0) as usize).min(speed.len() - 1);
+    for (k, worst) in found.iter().enumerate() {
+        let Some(worst) = worst else { continue };
+        let from = place(ticks[k.saturating_sub(window)].s);
+        let to = place(ticks[(k + window).min(ticks.len() - 1)].s + step_m);
+        for factor in &mut factor[from..=to] {
+            *factor = factor.min(worst.slower);
+        }
+    }
+    for (speed, factor) in speed.iter_mut().zip(factor) {
+        // A little more than asked for, as a slower place also means a steeper way to it.
+        *speed *= if factor < 1.0 { factor * 0.995 } else { 1.0 };
+    }
+}

@@ -1,0 +1,37 @@
+//! Set points, one row a servo cycle, from the start of the program.
+
+use super::{FileKind, Job, Key, Kind, ProgramError};
+use crate::interpolate::Interpolator;
+use crate::trajectory::motion::set_points;
+use crate::trajectory::program::{TableError, read_table};
+
+/// How far the first row of a table may be from the start.
+const START_M: f64 = 1e-9;
+
+pub(super) const KIND: Kind = Kind {
+    reads: &[Key::File],
+    needs: &[Key::File],
+    file: Some(FileKind { content: "set points", bytes_max: 64 << 20 }),
+    is_plane: false,
+    plan,
+    describe: |program| format!("set points of {}", program.file_name().display()),
+    example: "kind = \"table\"\nstart_m = [0.0, 0.0]\nfeed_m_s = 0.02\nfile = \"example.txt\"\n\
+              dwell_after_s = 1.0",
+    example_file: "x,y\n0.0,0.0\n0.0,0.0\n",
+};
+
+/// Refuses a table that does not begin where the axes rest before a run.
+fn plan(job: &Job) -> Result<Interpolator, ProgramError> {
+    let table = read_table(job.text, job.axis_names)?;
+    let starts = table.position_m.iter().zip(&job.program.start_m);
+    for (name, (&found_m, &start_m)) in job.axis_names.iter().zip(starts) {
+        if (found_m - start_m).abs() > START_M {
+            return Err(ProgramError::Table(TableError {
+                line: table.lines.first().copied().unwrap_or(1),
+                found: format!("axis {name} begins at {found_m}"),
+                allowed: format!("the first row must be [program] start_m, {start_m}"),
+            }));
+        }
+    }
+    job.play(&set_points(&table.position_m, job.limits, job.cycle_s)?)
+}

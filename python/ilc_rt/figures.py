@@ -1,0 +1,68 @@
+"""The figures of a run. Derived from the source of the controller: do not edit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figures:
+    """Figures of one run; lengths in metres, angles in radians.
+
+    A figure over several axes is over the linear ones, or in radians over all of a
+    cell whose axes are all rotary.
+
+    Attributes
+    ----------
+    tracking_inf_m : float
+        Largest absolute tracking error of any axis, in the measurement learned from.
+    tracking_rms_m : float
+        RMS over time of the Euclidean norm of the tracking error.
+    contour_inf_m : float | None
+        Largest distance of the tool from the reference path; absent where the path has
+        no contour.
+    contour_rms_m : float | None
+        RMS of that distance.
+    axes_tracking_inf_m : tuple[float, ...]
+        Largest absolute tracking error of each axis, in its own unit.
+    axes_tracking_rms_m : tuple[float, ...]
+        RMS tracking error of each axis, in its own unit.
+    encoder_tracking_inf_m : float
+        Largest absolute tracking error of any axis at the encoders.
+    tool_tracking_inf_m : float | None
+        Largest absolute tracking error of any axis at the tool; absent without such a
+        measurement.
+    overruns : int
+        Servo cycles that began a whole cycle late or more.
+    missing_samples : int
+        Samples whose measurement never arrived; the last one known stands in for them.
+    late_updates : int
+        Runs so far that repeated the old input because the learning update was late.
+    update_ms : float
+        Time of the learning update that made the input of this run; 0 without one.
+    rolled_back : bool
+        True if the error had grown so far that the best input was restored after this
+        run.
+    learning_off : bool
+        True if nothing was learned from this run and learning is off, as the error had
+        grown.
+    remark : str | None
+        Reason of the decision on the next input, where the law alone did not decide;
+        one sentence.
+    """
+
+    tracking_inf_m: float
+    tracking_rms_m: float
+    contour_inf_m: float | None = None
+    contour_rms_m: float | None = None
+    axes_tracking_inf_m: tuple[float, ...] = ()
+    axes_tracking_rms_m: tuple[float, ...] = ()
+    encoder_tracking_inf_m: float = 0.0
+    tool_tracking_inf_m: float | None = None
+    overruns: int = 0
+    missing_samples: int = 0
+    late_updates: int = 0
+    update_ms: float = 0.0
+    rolled_back: bool = False
+    learning_off: bool = False
+    remark: str | None = None

@@ -1,0 +1,236 @@
+"""The library of all runs, in one SQLite file."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any
+
+from ilc_rt import _native
+
+if TYPE_CHECKING:
+    import builtins
+
+    from numpy.typing import ArrayLike
+    from typing_extensions import Self
+
+
+class Library(_native.Library):
+    """Every run of every campaign, in one SQLite file.
+
+    Parameters
+    ----------
+    path : str or os.PathLike
+        The file; it is made if it is not there. ``:memory:`` is a library in
+        memory. The name is never taken for an address.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be opened or is no library; it is left as it is.
+
+    Notes
+    -----
+    What reads opens the file for reading only, and for no longer than that: a
+    library that cannot be written is read all the same, and nothing is left
+    beside it.
+
+    Examples
+    --------
+    >>> from ilc_rt import Library
+    >>> Library(":memory:").list()
+    []
+    """
+
+    def __new__(cls, path: str | PathLike[str]) -> Self:
+        return super().__new__(cls, path=fspath(path))
+
+    def list(self, cell: str | None = None) -> list[dict[str, Any]]:
+        """Return the runs kept, oldest first, without their arrays.
+
+        Parameters
+        ----------
+        cell : str or None
+            Only runs of the cell of this name.
+
+        Returns
+        -------
+        list of dict
+            Provenance and figures of each run; lengths in metres, angles in radians. A
+            figure over several axes is over the linear ones, or over all of a cell
+            whose axes are all rotary; contour errors are None where the path has none.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        """
+        return super().list(cell)
+
+    def load(self, id: int) -> dict[str, Any]:
+        """Return one run with its arrays.
+
+        Parameters
+        ----------
+        id : int
+            Key of the run, as `list` gives it.
+
+        Returns
+        -------
+        dict
+            What `list` gives, and ``law_parameters`` and ``program`` (JSON),
+            ``reference_m``, ``input``, ``encoder_m``, ``tool_m`` (or None),
+            ``error_m`` of shape (n_samples, n_axes), ``contour_m`` of shape
+            (n_samples,) (None: the path has no contour), ``disturbance`` of shape
+            (n_disturbances,) (None: none is measured).
+
+        Raises
+        ------
+        OSError
+            If there is no such run, or its arrays do not match their digest.
+        """
+        return super().load(id)
+
+    def recall(
+        self, disturbance: ArrayLike, top: int = 30, cell: str | None = None
+    ) -> builtins.list[dict[str, Any]]:
+        """Return the runs made under a disturbance like this one, nearest first.
+
+        Parameters
+        ----------
+        disturbance : float or array_like of float64, shape (n_disturbances,)
+            The disturbance.
+        top : int
+            How many runs at most.
+        cell : str or None
+            Only runs of the cell of this name.
+
+        Returns
+        -------
+        list of dict
+            What `list` gives of each, and ``distance``, in the unit of the
+            disturbance. Of equally near runs the older comes first.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the disturbance is no number, or not finite.
+        OSError
+            If the file cannot be read.
+        """
+        return super().recall(disturbance, top, cell)
+
+    def append(
+        self,
+        u: ArrayLike,
+        e: ArrayLike,
+        cycle_s: float,
+        disturbance: ArrayLike | None = None,
+        reference_m: ArrayLike | None = None,
+        *,
+        cell: str = "elsewhere",
+        campaign: str = "elsewhere",
+        law: str = "elsewhere",
+    ) -> int:
+        """Keep a run that was made elsewhere.
+
+        Parameters
+        ----------
+        u : ndarray of float64, shape (n_samples,) or (n_samples, n_axes)
+            Its learned input, in m or m/s.
+        e : ndarray of float64, same shape as `u`
+            Its error in m, reference minus measurement.
+        cycle_s : float
+            Its sample time in s.
+        disturbance : float, array_like of float64 or None
+            The disturbance it was made under, shape (n_disturbances,).
+        reference_m : ndarray of float64 or None
+            Its set points in m, same shape as `u`; None: zero, so that its path is
+            one point. The contour error is the distance to the path near the same
+            time.
+        cell, campaign, law : str
+            Names; its number follows the last one of the campaign.
+
+        Returns
+        -------
+        int
+            Key of the run.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an array has the wrong shape, dtype or a number that is not finite,
+            cycle_s is not above 0, or a name is empty or has control characters.
+        OSError
+            If the file cannot be written.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from ilc_rt import Library
+        >>> library = Library(":memory:")
+        >>> library.append(np.zeros(3), np.ones(3), cycle_s=0.01, disturbance=21.5)
+        1
+        >>> library.recall(20.0)[0]["distance"]
+        1.5
+        """
+        return super()._append(
+            u=u,
+            e=e,
+            cycle_s=cycle_s,
+            disturbance=disturbance,
+            reference_m=reference_m,
+            cell=cell,
+            campaign=campaign,
+            law=law,
+        )
+
+    def trim(self, keep: int, cell: str | None = None) -> int:
+        """Delete all but the most relevant runs, and return how many were deleted.
+
+        Parameters
+        ----------
+        keep : int
+            How many runs stay.
+        cell : str or None
+            Only among runs of the cell of this name.
+
+        Returns
+        -------
+        int
+            Runs deleted.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written, or the runs have different numbers of
+            disturbances (nothing is deleted then), or the file could not be made
+            smaller.
+
+        Notes
+        -----
+        The relevance of DPW-ILC with RMS error and disturbance in units of their
+        spread over these runs, summed over the disturbances of all of them; without
+        disturbances the smallest errors stay. The file becomes smaller.
+        """
+        return super().trim(keep, cell)
+
+    def export(self, id: int, path: str | PathLike[str]) -> None:
+        """Write one run to a file: ``.npz``, ``.csv`` or ``.json`` by its ending.
+
+        Parameters
+        ----------
+        id : int
+            Key of the run, as `list` gives it.
+        path : str or os.PathLike
+            The file.
+
+        Raises
+        ------
+        BadInputError
+            If the ending is unknown or the file cannot be written.
+        OSError
+            If there is no such run, or its arrays do not match their digest.
+        """
+        # It reads records, and they read libraries.
+        import_module("ilc_rt.export").export_run(self.load(id), path)

@@ -1,0 +1,342 @@
+"""Straight moves: limited in jerk, exponential/sigmoid, and with an oscillation along them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ilc_rt import _native
+from ilc_rt.trajectory.sampled import Trajectory
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+def jerk_limited(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float | ArrayLike,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    setting: str = "complete",
+) -> Trajectory:
+    """Plan straight moves, each axis limited in jerk.
+
+    Seven phases of jerk a move. What happens between moves is one of the two
+    settings of machine tools.
+
+    Parameters
+    ----------
+    points_m : ndarray of float64, shape (n_points,) or (n_points, n_axes)
+        Start and the end of each move, in m.
+    feed_m_s : float or ndarray of float64, shape (n_points - 1,)
+        Speed along each move, in m/s.
+    dt_s : float
+        Sample time in s.
+    velocity_max_m_s : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s.
+    acceleration_max_m_s2 : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s^2.
+    jerk_max_m_s3 : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s^3.
+    setting : str
+        ``"complete"``: every move is completed, an oscillation loses frequency.
+        ``"on_time"``: the next begins on time, an oscillation loses amplitude.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    TrajectoryError
+        If a value is out of its range.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    References
+    ----------
+    [dimarco2016], Chapter 2.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> move = trajectory.jerk_limited(
+    ...     [0.0, 2.0], feed_m_s=1.0, dt_s=0.01,
+    ...     velocity_max_m_s=1.0, acceleration_max_m_s2=2.0, jerk_max_m_s3=8.0)
+    >>> round(float(move.t_s[-1]), 6)
+    2.75
+    """
+    return Trajectory(
+        **_native.jerk_limited(
+            points_m=points_m,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            setting=setting,
+        )
+    )
+
+
+def exponential_sigmoid(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float | ArrayLike,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    amplitude_m: float | ArrayLike | None = None,
+    frequency_hz: float | ArrayLike | None = None,
+    alpha_max: float | dict[str, float] | None = None,
+) -> Trajectory:
+    """Plan an exponential/sigmoid (E/S) move.
+
+    ``x = (m t)(1 - exp(-a t^3)) + A sin(w t)(1 - exp(-a t^2))`` at the start,
+    sigmoids where a line goes on or turns round, the mirror image of a start
+    where it ends. It is on its programmed path, and on time, soon after a start.
+    Each alpha is the largest that honours every limit.
+
+    Parameters
+    ----------
+    points_m : ndarray of float64, shape (n_points,) or (n_points, n_axes)
+        Start and the end of each leg, in m.
+    feed_m_s : float or ndarray of float64, shape (n_points - 1,)
+        Speed of each leg, in m/s; a start overshoots it by 79 %.
+    dt_s : float
+        Sample time in s.
+    velocity_max_m_s : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s.
+    acceleration_max_m_s2 : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s^2.
+    jerk_max_m_s3 : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s^3.
+    amplitude_m : float or ndarray of float64, shape (n_points - 1,)
+        Amplitude of the oscillation along each leg, in m.
+    frequency_hz : float or ndarray of float64, shape (n_points - 1,)
+        Its frequency, in Hz.
+    alpha_max : float or dict of float, optional
+        No alpha above this is used, at every place or by the name of the place:
+        ``"start-up"``, ``"transition"``, ``"end"``. The largest that the limits
+        allow is not the one with the smallest `tracking_index`.
+
+    Returns
+    -------
+    Trajectory
+        With `alphas`.
+
+    Raises
+    ------
+    TrajectoryError
+        If no alpha holds the limits, or a value is out of its range.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    Notes
+    -----
+    A start has to be over before its leg is: ``a T^3`` of at least 45, so that
+    its acceleration reaches about ``11 v / T`` in a leg of T seconds.
+
+    References
+    ----------
+    [dimarco2016], Section 2.1, 2.3.3.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> move = trajectory.exponential_sigmoid(
+    ...     [0.0, 0.2, 0.0], feed_m_s=0.1, dt_s=0.001,
+    ...     velocity_max_m_s=0.5, acceleration_max_m_s2=5.0, jerk_max_m_s3=200.0)
+    >>> " ".join(place for _, place, _, _ in move.alphas)
+    'start-up transition end'
+    """
+    return Trajectory(
+        **_native.exponential_sigmoid(
+            points_m=points_m,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            amplitude_m=amplitude_m,
+            frequency_hz=frequency_hz,
+            alpha_max=alpha_max,
+        )
+    )
+
+
+def modulated(
+    points_m: ArrayLike,
+    *,
+    feed_m_s: float,
+    amplitude_m: float,
+    frequency_hz: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    interpolation: str = "exponential_sigmoid",
+) -> Trajectory:
+    """Plan a modulated tool path: a feed with an oscillation along it.
+
+    ``x = v t + A sin(w t)``, as a ramped sinusoid by the E/S interpolator, or as
+    the six-point sine that a numerical controller gets, by the jerk-limited
+    linear one.
+
+    Parameters
+    ----------
+    points_m : ndarray of float64, shape (2,) or (2, n_axes)
+        Start and end, in m.
+    feed_m_s : float
+        Speed of the line, in m/s.
+    amplitude_m : float
+        Amplitude, in m.
+    frequency_hz : float
+        Frequency, in Hz.
+    dt_s : float
+        Sample time in s.
+    velocity_max_m_s : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s.
+    acceleration_max_m_s2 : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s^2.
+    jerk_max_m_s3 : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s^3.
+    interpolation : str
+        ``"exponential_sigmoid"``, or ``"complete"`` or ``"on_time"`` for the
+        six-point sine in one of the two settings.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    TrajectoryError
+        If no alpha holds the limits, or a value is out of its range.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    References
+    ----------
+    [dimarco2016], Chapters 1 and 2.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> path = trajectory.modulated(
+    ...     [0.0, 0.1], feed_m_s=0.02, amplitude_m=0.001, frequency_hz=2.0, dt_s=0.001,
+    ...     velocity_max_m_s=0.5, acceleration_max_m_s2=5.0, jerk_max_m_s3=200.0)
+    >>> round(float(path.t_s[-1]), 6)
+    5.0
+    """
+    return Trajectory(
+        **_native.modulated(
+            points_m=points_m,
+            feed_m_s=feed_m_s,
+            amplitude_m=amplitude_m,
+            frequency_hz=frequency_hz,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            interpolation=interpolation,
+        )
+    )
+
+
+def sigmoid_pair(
+    *,
+    velocity_m_s: ArrayLike,
+    amplitude_m: ArrayLike,
+    omega_rad_s: ArrayLike,
+    phase_zero_s: ArrayLike,
+    corner_s: float,
+    duration_s: float,
+    start_alpha: float,
+    transition_alpha: float,
+    sine_alpha: float,
+    sine_offset_s: float,
+    dt_s: float,
+) -> Trajectory:
+    """Sample two legs on one axis, joined by sigmoids, every alpha given.
+
+    ``x = (x1 a/(a + exp(s c)) + x2 b/(b + exp(-s c))) (1 - exp(-a0 t^2))``
+
+    with c the time from the corner, ``a = |v2/v1|``, ``b = 1/a``, and
+    oscillations on x1 and x2 that fade before the corner and after it.
+
+    Parameters
+    ----------
+    velocity_m_s : array_like of float64, shape (2,)
+        Velocity of each leg, signed, in m/s.
+    amplitude_m : array_like of float64, shape (2,)
+        Amplitude of each oscillation, in m.
+    omega_rad_s : array_like of float64, shape (2,)
+        Its angular frequency, in rad/s.
+    phase_zero_s : array_like of float64, shape (2,)
+        Time at which its phase is 0, in s.
+    corner_s : float
+        When the first leg gives way to the second, in s.
+    duration_s : float
+        Length of the motion, in s; it does not come to rest.
+    start_alpha : float
+        Of the start, a0 in 1/s^2.
+    transition_alpha : float
+        Of the sigmoids between the legs, s in 1/s.
+    sine_alpha : float
+        Of the sigmoids that fade the oscillations, in 1/s.
+    sine_offset_s : float
+        How far from the corner these are half open, in s.
+    dt_s : float
+        Sample time in s.
+
+    Returns
+    -------
+    Trajectory
+        `programmed_m` is without start and transition.
+
+    Raises
+    ------
+    TrajectoryError
+        If a velocity is 0, an alpha or a time is not above 0, or a number is not
+        finite.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    Notes
+    -----
+    No limit is held: it is the thesis's own program, to compare with and to
+    make its reference again. `exponential_sigmoid` plans for a machine.
+
+    References
+    ----------
+    [dimarco2016], Appendix A.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> path = trajectory.sigmoid_pair(
+    ...     velocity_m_s=[10.0, -5.0], amplitude_m=[2.0, 1.0], omega_rad_s=[10.0, 20.0],
+    ...     phase_zero_s=[0.0, 6.01], corner_s=6.0, duration_s=14.0, start_alpha=5.0,
+    ...     transition_alpha=2.0, sine_alpha=3.0, sine_offset_s=1.0, dt_s=0.01)
+    >>> path.n_samples
+    1401
+    """
+    return Trajectory(
+        **_native.sigmoid_pair(
+            velocity_m_s=velocity_m_s,
+            amplitude_m=amplitude_m,
+            omega_rad_s=omega_rad_s,
+            phase_zero_s=phase_zero_s,
+            corner_s=corner_s,
+            duration_s=duration_s,
+            start_alpha=start_alpha,
+            transition_alpha=transition_alpha,
+            sine_alpha=sine_alpha,
+            sine_offset_s=sine_offset_s,
+            dt_s=dt_s,
+        )
+    )

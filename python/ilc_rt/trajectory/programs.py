@@ -1,0 +1,173 @@
+"""Programs of lines and arcs: rasters and part programs in G-code."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ilc_rt import _native
+from ilc_rt.trajectory.sampled import Trajectory
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+def raster(
+    *,
+    width_m: float,
+    pitch_m: float,
+    rows: int,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    start_m: tuple[float, float] = (0.0, 0.0),
+    there_and_back: bool = False,
+    setting: str = "complete",
+) -> Trajectory:
+    """Plan a raster: rows to and fro, and back if asked for.
+
+    Parameters
+    ----------
+    width_m : float
+        Length of a row along the first axis, in m.
+    pitch_m : float
+        Distance of the rows along the second axis, in m.
+    rows : int
+        Number of rows.
+    feed_m_s : float
+        Speed, in m/s.
+    dt_s : float
+        Sample time in s.
+    velocity_max_m_s : float or ndarray of float64, shape (2,)
+        Limit of each axis, in m/s.
+    acceleration_max_m_s2 : float or ndarray of float64, shape (2,)
+        Limit of each axis, in m/s^2.
+    jerk_max_m_s3 : float or ndarray of float64, shape (2,)
+        Limit of each axis, in m/s^3.
+    start_m : (float, float)
+        First corner, in m.
+    there_and_back : bool
+        True to go the same way back to the start.
+    setting : str
+        ``"complete"`` or ``"on_time"``, as in `jerk_limited`.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    TrajectoryError
+        If a value is out of its range.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    References
+    ----------
+    [barton2010], Section 8.1.2.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> path = trajectory.raster(
+    ...     width_m=0.02, pitch_m=0.005, rows=3, feed_m_s=0.05, dt_s=0.002,
+    ...     velocity_max_m_s=0.5, acceleration_max_m_s2=2.0, jerk_max_m_s3=100.0)
+    >>> path.position_m[-1].tolist()
+    [0.02, 0.01]
+    """
+    return Trajectory(
+        **_native.raster(
+            width_m=width_m,
+            pitch_m=pitch_m,
+            rows=rows,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            start_m=start_m,
+            there_and_back=there_and_back,
+            setting=setting,
+        )
+    )
+
+
+def gcode(
+    text: str | bytes,
+    *,
+    start_m: ArrayLike,
+    feed_m_s: float,
+    dt_s: float,
+    velocity_max_m_s: float | ArrayLike,
+    acceleration_max_m_s2: float | ArrayLike,
+    jerk_max_m_s3: float | ArrayLike,
+    rapid_m_s: float | None = None,
+    blend_s: float | None = None,
+    block_delete: bool = False,
+) -> Trajectory:
+    r"""Plan a part program in G-code.
+
+    G0 to G4, G17, G20, G21, G80, G90, G91, M2, M30; arcs by I and J, or R;
+    comments; words that ask for what is so anyway. The words mean what they
+    mean to LinuxCNC, or are refused.
+
+    Parameters
+    ----------
+    text : str or bytes
+        The program; bytes may have any encoding that continues ASCII.
+    start_m : ndarray of float64, shape (n_axes,)
+        Where it begins, in m.
+    feed_m_s : float
+        Speed until the first F, and of G0 unless `rapid_m_s` is given, in m/s.
+    dt_s : float
+        Sample time in s.
+    velocity_max_m_s : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s.
+    acceleration_max_m_s2 : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s^2.
+    jerk_max_m_s3 : float or ndarray of float64, shape (n_axes,)
+        Limit of each axis, in m/s^3.
+    rapid_m_s : float, optional
+        Speed of G0, in m/s.
+    blend_s : float, optional
+        Window that rounds the corners, in s; without it every move is at rest
+        at its end.
+    block_delete : bool
+        True to leave out blocks that begin with /.
+
+    Returns
+    -------
+    Trajectory
+        Its acceleration is the central difference of its velocity.
+
+    Raises
+    ------
+    TrajectoryError
+        If a word is not understood, with its line, or a limit would be broken.
+    ValueError, TypeError
+        If an array has the wrong shape, dtype or a number that is not finite.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> path = trajectory.gcode(
+    ...     "G1 X10 F3000\nG3 X0 Y10 I-10 J0", start_m=[0.0, 0.0], feed_m_s=0.05, dt_s=0.002,
+    ...     velocity_max_m_s=0.5, acceleration_max_m_s2=2.0, jerk_max_m_s3=100.0)
+    >>> path.position_m[-1].tolist()
+    [0.0, 0.01]
+    """
+    return Trajectory(
+        **_native.gcode(
+            text=text,
+            start_m=start_m,
+            feed_m_s=feed_m_s,
+            dt_s=dt_s,
+            velocity_max_m_s=velocity_max_m_s,
+            acceleration_max_m_s2=acceleration_max_m_s2,
+            jerk_max_m_s3=jerk_max_m_s3,
+            rapid_m_s=rapid_m_s,
+            blend_s=blend_s,
+            block_delete=block_delete,
+        )
+    )

@@ -1,0 +1,121 @@
+"""Sampled motions: `Trajectory`, and how well one follows its program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ilc_rt import _native
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Trajectory:
+    """A planned motion, sampled.
+
+    The first and the last sample are at rest, but for `sigmoid_pair`.
+
+    Attributes
+    ----------
+    dt_s : float
+        Sample time in s.
+    position_m, velocity_m_s, acceleration_m_s2 : ndarray of float64, shape (n_samples, n_axes)
+        Motion in m, m/s and m/s^2.
+    programmed_m : ndarray of float64, shape (n_samples, n_axes)
+        Positions in m at the same times without acceleration limits.
+    alphas : list of tuple
+        Of an exponential/sigmoid motion: segment, place, the alpha chosen, and the
+        intervals of alpha that hold the limits.
+    computing_s : float
+        Time that planning took, in s.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> move = trajectory.jerk_limited(
+    ...     [[0.0], [0.1]], feed_m_s=0.2, dt_s=0.001,
+    ...     velocity_max_m_s=0.5, acceleration_max_m_s2=2.0, jerk_max_m_s3=50.0)
+    >>> float(move.position_m[-1, 0])
+    0.1
+    """
+
+    dt_s: float
+    position_m: NDArray[np.float64]
+    velocity_m_s: NDArray[np.float64]
+    acceleration_m_s2: NDArray[np.float64]
+    programmed_m: NDArray[np.float64]
+    alphas: list[tuple[int, str, float, list[tuple[float, float]]]]
+    computing_s: float
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return len(self.position_m)
+
+    @property
+    def n_axes(self) -> int:
+        """Number of axes."""
+        return int(self.position_m.shape[1])
+
+    @property
+    def t_s(self) -> NDArray[np.float64]:
+        """Times of the samples in s, shape (n_samples,)."""
+        return np.arange(self.n_samples, dtype=np.float64) * self.dt_s
+
+    def __repr__(self) -> str:
+        """Return the size and the sample time."""
+        return f"Trajectory(n_samples={self.n_samples}, n_axes={self.n_axes}, dt_s={self.dt_s})"
+
+
+def tracking_index(
+    trajectory: Trajectory, k_e: float = 600.0, k_a: float = 1.0
+) -> tuple[float, float]:
+    """Return the two parts of the index J of an interpolated motion.
+
+    ``J = integral of k_e (y_des - y)^2 + k_a y''^2``, by the trapezoidal rule.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion; `programmed_m` is what it is compared with.
+    k_e : float
+        Weight of the tracking error.
+    k_a : float
+        Weight of the acceleration.
+
+    Returns
+    -------
+    (float, float)
+        The parts of tracking and of acceleration; their sum is J.
+
+    Raises
+    ------
+    TrajectoryError
+        If a weight is below 0 or not finite.
+
+    References
+    ----------
+    [dimarco2016], Eq. 2.19.
+
+    Examples
+    --------
+    >>> from ilc_rt import trajectory
+    >>> move = trajectory.jerk_limited(
+    ...     [0.0, 0.1], feed_m_s=0.1, dt_s=0.001,
+    ...     velocity_max_m_s=0.5, acceleration_max_m_s2=2.0, jerk_max_m_s3=50.0)
+    >>> tracking, acceleration = trajectory.tracking_index(move)
+    >>> tracking > 0.0 and acceleration > 0.0
+    True
+    """
+    return _native.tracking_index(
+        dt_s=trajectory.dt_s,
+        position_m=trajectory.position_m,
+        acceleration_m_s2=trajectory.acceleration_m_s2,
+        programmed_m=trajectory.programmed_m,
+        k_e=k_e,
+        k_a=k_a,
+    )

@@ -1,0 +1,101 @@
+//! Targets of a simulated drive: taken over at SYNC as its mode says, and watched.
+
+use ilc_rt::fieldbus::Frame;
+use ilc_rt::fieldbus::canopen::emcy;
+use ilc_rt::fieldbus::cia402::{Mode, State};
+
+use super::drive::DriveNode;
+use super::drive_objects::rounded;
+
+/// The following-error monitor is off at this window.
+const WINDOW_OFF: i64 = 0xFFFF_FFFF;
+
+impl DriveNode {
+    pub(super) fn forget_targets(&mut self) {
+        let dictionary = self.communication.dictionary_mut();
+        dictionary.take_written(self.slots.target_position);
+        dictionary.take_written(self.slots.target_velocity);
+    }
+
+    /// Takes over the target of the active mode at SYNC.
+    pub(super) fn take_target(&mut self) {
+        if self.state() != State::OperationEnabled || self.is_halted {
+            self.forget_targets();
+            return;
+        }
+        let dictionary = self.communication.dictionary_mut();
+        let has_position = dictionary.take_written(self.slots.target_position);
+        let has_velocity = dictionary.take_written(self.slots.target_velocity);
+        match self.mode() {
+            Some(Mode::Csp) => self.take_position(has_position),
+            Some(Mode::Csv) => self.take_velocity(has_velocity),
+            None => {}
+        }
+    }
+
+    fn take_position(&mut self, is_new: bool) {
+        if is_new {
+            let counts =
+                self.number(self.slots.target_position) + self.number(self.slots.position_offset);
+            self.motion.position_target(self.units.place_m(counts), self.period_s());
+        } else if self.communication.has_deadline() {
+            // Without a promised deadline a target is there to stay, as when it is set by SDO.
+            self.motion.extrapolate_once(self.period_s());
+        }
+    }
+
+    fn take_velocity(&mut self, is_new: bool) {
+        if is_new {
+            let velocity_m_s = self.units.velocity_m_s(self.number(self.slots.target_velocity))
+                + self.units.velocity_m_s(self.number(self.slots.velocity_offset));
+            self.motion.velocity_target(velocity_m_s);
+        }
+    }
+
+    /// Shows the mode that is active; a change under power begins with a hold.
+    pub(super) fn show_mode(&mut self) {
+        let dictionary = self.communication.dictionary_mut();
+        if !dictionary.take_written(self.slots.mode) {
+            return;
+        }
+        let (wanted, shown) =
+            (dictionary.number(self.slots.mode), dictionary.number(self.slots.mode_display));
+        dictionary.set(self.slots.mode_display, wanted);
+        if wanted != shown && self.state() == State::OperationEnabled {
+            self.motion.hold(self.measured.position_m);
+        }
+    }
+
+    pub(super) fn watch_following_error(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) {
+        let window = self.number(self.slots.error_window);
+        let watched = self.state() == State::OperationEnabled
+            && self.mode() == Some(Mode::Csp)
+            && window != WINDOW_OFF;
+        if !watched || rounded(self.following_error_counts()).abs() <= window {
+            self.astray_us = 0;
+            return;
+        }
+        self.astray_us += u64::from(step_us);
+        let patience_us = u64::try_from(self.number(self.slots.error_time_ms)).unwrap_or(0) * 1000;
+        if self.astray_us > patience_us {
+            self.has_following_error = true;
+            self.communication.emergency(emcy::CODE_FOLLOWING_ERROR, out);
+            self.fault(emcy::CODE_FOLLOWING_ERROR);
+        }
+    }
+
+    /// Demand before limits minus actual position; 0 where position is not controlled.
+    pub(super) fn following_error_counts(&self) -> f64 {
+        let demand_m = self.motion.demand_m().unwrap_or(self.measured.position_m);
+        self.units.distance(demand_m - self.measured.position_m)
+    }
+
+    pub(super) fn mode(&self) -> Option<Mode> {
+        i8::try_from(self.number(self.slots.mode_display)).ok().and_then(Mode::from_code)
+    }
+
+    pub(super) fn period_s(&self) -> f64 {
+        let exponent = i32::try_from(self.number(self.slots.period_exponent)).unwrap_or(-3);
+        self.number(self.slots.period) as f64 * 10.0_f64.powi(exponent)
+    }
+}

@@ -1,0 +1,96 @@
+"""Names and defaults of the Python classes agree with the schema of the cell description."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import subprocess
+from typing import Any
+
+import pytest
+
+from ilc_rt import laws
+from ilc_rt.processes import find_program
+
+# The class for each table of `[learning]` that describes a law, or what goes round one.
+CLASSES = {
+    "adjoint": laws.AdjointIlc,
+    "constrained": laws.ConstrainedIlc,
+    "dynamic": laws.NormOptimalIlc.dynamic,
+    "error_feedforward": laws.ErrorFeedforwardIlc,
+    "flexible": laws.FlexibleIlc,
+    "formation": laws.NormOptimalIlc.formation,
+    "gate": laws.Gate,
+    "ladder": laws.Ladder,
+    "model_inverse": laws.ModelInverseIlc,
+    "norm_optimal": laws.NormOptimalIlc,
+    "pd": laws.PdIlc,
+    "relevance": laws.RelevanceWeights,
+    "through_jacobian": laws.ThroughJacobian,
+}
+# What a cell says otherwise: its own filter in place of an object, quantities with the unit of
+# the axis, laws by name.
+OTHER_IN_A_CELL = {
+    "adjoint": {"order", "cutoff_hz"},
+    "constrained": {
+        "change_max_m", "change_max_m_s", "step_max_m", "step_max_m_s", "input_max_m",
+        "input_max_m_s", "position_min_m", "position_max_m", "velocity_max_m_s",
+        "acceleration_max_m_s2", "output_min_m", "output_max_m",
+    },
+    "dynamic": {"order", "cutoff_hz"},
+    "error_feedforward": {"order", "cutoff_hz"},
+    "flexible": {"core"},
+    "formation": {"agents", "formation"},
+    "gate": {"tolerance_m"},
+    "model_inverse": {"order", "cutoff_hz"},
+    "norm_optimal": {"contour", "phase", "smoothing_hz"},
+    "pd": {"order", "cutoff_hz"},
+    "relevance": {"core", "top"},
+    "through_jacobian": {"core"},
+}  # fmt: skip
+# A number of Python that a cell leaves out to mean the same.
+NOTHING = {("dynamic", "plain"), ("relevance", "disturbance")}
+
+
+def tables() -> dict[str, Any]:
+    """Return the tables of ``[learning]`` in the schema that the controller prints."""
+    command = [str(find_program("ilc-rt")), "schema"]
+    whole = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+
+    def resolved(part: dict[str, Any]) -> dict[str, Any]:
+        while True:
+            if "$ref" in part:
+                part = whole["$defs"][part["$ref"].rsplit("/", 1)[-1]]
+            elif "anyOf" in part:
+                part = next(one for one in part["anyOf"] if one.get("type") != "null")
+            elif len(part.get("allOf", [])) == 1:
+                part = part["allOf"][0]
+            else:
+                return part
+
+    learning = resolved(whole["properties"]["learning"])["properties"]
+    found = {name: resolved(part) for name, part in learning.items()}
+    return {name: part["properties"] for name, part in found.items() if "properties" in part}
+
+
+TABLES = tables()
+
+
+def test_every_table_of_learning_has_a_class() -> None:
+    assert set(TABLES) == set(CLASSES)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_the_defaults_are_those_of_the_cell_description(name: str) -> None:
+    parameters = inspect.signature(CLASSES[name]).parameters
+    other = OTHER_IN_A_CELL.get(name, set())
+    assert not other - set(TABLES[name]), "not in the schema"
+    compared = set(TABLES[name]) - other
+    assert not compared - set(parameters), "not in Python"
+    for key in compared:
+        given = parameters[key].default
+        if (name, key) in NOTHING and given is None:
+            continue
+        wanted = TABLES[name][key].get("default")
+        given = None if given is inspect.Parameter.empty else given
+        assert given == wanted, key
