@@ -133,7 +133,7 @@ pub struct Limits {
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub velocity_max_m_s: f64,
     /// Highest acceleration, also of a controlled stop.
-    #[schemars(range(min = 0.0001, max = 10000.0))]
+    #[schemars(range(min = 0.0001, max = 1e4))]
     pub acceleration_max_m_s2: f64,
     /// Highest jerk.
     #[schemars(range(min = 0.001, max = 1e7))]
@@ -155,7 +155,7 @@ pub struct AxisModel {
     #[schemars(range(min = 0.05, max = 5.0))]
     pub damping: Option<f64>,
     /// Bandwidth of the drive's velocity loop, first order; csv only.
-    #[schemars(range(min = 0.1, max = 10000.0))]
+    #[schemars(range(min = 0.1, max = 1e4))]
     pub velocity_bandwidth_hz: Option<f64>,
     /// Servo cycles from a command to its first effect, beyond the one of the sampler. A drive that
     /// interpolates its set points adds one; a little more makes up for lags that the model leaves out.

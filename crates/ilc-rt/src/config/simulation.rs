@@ -58,7 +58,7 @@ pub struct AxisSimulation {
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub stribeck_m_s: f64,
     /// Part of the mass that swings as the mode; 0 for none.
-    #[schemars(range(min = 0.0, max = 90000.0))]
+    #[schemars(range(min = 0.0, max = 9e4))]
     pub mode_mass_kg: f64,
     /// Natural frequency of the mode.
     #[schemars(range(min = 0.1, max = 1000.0))]

@@ -31,7 +31,7 @@ pub struct Program {
     #[serde(default)]
     pub block_delete: bool,
     /// Highest acceleration across a smooth curve; the axes' own limits if it is not given.
-    #[schemars(range(min = 1e-6, max = 10000.0))]
+    #[schemars(range(min = 1e-6, max = 1e4))]
     pub curvature_acceleration_max_m_s2: Option<f64>,
     /// `[program.butterfly]`
     pub butterfly: Option<ButterflySection>,
