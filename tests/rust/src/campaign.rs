@@ -30,8 +30,12 @@ pub fn in_process(cell: &Cell) -> Box<dyn Bus> {
 }
 
 /// Options of a campaign in lock-step, without telemetry.
+///
+/// # Panics
+/// If the options are not those of `ilc-rt run`.
 pub fn options(library: PathBuf, iterations: u32) -> Options {
-    let mut options: Options = parse(&["--lockstep".into(), "--no-telemetry".into()]).unwrap();
+    let mut options: Options =
+        parse(&["--lockstep".into(), "--no-telemetry".into()]).expect("options of ilc-rt run");
     (options.iterations, options.session.library) = (iterations, library);
     options
 }

@@ -42,7 +42,7 @@ fn wrapped(text: &str, indent: &str) -> String {
     for word in text.split_whitespace() {
         if line.len() + 1 + word.chars().count() > WIDTH && line != indent {
             let _ = writeln!(lines, "{line}");
-            line = indent.to_owned();
+            indent.clone_into(&mut line);
         }
         if line != indent {
             line.push(' ');

@@ -20,4 +20,6 @@ pub mod q_filter;
 pub mod relevance;
 pub mod through_jacobian;
 
-pub use context::{BuildError, Example, Json, LawAxis, LawCell, LawContext, LawParameters, LawTables};
+pub use context::{
+    BuildError, Example, Json, LawAxis, LawCell, LawContext, LawParameters, LawTables,
+};
