@@ -3,7 +3,8 @@
 //! Whoever starts a cell reads it through [`Cell::load`]: design, the binary, the simulator
 //! and Python. It knows the numbers and their ranges, and nothing of how they are used.
 //!
-//! Family: `cell` and `validate` call each other, as a cell is checked where it is loaded.
+//! Family: `cell`, `mode` and `validate`: a cell is checked where it is loaded, by what the mode of each axis
+//! demands.
 
 mod cell;
 mod error;

@@ -16,7 +16,7 @@ pub enum TrajectoryError {
     },
     /// A point has too few or too many coordinates.
     Coordinates {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// Number of coordinates given.
         found: usize,
@@ -25,26 +25,26 @@ pub enum TrajectoryError {
     },
     /// A feed is not a positive number.
     Feed {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// The value given.
         feed: f64,
     },
     /// A segment ends where it starts.
     ZeroLength {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
     },
     /// An arc is not in the plane of two of the axes.
     Plane {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// The two axes, from 0.
         plane: [usize; 2],
     },
     /// The ends of an arc are not equally far from its centre.
     Arc {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// Distance of the start.
         from_radius: f64,
@@ -53,52 +53,52 @@ pub enum TrajectoryError {
     },
     /// An arc where only lines can be.
     NotStraight {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
     },
     /// The amplitude of an oscillation is negative, or not finite.
     Amplitude {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// The value given.
         amplitude: f64,
     },
     /// The frequency of an oscillation is not a positive number.
     Frequency {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// The value given.
         frequency_hz: f64,
     },
     /// A row of set points that is too far from those before it.
     Row {
-        /// Which row; those after the last one are the rest at the end.
+        /// Index of the row; those after the last one are the rest at the end.
         row: usize,
-        /// Which axis.
+        /// Index of the axis.
         axis: usize,
-        /// Which limit.
+        /// The limit concerned.
         quantity: Quantity,
-        /// What is reached there.
+        /// The value reached.
         reached: f64,
         /// The limit.
         limit: f64,
     },
     /// A set point of a planned path that is too far from those before it.
     SetPoint {
-        /// When, from the first set point.
+        /// Time from the first set point.
         at_s: f64,
-        /// Which axis.
+        /// Index of the axis.
         axis: usize,
-        /// Which limit.
+        /// The limit concerned.
         quantity: Quantity,
-        /// What is reached there.
+        /// The value reached.
         reached: f64,
         /// The limit.
         limit: f64,
     },
     /// No α holds the limits.
     Alpha {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// `start-up`, `transition` or `end`.
         place: &'static str,
@@ -106,25 +106,25 @@ pub enum TrajectoryError {
         alpha: f64,
         /// The limit that it breaks most.
         quantity: Quantity,
-        /// What is reached there.
+        /// The value reached.
         reached: f64,
         /// The limit along the path.
         limit: f64,
     },
     /// The programmed oscillation breaks a limit, whatever its start.
     Programmed {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// The limit that it breaks.
         quantity: Quantity,
-        /// What is reached.
+        /// The value reached.
         reached: f64,
         /// The limit along the path.
         limit: f64,
     },
     /// The largest α wanted is so small that an end is not over within its leg.
     AlphaMax {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
         /// `start-up`, `transition` or `end`.
         place: &'static str,
@@ -135,11 +135,11 @@ pub enum TrajectoryError {
     },
     /// A leg is over before its ends can be.
     Hurried {
-        /// Which segment.
+        /// Index of the segment.
         segment: usize,
-        /// How long it lasts.
+        /// Its duration.
         lasts_s: f64,
-        /// What both ends need.
+        /// The duration that both ends need.
         needs_s: f64,
     },
     /// A parameter of a shape is not usable.
@@ -148,7 +148,7 @@ pub enum TrajectoryError {
         name: &'static str,
         /// The value given.
         value: f64,
-        /// What is allowed.
+        /// The values allowed.
         allowed: &'static str,
     },
     /// A curve has a point at which its direction is not defined.
@@ -158,13 +158,13 @@ pub enum TrajectoryError {
     },
     /// No speed was found at which a curve holds the limits.
     Unproven {
-        /// Which axis.
+        /// Index of the axis.
         axis: usize,
         /// Where, along the curve.
         at: f64,
-        /// Which limit.
+        /// The limit concerned.
         quantity: Quantity,
-        /// What is reached there.
+        /// The value reached.
         reached: f64,
         /// The limit.
         limit: f64,
@@ -186,7 +186,7 @@ pub enum TrajectoryError {
     },
     /// The run has more samples than a plan may hold.
     TooLong {
-        /// How long it would last.
+        /// Its duration.
         duration_s: f64,
         /// Samples it would have.
         n_samples: f64,
@@ -195,9 +195,9 @@ pub enum TrajectoryError {
     },
     /// A blended path would break a limit of an axis.
     Exceeds {
-        /// Which axis.
+        /// Index of the axis.
         axis: usize,
-        /// Which limit.
+        /// The limit concerned.
         quantity: Quantity,
         /// Largest value that the set points reach.
         reached: f64,

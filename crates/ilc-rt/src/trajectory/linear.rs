@@ -14,16 +14,16 @@ mod to_rest;
 
 use self::to_rest::{AxisState, ToRest};
 
-/// When the next move begins.
+/// Start of the next move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinearSetting {
-    /// When the one before it is complete: amplitude is kept, frequency falls.
+    /// At the end of the one before it: amplitude is kept, frequency falls.
     CompleteEveryMove,
     /// At the time that the program has for it: frequency is kept, amplitude falls.
     StartOnTime,
 }
 
-/// How a move is carried out.
+/// Execution of a move.
 #[derive(Clone, Debug)]
 #[expect(
     clippy::large_enum_variant,
@@ -119,7 +119,7 @@ impl Linear {
         })
     }
 
-    /// How long until everything rests.
+    /// Duration until every axis rests.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
@@ -146,7 +146,7 @@ impl Linear {
         found
     }
 
-    /// Where the program is at a time, with no limits.
+    /// Position of the program at a time, without limits.
     pub fn programmed_m(&self, t_s: f64) -> [f64; MAX_AXES] {
         let at = self.lines.partition_point(|(_, start_s)| *start_s <= t_s).max(1) - 1;
         let Some((line, start_s)) = self.lines.get(at) else { return [0.0; MAX_AXES] };
@@ -156,7 +156,7 @@ impl Linear {
         line.point_m(share * line.length_m)
     }
 
-    /// When the program would be over if there were no limits.
+    /// Duration of the program without limits.
     pub fn nominal_s(&self) -> f64 {
         self.nominal_s
     }

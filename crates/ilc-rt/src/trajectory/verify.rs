@@ -44,7 +44,7 @@ impl Differences {
     }
 }
 
-/// What differences of rounded positions carry of their own, for velocity (0) to jerk (2).
+/// Noise in the differences of rounded positions, for velocity (0) to jerk (2).
 pub(super) fn rounding_noise(farthest_m: f64, order: usize, dt_s: f64) -> f64 {
     let power = i32::try_from(order).unwrap_or(2) + 1;
     8.0 * f64::EPSILON * (2.0 + farthest_m) / dt_s.powi(power)

@@ -88,17 +88,6 @@ impl Formation {
         (1..n_agents).flat_map(|gap| (0..n_agents - gap).map(move |i| (i, i + gap))).collect()
     }
 
-    /// Replaces the formation errors by any linear map of all errors.
-    ///
-    /// # Errors
-    /// - [`LearningError::Weight`] unless the map has one column for each axis of each agent and
-    ///   finite entries.
-    pub fn with_shape(mut self, shape: DMatrix<f64>) -> Result<Self, LearningError> {
-        check_map("shape", &shape, self.n_channels())?;
-        self.shape = shape;
-        Ok(self)
-    }
-
     /// Replaces the centre (by default the mean) by any linear map of all errors to those of one
     /// agent.
     ///
@@ -279,7 +268,7 @@ mod tests {
         assert!(Formation::new(0, 2).unwrap_err().to_string().contains("n_agents"));
         assert!(Formation::new(2, 0).unwrap_err().to_string().contains("n_axes"));
         let good = Formation::new(2, 2).unwrap();
-        let narrow = good.clone().with_shape(DMatrix::zeros(1, 3)).unwrap_err();
+        let narrow = good.clone().with_centre(DMatrix::zeros(2, 3)).unwrap_err();
         assert!(narrow.to_string().contains("3 columns"));
         let flat = good.clone().with_centre(DMatrix::zeros(1, 4)).unwrap_err();
         assert!(flat.to_string().contains("1 rows"));

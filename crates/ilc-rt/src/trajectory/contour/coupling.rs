@@ -1,4 +1,4 @@
-//! Which way is along a path and which across: tangents and coupling gains from the reference.
+//! Directions along and across a path: tangents and coupling gains from the reference.
 
 use super::tangent::path_tangents;
 

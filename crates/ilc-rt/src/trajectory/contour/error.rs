@@ -1,8 +1,8 @@
-//! What is no path and no arc.
+//! Refusals of paths and arcs.
 
 use thiserror::Error;
 
-/// Why a path or an arc was refused.
+/// A refused path or arc.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum ContourError {
     /// There is no sample.
@@ -11,9 +11,9 @@ pub enum ContourError {
     /// A coordinate is not a number.
     #[error("sample {sample}, axis {}: {value}; only finite values are allowed", axis + 1)]
     NotFinite {
-        /// Which sample.
+        /// The sample.
         sample: usize,
-        /// Which axis.
+        /// The axis.
         axis: usize,
         /// The value given.
         value: f64,

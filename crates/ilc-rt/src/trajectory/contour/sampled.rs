@@ -4,10 +4,10 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 use super::ContourError;
 
-/// Where a path is nearest to a point.
+/// The place of a path that is nearest to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest<const N: usize> {
-    /// How far away.
+    /// Distance.
     pub distance_m: f64,
     /// The nearest point of the path.
     pub foot_m: [f64; N],

@@ -5,9 +5,9 @@ use super::ContourError;
 /// A straight piece of a contour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// Where it begins.
+    /// Start.
     pub from_m: [f64; 3],
-    /// Where it ends.
+    /// End.
     pub to_m: [f64; 3],
 }
 

@@ -7,8 +7,8 @@ use crate::interpolate::{AxisLimits, Quantity};
 use crate::trajectory::motion::SampledMotion;
 use crate::trajectory::verify::Verification;
 
-/// What the search asks for, on frames between the places, and the proof, on exact ones; the rest is
-/// for what lies between two ticks.
+/// Shares of the limits for the search, on frames between the places, and for the proof, on exact ones;
+/// the rest is for what lies between two ticks.
 pub(super) const SOUGHT: f64 = 1.0 - 2e-3;
 pub(super) const KEPT: f64 = 1.0 - 5e-4;
 

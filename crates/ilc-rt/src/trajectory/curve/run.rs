@@ -18,7 +18,7 @@ use crate::trajectory::path::check_limits;
 const PLACES: usize = 4_000;
 /// Most places, for long curves.
 const PLACES_MAX: usize = 60_000;
-/// How near a turn, in steps between places, the direction is looked at.
+/// Distance from a turn, in steps between places, at which its direction is taken.
 const EDGE_SHARE: f64 = 1e-3;
 /// Attempts that slow down only where a limit is broken, and attempts in all.
 const LOCAL_ROUNDS: usize = 16;

@@ -57,7 +57,7 @@ impl TimeLaw<'_> {
         speed
     }
 
-    /// How long the motion would last before it is averaged.
+    /// Duration of the motion before it is averaged.
     pub(super) fn swept_s(&self) -> f64 {
         let step_m = self.step_m();
         self.swept().windows(2).map(|pair| 2.0 * step_m / (pair[0] + pair[1])).sum()

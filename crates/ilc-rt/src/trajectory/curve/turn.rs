@@ -1,4 +1,4 @@
-//! Where a curve turns back or bends too tightly to be run through: there it is cut, and the axes come
+//! Cuts of a curve where it turns back or bends too tightly to be run through: there the axes come
 //! to rest.
 //!
 //! By the parameter a curve slows down where it turns back: its first derivative is smallest, and across
@@ -18,7 +18,7 @@ const HALVINGS: usize = 60;
 pub(super) struct Piece<'a, C> {
     curve: &'a C,
     breaks: Vec<f64>,
-    /// Whether it begins and ends at a turn.
+    /// True for an end of the piece that is a turn.
     pub(super) turns: [bool; 2],
 }
 

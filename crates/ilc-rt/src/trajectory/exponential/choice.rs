@@ -1,4 +1,4 @@
-//! Which α each place of an E/S move gets. Cold; read by its plan.
+//! Choice of α for each place of an E/S move; read by its plan.
 
 use super::alpha::{AlphaInterval, Place};
 use super::leg::{End, Leg, PlacedLeg};
@@ -30,7 +30,7 @@ pub struct AlphaChoice {
 pub struct AlphaMax {
     /// At starts from rest.
     pub start_up: f64,
-    /// Where a line goes on, or turns round.
+    /// At a corner where a line goes on, or turns round.
     pub transition: f64,
     /// At ends at rest.
     pub end: f64,

@@ -8,14 +8,14 @@ use super::equations::weight_after;
 use crate::interpolate::line::Line;
 use crate::trajectory::jet::Jet;
 
-/// Where exponentials are taken as gone: `e^{-45}` is below the rounding of 1.
+/// Exponent at which exponentials count as gone: `e^{-45}` is below the rounding of 1.
 pub(super) const GONE: f64 = 45.0;
 /// `∛45`: where `e^{-x³}` is gone.
 const GONE_CUBE_ROOT: f64 = 3.556_893_304_490_063;
 /// Clearance of the oscillation from a corner, in units of `1/α`, beyond `A/v`.
 const CLEARANCE: f64 = 4.0;
 
-/// What happens at one end of a leg.
+/// One end of a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum End {
     /// From rest, or to rest as its mirror image: Eq. 2.3, α in s⁻³.
@@ -51,7 +51,7 @@ pub(super) struct PlacedLeg {
 }
 
 impl Leg {
-    /// What this end adds to the line, at a time counted from the end into the leg, and the window
+    /// Deviation from the line by this end, at a time counted from the end into the leg, and the window
     /// of the oscillation there. Read forward in that time; the last end is reversed by the caller.
     fn end(&self, which: usize, tau_s: f64) -> (Jet, Jet) {
         let Some(alpha) = self.alpha[which] else {
@@ -88,7 +88,7 @@ impl Leg {
         (deviation, window)
     }
 
-    /// How far from a corner the oscillation stays at 0: beyond it the line is farther from the
+    /// Distance from a corner within which the oscillation stays at 0: beyond it the line is farther from the
     /// corner than the oscillation reaches, so that it never passes the corner. A start has none.
     pub(super) fn clearance_s(&self, which: usize) -> f64 {
         let Some(alpha) = self.alpha[which] else { return 0.0 };
@@ -104,7 +104,7 @@ impl Leg {
         }
     }
 
-    /// How long an end is felt: the deviation, and the opening of the window.
+    /// Duration of an end: of the deviation, and of the opening of the window.
     pub(super) fn reach_s(&self, which: usize) -> (f64, f64) {
         let Some(alpha) = self.alpha[which] else { return (0.0, 0.0) };
         let oscillates = self.amplitude_m != 0.0;

@@ -26,7 +26,7 @@ pub struct ListedLeg {
 pub struct Listing {
     /// The legs.
     pub legs: [ListedLeg; 2],
-    /// When the first leg gives way to the second.
+    /// Time at which the first leg gives way to the second.
     pub corner_s: f64,
     /// α of the start, in s⁻², on line and oscillation alike.
     pub start_alpha: f64,
@@ -34,7 +34,7 @@ pub struct Listing {
     pub transition_alpha: f64,
     /// α of the windows of the oscillations, in s⁻¹.
     pub sine_alpha: f64,
-    /// How far from the corner the windows are half open.
+    /// Distance in time from the corner at which the windows are half open.
     pub sine_offset_s: f64,
 }
 
@@ -91,7 +91,7 @@ impl Listing {
         joined * (t.squared() * self.start_alpha).rise()
     }
 
-    /// Where the two legs are at a time, their oscillations included, with no start and no transition.
+    /// Position of the two legs at a time with their oscillations, without start and transition.
     pub fn programmed_m(&self, t_s: f64) -> f64 {
         let [first, second] = &self.legs;
         let leg = if t_s < self.corner_s { first } else { second };

@@ -123,7 +123,7 @@ impl ExponentialSigmoid {
         &self.choices
     }
 
-    /// How long the move lasts: the sum of `length / feed`.
+    /// Duration of the move: the sum of `length / feed`.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
@@ -160,7 +160,7 @@ impl ExponentialSigmoid {
         state
     }
 
-    /// Where the program is at a time, with no limits: what tracking is measured against.
+    /// Position of the program at a time, without limits: the reference of the tracking error.
     pub fn programmed_m(&self, t_s: f64) -> [f64; MAX_AXES] {
         let Some((placed, local_s)) = self.find(t_s) else { return self.at(t_s).position_m };
         let mut position_m = placed.line.along(placed.leg.programmed_m(local_s));

@@ -82,7 +82,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// What the list says of it.
+            /// The entry of the list.
             pub const fn entry(self) -> &'static Kind {
                 match self {
                     $(Self::$kind => &$file::KIND,)*

@@ -5,7 +5,7 @@ use crate::interpolate::Interpolator;
 use crate::trajectory::motion::set_points;
 use crate::trajectory::program::{TableError, read_table};
 
-/// How far the first row of a table may be from the start.
+/// Tolerance on the distance of the first row from the start.
 const START_M: f64 = 1e-9;
 
 pub(super) const KIND: Kind = Kind {

@@ -1,4 +1,4 @@
-//! What the two settings keep and what they lose.
+//! Properties that the two settings keep and lose.
 
 use super::*;
 use crate::trajectory::{ModulatedSegment, points_program};

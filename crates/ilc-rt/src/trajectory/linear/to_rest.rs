@@ -9,7 +9,7 @@ use crate::interpolate::AxisLimits;
 /// Bisections of the cruising velocity.
 const STEPS: usize = 100;
 
-/// Where an axis is.
+/// State of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct AxisState {
     pub(super) p: f64,

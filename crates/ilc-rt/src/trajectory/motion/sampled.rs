@@ -43,7 +43,7 @@ pub struct SampledMotion {
     pub velocity_m_s: Vec<f64>,
     /// Accelerations.
     pub acceleration_m_s2: Vec<f64>,
-    /// Where the program would be at each sample if there were no limits.
+    /// Position of the program at each sample, without limits.
     pub programmed_m: Vec<f64>,
 }
 

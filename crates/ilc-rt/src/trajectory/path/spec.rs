@@ -1,4 +1,4 @@
-//! What a run shall do: a path of lines and arcs, how corners are taken, and rests.
+//! Description of a run: a path of lines and arcs, its corners, and rests.
 
 use crate::interpolate::arc::Arc;
 use crate::interpolate::element::{Element, Leg};
@@ -19,7 +19,7 @@ pub struct PathSegment {
     pub to_m: Vec<f64>,
     /// Speed along the segment.
     pub feed_m_s: f64,
-    /// What makes it an arc; none for a line.
+    /// The arc; `None` for a line.
     pub arc: Option<ArcSpec>,
     /// Rest at its end.
     pub dwell_s: f64,
@@ -39,7 +39,7 @@ pub struct ArcSpec {
     pub plane: [usize; 2],
     /// Centre, in the two axes.
     pub center_m: [f64; 2],
-    /// Which way round.
+    /// Clockwise instead of anticlockwise.
     pub clockwise: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What an interpolator promises: limits, end points, repeatability, refusals.
+//! Promises of the interpolator: limits, end points, repeatability, refusals.
 
 use super::*;
 use crate::interpolate::random::Random;

@@ -142,7 +142,7 @@ impl<'a> Block<'a> {
         Ok(())
     }
 
-    /// Whether there is nothing but a comment in it.
+    /// True if it holds nothing but a comment.
     pub(super) fn is_empty(&self) -> bool {
         !self.is_begun
     }

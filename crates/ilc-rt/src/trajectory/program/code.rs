@@ -1,11 +1,11 @@
-//! What the G and M words mean here.
+//! Meaning of the G and M words.
 
-/// What is understood, for refusals.
+/// The words that are understood, for refusals.
 pub(super) const CODES: &str = "G0 G1 G2 G3 G4 G17 G20 G21 G61 G64 G80 G90 G91 M2 M30, and those that \
                                 ask for what is so anyway: G8 G40 G49 G54 G91.1 G92.1 G92.2 G94 G97 G98 \
                                 G99 M5 M9 M48 M49";
 
-/// How the tool goes to the next point.
+/// Course of the tool to the next point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Motion {
     Rapid,
@@ -30,11 +30,11 @@ pub(super) enum Code {
     ExactCorners(bool),
     /// M2 or M30.
     End,
-    /// What is so whether it is asked for or not.
+    /// A state that holds whether it is asked for or not.
     AsItIs,
 }
 
-/// What a word means, and its modal group: one word of a group may stand in a block.
+/// Meaning of a word, and its modal group: one word of a group may stand in a block.
 ///
 /// The number is given in tenths. Groups of G words are those of RS274/NGC; those of M words
 /// begin at 20.

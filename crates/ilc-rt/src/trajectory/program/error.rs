@@ -8,6 +8,6 @@ pub struct GcodeError {
     pub line: usize,
     /// The word, as written.
     pub word: String,
-    /// What is wrong and what is allowed.
+    /// The defect, and what is allowed.
     pub allowed: String,
 }

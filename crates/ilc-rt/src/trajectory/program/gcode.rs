@@ -49,7 +49,7 @@ pub fn read_gcode(text: &[u8], setting: &GcodeSetting) -> Result<GcodeProgram, G
     }
 }
 
-/// Where a block ends.
+/// End of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ended {
     /// With its line.
@@ -60,12 +60,12 @@ enum Ended {
     Program,
 }
 
-/// Where the program is between its percent signs.
+/// State between the percent signs of the program.
 #[derive(Clone, Copy, Debug, Default)]
 struct Delimited {
-    /// Whether something but blanks has been read.
+    /// True once something but blanks has been read.
     begun: bool,
-    /// Whether that was a `%`.
+    /// True if that was a `%`.
     opened: bool,
 }
 

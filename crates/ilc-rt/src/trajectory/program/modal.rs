@@ -1,4 +1,4 @@
-//! What holds from block to block, and what each block makes of it, in LinuxCNC's order: feed, dwell,
+//! Modal state of the interpreter, and its update by each block in LinuxCNC's order: feed, dwell,
 //! units, distance mode, motion, end.
 
 use super::block::{AXES, Block};
@@ -15,11 +15,11 @@ const INCH_M: f64 = 0.0254;
 const MOVES_MAX: usize = 250_000;
 /// Longest dwell.
 const DWELL_MAX_S: f64 = 3600.0;
-/// How much too short the radius of an arc may be whatever its decimals are, as in LinuxCNC, and the
+/// Tolerance on a radius that is too short whatever its decimals are, as in LinuxCNC, and the
 /// most that they can explain.
 const SHORT_M: f64 = 1.27e-6;
 const SHORT_MAX_M: f64 = 1.27e-5;
-/// What rounding the last decimal of end points and radius makes of half a chord at worst.
+/// Worst effect on half a chord of rounding the last decimal of end points and radius.
 const ROUNDED: f64 = 0.5 + std::f64::consts::FRAC_1_SQRT_2;
 
 /// The speed of G1 to G3.

@@ -5,13 +5,13 @@ use crate::trajectory::path::PathSegment;
 /// The setting that a program is read with.
 #[derive(Clone, Copy, Debug)]
 pub struct GcodeSetting<'a> {
-    /// Where it begins, one coordinate an axis: X Y Z A B C are the first six.
+    /// Start, one coordinate an axis: X Y Z A B C are the first six.
     pub start_m: &'a [f64],
     /// Speed along the path until the first F.
     pub feed_m_s: f64,
     /// Speed of G0.
     pub rapid_m_s: f64,
-    /// Which axes are rotary: their numbers are degrees. Those beyond its end are not.
+    /// True for rotary axes: their numbers are degrees. Axes beyond its end are linear.
     pub rotary: &'a [bool],
     /// True if the path comes to rest at its corners (G61, G61.1), false if it rounds them (G64).
     pub exact_corners: bool,
@@ -26,7 +26,7 @@ pub struct GcodeProgram {
     pub segments: Vec<PathSegment>,
     /// The line of each move, from 1.
     pub lines: Vec<usize>,
-    /// Whether each move is rapid (G0).
+    /// True for each move that is rapid (G0).
     pub rapid: Vec<bool>,
     /// Rest before the first move.
     pub dwell_before_s: f64,

@@ -12,9 +12,9 @@ use crate::trajectory::grid::N_SAMPLES_MAX;
 pub struct TableError {
     /// Line of the text, from 1.
     pub line: usize,
-    /// What is there.
+    /// The text found.
     pub found: String,
-    /// What is allowed.
+    /// The values allowed.
     pub allowed: String,
 }
 
@@ -120,7 +120,7 @@ fn bare(cell: &str) -> &str {
     cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')).unwrap_or(cell)
 }
 
-/// How many columns there are, for a refusal.
+/// Number of columns, for a refusal.
 fn columns(cells: &[&str]) -> String {
     let last_is_empty = cells.len() > 1 && cells.last().is_some_and(|cell| cell.is_empty());
     let noun = if cells.len() == 1 { "column" } else { "columns" };

@@ -1,4 +1,4 @@
-//! What the files of programs have in common: how they are encoded, and how a piece is shown.
+//! Encoding of program files, and the form in which a piece of one is shown.
 
 /// Most characters of the text that a refusal shows.
 const SHOWN_MAX: usize = 40;
@@ -6,7 +6,7 @@ const SHOWN_MAX: usize = 40;
 /// The text behind a byte order mark of UTF-8, which editors and spreadsheets put in front.
 ///
 /// # Errors
-/// What is wrong, for a text in UTF-16 or UTF-32.
+/// Refusal of a text in UTF-16 or UTF-32.
 pub(super) fn without_mark(text: &[u8]) -> Result<&[u8], &'static str> {
     if text.starts_with(&[0xff, 0xfe]) || text.starts_with(&[0xfe, 0xff]) {
         return Err("the text is in UTF-16: save it in UTF-8 or plain ASCII");

@@ -4,7 +4,7 @@
 //! `G0 x +0. 12 34y 7` is `G0 X0.1234 Y7`. What cannot be a token of the language is one of its own
 //! kind, so that the reader refuses it where it stands.
 
-/// What a token is.
+/// Kind of a token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Spaces, tabs and the like.

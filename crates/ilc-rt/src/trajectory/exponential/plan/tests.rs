@@ -1,4 +1,4 @@
-//! What E/S promises: on the path soon, at rest at its ends, no corner passed, α as large as can be.
+//! Promises of E/S: on the path soon, at rest at its ends, no corner passed, α as large as can be.
 
 use super::*;
 use crate::trajectory::Quantity;

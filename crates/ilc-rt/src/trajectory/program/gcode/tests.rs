@@ -1,4 +1,4 @@
-//! What words mean, in every spelling, and what is refused, with its line.
+//! Meaning of words in every spelling, and refusals with their line.
 
 use super::*;
 use crate::interpolate::random::Random;
