@@ -120,6 +120,7 @@ impl Drop for EventStream {
 ///     something else cannot.
 #[pyfunction]
 #[pyo3(signature = (cell, arguments, verb="run", law=None, disturbance=None))]
+#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 fn run_events(
     cell: &Bound<'_, PyCell>,
     arguments: Vec<String>,
@@ -197,6 +198,7 @@ impl Work {
 ///
 /// Raises ValueError with the name of the option, its value and what is allowed.
 #[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
     Work::parse(verb, &arguments).map(drop)
 }

@@ -52,6 +52,7 @@ impl From<IdentificationError> for Failure {
 /// Raises ModelError if the response cannot be fitted.
 /// Raises ValueError if an option cannot be used, or an amplitude is beyond a limit.
 #[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 fn identify_axis<'py>(
     py: Python<'py>,
     cell: &Bound<'py, PyCell>,
@@ -96,6 +97,7 @@ fn identify_axis<'py>(
 
 /// Return the experiment of options, words of ``ilc-rt identify``, in the default band if they give none.
 #[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'_, PyDict>> {
     let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
     let axis = options.axis.clone().unwrap_or_default();

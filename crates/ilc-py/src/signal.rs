@@ -135,9 +135,10 @@ impl PyFilter {
         Arguments::new(this.arguments.bind(slf.py())).call(&class)
     }
 
-    fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> PyResult<bool> {
-        let Ok(other) = other.cast::<Self>() else { return Ok(false) };
-        Ok(slf.get().filter == other.get().filter && slf.get_type().is(other.get_type()))
+    fn __eq__(slf: &Bound<'_, Self>, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| {
+            slf.get().filter == other.get().filter && slf.get_type().is(other.get_type())
+        })
     }
 
     fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {

@@ -36,10 +36,7 @@ const SETTINGS: [(&str, LinearSetting); 2] =
     [("complete", LinearSetting::CompleteEveryMove), ("on_time", LinearSetting::StartOnTime)];
 
 /// Plans a motion while other Python threads run, and returns its samples by name.
-fn planned<'py>(
-    py: Python<'py>,
-    plan: impl FnOnce() -> Planned + Send,
-) -> PyResult<Bound<'py, PyDict>> {
+fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> PyResult<Bound<'_, PyDict>> {
     let begun = Instant::now();
     let (motion, alphas) = detached(py, plan).or_raise()?;
     let computing_s = begun.elapsed().as_secs_f64();

@@ -16,8 +16,12 @@ use pyo3::types::PyDict;
 /// Examples
 /// --------
 /// >>> from ilc_rt._native import transports
-/// >>> [kind["name"] for kind in transports()]
-/// ['can', 'udp', 'zenoh', 'loopback']
+/// >>> for kind in transports():
+/// ...     print(kind.get("name"))
+/// can
+/// udp
+/// zenoh
+/// loopback
 #[pyfunction]
 fn transports(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     SCHEMES

@@ -107,6 +107,7 @@ pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
 }
 
 /// A number without a name of its own, which may not be too large for a float.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Real(pub(crate) f64);
 
 impl<'py> FromPyObject<'_, 'py> for Real {
