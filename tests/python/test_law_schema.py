@@ -12,7 +12,7 @@ import pytest
 from ilc_rt import laws
 from ilc_rt.processes import find_program
 
-# The class for each table of `[learning]` that describes a law, or what goes round one.
+# The class for each table of `[learning]` that describes a law or a wrapper of one.
 CLASSES = {
     "adjoint": laws.AdjointIlc,
     "constrained": laws.ConstrainedIlc,

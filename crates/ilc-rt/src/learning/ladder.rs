@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::{Law, LearningError, Standing, Surrogate};
 use crate::schema::field_order;
 
-/// `[learning.ladder]`: several runs with the same input before each step of learning, and how the gain
-/// of a step follows from the decay of the error.
+/// `[learning.ladder]`: several runs with the same input before each step of learning, with a gain
+/// that follows the decay of the error.
 ///
 /// # Units
 /// - numbers of runs and ratios
@@ -39,14 +39,14 @@ impl Default for LadderRule {
 }
 
 impl LadderRule {
-    /// Returns the rule with the given number of repeats: a decay of less than a fifth a step raises
-    /// the gain by a quarter, up to 1.5; growth halves it, down to 1/16.
+    /// Returns the rule with the given number of repeats: a decay of less than a fifth per step
+    /// raises the gain by a quarter, up to 1.5; growth halves it, down to 1/16.
     pub fn new(repeats: usize) -> Self {
         Self { repeats, slow: 0.8, increase: 1.25, lowest: 0.0625, highest: 1.5 }
     }
 }
 
-/// A law that learns from the mean error of several runs with the same input.
+/// A wrapper whose law learns from the mean error of several runs with the same input.
 ///
 /// `m_j = (e_1 + .. + e_n) / n`, `u_{j+1} = u_j + g_j (law(u_j, m_j) - u_j)`
 ///
@@ -59,18 +59,18 @@ impl LadderRule {
 /// - `f_j > f_{j-1}`: the error grew, so `g` is halved;
 /// - `slow f_{j-1} < f_j <= f_{j-1}`: it decays too slowly, so `g` is raised;
 /// - otherwise, or if `f_j` is less than twice the noise `s_j / sqrt(n)` of the mean, so that its
-///   ratio says nothing: `g` stays.
+///   ratio is meaningless: `g` stays.
 ///
 /// Where the caller rolls an input back ([`Law::on_rollback`]) the error grew too, though the
 /// law never learns from that run: `g` is halved, and the mean starts over.
 ///
 /// # Shapes
-/// - those of the law inside
+/// - those of the inner law
 /// # Real Time
 /// Cold path. Allocates in the first [`Law::update`] only.
 /// # Source
-/// - \[filter-based\], Section 6.2 (Fig. 32): average of repeated runs, and a gain that is
-///   raised where the error attenuates too slowly. It gives no rule; this one is ours.
+/// - \[filter-based\], Section 6.2 (Fig. 32): average of repeated runs, and a gain that is raised
+///   if the error attenuates too slowly. It gives no rule; this one is ours.
 #[derive(Debug)]
 pub struct Ladder<L> {
     law: L,
@@ -79,17 +79,17 @@ pub struct Ladder<L> {
     runs: usize,
     input: Vec<f64>,
     mean: Vec<f64>,
-    /// Sum over the runs of the squares of the deviations from their mean.
+    /// Sum over the runs of the squared deviations from their mean.
     deviation: f64,
     figure: Option<f64>,
     noise: f64,
 }
 
 impl<L: Law> Ladder<L> {
-    /// Puts the ladder round a law.
+    /// Wraps a law.
     ///
     /// # Errors
-    /// - [`LearningError::Empty`] for no repeats.
+    /// - [`LearningError::Empty`] for 0 repeats.
     /// - [`LearningError::Parameter`] unless `0 < slow <= 1`, `increase >= 1` and
     ///   `0 < lowest <= 1 <= highest`, all finite.
     pub fn new(law: L, rule: LadderRule) -> Result<Self, LearningError> {
@@ -140,32 +140,32 @@ impl<L: Law> Ladder<L> {
         self.gain
     }
 
-    /// Returns how many runs the mean holds that the next step will use.
+    /// Returns the number of runs in the mean for the next step.
     pub fn runs(&self) -> usize {
         self.runs
     }
 
-    /// Returns the root mean square of the repeatable error before the last step.
+    /// Returns the RMS of the repeatable error before the last step.
     pub fn figure(&self) -> Option<f64> {
         self.figure
     }
 
-    /// Returns the root mean square of the noise that was left in the mean of the last step.
+    /// Returns the RMS of the noise left in the mean of the last step.
     pub fn noise(&self) -> f64 {
         self.noise
     }
 
-    /// Returns the law inside.
+    /// Returns the inner law.
     pub fn law(&self) -> &L {
         &self.law
     }
 
-    /// Returns the law inside.
+    /// Returns the inner law.
     pub fn law_mut(&mut self) -> &mut L {
         &mut self.law
     }
 
-    /// Takes one more run into mean and deviation.
+    /// Adds a run to mean and deviation.
     fn take(&mut self, input: &[f64], error: &[f64]) {
         let is_same = self.mean.len() == error.len() && self.input == input;
         if self.runs == 0 || !is_same {
@@ -215,7 +215,7 @@ impl<L: Law> Law for Ladder<L> {
     ) -> Result<(), LearningError> {
         let is_finite = input.iter().chain(error).all(|value| value.is_finite());
         if next.len() != input.len() || !is_finite {
-            // The law inside knows the shapes and says what is wrong, without having learned.
+            // The inner law knows the shapes and returns their errors, without having learned.
             self.law.update(input, error, next)?;
             let allowed = "input and error must be finite, and the next input as long as the input";
             let value = next.len() as f64;
@@ -360,7 +360,7 @@ mod tests {
         law.update(&[1.0], &[8.0], &mut next).unwrap();
         law.on_rollback();
         assert_eq!((law.runs(), law.gain().to_bits()), (0, 0.5_f64.to_bits()));
-        // The same input again: what was seen of it before does not count.
+        // The same input again: earlier runs with it do not count.
         law.update(&[1.0], &[2.0], &mut next).unwrap();
         law.update(&[1.0], &[4.0], &mut next).unwrap();
         assert!((next[0] - 2.5).abs() < 1e-15);
@@ -372,7 +372,7 @@ mod tests {
 
     #[test]
     fn noise_does_not_move_the_gain() {
-        // The repeatable part is gone; what is left changes sign from run to run.
+        // The repeatable part is gone; the remainder changes sign from run to run.
         let mut law = ladder(LadderRule::new(2), 1);
         let mut next = [0.0];
         for size in [1.0, 1.1, 1.3, 0.9] {

@@ -1,4 +1,4 @@
-//! The switching mechanism: when any law is to learn, to rest, or to go back to the best input.
+//! The switching mechanism: learn, hold, or roll back to the best input; for any law.
 
 mod rule;
 
@@ -17,26 +17,26 @@ pub enum GateState {
     RolledBack,
 }
 
-/// A law that stops learning when the error is good enough, or before it diverges.
+/// A wrapper that stops its law when the error is good enough, or before it diverges.
 ///
-/// - *Learning*, and the error is inside the tolerance: *holding*, with the input as it is.
+/// - *Learning*, and the error is within the tolerance: *holding*, with the input unchanged.
 /// - *Learning*, and for `patience` runs in a row the error exceeded `growth` times the best one:
 ///   *rolled back*, to the input of the best run.
 /// - *Holding*, and the error exceeds `resume` times the tolerance: *learning* again.
-/// - *Rolled back*, and for `patience` runs in a row the error exceeds `growth` times what the same
-///   input once gave: the machine is not what it was, so *learning* again. An error inside the
+/// - *Rolled back*, and for `patience` runs in a row the error exceeds `growth` times its earlier
+///   value for the same input: the machine has changed, so *learning* again. An error within the
 ///   tolerance makes it *holding*.
 ///
-/// When learning resumes, what was best before is forgotten: it was so on another machine.
+/// When learning resumes, the best run so far is forgotten: it was made on a different machine
+/// state.
 ///
 /// # Shapes
 /// - those of the law inside
 /// # Real Time
 /// Cold path. Allocates in the first [`Law::update`] only, for the best input.
 /// # Source
-/// - \[filter-based\], Section 4 (Fig. 19) and Section 6.3: switching iterative learning.
-///   The paper switches off by hand before the error grows; growth, roll-back and resumption are
-///   ours.
+/// - \[filter-based\], Section 4 (Fig. 19) and Section 6.3: switching iterative learning. The paper
+///   switches off by hand before the error grows; growth, rollback and resumption are ours.
 #[derive(Debug)]
 pub struct Gate<L> {
     law: L,
@@ -50,7 +50,7 @@ pub struct Gate<L> {
 }
 
 impl<L: Law> Gate<L> {
-    /// Puts the gate round a law.
+    /// Wraps a law.
     ///
     /// # Errors
     /// - [`LearningError::Parameter`] for a tolerance that is negative or not finite, or a ratio
@@ -82,7 +82,7 @@ impl<L: Law> Gate<L> {
         })
     }
 
-    /// Returns what the gate is doing.
+    /// Returns the state of the gate.
     pub fn state(&self) -> GateState {
         self.state
     }
@@ -97,8 +97,8 @@ impl<L: Law> Gate<L> {
         &self.best_input
     }
 
-    /// Sets the number of channels of the error, for a [`Measure::Rms`]; for a caller that learns it with the first
-    /// run only.
+    /// Sets the number of channels of the error, for a [`Measure::Rms`]; for a caller that knows it
+    /// only at the first run.
     pub fn set_channels(&mut self, channels: usize) {
         if let Measure::Rms { n_channels } = &mut self.rule.measure {
             *n_channels = channels.max(1);
@@ -115,7 +115,7 @@ impl<L: Law> Gate<L> {
         &mut self.law
     }
 
-    /// Decides what to do after a run with this input and this figure.
+    /// Decides on the next input after a run with this input and this figure.
     fn judge(&mut self, input: &[f64], figure: f64) {
         let GateRule { tolerance, resume, growth, patience, .. } = self.rule;
         let left = self.state == GateState::Holding && figure > resume * tolerance;
@@ -152,13 +152,13 @@ impl<L: Law> Law for Gate<L> {
     ) -> Result<(), LearningError> {
         let figure = self.rule.measure.of(error);
         if next.len() != input.len() || !figure.is_finite() {
-            // The law inside knows the shapes and says what is wrong, without having learned.
+            // The inner law knows the shapes and returns their errors, without having learned.
             self.law.update(input, error, next)?;
             let allowed = "the figure of an error must be finite";
             return Err(LearningError::Parameter { what: "error", value: figure, allowed });
         }
         if self.best_input.len() != input.len() {
-            // The first run, or runs of another size: nothing can be compared.
+            // The first run, or runs of another size: there is nothing to compare with.
             self.best_figure = None;
         }
         self.judge(input, figure);

@@ -1,4 +1,4 @@
-//! When a gate opens and closes: the table of a cell, and the rule that it makes for so many axes.
+//! Parameters and decision rule of the gate.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,8 +8,8 @@ use crate::schema::field_order;
 /// Figure by which a run is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
-    /// Root of the mean over the samples of the squared length of the error, all channels taken
-    /// together: the figure by which a controller reports its runs.
+    /// RMS over time of the Euclidean norm of the error, all channels together: the figure that a
+    /// controller reports for its runs.
     Rms {
         /// Channels of the error.
         n_channels: usize,
@@ -49,23 +49,24 @@ pub enum GateMeasure {
     Max,
 }
 
-/// `[learning.gate]`: when the law learns, rests, or goes back to the best input.
+/// `[learning.gate]`: stops learning at a tolerance, and rolls back to the best input when the
+/// error grows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct GateParameters {
-    /// Error up to which the input is kept as it is; 0 to learn for ever.
+    /// Error up to which the input is kept unchanged; 0 to learn indefinitely.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub tolerance_m: f64,
     /// Figure by which a run is judged.
     pub measure: GateMeasure,
-    /// Factor by which the error must leave the tolerance before learning resumes.
+    /// Factor on the tolerance above which learning resumes.
     #[schemars(range(min = 1.0, max = 1e3))]
     pub resume: f64,
     /// Factor by which the error may exceed the best one so far.
     #[schemars(range(min = 1.0, max = 1e3))]
     pub growth: f64,
-    /// Number of runs in a row, or of steps of a ladder, in which it may do so before the best input is
+    /// Consecutive runs, or steps of a ladder, in which it may do so before the best input is
     /// restored.
     #[schemars(range(min = 1, max = 100))]
     pub patience: usize,
@@ -78,7 +79,8 @@ impl Default for GateParameters {
 }
 
 impl GateParameters {
-    /// Returns the rule for a cell of so many axes, whose ladder makes so many runs a step.
+    /// Returns the rule for a cell of `n_axes` axes, whose ladder makes `runs_a_step` runs per
+    /// step.
     pub fn rule(&self, n_axes: usize, runs_a_step: usize) -> GateRule {
         GateRule {
             measure: match self.measure {
@@ -88,13 +90,13 @@ impl GateParameters {
             tolerance: self.tolerance_m,
             resume: self.resume,
             growth: self.growth,
-            // A step's error shows in all its runs; the ladder must have seen them to answer.
+            // A step's error shows in all its runs; the ladder must have seen them to respond.
             patience: self.patience * runs_a_step,
         }
     }
 }
 
-/// When a [`Gate`] opens and closes.
+/// Thresholds of a [`Gate`].
 ///
 /// # Units
 /// - `tolerance` in units of the error; the others are ratios and numbers of runs
@@ -102,13 +104,13 @@ impl GateParameters {
 pub struct GateRule {
     /// Figure by which a run is judged.
     pub measure: Measure,
-    /// Figure up to which the error is good enough; 0 to learn for ever.
+    /// Figure up to which the error is good enough; 0 to learn indefinitely.
     pub tolerance: f64,
     /// Factor by which the error must leave the tolerance before learning resumes; 1 or more.
     pub resume: f64,
     /// Factor by which the error may exceed the best one so far; 1 or more, infinite to let it grow.
     pub growth: f64,
-    /// Number of runs in a row in which it may do so.
+    /// Number of consecutive runs in which it may do so.
     pub patience: usize,
 }
 
