@@ -49,7 +49,7 @@ pub(super) fn start(
     })
 }
 
-/// Listens before anything is sent: a bus with another master is left alone.
+/// Listens before anything is sent: a bus with another master is refused.
 fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
     let numbers = cell.axes.iter().map(|axis| axis.node);
     let numbers = numbers.chain(cell.tcp_encoder.iter().map(|tool| tool.node));
@@ -63,7 +63,7 @@ fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
     }
 }
 
-/// Returns what the drive of an axis is set up to.
+/// Returns the configuration of the drive of an axis.
 ///
 /// # Errors
 /// [`ConfigError`] for a node number or a scale that validation would have refused.
