@@ -92,7 +92,7 @@ impl PyCell {
         self.n_samples
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     #[getter]
     fn n_axes(&self) -> usize {
         self.cell.n_axes()
