@@ -15,8 +15,8 @@ const INCH_M: f64 = 0.0254;
 const MOVES_MAX: usize = 250_000;
 /// Longest dwell.
 const DWELL_MAX_S: f64 = 3600.0;
-/// Tolerance on a radius that is too short whatever its decimals are, as in LinuxCNC, and the
-/// most that they can explain.
+/// Tolerance on a radius that is too short regardless of its decimals, as in LinuxCNC, and the
+/// largest one that they can explain.
 const SHORT_M: f64 = 1.27e-6;
 const SHORT_MAX_M: f64 = 1.27e-5;
 /// Worst effect on half a chord of rounding the last decimal of end points and radius.
