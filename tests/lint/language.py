@@ -28,7 +28,7 @@ NOT_YET_CLEAN: tuple[str, ...] = ()
 HEAD = re.compile(r"(What|Whether|How|Why|Where|Which|Whatever|Whoever|Whose|Who)\b(?! if)")
 # Old phrase, and its replacement.
 PHRASES = {
-    r"(?<!there )\b(is|are|was|were) (?-i:none)\b": 'say "is not a …", "there is no …", "unlimited"',
+    r"(?<!there )\b(is|are|was|were) (?-i:none)\b": 'say "is not a …", "no …", "unlimited"',
     r"\banew\b": "again, new",
     r"\b(whoever|somebody|nobody)\b": "the caller, another program, the user, no …",
     r"\b(taken|takes?|took) back\b": "rolled back, undone, subtracted",
