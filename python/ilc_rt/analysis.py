@@ -255,7 +255,7 @@ def analyze(
         frequencies from zero to the Nyquist frequency.
     reference : array_like or None, shape (n_samples,) or (n_samples, n_outputs)
         Error of a run with input zero: the reference itself if only the learned input moves the
-            axis.
+        axis.
     noise_std : float or None
         Standard deviation of white measurement noise.
     n_runs : int
@@ -311,8 +311,8 @@ def refuse_divergent(law: AnyLaw, model: Model, n_samples: int) -> None:
     """Refuse a law that is predicted to diverge on a model.
 
     The quick part of `analyze`: less than a second up to 60 000 samples. A law written in Python is
-        accepted; for a `Gate` or a `Ladder` the inner law is analysed, for a law with bounds the
-        same law without them.
+    accepted; for a `Gate` or a `Ladder` the inner law is analysed, for a law with bounds the
+    same law without them.
 
     Parameters
     ----------
@@ -357,7 +357,7 @@ def tune(
     """Propose the weights of norm-optimal ILC, with reasons.
 
     The guidelines s1 to s4: ``q = 1``; the smallest robust s, times 2; r as long as it reduces the
-        error under noise; a check of the result.
+    error under noise; a check of the result.
 
     Parameters
     ----------

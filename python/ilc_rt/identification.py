@@ -61,7 +61,7 @@ class Identification:
         False if the output does not follow the input: the figures are then meaningless.
     input_unit : str or None
         Unit of the input: m, m/s, rad or rad/s; None if it is not an axis of a cell. The output has
-            the same without ``/s``.
+        the same without ``/s``.
     """
 
     measured: FrequencyResponse

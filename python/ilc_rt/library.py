@@ -32,7 +32,7 @@ class Library(_native.Library):
     Notes
     -----
     Reading opens the file read-only and closes it at once: a library without write permission can
-        be read, and no side files are created.
+    be read, and no side files are created.
 
     Examples
     --------

@@ -126,7 +126,7 @@ def frequency_response(
         Sample time in seconds.
     period_samples : int or None
         Samples per period of a periodic input: averages over whole periods, without window or
-            leakage.
+        leakage.
     segment_samples : int or None
         Samples per segment of Welch's method for any other input: Hann window, mean removed; an
         eighth of the signal if neither is given.

@@ -178,8 +178,8 @@ def suspects(axis: BelievedAxis, uncertainty: float, known_hz: float) -> list[Su
     """Return perturbed axes, the most demanding first.
 
     Up to `known_hz` the model is right within `uncertainty`: natural frequency, damping and delay
-        vary. Above it dynamics are arbitrary, such as a mode between drive and tool. Friction acts
-        at every frequency.
+    vary. Above it dynamics are arbitrary, such as a mode between drive and tool. Friction acts
+    at every frequency.
     """
     model = axis.model()
     gain = abs(float(model.dc_gain()[0, 0]))

@@ -153,9 +153,9 @@ def propose_weights(
     """Propose the learning weights of a cell.
 
     The weight `rate` is chosen by trials on perturbed axes: up to `known_hz` the model within
-        `uncertainty`, above it with a mode, everywhere with friction. Among the weights for which
-        no trial's error grows by more than 20 % over its smallest one, those with the smallest mean
-        error after `n_runs` runs are chosen.
+    `uncertainty`, above it with a mode, everywhere with friction. Among the weights for which
+    no trial's error grows by more than 20 % over its smallest one, those with the smallest mean
+    error after `n_runs` runs are chosen.
 
     Parameters
     ----------

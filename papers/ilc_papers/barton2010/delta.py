@@ -1,7 +1,7 @@
 """Chapter 7: the delta mechanism, its kinematics, its Jacobian, and one of its legs identified.
 
 The print describes two mechanisms: (7.5) has rods of 125 mm and 20 mm from the rods to the tool's
-    centre; appendices C and F have rods of 145 mm and no such distance. Both are computed.
+centre; appendices C and F have rods of 145 mm and no such distance. Both are computed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A reversal: E/S and linear interpolation at a 180° corner.
 
 The ratio of the two depends on the jerk limit, which is not printed, and on the evaluated part:
-    both are tabulated. Read by the other modules of this package only.
+both are tabulated. Read by the other modules of this package only.
 """
 
 from __future__ import annotations

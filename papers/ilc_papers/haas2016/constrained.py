@@ -74,7 +74,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
     dict
         Under `constrained`: `free` without bounds; for each bound and for `all` of them together
         `active` and `inactive`: the bound, the range of the runs, `violation` (largest excess), and
-            `co_inf_m` for each run.
+        `co_inf_m` for each run.
     """
     runs = 6 if reduced else RUNS
     tell("positioning within bounds: none")

@@ -217,7 +217,7 @@ class ThroughJacobian(_Around):
     ------
     LearningError
         If a Jacobian is singular: its condition number may be at most 1e6. `update` raises it for
-            another number of samples.
+        another number of samples.
     ValueError, TypeError
         If the array has the wrong shape, dtype or a number that is not finite,
         or `law` is not a law.

@@ -72,9 +72,9 @@ class ConstrainedIlc(Law):
     Notes
     -----
     Before the run the input is 0 and the set point is at its first value: the first step is the
-        input itself, and the first accelerations start from rest. If a run begins otherwise, make
-        the bounds of those samples infinite. Output samples before the first effect of the input
-        cannot be changed.
+    input itself, and the first accelerations start from rest. If a run begins otherwise, make
+    the bounds of those samples infinite. Output samples before the first effect of the input
+    cannot be changed.
 
     The next input exceeds no bound by more than 1e-9 of its size. If no such input is found,
     `update` returns the input of the run and `status` gives the reason. The solver is a primal-dual

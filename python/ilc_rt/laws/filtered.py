@@ -29,7 +29,7 @@ class PdIlc(Law):
         symmetric one.
     lead_samples : int
         Lead (look-ahead) of the error, 0 to 1000 samples: 1 for an axis without dead time, 1 more
-            for each sample of dead time.
+        for each sample of dead time.
 
     Raises
     ------
@@ -80,7 +80,7 @@ class ErrorFeedforwardIlc(Law):
         Low-pass Q of the error; an array holds the taps of a symmetric one.
     lead_samples : int
         Lead (look-ahead) of the error, 0 to 1000 samples: 1 for an axis without dead time, 1 more
-            for each sample of dead time.
+        for each sample of dead time.
     input_max : float or None
         Bound of the learned feed-forward.
 
@@ -94,7 +94,7 @@ class ErrorFeedforwardIlc(Law):
     Notes
     -----
     For the parallel structure: `u` is added to the controller's output. Each channel learns
-        separately. Beyond the end of the run the error is held.
+    separately. Beyond the end of the run the error is held.
 
     References
     ----------

@@ -48,7 +48,7 @@ class RelevanceIlc(_Recalled):
     ``u' = sum_j w_j L(u_j, e_j)``, ``w_j = N_j / sum_k N_k``
 
     with L the core law and N_j the relevance of run j: large for a run with a small error and a
-        disturbance similar to the coming one.
+    disturbance similar to the coming one.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ def contour_error(
         Measured points in m.
     window : int or None
         For a sampled path of 1 to 12 axes: search window in samples before and after the same time.
-            None, for 2 and 3 axes: the whole path, with a spatial index.
+        None, for 2 and 3 axes: the whole path, with a spatial index.
 
     Returns
     -------

@@ -137,7 +137,7 @@ def exponential_sigmoid(
     Notes
     -----
     A start must end before its leg does: ``a T^3`` of at least 45, so that its acceleration reaches
-        about ``11 v / T`` on a leg of T seconds.
+    about ``11 v / T`` on a leg of T seconds.
 
     References
     ----------
@@ -306,7 +306,7 @@ def sigmoid_pair(
     Notes
     -----
     No limit is enforced: this is the program of the thesis, for comparison and to reproduce its
-        reference. To plan for a machine use `exponential_sigmoid`.
+    reference. To plan for a machine use `exponential_sigmoid`.
 
     References
     ----------
