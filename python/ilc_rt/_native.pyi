@@ -1,7 +1,7 @@
 import builtins
 from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, Protocol, TypeAlias, final
+from typing import Any, Literal, Protocol, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +32,7 @@ __all__ = [
     "_made",
     "_made_of_kind",
     "analyze",
+    "butterfly",
     "check_options",
     "check_relevance_weights",
     "check_response",
@@ -43,6 +44,7 @@ __all__ = [
     "discretize",
     "evaluate_experiment",
     "excitation",
+    "exponential_sigmoid",
     "fit_rational",
     "fit_second_order",
     "fit_velocity_loop",
@@ -50,17 +52,13 @@ __all__ = [
     "formation_weights",
     "frequency_response",
     "from_transfer_function",
+    "gcode",
     "identify_axis",
     "instantaneous_frequency",
-    "plan_butterfly",
-    "plan_exponential",
-    "plan_gcode",
-    "plan_linear",
-    "plan_modulated",
-    "plan_raster",
-    "plan_spiral",
-    "plan_spline",
+    "jerk_limited",
+    "modulated",
     "projection_across",
+    "raster",
     "refuse_divergent",
     "relative_deviation",
     "repeatability",
@@ -71,6 +69,8 @@ __all__ = [
     "second_order_response",
     "sigmoid_pair",
     "single_experiment",
+    "spiral",
+    "spline",
     "tracking_index",
     "transports",
     "tune",

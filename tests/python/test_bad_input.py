@@ -60,7 +60,7 @@ OPTIONS = {
     "no such file": (["nix.toml"], ["nix.toml", "cannot be read", "No such file"]),
     "a folder for a file": (["."], ["cannot be read", "not a regular file"]),
     "unknown option": (["cell.toml", "--fast"], ["--fast", "--help"]),
-    "no runs": (["cell.toml", "--iterations", "0"], ["--iterations", "'0'", "allowed 1 to 4294967295"]),
+    "no runs": (["cell.toml", "--iterations", "0"], ["--iterations", "'0'", "1 to 4294967295"]),
     "no such measure": (["cell.toml", "--measure", "eye"], ["'eye'", "encoder, tcp"]),
     "no bus at all": (
         ["cell.toml", "--bus", "usb:0"], ["--bus", "`usb:0`", "can:INTERFACE", "udp:GROUP"],

@@ -209,7 +209,7 @@ impl PyStateSpace {
     }
 
     /// Return magnitude and unwrapped phase in rad of one channel at frequencies in rad/s.
-    #[pyo3(signature = (w_rad_s, output=None, input=None), text_signature = "(w_rad_s, output=0, input=0)")]
+    #[pyo3(signature = (w_rad_s, output=None, input=None), text_signature = "($self, w_rad_s, output=0, input=0)")]
     fn bode<'py>(
         &self,
         py: Python<'py>,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ilc_rt import _native
+from ilc_rt._native import TrajectoryError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,6 +51,27 @@ class Trajectory:
     programmed_m: NDArray[np.float64]
     alphas: list[tuple[int, str, float, list[tuple[float, float]]]]
     computing_s: float
+
+    def __post_init__(self) -> None:
+        """Check what a caller gave, as the planners do."""
+        for name in ("dt_s", "computing_s"):
+            value = getattr(self, name)
+            if not isinstance(value, float) or not 0.0 <= value < np.inf:
+                message = f"{name} = {value!r}; a finite number of at least 0 is needed"
+                raise TrajectoryError(message)
+        if not isinstance(self.alphas, list):
+            message = f"alphas = {self.alphas!r}; a list is needed"
+            raise TrajectoryError(message)
+        shape = np.shape(self.position_m)
+        for name in ("position_m", "velocity_m_s", "acceleration_m_s2", "programmed_m"):
+            values = getattr(self, name)
+            is_real = isinstance(values, np.ndarray) and values.dtype == np.float64
+            if not is_real or values.ndim != 2 or values.shape != shape:  # noqa: PLR2004
+                message = f"{name}: an array of float64, shape (n_samples, n_axes), is needed"
+                raise TrajectoryError(message)
+            if not np.isfinite(values).all():
+                message = f"{name} has a value that is not finite"
+                raise TrajectoryError(message)
 
     @property
     def n_samples(self) -> int:
@@ -96,6 +118,8 @@ def tracking_index(
     ------
     TrajectoryError
         If a weight is negative or not finite.
+    TypeError
+        If `trajectory` is not a `Trajectory`.
 
     References
     ----------
@@ -111,6 +135,9 @@ def tracking_index(
     >>> tracking > 0.0 and acceleration > 0.0
     True
     """
+    if not isinstance(trajectory, Trajectory):
+        message = f"trajectory is a {type(trajectory).__name__}; a Trajectory is needed"
+        raise TypeError(message)
     return _native.tracking_index(
         dt_s=trajectory.dt_s,
         position_m=trajectory.position_m,

@@ -206,7 +206,7 @@ fn whole_sections_that_are_missing_are_named() {
             "[simulation]",
             &["[learning] measure = tcp", "\"encoder\"", "no [tcp_encoder]"],
         ),
-        (EXAMPLES[0], "[[program.segment]]", "[learning]", &["[program]", "segment"]),
+        (EXAMPLES[0], "[[program.segment]]", "[learning]", &["[[program.segment]]"]),
         (EXAMPLES[0], "[program]", "[learning]", &["program"]),
         (EXAMPLES[0], "[bus]", "[[axis]]", &["missing field `bus`"]),
         (EXAMPLES[0], "[[axis]]", "[tcp_encoder]", &["axis"]),

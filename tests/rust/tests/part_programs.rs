@@ -72,7 +72,7 @@ fn every_kind_of_path_is_planned() {
                 other => panic!("{other:?} is needed by no kind"),
             }
             let line = Plan::new(&without, None, true).unwrap_err().to_string();
-            assert!(line.contains("missing: needed by this kind of path"), "{line}");
+            assert!(line.contains("= missing: ") && line.contains("needed by this kind"), "{line}");
         }
     }
 }

@@ -91,7 +91,7 @@ fn a_table_is_refused_with_its_line_or_row() {
     assert!(line.contains("line 3: axis a1 begins at 0.1") && line.contains("start_m"), "{line}");
     let line = refusal(&cell_text("loopback:", 5000, 10.0), &points());
     assert!(line.contains("cell.toml: [program] (axis 8 is a8): row 5: axis 8"), "{line}");
-    assert!(line.contains("jerk") && line.contains("limit 10 m/s^3"), "{line}");
+    assert!(line.contains("jerk") && line.contains("limit 10 rad/s^3"), "{line}");
     let line = refusal(&cell.replace("points.csv", "gone.csv"), &points());
     assert!(line.contains("gone.csv: cannot be read") && line.contains("set points"), "{line}");
 }

@@ -2,6 +2,7 @@
 
 use super::checker::Checker;
 use crate::config::{Cell, ConfigError};
+use crate::trajectory::kind::Key;
 
 /// Checks the ranges of the program, and the requirements of its kind of path.
 pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
@@ -22,7 +23,11 @@ fn check_kind(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     for (key, name, is_given) in program.given() {
         let (is_read, is_needed) = (kind.reads.contains(&key), kind.needs.contains(&key));
         v.that(is_read || !is_given, name, &"given", "not used by this kind of path; remove it")?;
-        v.that(is_given || !is_needed, name, &"missing", "needed by this kind of path")?;
+        let needed = match key {
+            Key::Segments => "at least one is needed by this kind of path",
+            _ => "needed by this kind of path",
+        };
+        v.that(is_given || !is_needed, name, &"missing", needed)?;
     }
     v.that(
         !kind.is_plane || cell.n_axes() == 2,
