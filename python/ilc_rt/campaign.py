@@ -100,9 +100,8 @@ class Campaign:
 
     Notes
     -----
-    The controller restores the best input when the error grows, unless the law
-    is a `Gate`, which does so by itself. It tells any other law that has a
-    method ``taken_back()``.
+    The controller restores the best input when the error grows (rollback), unless the law is a
+    `Gate`, which decides on its own. It notifies any other law that has a method ``taken_back()``.
 
     Examples
     --------

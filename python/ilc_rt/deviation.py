@@ -20,8 +20,7 @@ def path_deviation(
     """Return the shortest vector from the path to each measured position.
 
     Lag along the path is not a deviation: only the normal component counts. The nearest point is
-    searched among the reference's segments near the same time, so that self-intersections of a
-    path are no problem.
+    searched among the reference's segments near the same time, so that a path may cross itself.
 
     Parameters
     ----------

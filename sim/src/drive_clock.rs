@@ -32,7 +32,7 @@ pub(crate) struct DriveClock {
     looked: Duration,
     /// Elapsed time not yet returned as steps, while free-running.
     owed: Duration,
-    /// Time watched in vain since the last SYNC; `None` while free-running.
+    /// Time of silence watched since the last SYNC; `None` while free-running.
     silence: Option<Duration>,
     n_in_step: u32,
 }

@@ -66,7 +66,7 @@ impl EventStream {
         self.frame.take_raised().map(|raised| raised.into_value(py))
     }
 
-    /// Bring the axes to rest; the events go on until they are.
+    /// Bring the axes to rest; events continue until they are.
     ///
     /// - signal : int: Number of the signal that asked for it.
     #[pyo3(signature = (signal=SIGTERM))]

@@ -67,7 +67,8 @@ impl Keeper {
             .spawn(move || {
                 for request in received {
                     if let Some(came) = store.execute(request) {
-                        // There is no receiver after a panic of the campaign; the run is stored all the same.
+                        // There is no receiver after a panic of the campaign; the run is stored
+                        // nevertheless.
                         let _ = done.send(came);
                     }
                 }

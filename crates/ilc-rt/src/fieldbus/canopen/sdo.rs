@@ -55,7 +55,7 @@ impl Expedited {
         &self.bytes[..usize::from(self.len)]
     }
 
-    /// Returns whether the sender said how many bytes count.
+    /// Returns true if the sender stated the number of valid bytes.
     pub fn size_indicated(&self) -> bool {
         self.size_indicated
     }

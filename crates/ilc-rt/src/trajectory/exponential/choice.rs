@@ -30,7 +30,7 @@ pub struct AlphaChoice {
 pub struct AlphaMax {
     /// At starts from rest.
     pub start_up: f64,
-    /// At a corner where a line goes on, or turns round.
+    /// At a corner where a line continues, or reverses.
     pub transition: f64,
     /// At ends at rest.
     pub end: f64,

@@ -78,7 +78,7 @@ pub fn points_program(
             start_m.iter().zip(&along).map(|(from, share)| from + share * s_m / length_m).collect()
         };
         let feed_m_s = (s_m - before_m).abs() / (t_s - before_s);
-        // Two neighbours may coincide where the tool stands still.
+        // Two neighbours may coincide where the tool is at rest.
         if feed_m_s > 0.0 {
             moves.push(PathSegment::line(to_m, feed_m_s));
         }

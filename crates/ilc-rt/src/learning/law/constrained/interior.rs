@@ -257,7 +257,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
         for k in 0..self.v.len() {
             for (i, channel) in self.places.inputs.iter().enumerate() {
                 let mut next = self.input[k][i] + self.v[k][i];
-                // The sum rounds once more.
+                // The sum is rounded again.
                 if let Some(band) = &self.bands.input {
                     let (low, high) = band.at(k * M + i);
                     next = next.max(low).min(high);

@@ -61,9 +61,10 @@ pub enum Status {
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` time an iteration,
-/// of which there are at most 60 in a search; one from the last solution that fails starts over, and
-/// then once more with care, in at most 240 iterations altogether.
+/// Cold path. Allocates in the constructor, never in [`Law::update`]; `O(n_samples)` time per
+/// iteration, of which there are at most 60 in a search; if a search from the last solution (warm
+/// start) fails, it starts over, and then once more with care, in at most 240 iterations
+/// altogether.
 /// # Source
 /// - \[haas2016\], section 4: constraints on set points. \[mehrotra1992\]: the interior-point
 ///   method. \[rao1998\]: its linear system as a Riccati recursion.
