@@ -1,1 +1,1 @@
-"""Papers on iterative learning control, run through ilc-rt: one package a paper."""
+"""Papers on iterative learning control, run through ilc-rt: one package per paper."""

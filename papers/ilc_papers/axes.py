@@ -1,4 +1,4 @@
-"""Axes that the papers' pictures share.
+"""Axes shared by the papers' figures.
 
 The papers' packages import it.
 """
@@ -21,9 +21,9 @@ def errors_over_runs(axes: Axes, label: str, *, runs: bool = True) -> None:
     axes : Axes
         With its curves drawn.
     label : str
-        What the vertical axis shows, with its unit.
+        Quantity of the vertical axis, with its unit.
     runs : bool
-        Whether to name the horizontal axis: the lowest of several does.
+        Label the horizontal axis as well: on the lowest of several plots.
     """
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")

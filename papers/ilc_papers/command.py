@@ -84,7 +84,7 @@ def reproduce(
         write_json(outcomes, json_file)
         typer.echo(f"figures: {json_file}")
     if report is not None:
-        # Here and not above: matplotlib takes its time, and bad input should not wait for it.
+        # Imported here: matplotlib is slow to import, and bad input should not wait for it.
         from ilc_papers.gallery import write_gallery
 
         make_folder(report)

@@ -1,4 +1,4 @@
-"""The pages of several papers in one folder, and the page that leads to them.
+"""The pages of several papers in one folder, and their index page.
 
 Only the command imports it.
 """
@@ -28,7 +28,7 @@ def write_gallery(outcomes: Sequence[Outcome], folder: Path) -> list[Path]:
     outcomes : sequence of Outcome
         Figures of the papers.
     folder : Path
-        Where to; it is made if it is not there.
+        Output folder; created if missing.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def write_gallery(outcomes: Sequence[Outcome], folder: Path) -> list[Path]:
 
 
 def index_text(outcomes: Sequence[Outcome]) -> str:
-    """Return the page that leads to the papers' pages."""
+    """Return the index of the papers' pages."""
     lines = [
         "# Papers, reproduced",
         "",
@@ -76,7 +76,7 @@ def index_text(outcomes: Sequence[Outcome]) -> str:
 
 
 def counted(outcome: Outcome) -> str:
-    """Return how many of a paper's statements hold, as a sentence."""
+    """Return the number of a paper's statements that hold, as a sentence."""
     judged = [claim.holds for claim in outcome.claims if claim.holds is not None]
     compared = sum(claim.printed is not None for claim in outcome.claims)
     return (

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ilc_papers.paper import Claim, Figures, Paper, Tell
 
-#: Keys of a paper's entry in the file that are no figures of its own.
+#: Keys of a paper's entry in the file that are not its figures.
 ADDED = ("claims", "seconds", "reduced")
 
 
@@ -32,13 +32,13 @@ class Outcome:
     Parameters
     ----------
     paper : Paper
-        Which one.
+        The paper.
     figures : dict
-        What its systems gave, as JSON holds it.
+        Results of its systems, as stored in JSON.
     seconds : float
-        How long that took to compute.
+        Computing time.
     reduced : bool
-        Whether on reduced sizes.
+        True for reduced sizes.
     """
 
     paper: Paper
@@ -67,11 +67,11 @@ def compute(paper: Paper, *, reduced: bool, tell: Tell) -> Outcome:
     Parameters
     ----------
     paper : Paper
-        Which one.
+        The paper.
     reduced : bool
-        Whether on reduced sizes.
+        True for reduced sizes.
     tell : callable
-        Told what is being computed, before it is.
+        Called with the step being computed, before it starts.
     """
     begun_s = time.monotonic()
     figures = paper.compute(reduced, tell)
@@ -98,7 +98,7 @@ def read_json(
     Parameters
     ----------
     path : Path
-        What `write_json` wrote.
+        File written by `write_json`.
     names : sequence of str
         The papers that are wanted.
 

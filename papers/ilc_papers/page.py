@@ -1,4 +1,4 @@
-"""One page of Markdown for one paper: what it is, its printed figures beside ours, pictures.
+"""One page of Markdown per paper: summary, printed figures beside ours, plots.
 
 Made from an outcome alone, whether just computed or read from a file. The gallery imports it.
 """
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 def write_page(outcome: Outcome, folder: Path) -> Path:
-    """Write a paper's page and the pictures beside it.
+    """Write a paper's page and its plots.
 
     Parameters
     ----------
     outcome : Outcome
         Its figures.
     folder : Path
-        Where to; it must be there.
+        Output folder; it must exist.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def write_page(outcome: Outcome, folder: Path) -> Path:
             figure = Figure(figsize=(plots.WIDTH_IN, 3.6))
             picture.draw(outcome.figures, figure)
             try:
-                # Nothing of the program or the day, so that the same figures give the same file.
+                # Without program version or date, so that the same figures give the same file.
                 figure.savefig(target, metadata={"Software": None})
             except OSError as error:
                 message = f"{target}: cannot be written: {error.strerror}"
@@ -64,7 +64,7 @@ def page_name(outcome: Outcome) -> str:
 
 
 def picture_name(outcome: Outcome, stem: str) -> str:
-    """Return the name of one of a paper's pictures."""
+    """Return the name of one of a paper's plots."""
     return f"{outcome.paper.name}-{stem}.png"
 
 

@@ -1,8 +1,8 @@
 """A reproduced paper: how its figures are computed, what it printed, its pictures.
 
 Every paper's own package makes one `Paper`; the command `ilc reproduce` and the gallery import it.
-Claims and pictures are made from the figures alone, so that pages can be made again from a JSON
-file without computing anything.
+Claims and plots are made from the figures alone, so that pages can be regenerated from a JSON file
+without computing anything.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: What a paper's systems gave: numbers, strings and lists under names, as they go to JSON.
+#: Results of a paper's systems: numbers, strings and lists by name, as stored in JSON.
 Figures = dict[str, Any]
 
-#: Told what is being computed, before it is.
+#: Called with the step being computed, before it starts.
 Tell = Callable[[str], None]
 
 
@@ -36,11 +36,11 @@ class Claim:
     unit : str
         SI unit; empty for a ratio.
     source : str
-        Where the paper says it, as "Table 1" or "section 3.4".
+        Place in the paper, such as "Table 1" or "section 3.4".
     holds : bool or None
-        Whether the statement holds here; None for a figure that is only compared.
+        True if the statement holds here; None for a figure that is only compared.
     remark : str
-        What a reader has to know: why it differs, or that it does not follow from the print.
+        Explanation for the reader: why it differs, or that it does not follow from the print.
     """
 
     what: str
@@ -61,14 +61,14 @@ class Claim:
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of a paper, drawn from its figures.
+    """One plot of a paper, drawn from its figures.
 
     Parameters
     ----------
     stem : str
         Name of the file without its ending.
     caption : str
-        One sentence: what is seen, and which figure of the paper it stands for.
+        One sentence: its content, and the figure of the paper that it corresponds to.
     draw : callable
         `draw(figures, figure)` fills an empty matplotlib figure.
     """
@@ -94,7 +94,7 @@ class Paper:
         `compute(reduced, tell)` runs the systems and returns the figures; `reduced` takes fewer
         seeds, runs or samples, for a test.
     claims : callable
-        `claims(figures)` sets the printed figures beside ours.
+        `claims(figures)` compares the printed figures with ours.
     pictures : sequence of Picture
         In the order of the page.
     """

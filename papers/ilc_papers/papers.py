@@ -1,7 +1,7 @@
 """Reproduced papers, by their names on the command line.
 
-A paper's package is imported only when it is asked for, so that one does not wait for another's.
-The command, the workers and the tests import it.
+A paper's package is imported only on request, so that one does not wait for another's. The command,
+the workers and the tests import it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def _package(name: str) -> str:
     return f"ilc_papers.{name.replace('-', '_')}"
 
 
-#: Names of the papers that this installation has, in the order of the gallery.
+#: Names of the installed papers, in the order of the gallery.
 NAMES = tuple(name for name in _ORDER if find_spec(_package(name)) is not None)
 
 

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 class ReproductionView:
-    """Lines that say what is being computed; plain ones if not a terminal.
+    """Lines that show the step being computed; plain ones if not a terminal.
 
     Parameters
     ----------
     console : Console
-        Where to.
+        Output stream.
     """
 
     def __init__(self, console: Console) -> None:
@@ -56,7 +56,7 @@ class ReproductionView:
             self._bar.stop()
 
     def tell(self, name: str, what: str | None) -> None:
-        """Show what of a paper is being computed; None when it is done."""
+        """Show the part of a paper that is being computed; None when it is done."""
         text = "done" if what is None else what
         if not self._console.is_terminal:
             self._console.print(f"{name}: {text}", soft_wrap=True)

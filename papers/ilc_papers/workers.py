@@ -1,6 +1,6 @@
-"""Papers computed two at a time, each in a process of its own.
+"""Papers computed two at a time, each in its own process.
 
-No figure depends on what runs beside it. Only the command imports it.
+No figure depends on concurrent computations. Only the command imports it.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ def compute_side_by_side(
     Parameters
     ----------
     names : sequence of str
-        Which ones.
+        The papers.
     reduced : bool
-        Whether on reduced sizes.
+        True for reduced sizes.
     tell : callable
-        Told the name of a paper and what of it is being computed; None when it is done.
+        Called with the name of a paper and the part being computed; None when it is done.
     load_paper : callable
         Returns a paper by its name; each process calls it.
 
@@ -85,7 +85,7 @@ def compute_side_by_side(
 
 
 def _start(name: str, load_paper: _Load, *, reduced: bool) -> _Worker:
-    # A fresh interpreter for each: a fork would copy threads half-way through their work.
+    # A new interpreter for each: a fork would copy threads in mid-operation.
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(name, load_paper, reduced, theirs))
@@ -104,7 +104,7 @@ def _receive(worker: _Worker) -> tuple[str, Any]:
 
 
 def _work(name: str, load_paper: _Load, reduced: bool, messages: Connection) -> None:  # noqa: FBT001
-    """Compute one paper; the last message is its figures, or why there are none."""
+    """Compute one paper; the last message is its figures, or the error."""
     parent = multiprocessing.parent_process()
 
     def tell(what: str) -> None:
@@ -115,7 +115,7 @@ def _work(name: str, load_paper: _Load, reduced: bool, messages: Connection) -> 
     try:
         outcome = compute(load_paper(name), reduced=reduced, tell=tell)
     except KeyboardInterrupt:
-        # The terminal interrupts the whole group; the parent speaks for all.
+        # The terminal interrupts the whole group; the parent handles it for all.
         raise SystemExit(130) from None
     except Exception as error:
         messages.send(("failed", f"{type(error).__name__}: {error}"))

@@ -1,4 +1,4 @@
-"""Papers that are no papers: quick, broken, silent. Workers load them in processes of their own."""
+"""Dummy papers: quick, broken, silent. Workers load them in separate processes."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def found(name):
     told = []
     figures = section(name).compute(True, told.append)
     assert told
-    # Plain JSON and nothing else, or the pages could not be made again from the file.
+    # Plain JSON only, or the pages could not be regenerated from the file.
     return json.loads(json.dumps(figures, allow_nan=False))
 
 
@@ -126,7 +126,7 @@ def test_noise_is_expected_from_the_covariance():
     assert noise["noise_std"] ** 2 == pytest.approx(1e-6)
     assert rises(noise["expected_rms"][::-1])
     np.testing.assert_allclose(noise["monte_carlo_rms"], noise["expected_rms"], rtol=0.03)
-    # (3.24) counts on the sign of the disturbance changing from run to run, and then is exact.
+    # (3.24) assumes that the sign of the disturbance alternates from run to run, and then is exact.
     assert max(noise["alternating_difference"]) < 1e-7
     assert noise["equation_3_24_rms"][0] > 1.05 * noise["expected_rms"][0]
 
@@ -217,7 +217,7 @@ def test_each_objective_serves_what_it_weighs():
         for name in ("individual", "formation", "combined")
     }
     assert x1["individual"] < x1["combined"] < 0.05 * start
-    # Identical references: doing nothing keeps the formation, and that is all it asks for.
+    # Identical references: a zero input keeps the formation, which is its only objective.
     assert formation["formation"]["largest_input"] < 1e-9
     assert x1["formation"] == pytest.approx(start)
     shape = {
@@ -270,7 +270,7 @@ def test_a_fast_axis_relieves_a_slow_one():
 
 @pytest.mark.parametrize("name", ["raster", "uncertain", "bursts"])
 def test_each_way_of_weighing_in_time_is_there_beside_feedback(name):
-    """The same names in all three sections, one figure a run, feedback without a trend."""
+    """The same names in all three sections, one figure per run, feedback without a trend."""
     ways = [
         found(name)[way]["contour_rms_m"] for way in ("feedback", "time_invariant", "time_varying")
     ]

@@ -1,4 +1,4 @@
-"""Chapters 7 and 8 of [barton2010], reduced: what must come out whatever the print leaves open."""
+"""Chapters 7 and 8 of [barton2010], reduced: results for any choice left open by the print."""
 
 import json
 
@@ -73,7 +73,7 @@ def test_the_linearised_leg_is_the_printed_model():
 def test_individual_learning_serves_every_agent(learned, path):
     for agent in learned[path]["individual"]["agents"]:
         assert fall(agent["tracking_rms_m"]) > 5.0
-    # What the printed filter leaves of it goes too, and the contour error with it.
+    # The rest that passes the printed filter is removed too, and the contour error with it.
     for agent in learned["unfiltered"][path]["individual"]["agents"]:
         assert fall(agent["tracking_rms_m"]) > 30.0
         assert fall(agent["contour_rms_m"]) > 5.0
@@ -87,7 +87,7 @@ def test_coordinated_learning_keeps_the_formation(learned, path, case):
 
 @pytest.mark.parametrize("path", ["raster", "spiral", "disturbed"])
 def test_the_formation_alone_does_not_serve_tracking(learned, path):
-    """Equal references: what all agents share costs nothing, so it stays."""
+    """Equal references: an error common to all agents has no cost, so it stays."""
     for agent in learned[path]["formation"]["agents"]:
         assert fall(agent["tracking_rms_m"]) < 1.5
     for agent in learned[path]["combined"]["agents"]:

@@ -1,4 +1,4 @@
-"""`ilc reproduce`: what it prints, writes and refuses, with papers made for the purpose."""
+"""`ilc reproduce`: its output, files and refusals, with papers made for the purpose."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_all_papers_in_processes_give_the_same_figures_as_one(capsys, tmp_path: 
 def test_pages_from_a_file_are_those_of_the_computation(
     capsys, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """The file is all that a page needs; the pictures are the same byte for byte."""
+    """The file is all that a page needs; the plots are identical byte for byte."""
     file, first, second = tmp_path / "f.json", tmp_path / "first", tmp_path / "second"
     assert main(["reproduce", "all", "--json", str(file), "--report", str(first)]) == 0
     monkeypatch.setattr(reproduce, "_compute", None)
@@ -107,7 +107,7 @@ def test_pages_from_a_file_are_those_of_the_computation(
     index = (first / "index.md").read_text()
     assert "## [two-halves](two-halves.md)" in index
     assert "1 of 2 statements hold; 1 printed figures are compared." in index
-    # A page by itself leaves the index alone.
+    # A single page leaves the index unchanged.
     (first / "index.md").unlink()
     assert main(["reproduce", "one", "--from", str(file), "--report", str(first)]) == 0
     assert not (first / "index.md").exists()

@@ -94,7 +94,7 @@ def test_dpw_goes_on_improving_where_pd_ilc_stays(figures, system):
     assert gain["pd_ilc"] > 0.9
     assert gain["dpw"] < 0.8
     assert gain["dpw_top30"] < 0.6
-    # A run without a learned input is the same whatever the law.
+    # A run without a learned input is the same for all laws.
     first = {found["rms_seed0"][law][0] for law in LAWS}
     assert len(first) == 1
     share = np.array(found["final_relevance"]["share"])
@@ -134,7 +134,7 @@ def test_every_campaign_is_the_same_again():
 def test_claims_and_pictures_come_from_the_figures_alone(figures):
     claims = PAPER.claims(figures)
     assert len({claim.what for claim in claims}) == len(claims)
-    # What does not follow from the print says why.
+    # A statement that does not follow from the print says why.
     assert all(claim.remark for claim in claims if claim.holds is False)
     failing = {claim.what for claim in claims if claim.holds is False}
     assert failing == {

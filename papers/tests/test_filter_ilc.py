@@ -133,7 +133,7 @@ def test_the_switched_filter_helps_where_the_motion_is_fast(filtered: Figures) -
     assert filters.falls(wide["rmse_m"])
     assert wide["fast_rmse_m"] < 0.6 * wide["low_pass"]["fast_rmse_m"]
     assert wide["slow_rmse_m"] < 1.1 * wide["low_pass"]["slow_rmse_m"]
-    # With the paper's lead the fast stretches diverge, and they alone.
+    # With the paper's lead only the fast parts diverge.
     assert not filters.falls(wide["lead_1"]["rmse_m"])
     assert wide["lead_1"]["fast_rmse_m"] > 4.0 * wide["lead_1"]["slow_rmse_m"]
 
@@ -224,7 +224,7 @@ def test_what_does_not_hold_is_known(figures: Figures) -> None:
 
 
 def test_every_picture_draws_something(figures: Figures) -> None:
-    """From the figures alone, as they come back from JSON."""
+    """From the figures alone, as read back from JSON."""
     restored = json.loads(json.dumps(figures, allow_nan=False))
     for picture in PAPER.pictures:
         figure = Figure()

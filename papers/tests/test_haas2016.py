@@ -46,7 +46,7 @@ def test_co_ilc_falls_in_every_run_and_below_pd_ilc(figures: dict[str, Any], nam
     assert (np.diff(co) < 0.0).all()
     assert (co[1:] < pd[1:]).all()
     assert (co[1:] < causal[1:]).all()
-    # The ramp's lag, 2 delta v / w0, is the least that an axis without learning is off by.
+    # The ramp's lag, 2 delta v / w0, is the smallest error of an axis without learning.
     assert co[0] > 0.5 * 0.2 / 157.0
     assert co[50] < 1e-3 * co[0]
 
@@ -111,7 +111,7 @@ def test_each_bound_is_held_and_costs_nothing_where_it_is_not_reached(
     reached = [held["bound_reached"] for held in active.get("bounds", {"": active}).values()]
     assert any(reached)
     assert active["differs_from_free_m"] > 0.0
-    # Learning goes on within any of these bounds.
+    # Learning continues within any of these bounds.
     assert active["co_inf_m"][-1] < 0.5 * free[0]
 
 
@@ -149,7 +149,7 @@ def test_every_statement_but_one_holds(figures: dict[str, Any]) -> None:
 
 
 def test_every_picture_draws_something(figures: dict[str, Any]) -> None:
-    """From the figures alone, as they come back from JSON."""
+    """From the figures alone, as read back from JSON."""
     restored = json.loads(json.dumps(figures, allow_nan=False))
     for picture in PAPER.pictures:
         figure = Figure()

@@ -1,4 +1,4 @@
-"""Analysis before the first run: convergence, weights, and what repeats at all."""
+"""Analysis before the first run: convergence, robustness, weights, and repeatability."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ TEXTS = {
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Analysis:
-    """Prediction of what a law will do with a model.
+    """Predicted convergence and performance of a law on a model.
 
     ``u[j+1] = T u[j] + L_e r`` with ``T = L_u - L_e P``.
 
@@ -51,9 +51,9 @@ class Analysis:
     method : {"dense", "structured"}
         Method of the analysis.
     converges : bool
-        The error converges, without growing beyond all measure before.
+        The error converges, without excessive transient growth.
     monotonic : bool
-        Every run brings the input nearer to its limit.
+        Monotone convergence: every run brings the input nearer to its limit.
     why : str
         The verdict as a sentence with its figures.
     spectral_radius, spectral_radius_error : float
@@ -62,23 +62,22 @@ class Analysis:
         Largest singular value of T, the worst factor of a run, and its uncertainty;
         None where it is not computed.
     transient_growth : float
-        Largest growth of an error before it falls.
+        Transient growth: largest growth of an error before it falls.
     critical_frequency_hz : float or None
-        First frequency in Hz at which a run makes the error grow; None if there is none.
+        First frequency in Hz at which a run amplifies the error; None if there is none.
     learnable_frequency_hz : float or None
-        The same for the law without its filter.
+        The same for the law without its Q-filter.
     robust_factor, robust_lifted : float or None
         Worst factor of a run within the uncertainty over frequency, and its upper
         bound over the whole run.
     uncertainty_allowed : float or None
-        Largest uncertainty, the same at all frequencies, with which the law still
-        converges.
+        Largest frequency-independent uncertainty for which the law still converges.
     initial_error_rms, converged_error_rms : float or None
         RMS error before learning and in the steady state, for the reference given.
     expected_rms_limit : float or None
-        Steady-state expected RMS error under the noise given.
+        Limit of the expected RMS error under the given noise.
     pd_factor : float or None
-        ``|1 - (kp + kd) p_1|`` of a proportional-derivative law.
+        ``|1 - (kp + kd) p_1|`` of a PD-type law.
     pd_gain_range : tuple[float, float] or None
         Range of kp + kd in which that factor is below 1.
     frequency_hz, contraction : ndarray of float64
@@ -86,7 +85,7 @@ class Analysis:
     converged_input, converged_error : ndarray of float64 or None
         Steady state, shape (n_samples, n_inputs or n_outputs); None if not known.
     expected_rms : ndarray of float64
-        Expected RMS error of each run under the noise given; may be empty.
+        Expected RMS error of each run under the given noise; may be empty.
     """
 
     n_samples: int
@@ -132,7 +131,7 @@ class Analysis:
         return figures
 
     def __str__(self) -> str:
-        """Return the verdict and the figures, one a line."""
+        """Return the verdict and the figures, one per line."""
         verdict = "converges in every run" if self.monotonic else "converges, not in every run"
         lines = [f"{verdict if self.converges else 'will not converge'}: {self.why}"]
         for name, text in TEXTS.items():
@@ -151,7 +150,7 @@ class Analysis:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Tuning:
-    """Weights of norm-optimal learning, with the reasons for them.
+    """Weights of norm-optimal ILC, with the reasons for them.
 
     Attributes
     ----------
@@ -162,7 +161,7 @@ class Tuning:
     r : float
         Weight of the change of the input.
     smoothing_hz : float or None
-        Bandwidth in Hz beyond which the learned input holds little but noise.
+        Bandwidth in Hz above which the learned input is mostly noise.
     steps : list of dict
         ``name``, ``what``, ``value`` and ``why`` of each step.
     analysis : Analysis
@@ -199,13 +198,13 @@ class Repeatability:
     spread : ndarray of float64
         Standard deviation from run to run, sample by sample.
     mean_rms : float
-        RMS of the mean error: what learning can remove.
+        RMS of the mean error: the part that learning can remove.
     spread_rms : float
-        RMS of the standard deviation: what it cannot.
+        RMS of the standard deviation: the part that it cannot.
     ratio : float
-        `spread_rms` over `mean_rms`; well below 1 where learning applies.
+        `spread_rms` over `mean_rms`; well below 1 if learning is worthwhile.
     learnable : float
-        Share of the mean square of one run's error that repeats, 0 to 1.
+        Repeatable share of the mean square of one run's error, 0 to 1.
     least_rms : float
         Smallest RMS of any run.
     largest_rms : float
@@ -238,29 +237,29 @@ def analyze(
     noise_std: float | None = None,
     n_runs: int = 20,
 ) -> Analysis:
-    """Say before the first run what a law will do with a model.
+    """Predict the convergence and performance of a law on a model, before the first run.
 
     ``u[j+1] = T u[j] + L_e (r - d[j])`` with ``T = L_u - L_e P``.
 
     Parameters
     ----------
     law : object or dict
-        A law of this package, any object with ``update(u, e, disturbance=None)``,
-        or the weights of norm-optimal learning, as ``{"q": 1.0, "r": 0.1}``.
+        A law of this package, any object with ``update(u, e, disturbance=None)``, or the weights of
+        norm-optimal ILC, e.g. ``{"q": 1.0, "r": 0.1}``.
     model : StateSpace or compatible
-        Sampled model from the learned input to the measurement.
+        Discrete model from the learned input to the measurement.
     n_samples : int or None
-        Samples of a run; None where the law or the reference says.
+        Samples of a run; None if the law or the reference determines them.
     uncertainty : float, array_like or None
-        How far the axes may be from the model, 0.2 for 20 %; an array holds gains
-        at equally spaced frequencies from zero to half the sample rate.
+        Multiplicative model uncertainty, 0.2 for 20 %; an array holds gains at equally spaced
+        frequencies from zero to the Nyquist frequency.
     reference : array_like or None, shape (n_samples,) or (n_samples, n_outputs)
-        Error of a run with input zero: the reference itself where nothing but
-        the learned input moves the axis.
+        Error of a run with input zero: the reference itself if only the learned input moves the
+        axis.
     noise_std : float or None
-        Standard deviation of white noise in the measurement.
+        Standard deviation of white measurement noise.
     n_runs : int
-        Runs for which the expected error is told.
+        Number of runs for which the expected error is computed.
 
     Returns
     -------
@@ -269,23 +268,22 @@ def analyze(
     Raises
     ------
     LearningError
-        If the law is not linear, or something given does not fit.
+        If the law is nonlinear, or an argument does not match it.
     ValueError, TypeError
         If an argument has the wrong shape or kind.
 
     Notes
     -----
-    A law written in Python is tried for linearity, and reset before each of its
-    updates; it should keep nothing from run to run. Of a `Gate` or a `Ladder` the
-    law inside is analysed, with gain 1, of a law with bounds the same law without
-    them: a bound that is reached can only hold the input there. Up to 640 inputs whole
-    matrices are formed, beyond that products with signals; a law written in Python
-    is tried input by input up to 3000 of them, and has no `monotonic_factor` beyond.
+    A law written in Python is tested for linearity, and reset before each of its updates; it should
+    keep no state between runs. For a `Gate` or a `Ladder` the inner law is analysed, with gain 1;
+    for a law with bounds the same law without them: an active bound only holds the input. Up to 640
+    inputs dense matrices are used, beyond that matrix-free products; a law written in Python is
+    analysed column by column up to 3000 inputs, and has no `monotonic_factor` beyond.
 
     References
     ----------
-    [barton2010], Eq. (3.16) to (3.23); [dimarco2016], Eq. (3.4), which is no
-    condition for monotonic convergence: `monotonic_factor` is.
+    [barton2010], Eq. (3.16) to (3.23); [dimarco2016], Eq. (3.4), which is not a condition for
+    monotone convergence: `monotonic_factor` is.
 
     Examples
     --------
@@ -310,18 +308,18 @@ def analyze(
 
 
 def refuse_divergent(law: AnyLaw, model: Model, n_samples: int) -> None:
-    """Refuse a law that will not converge with a model.
+    """Refuse a law that is predicted to diverge on a model.
 
-    The quick part of `analyze`: less than a second up to 60 000 samples. A law
-    written in Python is let through; of a `Gate` or a `Ladder` the law inside is
-    looked at, of a law with bounds the same law without them.
+    The quick part of `analyze`: less than a second up to 60 000 samples. A law written in Python is
+    accepted; for a `Gate` or a `Ladder` the inner law is analysed, for a law with bounds the
+    same law without them.
 
     Parameters
     ----------
     law : object
         The law.
     model : StateSpace or compatible
-        Sampled model from the learned input to the measurement.
+        Discrete model from the learned input to the measurement.
     n_samples : int
         Samples of a run.
 
@@ -333,8 +331,8 @@ def refuse_divergent(law: AnyLaw, model: Model, n_samples: int) -> None:
     Warns
     -----
     UserWarning
-        If the low-pass of the law begins above the frequency from which on the
-        law makes the error grow; both are named.
+        If the cut-off of the law's low-pass is above the critical frequency, above which the law
+        amplifies the error; both are named.
 
     Examples
     --------
@@ -356,26 +354,26 @@ def tune(
     reference: ArrayLike | None = None,
     n_runs: int = 10,
 ) -> Tuning:
-    """Propose the weights of norm-optimal learning, with the reasons.
+    """Propose the weights of norm-optimal ILC, with reasons.
 
-    The guidelines s1 to s4: ``q = 1``; the smallest s that is robust, times 2; r
-    until the error under noise does not get smaller; a check of the result.
+    The guidelines s1 to s4: ``q = 1``; the smallest robust s, times 2; r as long as it reduces the
+    error under noise; a check of the result.
 
     Parameters
     ----------
     model : StateSpace or compatible
-        Sampled model from the learned input to the measurement.
+        Discrete model from the learned input to the measurement.
     n_samples : int
         Samples of a run.
     uncertainty : float, array_like or None
-        How far the axes may be from the model, 0.2 for 20 %; an array holds gains
-        at equally spaced frequencies from zero to half the sample rate.
+        Multiplicative model uncertainty, 0.2 for 20 %; an array holds gains at equally spaced
+        frequencies from zero to the Nyquist frequency.
     noise_std : float or None
-        Standard deviation of white noise in the measurement.
+        Standard deviation of white measurement noise.
     reference : array_like or None, shape (n_samples,) or (n_samples, n_outputs)
         Error of a run with input zero.
     n_runs : int
-        Runs in which learning should be done.
+        Number of runs within which learning should be finished.
 
     Returns
     -------
@@ -384,7 +382,7 @@ def tune(
     Raises
     ------
     LearningError
-        If something given does not fit.
+        If an argument does not match the model.
     ValueError, TypeError
         If an argument has the wrong shape or kind.
 
@@ -426,12 +424,12 @@ def repeatability(errors: ArrayLike) -> Repeatability:
     Returns
     -------
     Repeatability
-        What repeats and what does not: whether learning is worth while.
+        Repeatable and non-repeatable parts of the error.
 
     Raises
     ------
     LearningError
-        If there are fewer than two runs.
+        For fewer than two runs.
     ValueError, TypeError
         If `errors` has the wrong shape, dtype or a number that is not finite.
 

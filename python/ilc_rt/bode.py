@@ -1,4 +1,4 @@
-"""The Bode diagram of an identified axis: measurement, model, coherence, uncertainty."""
+"""Bode plot of an identified axis: measurement, model, coherence, uncertainty."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ def bode(
     bound: NDArray[np.float64],
     title: str = "",
 ) -> Figure:
-    """Draw magnitude, phase, and how far both can be trusted.
+    """Draw magnitude, phase, coherence and uncertainty.
 
     Parameters
     ----------
     frequency_hz : ndarray of float64, shape (n_frequencies,)
         Frequencies in Hz.
     response, model : ndarray of complex128, shape (n_frequencies,)
-        What was measured, and what the model says.
+        Measured and modelled response.
     coherence, bound : ndarray of float64, shape (n_frequencies,)
         Coherence, and the bound of the multiplicative uncertainty.
     title : str
-        What is drawn.
+        Title of the plot.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 6.4))
         magnitude, phase, trust = figure.subplots(3, 1, sharex=True, height_ratios=(2, 2, 1.4))
-        # The model's phase is drawn where the measured one is: turns mean nothing.
+        # The model's phase is drawn near the measured one: whole turns are arbitrary.
         shown_deg = np.degrees(np.unwrap(np.angle(response)))
         model_deg = np.degrees(np.unwrap(np.angle(model)))
         model_deg += 360.0 * np.round(np.median(shown_deg - model_deg) / 360.0)
@@ -66,7 +66,7 @@ def bode(
 
 
 def _decibels(response: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return the magnitude in dB; NaN, which is not drawn, where it is 0."""
+    """Return the magnitude in dB; NaN, which is not drawn, for 0."""
     size = np.abs(response)
     found = 20.0 * np.log10(np.where(size > 0.0, size, 1.0))
     return np.where(size > 0.0, found, np.nan)

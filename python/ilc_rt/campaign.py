@@ -1,4 +1,4 @@
-"""A campaign: the same program again and again, each run better than the last."""
+"""A campaign: the same program repeatedly, each run better than the last."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ class Campaign:
     cell : path or Cell
         The cell description.
     law : object or None
-        A learning law with ``update(u, e, disturbance=None)``; None for the
-        law that the cell names. A law written in Python makes the controller
-        run inside this process; it is called between runs, never in the loop.
+        A learning law with ``update(u, e, disturbance=None)``; None for the cell's own law. With a
+        law written in Python the controller runs inside this process; the law is called between
+        runs, never in the loop.
     library : path
         Library file that every run is stored in.
     bus : str or None
@@ -67,12 +67,11 @@ class Campaign:
         Pace the loop by the drives' answers, without a wall clock. None means
         yes for ``loopback:``, no for every other bus.
     drives : {"auto", "simulated", "external"}
-        Whether to start simulated drives. "auto" never does so on a CAN bus,
-        where real ones may be listening.
+        Start simulated drives. "auto" never does so on a CAN bus, where real ones may be listening.
     resume : bool
         Resume the newest campaign of this cell, program, measurement and law.
     learning : bool
-        Learn; if not, every run is like the first.
+        Learn; otherwise every run is like the first.
     disturbance : callable, array_like of float64 or None
         Measured disturbance before each run, e.g. a temperature: stored with
         the run, and given to the law for the next run. Either one row per run,
@@ -80,31 +79,29 @@ class Campaign:
         number (from 0) that is called while the axes return. The controller
         then runs inside this process.
     allow_divergent : bool
-        Start the law even if the analysis predicts divergence. A law written
-        in Python is not analysed: it always starts. Of a `Gate` or a `Ladder`
-        the law inside is analysed.
+        Start the law even if the analysis predicts divergence. A law written in Python is not
+        analysed: it always starts. For a `Gate` or a `Ladder` the inner law is analysed.
     telemetry : bool
         Publish on Zenoh; never with ``loopback:``.
 
     Raises
     ------
     CampaignError
-        If the cell, the bus or a program cannot be used.
+        If the cell, the bus or a program is unusable.
     BadInputError
-        If the law will not converge with the cell's model.
+        If the law is predicted to diverge on the cell's model.
 
     Warns
     -----
     UserWarning
-        If the law's low-pass begins above the frequency from which on the law
-        makes the error grow, or the error of the cell's own law will rise
-        before it falls; not with `allow_divergent`.
+        If the cut-off of the law's low-pass is above the critical frequency, above which the law
+        amplifies the error, or the error of the cell's own law will rise before it falls; not with
+        `allow_divergent`.
 
     Notes
     -----
-    The controller restores the best input when the error grows, unless the law
-    is a `Gate`, which does so by itself. It tells any other law that has a
-    method ``taken_back()``.
+    The controller restores the best input when the error grows (rollback), unless the law is a
+    `Gate`, which decides on its own. It notifies any other law that has a method ``taken_back()``.
 
     Examples
     --------
@@ -135,7 +132,7 @@ class Campaign:
         if isinstance(cell, Cell):
             self.cell = cell
         else:
-            # The cell's own law does not matter if another one is given.
+            # The cell's own law is irrelevant if another one is given.
             self.cell = load_cell(cell, allow_divergent=allow_divergent or law is not None)
         self.allow_divergent = allow_divergent
         self.law = law
@@ -156,7 +153,7 @@ class Campaign:
         self.resume = resume
         self.learning = learning
         self.telemetry = telemetry
-        # Excitation in place of the program, if an axis is to be identified.
+        # Excitation in place of the program, for an identification.
         self.experiment: Experiment | None = None
         self.disturbance = disturbance
         self.result = CampaignResult(self.library)
@@ -167,13 +164,13 @@ class Campaign:
             raise BadInputError(message)
 
     def run(self, iterations: int) -> Iterator[IterationRecord]:
-        """Run the program and yield one record a run, as it is completed.
+        """Run the program and yield one record per run, as it is completed.
 
         Parameters
         ----------
         iterations : int
-            Runs in the whole campaign, at least 1, those before a `resume`
-            included; the first is without learning.
+            Runs in the whole campaign, at least 1, including those before a `resume`; the first is
+            without learning.
 
         Raises
         ------
@@ -190,8 +187,8 @@ class Campaign:
     def events(self, iterations: int) -> Generator[Event, None, None]:
         """Run the program and yield every event of the controller.
 
-        Leaving the loop early stops the axes in a controlled way before this
-        iterator is closed. Parameters and errors are those of `run`.
+        Leaving the loop early is a controlled stop of the axes before this iterator is closed.
+        Parameters and errors are those of `run`.
         """
         verb, words = self._command(iterations)
         try:
@@ -217,10 +214,9 @@ class Campaign:
         stop.raise_received()
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
-        """Ask the running controller for a controlled stop.
+        """Request a controlled stop of the running controller.
 
-        For signal handlers and other threads; the events go on until the
-        axes are at rest.
+        For signal handlers and other threads; events continue until the axes are at rest.
         """
         if self._controller is not None:
             self._controller.interrupt(number)
@@ -286,12 +282,12 @@ def load_cell(path: str | Path, *, allow_divergent: bool = False) -> Cell:
     path : path
         The TOML file.
     allow_divergent : bool
-        Whether its law is accepted also if it will not converge.
+        Accept a law even if it is predicted to diverge.
 
     Raises
     ------
     BadInputError
-        With file, key, value and what is allowed.
+        With file, key, value and the allowed values.
     """
     try:
         return Cell.load(path, allow_divergent=allow_divergent)
@@ -302,7 +298,7 @@ def load_cell(path: str | Path, *, allow_divergent: bool = False) -> Cell:
 def _measure(
     disturbance: Callable[[int], ArrayLike] | ArrayLike | None, iterations: int
 ) -> Callable[[int], ArrayLike] | None:
-    """Return a function that gives the disturbance of each run."""
+    """Return a function that returns the disturbance of each run."""
     if disturbance is None or callable(disturbance):
         return disturbance
     rows = np.asarray(disturbance)

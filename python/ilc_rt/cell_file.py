@@ -1,4 +1,4 @@
-"""Changes of a cell description that leave everything else in it as it was written."""
+"""Edits of a cell description that preserve the rest of the file."""
 
 from __future__ import annotations
 
@@ -21,30 +21,29 @@ BOM = "\ufeff"
 
 
 def write_values(path: str | Path, tables: Mapping[str, Mapping[str, float]]) -> bool:
-    """Put numbers into tables of a cell description, in one step.
+    """Set numbers in tables of a cell description, atomically.
 
-    Comments, order and spelling of everything else stay. The file is replaced
-    only by one that the controller accepts.
+    Comments, order and spelling of everything else are preserved. The file is only replaced by one
+    that the controller accepts.
 
     Parameters
     ----------
     path : path
         The cell description.
     tables : mapping
-        The numbers by key, by table, as ``learning.norm_optimal``; a table that
-        is not there is made.
+        The numbers by key, by table, e.g. ``learning.norm_optimal``; a missing table is created.
 
     Returns
     -------
     bool
-        Whether anything changed.
+        True if anything changed.
 
     Raises
     ------
     BadInputError
         If the file cannot be read or written, or would not be accepted.
     """
-    # A link stays a link: what it points to is replaced.
+    # A link stays a link: its target is replaced.
     place = Path(path).resolve()
     try:
         text = place.read_bytes().decode("utf-8")
@@ -66,12 +65,12 @@ def write_values(path: str | Path, tables: Mapping[str, Mapping[str, float]]) ->
 
 
 def changed_text(text: str, section: str, values: Mapping[str, float], name: str) -> str:
-    """Return a TOML text with numbers put into a table.
+    """Return a TOML text with numbers set in a table.
 
     Raises
     ------
     BadInputError
-        If the text is not TOML, or something else has the table's name.
+        If the text is not TOML, or the table's name is in use for something else.
     """
     try:
         document = tomlkit.parse(text)
@@ -101,10 +100,10 @@ def _is_equal(found: object, value: float) -> bool:
 
 
 def _replace(place: Path, text: str, name: str) -> None:
-    """Replace a file by one that the controller accepts, or leave it."""
+    """Replace a file by one that the controller accepts, or leave it unchanged."""
     draft: str | None = None
     try:
-        # In the same folder: what it names lies beside it, and a move within one is one step.
+        # In the same folder: files that it names are there, and a rename within a folder is atomic.
         handle, draft = tempfile.mkstemp(prefix=f".{place.stem}-", suffix=".toml", dir=place.parent)
         with os.fdopen(handle, "wb") as file:
             file.write(text.encode("utf-8"))

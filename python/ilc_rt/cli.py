@@ -1,4 +1,4 @@
-"""The program `ilc`: run, look at and keep what the machine learned."""
+"""The program `ilc`: run, inspect and store what the machine has learned."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def options(
         ),
     ] = False,
 ) -> None:
-    """Take the options that stand before the verb."""
+    """Handle the options before the verb."""
 
 
 app.command("demo")(demo.demo)
@@ -104,7 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as error:
         return error.code if isinstance(error.code, int) else EXIT_FAILURE
     except BrokenPipeError:
-        # The reader has gone, as in `ilc library list | head`; nothing is left to say.
+        # The output is closed, as in `ilc library list | head`; there is nothing left to print.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
     except Exception as error:
@@ -115,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _unexpected(error: Exception) -> int:
-    """Report a wrong command line, or what nobody thought of."""
+    """Report an invalid command line, or an unexpected error."""
     format_message = getattr(error, "format_message", None)
     if callable(format_message):
         context = getattr(error, "ctx", None)

@@ -1,7 +1,7 @@
-"""What is shown of the runs of a campaign, and by which error they are compared.
+"""Displayed errors of a campaign's runs, and the error by which they are compared.
 
-Runs are compared by their contour error where their path has one, else by
-their tracking error. Lengths and angles are never put into one figure.
+Runs are compared by their contour error if their path has one, else by their tracking error.
+Lengths and angles are never combined in one figure.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
     Figure = Callable[[IterationRecord], "float | None"]
 
-# The best run is worth a word if it is this much better than the last.
+# The best run is mentioned if it is this much better than the last.
 BEST_SHARE = 0.9
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """An error of every run, and the unit it is shown in."""
+    """An error of every run, with its display unit."""
 
     name: str
     unit: Unit
@@ -33,7 +33,7 @@ class Column:
 
     @property
     def heading(self) -> str:
-        """What stands above it: ``"max tracking µm"``."""
+        """Heading: ``"max tracking µm"``."""
         return f"{self.name} {self.unit.symbol}"
 
     def cell(self, record: IterationRecord) -> str:
@@ -50,7 +50,7 @@ class Comparison:
     records : sequence of IterationRecord
         The runs in their order, at least one.
     units : sequence of str
-        What each axis is measured in, ``"m"`` or ``"rad"``; all linear if empty.
+        Unit of each axis, ``"m"`` or ``"rad"``; all linear if empty.
     """
 
     records: Sequence[IterationRecord]
@@ -58,17 +58,17 @@ class Comparison:
 
     @property
     def first(self) -> IterationRecord:
-        """The run that the others are compared with."""
+        """The reference run of the comparison."""
         return self.records[0]
 
     @property
     def is_mixed(self) -> bool:
-        """Whether there are linear and rotary axes side by side."""
+        """True if there are both linear and rotary axes."""
         return len(set(self.units)) > 1
 
     @property
     def by_contour(self) -> bool:
-        """Whether the runs are compared by their contour error."""
+        """True if the runs are compared by their contour error."""
         there = all(record.contour_inf_m is not None for record in self.records)
         return there and (self.first.contour_inf_m or 0.0) > 0.0
 
@@ -78,17 +78,17 @@ class Comparison:
         return record.tracking_inf_m if contour_m is None else contour_m
 
     def size(self, of: Figure) -> float:
-        """Return the largest of an error over the runs: its unit suits it."""
+        """Return the largest value of an error over the runs, which determines its unit."""
         errors = (of(record) for record in self.records)
         return max((e for e in errors if e is not None and math.isfinite(e)), default=0.0)
 
     def errors(self, *, rms: bool = True) -> list[Column]:
-        """Return the errors that are shown of every run.
+        """Return the displayed errors of every run.
 
         Parameters
         ----------
         rms : bool
-            Whether root mean squares are among them.
+            Include RMS errors.
         """
         columns = self.tracking(rms=rms)
         if self.first.contour_inf_m is not None:
@@ -100,7 +100,7 @@ class Comparison:
         return columns
 
     def tracking(self, *, rms: bool = True) -> list[Column]:
-        """Return the tracking errors that are shown: of linear and rotary axes apart."""
+        """Return the displayed tracking errors: of linear and rotary axes separately."""
         if not self.is_mixed:
             base = self.units[0] if self.units else "m"
             unit = unit_for(base, self.size(lambda record: record.tracking_inf_m))
@@ -118,7 +118,7 @@ class Comparison:
         return columns
 
     def sentence(self) -> str:
-        """Say in one plain sentence what was learned."""
+        """Return the result of learning as a sentence."""
         if self.by_contour:
             unit = unit_for("m", self.size(self.compared))
             return f"Contour error {self._course(Column('', unit, self.compared))}."
@@ -135,9 +135,9 @@ class Comparison:
         return f"Tracking error {', '.join(parts)} within {self._count()}."
 
     def remarks(self) -> list[str]:
-        """Return what decided on the next input where it was not learning alone, a line each.
+        """Return the decisions on inputs other than learning, one per line.
 
-        What is remarked on one run after the other stands once.
+        A remark repeated in consecutive runs appears once.
         """
         before: str | None = None
         lines = []
@@ -166,15 +166,15 @@ class Comparison:
 
 
 def remark_on(record: IterationRecord) -> str | None:
-    """Return what decided on the input after a run, if it was not learning alone."""
+    """Return the decision on the input after a run, unless it was learning."""
     if record.remark:
         return record.remark
-    # Kept by a version that did not say why.
+    # Stored by a version without reasons.
     return "the error grew: the best input is restored" if record.rolled_back else None
 
 
 def note(record: IterationRecord) -> str:
-    """Return what became of a run in a few words, for a column of a table."""
+    """Return the outcome of a run in a few words, for a column of a table."""
     said = ("rolled back", record.rolled_back), ("learning off", record.learning_off)
     return ", ".join(words for words, holds in said if holds)
 

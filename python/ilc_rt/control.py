@@ -1,7 +1,6 @@
-"""Controllers as the loop runs them, tick by tick: PID, cascade, cross-coupled.
+"""Controllers as in the loop, tick by tick: PID, cascade, cross-coupled.
 
-Each has the methods of the compiled class that it derives from: `step` for one tick, and
-`reset` to start again from rest.
+Each has the methods of its native base class: `step` for one tick, and `reset` to return to rest.
 """
 
 from __future__ import annotations
@@ -17,9 +16,9 @@ __all__ = ["Cascade", "CrossCoupled", "Pid"]
 
 
 class Pid(_native.Pid):
-    """PID controller with a filtered derivative and anti-windup.
+    """PID controller with derivative filter, output saturation and anti-windup.
 
-    ``u[k] = kp e[k] + ki dt sum(e[:k]) + kd (de/dt)[k]``, cut to +-output_max
+    ``u[k] = kp e[k] + ki dt sum(e[:k]) + kd (de/dt)[k]``, saturated at +-output_max
 
     Parameters
     ----------
@@ -32,17 +31,17 @@ class Pid(_native.Pid):
     dt_s : float
         Sample time in s.
     derivative : {"difference", "delayed", "filtered"}
-        ``(e[k] - e[k-1]) / dt``, the same one sample late, or ``s / (T s + 1)``,
-        exact for an error that is held over the sample.
+        ``(e[k] - e[k-1]) / dt``, the same delayed by a sample, or ``s / (T s + 1)``, discretised
+        with a zero-order hold.
     filter_s : float
-        T of the filtered derivative in s.
+        Time constant T of the filtered derivative in s.
     output_max : float or None
-        Largest output, either way.
+        Output limit, symmetric.
 
     Raises
     ------
     ValueError
-        If a number is not finite, or a time or limit is not above 0.
+        If a number is not finite, or a time or limit is not positive.
 
     References
     ----------
@@ -80,7 +79,7 @@ class Pid(_native.Pid):
 
 
 class Cascade(_native.Cascade):
-    """Cascade of proportional position and proportional-integral velocity control.
+    """Cascade of P position control and PI velocity control.
 
     ``v* = kv (r - y) + f r'``, ``F = kp (v* - y') + kp dt / Tn sum(v* - y') + m r''``
 
@@ -91,20 +90,20 @@ class Cascade(_native.Cascade):
     velocity_gain_n_s_m : float
         kp in N s/m.
     integral_time_s : float or None
-        Tn in s; None for no integral part.
+        Integral time Tn in s; None switches the integral off.
     dt_s : float
         Sample time in s.
     velocity_feedforward : float
-        f, the share of the reference velocity that is fed forward.
+        Velocity feed-forward f: share of the reference velocity.
     acceleration_feedforward_kg : float
-        m, the mass that is fed forward.
+        Acceleration feed-forward m: the moving mass.
     velocity_max_m_s, force_max_n : float or None
         Limits.
 
     Raises
     ------
     ValueError
-        If a number is not finite, or a time or limit is not above 0.
+        If a number is not finite, or a time or limit is not positive.
 
     References
     ----------
@@ -150,7 +149,7 @@ class CrossCoupled(_native.CrossCoupled):
     Parameters
     ----------
     controller : Pid
-        Controller of the contour error; a copy of it is taken, at rest.
+        Controller of the contour error; it is copied, at rest.
 
     References
     ----------

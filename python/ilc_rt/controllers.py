@@ -30,13 +30,13 @@ class Controller(Protocol):
     """A controller that is about to run."""
 
     def lines(self) -> Iterator[str]:
-        """Yield one event a line until the controller ends."""
+        """Yield one event per line until the controller ends."""
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
-        """Ask for a controlled stop; `lines` goes on until it has happened."""
+        """Request a controlled stop; `lines` continues until the axes are at rest."""
 
     def failure(self) -> CampaignError | None:
-        """Return why the controller ended, if not by finishing."""
+        """Return the reason for the controller's end; None if it finished."""
 
     def close(self) -> None:
         """Stop the axes if they still move, then end and reap everything."""
@@ -71,7 +71,7 @@ class ProcessController:
             raise
 
     def lines(self) -> Iterator[str]:
-        """Yield one event a line until the controller ends."""
+        """Yield one event per line until the controller ends."""
         with selectors.DefaultSelector() as selector:
             selector.register(self._controller, selectors.EVENT_READ)
             if self._drives is not None:
@@ -83,7 +83,7 @@ class ProcessController:
                     program.receive()
                     if program.at_end:
                         selector.unregister(program)
-                        # The controller sees the silence itself; this only bounds the wait.
+                        # The controller detects the silence; this only bounds the wait.
                         self._must_stop_within(DRIVES_DIED_DEADLINE_S)
                 while self._controller.lines:
                     yield self._controller.lines.pop(0)
@@ -93,12 +93,12 @@ class ProcessController:
                     raise self._with_cause(CampaignError(message))
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
-        """Ask for a controlled stop; `lines` goes on until it has happened."""
+        """Request a controlled stop; `lines` continues until the axes are at rest."""
         self._controller.signal(number)
         self._must_stop_within(STOP_DEADLINE_S)
 
     def failure(self) -> CampaignError | None:
-        """Return why the controller ended, if not by finishing."""
+        """Return the reason for the controller's end; None if it finished."""
         if not self._controller.at_end:
             return None
         error = self._controller.failure()
@@ -123,7 +123,7 @@ class ProcessController:
             self._stop_by = time.monotonic() + seconds
 
     def _with_cause(self, error: CampaignError) -> CampaignError:
-        """Add that the simulated drives died, if they did."""
+        """Add the death of the simulated drives, if they died."""
         if self._drives is None or self._drives.returncode is None:
             return error
         cause = self._drives.failure().reason
@@ -154,7 +154,7 @@ class InProcessController:
         self._stream: EventStream | None = None
 
     def lines(self) -> Iterator[str]:
-        """Yield one event a line until the controller ends."""
+        """Yield one event per line until the controller ends."""
         try:
             self._stream = run_events(**self._options)
             if self._asked is not None:
@@ -169,13 +169,13 @@ class InProcessController:
             self._error.__cause__ = raised
 
     def interrupt(self, number: int = signal.SIGINT) -> None:
-        """Ask for a controlled stop; `lines` goes on until it has happened."""
+        """Request a controlled stop; `lines` continues until the axes are at rest."""
         self._asked = number
         if self._stream is not None:
             self._stream.stop(number)
 
     def failure(self) -> CampaignError | None:
-        """Return why the controller ended, if not by finishing."""
+        """Return the reason for the controller's end; None if it finished."""
         return self._error
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""How far a run left the programmed path, as a vector at every sample."""
+"""Deviation of a run from the programmed path, as a vector at every sample."""
 
 from __future__ import annotations
 
@@ -19,9 +19,8 @@ def path_deviation(
 ) -> Array:
     """Return the shortest vector from the path to each measured position.
 
-    Lag along the path is no deviation: only what is normal to the path
-    counts. The nearest point is sought among the reference's segments near
-    the same time, so a path that crosses itself is not confused.
+    Lag along the path is not a deviation: only the normal component counts. The nearest point is
+    searched among the reference's segments near the same time, so that a path may cross itself.
 
     Parameters
     ----------
@@ -30,7 +29,7 @@ def path_deviation(
     measured_m : ndarray of float64, shape (n_samples, n_axes)
         Measured positions in m.
     window_samples : int
-        How far before and after a sample the nearest point is sought.
+        Samples before and after, within which the nearest point is searched.
 
     Returns
     -------
@@ -74,14 +73,14 @@ def path_deviation(
 
 
 def magnification(largest_m: float, extent_m: float, share: float = 0.12) -> int:
-    """Return the round factor at which the largest deviation is well seen.
+    """Return the round factor that magnifies the largest deviation visibly.
 
     Parameters
     ----------
     largest_m, extent_m : float
         Largest deviation and size of the picture, in m.
     share : float
-        The part of the picture that the largest deviation may take.
+        Largest share of the picture for the largest deviation.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Errors that a person can act on: one line, and what the program exits with."""
+"""Errors for users: one line, and the exit code of the program."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class CampaignError(RuntimeError):
     Parameters
     ----------
     reason : str
-        One line for people.
+        One readable line.
     exit_code : int
         2 for bad input, 3 for a controlled stop after a fault, 1 otherwise.
 
@@ -37,19 +37,19 @@ class FaultError(CampaignError):
     Parameters
     ----------
     reason : str
-        One line for people.
+        One readable line.
     exit_code : int
-        What the program exits with.
+        Exit code of the program.
     kind : str
-        Cause, as ``"following_error"``; `docs/events.schema.json` lists all.
+        Cause, e.g. ``"following_error"``; `docs/events.schema.json` lists all.
     axis, node : str or None, int or None
-        Where, if it is one axis or node.
+        Axis and node, if it concerns a single one.
     code : int or None
-        Number that the kind says, as an emergency code.
+        Number defined by the kind, e.g. an emergency code.
     value, limit, unit : float or None, float or None, str or None
-        What was found, and the limit that it exceeds.
+        Value found, and the limit exceeded.
     cycles : object or None
-        The last servo cycles before the stop, a `ilc_rt.events.LastCycles`.
+        The last servo cycles before the stop, an `ilc_rt.events.LastCycles`.
 
     Examples
     --------
@@ -78,7 +78,7 @@ class FaultError(CampaignError):
 
 
 class BadInputError(CampaignError):
-    """A file, an option or a value that cannot be used."""
+    """An unusable file, option or value."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason, EXIT_BAD_INPUT)

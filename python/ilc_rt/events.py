@@ -1,7 +1,7 @@
-"""What the controller says while it runs, as typed events.
+"""Events of the running controller, as typed classes.
 
-``ilc-rt run --events`` prints one JSON object a line, and publishes the same
-objects on Zenoh. `parse_event` turns one of them into one of the classes here.
+``ilc-rt run --events`` prints one JSON object per line, and publishes the same objects on Zenoh.
+`parse_event` converts them to the classes here.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class EventError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class RealTimeReport:
-    """What the operating system granted to the servo thread."""
+    """Real-time settings granted to the servo thread by the operating system."""
 
     policy: str = ""
     priority: int = 0
@@ -30,7 +30,7 @@ class RealTimeReport:
 
 @dataclass(frozen=True, slots=True)
 class Histogram:
-    """Quantiles and counts of a time, in microseconds.
+    """Quantiles and counts of a duration, in microseconds.
 
     `bins` holds ``(upper bound, count)`` pairs, lowest first.
     """
@@ -44,10 +44,10 @@ class Histogram:
 
 @dataclass(frozen=True, slots=True)
 class StartEvent:
-    """The campaign begins; everything that stays the same while it lasts.
+    """Start of a campaign, with everything that is constant during it.
 
-    `iterations` counts all runs of the campaign, also those before
-    `first_index` that a resumed one has behind it.
+    `iterations` counts all runs of the campaign, including those before `first_index` of a resumed
+    one.
     """
 
     name: ClassVar[str] = "start"
@@ -69,7 +69,7 @@ class StartEvent:
 
 @dataclass(frozen=True, slots=True)
 class StateEvent:
-    """The campaign entered a state, as ``"running"`` or ``"returning"``."""
+    """The campaign entered a state, e.g. ``"running"`` or ``"returning"``."""
 
     name: ClassVar[str] = "state"
     state: str
@@ -78,7 +78,7 @@ class StateEvent:
 
 @dataclass(frozen=True, slots=True)
 class ProgressEvent:
-    """How far the run has come."""
+    """Progress of the run."""
 
     name: ClassVar[str] = "progress"
     iteration: int
@@ -102,7 +102,7 @@ class IterationEvent(Figures):
 
 @dataclass(frozen=True, slots=True)
 class JudgedEvent:
-    """What the law decided on a run that was told already, as it computed meanwhile."""
+    """Decision of the law on a run that was already published, as it was still computing."""
 
     name: ClassVar[str] = "judged"
     id: int
@@ -114,7 +114,7 @@ class JudgedEvent:
 
 @dataclass(frozen=True, slots=True)
 class LatencyEvent:
-    """How late the servo loop woke and how long it computed."""
+    """Wake-up latency and execution time of the servo loop."""
 
     name: ClassVar[str] = "latency"
     wake_late_us: Histogram
@@ -123,9 +123,9 @@ class LatencyEvent:
 
 @dataclass(frozen=True, slots=True)
 class LastCycles:
-    """Servo cycles before a stop, oldest first; one row a cycle, one column an axis.
+    """Servo cycles before a stop, oldest first; one row per cycle, one column per axis.
 
-    `missing` is True for a cycle whose measurement has not come.
+    `missing` is True for a cycle whose measurement has not arrived.
     """
 
     first_sync: int | None
@@ -138,11 +138,11 @@ class LastCycles:
 
 @dataclass(frozen=True, slots=True)
 class FaultEvent:
-    """Why the axes are being stopped: a sentence, and the same in fields.
+    """Reason of a stop of the axes: a sentence, and the same in fields.
 
-    `kind` is the cause, as ``"following_error"``; `axis` and `node` say where,
-    `code` is the number that the kind says, as an emergency code, `value` what
-    was found and `limit` what is allowed, in `unit`.
+    `kind` is the cause, e.g. ``"following_error"``; `axis` and `node` give the place, `code` is a
+    number defined by the kind, e.g. an emergency code, `value` is the value found and `limit` the
+    allowed one, in `unit`.
     """
 
     name: ClassVar[str] = "fault"
@@ -207,8 +207,7 @@ def parse_event(line: str | bytes) -> Event | None:
     Returns
     -------
     Event or None
-        None for a kind of event that this version does not know, so that a
-        newer controller can still be followed.
+        None for an unknown kind of event, so that a newer controller can still be followed.
 
     Raises
     ------

@@ -16,7 +16,7 @@ class Experiment:
     axis : str
         Name of the axis.
     waveform : {"sweep", "linear-sweep", "multisine"}
-        A sine of rising frequency, or all harmonics of the period at once.
+        Swept sine, or multisine with all harmonics of the period.
     from_hz, to_hz : float
         Band in Hz.
     period_s : float
@@ -24,7 +24,7 @@ class Experiment:
     periods : int
         Evaluated periods.
     amplitude : float or None
-        Peak in the unit of the input; half of what the limits allow if None.
+        Peak in the unit of the input; half of the largest possible one if None.
     at_m : float or None
         Position that the axis is excited around; the program's start if None.
 

@@ -1,4 +1,4 @@
-"""Take one run out of the library into a file of another kind."""
+"""Export of a run from the library to a file of another format."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from ilc_rt.text import NAME_MAX, printable
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# Characters of a value at the head of a table; a program or a law may have many.
+# Largest number of characters of a value in a table's header; a program or a law may be long.
 VALUE_MAX = 1_000_000
 FORMATS = (".npz", ".csv", ".json")
 
 
 def export_run(row: Mapping[str, Any], path: str | Path) -> None:
-    """Write a run as ``.npz``, ``.csv`` or ``.json``, by the file's ending.
+    """Write a run as ``.npz``, ``.csv`` or ``.json``, by the file's suffix.
 
     Parameters
     ----------
     row : mapping
-        What `Library.load` returns.
+        Result of `Library.load`.
     path : path
-        The file. npz and json hold everything; csv holds the signals, one
-        sample a line, and the rest as comments at its head.
+        The file. npz and json hold everything; csv holds the signals, one sample per line, and the
+        rest as comments in its header.
 
     Raises
     ------
     BadInputError
-        If the ending is unknown or the file cannot be written.
+        If the suffix is unknown or the file cannot be written.
     """
     target = Path(path)
     if target.suffix not in FORMATS:
@@ -52,7 +52,7 @@ def export_run(row: Mapping[str, Any], path: str | Path) -> None:
     if target.suffix == ".npz":
         _write_npz(target, signals, rest)
     elif target.suffix == ".csv":
-        # One value a run, not one a sample: it stands at the head.
+        # One value per run, not per sample: it is in the header.
         disturbance = signals.pop("disturbance", None)
         rest["disturbance"] = None if disturbance is None else disturbance.tolist()
         write_text(target, _csv_text(signals, rest))

@@ -19,10 +19,10 @@ class Figures:
     tracking_rms_m : float
         RMS over time of the Euclidean norm of the tracking error.
     contour_inf_m : float | None
-        Largest distance of the tool from the reference path; absent where the path has
-        no contour.
+        Largest contour error: distance of the tool from the reference path; absent if
+        the path has no contour.
     contour_rms_m : float | None
-        RMS of that distance.
+        RMS of the contour error.
     axes_tracking_inf_m : tuple[float, ...]
         Largest absolute tracking error of each axis, in its own unit.
     axes_tracking_rms_m : tuple[float, ...]
@@ -33,22 +33,22 @@ class Figures:
         Largest absolute tracking error of any axis at the tool; absent without such a
         measurement.
     overruns : int
-        Servo cycles that began a whole cycle late or more.
+        Servo cycles that began at least a whole cycle late.
     missing_samples : int
-        Samples whose measurement never arrived; the last one known stands in for them.
+        Samples whose measurement never arrived; the last known one stands in for them.
     late_updates : int
         Runs so far that repeated the old input because the learning update was late.
     update_ms : float
-        Time of the learning update that made the input of this run; 0 without one.
+        Computing time of the learning update for this run's input; 0 without one.
     rolled_back : bool
-        True if the error had grown so far that the best input was restored after this
-        run.
+        True if the best input was restored after this run (rollback), as the error had
+        grown.
     learning_off : bool
         True if nothing was learned from this run and learning is off, as the error had
         grown.
     remark : str | None
-        Reason of the decision on the next input, where the law alone did not decide;
-        one sentence.
+        Reason of the decision on the next input, unless the law alone decided; one
+        sentence.
     """
 
     tracking_inf_m: float

@@ -25,7 +25,7 @@ __all__ = [
 
 
 def _frequencies(frequency_hz: ArrayLike) -> NDArray[np.float64]:
-    """Return finite frequencies with one axis."""
+    """Return a one-dimensional array of finite frequencies."""
     given = np.zeros(np.shape(frequency_hz))
     checked = _native.check_response(
         frequency_hz=frequency_hz, response=given, coherence=None, n_averages=1.0
@@ -37,7 +37,7 @@ class _Fit:
     """A fitted model with delay."""
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Return the response of the model, delay included.
+        """Return the response of the model, including the delay.
 
         Parameters
         ----------
@@ -60,8 +60,8 @@ class _Fit:
 class SecondOrderFit(_Fit):
     """Fitted second-order model with delay.
 
-    ``G(s) = K w0^2 / (s^2 + 2 delta w0 s + w0^2) exp(-s tau)``, behind a
-    zero-order hold if sampled. What is known beforehand has the deviation 0.
+    ``G(s) = K w0^2 / (s^2 + 2 delta w0 s + w0^2) exp(-s tau)``, behind a zero-order hold if
+    discrete. Known parameters have the deviation 0.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class SecondOrderFit(_Fit):
     delay_samples: int
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Return the response of the model, delay included."""
+        """Return the response of the model, including the delay."""
         return _native.second_order_response(frequency_hz, **vars(self))
 
     def state_space(self) -> StateSpace:
@@ -111,12 +111,12 @@ class SecondOrderFit(_Fit):
         Returns
         -------
         StateSpace
-            Sampled with `delay_samples` of delay, or continuous without delay.
+            Discrete with `delay_samples` of delay, or continuous without delay.
 
         Raises
         ------
         ModelError
-            If frequency and damping cannot be used.
+            If frequency or damping is invalid.
         """
         return _native.second_order_model(**vars(self))
 
@@ -164,7 +164,7 @@ class VelocityLoopFit(_Fit):
     delay_samples: int
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Return the response of the position loop, delay included."""
+        """Return the response of the position loop, including the delay."""
         return _native.velocity_loop_response(frequency_hz, **vars(self))
 
 
@@ -177,9 +177,9 @@ class RationalFit(_Fit):
     model : StateSpace
         Model without the delay.
     delay_s : float
-        Dead time in seconds, as it was given.
+        Known dead time in seconds.
     reflected_poles : int
-        Poles that were reflected into the stable region.
+        Number of poles reflected into the stable region.
     residual_rms : float
         Weighted RMS of the relative difference of measurement and model.
     """
@@ -190,7 +190,7 @@ class RationalFit(_Fit):
     residual_rms: float
 
     def response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Return the response of the model, delay included."""
+        """Return the response of the model, including the delay."""
         w = 2.0 * np.pi * _frequencies(frequency_hz)
         response: NDArray[np.complex128] = self.model.frequency_response(w)[:, 0, 0]
         late: NDArray[np.complex128] = response * np.exp(-1j * w * self.delay_s)
@@ -213,18 +213,18 @@ def fit_second_order(
     Parameters
     ----------
     frequency_hz : array_like, shape (n_frequencies,)
-        Frequencies in Hz, above 0 and rising.
+        Frequencies in Hz, positive and ascending.
     response : array_like of complex, shape (n_frequencies,)
         Measured response.
     coherence : array_like or None, shape (n_frequencies,)
-        Coherence that weighs the frequencies; None for equal weights.
+        Coherence as weight of the frequencies; None for equal weights.
     n_averages : float
-        Averages behind the response; with one, coherence says nothing.
+        Averages behind the response; with one, the coherence is always 1.
     dt_s : float or None
         Sample time in seconds of the hold before the axis; None for a
         continuous model.
     gain, delay_s : float or None
-        What is known beforehand; fitted if None.
+        Known parameters; fitted if None.
 
     Returns
     -------
@@ -282,7 +282,7 @@ def fit_velocity_loop(
     Parameters
     ----------
     frequency_hz : array_like, shape (n_frequencies,)
-        Frequencies in Hz, above 0 and rising.
+        Frequencies in Hz, positive and ascending.
     response : array_like of complex, shape (n_frequencies,)
         Measured response from velocity input to position.
     position_gain_per_s : float
@@ -290,9 +290,9 @@ def fit_velocity_loop(
     dt_s : float
         Servo cycle in seconds.
     coherence : array_like or None, shape (n_frequencies,)
-        Coherence that weighs the frequencies; None for equal weights.
+        Coherence as weight of the frequencies; None for equal weights.
     n_averages : float
-        Averages behind the response; with one, coherence says nothing.
+        Averages behind the response; with one, the coherence is always 1.
     delay_s : float or None
         Known delay in seconds, with which the gain is 1; both are fitted if
         None.
@@ -335,27 +335,27 @@ def fit_rational(
     delay_s: float = 0.0,
     dt_s: float | None = None,
 ) -> RationalFit:
-    """Fit a stable fraction of given degrees to a frequency response.
+    """Fit a stable rational transfer function of given degrees to a frequency response.
 
-    ``min sum_k w_k |ln(H_k exp(j w_k tau) / G(f_k))|^2``, begun by Sanathanan's
-    and Koerner's rounds; unstable poles are reflected.
+    ``min sum_k w_k |ln(H_k exp(j w_k tau) / G(f_k))|^2``, started with the rounds of Sanathanan and
+    Koerner; unstable poles are reflected.
 
     Parameters
     ----------
     frequency_hz : array_like, shape (n_frequencies,)
-        Frequencies in Hz, above 0 and rising.
+        Frequencies in Hz, positive and ascending.
     response : array_like of complex, shape (n_frequencies,)
         Measured response.
     n_zeros, n_poles : int
         Degrees of numerator and denominator.
     coherence : array_like or None, shape (n_frequencies,)
-        Coherence that weighs the frequencies; None for equal weights.
+        Coherence as weight of the frequencies; None for equal weights.
     n_averages : float
-        Averages behind the response; with one, coherence says nothing.
+        Averages behind the response; with one, the coherence is always 1.
     delay_s : float
-        Known delay in seconds that is taken out first.
+        Known delay in seconds, removed first.
     dt_s : float or None
-        Sample time in seconds for a sampled model; None for a continuous one.
+        Sample time in seconds for a discrete model; None for a continuous one.
 
     Returns
     -------

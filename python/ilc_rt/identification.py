@@ -1,4 +1,4 @@
-"""Result of an identification: response, model, residual, and their picture.
+"""Result of an identification: response, model, residual, and their Bode plot.
 
 `identify` makes it; the command `ilc identify` prints and writes it.
 """
@@ -41,8 +41,8 @@ class Identification:
         Model that ``[axis.model]`` can express: unit gain and whole samples of
         delay; the velocity loop alone for a csv axis.
     uncertainty : tuple of two arrays
-        Frequencies in Hz, and the bound there of the residual of `described`:
-        ``|H/G - 1|`` and three standard deviations of the measurement.
+        Frequencies in Hz, and the bound of the residual of `described` at each: ``|H/G - 1|`` plus
+        three standard deviations of the measurement.
     u, y : ndarray of float64, shape (n_samples,)
         Input and output of the evaluated periods.
     period_samples : int
@@ -50,18 +50,18 @@ class Identification:
     dt_s : float
         Sample time in seconds.
     experiment : Experiment
-        The experiment, with the amplitude that was used.
+        The experiment, with the actual amplitude.
     interface : {"csp", "csv"} or None
-        How the axis is commanded; None if it is not an axis of a cell.
+        Mode of the axis; None if it is not an axis of a cell.
     doubt : str or None
         Reason not to use the model, if there is one.
     axis_model : str
         The section ``[axis.model]`` with the described model.
     followed : bool
-        False if the output does not follow the input: no figure means anything.
+        False if the output does not follow the input: the figures are then meaningless.
     input_unit : str or None
-        Unit of the input: m, m/s, rad or rad/s; None if it is not an axis of a
-        cell. That of the output is the same without ``/s``.
+        Unit of the input: m, m/s, rad or rad/s; None if it is not an axis of a cell. The output has
+        the same without ``/s``.
     """
 
     measured: FrequencyResponse
@@ -80,7 +80,7 @@ class Identification:
     input_unit: str | None = None
 
     def __repr__(self) -> str:
-        """Return the result on one line, without the signals."""
+        """Return the result in one line, without the signals."""
         return (
             f"Identification({self.experiment.waveform!r}, n_frequencies={len(self.frequency_hz)}, "
             f"model={self.model!r}, doubt={self.doubt!r})"
@@ -104,13 +104,13 @@ class Identification:
     def uncertainty_on_grid(self, count: int = 257) -> Array:
         """Return the bound at equally spaced frequencies from 0 to Nyquist.
 
-        Below the band of the excitation the bound is that at its lower end;
-        above it at least 1, as nothing is known there.
+        Below the band of the excitation the bound at its lower end is used; above it at least 1, as
+        the response is unknown there.
 
         Parameters
         ----------
         count : int
-            How many frequencies, at least 2.
+            Number of frequencies, at least 2.
 
         Returns
         -------
@@ -136,7 +136,7 @@ class Identification:
     def rows(self) -> list[tuple[str, str, str]]:
         """Return name, value and standard deviation of every figure, as text.
 
-        Of an axis of a cell the figures are those of ``[axis.model]``.
+        For an axis of a cell the figures are those of ``[axis.model]``.
         """
         free, described = self.model, self.described
         gain = ("gain", f"{free.gain:.5f}", f"{free.gain_deviation:.1e}")
@@ -169,7 +169,7 @@ class Identification:
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of the file of ``--json``."""
+        """Return the content of the ``--json`` file."""
         model, bound = self.model, self.uncertainty
         return {
             "axis": self.experiment.axis,
@@ -210,7 +210,7 @@ class Identification:
         write_text(path, json_text(self.to_json()))
 
     def figure(self) -> Figure:
-        """Return the Bode diagram of measurement and model."""
+        """Return the Bode plot of measurement and model."""
         from ilc_rt.bode import bode
 
         return bode(

@@ -1,7 +1,7 @@
 """Identification: excite an axis, measure its response, and fit a model to it.
 
-`swept_sine` and `multisine` make the whole experiment, on a cell's real loop
-or on any function from input to output; the other names are its steps.
+`swept_sine` and `multisine` run a whole experiment, on a cell's real loop or on any function from
+input to output; the other names are its steps.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def swept_sine(
     spacing: Literal["logarithmic", "linear"] = "logarithmic",
     **options: Any,  # noqa: ANN401 (those of `multisine`)
 ) -> Identification:
-    """Identify an axis with a sine of rising frequency.
+    """Identify an axis with a swept sine (chirp).
 
     Parameters
     ----------
@@ -63,9 +63,9 @@ def swept_sine(
         A cell, whose axis is excited by the real controller, or a function
         from input to output, both of shape (n_samples,).
     spacing : {"logarithmic", "linear"}
-        Whether low frequencies get more time, or all the same.
+        Logarithmic (more time for low frequencies) or linear sweep.
     **options
-        Everything that `multisine` takes.
+        All parameters of `multisine`.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def multisine(
     tell: Callable[[str], None] | None = None,
     duration_s: None = None,
 ) -> Identification:
-    """Identify an axis with all harmonics of a period at once.
+    """Identify an axis with all harmonics of a period at once (multisine).
 
     Parameters
     ----------
@@ -125,18 +125,17 @@ def multisine(
         hold still, or a function from input to output, both of shape
         (n_samples,).
     axis : str or None
-        Name of the cell's axis; may be left out if it has one only.
+        Name of the cell's axis; optional if it has only one.
     amplitude : float or None
-        Peak of the input in m or rad (csp), in m/s or rad/s (csv); half of
-        what the limits of the axis allow if None. Must be given for a function.
+        Peak of the input in m or rad (csp), in m/s or rad/s (csv); half of the largest possible one
+        if None. Required for a function.
     from_hz, to_hz : float or None
-        Band in Hz. Without `to_hz` a cell's axis is excited up to 1.5 times the
-        natural frequency in its description; where friction or a mode spoil the
-        fit, again in narrower bands, which leave room for a larger amplitude.
-        A function is excited from 1 to 50 Hz.
+        Band in Hz. Without `to_hz` a cell's axis is excited up to 1.5 times the natural frequency
+        in its description; if friction or a flexible mode spoils the fit, again in narrower bands,
+        which permit a larger amplitude. A function is excited from 1 to 50 Hz.
     period_s : float or None
-        Length of a period in seconds; its inverse is the resolution in Hz. None
-        for 8 s, or more where the natural frequency is low.
+        Length of a period in seconds; its inverse is the resolution in Hz. None for 8 s, or more if
+        the natural frequency is low.
     periods : int
         Evaluated periods; their scatter is the noise.
     dt_s : float or None
@@ -146,11 +145,11 @@ def multisine(
     measure, bus, lockstep, drives, telemetry
         As for `Campaign`.
     library : path or None
-        Library that the experiment is stored in; none if None.
+        Library that the experiment is stored in; None for no library.
     observe : callable or None
         Called with every event of the controller.
     tell : callable or None
-        Called with a sentence on every band that was tried.
+        Called with a sentence on every band tried.
     duration_s : None
         Former name of `period_s`; refused.
 
@@ -161,8 +160,8 @@ def multisine(
     Raises
     ------
     CampaignError
-        If the experiment is beyond a limit of the axis (before anything
-        moves), or the controller stopped.
+        If the experiment is beyond a limit of the axis (before anything moves), or the controller
+        stopped.
     ValueError
         If a value is out of range, or the response cannot be fitted.
 
@@ -204,12 +203,12 @@ def identify(
     duration_s: float | None = None,
     **session: Any,  # noqa: ANN401 (those of `Campaign`)
 ) -> Identification:
-    """Identify an axis with a waveform that is given by its name.
+    """Identify an axis with a waveform given by name.
 
     Parameters
     ----------
     system : path, Cell or callable
-        As for `multisine`, like all that is not named here.
+        As for `multisine`, like all arguments not listed here.
     waveform : {"sweep", "linear-sweep", "multisine"}
         Waveform of the excitation.
     **session
@@ -283,7 +282,7 @@ def identify(
 
 
 def _with_models(found: dict[str, Any]) -> dict[str, Any]:
-    """Return what an identification found, with its response and its models as objects."""
+    """Return the result of an identification, with its response and models as objects."""
     described = found["described"]
     form = VelocityLoopFit if "bandwidth_hz" in described else SecondOrderFit
     return {

@@ -1,8 +1,8 @@
-"""Turn Ctrl-C and a request to end into a controlled stop of the axes.
+"""Converts Ctrl-C and requests to end into a controlled stop of the axes.
 
-A plain KeyboardInterrupt would unwind this process while axes move. Instead
-the first signal asks the controller to stop; what it then reports is still
-read, and the exception is raised when the axes are at rest.
+A plain KeyboardInterrupt would unwind this process while axes move. Instead the first signal
+requests a stop of the controller; its further events are still read, and the exception is raised
+when the axes are at rest.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class ControlledStop:
 
     Notes
     -----
-    Only handlers that nobody has replaced are replaced, and only in the main
-    thread, where Python allows it.
+    Handlers are replaced only if they are Python's own, and only in the main thread, where Python
+    allows it.
 
     Examples
     --------
@@ -60,13 +60,13 @@ class ControlledStop:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Put the signal handlers back."""
+        """Restore the signal handlers."""
         for number, handler in self._replaced.items():
             signal.signal(number, handler)
         self._replaced.clear()
 
     def raise_received(self) -> None:
-        """Raise what the signal stands for, if one has come.
+        """Raise the exception of a received signal.
 
         Raises
         ------

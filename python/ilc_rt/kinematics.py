@@ -14,17 +14,15 @@ __all__ = ["Delta", "Gantry", "KinematicsError"]
 
 
 class Delta(_native.Delta):
-    """Three-leg parallel mechanism.
+    """Delta mechanism: a parallel robot with three legs.
 
-    Cranks at 0, 120 and 240 degrees around a base, each with a rod to the tool,
-    which stands above the knees:
-    ``|p - k_i| = rod``, ``k_i = Rz(phi_i) (base + crank cos theta_i, 0, crank sin theta_i)``
+    Cranks at 0, 120 and 240 degrees around a base, each with a rod to the tool, which is above the
+    knees: ``|p - k_i| = rod``, ``k_i = Rz(phi_i) (base + crank cos theta_i, 0, crank sin theta_i)``
 
     Parameters
     ----------
     base_m : float
-        Radius at which the cranks turn, less the radius at which the rods are
-        fixed to the tool, in m.
+        Radius of the crank pivots minus the radius of the rod joints on the tool, in m.
     crank_m : float
         Length of a crank in m.
     rod_m : float
@@ -33,8 +31,8 @@ class Delta(_native.Delta):
     Raises
     ------
     KinematicsError
-        If the lengths make no mechanism. The methods raise it for a pose that is out of
-        reach or singular, and name pose, leg and sample.
+        If the lengths are impossible. The methods raise it for a pose that is out of reach or
+        singular, and name pose, leg and sample.
 
     References
     ----------
@@ -60,19 +58,19 @@ class Delta(_native.Delta):
 
 
 class Gantry(_native.Gantry):
-    """Gantry whose second axis is out of square.
+    """Gantry with an orthogonality error between its axes.
 
     ``x_tool = x + orthogonality_rad y``, ``y_tool = y``
 
     Parameters
     ----------
     orthogonality_rad : float
-        Error of the right angle in rad.
+        Orthogonality error in rad.
 
     Raises
     ------
     KinematicsError
-        If the angle is not a number.
+        If the angle is not finite.
 
     References
     ----------

@@ -21,19 +21,18 @@ class Library(_native.Library):
     Parameters
     ----------
     path : str or os.PathLike
-        The file; it is made if it is not there. ``:memory:`` is a library in
-        memory. The name is never taken for an address.
+        Path of the file, created if missing. ``:memory:`` is an in-memory library. The path is
+        never interpreted as an address.
 
     Raises
     ------
     OSError
-        If the file cannot be opened or is no library; it is left as it is.
+        If the file cannot be opened or is not a library; it is left unchanged.
 
     Notes
     -----
-    What reads opens the file for reading only, and for no longer than that: a
-    library that cannot be written is read all the same, and nothing is left
-    beside it.
+    Reading opens the file read-only and closes it at once: a library without write permission can
+    be read, and no side files are created.
 
     Examples
     --------
@@ -46,7 +45,7 @@ class Library(_native.Library):
         return super().__new__(cls, path=fspath(path))
 
     def list(self, cell: str | None = None) -> list[dict[str, Any]]:
-        """Return the runs kept, oldest first, without their arrays.
+        """Return the stored runs, oldest first, without their arrays.
 
         Parameters
         ----------
@@ -68,7 +67,7 @@ class Library(_native.Library):
         return super().list(cell)
 
     def load(self, id: int) -> dict[str, Any]:
-        """Return one run with its arrays.
+        """Return a run with its arrays.
 
         Parameters
         ----------
@@ -78,11 +77,10 @@ class Library(_native.Library):
         Returns
         -------
         dict
-            What `list` gives, and ``law_parameters`` and ``program`` (JSON),
-            ``reference_m``, ``input``, ``encoder_m``, ``tool_m`` (or None),
-            ``error_m`` of shape (n_samples, n_axes), ``contour_m`` of shape
-            (n_samples,) (None: the path has no contour), ``disturbance`` of shape
-            (n_disturbances,) (None: none is measured).
+            The keys of `list`, and ``law_parameters`` and ``program`` (JSON), ``reference_m``,
+            ``input``, ``encoder_m``, ``tool_m`` (or None), ``error_m`` of shape (n_samples,
+            n_axes), ``contour_m`` of shape (n_samples,) (None: the path has no contour),
+            ``disturbance`` of shape (n_disturbances,) (None: none is measured).
 
         Raises
         ------
@@ -94,27 +92,27 @@ class Library(_native.Library):
     def recall(
         self, disturbance: ArrayLike, top: int = 30, cell: str | None = None
     ) -> builtins.list[dict[str, Any]]:
-        """Return the runs made under a disturbance like this one, nearest first.
+        """Return the runs made under a similar disturbance, nearest first.
 
         Parameters
         ----------
         disturbance : float or array_like of float64, shape (n_disturbances,)
             The disturbance.
         top : int
-            How many runs at most.
+            Largest number of runs.
         cell : str or None
             Only runs of the cell of this name.
 
         Returns
         -------
         list of dict
-            What `list` gives of each, and ``distance``, in the unit of the
-            disturbance. Of equally near runs the older comes first.
+            The keys of `list`, and ``distance``, in the unit of the disturbance. Ties: the older
+            run first.
 
         Raises
         ------
         ValueError, TypeError
-            If the disturbance is no number, or not finite.
+            If the disturbance is not a number, or not finite.
         OSError
             If the file cannot be read.
         """
@@ -132,7 +130,7 @@ class Library(_native.Library):
         campaign: str = "elsewhere",
         law: str = "elsewhere",
     ) -> int:
-        """Keep a run that was made elsewhere.
+        """Store a run that was made elsewhere.
 
         Parameters
         ----------
@@ -145,11 +143,10 @@ class Library(_native.Library):
         disturbance : float, array_like of float64 or None
             The disturbance it was made under, shape (n_disturbances,).
         reference_m : ndarray of float64 or None
-            Its set points in m, same shape as `u`; None: zero, so that its path is
-            one point. The contour error is the distance to the path near the same
-            time.
+            Its set points in m, same shape as `u`; None: zero, so that the path is a single point.
+            The contour error is the distance to the path near the same time.
         cell, campaign, law : str
-            Names; its number follows the last one of the campaign.
+            Names; the run number continues that of the campaign.
 
         Returns
         -------
@@ -191,32 +188,31 @@ class Library(_native.Library):
         Parameters
         ----------
         keep : int
-            How many runs stay.
+            Number of runs to keep.
         cell : str or None
             Only among runs of the cell of this name.
 
         Returns
         -------
         int
-            Runs deleted.
+            Number of deleted runs.
 
         Raises
         ------
         OSError
-            If the file cannot be written, or the runs have different numbers of
-            disturbances (nothing is deleted then), or the file could not be made
-            smaller.
+            If the file cannot be written or shrunk, or the runs have different numbers of
+            disturbances (then nothing is deleted).
 
         Notes
         -----
-        The relevance of DPW-ILC with RMS error and disturbance in units of their
-        spread over these runs, summed over the disturbances of all of them; without
-        disturbances the smallest errors stay. The file becomes smaller.
+        The relevance of DPW-ILC, with RMS error and disturbance scaled by their spread over these
+        runs and summed over all their disturbances; without disturbances the runs with the smallest
+        errors are kept. The file shrinks.
         """
         return super().trim(keep, cell)
 
     def export(self, id: int, path: str | PathLike[str]) -> None:
-        """Write one run to a file: ``.npz``, ``.csv`` or ``.json`` by its ending.
+        """Write a run to a file: ``.npz``, ``.csv`` or ``.json``, by its extension.
 
         Parameters
         ----------
@@ -228,9 +224,9 @@ class Library(_native.Library):
         Raises
         ------
         BadInputError
-            If the ending is unknown or the file cannot be written.
+            If the extension is unknown or the file cannot be written.
         OSError
             If there is no such run, or its arrays do not match their digest.
         """
-        # It reads records, and they read libraries.
+        # Imported late: `export` imports records, and records import libraries.
         import_module("ilc_rt.export").export_run(self.load(id), path)

@@ -1,4 +1,4 @@
-"""Models of axes: from transfer functions, from frequency and damping, sampled."""
+"""Models of axes: from transfer functions, from natural frequency and damping; discretisation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def from_transfer_function(num: ArrayLike, den: ArrayLike, dt_s: float | None = 
     den : array_like, shape (n_den,)
         Denominator, highest power first.
     dt_s : float or None
-        Sample time in seconds; None or 0 for a continuous model.
+        Sample time in seconds; None or 0 for a continuous-time model.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def from_transfer_function(num: ArrayLike, den: ArrayLike, dt_s: float | None = 
     Raises
     ------
     ModelError
-        If the numerator has the higher degree or the denominator is zero.
+        If the degree of the numerator exceeds that of the denominator, or the denominator is zero.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def from_transfer_function(num: ArrayLike, den: ArrayLike, dt_s: float | None = 
 
 
 def second_order(natural_frequency_rad_s: float, damping: float) -> StateSpace:
-    """Return the continuous model of a position loop.
+    """Return the continuous-time model of a position loop.
 
     ``G(s) = w0^2 / (s^2 + 2 delta w0 s + w0^2)``
 
@@ -63,7 +63,7 @@ def second_order(natural_frequency_rad_s: float, damping: float) -> StateSpace:
     Returns
     -------
     StateSpace
-        Continuous model; `discretize` makes it sampled.
+        Continuous-time model; `discretize` converts it to discrete time.
 
     Raises
     ------
@@ -84,30 +84,30 @@ def second_order(natural_frequency_rad_s: float, damping: float) -> StateSpace:
 
 
 def discretize(model: Model, dt_s: float, method: Literal["zoh", "tustin"] = "zoh") -> StateSpace:
-    """Return the sampled form of a continuous model.
+    """Return the discrete-time form of a continuous-time model.
 
     Parameters
     ----------
     model : StateSpace or compatible
-        Continuous model.
+        Continuous-time model.
     dt_s : float
         Sample time in seconds.
     method : {"zoh", "tustin"}
-        Zero-order hold (exact for a held input) or Tustin's bilinear rule.
+        Zero-order hold (exact for a piecewise constant input) or Tustin's bilinear rule.
 
     Returns
     -------
     StateSpace
-        Sampled model.
+        Discrete-time model.
 
     Raises
     ------
     ModelError
-        If the model is sampled already or the sample time is not positive.
+        If the model is already in discrete time or the sample time is not positive.
     ValueError
-        If `method` is not one of those offered.
+        If `method` is unknown.
     TypeError
-        If `model` is no model.
+        If `model` is not a model.
 
     Examples
     --------

@@ -1,13 +1,12 @@
-"""Watch a controller from anywhere on the network, through Zenoh.
+"""Monitoring of a controller from anywhere on the network, through Zenoh.
 
-Under ``ilc/<cell>/`` the controller publishes ``state``, ``iteration``,
-``fault``, ``servo`` and ``latency``: the JSON objects of its event stream. A
-monitor can command nothing, and the loop never waits for one; at the end of a
-campaign the controller asks on ``heard`` whether all of it has arrived.
+Under ``ilc/<cell>/`` the controller publishes ``state``, ``iteration``, ``fault``, ``servo`` and
+``latency``: the JSON objects of its event stream. A monitor cannot command anything, and the loop
+never waits for one; at the end of a campaign the controller queries ``heard`` to confirm that all
+messages have arrived.
 
-Anybody on the network can publish under these keys, so that nothing received is
-believed: texts are cleaned of control characters, and what is not of the right
-types is told as one warning.
+Any program on the network can publish under these keys, so all input is untrusted: control
+characters are removed from texts, and wrong types cause one warning.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ TEXT_MAX = 2_000
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """Something a controller published.
+    """A published message.
 
     Attributes
     ----------
@@ -58,9 +57,9 @@ class Message:
     payload : dict
         The JSON object; empty for ``alive`` and ``gone``.
     event : Event or None
-        The same as a typed event, where it is one.
+        The same as a typed event, if it is one.
     warning : str or None
-        What is wrong with the message, if it is not what it should be.
+        Defect of the message, if it is invalid.
     """
 
     cell: str
@@ -76,16 +75,16 @@ class Monitor:
     Parameters
     ----------
     cell : str
-        Name of a cell, ``"*"`` for every one.
+        Name of a cell, ``"*"`` for all.
     connect : sequence of str
-        Zenoh endpoints to connect to, as ``tcp/192.168.1.5:7447``.
+        Zenoh endpoints to connect to, e.g. ``tcp/192.168.1.5:7447``.
     scouting : bool
-        Whether to look for controllers on the network by multicast.
+        Discover controllers on the network by multicast.
 
     Raises
     ------
     BadInputError
-        If an endpoint is not understood.
+        If an endpoint is invalid.
     CampaignError
         If no Zenoh session can be opened.
 
@@ -106,7 +105,7 @@ class Monitor:
         self._queue: queue.Queue[Message] = queue.Queue(QUEUE_MAX)
         self._lost = 0
         self._session = _open(connect, scouting=scouting)
-        # The token first: a controller seen alive is asked for its state at once.
+        # The token first: the state of a live controller is queried at once.
         self._tokens = self._session.liveliness().declare_subscriber(
             f"ilc/{cell}/alive", _direct(self._on_token), history=True
         )
@@ -128,16 +127,16 @@ class Monitor:
 
     @property
     def lost(self) -> int:
-        """Messages dropped because nobody took them."""
+        """Number of messages dropped because the reader was too slow."""
         return self._lost
 
     def messages(self, timeout_s: float | None = None) -> Iterator[Message]:
-        """Yield messages as they come.
+        """Yield messages as they arrive.
 
         Parameters
         ----------
         timeout_s : float or None
-            End when this long has passed in all; None for never.
+            End after this total time; None for never.
         """
         until = None if timeout_s is None else time.monotonic() + timeout_s
         while until is None or time.monotonic() < until:
@@ -150,12 +149,12 @@ class Monitor:
                 yield from self.ask_state(message.cell)
 
     def ask_state(self, cell: str | None = None) -> list[Message]:
-        """Ask for the present state; for those who join late.
+        """Query the current state, for late joiners.
 
         Returns
         -------
         list of Message
-            One a controller that answered.
+            One per controller that replied.
         """
         replies = self._session.get(f"ilc/{cell or self._cell}/state", timeout=2.0)
         messages = [_message(reply.ok) for reply in replies if reply.ok is not None]
@@ -193,7 +192,7 @@ def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
         config.insert_json5("connect/endpoints", json.dumps(list(connect)))
         config.insert_json5("scouting/multicast/enabled", json.dumps(scouting))
         config.insert_json5("listen/endpoints", "[]")
-        # By itself Zenoh leaves out the host's own interface, where controllers keep to it.
+        # By default Zenoh skips the loopback interface, which controllers use.
         interfaces = ",".join(name for _, name in socket.if_nameindex())
         config.insert_json5("scouting/multicast/interface", json.dumps(interfaces))
     except zenoh.ZError as error:
@@ -210,8 +209,8 @@ def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
 def _direct(callback: Callable[[_T], None]) -> handlers.Callback[_T]:
     """Return a callback that runs in the order of arrival with all others.
 
-    By default each subscriber has a thread of its own, and the end of a
-    controller could overtake its last words.
+    By default each subscriber has its own thread, and the end of a controller could overtake its
+    last messages.
     """
     from zenoh.handlers import Callback
 
@@ -219,7 +218,7 @@ def _direct(callback: Callable[[_T], None]) -> handlers.Callback[_T]:
 
 
 def _answer(query: zenoh.Query) -> None:
-    """Tell a controller that all it has published before has arrived."""
+    """Confirm to a controller that everything published before has arrived."""
     query.reply(query.key_expr, b"")
 
 
@@ -267,7 +266,7 @@ def _clean_all(value: object) -> object:
 
 
 def _misfit(event: object) -> str | None:
-    """Return which field of a typed object holds something of another type."""
+    """Return the name of a field of a typed object with a value of the wrong type."""
     hints = typing.get_type_hints(type(event))
     for field in fields(event):  # type: ignore[arg-type]
         value = getattr(event, field.name)
@@ -281,7 +280,7 @@ def _misfit(event: object) -> str | None:
 
 
 def _fits(value: object, hint: object) -> bool:
-    """Return whether a value is of an annotated type; numbers are finite."""
+    """Return whether a value has the annotated type; numbers must be finite."""
     origin = typing.get_origin(hint)
     if origin in {typing.Union, types.UnionType}:
         return any(_fits(value, one) for one in typing.get_args(hint))

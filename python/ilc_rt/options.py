@@ -1,7 +1,7 @@
 """Options of the controller, as `ilc-rt` itself describes them.
 
-Names, defaults, ranges and help stand in one place, in Rust; the classes and verbs of this package
-take them from here and hand their values over as words of a command line.
+Names, defaults, ranges and help are defined in one place, in Rust; the classes and verbs of this
+package take them from here and pass their values on as words of a command line.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Option:
             text = repr(float(value)) if self.kind == "number" else str(value)
         if text == self.default:
             return []
-        # Apart, what begins with a hyphen would be taken for an option.
+        # Separately, a value that begins with a hyphen would be taken for an option.
         flag = self.flags[0]
         return [f"{flag}={text}"] if text.startswith("-") else [flag, text]
 

@@ -1,7 +1,7 @@
 """The pictures of a campaign, each a matplotlib figure.
 
-Every figure is drawn without a display, in colours that colour-blind people
-can tell apart (Okabe and Ito), at a width that a phone can show.
+Every figure is drawn without a display, in colours for colour-blind readers (Okabe and Ito), at a
+width that suits a phone.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ PATH = "#DADDE2"
 INK = "#30343B"
 WIDTH_IN = 5.6
 FIRST_BIN_RATIO = 1.5
-# Range of a coordinate from which on an axis moves, and the distance below which there is rounding.
+# Smallest range of a coordinate that counts as motion, and distance that counts as rounding.
 MOVES_M = 1e-9
 ROUNDING_M = 1e-12
 
@@ -194,7 +194,7 @@ def tracking(result: CampaignResult) -> Figure | None:
 
 
 def latency(result: CampaignResult) -> Figure | None:
-    """Draw how late the loop woke and how long it computed; None in lock-step."""
+    """Draw latency and execution time of the loop; None in lock-step."""
     if result.latency is None:
         return None
     with mpl.rc_context(STYLE):
@@ -209,7 +209,7 @@ def latency(result: CampaignResult) -> Figure | None:
 def _convergence_panel(
     axes: Axes, records: Sequence[IterationRecord], columns: list[Column], base: str
 ) -> None:
-    """Draw the errors of one unit; one of 0 has no place on a logarithmic scale."""
+    """Draw the errors of one unit; an error of 0 has no place on a logarithmic scale."""
     index = [record.index for record in records]
     rows = [(column, [column.of(record) for record in records]) for column in columns]
     known = [value for _, row in rows for value in row if value]
@@ -254,7 +254,7 @@ def _contour_panel(
     names: tuple[str, ...],
     extent_m: float,
 ) -> None:
-    """Draw paths and their deviations; the first one's size decides on the magnification."""
+    """Draw paths and their deviations; the first one determines the magnification."""
     largest_m = float(np.linalg.norm(paths[0][2], axis=1).max())
     largest_m = 0.0 if largest_m < ROUNDING_M else largest_m
     factor = magnification(largest_m, extent_m)
@@ -279,7 +279,7 @@ def _contour_panel(
 
 
 def _round_down(value: float) -> float:
-    """Return the next of 1, 2, 5, 10 ... that is not above."""
+    """Return the largest of 1, 2, 5, 10 ... that is not above."""
     if value <= 0.0:
         return 0.0
     decade = 10.0 ** float(np.floor(np.log10(value)))
@@ -287,7 +287,7 @@ def _round_down(value: float) -> float:
 
 
 def _histogram_panel(axes: Axes, histogram: Histogram, colour: str, title: str) -> None:
-    """Draw the bins as they are counted: each begins where the one before ends."""
+    """Draw the bins as counted: each begins at the end of the previous one."""
     seen = [number for number, (_, count) in enumerate(histogram.bins) if count > 0]
     if seen:
         uppers = np.array([upper for upper, _ in histogram.bins], dtype=np.float64)

@@ -36,10 +36,9 @@ END_DEADLINE_S = 5.0
 def find_program(name: str) -> Path:
     """Find one of the two programs.
 
-    Looked for where the wheel that brought this package put it, which
-    depends on how that was installed: beside the running interpreter (a
-    virtual environment's ``bin``), in the folder of this installation's or
-    this user's scripts, under ``pip install --target``; then along ``PATH``.
+    Searched where the wheel installs it, which depends on the kind of installation: beside the
+    running interpreter (a virtual environment's ``bin``), in the scripts folder of this
+    installation or user, under ``pip install --target``; then on ``PATH``.
 
     Parameters
     ----------
@@ -69,7 +68,7 @@ def find_program(name: str) -> Path:
 
 
 class Program:
-    """A running program whose lines are read as they come.
+    """A running program whose lines are read as they arrive.
 
     Parameters
     ----------
@@ -78,8 +77,8 @@ class Program:
 
     Notes
     -----
-    Standard error goes to a file of its own, so a talkative program never
-    blocks; its last line is the reason that `failure` gives.
+    Standard error goes to its own file, so that verbose output never blocks; its last line is the
+    reason in `failure`.
     """
 
     def __init__(self, argv: Sequence[str | Path]) -> None:
@@ -91,7 +90,7 @@ class Program:
         try:
             self._process = subprocess.Popen(
                 [str(argument) for argument in argv],
-                # Open for as long as this process lives: programs that are told so end with it.
+                # Open for the lifetime of this process: programs started with it end with it.
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
@@ -131,7 +130,7 @@ class Program:
         return self._process.stdout.fileno()
 
     def receive(self) -> None:
-        """Move what is in the pipe to `lines`; call it when readable."""
+        """Move the content of the pipe to `lines`; call it when readable."""
         chunk = os.read(self.fileno(), 65536)
         self.at_end = not chunk
         *whole, self._partial = (self._partial + chunk).split(b"\n")
@@ -164,13 +163,13 @@ class Program:
                 self.receive()
 
     def signal(self, number: int) -> None:
-        """Send a signal, if it still runs."""
+        """Send a signal, if it is still running."""
         if self.returncode is None:
             with contextlib.suppress(ProcessLookupError):
                 self._process.send_signal(number)
 
     def failure(self) -> CampaignError:
-        """Return the error that says why it ended: its own last line."""
+        """Return the error with the reason of its end: its own last line."""
         code = self._wait(END_DEADLINE_S)
         reason = self.last_error_line()
         if not reason and code is not None and code < 0:
@@ -180,14 +179,14 @@ class Program:
         return CampaignError(reason, code if code is not None and code > 0 else EXIT_FAILURE)
 
     def last_error_line(self) -> str:
-        """Return the last line that it wrote to standard error, or ``""``."""
+        """Return the last line on its standard error, or ``""``."""
         self._errors.seek(0)
         lines = self._errors.read().decode("utf-8", "replace").split("\n")
         said = [line.strip() for line in lines if line.strip()]
         return said[-1].removeprefix(f"{self.name}: ") if said else ""
 
     def close(self) -> None:
-        """End it if it still runs (politely, then not), and reap it."""
+        """Terminate it if it is still running, then kill it, and reap it."""
         if self.returncode is None:
             self.signal(signal.SIGTERM)
             if self._wait(END_DEADLINE_S) is None:
@@ -215,12 +214,12 @@ def start_simulated_drives(cell_file: str | Path, bus: str | None, *, lockstep: 
     bus : str or None
         Bus address in place of the cell's.
     lockstep : bool
-        Whether the drives advance on SYNC.
+        Advance the drives on SYNC.
 
     Raises
     ------
     CampaignError
-        If it does not get ready.
+        If it does not become ready.
     """
     argv: list[str | Path] = [find_program("ilc-sim"), "run", cell_file, "--with-parent"]
     if bus is not None:

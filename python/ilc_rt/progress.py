@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ilc_rt.events import Event
     from ilc_rt.result import CampaignResult
 
-# Lines below the table of a terminal: the newest ones.
+# Number of remarks below the table in a terminal: the newest ones.
 REMARKS_SHOWN = 8
 WORDS = {
     "bringing_up": "bringing the drives up",
@@ -45,7 +45,7 @@ WORDS = {
 
 
 def describe(start: StartEvent) -> str:
-    """Return one line that says what is about to run where."""
+    """Return one line on the coming campaign and its bus."""
     clock = "real time" if start.mode == "realtime" else "lock-step"
     seconds = start.n_samples * start.cycle_s
     axes = f"{start.n_axes} {'axis' if start.n_axes == 1 else 'axes'}"
@@ -64,11 +64,11 @@ class CampaignView:
     Parameters
     ----------
     console : Console or None
-        Where to; standard output by default.
+        Output; standard output by default.
     """
 
     def __init__(self, console: Console | None = None) -> None:
-        # Names may have brackets and colons: nothing that is printed is markup.
+        # Names may contain brackets and colons: nothing printed is markup.
         self._console = console or Console(highlight=False, markup=False, emoji=False)
         self._live: Live | None = None
         self._bar = Progress(
@@ -100,7 +100,7 @@ class CampaignView:
             self._live.stop()
 
     def show(self, event: Event, result: CampaignResult) -> None:
-        """Show one event; `result` has taken it in already."""
+        """Show one event; `result` has handled it already."""
         if isinstance(event, StartEvent):
             self._runs = event.iterations
             self._console.print(describe(event), soft_wrap=True)
@@ -111,7 +111,7 @@ class CampaignView:
             words = WORDS.get(event.state, printable(event.state.replace("_", " ")))
             index = event.iteration
             if index is None or index >= self._runs > 0:
-                run = ""  # the way home after the last run
+                run = ""  # the return after the last run
             else:
                 run = f"run {index}" + (f" ({index + 1} of {self._runs}): " if self._runs else ": ")
             self._bar.reset(self._task, description=run + words)
@@ -133,7 +133,7 @@ class CampaignView:
         comparison = result.comparison
         names = headings(comparison)
         if not self._names:
-            # What a resumed campaign has behind it was told when it was made.
+            # Remarks on the earlier runs of a resumed campaign were shown when they were made.
             self._remarked = len(_remarks(result)) if len(result.records) > 1 else 0
         if names != self._names:
             # Once, and again if the errors have outgrown their unit.
@@ -158,7 +158,7 @@ class CampaignView:
 
 
 def _table(result: CampaignResult) -> list[RenderableType]:
-    """Return the table of runs, and below it what was remarked on them."""
+    """Return the table of runs, with the remarks below it."""
     if not result.records:
         return []
     table = runs_table(result.comparison)

@@ -1,27 +1,27 @@
-"""Numbers for people: three digits, a unit with a sensible prefix, a change in percent."""
+"""Formatting of numbers: three digits, a unit with a suitable prefix, a change in percent."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-# Change beyond which a percentage says nothing any more.
+# Change beyond which a percentage is meaningless.
 CHANGE_MAX_PERCENT = 1e4
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit to show a quantity in that is kept in metres or radians.
+    """Display unit of a quantity in metres or radians.
 
     Attributes
     ----------
     symbol : str
-        As it is written, ``"µm"``.
+        Its symbol, ``"µm"``.
     base : str
-        What it is a part of, ``"m"``.
+        Its base unit, ``"m"``.
     scale : float
-        How many of it make one metre or radian.
+        Number of these per metre or radian.
 
     Examples
     --------
@@ -43,14 +43,14 @@ class Unit:
 
 
 def unit_for(base: str, size: float | None) -> Unit:
-    """Return the unit that suits a quantity of this size.
+    """Return a suitable unit for a quantity of this size.
 
     Parameters
     ----------
     base : str
-        What it is kept in: ``"m"``, ``"rad"``, ``"m/s"`` or ``"rad/s"``.
+        Base unit: ``"m"``, ``"rad"``, ``"m/s"`` or ``"rad/s"``.
     size : float or None
-        Its size, or that of the first of a row of them.
+        Its size, or that of the first of a row of quantities.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def unit_for(base: str, size: float | None) -> Unit:
 
 
 def digits(value: float) -> str:
-    """Return a number with three significant digits, without an exponent where possible.
+    """Return a number with three significant digits, if possible without an exponent.
 
     Examples
     --------
@@ -90,7 +90,7 @@ def digits(value: float) -> str:
 
 
 def percent(before: float | None, after: float | None) -> float | None:
-    """Return a change in percent; None where no percentage tells it.
+    """Return a change in percent; None if a percentage is meaningless.
 
     Examples
     --------

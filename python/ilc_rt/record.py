@@ -56,7 +56,7 @@ class IterationRecord(Figures):
 
     @classmethod
     def from_event(cls, event: IterationEvent, library: str) -> IterationRecord:
-        """Return the record that an iteration event announces."""
+        """Return the record of an iteration event."""
         return cls(library=library, **{name: getattr(event, name) for name in FIGURES})
 
     @classmethod
@@ -92,23 +92,23 @@ class IterationRecord(Figures):
 
     @property
     def error_m(self) -> NDArray[np.float64]:
-        """Tracking error that was learned from in m, shape (n_samples, n_axes)."""
+        """Tracking error learned from in m, shape (n_samples, n_axes)."""
         return self._signal("error_m")
 
     @property
     def contour_m(self) -> NDArray[np.float64] | None:
         """Distance from the programmed path in m, shape (n_samples,), or None."""
-        # Older libraries hold rounding for a path that has no contour.
+        # Older libraries contain rounding errors for a path without a contour.
         return None if self.contour_inf_m is None else self._optional("contour_m")
 
     @property
     def disturbance(self) -> NDArray[np.float64] | None:
-        """What was measured before the run, shape (n_disturbances,), or None."""
+        """Measured disturbance before the run, shape (n_disturbances,), or None."""
         return self._optional("disturbance")
 
     @property
     def tool_or_encoder_m(self) -> NDArray[np.float64]:
-        """The tool where it is measured, else the encoders: what contour is of."""
+        """Measurement of the contour: at the tool if it is measured, else at the encoders."""
         tool = self.tool_m
         return self.encoder_m if tool is None else tool
 
@@ -118,12 +118,12 @@ class IterationRecord(Figures):
         return str(self.row().get("law_parameters") or "{}")
 
     def row(self) -> dict[str, Any]:
-        """Return everything that the library holds of this run.
+        """Return everything stored in the library about this run.
 
         Raises
         ------
         BadInputError
-            If the library or the run in it is gone.
+            If the library or its run does not exist any more.
         """
         if not self._loaded:
             if not Path(self.library).is_file():

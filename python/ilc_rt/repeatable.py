@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ilc_rt._native import Cell
     from ilc_rt.events import Event
 
-# Learning pays from here on, and pays well from there on.
+# Thresholds of the ratio for "some" and "good" benefit of learning.
 SOME, WELL = 1.0, 3.0
 
 
@@ -36,11 +36,11 @@ class AxisRepeatability:
     axis : str
         Name of the axis.
     repeatable_rms_m : float
-        RMS over time of the part that all runs share: what learning can take.
+        RMS over time of the repeatable part: what learning can remove.
     non_repeatable_rms_m : float
-        RMS of what differs from run to run: what it cannot.
+        RMS of the remainder that differs from run to run: what it cannot.
     ratio : float
-        First over second; None if nothing differs at all.
+        Ratio of the two; None if nothing differs.
     unit : {"m", "rad"}
         Unit of the axis, and of both figures.
     """
@@ -82,7 +82,7 @@ class RepeatabilityCheck:
         return any(axis.verdict != "no" for axis in self.axes)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of the file of ``--json``."""
+        """Return the content of the ``--json`` file."""
         axes = [{**asdict(axis), "verdict": axis.verdict} for axis in self.axes]
         return {"n_runs": self.n_runs, "applicable": self.applicable, "axes": axes}
 
@@ -100,11 +100,10 @@ class RepeatabilityCheck:
 def compare_runs(
     errors: ArrayLike, axis_names: tuple[str, ...] = (), axis_units: tuple[str, ...] = ()
 ) -> RepeatabilityCheck:
-    """Split the errors of equal runs into what repeats and what does not.
+    """Split the errors of equal runs into the repeatable and the non-repeatable part.
 
-    ``s^2[k] = sum_j (e_j[k] - m[k])^2 / (n - 1)`` with m the mean over the
-    runs; what repeats is ``ms(m) - ms(s) / n``, as the mean of n runs still
-    holds an n-th of what differs.
+    ``s^2[k] = sum_j (e_j[k] - m[k])^2 / (n - 1)`` with m the mean over the runs; the repeatable
+    part is ``ms(m) - ms(s) / n``, as the mean of n runs still contains an n-th of the scatter.
 
     Parameters
     ----------
@@ -177,11 +176,11 @@ def check_repeatability(
     cell : path or Cell
         The cell.
     runs : int
-        How many, at least 2.
+        Number of runs, at least 2.
     bus, measure, lockstep, drives, telemetry
         As for `Campaign`.
     library : path or None
-        Library that the runs are stored in; none if None.
+        Library that the runs are stored in; None for no library.
     observe : callable or None
         Called with every event of the controller.
 

@@ -1,7 +1,7 @@
-"""A campaign as one HTML file that needs nothing else.
+"""Report of a campaign: a single self-contained HTML file.
 
-The pictures are inside the page; nothing is fetched, so it can be mailed,
-archived, printed and read on a phone.
+The figures are embedded and nothing is fetched, so the page can be mailed, archived, printed and
+read on a phone.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def write_report(result: CampaignResult, path: str | Path) -> Path:
     result : CampaignResult
         At least one run.
     path : path
-        The file, or a folder that gets ``ilc-report.html``.
+        The file, or a folder, in which ``ilc-report.html`` is written.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def write_report(result: CampaignResult, path: str | Path) -> Path:
     Raises
     ------
     BadInputError
-        If there is no run to report, or the file cannot be written.
+        If there is no run to report or the file cannot be written.
     """
     target = Path(path)
     if target.is_dir() or not target.suffix:
@@ -106,18 +106,18 @@ def render(result: CampaignResult) -> str:
 
 
 def svg(figure: Figure, name: str) -> str:
-    """Return a figure as inline SVG, without links and with ids of its own.
+    """Return a figure as inline SVG, without links and with unique ids.
 
     Parameters
     ----------
     figure : Figure
-        What to draw.
+        Figure to draw.
     name : str
-        Prefix of the ids, different for every picture of a page.
+        Prefix of the ids, unique to each figure of a page.
     """
     buffer = io.StringIO()
     with mpl.rc_context({**plots.STYLE, "svg.hashsalt": name}), warnings.catch_warnings():
-        # A name may have letters that the font lacks; whoever reads the page has them.
+        # A name may contain glyphs that the font lacks; the reader's browser has them.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
@@ -179,7 +179,7 @@ def _tiles(result: CampaignResult) -> Iterator[str]:
     ):
         yield tile(_minus(change), f"{'contour' if comparison.by_contour else 'tracking'} error")
     for base in dict.fromkeys(result.axis_units):
-        # Of one kind of axes alone, or of each kind its own.
+        # Of the only kind of axes, or of each kind separately.
         rms = [c for c in comparison.tracking() if c.name == "RMS tracking"]
         column = next(c for c in rms if c.unit.base == base)
         whose = {"m": "of the linear axes, ", "rad": "of the rotary axes, "}[base]
@@ -214,14 +214,14 @@ def _table(result: CampaignResult) -> str:
 
 
 def _notes(record: IterationRecord, before: IterationRecord | None) -> str:
-    # What is kept counts the late lessons of the campaign up to this run.
+    # The record counts the late updates of the campaign up to this run.
     was_late = record.late_updates > (before.late_updates if before else 0)
     gaps = f"{record.missing_samples} samples missing" if record.missing_samples else ""
     return ", ".join(filter(None, (note(record), gaps, "learning late" if was_late else "")))
 
 
 def _axes(result: CampaignResult) -> str:
-    """Return the table of the single axes, where there are several and their figures are known."""
+    """Return the table per axis, if there are several axes and their figures are known."""
     first, last = result.records[0], result.records[-1]
     figures = [(record.axes_tracking_inf_m, record.axes_tracking_rms_m) for record in (first, last)]
     if result.n_axes < 2 or any(len(row) < result.n_axes for pair in figures for row in pair):
@@ -301,7 +301,7 @@ def _parameters(result: CampaignResult) -> str:
 
 
 def _remarks(result: CampaignResult) -> str:
-    """Return what kept learning from going on, if anything did."""
+    """Return what prevented learning from continuing, if anything."""
     if not any(map(note, result.records)):
         return ""
     lines = [printable(line) for line in result.comparison.remarks()]

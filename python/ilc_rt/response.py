@@ -1,4 +1,4 @@
-"""Measured frequency responses, their uncertainty, and the excitation that shows them."""
+"""Measured frequency responses, their uncertainty, and excitation signals."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class FrequencyResponse:
     Parameters
     ----------
     frequency_hz : array_like, shape (n_frequencies,)
-        Frequencies in Hz, rising.
+        Frequencies in Hz, increasing.
     response : array_like of complex, shape (n_frequencies,)
         Output over input.
     coherence : array_like or None, shape (n_frequencies,)
-        Share of the output's power that follows the input, 0 to 1; 1 if None.
+        Share of the output power that is coherent with the input, 0 to 1; 1 if None.
     n_averages : float
         Independent averages behind each estimate.
 
@@ -79,7 +79,7 @@ class FrequencyResponse:
         return _native.relative_deviation(**vars(self))
 
     def band(self, from_hz: float, to_hz: float) -> FrequencyResponse:
-        """Return the part in a band, both ends included.
+        """Return the part within a band, both ends included.
 
         Parameters
         ----------
@@ -125,18 +125,18 @@ def frequency_response(
     dt_s : float
         Sample time in seconds.
     period_samples : int or None
-        Samples in a period of a periodic input: averages over whole periods,
-        without window and without leakage.
+        Samples per period of a periodic input: averages over whole periods, without window or
+        leakage.
     segment_samples : int or None
-        Samples in a segment of Welch's method for any other input: Hann window,
-        mean taken off; an eighth of the signal if neither is given.
+        Samples per segment of Welch's method for any other input: Hann window, mean removed; an
+        eighth of the signal if neither is given.
     overlap_samples : int or None
-        Samples that segments share; half a segment if None.
+        Overlap of the segments in samples; half a segment if None.
 
     Returns
     -------
     FrequencyResponse
-        At the frequencies that the input holds.
+        At the frequencies excited by the input.
 
     Raises
     ------
@@ -172,29 +172,29 @@ def frequency_response(
 def uncertainty(
     measured: FrequencyResponse, model: ArrayLike, deviations: float = 3.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a bound of what a model leaves over of a measured response.
+    """Return a bound of the multiplicative error of a model from a measured response.
 
     ``bound(f) = max(|H/G - 1| + z sigma |H/G|)`` over a third of an octave.
 
     Parameters
     ----------
     measured : FrequencyResponse
-        What was measured.
+        Measured response.
     model : array_like of complex, shape (n_frequencies,)
         Response of the model at the same frequencies.
     deviations : float
-        Standard deviations z of the measurement that the bound allows for.
+        Standard deviations z of the measurement added to the bound.
 
     Returns
     -------
     frequency_hz : ndarray of float64, shape (n_frequencies,)
     bound : ndarray of float64, shape (n_frequencies,)
-        Multiplicative uncertainty, as a robust-convergence test takes it.
+        Multiplicative uncertainty, as used by a robust-convergence test.
 
     Raises
     ------
     ModelError
-        If the lengths differ, the model is 0 somewhere or `deviations` negative.
+        If the lengths differ, the model is 0 at a frequency or `deviations` is negative.
 
     References
     ----------
@@ -218,21 +218,21 @@ def excitation(
     periods: int,
     dt_s: float,
 ) -> tuple[NDArray[np.float64], int, int]:
-    """Return an excitation from rest to rest.
+    """Return an excitation that starts and ends at rest.
 
     Parameters
     ----------
     waveform : {"sweep", "linear-sweep", "multisine"}
-        A sine of rising frequency and then rest, or all harmonics at once.
+        A swept sine (chirp) followed by rest, or a multisine.
     amplitude : float
         Peak, in the unit of the input.
     from_hz, to_hz : float
-        Band in Hz, at most to 0.45 / dt_s.
+        Band in Hz, up to 0.45 / dt_s.
     period_s : float
         Length of a period in seconds, at least five cycles of the lowest
         frequency.
     periods : int
-        Periods that are evaluated.
+        Number of evaluated periods.
     dt_s : float
         Sample time in seconds.
 
@@ -240,16 +240,16 @@ def excitation(
     -------
     values : ndarray of float64, shape (n_samples,)
     first_sample : int
-        First sample of the first period that is evaluated.
+        First sample of the first evaluated period.
     period_samples : int
-        Samples in a period.
+        Samples per period.
 
     Raises
     ------
     ModelError
         If a value is out of range.
     ValueError
-        If `waveform` is not one of those offered.
+        If `waveform` is unknown.
 
     References
     ----------
@@ -274,7 +274,7 @@ def excitation(
 
 
 def _parts(measured: FrequencyResponse) -> dict[str, object]:
-    """Return a measured response by names."""
+    """Return a measured response as a dict."""
     if isinstance(measured, FrequencyResponse):
         return vars(measured)
     line = f"measured = {measured!r:.60}; a FrequencyResponse is needed"

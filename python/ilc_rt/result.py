@@ -1,4 +1,4 @@
-"""A campaign as a whole: what ran where, its runs, and what came of it."""
+"""Result of a campaign: its setup, its runs and its outcome."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from ilc_rt.library import Library
 from ilc_rt.quantity import digits
 from ilc_rt.record import IterationRecord
 
-# What stands for standard output in the place of a file.
+# Path that stands for standard output.
 STANDARD_OUTPUT = Path("-")
 
 
 @dataclass(slots=True)
 class CampaignResult:
-    """What a campaign did, collected from its events or from the library.
+    """Result of a campaign, collected from its events or from the library.
 
     Attributes
     ----------
     records : list of IterationRecord
-        The runs in their order.
+        The runs in order.
     start : StartEvent or None
-        What ran where; None for a campaign read from a library.
+        Setup; None for a campaign read from a library.
     latency : LatencyEvent or None
-        Times of the servo loop; None in lock-step.
+        Timing of the servo loop; None in lock-step.
 
     Examples
     --------
@@ -68,14 +68,14 @@ class CampaignResult:
 
     @classmethod
     def from_library(cls, library: str | Path, campaign: str | None = None) -> CampaignResult:
-        """Collect a campaign from the library; the latest if none is named.
+        """Collect a campaign from the library; the latest one by default.
 
         Parameters
         ----------
         library : path
             Library file.
         campaign : str or None
-            Identifier of the campaign, or the beginning of it.
+            Identifier of the campaign, or a prefix of it.
 
         Raises
         ------
@@ -114,7 +114,7 @@ class CampaignResult:
         )
 
     def follow(self, event: Event) -> None:
-        """Take in one event of the campaign that runs now."""
+        """Add an event of the running campaign."""
         if isinstance(event, StartEvent):
             self.start = event
             self.cell, self.campaign = event.cell, event.campaign
@@ -138,39 +138,39 @@ class CampaignResult:
 
     @property
     def unkept(self) -> bool:
-        """Whether the campaign was stopped as a run could not be kept."""
+        """True if the campaign was stopped because a run could not be stored."""
         return self.fault is not None and self.fault.kind == "library"
 
     @property
     def mode(self) -> str:
-        """``"realtime"``, ``"lockstep"``, or ``""`` if not known."""
+        """``"realtime"``, ``"lockstep"``, or ``""`` if unknown."""
         return self.start.mode if self.start else ""
 
     @property
     def bus(self) -> str:
-        """Address of the bus, or ``""`` if not known."""
+        """Address of the bus, or ``""`` if unknown."""
         return self.start.bus if self.start else ""
 
     def input_unit(self, axis: int) -> str:
-        """Return the unit of an axis' learned input: m, m/s, rad or rad/s."""
+        """Return the unit of the learned input of an axis: m, m/s, rad or rad/s."""
         return self.input_units[axis] if axis < len(self.input_units) else "m"
 
     def axis_unit(self, axis: int) -> str:
-        """Return what an axis is measured in: m or rad."""
+        """Return the unit of the position of an axis: m or rad."""
         return self.input_unit(axis).removesuffix("/s")
 
     @property
     def axis_units(self) -> tuple[str, ...]:
-        """What each axis is measured in: m or rad."""
+        """Unit of the position of each axis: m or rad."""
         return tuple(self.axis_unit(axis) for axis in range(self.n_axes))
 
     @property
     def comparison(self) -> Comparison:
-        """What is shown of the runs; there must be one."""
+        """Figures of the runs; there must be at least one run."""
         return Comparison(self.records, self.axis_units)
 
     def sentence(self) -> str:
-        """Say in one plain sentence what was learned.
+        """Return a plain sentence on what was learned.
 
         Examples
         --------
@@ -182,7 +182,7 @@ class CampaignResult:
         return self.comparison.sentence()
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of the file of ``--json``."""
+        """Return the content of the file written by ``--json``."""
         start = self.start
         return {
             "cell": self.cell,
@@ -243,7 +243,7 @@ def axis_names(row: dict[str, Any]) -> tuple[str, ...]:
 
 
 def library_rows(library: str | Path, cell: str | None = None) -> list[dict[str, Any]]:
-    """Return the rows of a library that must exist.
+    """Return the rows of an existing library.
 
     Raises
     ------
@@ -276,7 +276,7 @@ def micrometres(length_m: float | None) -> str:
 
 
 def json_text(content: object) -> str:
-    r"""Return a file's text; a number that is not finite is null, as JSON has none.
+    r"""Return the text of a JSON file, with null for non-finite numbers.
 
     Examples
     --------
@@ -284,7 +284,7 @@ def json_text(content: object) -> str:
     '{\n  "error_m": null\n}\n'
     """
     text = json.dumps(_finite(content), indent=2, allow_nan=False)
-    # What is written as an escape already are the other control characters, and all beyond ASCII.
+    # The other control characters, and all non-ASCII characters, are already escaped.
     return text.replace("\x7f", "\\u007f") + "\n"
 
 
@@ -299,19 +299,19 @@ def _finite(content: object) -> object:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a file, with an error that a person understands.
+    """Write a file; a failure raises an error with a readable message.
 
     Raises
     ------
     BadInputError
-        If it cannot be written.
+        If the file cannot be written.
 
     Notes
     -----
-    The path ``-`` is standard output.
+    The path ``-`` stands for standard output.
     """
     if Path(path) == STANDARD_OUTPUT:
-        # Where other lines were turned away from it, it is still the one the process has.
+        # Other output may be redirected, but this is the stream of the process.
         out = sys.__stdout__ or sys.stdout
         out.write(text)
         out.flush()

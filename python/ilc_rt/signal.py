@@ -1,8 +1,7 @@
-"""Filters, and the frequency that a signal has at each moment.
+"""Filters, and the instantaneous frequency of a signal.
 
-Butterworth, Gaussian, symmetric and switched low-passes; each can be applied to a
-signal or given to a law. All derive from `Filter`, whose `zero_phase` is the same for
-all.
+Butterworth, Gaussian, symmetric FIR and switched low-passes; each can be applied to a signal or
+passed to a law as its Q-filter. All derive from `Filter`, whose `zero_phase` is common to all.
 """
 
 from __future__ import annotations
@@ -34,10 +33,10 @@ __all__ = [
 
 
 class _Filter(Filter):
-    """A filter whose numbers are attributes."""
+    """Filter whose parameters are attributes."""
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401
-        """Return a number of the filter."""
+        """Return a parameter of the filter."""
         if not name.startswith("_"):
             figures = self._figures()
             if name in figures:
@@ -52,20 +51,20 @@ class ButterworthFilter(_Filter):
     Parameters
     ----------
     order : int
-        1 to 12.
+        Order, 1 to 12.
     cutoff_hz : float
-        Frequency in Hz at which one pass has a gain of 1/sqrt(2). `zero_phase` makes
-        two: there its gain is 1/2.
+        Cut-off frequency in Hz (gain 1/sqrt(2)) of one pass. `zero_phase` makes two passes: there
+        the gain is 1/2.
     dt_s : float
         Sample time in seconds.
     causal : bool
-        Apply it in a learning law forward only, with lag, instead of forward and
-        backward, without.
+        In a learning law, apply the filter forward only, with lag, instead of forward and backward,
+        with zero phase.
 
     Raises
     ------
     SignalError
-        If order, cut-off or sample time cannot be designed for.
+        If the design fails for this order, cut-off or sample time.
 
     Examples
     --------
@@ -90,7 +89,7 @@ class ButterworthFilter(_Filter):
         return self._sos()
 
     def filter(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Return the signal filtered forward only, from rest.
+        """Return the causally filtered signal, from zero initial state.
 
         Parameters
         ----------
@@ -111,7 +110,7 @@ class ButterworthFilter(_Filter):
 
 
 class GaussianFilter(_Filter):
-    """Gaussian low-pass filter, without lag or overshoot.
+    """Gaussian low-pass filter, zero-phase and without overshoot.
 
     ``w[i] = exp(-(i T / sigma)^2 / 2) / sum``, ``sigma = sqrt(ln 2) / (2 pi f)``
 
@@ -130,12 +129,12 @@ class GaussianFilter(_Filter):
     Raises
     ------
     SignalError
-        If bandwidth or sample time cannot be designed for.
+        If the design fails for this bandwidth or sample time.
 
     Notes
     -----
-    Beyond its ends the signal is mirrored between two samples. The bell is cut
-    off where 99.99 % of its area are inside.
+    The signal is mirrored at its ends, between two samples. The bell is truncated to 99.99 % of its
+    area.
 
     References
     ----------
@@ -158,32 +157,31 @@ class GaussianFilter(_Filter):
 
 
 class FirFilter(_Filter):
-    """Symmetric smoother of finite length, without lag.
+    """Symmetric FIR smoother, zero-phase.
 
     ``y[k] = sum_i h[i] x[k + i - r]``, ``h[i] = h[2 r - i]``
 
     Parameters
     ----------
     taps : array_like, shape (2 r + 1,)
-        Taps h, the same from either end.
+        Taps h, symmetric.
     repeats : int
-        Number of passes that the filter does in one: the taps are convolved with
-        themselves.
+        Number of passes combined into one: the taps are convolved with themselves.
 
     Raises
     ------
     SignalError
-        If the taps are an even number, or not symmetric.
+        If the number of taps is even, or they are not symmetric.
     ValueError, TypeError
         If `taps` has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
-    Beyond its ends the signal is held.
+    The signal is held constant beyond its ends.
 
     References
     ----------
-    [dimarco2016], Eq. (3.2), for which the filter of the example serves.
+    [dimarco2016], Eq. (3.2), whose example uses such a filter.
 
     Examples
     --------
@@ -201,9 +199,9 @@ class FirFilter(_Filter):
 
 
 class SwitchedFilter(_Filter):
-    """Zero-phase low-pass with another cut-off on each segment.
+    """Zero-phase low-pass filter with a different cut-off on each segment.
 
-    ``y[k] = sum_i w_i[k] (Q_i x)[k]``, the weights going over along half a cosine
+    ``y[k] = sum_i w_i[k] (Q_i x)[k]``, the weights following half a cosine at the transitions
 
     Parameters
     ----------
@@ -216,15 +214,15 @@ class SwitchedFilter(_Filter):
     order : int
         Order of one pass, 1 to 12.
     blend : int
-        Samples within which it goes over from one segment to the next, half of
-        them before the start of the later one.
+        Length of the transition between segments in samples, half of it before the start of the
+        later one.
 
     Raises
     ------
     SignalError
-        If a cut-off or the order cannot be designed for, the segments are not in
-        order, or there are not as many starts as cut-offs. `zero_phase` raises it
-        if the signal ends before a segment starts.
+        If the design fails for a cut-off or the order, the segments are not in order, or the
+        numbers of starts and cut-offs differ. `zero_phase` raises it if the signal ends before a
+        segment starts.
 
     References
     ----------
@@ -274,34 +272,33 @@ class SwitchedFilter(_Filter):
         margin_s: float | None = None,
         blend_s: float | None = None,
     ) -> Self:
-        """Design the filter for a motion by its instantaneous frequency.
+        """Design the filter from the instantaneous frequency of a motion.
 
         Parameters
         ----------
         reference : array_like, shape (n_samples,) or (n_samples, n_channels)
-            The motion; a velocity shows the fast stretches better than a position.
+            The motion; a velocity reveals the fast parts better than a position.
         dt_s : float
             Sample time in seconds.
         low_hz, high_hz : float
-            Cut-offs in Hz where the motion is slow, and where it is fast.
+            Cut-offs in Hz for slow and for fast motion.
         threshold_hz : float
-            Instantaneous frequency of the motion in Hz above which it is fast.
+            Instantaneous frequency in Hz above which the motion is fast.
         order : int
             Order of one pass.
         window_s : float or None
-            Span over which the frequency is averaged, weighted by the squared
-            amplitude; one period of the threshold unless given.
+            Averaging window of the frequency, weighted by the squared amplitude; by default one
+            period of the threshold.
         margin_s : float or None
-            Time before and after a fast stretch in which the filter is open; one
-            period of the lower cut-off unless given.
+            Time before and after a fast part in which the filter is open; by default one period of
+            the lower cut-off.
         blend_s : float or None
-            Time within which it goes over; one period of the lower cut-off unless
-            given.
+            Length of a transition; by default one period of the lower cut-off.
 
         Returns
         -------
         SwitchedFilter
-            Filter for runs of as many samples; open wherever any channel is fast.
+            Filter for runs of the same length; open wherever any channel is fast.
 
         Raises
         ------
@@ -359,7 +356,7 @@ def gaussian(bandwidth_hz: float, dt_s: float) -> GaussianFilter:
 
 
 def fir(taps: ArrayLike, repeats: int = 1) -> FirFilter:
-    """Return a symmetric smoother of finite length, as `FirFilter` describes it.
+    """Return a symmetric FIR smoother, as `FirFilter` describes it.
 
     Examples
     --------
@@ -371,22 +368,21 @@ def fir(taps: ArrayLike, repeats: int = 1) -> FirFilter:
 
 
 def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]:
-    """Return the frequency of a signal from sample to sample.
+    """Return the instantaneous frequency of a signal at each sample.
 
     ``f[k] = wrap(arg a[k+1] - arg a[k]) / (2 pi T)``, a the analytic signal
 
     Parameters
     ----------
     x : array_like, shape (n_samples,)
-        Signal that swings about zero.
+        Signal that oscillates about zero.
     dt_s : float
         Sample time T in seconds.
 
     Returns
     -------
     ndarray of float64, shape (n_samples - 1,)
-        Frequency in Hz. Where the amplitude is small it is noise and may be
-        negative.
+        Frequency in Hz. At small amplitudes it is noise and may be negative.
 
     Raises
     ------
@@ -411,13 +407,13 @@ def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]:
 
 
 def zero_phase(filter: Filter | ArrayLike, x: ArrayLike) -> NDArray[np.float64]:
-    """Return a signal filtered without lag.
+    """Return the zero-phase filtered signal.
 
     Parameters
     ----------
     filter : Filter or array_like
-        Filter; an array holds the taps of a symmetric one. A Butterworth filter
-        is applied forward and backward, also one that laws apply forward only.
+        Filter; an array holds the taps of a symmetric FIR filter. A Butterworth filter is applied
+        forward and backward, even one that laws apply forward only.
     x : array_like, shape (n_samples,) or (n_samples, n_channels)
         Signal.
 

@@ -1,4 +1,4 @@
-"""The table of runs that the terminal shows, and its lines for a file or a pipe."""
+"""The table of runs in the terminal, and its plain lines for a file or a pipe."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from ilc_rt.comparison import Column
     from ilc_rt.record import IterationRecord
 
-# What a column is at least, so that the table keeps its shape while runs come in.
+# Minimum widths of columns, so that the layout stays fixed while runs arrive.
 WIDTHS = {"run": 3, "change": 8, "overruns": 8, "learning ms": 8}
 ERROR_WIDTH = 8
 
 
 def headings(comparison: Comparison) -> tuple[str, ...]:
-    """Return the headings of the cells of a run; the last one, of what became of it, is empty."""
+    """Return the headings of the columns of a run; the last one, for the outcome, is empty."""
     errors = (column.heading for column in _errors(comparison))
     return ("run", *errors, "change", "overruns", "learning ms", "")
 
@@ -42,7 +42,7 @@ def run_cells(comparison: Comparison, record: IterationRecord) -> tuple[str, ...
 
 
 def runs_table(comparison: Comparison) -> Table:
-    """Return a table with one row a run."""
+    """Return a table with one row per run."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in headings(comparison):
         if name:
@@ -57,7 +57,7 @@ def runs_table(comparison: Comparison) -> Table:
 
 
 def plain_line(cells: Sequence[str], names: Sequence[str]) -> str:
-    """Return cells as one line of fixed columns, for a file or a pipe.
+    """Return cells as a line of fixed columns, for a file or a pipe.
 
     Examples
     --------
@@ -70,6 +70,6 @@ def plain_line(cells: Sequence[str], names: Sequence[str]) -> str:
 
 
 def _errors(comparison: Comparison) -> list[Column]:
-    """Of linear and rotary axes the largest only: more would not fit."""
+    """Of linear and rotary axes the largest only, for lack of space."""
     columns = comparison.errors(rms=not comparison.is_mixed)
     return [column for column in columns if column.name != "RMS contour"]

@@ -1,26 +1,26 @@
-"""Texts that came from elsewhere, as they may be shown in a terminal, a page or a picture."""
+"""Sanitised display of untrusted text in a terminal, a page or a figure."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 
-# Control and format characters (escape sequences, bell, null, overrides of the writing direction),
-# halves of characters, and separators of lines: what does something other than being read.
+# Control and format characters (escape sequences, bell, null, bidirectional overrides), surrogates,
+# and line separators: characters that act instead of being displayed.
 HIDDEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 LENGTH_MAX = 400
 NAME_MAX = 64
 
 
 def printable(text: object, length_max: int = LENGTH_MAX) -> str:
-    r"""Return a text in one line in which every character is seen, and not too long.
+    r"""Return a text as one line of limited length in which every character is visible.
 
     Parameters
     ----------
     text : object
-        What is to be shown.
+        Text to display.
     length_max : int
-        Characters at most; what is longer ends in an ellipsis.
+        Maximum number of characters; a longer text ends in an ellipsis.
 
     Examples
     --------
@@ -28,7 +28,7 @@ def printable(text: object, length_max: int = LENGTH_MAX) -> str:
     'x\\x1b[2J\\n'
     """
     whole = str(text)
-    # Nothing of a text of megabytes that is cut off need be looked at.
+    # The part of a huge text that is cut off need not be examined.
     part = whole[: length_max + 1]
     seen = "".join(map(_seen, part))
     if len(whole) > length_max:
@@ -37,12 +37,12 @@ def printable(text: object, length_max: int = LENGTH_MAX) -> str:
 
 
 def printable_lines(text: str) -> str:
-    """Return a text whose line breaks stay and whose other hidden characters are seen."""
+    """Return a text with its line breaks, in which all other hidden characters are visible."""
     return "\n".join("".join(map(_seen, line)) for line in text.split("\n"))
 
 
 def label(name: object) -> str:
-    r"""Return a name for a picture, where a dollar is a dollar and begins no formula.
+    r"""Return a name for a figure, in which a dollar sign does not start a formula.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def label(name: object) -> str:
 
 
 def file_name(name: object) -> str:
-    """Return a name as part of a file's name: letters, digits, ``-`` and ``_``.
+    """Return a name as part of a file name: letters, digits, ``-`` and ``_``.
 
     Examples
     --------
@@ -66,6 +66,6 @@ def file_name(name: object) -> str:
 def _seen(character: str) -> str:
     if unicodedata.category(character) not in HIDDEN:
         return character
-    # As Python writes it, `\x1b`; what it would print as it is, as a number.
+    # As Python's escapes, `\x1b`; a character without one, as its number.
     written = ascii(character)[1:-1]
     return written if written != character else f"\\x{ord(character):02x}"

@@ -1,4 +1,4 @@
-"""The kinds of bus, as the native module describes them."""
+"""The kinds of bus, as described by the native module."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class Transport:
     Attributes
     ----------
     name, syntax, example : str
-        Name in front of the colon of an address; its syntax; one that is allowed.
+        Name before the colon of an address; its syntax; an example.
     summary : str
-        What carries the frames.
+        Carrier of the frames.
     has_bits : bool
-        Whether it is a real bus, whose load counts.
+        True for a real bus, whose load is reported.
     in_process : bool
-        Whether the simulated drives run inside this process, in lock-step.
+        True if the simulated drives run inside this process, in lock-step.
     """
 
     name: str
@@ -42,7 +42,7 @@ def transport_of(bus: str) -> Transport:
     Raises
     ------
     BadInputError
-        If there is no such kind.
+        If the kind is unknown.
 
     Examples
     --------

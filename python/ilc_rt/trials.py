@@ -1,6 +1,6 @@
-"""Trials of learning weights on axes that differ from their model in what models leave out.
+"""Trials of learning weights on axes with unmodelled dynamics.
 
-`tuning` chooses the weights by them. They need the cell description only: no drive moves.
+`tuning` uses them to choose the weights. They need only the cell description: no drive moves.
 """
 
 from __future__ import annotations
@@ -26,36 +26,36 @@ if TYPE_CHECKING:
 MODE_DAMPING = 0.1
 """Damping of the modes that a trial adds: that of a lightly damped structure."""
 MODE_PLACES = (1.0, 1.25, 1.6, 2.2)
-"""Where they are, relative to the frequency up to which the model is trusted."""
+"""Frequencies of these modes, relative to the frequency up to which the model is trusted."""
 KNOWN_SHARE = 1.3
-"""That frequency relative to the axis' natural frequency, if nobody says otherwise: a position loop
-is tuned to stay well below the first mode."""
+"""Default of that frequency, relative to the natural frequency of the axis: a position loop is
+tuned well below the first mode."""
 FRICTION_SHARE = 0.05
 """Friction relative to the largest error of a run without learning."""
 
 
 @dataclass(frozen=True)
 class BelievedAxis:
-    """An axis as its cell describes it, with its part of the program.
+    """An axis according to its cell, with its part of the program.
 
     Attributes
     ----------
     name : str
         Name of the axis.
     unit : {"m", "rad"}
-        What its coordinate is measured in.
+        Unit of its position.
     interface : {"csp", "csv"}
-        How it is commanded.
+        Its command mode.
     dt_s : float
         Servo cycle in seconds.
     way : ndarray of float64, shape (n_samples,)
         Set points of a run, from its start.
     natural_frequency_hz, damping : float
-        Of the position loop; of a csv axis those that loop and drive make.
+        Of the position loop; of a csv axis those of loop and drive together.
     delay_samples : int
-        Cycles from a command to its first effect.
+        Dead time: cycles from a command to its first effect.
     velocity_bandwidth_hz, position_gain_per_s, velocity_feedforward : float
-        Of a csv axis; 0 for a csp axis.
+        Loop gain of a csv axis; 0 for a csp axis.
     """
 
     name: str
@@ -76,10 +76,9 @@ class BelievedAxis:
         Parameters
         ----------
         frequency, damping : float
-            Factors of natural frequency (csp) or velocity bandwidth (csv), and
-            of damping (csp).
+            Factors of natural frequency (csp) or velocity bandwidth (csv), and of damping (csp).
         delay : int
-            Cycles beyond `delay_samples`.
+            Cycles in addition to `delay_samples`.
         """
         turn, n_delay = 2.0 * np.pi, max(self.delay_samples + delay, 0)
         if self.interface == "csp":
@@ -91,12 +90,12 @@ class BelievedAxis:
         velocity = from_transfer_function([bandwidth], [1.0, bandwidth, 0.0])
         gain = [[self.position_gain_per_s]]
         nothing = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0))
-        # The position that the loop sees is a cycle old.
+        # The loop sees a position that is one cycle old.
         controller = StateSpace(*nothing, gain, self.dt_s).delayed(1)
         return discretize(velocity, self.dt_s).delayed(n_delay).feedback(controller)
 
     def drive(self) -> Array:
-        """Return what moves the axis without learning, in the unit of its input."""
+        """Return the input of a run without learning, in the unit of the axis input."""
         if self.interface == "csp":
             return self.way
         ahead = np.append(self.way[1:], self.way[-1:])
@@ -108,13 +107,13 @@ class BelievedAxis:
         return self.way - self.model().simulate(self.drive())
 
     def direction(self) -> Array:
-        """Return which way the axis moves at each sample; where it rests, which way it came."""
+        """Return the direction of motion at each sample; at rest, the last direction."""
         sign = np.sign(np.diff(self.way, prepend=self.way[:1]))
         moved = np.maximum.accumulate(np.where(sign != 0.0, np.arange(len(sign)), 0))
         return sign[moved]
 
     def mode(self, frequency_hz: float) -> StateSpace:
-        """Return what a mode between drive and tool makes of the position."""
+        """Return the position filtered by a mode between drive and tool."""
         w = 2.0 * np.pi * frequency_hz
         top = [2.0 * MODE_DAMPING * w, w * w]
         return discretize(from_transfer_function(top, [1.0, *top]), self.dt_s, "tustin")
@@ -123,14 +122,14 @@ class BelievedAxis:
 def believed_axes(
     cell: Cell, samples_max: int | None = None
 ) -> tuple[list[BelievedAxis], dict[str, Any]]:
-    """Return the axes of a cell, and its whole description as it was written.
+    """Return the axes of a cell, and its whole description as written.
 
     Parameters
     ----------
     cell : Cell
-        The cell; what it has read needs no more checks.
+        The cell; already validated.
     samples_max : int or None
-        How much of the program the axes get.
+        Limit of the part of the program that the axes get.
     """
     written = tomlkit.parse(Path(cell.path).read_text(encoding="utf-8-sig")).unwrap()
     way = cell.reference()[:samples_max] - cell.reference()[0]
@@ -158,7 +157,7 @@ def believed_axes(
 
 @dataclass(frozen=True)
 class Suspect:
-    """An axis as it might be.
+    """A perturbed axis.
 
     Attributes
     ----------
@@ -167,7 +166,7 @@ class Suspect:
     plant : StateSpace
         Learned input to measured position.
     friction : float
-        Friction as the input that it takes to overcome it.
+        Friction, as the input needed to overcome it.
     """
 
     what: str
@@ -176,11 +175,11 @@ class Suspect:
 
 
 def suspects(axis: BelievedAxis, uncertainty: float, known_hz: float) -> list[Suspect]:
-    """Return what an axis might be, the most demanding first.
+    """Return perturbed axes, the most demanding first.
 
-    Up to `known_hz` the model is right but for `uncertainty`: natural
-    frequency, damping and delay differ. Above it there may be anything, as a
-    mode between drive and tool. At every frequency there is friction.
+    Up to `known_hz` the model is right within `uncertainty`: natural frequency, damping and delay
+    vary. Above it dynamics are arbitrary, such as a mode between drive and tool. Friction acts
+    at every frequency.
     """
     model = axis.model()
     gain = abs(float(model.dc_gain()[0, 0]))
@@ -217,14 +216,14 @@ class Weights:
 
 @dataclass(frozen=True)
 class Trial:
-    """What learning did on a suspect.
+    """Result of learning on a perturbed axis.
 
     Attributes
     ----------
     axis : str
         Name of the axis.
     what : str
-        How the suspect differs from the model.
+        How the perturbed axis differs from the model.
     rms : ndarray of float64, shape (n_runs + 1,)
         RMS error of each run; the first one is without learning.
     input_peak : float
@@ -238,7 +237,7 @@ class Trial:
 
     @property
     def growth(self) -> float:
-        """Largest ratio of a run's error to the least one before it."""
+        """Largest ratio of a run's error to the smallest one before it."""
         return float((self.rms[1:] / np.minimum.accumulate(self.rms)[:-1]).max())
 
 
@@ -252,7 +251,7 @@ class Bench:
     uncertainty, known_hz : float
         As for `suspects`.
     noise : float
-        Standard deviation of white noise in the measurement.
+        Standard deviation of white measurement noise.
     n_runs : int
         Runs after the first one.
     """
@@ -265,13 +264,13 @@ class Bench:
         self.suspects = suspects(axis, uncertainty, known_hz)
         drive, direction = axis.drive(), axis.direction()
         self._drives = [drive - suspect.friction * direction for suspect in self.suspects]
-        # The same noise for every weight: what differs between them is not chance.
+        # The same noise for all weights, so that they differ by more than chance.
         shape = (n_runs + 1, len(axis.way))
         self._noise = noise * np.random.default_rng(1).standard_normal(shape) if noise else None
         self._n_runs = n_runs
 
     def try_weights(self, weights: Weights, growth_max: float = np.inf) -> list[Trial] | None:
-        """Return a trial of each suspect; None as soon as an error grows by more than allowed."""
+        """Return a trial of each perturbed axis; None if an error grows more than allowed."""
         n_samples = len(self.axis.way)
         law = NormOptimalIlc(
             self.model, n_samples, q=weights.q, s=weights.s, r=weights.r, rate=weights.rate

@@ -1,4 +1,4 @@
-"""Weights of norm-optimal learning for a cell, chosen by trials on what its axes might be."""
+"""Weights of norm-optimal learning for a cell, chosen by trials on perturbed axes."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ TUNED_LAWS = ("norm_optimal", "constrained")
 UNCERTAINTY = 0.3
 """Default relative model uncertainty: the residual of a good fit on an axis with friction."""
 GROWTH_MAX = 1.2
-"""Growth of an error over the best one that a trial may show."""
+"""Largest growth of an error over the smallest one in a trial."""
 TRIAL_RUNS_MAX = 100
-"""Runs that a trial makes at most: what has not grown by then grows slowly enough to be seen."""
+"""Largest number of runs of a trial: an error that has not grown by then grows slowly enough to be
+noticed."""
 ACROSS_TO_ALONG = 1.5
 """Largest ratio of the weights of an error across the path and along it."""
 SAMPLES_MAX = 20_000
-"""Samples of a run that a trial looks at."""
+"""Largest number of samples per run in a trial."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Reason:
 
 @dataclass(frozen=True)
 class Proposal:
-    """Weights for a cell, with the reasons and what to expect.
+    """Weights for a cell, with reasons and predictions.
 
     Attributes
     ----------
@@ -54,22 +55,21 @@ class Proposal:
     law : str
         The law of the cell.
     section : str
-        Table of the cell description that the weights belong in.
+        Table of the cell description in which the weights belong.
     weights : Weights
-        What is proposed.
+        The proposed weights.
     reasons : tuple of Reason
-        Why, weight by weight.
+        Reasons, weight by weight.
     trials : tuple of Trial
-        What the weights did on everything that the axes might be.
+        Results of the weights on all perturbed axes.
     notes : tuple of str
-        What else should be known, a sentence each.
+        Further notes, one sentence each.
     uncertainty, known_hz, noise, n_runs
-        What the trials assumed; `known_hz` axis by axis.
+        Assumptions of the trials; `known_hz` per axis.
     units : dict
-        What each axis is measured in.
+        Unit of position of each axis.
     along : float or None
-        What the weight along the path should be, if the cell weighs contours and
-        has too little of it.
+        Proposed weight along the path, if the cell weighs contours and its own is too small.
     """
 
     cell: str
@@ -99,7 +99,7 @@ class Proposal:
         return {"q": w.q, "s": w.s, "r": w.r, "rate": w.rate}
 
     def write(self, path: str | Path) -> bool:
-        """Put the weights into a cell description; return whether it changed.
+        """Write the weights into a cell description; return True if it changed.
 
         Raises
         ------
@@ -116,7 +116,7 @@ class Proposal:
         return [trial for trial in self.trials if trial.axis == axis]
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of the file of ``--json``."""
+        """Return the content of the file written by ``--json``."""
         return {
             "cell": self.cell,
             "law": self.law,
@@ -150,30 +150,28 @@ def propose_weights(
     noise_m: float = 0.0,
     n_runs: int = 10,
 ) -> Proposal:
-    """Propose the weights of learning for a cell.
+    """Propose the learning weights of a cell.
 
-    The weight `rate` is chosen by trials on what the axes might be: up to
-    `known_hz` the model but for `uncertainty`, above it with a mode, everywhere
-    with friction. Of the weights with which no trial's error grows by more than
-    20 % over its best one, those are taken that leave the least error after
-    `n_runs` runs, on the average of the trials.
+    The weight `rate` is chosen by trials on perturbed axes: up to `known_hz` the model within
+    `uncertainty`, above it with a mode, everywhere with friction. Among the weights for which
+    no trial's error grows by more than 20 % over its smallest one, those with the smallest mean
+    error after `n_runs` runs are chosen.
 
     Parameters
     ----------
     cell : path
         The cell description.
     uncertainty : float or sequence of float
-        How far the axes may be from their model where it is known, 0.3 for
-        30 %; several for gains at equally spaced frequencies from zero to half
-        the cycle rate: the first counts where the model is known, and the model
-        is known up to where they first reach 1.
+        Relative model uncertainty where the model is known, 0.3 for 30 %; an array holds gains at
+        equally spaced frequencies from zero to the Nyquist frequency: the first one applies where
+        the model is known, which is up to where they first reach 1.
     known_hz : float or None
-        Frequency up to which the model is known; None for 1.3 times the natural
-        frequency of each axis.
+        Frequency up to which the model is known; None for 1.3 times the natural frequency of each
+        axis.
     noise_m : float
-        Standard deviation of white noise in the measurement.
+        Standard deviation of white measurement noise.
     n_runs : int
-        Runs in which learning should be done; beyond 100 as for 100.
+        Runs by which learning should be complete; values above 100 count as 100.
 
     Returns
     -------
@@ -228,7 +226,7 @@ def propose_weights(
 
 def _load(cell: str | Path) -> Cell:
     try:
-        # Weights are asked for because those in the file may be wrong.
+        # Weights are requested because those in the file may be wrong.
         return Cell.load(cell, allow_divergent=True)
     except ValueError as error:
         raise BadInputError(" ".join(str(error).split())) from error
@@ -237,7 +235,7 @@ def _load(cell: str | Path) -> Cell:
 def _known(
     uncertainty: float | Sequence[float], known_hz: float | None, dt_s: float
 ) -> tuple[float, float | None]:
-    """Return the uncertainty where the model is known, and up to where it is."""
+    """Return the uncertainty where the model is known, and up to which frequency."""
     gains = np.atleast_1d(np.asarray(uncertainty, dtype=np.float64))
     if gains.ndim != 1 or len(gains) == 0 or not np.all(np.isfinite(gains) & (gains >= 0.0)):
         message = f"uncertainty = {uncertainty}; gains of 0 or more are needed, as 0.3 for 30 %"
@@ -266,13 +264,13 @@ def _known(
 
 
 def _growth_max(written: dict[str, Any]) -> float:
-    """Return how much an error may grow: safely less than what makes the controller roll back."""
+    """Return the allowed growth of an error, safely below that of a rollback."""
     rollback = float(written.get("learning", {}).get("rollback_ratio", 1.5))
     return min(GROWTH_MAX, 1.0 + 0.4 * (rollback - 1.0))
 
 
 def _error_weights(table: dict[str, Any]) -> list[float]:
-    """Return the least and the largest weight of an error that the cell's own table makes."""
+    """Return the smallest and the largest error weight that the table of the cell produces."""
     contour = table.get("contour")
     found = []
     for phase in [{}, *table.get("phase", [])]:
@@ -285,7 +283,7 @@ def _error_weights(table: dict[str, Any]) -> list[float]:
 
 
 def _along(table: dict[str, Any]) -> float | None:
-    """Return the weight along the path that a contour weight needs; None if it has it."""
+    """Return the required weight along the path; None if it is large enough."""
     contour = table.get("contour")
     if contour is None:
         return None

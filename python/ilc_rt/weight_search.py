@@ -14,24 +14,24 @@ if TYPE_CHECKING:
 
 STEPS_PER_OCTAVE = 2
 WORTH_WHILE = 0.98
-"""Share of the expected error below which a weight of the change earns its place."""
+"""Share of the expected error below which a weight of the change is worth adding."""
 BISECTIONS = 2
-"""Halvings, in octaves, of the step between the best rate and the first that grows."""
+"""Bisections, in octaves, between the best rate and the first one that grows."""
 
 
 class WeightSearch:
-    """Search for the rate of learning with the least error that no trial's growth forbids.
+    """Search for the weight `rate` with the smallest error among those with which no trial grows.
 
     Parameters
     ----------
     benches : list of Bench
-        One for each axis that moves.
+        One for each moving axis.
     q : float
         Weight of the error.
     levels : list of float
-        Least and largest weight of the error along the run.
+        Smallest and largest weight of the error along the run.
     growth_max : float
-        Growth of an error over the best one that a trial may show.
+        Allowed growth of an error over the smallest one in a trial.
     n_runs : int
         Runs of a trial.
     """
@@ -60,7 +60,7 @@ class WeightSearch:
             weights = Weights(self.q, 0.0, 0.0, rate)
             trials = self._trials(weights, self.growth_max)
             if trials is None:
-                # Below a rate with which an error grows it grows all the more.
+                # Below a rate with which an error grows, it grows even more.
                 self.refused = rate
                 break
             best = self._better(best, weights, trials)
@@ -94,14 +94,14 @@ class WeightSearch:
         return (score, weights, trials) if best is None or score < best[0] else best
 
     def _changes(self) -> list[float]:
-        """Return weights of the change that may pay: only against noise."""
+        """Return the weights of the change worth trying: only against noise."""
         if all(bench.noise == 0.0 for bench in self.benches):
             return []
         square = max(float(bench.model.dc_gain()[0, 0]) ** 2 for bench in self.benches)
         return [rounded(self.levels[0] * square * share) for share in (0.3, 1.0, 3.0, 10.0)]
 
     def _trials(self, weights: Weights, growth_max: float) -> list[Trial] | None:
-        """Return the trials of all axes; None if an error grows by more than allowed.
+        """Return the trials of all axes; None if an error grows more than allowed.
 
         Of several weights of the error the larger, with which learning is bolder, may forbid a
         rate; the residual error is that of the smallest.
@@ -117,7 +117,7 @@ class WeightSearch:
         return found
 
     def _score(self, trials: list[Trial]) -> float:
-        """Return the mean of the trials' last errors, of all axes together."""
+        """Return the mean of the last errors of the trials, over all axes."""
         by_axis: dict[str, list[float]] = {}
         for trial in trials:
             by_axis.setdefault(trial.axis, []).append(float(trial.rms[-1]))
@@ -125,5 +125,5 @@ class WeightSearch:
 
 
 def rounded(value: float) -> float:
-    """Return a value to three digits, as a person would write it."""
+    """Return a value rounded to three digits."""
     return float(f"{value:.3g}")

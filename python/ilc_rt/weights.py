@@ -1,4 +1,4 @@
-"""Weights of norm-optimal learning along the run, from what they mean."""
+"""Weights of norm-optimal learning along the run, by their meaning."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def contour(
     along: ArrayLike = 0.0,
     axes: Sequence[int] | None = None,
 ) -> NDArray[np.float64]:
-    """Return weights by which the error across the path counts more.
+    """Return weights that emphasise the error across the path (contour error).
 
     ``Q_k = q I + contour (I - t_k t_k') + along t_k t_k'`` with ``t_k`` the unit
     tangent of the reference.
@@ -30,34 +30,33 @@ def contour(
     Parameters
     ----------
     reference : ndarray of float64, shape (n_samples, n_outputs)
-        Reference of every output, the axes of the path in one unit.
+        Reference of every output; the axes of the path share one unit.
     q : float or ndarray of shape (n_samples,), (p, p) or (n_samples, p, p)
-        Weight of every output by itself.
+        Weight of each output individually.
     contour : float or ndarray of shape (n_samples,)
         Weight of the error across the path: to first order the contour error.
     along : float or ndarray of shape (n_samples,)
         Weight of the error along the path.
     axes : sequence of int, optional
-        Outputs that make the path; by default all.
+        Outputs that form the path; by default all.
 
     Returns
     -------
     ndarray of float64, shape (n_samples, n_outputs, n_outputs)
-        Weight of the error, to be given to a law as `q`.
+        Weight of the error, for the parameter `q` of a law.
 
     Raises
     ------
     LearningError
-        If a weight is negative or does not fit, the path never moves, or it has
-        fewer than two axes.
+        If a weight is negative or inconsistent, the path never moves, or it has fewer than two
+        axes.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
-    Where the reference rests its tangent is undefined; there the one nearest in
-    time holds. With q = along = 0 nothing weighs the error along the path: give
-    the law an s or r above 0.
+    Where the reference is at rest its tangent is undefined; the one nearest in time is used. With q
+    = along = 0 the error along the path has no weight: give the law an s or r above 0.
 
     References
     ----------
@@ -79,29 +78,29 @@ def contour(
 def coupled(
     coupling: ArrayLike, sigma: ArrayLike = 1.0, gamma: ArrayLike = 0.0
 ) -> NDArray[np.float64]:
-    """Return weights that divide between channels and coupled signals.
+    """Return weights shared between channels and coupled signals.
 
     ``Q_k = sigma_k (gamma_k I + (1 - gamma_k) C_k' C_k)``
 
     Parameters
     ----------
     coupling : ndarray of float64, shape (n_samples, c, p)
-        What each of p channels contributes to each of c coupled signals, as
-        ``[-sin theta, cos theta]`` to the contour error.
+        Contribution of each of p channels to each of c coupled signals, such as ``[-sin theta, cos
+        theta]`` for the contour error.
     sigma : float or ndarray of shape (n_samples,)
         Overall weight.
     gamma : float or ndarray of shape (n_samples,)
-        Share of the channels by themselves, 0 to 1.
+        Share of the individual channels, 0 to 1.
 
     Returns
     -------
     ndarray of float64, shape (n_samples, p, p)
-        Weight, to be given to a law as `q`, `s` or `r`.
+        Weight, for the parameter `q`, `s` or `r` of a law.
 
     Raises
     ------
     LearningError
-        If sigma is negative or gamma outside 0 to 1, or a length does not fit.
+        If sigma is negative, gamma is outside 0 to 1, or a length is inconsistent.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
@@ -126,9 +125,9 @@ def schedule(
     bandwidth_hz: float | None = None,
     dt_s: float | None = None,
 ) -> NDArray[np.float64]:
-    """Return numbers that switch smoothly from one part of a run to the next.
+    """Return values that switch smoothly between the parts of a run.
 
-    Each value holds from its start on; a Gaussian filter makes the steps smooth.
+    Each value holds from its start; a Gaussian filter smooths the steps.
 
     Parameters
     ----------
@@ -137,22 +136,22 @@ def schedule(
     n_samples : int
         Samples of a run.
     bandwidth_hz : float, optional
-        Frequency in Hz that the filter lowers to 1/sqrt(2); by default the values
-        step. From 10 % to 90 % takes 0.34 / bandwidth_hz seconds.
+        Frequency in Hz at which the gain of the filter is 1/sqrt(2); by default the values step.
+        The rise time from 10 % to 90 % is 0.34 / bandwidth_hz seconds.
     dt_s : float, optional
-        Sample time in seconds; needed with `bandwidth_hz`.
+        Sample time in seconds; required with `bandwidth_hz`.
 
     Returns
     -------
     ndarray of float64, shape (n_samples,)
-        Values, none outside the range of those given.
+        Values, within the range of the given ones.
 
     Raises
     ------
     LearningError
-        If the starts do not rise from 0 within the run, or a value is not finite.
+        If the starts do not increase from 0 within the run, or a value is not finite.
     SignalError
-        If there is no such filter, or it is longer than the run.
+        If the filter cannot be designed or is longer than the run.
     ValueError
         If only one of `bandwidth_hz` and `dt_s` is given.
 
@@ -191,21 +190,21 @@ def formation(
     Parameters
     ----------
     n_agents, n_axes : int
-        Agents, and axes of each; their errors stand one agent after the other.
+        Agents, and axes of each; their errors are stacked agent by agent.
     n_samples : int
         Samples of a run.
     tracking : float or array that broadcasts to (n_samples, n_agents)
-        Share of tracking; the rest is the formation's.
+        Share of tracking; the rest goes to the formation.
     own : float or array that broadcasts to (n_samples, n_agents)
-        Share of its own error in what an agent tracks.
+        Share of the agent's own error in its tracking.
     centre : float or array that broadcasts to (n_samples, n_agents)
-        Share of the error of the formation's centre in what an agent tracks.
+        Share of the error of the formation's centre in an agent's tracking.
     sigma : float or array that broadcasts to (n_samples, n_agents)
         Overall weight.
     weight : float or ndarray of shape (n_samples,), (d, d) or (n_samples, d, d)
         Weight of the d axes of an agent, and of the centre.
     leaders : sequence of int, optional
-        Agents that alone track their references; takes the place of `own`.
+        The only agents that track their references; replaces `own`.
     pairs : sequence of (int, int), optional
         Pairs of agents that keep their offset; by default all.
     axes : sequence of int, optional
@@ -214,21 +213,20 @@ def formation(
     Returns
     -------
     ndarray of float64, shape (n_samples, n_agents * n_axes, n_agents * n_axes)
-        Weight of all agents' errors, to be given to a law as `q`.
+        Weight of the errors of all agents, for the parameter `q` of a law.
 
     Raises
     ------
     LearningError
-        If a share lies outside 0 to 1, a weight is negative, or an agent or axis
-        is not there.
+        If a share is outside 0 to 1, a weight is negative, or an agent or axis does not exist.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
-    The formation error of agents i and j is ``e_j - e_i``: the wanted offset, as
-    their references have it, less the actual one. Where agents that a term
-    couples have different gains, the symmetric form of the product is taken.
+    The formation error of agents i and j is ``e_j - e_i``: the wanted offset, from their
+    references, minus the actual one. Where coupled agents have different gains, the symmetric part
+    of the product is used.
 
     References
     ----------

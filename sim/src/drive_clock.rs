@@ -1,25 +1,26 @@
-//! The drives' clock in real time: locked to SYNC like a real drive's, free without it.
+//! The drives' clock in real time: locked to SYNC like a real drive's, free-running without it.
 //!
-//! A real drive samples in hardware and locks its control loop to SYNC; a SYNC that is handled a little
-//! late by a busy computer does not move the moment of sampling. So, while SYNCs come, each one stands
-//! for exactly one cycle, whenever it is handled. A computer that stalls stalls controller and plant
-//! alike: cycles left out by the controller are left out by the plant too, and it is the controller
-//! that counts them.
+//! A real drive samples in hardware and locks its control loop to SYNC; a SYNC handled slightly
+//! late by a busy computer does not shift its sampling. So, while SYNCs arrive, each one stands for
+//! exactly one cycle, whenever it is handled. A stall of the computer stalls controller and plant
+//! alike: cycles skipped by the controller are skipped by the plant too, and the controller counts
+//! them.
 //!
-//! Controller and drives share a computer, and whichever of them is stalled, the other must not take it
-//! for lost. The silence between two SYNCs is therefore the time for which this process *watched* the
-//! bus in vain: a gap in which it did not run itself counts as one look. Once the drives have run in step
-//! for a while, a long silence stops the plant's time before it sets it free; then the wall clock rules,
-//! from that moment on, and the drives miss their commands. Time that has been stood still is not made up
-//! for.
+//! Controller and drives share a computer, and if one of them is stalled, the other must not count
+//! it as lost. The silence between two SYNCs is therefore the time for which this process *watched*
+//! the bus in vain: a gap in which it did not run counts as one check. Once the drives have been in
+//! lock for a while, a long silence first pauses the plant's time; then the clock runs freely with
+//! the wall clock, from that moment on, and the drives miss their commands. Paused time is not made
+//! up for.
 
 use std::time::Duration;
 
-/// Cycles without SYNC after which the clock runs by itself, unless it has run in step.
+/// Cycles without SYNC after which the clock runs freely, unless it has been in lock.
 const LOOSE_CYCLES: u32 = 15;
-/// SYNCs in a row, each within [`LOOSE_CYCLES`] of the one before, after which the clock is in step.
+/// Consecutive SYNCs, each within [`LOOSE_CYCLES`] of the previous one, after which the clock is in
+/// lock.
 const IN_STEP: u32 = 10;
-/// Most that passes between two looks at the bus; what is beyond it is a stall of this process.
+/// Largest time that counts between two checks of the bus; a longer gap is a stall of this process.
 const LOOK_MAX: Duration = Duration::from_millis(10);
 
 /// The clock; it is given the wall time and returns steps to take.
@@ -29,15 +30,15 @@ pub(crate) struct DriveClock {
     step: Duration,
     patience: Duration,
     looked: Duration,
-    /// Time that has passed and is not given as steps yet, while free.
+    /// Elapsed time not yet returned as steps, while free-running.
     owed: Duration,
-    /// Time watched in vain since the last SYNC; `None` while free.
+    /// Time of silence watched since the last SYNC; `None` while free-running.
     silence: Option<Duration>,
     n_in_step: u32,
 }
 
 impl DriveClock {
-    /// `step` must divide `cycle`; `patience` is the silence that ends a lock once the clock is in step.
+    /// Creates the clock. `step` must divide `cycle`; `patience` is the silence that ends a lock.
     pub(crate) fn new(cycle: Duration, step: Duration, patience: Duration) -> Self {
         Self {
             cycle,
@@ -50,7 +51,7 @@ impl DriveClock {
         }
     }
 
-    /// Steps to take before the nodes sample for a SYNC handled at `now`.
+    /// Returns the steps to take before the nodes sample for a SYNC handled at `now`.
     pub(crate) fn at_sync(&mut self, now: Duration) -> u32 {
         let passed = self.look(now);
         let Some(silence) = self.silence.replace(Duration::ZERO) else {
@@ -62,7 +63,7 @@ impl DriveClock {
         count(self.cycle, self.step)
     }
 
-    /// Steps to take at `now` when no SYNC has come: none while locked.
+    /// Returns the steps to take at `now` without a SYNC: none while locked.
     pub(crate) fn idle(&mut self, now: Duration) -> u32 {
         let passed = self.look(now);
         let Some(silence) = self.silence else { return self.take(passed) };
@@ -80,7 +81,7 @@ impl DriveClock {
         (self.cycle * LOOSE_CYCLES).min(self.patience)
     }
 
-    /// The time that has passed since the last look, as far as this process was awake.
+    /// Returns the time since the last check during which this process was awake.
     fn look(&mut self, now: Duration) -> Duration {
         let passed = now.saturating_sub(self.looked).min(LOOK_MAX);
         self.looked = now;
@@ -113,7 +114,7 @@ mod tests {
         DriveClock::new(CYCLE, STEP, PATIENCE)
     }
 
-    /// A clock that has seen a SYNC at every cycle up to and including number `n`.
+    /// Returns a clock that has received a SYNC at every cycle up to and including number `n`.
     fn locked(n: u32) -> DriveClock {
         let mut clock = clock();
         clock.at_sync(Duration::ZERO);
@@ -123,7 +124,7 @@ mod tests {
         clock
     }
 
-    /// Looks once a millisecond for a while, and returns the steps given and the time at the end.
+    /// Checks once a millisecond for a while, and returns the steps and the time at the end.
     fn watch(clock: &mut DriveClock, from: Duration, span: Duration) -> (u32, Duration) {
         let mut n_steps = 0;
         let mut now = from;
@@ -166,7 +167,7 @@ mod tests {
         for stall_ms in [20, 38, 100, 300, 5000] {
             let mut clock = locked(20);
             let woken = CYCLE * 20 + Duration::from_millis(stall_ms);
-            // The first frames to be seen are commands, and then comes the first SYNC of many.
+            // The first frames are commands, followed by the first SYNC of many.
             assert_eq!(clock.idle(woken), 0, "{stall_ms} ms");
             assert_eq!(clock.idle(woken), 0, "{stall_ms} ms");
             assert_eq!(clock.at_sync(woken), STEPS, "{stall_ms} ms");

@@ -1,4 +1,4 @@
-//! The electronic data sheet of a node, written from the very table that the node answers from.
+//! The electronic data sheet (EDS) of a node, written from its own object dictionary.
 
 use std::fmt::{self, Write};
 

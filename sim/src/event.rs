@@ -6,7 +6,7 @@ use ilc_rt::fieldbus::cia402::State;
 /// A change of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
-    /// Time of the machine, since it was powered.
+    /// Time of the machine since power-on.
     pub time_us: u64,
     /// Node.
     pub node: NodeId,
@@ -17,13 +17,13 @@ pub struct Event {
 /// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Another NMT state.
+    /// A new NMT state.
     Nmt(NmtState),
-    /// Another drive state.
+    /// A new drive state.
     Drive(State),
     /// An emergency message with this code.
     Emergency(u16),
-    /// No power any more.
+    /// Loss of power.
     Muted,
 }
 

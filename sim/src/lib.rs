@@ -1,8 +1,8 @@
 //! Simulated CiA 402 drives and plants that speak the real protocol.
 //!
-//! `plant` is physics, `node` is CANopen and the drive profile, `machine` joins them under one clock.
-//! In process, a [`machine::Machine`] is the far side of a bus in memory; as a process of its own, the
-//! binary `ilc-sim` puts it on any bus. `ilc-rt` never imports this crate.
+//! `plant` is physics, `node` is CANopen and the drive profile, `machine` joins them under one
+//! clock. In process, a [`machine::Machine`] is the far side of a bus in memory; as a separate
+//! process, the binary `ilc-sim` puts it on any bus. `ilc-rt` never imports this crate.
 
 pub mod eds;
 pub mod event;

@@ -1,4 +1,4 @@
-//! A whole simulated machine: its nodes, its plant, and the time they share.
+//! A whole simulated machine: its nodes, its plant, and their common time.
 
 use std::collections::VecDeque;
 
@@ -12,7 +12,7 @@ use crate::event::{Change, Event};
 use crate::node::{Dictionary, DriveNode, DriveParameters, EncoderNode, Measured};
 use crate::plant::{Demand, Gantry, Plant};
 
-/// Events kept until they are taken; older ones are dropped.
+/// Number of events kept until they are taken; older ones are dropped.
 const EVENTS_MAX: usize = 64;
 
 /// Source of the machine's time.
@@ -20,14 +20,14 @@ const EVENTS_MAX: usize = 64;
 pub enum ClockMode {
     /// Every SYNC advances the machine by one cycle, before the nodes sample.
     LockStep,
-    /// [`Machine::advance`] does, at the pace of its caller.
+    /// [`Machine::advance`], at the pace of its caller.
     RealTime,
 }
 
-/// Reason that a cell description makes no machine.
+/// Reason that a cell description is not a valid machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MachineError {
-    /// A node number is not one.
+    /// An invalid node number.
     #[error("node {0}: allowed 1 to 127")]
     Node(u8),
     /// An object is missing from a node's own table.
@@ -38,7 +38,7 @@ pub enum MachineError {
         /// Abort code of the look-up.
         code: AbortCode,
     },
-    /// The plant has another number of axes than the cell.
+    /// A plant with a different number of axes than the cell.
     #[error("plant: expected {expected} axes, found {found}")]
     Axes {
         /// Axes of the cell.
@@ -48,18 +48,18 @@ pub enum MachineError {
     },
 }
 
-/// A drive on its axis, and what was last told of it.
+/// A drive on its axis, and its last published state.
 #[derive(Clone, Debug)]
 struct Axis {
     drive: DriveNode,
     is_muted: bool,
     nmt: NmtState,
     state: State,
-    /// Share of its force that the plant lets the motor use.
+    /// Share of its force available to the motor.
     force_share: f64,
 }
 
-/// The encoder of the tool, and what was last told of it.
+/// The encoder of the tool, and its last published state.
 #[derive(Clone, Debug)]
 struct Tool {
     encoder: EncoderNode,
@@ -67,7 +67,7 @@ struct Tool {
     nmt: NmtState,
 }
 
-/// All nodes of a cell, and the plant they move.
+/// All nodes of a cell, and their plant.
 ///
 /// # Real Time
 /// Set-up allocates; [`receive`](Responder::receive) and [`advance`](Self::advance) do not.
@@ -85,18 +85,18 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// The machine that a cell description states, at rest and not yet booted.
+    /// Creates the machine of a cell description, at rest and not yet booted.
     ///
     /// # Errors
-    /// [`MachineError`] if the cell is not one that was validated.
+    /// [`MachineError`] for an unvalidated cell.
     pub fn from_cell(cell: &Cell, clock: ClockMode) -> Result<Self, MachineError> {
         Self::with_plant(cell, clock, Box::new(Gantry::from_cell(cell)))
     }
 
-    /// The same nodes on another plant.
+    /// Creates the same nodes on another plant.
     ///
     /// # Errors
-    /// [`MachineError`] if the cell is not one that was validated, or the plant has not its axes.
+    /// [`MachineError`] for an unvalidated cell, or a plant with another number of axes.
     pub fn with_plant(
         cell: &Cell,
         clock: ClockMode,
@@ -149,7 +149,7 @@ impl Machine {
         Ok(machine)
     }
 
-    /// Powers the nodes: each sends its boot-up. Done by the first frame or step otherwise.
+    /// Powers the nodes: each sends its boot-up. Otherwise done by the first frame or step.
     pub fn boot(&mut self, out: &mut dyn FnMut(Frame)) {
         if self.has_booted {
             return;
@@ -164,7 +164,7 @@ impl Machine {
         self.note_changes();
     }
 
-    /// Lets `n_steps` steps of the drives' own loops pass.
+    /// Advances by `n_steps` steps of the drives' own loops.
     pub fn advance(&mut self, n_steps: u32, out: &mut dyn FnMut(Frame)) {
         self.boot(out);
         for _ in 0..n_steps {
@@ -172,8 +172,8 @@ impl Machine {
         }
     }
 
-    /// Takes the power from a node: no frame comes from it any more, and its axis is braked.
-    /// Returns whether there is such a node.
+    /// Cuts the power of a node: it sends no more frames, and its axis is braked. Returns true if
+    /// the node exists.
     pub fn mute(&mut self, node: NodeId) -> bool {
         let axis = self.axes.iter_mut().find(|axis| axis.drive.node() == node);
         let tool = self.tool.as_mut().filter(|tool| tool.encoder.node() == node);
@@ -188,22 +188,22 @@ impl Machine {
         true
     }
 
-    /// Time since the machine was powered.
+    /// Returns the time since power-on.
     pub fn time_us(&self) -> u64 {
         self.time_us
     }
 
-    /// One step of the drives' own loops.
+    /// Returns the step of the drives' own loops.
     pub fn step_us(&self) -> u32 {
         self.step_us
     }
 
-    /// The physics, to look at.
+    /// Returns the plant, for reading.
     pub fn plant(&self) -> &dyn Plant {
         self.plant.as_ref()
     }
 
-    /// State of the drive at `node`, if there is one.
+    /// Returns the state of the drive at `node`, if there is one.
     pub fn drive_state(&self, node: NodeId) -> Option<State> {
         self.axes.iter().find(|axis| axis.drive.node() == node).map(|axis| axis.drive.state())
     }
@@ -220,20 +220,20 @@ impl Machine {
         })
     }
 
-    /// Objects of `node`, if there is one.
+    /// Returns the objects of `node`, if it exists.
     pub fn dictionary(&self, node: NodeId) -> Option<&Dictionary> {
         let tool = self.tool.iter().map(|tool| (tool.encoder.node(), tool.encoder.dictionary()));
         let drives = self.axes.iter().map(|axis| (axis.drive.node(), axis.drive.dictionary()));
         drives.chain(tool).find(|(found, _)| *found == node).map(|(_, dictionary)| dictionary)
     }
 
-    /// All nodes: the axes in order, then the encoder.
+    /// Returns all nodes: the axes in order, then the encoder.
     pub fn nodes(&self) -> impl Iterator<Item = NodeId> {
         let tool = self.tool.iter().map(|tool| tool.encoder.node());
         self.axes.iter().map(|axis| axis.drive.node()).chain(tool)
     }
 
-    /// Takes the oldest event that was not taken yet.
+    /// Takes the oldest event.
     pub fn take_event(&mut self) -> Option<Event> {
         self.events.pop_front()
     }
@@ -307,8 +307,8 @@ fn push(events: &mut VecDeque<Event>, event: Event) {
 }
 
 impl Responder for Machine {
-    /// Takes a frame from the bus. In lock-step a SYNC first lets one cycle pass, so that what the
-    /// nodes send in answer is the end of that cycle.
+    /// Handles a frame from the bus. In lock-step a SYNC first advances one cycle, so that the
+    /// nodes' answers are the state at the end of that cycle.
     fn receive(&mut self, frame: &Frame, reply: &mut dyn FnMut(Frame)) {
         self.boot(reply);
         if self.clock == ClockMode::LockStep && sync::is_sync(frame) {

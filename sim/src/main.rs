@@ -1,4 +1,4 @@
-//! Simulated drives in a process of their own.
+//! Simulated drives as a separate process.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -72,14 +72,14 @@ enum Verb {
 enum Failure {
     /// Input that cannot be used: exit status 2.
     Input(String),
-    /// Something broke on the way: exit status 1.
+    /// A failure at run time: exit status 1.
     Broken(String),
 }
 
 fn main() -> ExitCode {
     let outcome = match Arguments::try_parse() {
         Ok(arguments) => carry_out(arguments.verb),
-        // What is printed by --help and --version comes as an error as well.
+        // The output of --help and --version arrives as an error as well.
         Err(answer) if answer.exit_code() == 0 => answer.exit(),
         Err(refusal) => Err(Failure::Input(refusal_line(&refusal))),
     };
@@ -88,7 +88,7 @@ fn main() -> ExitCode {
         Err(Failure::Input(line)) => (line, 2),
         Err(Failure::Broken(line)) => (line, 1),
     };
-    // There is no reader if standard error is gone.
+    // No reader is left if standard error is closed.
     let _ = writeln!(std::io::stderr(), "ilc-sim: {}", printable_lines(&line));
     ExitCode::from(status)
 }
@@ -127,7 +127,7 @@ fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Res
     })
 }
 
-/// Reads a span between a millisecond and a minute.
+/// Parses a span between a millisecond and a minute.
 fn seconds(text: &str) -> Result<Duration, String> {
     let refused = || format!("{text}: allowed 0.001 to 60");
     let span = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());

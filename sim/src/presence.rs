@@ -1,8 +1,8 @@
-//! Detection of nodes on the bus before they are simulated: listened for, then asked for.
+//! Detection of nodes on the bus before they are simulated: by listening, then by requests.
 //!
-//! A second node of a number makes every answer on the bus ambiguous, and its boot-up stops the campaign
-//! that is under way. So nothing is sent while anything is heard of the nodes; only nodes that are idle
-//! are asked.
+//! A second node of the same number makes every answer on the bus ambiguous, and its boot-up stops
+//! a running campaign. So nothing is sent while any of the nodes is heard; only idle nodes are
+//! asked.
 
 use std::time::{Duration, Instant};
 
@@ -12,14 +12,14 @@ use ilc_rt::fieldbus::canopen::{NodeId, ObjectAddress, cob_id};
 use ilc_rt::fieldbus::cia402::objects;
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 
-/// Listening time: drives under way send in every cycle, and a heartbeat every 100 ms.
+/// Listening time: running drives send in every cycle, and a heartbeat every 100 ms.
 const LISTEN: Duration = Duration::from_millis(150);
-/// Listening time for a master: the longest servo cycle, and some more.
+/// Listening time for a master: the longest servo cycle, with a margin.
 const MASTER: Duration = Duration::from_millis(120);
 /// Time-out of an idle node.
 const ANSWER: Duration = Duration::from_millis(150);
 
-/// Returns the first of `nodes` that is there.
+/// Returns the first of `nodes` that exists.
 ///
 /// # Errors
 /// [`BusError`] if the bus fails.

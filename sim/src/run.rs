@@ -17,17 +17,17 @@ use ilc_sim::{ClockMode, Machine};
 use crate::drive_clock::DriveClock;
 use crate::presence;
 
-/// Longest wait for a frame before the plant is brought up to date.
+/// Longest wait for a frame before the plant is advanced.
 const BATCH: Duration = Duration::from_millis(1);
-/// Real-time priority of the drives, below the controller's: they stand for hardware.
+/// Real-time priority of the drives, below the controller's: they stand in for hardware.
 const PRIORITY: i32 = 70;
 
-/// A node that is to lose its power.
+/// A node that will lose its power.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mute {
     /// Node.
     pub(crate) node: NodeId,
-    /// When, since the start.
+    /// Time since the start.
     pub(crate) after: Duration,
 }
 
@@ -46,10 +46,10 @@ impl FromStr for Mute {
 
 /// Rest of axes that lost their controller before the drives end.
 const REST: Duration = Duration::from_millis(300);
-/// When the drives end in any case after the program that started them is gone.
+/// Latest end of the drives after their parent program is gone.
 const ORPHAN_MAX: Duration = Duration::from_secs(10);
 
-/// Drives whose parent is gone, and when they may go as well.
+/// Drives without their parent, and the times at which they may end.
 #[derive(Debug, Default)]
 struct Orphan {
     since: Option<Duration>,
@@ -57,8 +57,8 @@ struct Orphan {
 }
 
 impl Orphan {
-    /// Returns whether to end now: the axes have been at rest for a while, as the controller has stopped them or
-    /// the drives have, missing its commands.
+    /// Returns true to end now: the axes have been at rest for a while, stopped by the controller
+    /// or by the drives on missing commands.
     fn is_over(&mut self, now: Duration, is_energised: bool) -> bool {
         let since = *self.since.get_or_insert(now);
         let moved = self.moved.get_or_insert(now);
@@ -72,11 +72,11 @@ impl Orphan {
 /// Behaviour of the machine beyond its cell description.
 #[derive(Clone, Debug)]
 pub(crate) struct Habits {
-    /// Silence after which SYNC counts as lost and time goes on by itself.
+    /// Silence after which SYNC counts as lost and time runs freely.
     pub(crate) sync_lost_after: Duration,
-    /// Nodes that are to lose their power.
+    /// Nodes that will lose their power.
     pub(crate) mutes: Vec<Mute>,
-    /// True if to end, when the axes are at rest, once standard input closes.
+    /// True to end, when the axes are at rest, once standard input closes.
     pub(crate) with_parent: bool,
 }
 
@@ -89,7 +89,7 @@ pub(crate) enum RunError {
     /// The thread that watches standard input cannot be started.
     #[error("no thread to watch standard input: {0}")]
     Thread(std::io::Error),
-    /// The nodes are there already.
+    /// The nodes exist already.
     #[error(
         "{address}: node {node} is on this bus already; another ilc-sim, or a real drive, has this \
          number: stop it, or give --bus another address"
@@ -100,7 +100,7 @@ pub(crate) enum RunError {
     Signal(std::io::Error),
 }
 
-/// The sending side, which counts.
+/// The sending side, with a counter.
 struct Outlet {
     bus: Box<dyn Bus>,
     n_sent: u64,
@@ -146,7 +146,7 @@ pub(crate) fn run(
         habits.sync_lost_after,
     );
     if clock == ClockMode::RealTime {
-        // What is refused only makes the drives less punctual; the controller tells of its own rights.
+        // A refusal only makes the drives less punctual; the controller reports its own rights.
         let _ = thread::enter(RtRequest { priority: PRIORITY, lock_memory: true });
     }
     let is_orphan = Arc::new(AtomicBool::new(false));
@@ -229,7 +229,7 @@ fn summary(
     )
 }
 
-/// Prints a line. A reader who has gone must not stop the drives.
+/// Prints a line. A closed output must not stop the drives.
 fn print(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }

@@ -1,7 +1,7 @@
 """Frames between python-can's ``udp_multicast`` interface and ours, in both directions.
 
 The other side is ``bus_echo``, an example of the Rust crate, in its own process: it returns each
-    frame with the next identifier. ``make test-python`` builds it.
+frame with the next identifier. ``make test-python`` builds it.
 """
 
 from __future__ import annotations

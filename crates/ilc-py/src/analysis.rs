@@ -1,5 +1,5 @@
-//! What a law will do, with which weights, and what repeats from run to run: `analyze`,
-//! `refuse_divergent`, `tune`, `repeatability`.
+//! Analysis, tuning and repeatability of laws: `analyze`, `refuse_divergent`, `tune`,
+//! `repeatability`.
 //!
 //! Each returns its figures by name; the classes that hold them are those of `ilc_rt.analysis`.
 
@@ -137,7 +137,7 @@ fn read_uncertainty(a: Arguments<'_, '_>) -> PyResult<Option<Uncertainty>> {
     })
 }
 
-/// Reads an error with a channel for each output.
+/// Reads an error with one channel per output.
 fn read_reference(
     a: Arguments<'_, '_>,
     model: &StateSpace,
@@ -152,7 +152,7 @@ fn read_reference(
     })
 }
 
-/// Reads a law, native or written in Python, or the weights of an optimal one.
+/// Reads a law, native or written in Python, or the weights of a norm-optimal one.
 fn read_law(
     object: &Bound<'_, PyAny>,
     model: &StateSpace,

@@ -1,4 +1,4 @@
-//! Arrays that come from and go to Python.
+//! Conversion of arrays from and to Python.
 
 use ilc_rt::model::StateSpace;
 use numpy::ndarray::{Array1, Array2};
@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 /// The matrix type of `ilc-rt`.
 pub(crate) type Matrix = nalgebra::DMatrix<f64>;
 
-/// Samples and channels of a signal, and whether it has a channel axis.
+/// Samples and channels of a signal, and true if it has a channel axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Layout {
     pub(crate) n_samples: usize,
@@ -56,13 +56,13 @@ impl Layout {
         Err(misfit(name, &self.shape(), &format!("({n_samples}, {n_channels})")))
     }
 
-    /// Returns the shape as it came from Python.
+    /// Returns the original shape.
     pub(crate) fn shape(self) -> Vec<usize> {
         if self.is_flat { vec![self.n_samples] } else { vec![self.n_samples, self.n_channels] }
     }
 }
 
-/// A signal, time first, that remembers whether it had a channel axis.
+/// A signal, time first, with its original layout.
 #[derive(Debug)]
 pub(crate) struct Signal {
     pub(crate) values: Vec<f64>,
@@ -96,7 +96,7 @@ impl Signal {
         Err(misfit(name, &self.shape(), &rule))
     }
 
-    /// Returns the shape as it came from Python.
+    /// Returns the original shape.
     pub(crate) fn shape(&self) -> Vec<usize> {
         if self.is_flat { vec![self.n_samples] } else { vec![self.n_samples, self.n_channels] }
     }
@@ -170,10 +170,10 @@ pub(crate) fn read_array(
     Ok((values, shape))
 }
 
-/// Refuses numbers in row-major order of which one is infinite or not a number.
+/// Refuses infinite or NaN numbers in a row-major array.
 pub(crate) fn refuse_infinite(name: &str, values: &[f64], shape: &[usize]) -> PyResult<()> {
-    // One pass without a branch: a sum of `x * 0` is 0 unless an `x` is infinite or not a number.
-    // In several sums at a time, because each would wait for its last addition.
+    // One pass without branches: a sum of `x * 0` is 0 unless an `x` is infinite or NaN. Several
+    // partial sums, because each addition would wait for the previous one.
     let chunks = values.chunks_exact(16);
     let rest = chunks.remainder();
     let mut poison = [0.0; 16];
@@ -193,7 +193,7 @@ pub(crate) fn refuse_infinite(name: &str, values: &[f64], shape: &[usize]) -> Py
     )))
 }
 
-/// Reads any array of float64 or integers in row-major order, infinite numbers and NaN included.
+/// Reads any array of float64 or integers in row-major order, including infinite numbers and NaN.
 pub(crate) fn read_numbers(
     name: &str,
     object: &Bound<'_, PyAny>,
@@ -201,7 +201,7 @@ pub(crate) fn read_numbers(
     let array = in_order(name, object)?;
     let shape = array.shape().to_vec();
     let array = array.readonly();
-    // One plain copy where the numbers lie in order, as they nearly always do.
+    // A single copy if the array is contiguous, the usual case.
     let values = match array.as_slice() {
         Ok(values) => values.to_vec(),
         Err(_) => array.as_array().iter().copied().collect(),
@@ -209,7 +209,7 @@ pub(crate) fn read_numbers(
     Ok((values, shape))
 }
 
-/// Returns an array of float64 in row-major order: the very one that is given, if it is such.
+/// Returns an array of float64 in row-major order: the given one itself, if it is one.
 pub(crate) fn in_order<'py>(
     name: &str,
     object: &Bound<'py, PyAny>,
@@ -231,8 +231,8 @@ fn converted<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py,
     let dtype = array.getattr("dtype")?;
     let kind: String = dtype.getattr("kind")?.extract()?;
     let size: usize = dtype.getattr("itemsize")?.extract()?;
-    // An empty list becomes float64 by itself; what is narrower is widened without loss, and integers
-    // are exact as far as they are set-points.
+    // An empty list is float64 already; narrower floats are widened without loss, and integers are
+    // exact within the range of set points.
     if !(matches!(kind.as_str(), "i" | "u") || kind == "f" && size <= 8) {
         return Err(PyTypeError::new_err(format!(
             "{name} has dtype {dtype}; float64, or what widens to it, is needed"
@@ -246,7 +246,7 @@ fn converted<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Bound<'py,
     Ok(array.call_method0("copy")?.cast_into::<PyArrayDyn<f64>>()?)
 }
 
-/// Returns the position of a flat index as Python would write it.
+/// Returns the position of a flat index in Python's notation.
 fn place(index: usize, shape: &[usize]) -> String {
     let mut rest = index;
     let mut indices = Vec::new();
@@ -258,7 +258,7 @@ fn place(index: usize, shape: &[usize]) -> String {
     format!("[{}]", indices.join(", "))
 }
 
-/// Returns whether an output of `model` can be handed back without channel axis.
+/// Returns true if an output of `model` can be returned without channel axis.
 pub(crate) fn is_flat_output(input: &Signal, model: &StateSpace) -> bool {
     input.is_flat && model.n_outputs() == 1
 }

@@ -1,7 +1,7 @@
-//! Arguments by name, as the typed functions and classes of Python hand them on.
+//! Keyword arguments, as passed on by the typed functions and classes of Python.
 //!
-//! For every family of this crate: each argument is read, and refused, under its own name. The signatures,
-//! defaults and documentation are those of the Python package.
+//! For every family of this crate: each argument is read, and refused, under its own name.
+//! Signatures, defaults and documentation are those of the Python package.
 
 use ilc_rt::learning::weights::Weight;
 use ilc_rt::model::StateSpace;
@@ -23,7 +23,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
         Self(keywords)
     }
 
-    /// Wraps the keywords of a function that needs some.
+    /// Wraps the keywords of a function that requires some.
     pub(crate) fn of(keywords: Option<&'a Bound<'py, PyDict>>) -> PyResult<Self> {
         keywords.map(Self).ok_or_else(|| PyTypeError::new_err("keyword arguments are needed"))
     }
@@ -33,7 +33,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
         self.0.py()
     }
 
-    /// Returns an argument that has to be there.
+    /// Returns a required argument.
     pub(crate) fn get(self, name: &str) -> PyResult<Bound<'py, PyAny>> {
         self.0
             .get_item(name)?
@@ -54,7 +54,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
         self.given(name)?.map(|value| read(name, &value)).transpose()
     }
 
-    /// Reads a number, infinite ones and NaN included.
+    /// Reads a number, including infinity and NaN.
     pub(crate) fn number(self, name: &str) -> PyResult<f64> {
         number(name, &self.get(name)?)
     }
@@ -74,14 +74,14 @@ impl<'a, 'py> Arguments<'a, 'py> {
         self.maybe(name, whole)
     }
 
-    /// Reads numbers counted from 0, or `None`.
+    /// Reads indices from 0, or `None`.
     pub(crate) fn maybe_wholes(self, name: &str) -> PyResult<Option<Vec<usize>>> {
         self.maybe(name, |name, list| {
             each(name, list, "a sequence of numbers counted from 0", |i| whole(name, i))
         })
     }
 
-    /// Reads pairs of numbers counted from 0, or `None`.
+    /// Reads pairs of indices from 0, or `None`.
     pub(crate) fn maybe_pairs(self, name: &str) -> PyResult<Option<Vec<(usize, usize)>>> {
         self.maybe(name, |name, list| {
             each(name, list, "a sequence of pairs of agents", |both| {
@@ -91,7 +91,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
         })
     }
 
-    /// Reads a truth value.
+    /// Reads a bool.
     pub(crate) fn flag(self, name: &str) -> PyResult<bool> {
         let value = self.get(name)?;
         value.extract().map_err(|_| refused(name, &value, "True or False"))
@@ -123,17 +123,17 @@ impl<'a, 'py> Arguments<'a, 'py> {
         Err(PyValueError::new_err(format!("{name} = {text}; {others} or {last} is needed")))
     }
 
-    /// Reads a model that does not change.
+    /// Reads a time-invariant model.
     pub(crate) fn model(self, name: &str) -> PyResult<StateSpace> {
         read_model(name, &self.get(name)?)
     }
 
-    /// Reads finite numbers with one axis.
+    /// Reads a one-dimensional array of finite numbers.
     pub(crate) fn vector(self, name: &str) -> PyResult<Vec<f64>> {
         read_vector(name, &self.get(name)?)
     }
 
-    /// Reads a number for each of two things.
+    /// Reads two numbers.
     pub(crate) fn pair(self, name: &str) -> PyResult<[f64; 2]> {
         match self.vector(name)?[..] {
             [first, second] => Ok([first, second]),
@@ -184,7 +184,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
         Ok(kept)
     }
 
-    /// Returns the call as Python would write it; of an array its shape.
+    /// Returns the call in Python's notation, with arrays by their shapes.
     pub(crate) fn call(self, name: &str) -> PyResult<String> {
         let mut words = Vec::new();
         for (key, value) in self.0 {

@@ -23,11 +23,11 @@ use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::python_law::{Channels, Frame, PythonLaw};
 
-/// Frames that may wait for the loop on the bus inside the process.
+/// Capacity of the in-process bus towards the loop, in frames.
 const LOOPBACK_FRAMES: usize = 1024;
-/// Events that may wait for Python; the campaign waits when they are not taken.
+/// Capacity of events towards Python; a full queue makes the campaign wait.
 const EVENTS: usize = 64;
-/// How often a waiting `next` looks for signals.
+/// Interval at which a waiting `next` checks for signals.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Signal number with which a dropped stream stops its axes.
 const SIGTERM: i32 = 15;
@@ -38,7 +38,7 @@ struct EventStream {
     events: Mutex<Receiver<String>>,
     thread: Mutex<Option<JoinHandle<Result<(), CampaignError>>>>,
     stop: Arc<AtomicI32>,
-    /// Of the law that is written in Python.
+    /// Frame of a law written in Python.
     frame: Arc<Frame>,
 }
 
@@ -66,7 +66,7 @@ impl EventStream {
         self.frame.take_raised().map(|raised| raised.into_value(py))
     }
 
-    /// Bring the axes to rest; the events go on until they are.
+    /// Bring the axes to rest; events continue until they are.
     ///
     /// - signal : int: Number of the signal that asked for it.
     #[pyo3(signature = (signal=SIGTERM))]
@@ -91,7 +91,7 @@ impl Drop for EventStream {
         self.stop.store(SIGTERM, Ordering::Relaxed);
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let Some(thread) = thread {
-            // The campaign must not wait for somebody to take its events, nor for the interpreter.
+            // The campaign must not wait for a reader of its events, nor for the interpreter.
             Python::attach(|py| {
                 detached(py, || {
                     let events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
@@ -177,7 +177,7 @@ fn run_events(
     Ok(EventStream { events: Mutex::new(events), thread: Mutex::new(Some(thread)), stop, frame })
 }
 
-/// Options of what the campaign's thread does.
+/// Operations of the campaign's thread.
 enum Work {
     Run(Options),
     Identify(IdentifyOptions),

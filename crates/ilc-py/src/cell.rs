@@ -74,7 +74,7 @@ impl PyCell {
         &self.cell.cell.name
     }
 
-    /// Where it was read from.
+    /// Path of the file that it was read from.
     #[getter]
     fn path(&self) -> String {
         self.cell.file.display().to_string()
@@ -92,7 +92,7 @@ impl PyCell {
         self.n_samples
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     #[getter]
     fn n_axes(&self) -> usize {
         self.cell.n_axes()
@@ -111,7 +111,7 @@ impl PyCell {
         self.cell.axes.iter().map(name).collect()
     }
 
-    /// What each axis is measured in: `m`, or `rad` for a rotary one.
+    /// Unit of the position of each axis: `m`, or `rad` for a rotary one.
     #[getter]
     fn axis_units(&self) -> Vec<&'static str> {
         self.cell.axes.iter().map(|axis| axis.unit.symbol()).collect()
@@ -145,7 +145,7 @@ impl PyCell {
         self.cell.learning.law.as_str()
     }
 
-    /// What the analysis has to say against the law, though it may start.
+    /// Warnings of the analysis of the law, which may start nevertheless.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()

@@ -165,7 +165,7 @@ fn read_point(name: &str, object: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
     }
 }
 
-/// Reads a list of shapes; `None` if it is something else.
+/// Reads a list of shapes; `None` for anything else.
 fn read_shapes(object: &Bound<'_, PyAny>, window: Option<usize>) -> PyResult<Option<Vec<Shape>>> {
     let Ok(list) = object.cast::<PyList>() else { return Ok(None) };
     let mut shapes = Vec::with_capacity(list.len());

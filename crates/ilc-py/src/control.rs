@@ -1,4 +1,5 @@
-//! Controllers, tick by tick: what stands behind `Pid`, `Cascade` and `CrossCoupled` of `ilc_rt.control`.
+//! Controllers, tick by tick: the native side of `Pid`, `Cascade` and `CrossCoupled` of
+//! `ilc_rt.control`.
 
 use ilc_rt::control::{
     Bounded, Cascade, CascadeGains, CascadeReference, CrossCoupled, Derivative, Pid, PidGains,

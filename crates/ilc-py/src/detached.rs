@@ -1,4 +1,4 @@
-//! The one way to let the interpreter go during long work.
+//! Release of the interpreter (GIL) during long work.
 
 use pyo3::marker::Ungil;
 use pyo3::prelude::*;

@@ -1,4 +1,4 @@
-//! Which error of `ilc-rt` becomes which exception.
+//! Mapping from errors of `ilc-rt` to Python exceptions.
 
 use ilc_rt::trajectory::contour;
 use ilc_rt::{
@@ -10,13 +10,13 @@ use pyo3::prelude::*;
 
 use crate::exceptions;
 
-/// Turns an error of `ilc-rt` into the exception of its family, with the same sentence.
+/// Converts an error of `ilc-rt` into the exception of its family, with the same sentence.
 pub(crate) trait OrRaise<T> {
     /// Returns the value or the exception.
     fn or_raise(self) -> PyResult<T>;
 }
 
-/// Says which exception the errors of a module become.
+/// Maps the errors of a module to an exception.
 macro_rules! raise {
     ($($error:ty => $exception:ty),* $(,)?) => {
         $(impl<T> OrRaise<T> for Result<T, $error> {

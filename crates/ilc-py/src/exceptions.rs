@@ -1,4 +1,4 @@
-//! The exceptions of `ilc_rt`. All are `ValueError`: the caller gave something that cannot be used.
+//! The exceptions of `ilc_rt`. All are `ValueError`: the caller passed an invalid value.
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;

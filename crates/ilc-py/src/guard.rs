@@ -1,7 +1,7 @@
-//! The borrow guard of everything that Python objects keep and change.
+//! Borrow guard of values that Python objects own and change.
 //!
-//! Waits for other threads without the interpreter, as who holds the guard may be waiting for it, and refuses
-//! what would wait for itself: a law inside a gate that asks the gate during its own update.
+//! Waits for other threads with the interpreter released, as the holder of the guard may be waiting
+//! for it, and refuses a deadlock: a law inside a gate that uses the gate during its own update.
 
 use std::ops::{Deref, DerefMut};
 use std::ptr;
@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 
 thread_local! {
-    /// Its address tells a thread from all others that run.
+    /// Its address is unique among the running threads.
     static THREAD: u8 = const { 0 };
 }
 
@@ -35,10 +35,11 @@ impl<T> Guarded<T> {
         Self { value: Mutex::new(value), user: AtomicUsize::new(0) }
     }
 
-    /// Borrows the value. One whose user panicked half-way starts each update from scratch and can go on.
+    /// Borrows the value. If its last user panicked half-way, the value is still usable, as each
+    /// update starts from scratch.
     ///
     /// # Errors
-    /// - `RuntimeError` if this very thread uses it already.
+    /// - `RuntimeError` if this thread already uses it.
     pub(crate) fn borrow(&self, py: Python<'_>) -> PyResult<Borrowed<'_, T>> {
         if self.user.load(Ordering::Relaxed) == this_thread() {
             return Err(PyRuntimeError::new_err(

@@ -1,4 +1,4 @@
-//! Identification: frequency responses, the models fitted to them, excitations, uncertainty.
+//! Identification: frequency responses, fits, excitations, uncertainty.
 //!
 //! Each function returns its figures by name; the classes that hold them are those of `ilc_rt.fits`.
 
@@ -255,7 +255,7 @@ fn excitation<'py>(
     Ok((give(a.py(), signal.values), signal.first_sample, signal.period_samples))
 }
 
-/// Reads complex numbers with one axis, real ones too.
+/// Reads a one-dimensional array of complex or real numbers.
 fn read_complex(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<Complex<f64>>> {
     let numpy = object.py().import("numpy")?;
     let array = numpy.call_method1("asarray", (object,)).map_err(|error| {

@@ -1,4 +1,4 @@
-//! Mechanisms: what stands behind `Delta` and `Gantry` of `ilc_rt.kinematics`.
+//! Mechanisms: the native side of `Delta` and `Gantry` of `ilc_rt.kinematics`.
 
 use ilc_rt::kinematics::{Delta, Gantry, KinematicsError};
 use numpy::IntoPyArray;
@@ -136,7 +136,7 @@ impl PyGantry {
         slf.get().made.reduce(slf.get_type().as_any())
     }
 
-    /// Error of the right angle in rad.
+    /// Orthogonality error in rad.
     #[getter]
     fn orthogonality_rad(&self) -> f64 {
         self.gantry.orthogonality_rad()
@@ -171,7 +171,7 @@ impl PyGantry {
     }
 }
 
-/// One triple, or one a sample.
+/// One triple, or one per sample.
 struct Poses {
     values: Vec<[f64; 3]>,
     is_single: bool,

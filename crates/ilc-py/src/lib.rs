@@ -1,9 +1,9 @@
 //! Python bindings of `ilc-rt`: conversion, shape checks and error mapping only.
 //!
-//! One file per family of Python names, each with its `register`; `argument` checks what comes in,
-//! `exceptions` and `error` say what is raised, and `detached` lets the interpreter go.
+//! One file per family of Python names, each with its `register`; `argument` checks input,
+//! `exceptions` and `error` define the exceptions, and `detached` releases the interpreter.
 //!
-//! Family: `laws` and `python_law` call each other: a law inside another one may be written in Python.
+//! Family: `laws` and `python_law` call each other: an inner law may be written in Python.
 //!
 //! Family: `arguments`, `model` and `model_argument` read each other's arguments.
 //!

@@ -27,12 +27,12 @@ pub(crate) struct PyLibrary {
     held: Held,
 }
 
-/// Where the runs are.
+/// Storage of the runs.
 #[derive(Debug)]
 enum Held {
-    /// In memory, for as long as this object lives.
+    /// In memory, for the lifetime of this object.
     Memory(Box<Mutex<Library>>),
-    /// In a file, which is opened for each thing that is done.
+    /// In a file, opened for each operation.
     File(PathBuf),
 }
 
@@ -49,7 +49,7 @@ impl PyLibrary {
         }
         match Library::read(&path) {
             Ok(_) => {}
-            // A new file is made at once, so that a name that cannot be used is refused here.
+            // A new file is created at once, so that an unusable name is refused here.
             Err(LibraryError::Missing { .. } | LibraryError::Empty { .. }) => {
                 Library::open(&path).or_raise()?;
             }
@@ -66,7 +66,7 @@ impl PyLibrary {
         slf.get().made.reduce(slf.get_type().as_any())
     }
 
-    /// Return the runs kept, oldest first, without their arrays.
+    /// Return the stored runs, oldest first, without their arrays.
     fn list<'py>(&self, py: Python<'py>, cell: Option<&str>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let rows = detached(py, || self.read(|library| library.list(None))).or_raise()?;
         rows.iter()
@@ -75,7 +75,7 @@ impl PyLibrary {
             .collect()
     }
 
-    /// Return one run with its arrays.
+    /// Return a run with its arrays.
     fn load<'py>(&self, py: Python<'py>, id: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
         let id = whole::id(id)?;
         let row = detached(py, || self.read(|library| library.load(id))).or_raise()?;
@@ -101,7 +101,7 @@ impl PyLibrary {
         Ok(run)
     }
 
-    /// Return the runs made under a disturbance like this one, nearest first.
+    /// Return the runs made under a similar disturbance, nearest first.
     fn recall<'py>(
         &self,
         py: Python<'py>,
@@ -124,7 +124,7 @@ impl PyLibrary {
             .collect()
     }
 
-    /// Keep a run that was made elsewhere.
+    /// Store a run that was made elsewhere.
     #[pyo3(signature = (**keywords))]
     fn _append(&self, py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<i64> {
         let a = Arguments::of(keywords)?;

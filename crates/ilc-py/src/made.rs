@@ -1,8 +1,8 @@
-//! How an object was made, so that a copy can be made in the same way: in another process, too.
+//! Record of an object's creation, for copies and pickles.
 //!
-//! Every class is pickled and copied by this one mechanism: the call that made it, with its arguments by
-//! name. So a copy begins as the original did: what a law, a gate or a controller has learned or summed
-//! up since is not in it.
+//! Every class is pickled and copied by this mechanism: the call that created it, with its
+//! arguments by name. So a copy starts from the initial state: it does not contain what a law, a
+//! gate or a controller has learned or integrated since.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -10,16 +10,16 @@ use pyo3::wrap_pyfunction;
 
 use crate::arguments::Arguments;
 
-/// The call that made an object.
+/// The call that created an object.
 #[derive(Debug)]
 pub(crate) struct Made {
-    /// The static method that was called, if not the class itself.
+    /// The static method called; `None` for the class itself.
     how: Option<&'static str>,
     arguments: Py<PyDict>,
 }
 
 impl Made {
-    /// Takes down a call of a static method.
+    /// Records a call of a static method.
     pub(crate) fn new(
         how: &'static str,
         fill: impl FnOnce(&Bound<'_, PyDict>) -> PyResult<()>,
@@ -31,17 +31,17 @@ impl Made {
         })
     }
 
-    /// Takes down a call of the class with these keywords.
+    /// Records a call of the class with these keywords.
     pub(crate) fn of(arguments: Arguments<'_, '_>) -> PyResult<Self> {
         Ok(Self { how: None, arguments: arguments.kept()?.unbind() })
     }
 
-    /// Returns the call as Python would write it, for a class of this name.
+    /// Returns the call in Python's notation, for a class of this name.
     pub(crate) fn shown(&self, py: Python<'_>, name: &str) -> PyResult<String> {
         Arguments::new(self.arguments.bind(py)).call(name)
     }
 
-    /// Returns what `__reduce__` returns for an object of a class.
+    /// Returns the result of `__reduce__` for an object of a class.
     pub(crate) fn reduce(&self, class: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
         let py = class.py();
         let maker = py.import("ilc_rt._native")?.getattr("_made")?;
@@ -50,7 +50,7 @@ impl Made {
     }
 }
 
-/// Makes an object again by the call that made it.
+/// Creates an object again by its recorded call.
 #[pyfunction]
 #[pyo3(signature = (cls, how, arguments))]
 fn _made<'py>(
@@ -74,7 +74,8 @@ fn _made_of_kind<'py>(
     native.getattr("__new__")?.call((class, kind), Some(arguments))
 }
 
-/// Returns what `__reduce__` returns for a law or a filter: with what a class derived from it keeps.
+/// Returns the result of `__reduce__` for a law or a filter, including the attributes of a derived
+/// class.
 pub(crate) fn reduce_kind<'py>(
     object: &Bound<'py, PyAny>,
     native: &str,

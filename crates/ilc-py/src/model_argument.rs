@@ -1,4 +1,4 @@
-//! What is accepted wherever a model is expected.
+//! Accepted models: our own, and those of scipy.signal and python-control.
 
 use ilc_rt::learning::law::norm_optimal::Plant;
 use ilc_rt::model::{StateSpace, TimeVarying, from_transfer_matrix};
@@ -20,7 +20,8 @@ pub(crate) fn read_model(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Stat
         return Ok(own.get().model().clone());
     }
     if !object.hasattr("A")? {
-        // python-control's have a to_ss as well, but it refuses matrices; `ninputs` tells them apart.
+        // python-control's have a to_ss as well, but it refuses matrices; `ninputs` distinguishes
+        // them.
         if object.hasattr("ninputs")? && object.hasattr("num")? && object.hasattr("den")? {
             return read_transfer_matrix(name, object);
         }
@@ -36,7 +37,7 @@ pub(crate) fn read_model(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Stat
     StateSpace::new(a, b, c, d, read_time_base(name, object)?).or_raise()
 }
 
-/// Reads a matrix of transfer functions: for each output a row of polynomials, one for each input.
+/// Reads a matrix of transfer functions: one row per output, with one polynomial per input.
 fn read_transfer_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<StateSpace> {
     let rows = |part: &str| -> PyResult<Vec<Vec<Bound<'_, PyAny>>>> {
         object.getattr(part)?.extract().map_err(|_| foreign(name, object))
@@ -58,7 +59,7 @@ fn read_transfer_matrix(name: &str, object: &Bound<'_, PyAny>) -> PyResult<State
     from_transfer_matrix(&entries, read_time_base(name, object)?).or_raise()
 }
 
-/// Reads the sample time that an object of scipy.signal or python-control has.
+/// Reads the sample time of an object of scipy.signal or python-control.
 fn read_time_base(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
     let dt = object.getattr("dt").map_err(|_| foreign(name, object))?;
     if dt.is_instance_of::<PyBool>() {
@@ -69,7 +70,7 @@ fn read_time_base(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Option<f64>
     read_sample_time(&format!("{name}.dt"), &dt)
 }
 
-/// A model that may vary along the run.
+/// A time-invariant or time-varying model.
 #[derive(Debug, Clone)]
 pub(crate) enum AnyModel {
     Invariant(StateSpace),
@@ -93,7 +94,7 @@ impl AnyModel {
     }
 }
 
-/// Reads a `TimeVarying`, or whatever [`read_model`] does.
+/// Reads a `TimeVarying`, or any model that [`read_model`] accepts.
 pub(crate) fn read_any_model(name: &str, object: &Bound<'_, PyAny>) -> PyResult<AnyModel> {
     if let Ok(own) = object.cast::<PyTimeVarying>() {
         return Ok(AnyModel::Varying(own.get().model().clone()));

@@ -1,4 +1,5 @@
-//! The one adapter for laws that are Python objects: a campaign's own, inside another law, or analysed.
+//! The adapter of laws that are Python objects: in a campaign, inside another law, or under
+//! analysis.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,38 +12,38 @@ use crate::argument::{Signal, give_signal};
 use crate::laws::PyLaw;
 use crate::whole::shown;
 
-/// Channels of the signals that a Python object sees.
+/// Channels of the signals passed to a Python object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Channels {
     pub(crate) n_inputs: usize,
     pub(crate) n_outputs: usize,
 }
 
-/// What passes between a Python object and whoever runs it, beside the signals.
+/// Data exchanged between a Python object and its caller, besides the signals.
 #[derive(Debug, Default)]
 pub(crate) struct Frame {
-    /// Whether the signals have no channel axis.
+    /// True if the signals have no channel axis.
     is_flat: AtomicBool,
-    /// Disturbance of the coming run, handed on as it came.
+    /// Disturbance of the coming run, passed on unchanged.
     disturbance: Mutex<Option<Py<PyAny>>>,
-    /// The exception that the object raised last, with its traceback.
+    /// The last exception raised by the object, with its traceback.
     raised: Mutex<Option<PyErr>>,
 }
 
 impl Frame {
-    /// Sets what the next update hands on.
+    /// Sets the data passed on by the next update.
     pub(crate) fn prepare(&self, is_flat: bool, disturbance: Option<Py<PyAny>>) {
         self.is_flat.store(is_flat, Ordering::Relaxed);
         *self.disturbance.lock().unwrap_or_else(PoisonError::into_inner) = disturbance;
         *self.raised.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// Returns whether the signals of the last update had no channel axis.
+    /// Returns true if the signals of the last update had no channel axis.
     pub(crate) fn is_flat(&self) -> bool {
         self.is_flat.load(Ordering::Relaxed)
     }
 
-    /// Takes the exception that the object raised since [`Frame::prepare`].
+    /// Takes the exception raised by the object since [`Frame::prepare`].
     pub(crate) fn take_raised(&self) -> Option<PyErr> {
         self.raised.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
@@ -55,16 +56,16 @@ impl Frame {
 #[derive(Debug)]
 pub(crate) struct PythonLaw {
     law: Py<PyAny>,
-    /// The class, which names the law in the library.
+    /// Name of the class, which is the law's name in the library.
     name: String,
     channels: Channels,
     frame: Arc<Frame>,
-    /// Disturbance of the coming run that the object has not been told yet.
+    /// Disturbance of the coming run, not yet passed to the object.
     next_disturbance: Option<Vec<f64>>,
 }
 
 impl PythonLaw {
-    /// Wraps an object, named `argument` where it is refused.
+    /// Wraps an object, named `argument` in errors.
     ///
     /// # Errors
     /// - `TypeError` if it has no method `update`.
@@ -110,19 +111,19 @@ impl PythonLaw {
         Ok(next.values)
     }
 
-    /// Tells the object of a run that it does not learn from.
+    /// Passes the disturbance of a run that the object does not learn from.
     fn announce(&self, py: Python<'_>, disturbance: Vec<f64>) {
-        // A law that has no `expect` has no use for it; one that fails shows it in the update.
+        // A law without `expect` ignores it; a failure shows in the update.
         let _ = give_signal(py, disturbance, 1, true)
             .and_then(|values| self.law.bind(py).call_method1("expect", (values,)));
     }
 
-    /// Calls a method that the object may lack; one that fails has done nothing.
+    /// Calls an optional method of the object; a failure has no effect.
     fn call_if_there(&self, method: &str) {
         let _ = Python::attach(|py| self.law.bind(py).call_method0(method).map(drop));
     }
 
-    /// Asks the native law that the object is, if it is one.
+    /// Queries the native law behind the object, if there is one.
     fn ask_native<T>(&self, ask: impl FnOnce(&dyn Law) -> T) -> Option<T> {
         Python::attach(|py| {
             let native = self.law.bind(py).cast::<PyLaw>().ok()?;
@@ -181,7 +182,7 @@ impl Law for PythonLaw {
 
     fn describe(&self) -> String {
         let shown = Python::attach(|py| self.law.bind(py).repr().map(|text| text.to_string()));
-        // The address in a default repr differs from process to process and would prevent resuming.
+        // The address in a default repr differs between processes and would prevent resuming.
         let shown = shown.ok().filter(|text| !text.contains(" at 0x"));
         serde_json::json!({ "law": self.name, "repr": shown }).to_string()
     }

@@ -201,7 +201,7 @@ pub(crate) fn read_filter(name: &str, object: Option<&Bound<'_, PyAny>>) -> PyRe
     if let Ok(filter) = object.cast::<PyFilter>() {
         return Ok(filter.get().filter.clone());
     }
-    // Anything with a length may be taps; what is not is named as a filter, not as an array.
+    // Anything with a length may be taps; anything else is refused as a filter, not as an array.
     if object.len().is_err() || object.is_instance_of::<PyString>() {
         let kind = object.get_type().name()?;
         return Err(PyTypeError::new_err(format!(

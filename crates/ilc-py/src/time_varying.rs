@@ -50,7 +50,7 @@ impl PyTimeVarying {
     }
 }
 
-/// One matrix a sample.
+/// One matrix per sample.
 fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, [usize; 3])> {
     let (values, shape) = read_array(name, object)?;
     match shape[..] {

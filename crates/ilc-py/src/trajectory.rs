@@ -1,4 +1,4 @@
-//! Trajectories: what stands behind the functions of `ilc_rt.trajectory` that plan one.
+//! Trajectories: the native side of the planning functions of `ilc_rt.trajectory`.
 //!
 //! Each returns its samples by name; the class that holds them is `ilc_rt.trajectory.Trajectory`.
 
@@ -25,7 +25,7 @@ use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::exceptions;
 
-/// A chosen alpha: segment, place, value, and the intervals that hold the limits.
+/// A chosen alpha: segment, place, value, and its admissible intervals.
 type Alpha = (usize, String, f64, Vec<(f64, f64)>);
 /// A planned motion.
 type Planned = Result<(SampledMotion, Vec<Alpha>), TrajectoryError>;
@@ -53,7 +53,7 @@ fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> PyResult<Bo
     Ok(samples)
 }
 
-/// Reads the points of a path, one a row.
+/// Reads the points of a path, one per row.
 fn read_points(a: Arguments<'_, '_>) -> PyResult<Vec<Vec<f64>>> {
     let points = a.signal("points_m")?;
     Ok(points.values.chunks(points.n_channels).map(<[f64]>::to_vec).collect())
@@ -100,7 +100,7 @@ fn read_run_limits(a: Arguments<'_, '_>, n_axes: usize) -> PyResult<RunLimits> {
     })
 }
 
-/// Reads a place in the plane.
+/// Reads a point in the plane.
 fn read_place(a: Arguments<'_, '_>, name: &str) -> PyResult<[f64; 2]> {
     let (x, y): (f64, f64) = a.get(name)?.extract()?;
     if x.is_finite() && y.is_finite() {
@@ -109,7 +109,7 @@ fn read_place(a: Arguments<'_, '_>, name: &str) -> PyResult<[f64; 2]> {
     Err(PyValueError::new_err(format!("{name} = ({x}, {y}); finite numbers are needed")))
 }
 
-/// Reads the largest alphas: a number, or one by place.
+/// Reads the upper bounds of alpha: a number, or one by place.
 fn read_alpha_max(a: Arguments<'_, '_>) -> PyResult<AlphaMax> {
     let mut alpha_max = AlphaMax::default();
     let Some(object) = a.given("alpha_max")? else { return Ok(alpha_max) };

@@ -1,4 +1,4 @@
-//! Weights along the run: `ilc_rt.weights`, and how laws read them.
+//! Weights along the run: `ilc_rt.weights`, and their conversion for laws.
 
 use ilc_rt::learning::LearningError;
 use ilc_rt::learning::weights::{
@@ -16,7 +16,7 @@ use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::whole::{each, number, pair, shown, whole};
 
-/// Reads a number, or one for each sample.
+/// Reads a number, or one per sample.
 fn read_gain(a: Arguments<'_, '_>, name: &str, n_samples: usize) -> PyResult<Gain> {
     let (values, shape) = read_array(name, &a.get(name)?)?;
     match shape[..] {
@@ -26,7 +26,7 @@ fn read_gain(a: Arguments<'_, '_>, name: &str, n_samples: usize) -> PyResult<Gai
     }
 }
 
-/// Reads a number, or one for each agent, for each sample, or for each agent at each sample.
+/// Reads a number, or one per agent, per sample, or per agent and sample.
 fn read_gains(
     a: Arguments<'_, '_>,
     name: &str,
@@ -55,7 +55,7 @@ fn read_gains(
     Ok((0..cols).map(of).collect())
 }
 
-/// Reads a matrix, or one for each sample.
+/// Reads a matrix, or one per sample.
 pub(crate) fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<Matrix>> {
     let (values, shape) = read_array(name, object)?;
     match shape[..] {
@@ -67,7 +67,7 @@ pub(crate) fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<V
     }
 }
 
-/// Returns a weight to Python as one matrix for each sample.
+/// Returns a weight to Python as one matrix per sample.
 fn give_blocks<'py>(
     py: Python<'py>,
     weight: &Weight,
@@ -76,7 +76,7 @@ fn give_blocks<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut values = Vec::with_capacity(n_samples * p * p);
     for k in 0..n_samples {
-        // Symmetric: by columns is by rows.
+        // Symmetric: column-major equals row-major.
         values.extend_from_slice(weight.at(k, p).as_slice());
     }
     if let Some(at) = values.iter().position(|value| !value.is_finite()) {
@@ -103,7 +103,7 @@ pub(crate) fn read_contour(a: Arguments<'_, '_>) -> PyResult<(Weight, usize, usi
     Ok((weight.or_raise()?, n_samples, p))
 }
 
-/// Reads what several agents are to keep, as a weight of all their errors.
+/// Reads the objective of several agents, as a weight of all their errors.
 pub(crate) fn read_formation_weight(
     a: Arguments<'_, '_>,
     n_samples: usize,
@@ -170,7 +170,7 @@ fn schedule<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, P
     give_signal(a.py(), values, 1, true)
 }
 
-/// Reads segments: where each starts, and its value.
+/// Reads segments: the start and the value of each.
 fn read_segments(object: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
     let needed = "a pair of a sample and a number";
     each("segments", object, "a sequence of (start, value)", |both| {

@@ -5,13 +5,13 @@ use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyFloat, PyString};
 
-/// The largest number that any count, index or order may be.
+/// Largest count, index or order.
 const MAX: u64 = u32::MAX as u64;
 
-/// Reads a whole number: Python's, NumPy's, whatever has an index.
+/// Reads an integer: Python's, NumPy's, or any object with `__index__`.
 ///
 /// # Errors
-/// - `TypeError` for a truth value, a float, or anything else that counts nothing.
+/// - `TypeError` for a bool, a float, or any other non-integer.
 /// - `ValueError` for a number that is negative or too large.
 pub(crate) fn whole(name: &str, object: &Bound<'_, PyAny>) -> PyResult<usize> {
     let number = integer(name, object, &format!("0 to {MAX}"))?;
@@ -22,7 +22,7 @@ pub(crate) fn whole(name: &str, object: &Bound<'_, PyAny>) -> PyResult<usize> {
     }
 }
 
-/// Returns the integer that an object stands for.
+/// Returns the integer value of an object.
 fn integer<'py>(
     name: &str,
     object: &Bound<'py, PyAny>,
@@ -40,7 +40,7 @@ fn out_of_range(name: &str, number: &Bound<'_, PyAny>, range: &str) -> PyErr {
     PyValueError::new_err(format!("{name} = {text}; a whole number from {range} is needed"))
 }
 
-/// Returns how a value shows itself, on one line and not for ever.
+/// Returns the repr of a value, in one line of bounded length.
 pub(crate) fn shown(object: &Bound<'_, PyAny>) -> String {
     const LONGEST: usize = 60;
     // A number of thousands of digits has no text.
@@ -64,7 +64,7 @@ pub(crate) fn each<'py, T>(
     object.try_iter().map_err(refused)?.map(|element| read(&element?)).collect()
 }
 
-/// Reads two things that belong together.
+/// Reads a pair.
 pub(crate) fn pair<'py>(
     name: &str,
     object: &Bound<'py, PyAny>,
@@ -85,10 +85,10 @@ pub(crate) fn id(object: &Bound<'_, PyAny>) -> PyResult<i64> {
     }
 }
 
-/// Reads a number: Python's, NumPy's, whatever converts to a float.
+/// Reads a number: Python's, NumPy's, or any object with `__float__`.
 ///
 /// # Errors
-/// - `TypeError` for what is not a number.
+/// - `TypeError` for anything but a number.
 /// - `ValueError` for an integer beyond the largest float.
 pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
     if object.is_instance_of::<PyString>() {
@@ -106,7 +106,7 @@ pub(crate) fn number(name: &str, object: &Bound<'_, PyAny>) -> PyResult<f64> {
     })
 }
 
-/// A number without a name of its own, which may not be too large for a float.
+/// A number without a name of its own, within the range of a float.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Real(pub(crate) f64);
 

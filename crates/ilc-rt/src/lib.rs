@@ -2,8 +2,8 @@
 //!
 //! A fixed-rate servo loop on CiA 402 drives, an interpolator, and iterative learning control that
 //! computes the next run's input while the axes return to the start. `ARCHITECTURE.md` at the root
-//! of the project tells how the modules fit; each module's head says what it is for and who may
-//! import it.
+//! of the project describes how the modules fit together; the head of each module states its
+//! purpose and who may import it.
 
 pub mod campaign;
 pub mod cli;

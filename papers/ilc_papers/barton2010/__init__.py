@@ -56,7 +56,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set what every section prints beside its figures."""
+    """Compare every section with the print."""
     return [claim for section in SECTIONS for claim in section.claims(figures[_name(section)])]
 
 

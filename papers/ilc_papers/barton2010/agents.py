@@ -44,7 +44,7 @@ def agents() -> list[StateSpace]:
 
 
 def together(models: Sequence[StateSpace]) -> StateSpace:
-    """Return the agents as one model, one after the other."""
+    """Return the agents stacked into one model."""
     whole = models[0]
     for model in models[1:]:
         whole = whole.append(model)

@@ -86,7 +86,7 @@ def _against_formation(found: np.ndarray) -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set tables I.1 to I.3 beside the figures."""
+    """Compare tables I.1 to I.3 with the print."""
     against, names = figures["printed"], figures["axes"]
     shown = [
         Claim(

@@ -27,7 +27,7 @@ LOW, HIGH = 2e-2, 20.0
 #: Four bursts, first sample and one past the last, and their standard deviation; chosen.
 BURSTS = ((180, 240), (420, 480), (680, 740), (920, 980))
 NOISE_STD_M = 5e-6
-#: Runs, and those at the end whose errors are taken as converged.
+#: Runs, and the last ones, whose errors count as converged.
 ITERATIONS, CONVERGED = 60, 30
 WIDTH_M, PITCH_M = 0.0088, 0.004
 
@@ -75,7 +75,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
         figures[name]["converged_rms_m"] = float(np.mean(converged_m))
         figures[name]["spread_of_rms_m"] = float(np.std(converged_m))
     figures["feedback"], _ = table.learn(None, iterations, disturbance=noise.__getitem__)
-    # Of the two weights that do not vary, the one that learns as fast as the varying one.
+    # Of the two constant weights, the one that learns as fast as the varying one.
     figures["time_invariant"] = figures["low_r"]
     return figures
 
@@ -85,7 +85,7 @@ def _settled_at(errors: list[float]) -> int:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set section 5.6 beside the figures."""
+    """Compare section 5.6 with the print."""
     low, high, varying = (figures[name] for name in ("low_r", "high_r", "time_varying"))
     return [
         Claim(

@@ -1,6 +1,6 @@
 """Chapter 7: the delta mechanism, its kinematics, its Jacobian, and one of its legs identified.
 
-Two mechanisms are in the print: (7.5) has rods of 125 mm and 20 mm from the rods to the tool's
+The print describes two mechanisms: (7.5) has rods of 125 mm and 20 mm from the rods to the tool's
 centre; appendices C and F have rods of 145 mm and no such distance. Both are computed.
 """
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Base radius less what the rods stand off the tool's centre, crank, rod; metres.
+#: Base radius minus the distance of the rods from the tool's centre, crank, rod; metres.
 GEOMETRIES = {"appendix C": (0.037, 0.060, 0.145), "table 7.1": (0.037 - 0.020, 0.060, 0.125)}
-#: Jacobian (8.2) in m/rad: its first column says the other two.
+#: Jacobian (8.2) in m/rad: its first column determines the other two.
 PRINTED_JACOBIAN_M = (
     np.array([[-44.71, 22.36, 22.36], [0.0, -38.72, 38.72], [14.56, 14.56, 14.56]]) * 1e-3
 )
@@ -172,7 +172,7 @@ def _identification(*, reduced: bool) -> dict[str, Any]:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set chapter 7's statements beside the figures."""
+    """Compare the statements of chapter 7 with the results."""
     shown = figures["geometries"]["appendix C"]
     printed, steps = shown["printed_jacobian"], shown["finite_difference"]
     identified, true = figures["identification"], figures["identification"]["true"]

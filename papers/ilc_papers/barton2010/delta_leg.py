@@ -1,8 +1,8 @@
 """One leg of the mechanism: its motion, its stabilising controller, and its identification.
 
-Sections 7.3.2, 7.3.3 and 8.1.1. The masses of table 7.3 are not printed. The leg here gets the
+Sections 7.3.2, 7.3.3 and 8.1.1. The masses of table 7.3 are not printed. The leg here has the
 inertia, damping and weight for which the exact linearisation about home is the printed model
-(7.19), so that what identification should find is known.
+(7.19), so that the correct result of the identification is known.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ GAIN_RAD_NM, NATURAL_RAD_S, DAMPING = 6.0, 9.0, 0.9
 KP, KD, KI = 2.3, 0.04, 0.3
 #: Steps of the integration in a sample.
 SUBSTEPS = 4
-#: Resolution of the encoder: 14 bits a turn (not printed).
+#: Resolution of the encoder: 14 bits per turn (not printed).
 RESOLUTION_RAD = 2.0 * math.pi / 2**14
 
 # alpha, c_d and beta of (7.13) with the sign of the weight corrected (D.4).
@@ -65,7 +65,7 @@ def stabilised_poles() -> tuple[float, float]:
 
 
 def pendulum(resolution_rad: float) -> Callable[[Array], Array]:
-    """Return the leg of (7.13) about home: torque on top of its weight's, to change of angle.
+    """Return the leg of (7.13) about home: additional torque to change of angle.
 
     ``alpha theta'' + c_d theta' + beta cos(theta) = tau``, integrated with four Runge-Kutta steps
     a sample while the torque is held; the angle is read with a resolution (0 for none).
@@ -98,7 +98,7 @@ def pendulum(resolution_rad: float) -> Callable[[Array], Array]:
 
 
 def excite(system: Callable[[Array], Array], amplitude: float, *, reduced: bool) -> Identification:
-    """Identify a leg with a sine of rising frequency, 0.2 to 10 Hz (section 7.3.3)."""
+    """Identify a leg with a swept sine, 0.2 to 10 Hz (section 7.3.3)."""
     return swept_sine(
         system, dt_s=DT_S, amplitude=amplitude, from_hz=0.2, to_hz=10.0, period_s=25.0,
         periods=2 if reduced else 3,
@@ -106,7 +106,7 @@ def excite(system: Callable[[Array], Array], amplitude: float, *, reduced: bool)
 
 
 def described(found: Identification) -> dict[str, Any]:
-    """Return what identification found, as figures."""
+    """Return the identified parameters, as figures."""
     model = found.model
     return {
         "amplitude": found.experiment.amplitude,

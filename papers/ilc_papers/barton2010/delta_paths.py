@@ -1,7 +1,7 @@
 """The mechanism's home, and the raster and the spiral that its tool follows (section 8.1.2).
 
-The print gives the period of the raster (2 s) and no size. Sizes here are chosen so that both
-take about 2 s and stay where the mechanism moves evenly in every direction.
+The print gives the period of the raster (2 s) but no size. The sizes here are chosen so that both
+take about 2 s and stay where the mechanism moves uniformly in every direction.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _LIMITS: dict[str, Any] = {
 
 
 def home_m(delta: Delta) -> NDArray[np.float64]:
-    """Return where the tool is at home, shape (3,)."""
+    """Return the position of the tool at home, shape (3,)."""
     return delta.forward(np.full(3, HOME_RAD))
 
 

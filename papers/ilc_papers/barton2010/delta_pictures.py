@@ -1,4 +1,4 @@
-"""Pictures of chapter 7, drawn from the figures of section `delta`."""
+"""Plots of chapter 7, drawn from the figures of section `delta`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Appendix J: a fast axis that takes over what a slow one cannot do, by a dynamic weight.
+"""Appendix J: a fast axis that compensates the errors of a slow one, by a dynamic weight.
 
 The paper's package makes its section `dissimilar` with it.
 """
@@ -112,7 +112,7 @@ def coupling_gains() -> Array:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set section J.6 beside the figures."""
+    """Compare section J.6 with the print."""
     nominal, coupled = figures["nominal"], figures["coupled"]
     plain = coupled["plain_rms"][-1] / nominal["plain_rms"][-1]
     return [

@@ -122,7 +122,7 @@ def converged(rows: list[list[float]]) -> list[float]:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set section 6.4 beside the figures."""
+    """Compare section 6.4 with the print."""
     x1 = {name: converged(figures[name]["tracking_rms_m"])[0] for name in CASES}
     start = figures["individual"]["tracking_rms_m"][0][0]
     shape = {name: max(converged(figures[name]["formation_rms_m"])) for name in CASES}

@@ -1,7 +1,7 @@
 """Chapter 8: three delta mechanisms, raster and spiral, three objectives, one agent disturbed.
 
-Nine drives on the real controller in lock-step, in the series architecture: what is learned is
-added to the set points of the drives' own position loops. Learning sees the tools' errors, by
+Nine drives on the real controller in lock-step, in the series architecture: the learned input is
+added to the set points of the drives' own position loops. Learning uses the tools' errors, by
 forward kinematics from the drives' encoders (8.7).
 """
 
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 
 #: The agent that is disturbed, from 1 as in the thesis, and the reference of section 8.3.4.
 DISTURBED_AGENT, DISTURBED_PATH = 1, "spiral"
-#: Samples around its own time within which a point is compared with the path.
+#: Search window, in samples, for the distance of a point from the path.
 WINDOW = 60
-#: Every so many samples of a path are kept for the pictures, to so many decimals of a metre.
+#: Decimation of the paths stored for the plots, and their decimals of a metre.
 STRIDE, DECIMALS = 4, 7
 #: Cases that are run without the Gaussian filter too.
 UNFILTERED: tuple[Case, ...] = ("individual", "formation")
@@ -126,7 +126,7 @@ def _campaign(
 
 
 def _kept(points_m: Array) -> list[list[float]]:
-    """Return what of a path is kept for the pictures."""
+    """Return the part of a path that is stored for the plots."""
     kept: list[list[float]] = np.round(points_m[::STRIDE], DECIMALS).tolist()
     return kept
 
@@ -160,7 +160,7 @@ def fall(errors_m: list[float]) -> float:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set chapter 8's statements beside the figures; the thesis prints pictures, no numbers."""
+    """Compare the statements of chapter 8 with the results; the thesis prints plots, no numbers."""
     found: list[Claim] = []
     for path in PATHS:
         found += _tracking_claims(figures, path) + _formation_claims(figures, path)
@@ -252,7 +252,7 @@ def _disturbed_claims(figures: Figures) -> list[Claim]:
 
 
 def _own_claims(figures: Figures) -> list[Claim]:
-    """Set what the thesis leaves open beside its own choice."""
+    """Compare the parameters that the thesis leaves open with the chosen ones."""
     constant = figures["raster"]["individual"]["agents"][0]["tracking_rms_m"][-1]
     varying = figures["varying_jacobian"]["agents"][0]["tracking_rms_m"][-1]
     free = fall(figures["unfiltered"]["raster"]["individual"]["agents"][0]["tracking_rms_m"])

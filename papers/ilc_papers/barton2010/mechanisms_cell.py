@@ -1,6 +1,6 @@
 """Three delta mechanisms as one cell: nine rotary drives on a bus, and their table of set points.
 
-A drive's own position loop stands for a leg under its stabilising controller: it has the natural
+A drive's own position loop represents a leg with its stabilising controller: it has the natural
 frequency and damping that (8.3) with table 8.1 gives the leg (7.19).
 """
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 #: Mechanisms, and legs of each.
 N_AGENTS, N_LEGS = 3, 3
-#: Counts of the drives' encoders in a radian: 20 bits a turn.
+#: Encoder counts of the drives per radian: 20 bits per turn.
 COUNTS_PER_RAD = 2**20 / (2.0 * math.pi)
 #: Noise of the encoders: standard deviation.
 NOISE_RAD = 1e-5
@@ -125,24 +125,24 @@ def nominal_leg() -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Machine:
-    """A cell on disk, and what its tools are to do."""
+    """A cell on disk, and the references of its tools."""
 
     cell: Cell
     library: Path
     #: Set points of one mechanism, rests included, shape (n_samples, 3).
     angle_rad: Array
-    #: Where its tool should be meanwhile, shape (n_samples, 3).
+    #: Reference of its tool in the meantime, shape (n_samples, 3).
     tool_m: Array
     delta: Delta
 
     def run(self, law: Law | None, iterations: int) -> list[Array]:
-        """Run a campaign in lock-step; return where the tools were, (n_samples, 3, 3) each run."""
+        """Run a campaign in lock-step; return the tool positions, (n_samples, 3, 3) per run."""
         campaign = Campaign(self.cell, law, self.library)
         return [tools_m(self.delta, record.encoder_m) for record in campaign.run(iterations)]
 
 
 def tools_m(delta: Delta, angles_rad: Array) -> Array:
-    """Return the tools' places, shape (n_samples, n_agents, 3), from all joints of a run."""
+    """Return the tool positions, shape (n_samples, n_agents, 3), from all joints of a run."""
     poses = np.ascontiguousarray(angles_rad).reshape(-1, N_LEGS)
     return delta.forward(poses).reshape(len(angles_rad), -1, 3)
 
@@ -157,7 +157,7 @@ def build(folder: Path, path: str, *, is_disturbed: bool, seed: int = 1) -> Mach
     path : str
         Name of the reference, `raster` or `spiral`.
     is_disturbed : bool
-        Whether the first mechanism differs from what learning believes.
+        True if the first mechanism differs from the model used for learning.
     seed : int
         Seed of the encoders' noise.
 

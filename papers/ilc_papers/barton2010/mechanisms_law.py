@@ -30,10 +30,10 @@ PER_MM2 = 1e6
 
 
 class AtTheTools:
-    """A law that learns from where the tools were, while the drives tell their angles.
+    """A law that learns from the tool positions, while the drives measure angles.
 
-    ``e_tool[k] = p[k] - forward(theta[k])`` for each mechanism; what the law inside returns is
-    smoothed, as the set points of the thesis are (section 8.3.1).
+    ``e_tool[k] = p[k] - forward(theta[k])`` for each mechanism; the output of the wrapped law is
+    smoothed, like the set points of the thesis (section 8.3.1).
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ class AtTheTools:
 def coordinated(path: str, case: Case, machine: Machine, *, is_smoothed: bool = True) -> AtTheTools:
     """Return the law (8.7) of a case: the model is the drives' with a constant Jacobian behind it.
 
-    The formation (8.8) is that of x and y; z is tracked by whatever tracks, and by nothing if the
-    formation alone counts. The input goes through the printed Gaussian filter if it `is_smoothed`.
+    The formation (8.8) is that of x and y; z is tracked by the tracking term, and not at all if
+    only the formation counts. The input passes the printed Gaussian filter if it `is_smoothed`.
     """
     jacobian = machine.delta.jacobian(np.full(N_LEGS, HOME_RAD))
     legs = one_mechanism(machine)

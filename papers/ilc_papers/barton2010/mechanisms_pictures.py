@@ -1,4 +1,4 @@
-"""Pictures of chapter 8, drawn from the figures of section `mechanisms`."""
+"""Plots of chapter 8, drawn from the figures of section `mechanisms`."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class Stage:
         From the learned inputs to the positions, `P = G / (1 + G k)` for each axis.
     reference_m : ndarray of shape (n_samples, 2)
     first_error_m : ndarray of shape (n_samples, 2)
-        What the controllers leave, `1 / (1 + G k)` times the reference.
+        Error left by the controllers, `1 / (1 + G k)` times the reference.
     """
 
     plant: StateSpace
@@ -86,7 +86,7 @@ class Stage:
         return trajectory.coupling_gains(self.reference_m)[:, np.newaxis, :]
 
     def contour_m(self, error_m: Array) -> Array:
-        """Return how far the tool is from the path at each sample."""
+        """Return the distance of the tool from the path at each sample."""
         return trajectory.contour_error(self.reference_m, self.reference_m - error_m)
 
     def linearised_m(self, error_m: Array) -> Array:

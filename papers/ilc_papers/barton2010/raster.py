@@ -32,7 +32,7 @@ S, R = 1e-2, 2e-2
 #: Overall weight at the corners and its smoothing, sections 5.4.2 and 5.4.3.
 CORNER_WEIGHT = 30.0
 BANDWIDTH_HZ = 15.0
-#: Half the time around a corner in which the weight is high: braking and starting again.
+#: Half the time around a corner in which the weight is high: deceleration and acceleration.
 CORNER_S = 0.04
 ITERATIONS = 20
 #: Size and limits of the raster, chosen: four rows, so that there are the six corners t1 to t6.
@@ -91,7 +91,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def corner_samples(reference_m: Array, width_m: float, pitch_m: float) -> list[int]:
-    """Return at which samples the raster comes to its six corners."""
+    """Return the samples at which the raster reaches its six corners."""
     places = [(1, 0), (1, 1), (0, 1), (0, 2), (1, 2), (1, 3)]
     samples, past = [], 0
     for column, row in places:
@@ -103,7 +103,7 @@ def corner_samples(reference_m: Array, width_m: float, pitch_m: float) -> list[i
 
 
 def schedules(corners: list[int]) -> tuple[Array, Array]:
-    """Return sigma_Q and gamma_Q: 30 around the corners; the axes by themselves from t3 to t4."""
+    """Return sigma_Q and gamma_Q: 30 around the corners; the axes individually from t3 to t4."""
     reach = round(CORNER_S / DT_S)
     parts = [(0, 1.0)]
     for corner in corners:
@@ -126,7 +126,7 @@ def _at_corners(contour_m: Array, corners: list[int]) -> list[float]:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set section 5.4 beside the figures."""
+    """Compare section 5.4 with the print."""
     feedback, invariant, varying, individual = (
         figures[name] for name in ("feedback", "time_invariant", "time_varying", "individual")
     )

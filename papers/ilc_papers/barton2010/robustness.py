@@ -54,7 +54,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def _bound(axis: Servo, s: float, r: float) -> float | None:
-    """Return what `analyze` promises not to be exceeded: `|T| + w |L_e P|`."""
+    """Return the bound guaranteed by `analyze`: `|T| + w |L_e P|`."""
     weights = {"q": 1.0, "s": s, "r": r}
     found = analyze(weights, axis.plant, axis.n_samples, uncertainty=UNCERTAINTY)
     return found.robust_lifted
@@ -143,7 +143,7 @@ def _guidelines(axis: Servo) -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set sections 3.3.2 and 3.3.4 beside the figures."""
+    """Compare sections 3.3.2 and 3.3.4 with the print."""
     worst, guidelines, example = (
         figures["worst_factor"], figures["guidelines"], figures["counterexample"]
     )  # fmt: skip

@@ -38,7 +38,7 @@ def runs(
     law : object or None
         Its update gives the next input; None leaves the input at zero.
     plant : callable
-        What the learned input does to the output.
+        Plant from learned input to output.
     first_error : ndarray of shape (n_samples,) or (n_samples, n_outputs)
         Error without learning and disturbance.
     iterations : int

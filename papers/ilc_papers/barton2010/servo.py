@@ -1,4 +1,4 @@
-"""Section 3.4: what each of the three weights of norm-optimal learning does to a servo axis.
+"""Section 3.4: effect of each of the three weights of norm-optimal learning on a servo axis.
 
 The paper's package makes its section `servo` with it.
 """
@@ -100,7 +100,7 @@ def _signals(axis: Servo) -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set the statements of sections 3.3 and 3.4 beside the figures."""
+    """Compare the statements of sections 3.3 and 3.4 with the results."""
     q, s, r, noise = (figures[name] for name in ("q", "s", "r", "noise"))
     factors = [*q["monotonic_factor"], *s["monotonic_factor"], *r["monotonic_factor"]]
     observed = [*q["observed_factor"], *s["observed_factor"], *r["observed_factor"]]

@@ -30,7 +30,7 @@ R_VALUES = (0.0, 0.1, 1.0, 10.0, 100.0)
 
 
 def noise_figures(axis: Servo, ahead: Sequence[Analysis], reduced: bool) -> Figures:  # noqa: FBT001
-    """Return the errors that white noise leaves, for each weight r at q = s = 1.
+    """Return the errors caused by white noise, for each weight r at q = s = 1.
 
     `u[j+1] = T u[j] + L_e (e_0 - d_j)`: the input of a run knows only the noise of earlier ones,
     so its covariance solves `X = T X T' + L_e L_e' sigma^2`, and
@@ -63,7 +63,7 @@ def noise_figures(axis: Servo, ahead: Sequence[Analysis], reduced: bool) -> Figu
         settled, fluctuation = _printed_equation(axis, r)
         mean_square = np.mean(settled**2) + NOISE_STD**2 * np.mean(np.sum(fluctuation**2, axis=1))
         figures["equation_3_24_rms"].append(float(np.sqrt(mean_square)))
-        # As many runs as bring the way there below 1e-8.
+        # Enough runs for the transient to fall below 1e-8.
         n_runs = 3 + int(np.log(1e-8) / np.log(max(found.spectral_radius, 1e-3)))
         figures["alternating_difference"].append(
             _alternating_difference(axis, law, settled, fluctuation, noise[0], n_runs)
@@ -72,7 +72,7 @@ def noise_figures(axis: Servo, ahead: Sequence[Analysis], reduced: bool) -> Figu
 
 
 def _disturbed(axis: Servo, law: NormOptimalIlc, noise: Array) -> list[Array]:
-    """Return the errors of runs in which each has its own disturbance of the output."""
+    """Return the errors of runs with a different disturbance of the output in each."""
     history = runs(law, axis.plant.simulate, axis.first_error, len(noise) - 1, lambda j: noise[j])
     return [e for _, e in history]
 
@@ -93,7 +93,7 @@ def _printed_equation(axis: Servo, r: float) -> tuple[Array, Array]:
 def _alternating_difference(
     axis: Servo, law: NormOptimalIlc, settled: Array, fluctuation: Array, noise: Array, n_runs: int
 ) -> float:
-    """Return how far (3.24) is from runs whose disturbance changes its sign each time."""
+    """Return the deviation of (3.24) from runs whose disturbance alternates in sign."""
     last = _disturbed(axis, law, np.array([(-1.0) ** j * noise for j in range(n_runs)]))[-1]
     expected = settled - fluctuation @ ((-1.0) ** (n_runs - 1) * noise)
     return float(np.abs(last - expected).max() / np.abs(expected).max())

@@ -1,4 +1,4 @@
-"""Pictures of section 3.4, drawn from the figures of section `servo`; that section imports it."""
+"""Plots of section 3.4, drawn from the figures of section `servo`; that section imports it."""
 
 from __future__ import annotations
 

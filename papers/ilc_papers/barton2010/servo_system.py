@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 CONTROLLER_GAIN = 0.425
 #: Samples of a run: the errors e(1) to e(400).
 N_SAMPLES = 400
-#: Sample time; the print has none, so that one sample is one second.
+#: Sample time; the print has none, so one sample is one second.
 DT_S = 1.0
 
 
@@ -52,9 +52,9 @@ class Servo:
 def servo(n_samples: int = N_SAMPLES) -> Servo:
     """Return the axis of eq. (3.25) to (3.27).
 
-    The controller follows the triangle by itself (figure 3.3), and the learned input is added
-    to its output, P = G / (1 + G C). As in the listings the first sample of the impulse response
-    is dropped: u(k) is paired with e(k + 1).
+    The controller alone follows the triangle (figure 3.3), and the learned input is added to its
+    output, P = G / (1 + G C). As in the listings the first sample of the impulse response is
+    dropped: u(k) is paired with e(k + 1).
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
         law = NormOptimalIlc.contour(table.plant, table.reference_m, q=0.0, contour=1.0, s=s, r=R)
         figures[name], _ = table.learn(law, 12 if reduced else ITERATIONS, true)
     figures["feedback"], _ = table.learn(None, 12 if reduced else ITERATIONS, true)
-    # Of the two weights that do not vary, the one with which learning is stable.
+    # Of the two constant weights, the one with stable learning.
     figures["time_invariant"] = figures["high_s"]
     return figures
 
@@ -106,7 +106,7 @@ def _factor(table: Stage, shift: StateSpace, s: float) -> float:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Set section 5.5 beside the figures."""
+    """Compare section 5.5 with the print."""
     low, high, varying = (
         figures[name]["contour_rms_m"] for name in ("low_s", "high_s", "time_varying")
     )

@@ -1,7 +1,7 @@
 """Campaigns of the five laws of chapter 4 over one sequence of temperatures.
 
-The laws are the product's; the machine is its models, run after run. Read by the other modules of
-this package only.
+The laws are the product's; the machine consists of its models, run after run. Read by the other
+modules of this package only.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from ilc_papers.dimarco2016.machine import System
 
-#: Gains of the text, section 4.2.1.1; the listing's are others.
+#: Gains of the text, section 4.2.1.1; those of the listing differ.
 GAIN = 1.284
 
 #: Weights of error and error rate, as printed, and EPSILON of the listing.
@@ -31,7 +31,7 @@ N_E, N_ER, EPSILON = 10.0, 2.0, 1.0
 #: Filter of the error rate, s/(0.1 s + 1).
 RATE_FILTER_S = 0.1
 
-#: How many of the most relevant runs the trimmed law counts.
+#: Number of most relevant runs used by the trimmed law.
 TOP = 30
 
 #: Temperatures closer than this are one entry of the table of Flexible ILC; not printed.
@@ -47,7 +47,7 @@ class Law(Protocol):
     def update(
         self, u: NDArray[np.float64], e: NDArray[np.float64], disturbance: float | None = None
     ) -> NDArray[np.float64]:
-        """Return the input of the coming run, whose disturbance is given."""
+        """Return the input of the next run, whose disturbance is given."""
         ...
 
 
@@ -119,7 +119,7 @@ def run(
     temperatures_k : ndarray of float64, shape (n_runs,)
         Temperature above T_0 of every run.
     names : sequence of str
-        Which of the `LAWS`.
+        Name of one of the `LAWS`.
     kept : sequence of int
         Runs whose error and input are kept.
     """
@@ -132,7 +132,7 @@ def run(
             campaign.law.expect(temperatures_k[0])
     for number, temperature_k in enumerate(temperatures_k):
         loop, scale = system.loop(temperature_k), system.expansion(temperature_k)
-        # The input after the last run is not needed, nor is its temperature known.
+        # The input after the last run is not needed, and its temperature is unknown.
         coming_k = temperatures_k[number + 1] if number + 1 < len(temperatures_k) else None
         for name, campaign in campaigns.items():
             error = reference - loop.simulate(reference + inputs[name]) / scale

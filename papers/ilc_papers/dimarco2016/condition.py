@@ -1,4 +1,4 @@
-"""Condition 3.4 on the gains of PD-ILC, against the lifted norm, and what happens in between.
+"""Condition 3.4 on the gains of PD-ILC, compared with the lifted norm, and the range between them.
 
 Read by the package's `__init__` only.
 """
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-#: Runs at constant temperature; without a Q filter the errors are then beyond all reason.
+#: Runs at constant temperature; without a Q-filter the errors then grow without limit.
 N_RUNS, REDUCED_RUNS = 150, 40
 REDUCED_SAMPLES = 400
 
@@ -68,7 +68,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Return what section 3.2 says of the gains, and what the lifted norm says."""
+    """Return the statements of section 3.2 on the gains, and those of the lifted norm."""
     found = figures["condition"]
     p1, norm, smoothed = found["p1_motor"], found["lifted_norm"], found["lifted_norm_with_q"]
     kept, lost = found["rms_with_q"], found["rms_without_q"]

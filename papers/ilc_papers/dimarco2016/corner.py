@@ -1,7 +1,7 @@
-"""There and back again: E/S and linear interpolation at a corner that turns round.
+"""A reversal: E/S and linear interpolation at a 180° corner.
 
-The ratio of the two depends on the jerk limit, which is not printed, and on what is counted: both
-are tabled. Read by the other modules of this package only.
+The ratio of the two depends on the jerk limit, which is not printed, and on the evaluated part:
+both are tabulated. Read by the other modules of this package only.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ DT_S = 1e-4
 JERKS_PER_S = (25.0, 50.0, 75.0, 100.0, 200.0, 1000.0, 10000.0)
 REDUCED_JERKS_PER_S = (50.0, 1000.0)
 
-#: What is counted, in s of the 2 s.
+#: Evaluated part, in s of the 2 s.
 SPANS_S = {"whole move": (0.0, 2.0), "half a second around the corner": (0.75, 1.25)}
 
 PRINTED_ALPHA = 50.0
@@ -52,7 +52,7 @@ def planned(jerk_per_s: float) -> dict[str, Trajectory]:
 
 
 def passing_m(path: Trajectory) -> float:
-    """Return how far a path goes beyond the corner; 0 if it does not."""
+    """Return the overshoot of a path beyond the corner; 0 if there is none."""
     return max(0.0, float(path.position_m.max()) - LENGTH_M)
 
 
@@ -100,7 +100,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Return what section 2.3.4 says."""
+    """Return the statements of section 2.3.4."""
     rows = figures["interpolation"]["corner"]["rows"]
     ratios = [row["ratio"]["whole move"]["complete"] for row in rows]
     tracking = [ratio["tracking"] for ratio in ratios]

@@ -1,7 +1,7 @@
 """The index J of tracking and acceleration: E/S against the linear interpolator, and over alpha.
 
 Lengths are planned in m and J is given in the thesis's unit, with lengths in inches: both of its
-terms are squares of a length, so that ratios do not depend on it. Read by the other modules of this
+terms are squares of a length, so the ratios do not depend on it. Read by the other modules of this
 package only.
 """
 
@@ -28,20 +28,20 @@ FREQUENCY_HZ = 2.0 / math.tau
 
 #: Run time over which J is taken. The thesis's motion has a start and no end.
 RUN_S = 10.0
-#: How long the planned move is: its end is far behind the run.
+#: Length of the planned move: its end is far behind the run.
 MOVE_S = 60.0
 DT_S = 0.001
 
 #: Weights of Eq. 2.19, with lengths in inches.
 K_E, K_A = 600.0, 1.0
 
-#: Acceleration limits in in/s². Below 1 not even the start of the oscillation fits in the move.
+#: Acceleration limits in in/s². Below 1 even the start of the oscillation does not fit.
 LIMITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 150.0, 200.0)
 REDUCED_LIMITS = (4.0, 20.0, 200.0)
-#: Jerk over acceleration limit, in 1/s: so large that it does not decide, as none is printed.
+#: Jerk over acceleration limit, in 1/s: so large that it has no effect, as none is printed.
 JERK_PER_S = 1000.0
 
-#: alphas of the start at which J is taken.
+#: Values of alpha of the start at which J is computed.
 ALPHAS = tuple(np.geomspace(1.0, 1e4, 33).tolist())
 REDUCED_ALPHAS = tuple(np.geomspace(1.0, 1e3, 10).tolist())
 
@@ -117,7 +117,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def whole_moves(chosen: tuple[float, ...]) -> list[Figures]:
-    """Return J of moves from rest to rest within the 10 s, or why there is none."""
+    """Return J of moves from rest to rest within the 10 s, or the reason why there is none."""
     rows: list[Figures] = []
     for limit in chosen:
         theirs = index(linear(limit, "on_time", RUN_S), 0.0, RUN_S)
@@ -150,7 +150,7 @@ def over_alpha(*, reduced: bool) -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Return what sections 2.3.1 to 2.3.3 say."""
+    """Return the statements of sections 2.3.1 to 2.3.3."""
     found = figures["interpolation"]["limits"]
     low = max(found["improvement_over_on_time"])
     high = found["improvement_over_on_time"][-1]

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 N_SEEDS, N_RUNS = 20, 500
 REDUCED_SEEDS, REDUCED_RUNS = 3, 120
 
-#: Every so many samples of a kept signal go to the figures.
+#: Decimation of the signals stored in the figures.
 STEP = 5
 
 TITLES = {"motor": "motor with R(T)", "expansion": "thermal expansion"}
 
 
 def last(n_runs: int) -> int:
-    """Return how many runs count as the last: 100 of 500, fewer of fewer."""
+    """Return the number of last runs: 100 of 500, fewer of fewer."""
     return min(100, n_runs // 4)
 
 
@@ -102,7 +102,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Return what sections 4.2.1.2 and 4.2.2.2 say, as medians over the seeds."""
+    """Return the statements of sections 4.2.1.2 and 4.2.2.2, as medians over the seeds."""
     made: list[Claim] = []
     for name, title in TITLES.items():
         found = figures[name]

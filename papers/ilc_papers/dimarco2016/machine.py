@@ -1,4 +1,4 @@
-"""The machine of chapter 4: a motor under PD control, and what the temperature does to it.
+"""The machine of chapter 4: a motor with PD control, and the effects of temperature.
 
 Units are the thesis's: the tool position counts as the angle of the motor, in inches as the
 reference does. Read by the other modules of this package only.

@@ -1,4 +1,4 @@
-"""Pictures of chapter 4: errors over the runs, signals of some runs, relevance of all.
+"""Plots of chapter 4: errors over the runs, signals of some runs, relevance of all.
 
 Made from the figures of `learning`; read by the package's `__init__` only.
 """

@@ -1,6 +1,6 @@
 """The reference of the thesis: the program of its Appendix A, by the product's interpolator.
 
-It is what chapter 4 learns on. Read by the other modules of this package only.
+The reference of the learning in chapter 4. Read by the other modules of this package only.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Return what the listing says of itself."""
+    """Return the listing's statements on itself."""
     found = figures["appendix_a"]
     return [
         Claim(

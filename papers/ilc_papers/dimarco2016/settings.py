@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from ilc_rt.trajectory import Trajectory
 
-#: The program is the thesis's in kind; its numbers, and the machine's limits, are ours.
+#: The kind of program is the thesis's; its numbers, and the machine's limits, are ours.
 FEED_M_S = 0.02
 LENGTH_M = 0.1
 AMPLITUDE_M = 0.0015
@@ -40,7 +40,7 @@ COARSE, FINE = 200, 40
 def residual(
     t_s: NDArray[np.float64], x_m: NDArray[np.float64], frequency_hz: float
 ) -> tuple[float, float]:
-    """Return what a line and a sine leave of a motion, and the amplitude of the sine."""
+    """Return the residual of a motion after a line and a sine, and the sine's amplitude."""
     phase = 2.0 * np.pi * frequency_hz * t_s
     basis = np.column_stack((np.ones_like(t_s), t_s, np.sin(phase), np.cos(phase)))
     share = np.linalg.lstsq(basis, x_m, rcond=None)[0]
@@ -50,8 +50,8 @@ def residual(
 def oscillation(path: Trajectory, frequency_hz: float) -> tuple[float, float]:
     """Return frequency and amplitude of the oscillation in the middle half of a path.
 
-    The sine that leaves least of the motion, beside a line; looked for from a fifth of the
-    programmed frequency to a little above it.
+    The sine with the smallest residual, in addition to a line; searched from a fifth of the
+    programmed frequency to slightly above it.
     """
     middle = slice(path.n_samples // 4, 3 * path.n_samples // 4)
     t_s, x_m = path.t_s[middle], path.position_m[middle, 0]
@@ -117,7 +117,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Return what chapter 2 says of the two settings."""
+    """Return the statements of chapter 2 on the two settings."""
     found = figures["interpolation"]["settings"]
     at = found["frequency_hz"].index(8.0)
 

@@ -1,4 +1,4 @@
-"""The axis of the paper and its motion: what every case of this paper runs on.
+"""The axis of the paper and its motion, common to all cases of this paper.
 
 The position loop is closed by gain, the learned signal is added to the controller's output
 (parallel structure), and the encoder is noisy. The other modules of the package import it.
@@ -48,7 +48,7 @@ def plant() -> StateSpace:
 
 
 def loop() -> StateSpace:
-    """Return what learning sees: from learned signal to position, ``G / (1 + C G)``."""
+    """Return the plant of the learning: from learned signal to position, ``G / (1 + C G)``."""
     return plant().process_sensitivity(Pid(KP, dt_s=DT_S).model())
 
 
@@ -109,13 +109,13 @@ class Course:
         return {"rmse_m": self.rmse_m, "max_m": self.max_m}
 
     def repeatable_m(self, last: int = 10) -> Array:
-        """Return the mean error of the last runs: what noise leaves of it."""
+        """Return the mean error of the last runs: the level reached under noise."""
         mean: Array = np.mean(self.errors_m[-last:], axis=0)
         return mean
 
 
 class Bench:
-    """Runs the motion again and again.
+    """Runs the motion repeatedly.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class Bench:
         learned : ndarray of float64, shape (n_samples,)
             Learned signal w.
         added : ndarray of float64, shape (n_samples,), or float
-            What else acts at the plant's input: a disturbance, a feed-forward.
+            Other input of the plant: a disturbance, a feed-forward.
 
         References
         ----------
@@ -151,7 +151,7 @@ class Bench:
         """
         noise_m = self._noise_m * self._random.standard_normal(self.motion.n_samples)
         followed_m = self.motion.position_m - noise_m
-        # With w, reference and noise entering at one place, one simulation gives all of it.
+        # Since w, reference and noise enter at one place, one simulation covers them all.
         return followed_m - self._loop.simulate(learned + added + KP * followed_m)
 
     def learn(
@@ -168,9 +168,9 @@ class Bench:
         law : object
             Learning law.
         runs : int
-            How many; the first is without learning.
+            Number of runs; the first is without learning.
         added : callable
-            What else acts at the plant's input in each run.
+            Other input of the plant in each run.
         observe : callable
             Told the number of each run when the law has learned from it.
         """

@@ -1,4 +1,4 @@
-"""Eq. 9 and Fig. 17, 18, 27: up to which frequency learning converges, and what a filter may pass.
+"""Eq. 9 and Fig. 17, 18, 27: critical frequency of learning, and the pass-band of a filter.
 
 A user sees this before the first run. Only the paper's package imports it.
 """
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ORDER = 4
-#: The paper's lead, and the one that makes up for the loop's lag at 50 Hz.
+#: The paper's lead, and the one that compensates the lag of the loop at 50 Hz.
 LEADS = (1, 5)
 CUTOFFS_HZ = (10.0, 11.0, 12.0, 15.0, 20.0)
 _MOST_LEADS = 10
@@ -79,7 +79,7 @@ def _with_filter(
 
 
 def _printed() -> Figures:
-    """Return what the paper's printed model and filter do, as they stand.
+    """Return the behaviour of the paper's printed model and filter, unchanged.
 
     References
     ----------
@@ -98,7 +98,7 @@ def _printed() -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Say what the analysis says of the paper's filters, and of its print."""
+    """State the results of the analysis for the paper's filters, and for its print."""
     told = figures["convergence"]
     critical_hz = told["critical_frequency_hz"]
     lead_5_hz = told[f"lead_{LEADS[1]}"]["critical_frequency_hz"]

@@ -1,4 +1,4 @@
-"""Fig. 7, 8 and 10 to 13: a disturbance that repeats, velocity feed-forward, and the drive's limit.
+"""Fig. 7, 8 and 10 to 13: repeating disturbance, velocity feed-forward, and saturation.
 
 Only the paper's package imports it.
 """
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 #: The disturbance at the plant's input, 1.25 s into the run; its size is not printed.
 DISTURBANCE, DISTURBANCE_S = 2e-4, 1.25
-#: It comes when learning has settled.
+#: It starts when learning has settled.
 DISTURBANCE_RUN = 15
 PRINTED_RUNS = 39
-#: The drive's limit, over what the motion needs.
+#: The drive's limit, relative to the demand of the motion.
 LIMIT_SHARE = 1.2
-#: Enough for the growth to reach it.
+#: Enough runs for the growth to reach it.
 _SATURATION_RUNS = 100
 
 
@@ -95,7 +95,7 @@ def _fed_forward(moves: Motion, runs: int) -> Figures:
 
 
 def _saturated(moves: Motion, runs: int) -> Figures:
-    """Return what learning without a filter asks of the drive, with and without the guard."""
+    """Return the demand of learning without a filter on the drive, with and without saturation."""
     needed = float(abs(Bench(moves).learn(ErrorFeedforwardIlc(GAIN), 12).inputs[-1]).max())
     limit = LIMIT_SHARE * needed
     free = Bench(moves).learn(ErrorFeedforwardIlc(GAIN), runs)

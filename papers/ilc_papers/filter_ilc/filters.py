@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from ilc_papers.filter_ilc.bench import Motion
 
 LOW_HZ, HIGH_HZ = 10.0, 50.0
-#: Where the motion swings faster than this, the filter opens; averaged over the window.
+#: Instantaneous frequency above which the filter opens; averaged over the window.
 THRESHOLD_HZ, WINDOW_S = 0.5, 0.5
-#: By how much the noise of one run may lift the RMS error over the least so far.
+#: Allowed rise of the RMS error over its minimum so far, for the noise of one run.
 NOISE_SHARE = 1.05
 
 
 def low_pass() -> signal.ButterworthFilter:
-    """Return the paper's off-line filter: fourth order, 10 Hz, applied without lag."""
+    """Return the paper's off-line filter: fourth order, 10 Hz, zero-phase."""
     return signal.butterworth(ORDER, LOW_HZ, DT_S)
 
 
@@ -91,7 +91,7 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def _fast(opening: signal.SwitchedFilter, n_samples: int) -> NDArray[np.bool_]:
-    """Return where the filter is open."""
+    """Return the samples at which the filter is open."""
     fast = np.zeros(n_samples, dtype=np.bool_)
     ends = [*opening.starts[1:], n_samples]
     for cutoff_hz, start, end in zip(opening.cutoffs_hz, opening.starts, ends, strict=True):
@@ -104,7 +104,7 @@ def _rms(x: NDArray[np.float64]) -> float:
 
 
 def falls(rmse_m: list[float]) -> bool:
-    """Return whether an error falls from run to run, up to what noise does to one run."""
+    """Return True if an error falls from run to run, within the noise of one run."""
     least = np.minimum.accumulate(rmse_m)
     return bool((np.array(rmse_m[1:]) <= NOISE_SHARE * least[:-1]).all())
 

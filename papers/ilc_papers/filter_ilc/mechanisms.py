@@ -1,4 +1,4 @@
-"""Fig. 19, 29 to 34: stop learning in time, learn from the mean of several runs, and whether to.
+"""Fig. 19, 29 to 34: stopping in time, learning from the mean of several runs, and repeatability.
 
 Only the paper's package imports it.
 """
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 TOLERANCE_M = 1.5e-6
 GROWTH = 1.2
-#: What appears at the plant's input when learning has long stopped, and from which run on.
+#: Disturbance at the plant's input long after learning has stopped, and its first run.
 _STEP, _STEP_RUN = 2e-5, 25
 _STEP_SAMPLE = 625
 REPEATS = 4
@@ -37,7 +37,7 @@ _CHECK_RUNS = 10
 
 
 def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
-    """Return what gate, ladder and repeatability check make of the motion.
+    """Return the results of gate, ladder and repeatability check on the motion.
 
     Returns
     -------
@@ -88,9 +88,9 @@ def _ladder(moves: Motion, runs: int, tell: Tell) -> Figures:
 
 
 def _learned_noise(moves: Motion, repeats: int) -> float:
-    """Return what noise alone has put into the learned signal after a few updates.
+    """Return the share of noise in the learned signal after a few updates.
 
-    The same runs without noise are taken away, so that nothing but noise is left.
+    The same runs without noise are subtracted, so that only noise remains.
     """
 
     def learn(noise_m: float) -> Array:
@@ -102,7 +102,7 @@ def _learned_noise(moves: Motion, repeats: int) -> float:
 
 
 def _check(moves: Motion) -> Figures:
-    """Return what repeats of the error without learning, over ten runs."""
+    """Return the repeatability of the error without learning, over ten runs."""
     bench = Bench(moves)
     errors = np.array([bench.run(np.zeros(moves.n_samples)) for _ in range(_CHECK_RUNS)])
     found = repeatability(errors)

@@ -1,7 +1,7 @@
 """Future work of Haas et al.: constraints on the set points, while learning.
 
-Each bound is tried where it does not matter, where the figures must be those without it, and where
-it does. Only the paper's package imports it.
+Each bound is tried inactive, where the results must equal those without it, and active. Only the
+paper's package imports it.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 DT_S = SAMPLE_TIMES_S["2ms"]
 RUNS = 12
-#: By what part of its size a bound may be exceeded: what `ConstrainedIlc` promises.
+#: Relative excess over a bound that `ConstrainedIlc` permits.
 SLACK = 1e-9
-#: Up to what part of the first error the interior point and the sweep may differ.
+#: Allowed difference between interior point and sweep, relative to the first error.
 SAME = 1e-6
 #: A bound counts as reached where less than this part of its span is left.
 _TOUCH = 1e-6
@@ -38,7 +38,7 @@ _TOUCH = 1e-6
 class _Bound:
     option: str
     unit: str
-    #: Where it matters: a part of what learning wants, or the limits of the program itself.
+    #: Bounds that become active: a part of the unconstrained input, or the limits of the program.
     share: float | None = None
     least: float | None = None
     largest: float | None = None
@@ -57,7 +57,7 @@ BOUNDS = {
 
 @dataclass
 class _Course:
-    """The runs of one campaign: errors, and where each bounded signal went."""
+    """The runs of one campaign: errors, and the range of each bounded signal."""
 
     error_inf_m: list[float]
     least: dict[str, float]
@@ -67,14 +67,14 @@ class _Course:
 
 
 def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
-    """Return, for each bound, what learning does with it where it matters and where not.
+    """Return, for each bound, the result of learning with it active and inactive.
 
     Returns
     -------
     dict
         Under `constrained`: `free` without bounds; for each bound and for `all` of them together
-        `active` and `inactive`: the bound, how far the runs went, `violation`, by how much it was
-        exceeded at most, and `co_inf_m` for each run.
+        `active` and `inactive`: the bound, the range of the runs, `violation` (largest excess), and
+        `co_inf_m` for each run.
     """
     runs = 6 if reduced else RUNS
     tell("positioning within bounds: none")
@@ -104,13 +104,13 @@ def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
 
 
 def _wide(name: str, free: _Course) -> tuple[float, float]:
-    """Return a bound that learning without it stays clear of."""
+    """Return a bound that stays inactive in learning without it."""
     span = free.largest[name] - free.least[name]
     return free.least[name] - 0.5 * span, free.largest[name] + 0.5 * span
 
 
 def _limits(name: str, free: _Course) -> tuple[float, float]:
-    """Return the bound of a quantity where it matters."""
+    """Return an active bound of a quantity."""
     bound = BOUNDS[name]
     if bound.least is not None and bound.largest is not None:
         return bound.least, bound.largest
@@ -119,7 +119,7 @@ def _limits(name: str, free: _Course) -> tuple[float, float]:
 
 
 def _learn(limits: dict[str, tuple[float, float]], runs: int) -> _Course:
-    """Learn the positioning moves within bounds, and measure what the law is bound by."""
+    """Learn the positioning moves within bounds, and measure the bounded quantities."""
     reference_m, model = program(DT_S), axis(DT_S)
     out = set_points(reference_m)
     bounds: dict[str, Any] = {BOUNDS[name].option: limit for name, limit in limits.items()}
@@ -163,7 +163,7 @@ def _signals(u: Array, before: Array, out: Array, output: Array) -> dict[str, Ar
 
 
 def _held(name: str, limits: tuple[float, float], course: _Course) -> Figures:
-    """Return a bound, how far the runs went, and by how much they exceeded it at most."""
+    """Return a bound, the range of the runs, and their largest excess over the bound."""
     least, largest = limits
     over = max(least - course.least[name], course.largest[name] - largest)
     return {
@@ -187,7 +187,7 @@ def _told(course: _Course, free: _Course) -> Figures:
 
 
 def claims(figures: Figures) -> list[Claim]:
-    """Say of each bound whether it is held, and what it costs."""
+    """State for each bound if it is held, and its cost."""
     told = figures["constrained"]
     names = [*BOUNDS, "all"]
     cases = [told[name][which] for name in names for which in ("active", "inactive")]

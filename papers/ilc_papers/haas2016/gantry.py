@@ -37,7 +37,7 @@ LABELS = {"none": "without learning", "enc": "CO-ILC (ENC)", "kgm": "CO-ILC (KGM
 
 
 def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
-    """Return the errors at the tool in each run, by what is learned from.
+    """Return the errors at the tool in each run, by the measurement learned from.
 
     Returns
     -------

@@ -71,7 +71,7 @@ def program(dt_s: float) -> Array:
 
 
 def set_points(reference_m: Array) -> Array:
-    """Return what goes out at each sample: the reference of the next one.
+    """Return the command at each sample: the reference of the next one.
 
     Eq. (3) pairs the input of a sample with the output of the next, and eq. (1) feeds input and
     reference through the same operator.
@@ -96,7 +96,7 @@ def laws(dt_s: float, n_samples: int) -> dict[str, Law]:
 
 
 def compute(reduced: bool, tell: Tell) -> Figures:  # noqa: FBT001
-    """Return the error of each law in each run, and what the analysis says of the laws.
+    """Return the error of each law in each run, and the analysis of the laws.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""The verbs of `ilc`, one a file; imported by the command line only."""
+"""The verbs of `ilc`, one per file; imported by the command line only."""

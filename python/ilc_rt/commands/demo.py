@@ -35,5 +35,5 @@ def demo(
     with resources.as_file(resources.files("ilc_rt").joinpath("data/gantry.toml")) as cell:
         iterations = options.pop("iterations")
         campaign = Campaign(cell, lockstep=lockstep, drives="simulated", **given(options))
-        # Nothing real moves here: what stops the axes is this computer, and it may recover.
+        # Nothing real moves here: only this computer can cause a fault, and it may recover.
         execute(campaign, iterations, json_file, report, restarts=RESTARTS)

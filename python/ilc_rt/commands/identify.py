@@ -71,7 +71,7 @@ def identify(
         typer.echo(f"picture: {printable(picture)}")
 
     if found.doubt is not None:
-        # The measurement is written all the same: it shows what is wrong.
+        # The measurement is written anyway: it shows the problem.
         message = f"no model for axis {name}: {found.doubt}; try a larger amplitude or another band"
         raise CampaignError(message)
 
@@ -92,7 +92,7 @@ def _tell(found: object) -> None:
 
 
 def _draw(found: object, folder: Path, name: str) -> Path:
-    # Here and not above: matplotlib takes its time, and bad input should not wait for it.
+    # Imported here, as matplotlib is slow to import, and bad input should be reported before.
     import io
 
     import matplotlib as mpl

@@ -1,4 +1,4 @@
-"""`ilc library`: what past runs are kept, and how to take them out."""
+"""`ilc library`: the stored runs, and their export."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from ilc_rt.text import printable
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# The last ones are shown if there is room for them; the campaign's name says when it began.
+# The last columns are shown if there is space; the campaign's name is its start time.
 COLUMNS = (
     "id", "campaign", "run", "cell", "law", "max tracking", "max contour",
     "note", "learned from", "created (UTC)",
 )  # fmt: skip
 N_NARROW = 8
 RIGHT = ("id", "run", "max tracking", "max contour")
-# Columns that give way, and what is left of them at least.
+# Columns that may be shortened, and their minimum widths.
 SHORTENED = {COLUMNS.index("note"): 11, COLUMNS.index("cell"): 6, COLUMNS.index("law"): 6}
 WIDE = 140
 
@@ -46,7 +46,7 @@ app = Typer(
     help="List, show, export and trim the runs in a library.",
 )
 
-# Characters of a program or of a law's parameters that are shown; `export` gives all of them.
+# Displayed characters of a program or of a law's parameters; `export` writes them completely.
 LENGTH_SHOWN = 2000
 
 RunId = Annotated[int, typer.Argument(metavar="ID", help="Number of the run in the library.")]
@@ -99,7 +99,7 @@ def list_runs(
 
 
 def _table(rows: list[dict[str, Any]], width: int) -> Table:
-    """Return the runs as a table; what `show` and `export` need is there at any width."""
+    """Return the runs as a table with the columns that `show` and `export` need at any width."""
     texts = [
         (
             str(row["id"]), printable(row["campaign"]), str(row["index"]), printable(row["cell"]),
@@ -116,7 +116,7 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
         max([len(name), *(len(text[column]) for text in texts)])
         for column, name in enumerate(names)
     ]
-    # Names give way, the longest first; a column is followed by two blanks.
+    # Names are shortened, the longest first; a column is followed by two blanks.
     excess = sum(wanted) + 2 * count - width
     for column in sorted(SHORTENED, key=lambda column: -wanted[column]):
         cut = max(0, min(excess, wanted[column] - SHORTENED[column]))
@@ -192,7 +192,7 @@ def trim(library: LibraryArgument, keep: Keep, cell: CellName = None) -> None:
 
 
 def error_text(row: Mapping[str, Any], figure: str) -> str:
-    """Return a figure of a run in the unit of its axes: angles where all axes are rotary."""
+    """Return a figure of a run in the unit of its axes: angles if all axes are rotary."""
     units = {str(unit).removesuffix("/s") for unit in row["input_units"]}
     base = "rad" if units == {"rad"} else "m"
     return unit_for(base, row[figure]).text(row[figure])

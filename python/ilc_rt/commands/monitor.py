@@ -132,7 +132,7 @@ class _View:
         sys.stdout.flush()
 
     def _warn(self, message: Message) -> None:
-        """Say what is wrong with a message, once for each cell and topic."""
+        """Report the defect of a message, once for each cell and topic."""
         whose = (message.cell, message.topic)
         if whose not in self._warned and len(self._warned) < WARNINGS_MAX:
             self._warned.add(whose)

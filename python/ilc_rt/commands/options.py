@@ -1,4 +1,4 @@
-"""Options and arguments that several verbs share; those of the controller come from `ilc-rt`."""
+"""Options and arguments shared by several verbs; those of the controller come from `ilc-rt`."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ class DriveChoice(str, Enum):
 
 
 def declared(verb: Verb, *names: str) -> Callable[[F], F]:
-    """Declare options of ``ilc-rt`` in the place of a function's ``**options``.
+    """Declare options of ``ilc-rt`` in place of a function's ``**options``.
 
     Parameters
     ----------
     verb : {"run", "identify"}
         Verb of ``ilc-rt`` that the options belong to.
     *names : str
-        The options; all but those that the function has parameters for, and
-        whether drives are simulated, if none is given.
+        The options; by default all but those that the function has parameters for, and the choice
+        of simulated drives.
     """
 
     def declare(function: F) -> F:
@@ -63,7 +63,7 @@ def declared(verb: Verb, *names: str) -> Callable[[F], F]:
 
 
 def given(values: dict[str, Any]) -> dict[str, Any]:
-    """Return the values of declared options as keywords of Python."""
+    """Return the values of declared options as Python keywords."""
     return {
         name: value.value if isinstance(value, Enum) else value for name, value in values.items()
     }

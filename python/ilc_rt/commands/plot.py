@@ -36,7 +36,7 @@ def plot(
     Example: ilc plot ilc-library.db --out pictures/
     """
     result = CampaignResult.from_library(library, campaign)
-    # Here and not above: matplotlib takes its time, and bad input should not wait for it.
+    # Imported here, as matplotlib is slow to import, and bad input should be reported before.
     import matplotlib as mpl
 
     from ilc_rt import plots

@@ -1,4 +1,4 @@
-"""`ilc repeatability`: whether learning applies to a cell."""
+"""`ilc repeatability`: repeatable and non-repeatable error of a cell."""
 
 from __future__ import annotations
 

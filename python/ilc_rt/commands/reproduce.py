@@ -1,4 +1,4 @@
-"""`ilc reproduce` where the papers are not installed: how to get them."""
+"""`ilc reproduce` without the papers: how to install them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import typer  # noqa: TC002 - typer reads it
 
 from ilc_rt.errors import BadInputError
 
-#: What a verb must allow so that it takes any arguments.
+#: Settings of a verb that accepts any arguments.
 ANY_ARGUMENTS = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 

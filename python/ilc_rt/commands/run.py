@@ -59,11 +59,10 @@ def execute(
     *,
     restarts: int = 0,
 ) -> None:
-    """Run a campaign in the terminal, then write what was asked for.
+    """Run a campaign in the terminal, then write the requested files.
 
-    Files are written also after a fault or a stop on request, of the runs
-    that were completed. A fault of the machine is followed by going on where
-    the campaign was, `restarts` times at most.
+    Files are also written after a fault or a requested stop, for the completed runs. After a fault
+    of the machine the campaign is resumed, at most `restarts` times.
     """
     try:
         _show(campaign, iterations, restarts)
@@ -84,7 +83,7 @@ def _show(campaign: Campaign, iterations: int, restarts: int) -> None:
             for event in campaign.events(iterations):
                 view.show(event, campaign.result)
     except CampaignError as stopped:
-        # A run that cannot be kept would not be kept the next time either.
+        # A run that could not be stored could not be stored the next time either.
         if stopped.exit_code != EXIT_FAULT or restarts == 0 or campaign.result.unkept:
             raise
         n_runs = len(campaign.result.records)
@@ -103,7 +102,7 @@ def _write(campaign: Campaign, json_file: Path | None, report: Path | None) -> N
         result.write_json(json_file)
         typer.echo(f"figures: {printable(json_file)}")
     if report is not None:
-        # Here and not above: matplotlib takes its time, and bad input should not wait for it.
+        # Imported here, as matplotlib is slow to import, and bad input should be reported before.
         from ilc_rt.report import write_report
 
         if not report.suffix:

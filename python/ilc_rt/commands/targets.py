@@ -14,10 +14,10 @@ from ilc_rt.text import printable
 
 
 def json_target(context: typer.Context, path: Path | None) -> Path | None:
-    """Look at what ``--json`` names before anything moves.
+    """Check the target of ``--json`` before anything moves.
 
-    Where the figures go to standard output, whatever else the verb prints
-    goes to standard error.
+    If the figures go to standard output, everything else that the verb prints goes to standard
+    error.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def json_target(context: typer.Context, path: Path | None) -> Path | None:
 
 
 def report_target(context: typer.Context, path: Path | None) -> Path | None:
-    """Look at what ``--report`` names before anything moves.
+    """Check the target of ``--report`` before anything moves.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def report_target(context: typer.Context, path: Path | None) -> Path | None:
 
 
 def check_file(option: str, path: Path) -> None:
-    """Refuse a file that cannot be written; it stays as it is, or away.
+    """Refuse a file that cannot be written; it stays unchanged, or absent.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def check_file(option: str, path: Path) -> None:
     """
     is_new = not path.exists()
     if not is_new and not path.is_file() and not path.is_dir():
-        return  # a device or a pipe: to open it now would be to use it
+        return  # a device or a pipe: opening it now would use it
     try:
         with path.open("a"):
             pass
@@ -73,7 +73,7 @@ def check_file(option: str, path: Path) -> None:
 def check_report(option: str, path: Path) -> None:
     """Refuse a report's file or folder that could not be written at the end.
 
-    A folder need not be there, but the one that it is made in must be.
+    A folder may be missing, but its parent must exist.
 
     Raises
     ------
@@ -104,12 +104,12 @@ def check_report(option: str, path: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder that is not there, and say so.
+    """Create a missing folder, and report it.
 
     Raises
     ------
     BadInputError
-        If it cannot be made.
+        If it cannot be created.
     """
     if folder.is_dir():
         return

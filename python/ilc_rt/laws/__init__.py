@@ -1,8 +1,8 @@
 """Learning laws: from one run's error to the next run's input.
 
-Each class documents its equation, its parameters with shapes and units, and its
-source. All derive from `Law`, whose `update` is the same for all; a law of your own
-is any object with ``update(u, e, disturbance=None)``.
+Each class documents its equation, its parameters with shapes and units, and its source. All derive
+from `Law`, whose `update` is the same for all; a custom law is any object with ``update(u, e,
+disturbance=None)``.
 """
 
 from ilc_rt._native import Law

@@ -1,4 +1,4 @@
-"""Types of the arguments that laws share, and the refusal of names that have changed."""
+"""Argument types shared by laws, and the refusal of renamed arguments."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class AnyLaw(Protocol):
 
 
 def renamed(**names: str) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Refuse arguments under the name that they had before.
+    """Refuse arguments under their former names.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What goes round any law: `Gate`, `Ladder`, `ThroughJacobian`."""
+"""Wrappers of any law: `Gate`, `Ladder`, `ThroughJacobian`."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 
 class _Around(Law):
-    """A law round another one."""
+    """A wrapper of a law."""
 
     @property
     def law(self) -> Any:  # noqa: ANN401
-        """The law inside."""
+        """The inner law."""
         return self.parameters["law"]
 
 
 class Gate(_Around):
-    """Stop any law when the error is good enough, or before it diverges.
+    """Gate: stops any law when the error is good enough, or before it diverges.
 
     Parameters
     ----------
@@ -32,19 +32,17 @@ class Gate(_Around):
         Any law: one of this package, or an object with
         ``update(u, e, disturbance)``.
     tolerance : float or None
-        Error up to which the input is kept as it is; None to keep learning.
+        Error up to which the input is kept unchanged; None to keep learning.
     measure : {"rms", "max"}
-        Norm of a run's error: the RMS over time of the Euclidean norm of all channels,
-        as a cell description and `tracking_rms_m` have it; or the largest magnitude
-        of any channel.
+        Norm of a run's error: the RMS over time of the Euclidean norm of all channels, as in a cell
+        description and `tracking_rms_m`; or the largest magnitude of any channel.
     resume : float
-        Factor by which the error must leave the tolerance before learning resumes.
+        Factor on the tolerance above which learning resumes.
     growth : float
         Factor by which the error may exceed the best one so far; infinite to let
         it grow.
     patience : int
-        Runs in a row in which it may do so. Then the input of the best run is
-        restored.
+        Number of consecutive runs with such growth before the input of the best run is restored.
 
     Raises
     ------
@@ -55,10 +53,10 @@ class Gate(_Around):
 
     Notes
     -----
-    `state` is "learning", "holding" (inside the tolerance) or "rolled_back" (to
-    the best input). Learning resumes from "holding" when the error exceeds
-    `resume` times the tolerance, and from "rolled_back" when for `patience` runs
-    in a row the error exceeds `growth` times what the same input once gave.
+    `state` is "learning", "holding" (within the tolerance) or "rolled_back" (to the best input).
+    Learning resumes from "holding" when the error exceeds `resume` times the tolerance, and from
+    "rolled_back" when for `patience` runs in a row the error exceeds `growth` times its earlier
+    value for the same input.
 
     References
     ----------
@@ -97,7 +95,7 @@ class Gate(_Around):
 
     @property
     def state(self) -> Literal["learning", "holding", "rolled_back"]:
-        """What the gate is doing."""
+        """State of the gate."""
         return self._figure("state")
 
     @property
@@ -127,7 +125,7 @@ class Ladder(_Around):
         Ratio of the error to that before the last step above which it decays too
         slowly.
     increase : float
-        Factor by which the gain g is then raised; 1 to leave it alone.
+        Factor by which the gain g is then raised; 1 to leave it unchanged.
     lowest, highest : float
         Lowest and highest gain.
 
@@ -140,10 +138,10 @@ class Ladder(_Around):
 
     Notes
     -----
-    What does not repeat falls with the root of `repeats`. The gain is 1 at first;
-    it is halved when the repeatable error grew over a step or an input was rolled
-    back, raised when it decayed too slowly, and left alone where the error is less
-    than twice the noise that is left in the mean. Another input begins a new mean.
+    The non-repeatable error falls with the root of `repeats`. The gain is 1 at first; it is halved
+    when the repeatable error grew over a step or an input was rolled back, raised when it decayed
+    too slowly, and unchanged if the error is less than twice the noise left in the mean. Another
+    input starts a new mean.
 
     References
     ----------
@@ -187,7 +185,7 @@ class Ladder(_Around):
 
     @property
     def runs(self) -> int:
-        """Runs in the mean that the next step will use."""
+        """Number of runs in the mean for the next step."""
         return self._figure("runs")
 
     @property
@@ -202,7 +200,7 @@ class Ladder(_Around):
 
 
 class ThroughJacobian(_Around):
-    """Learn in the joints from errors at the tool, with any law.
+    """Learn in joint space from errors at the tool, with any law.
 
     ``e_joint[k] = pinv(J_k) e_tool[k]``
 
@@ -212,26 +210,24 @@ class ThroughJacobian(_Around):
         A law of the joints: one of this package, or an object with
         ``update(u, e, disturbance)``.
     jacobian : array_like, shape (n_coordinates, n_joints) or (n_samples, n_coordinates, n_joints)
-        Tool motion for joint motion, as `Delta.jacobian` returns it; one matrix for
-        runs of any length, or one for each sample. Several mechanisms side by side
-        have theirs on the diagonal.
+        Tool motion per joint motion, as returned by `Delta.jacobian`; one matrix for runs of any
+        length, or one per sample. Several mechanisms are block-diagonal.
 
     Raises
     ------
     LearningError
-        If a Jacobian is singular: its largest singular value may be 1e6 times
-        the smallest. `update` raises it for another number of samples.
+        If a Jacobian is singular: its condition number may be at most 1e6. `update` raises it for
+        another number of samples.
     ValueError, TypeError
         If the array has the wrong shape, dtype or a number that is not finite,
         or `law` is not a law.
 
     Notes
     -----
-    `update` takes inputs of shape (n_samples, n_joints) in the unit of the joints, and
-    errors at the tool of shape (n_samples, n_coordinates) in m. The law sees errors
-    of the joints. To weigh errors at the tool by Q, give a norm-optimal law of the
-    joints ``q = J.T @ Q @ J``; for a constant square J this is the law of the model
-    ``J P``.
+    `update` takes inputs of shape (n_samples, n_joints) in the unit of the joints, and errors at
+    the tool of shape (n_samples, n_coordinates) in m. The inner law receives errors of the joints.
+    To weight errors at the tool by Q, give a norm-optimal law of the joints ``q = J.T @ Q @ J``;
+    for a constant square J this is the law of the model ``J P``.
 
     References
     ----------

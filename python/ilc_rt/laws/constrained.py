@@ -1,4 +1,4 @@
-"""Norm-optimal learning within bounds: `ConstrainedIlc`."""
+"""Constrained norm-optimal ILC: `ConstrainedIlc`."""
 
 from __future__ import annotations
 
@@ -15,21 +15,20 @@ if TYPE_CHECKING:
 
 
 class ConstrainedIlc(Law):
-    """Norm-optimal learning within bounds, in linear time.
+    """Constrained norm-optimal ILC, in linear time.
 
-    Minimises ``sum z'qz + u's u + v'rv + rate^2 |v[k] - v[k-1]|^2`` with z the
-    predicted error, u the next input and v its change, over all inputs for which
-    every bound holds.
+    Minimises ``sum z'qz + u's u + v'rv + rate^2 |v[k] - v[k-1]|^2`` with z the predicted error, u
+    the next input and v its change, over all inputs that satisfy every bound.
 
-    Each bound is a number b, for -b to b, or a pair (lower, upper). A side is a
-    number, an array of shape (n_samples,), (n_samples, n_channels) or
-    (1, n_channels), or None; infinite where there is no bound.
+    Each bound is a number b, for -b to b, or a pair (lower, upper). A side is a number, an array of
+    shape (n_samples,), (n_samples, n_channels) or (1, n_channels), or None; infinite entries mean
+    no bound.
 
     Parameters
     ----------
     model : StateSpace or compatible
-        Sampled model from the learned input to the measurement, dead time of the
-        bus included.
+        Discrete model from the learned input to the measurement, including the dead time of the
+        bus.
     n_samples : int
         Samples of a run.
     q : float or array_like, shape (n,), (n_outputs, n_outputs) or (n, n_outputs, n_outputs)
@@ -58,30 +57,29 @@ class ConstrainedIlc(Law):
     output_bounds : float or tuple, optional
         Bounds of the predicted output r - z, in its unit.
     output_reference : array_like, shape (n_samples,) or (n_samples, n_outputs), optional
-        The reference of the outputs, if it is not `reference`.
+        The reference of the outputs, if it differs from `reference`.
 
     Raises
     ------
     LearningError
-        If bounds contradict each other, with their names and the sample; if a
-        weight is not positive semidefinite, or s, r and rate are zero and the model
-        does not determine the input.
+        If bounds are contradictory, with their names and the sample; if a weight is not positive
+        semidefinite, or s, r and rate are zero and the model does not determine the input.
     ModelError
         If the model is continuous.
     ValueError, TypeError
-        If an argument has the wrong shape, dtype or a number that is not allowed.
+        If an argument has the wrong shape, dtype or a number out of range.
 
     Notes
     -----
-    Before the run the input is 0 and the set point stands at its first value: the
-    first step is the input itself, and the first accelerations start from rest.
-    Where a run begins otherwise, make the bounds of those samples infinite. Output
-    samples before the first effect of the input are as they are.
+    Before the run the input is 0 and the set point is at its first value: the first step is the
+    input itself, and the first accelerations start from rest. If a run begins otherwise, make
+    the bounds of those samples infinite. Output samples before the first effect of the input
+    cannot be changed.
 
-    The next input exceeds no bound by more than 1e-9 of its size. If no such input
-    is found, `update` returns the input of the run and `status` says why. A
-    primal-dual interior point does the search, its linear systems being solved by
-    a Riccati recursion; it starts warm, from the last solution.
+    The next input exceeds no bound by more than 1e-9 of its size. If no such input is found,
+    `update` returns the input of the run and `status` gives the reason. The solver is a primal-dual
+    interior-point method with a Riccati recursion for its linear systems, warm-started from the
+    last solution.
 
     References
     ----------
@@ -146,7 +144,7 @@ class ConstrainedIlc(Law):
 
     @property
     def status(self) -> Literal["untried", "solved", "infeasible", "max_iterations"]:
-        """How the last update ended."""
+        """Outcome of the last update."""
         return self._figure("status")
 
     @property
@@ -156,10 +154,10 @@ class ConstrainedIlc(Law):
 
     @property
     def iterations(self) -> int:
-        """Iterations of the last update; 0 if no bound was reached."""
+        """Iterations of the last update; 0 if no bound was active."""
         return self._figure("iterations")
 
     @property
     def gap(self) -> float:
-        """Largest relative excess of the cost over the optimum."""
+        """Relative duality gap: bound on the excess of the cost over the optimum."""
         return self._figure("gap")

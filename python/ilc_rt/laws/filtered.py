@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class PdIlc(Law):
-    """Proportional-derivative learning with a low-pass filter.
+    """PD-type ILC with a low-pass Q-filter.
 
     ``u'[n] = Q (u[n] + kp e[n + lead] + kd (e[n + lead] - e[n + lead - 1]))``
 
@@ -23,12 +23,12 @@ class PdIlc(Law):
     kp : float
         Proportional gain, input units per error unit.
     kd : float
-        Gain of the error's difference from sample to sample.
+        Derivative gain: of the error's difference from sample to sample.
     q_filter : Filter, array_like or None
-        Low-pass Q of `ilc_rt.signal`, applied without lag unless it is causal; an
-        array holds the taps of a symmetric one.
+        Low-pass Q of `ilc_rt.signal`, zero-phase unless it is causal; an array holds the taps of a
+        symmetric one.
     lead_samples : int
-        Lead of the error, 0 to 1000 samples: 1 for an axis without dead time, 1 more
+        Lead (look-ahead) of the error, 0 to 1000 samples: 1 for an axis without dead time, 1 more
         for each sample of dead time.
 
     Raises
@@ -40,8 +40,7 @@ class PdIlc(Law):
 
     Notes
     -----
-    Each channel learns alone. Beyond the end of the run the error is held at its
-    last value.
+    Each channel learns separately. Beyond the end of the run the error is held at its last value.
 
     References
     ----------
@@ -80,22 +79,22 @@ class ErrorFeedforwardIlc(Law):
     filter : Filter, array_like or None
         Low-pass Q of the error; an array holds the taps of a symmetric one.
     lead_samples : int
-        Lead of the error, 0 to 1000 samples: 1 for an axis without dead time, 1 more
+        Lead (look-ahead) of the error, 0 to 1000 samples: 1 for an axis without dead time, 1 more
         for each sample of dead time.
     input_max : float or None
-        Largest magnitude of the learned feed-forward.
+        Bound of the learned feed-forward.
 
     Raises
     ------
     LearningError
-        If the gain is not finite, or the largest input not positive.
+        If the gain is not finite, or the bound not positive.
     SignalError, TypeError
         If `filter` is not a filter.
 
     Notes
     -----
-    For the parallel structure: `u` is added to the controller's output. Each
-    channel learns alone. Beyond the end of the run the error is held.
+    For the parallel structure: `u` is added to the controller's output. Each channel learns
+    separately. Beyond the end of the run the error is held.
 
     References
     ----------
@@ -129,5 +128,5 @@ class ErrorFeedforwardIlc(Law):
 
     @property
     def n_limited(self) -> int:
-        """Values of the last input that stand at the limit."""
+        """Number of saturated values of the last input."""
         return self._figure("n_limited")

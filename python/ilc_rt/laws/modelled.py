@@ -1,4 +1,4 @@
-"""Laws that turn the error back through a model: `AdjointIlc`, `ModelInverseIlc`."""
+"""Model-based laws: `AdjointIlc` (gradient), `ModelInverseIlc`."""
 
 from __future__ import annotations
 
@@ -13,38 +13,37 @@ if TYPE_CHECKING:
 
 
 class AdjointIlc(Law):
-    """Gradient learning: the error run backward through the model.
+    """Adjoint (gradient) ILC: the error run backward through the model.
 
-    ``u' = Q (u + gain P' e)``, P the lifted operator of the model
+    ``u' = Q (u + gain P' e)``, P the lifted system of the model
 
     Parameters
     ----------
     model : StateSpace or compatible
-        Sampled model from the learned input to the measurement, dead time of the
-        bus included.
+        Discrete model from the learned input to the measurement, including the dead time of the
+        bus.
     n_samples : int
         Samples of a run.
     gain : float or None
-        Step alpha; ``1 / |P|^2``, half the limit, unless given.
+        Step alpha; by default ``1 / |P|^2``, half the limit.
     q_filter : Filter, array_like or None
-        Low-pass Q, applied without lag unless it is causal; an array holds the taps
-        of a symmetric one.
+        Low-pass Q, zero-phase unless it is causal; an array holds the taps of a symmetric one.
 
     Raises
     ------
     LearningError
-        If the gain is not positive, or from `gain_limit` on without a filter; if
-        the model answers to no input.
+        If the gain is not positive, or at least `gain_limit` without a filter; if the model
+        responds to no input.
     ModelError, SignalError, TypeError
         If the model is continuous or not a model, or the filter is not a filter or
         too long for the run.
 
     Notes
     -----
-    With the model right the error falls in every run if the gain is less than
-    `gain_limit`, which is ``2 / |P|^2``. The norm is approached from below, to
-    about one part in 1000. Of the laws with a model this one suffers least from a
-    wrong one; it is also the slowest where the gain of the model is small.
+    With an exact model the error falls in every run (monotone convergence) if the gain is less than
+    `gain_limit`, which is ``2 / |P|^2``. The norm is estimated to about one part in 1000, on the
+    safe side. Of the model-based laws this is the most robust against model errors; it is also the
+    slowest where the gain of the model is small.
 
     References
     ----------
@@ -74,33 +73,31 @@ class AdjointIlc(Law):
 
     @property
     def gain_limit(self) -> float:
-        """Gain from which on the error grows, ``2 / |P|^2``."""
+        """Gain above which the error grows, ``2 / |P|^2``."""
         return self._figure("gain_limit")
 
 
 class ModelInverseIlc(Law):
-    """Learning with the inverse of the model.
+    """Model-inverse ILC.
 
-    ``u' = Q (u + gain P^-1 e)``, each output paired with the first sample at which
-    it answers
+    ``u' = Q (u + gain P^-1 e)``, each output paired with the first sample at which it responds
 
     Parameters
     ----------
     model : StateSpace or compatible
-        Sampled model from the learned input to the measurement, dead time of the
-        bus included.
+        Discrete model from the learned input to the measurement, including the dead time of the
+        bus.
     n_samples : int
         Samples of a run.
     gain : float
         Step alpha, above 0 and below 2.
     q_filter : Filter, array_like or None
-        Low-pass Q, applied without lag unless it is causal; an array holds the taps
-        of a symmetric one.
+        Low-pass Q, zero-phase unless it is causal; an array holds the taps of a symmetric one.
 
     Raises
     ------
     LearningError
-        If the model has a zero on or outside the unit circle (the message names
+        If the model has a zero on or outside the unit circle (non-minimum phase; the message names
         it), no inverse, or the gain is out of range.
     ModelError, SignalError, TypeError
         If the model is continuous or not a model, or the filter is not a filter or
@@ -108,13 +105,13 @@ class ModelInverseIlc(Law):
 
     Notes
     -----
-    With gain 1, the model right and no filter the error is gone after one run. The
-    inverse amplifies noise where the gain of the model is small: there the filter
-    belongs. Beyond the end of the run the error is held.
+    With gain 1, an exact model and no filter the error is zero after one run. The inverse amplifies
+    noise where the gain of the model is small: a Q-filter is needed there. Beyond the end of the
+    run the error is held.
 
     References
     ----------
-    [barton2010], Eq. (3.13) to (3.15), whose limit for S = R = 0 it is.
+    [barton2010], Eq. (3.13) to (3.15), as the limit S = R = 0.
 
     Examples
     --------

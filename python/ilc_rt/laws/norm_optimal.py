@@ -1,4 +1,4 @@
-"""Norm-optimal learning: `NormOptimalIlc`."""
+"""Norm-optimal ILC: `NormOptimalIlc`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class NormOptimalIlc(Law):
-    """Norm-optimal learning, exact and in linear time.
+    """Norm-optimal ILC, exact and in linear time.
 
     Minimises ``sum z'qz + u's u + v'rv + rate^2 |v[k] - v[k-1]|^2`` with z the
     predicted error, u the next input and v its change.
@@ -26,8 +26,8 @@ class NormOptimalIlc(Law):
     Parameters
     ----------
     model : StateSpace, TimeVarying or compatible
-        Sampled model from the learned input to the measurement, dead time of the
-        bus included.
+        Discrete model from the learned input to the measurement, including the dead time of the
+        bus.
     n_samples : int
         Samples of a run.
     q : float or array_like, shape (n,), (n_outputs, n_outputs) or (n, n_outputs, n_outputs)
@@ -45,18 +45,16 @@ class NormOptimalIlc(Law):
         If a weight is not positive semidefinite, or s, r and rate are zero and the
         model does not determine the input or has an unstable inverse.
     ModelError, TypeError
-        If the model is continuous, varies over another number of samples, or is not
-        a model.
+        If the model is continuous, varies over another number of samples, or is not a model.
     ValueError, TypeError
         If a weight has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
-    With s = r = 0 this is convex-optimisation learning, `rate` being its d. The
-    law pairs each sample of the input with the first sample of the error that it
-    reaches. The last samples of the input reach nothing within the run: there
-    s, r and rate alone decide, and if all are zero the input stays as it was.
-    An update takes time and memory in proportion to n_samples.
+    With s = r = 0 this is convex-optimisation ILC (CO-ILC), `rate` being its d. The law pairs each
+    sample of the input with the first sample of the error that it affects. The last samples of the
+    input have no effect within the run: there s, r and rate alone decide, and if all are zero the
+    input is unchanged. An update takes time and memory proportional to n_samples.
 
     References
     ----------
@@ -101,26 +99,26 @@ class NormOptimalIlc(Law):
         rate: float = 0.0,
         axes: Sequence[int] | None = None,
     ) -> Self:
-        """Return the law that learns the contour rather than each axis.
+        """Return the law with contour weights: the error normal to the path instead of each axis.
 
         Parameters
         ----------
         model : StateSpace, TimeVarying or compatible
-            Sampled model from the learned input to the measurement.
+            Discrete model from the learned input to the measurement.
         reference : array_like, shape (n_samples, n_outputs)
             Reference of every output.
         q, contour, along : float or array_like
-            Weights of every output, of the error across and along the path, as in
+            Weights of every output, of the error normal to and along the path, as in
             `ilc_rt.weights.contour`.
         s, r, rate : float or array_like
             Weights of the input, as for the law itself.
         axes : sequence of int, optional
-            Outputs that make the path; by default all.
+            Outputs that form the path; by default all.
 
         Returns
         -------
         NormOptimalIlc
-            Law for runs as long as the reference.
+            Law for runs of the reference's length.
 
         Raises
         ------
@@ -172,12 +170,12 @@ class NormOptimalIlc(Law):
         pairs: Sequence[tuple[int, int]] | None = None,
         axes: Sequence[int] | None = None,
     ) -> Self:
-        """Return the law of several agents that keep a formation.
+        """Return the law of several agents in formation.
 
         Parameters
         ----------
         models : sequence of StateSpace or compatible
-            Sampled model of each agent, all with as many outputs.
+            Discrete model of each agent, all with the same number of outputs.
         n_samples : int
             Samples of a run.
         tracking, own, centre, sigma, weight : float or array_like
@@ -241,40 +239,39 @@ class NormOptimalIlc(Law):
         r: ArrayLike = 0.0,
         rate: float = 0.0,
     ) -> Self:
-        """Return the law that weighs the error through a filter.
+        """Return the law with a dynamic (frequency-dependent) weight of the error.
 
         ``sum |w|^2_q + |z|^2_plain + s |u'|^2 + r |v|^2 + ..``, ``w = F (G z)``
 
         Parameters
         ----------
         model : StateSpace, TimeVarying or compatible
-            Sampled model from the learned input to the measurement.
+            Discrete model from the learned input to the measurement.
         n_samples : int
             Samples of a run.
         filter : StateSpace or compatible
-            Causal, stable filter F: an input for each output of the model, or for
-            each row of `coupling`.
+            Causal, stable filter F: one input per output of the model, or per row of `coupling`.
         q : float or array_like, shape (n_samples,), (f, f) or (n_samples, f, f)
             Weight of the filter's outputs.
         plain : float or array_like, optional
-            Weight of the error itself besides; 0 unless given.
+            Weight of the unfiltered error; 0 by default.
         coupling : array_like, shape (n_samples, g, n_outputs), optional
-            G: what goes into the filter at each sample, as gains of a contour.
+            G: coupling of the channels before the filter at each sample, e.g. contour gains.
         s, r, rate : float or array_like
             Weights of the input, as for the law itself.
 
         Returns
         -------
         NormOptimalIlc
-            Law that filters each run's error before it learns from it.
+            Law that filters each run's error before learning from it.
 
         Raises
         ------
         LearningError
-            If the filter has a pole outside the unit circle, as one that runs
-            backwards has, or a weight does not fit.
+            If the filter has a pole outside the unit circle, e.g. one meant to run backward, or a
+            weight has the wrong shape.
         ModelError, ValueError, TypeError
-            If the filter does not fit the model, and as the law itself.
+            If the filter does not match the model, and as the law itself.
 
         References
         ----------
@@ -312,17 +309,17 @@ class NormOptimalIlc(Law):
 
     @property
     def q(self) -> Any:  # noqa: ANN401
-        """Weight of the predicted error, as it was given: a number or an array."""
+        """Weight of the predicted error, as given: a number or an array."""
         return _weight(self.parameters.get("q", 1.0))
 
     @property
     def s(self) -> Any:  # noqa: ANN401
-        """Weight of the next input, as it was given: a number or an array."""
+        """Weight of the next input, as given: a number or an array."""
         return _weight(self.parameters["s"])
 
     @property
     def r(self) -> Any:  # noqa: ANN401
-        """Weight of the change of the input, as it was given: a number or an array."""
+        """Weight of the change of the input, as given: a number or an array."""
         return _weight(self.parameters["r"])
 
     @property
@@ -332,14 +329,14 @@ class NormOptimalIlc(Law):
 
     @property
     def conditioning(self) -> float:
-        """How well the weights determine the input, 0 to 1.
+        """Conditioning of the input by the weights, 0 to 1.
 
-        Below about 1e-12 noise decides on part of the input.
+        Below about 1e-12 noise determines part of the input.
         """
         return self._figure("conditioning")
 
 
 def _weight(given: ArrayLike) -> float | NDArray[np.float64]:
-    """Return a weight as a number or an array of its own."""
+    """Return a weight as a number or a copy of the array."""
     weight = np.array(given, float)
     return weight if weight.ndim else float(weight)

@@ -1,4 +1,4 @@
-"""Laws that remember runs: `RelevanceIlc`, `FlexibleIlc`."""
+"""Laws with a memory of past runs: `RelevanceIlc`, `FlexibleIlc`."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 
 class _Recalled(Law):
-    """A law that proposes the next input from runs that it remembers."""
+    """A law that computes the next input from remembered runs."""
 
     def __len__(self) -> int:
         """Return the number of runs in memory."""
         return self._figure("n_runs")
 
     def remember(self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None) -> None:
-        """Remember a run that was made elsewhere.
+        """Add an earlier run, or one made elsewhere, to the memory.
 
         Parameters
         ----------
         u, e : array_like, shape (n_samples,) or (n_samples, n_channels)
             Its input and error.
         disturbance : float or array_like, shape (n_disturbances,)
-            The disturbance it was made under; None if none is measured.
+            Its disturbance; None if none is measured.
 
         Raises
         ------
@@ -43,20 +43,19 @@ class _Recalled(Law):
 
 
 class RelevanceIlc(_Recalled):
-    """Learning from every past run, weighted by its relevance (DPW-ILC).
+    """DPW-ILC: learning from every past run, weighted by its relevance.
 
     ``u' = sum_j w_j L(u_j, e_j)``, ``w_j = N_j / sum_k N_k``
 
-    with L the core law and N_j the relevance of run j: large for a run whose
-    error was small and whose disturbance was like the coming one's.
+    with L the core law and N_j the relevance of run j: large for a run with a small error and a
+    disturbance similar to the coming one.
 
     Parameters
     ----------
     library : Library or None
-        Runs of earlier campaigns; those that fit are read once, at the
-        first update: the same number of samples, axes and disturbances, and the
-        same cell, program and measurement as the newest of that size. None:
-        memory only. The law never writes: `Campaign` and `Library.append` do.
+        Runs of earlier campaigns; matching ones are read once, at the first update: the same number
+        of samples, axes and disturbances, and the same cell, program and measurement as the newest
+        of that size. None: memory only. The law never writes: `Campaign` and `Library.append` do.
     core : Law or object
         Law that proposes the next input from one run: any law, or any object with
         ``update(u, e, disturbance=None)`` whose result depends on u and e alone.
@@ -74,18 +73,17 @@ class RelevanceIlc(_Recalled):
     Raises
     ------
     LearningError
-        If a weight is negative, top is 0 or the sample time is not above 0.
-        `update` raises it if the number of disturbances changes.
+        If a weight is negative, top is 0 or the sample time is not positive. `update` raises it if
+        the number of disturbances changes.
     TypeError
         If core is not a law.
 
     Notes
     -----
-    The disturbance given to `update` is the coming run's: it is measured before
-    that run and used to weigh the past. The law remembers it, and stores the run
-    under it once its error is there. So the first run has to be announced by
-    `expect`; one that was not is used for the next input but not remembered.
-    Left out, the disturbance is that of the run before. At most 7 numbers.
+    The disturbance given to `update` is the coming run's: it is measured before that run and used
+    to weight the past. The law stores the run under it once its error is known. So the disturbance
+    of the first run has to be set by `expect`; a run without one is used for the next input but not
+    stored. If omitted, the disturbance is that of the previous run. At most 7 numbers.
 
     References
     ----------
@@ -143,7 +141,7 @@ class RelevanceIlc(_Recalled):
         Returns
         -------
         runs : ndarray of int64, shape (n_runs,)
-            Numbers of the runs in memory, from 0.
+            Indices of the runs in memory, from 0.
         weights : ndarray of float64, shape (n_runs,)
             Their weights, which add up to 1.
 
@@ -156,20 +154,19 @@ class RelevanceIlc(_Recalled):
         return np.array(runs, np.int64), np.array(weights, np.float64)
 
     def trim(self, keep: int, disturbances: ArrayLike | None = None) -> NDArray[np.int64]:
-        """Forget all but the runs that hold most weight.
+        """Keep only the runs with the largest weights.
 
         Parameters
         ----------
         keep : int
-            Number of runs that stay.
+            Number of runs to keep.
         disturbances : array_like or None, shape (n, n_disturbances), or (n,) for a single one
-            Disturbances to come; None: those of all runs in memory, as if they came
-            again.
+            Coming disturbances; None: those of all runs in memory, as if they were repeated.
 
         Returns
         -------
         ndarray of int64, shape (n_kept,)
-            Numbers, before the trimming, of the runs that stayed.
+            Indices, before the trimming, of the runs kept.
 
         Raises
         ------
@@ -178,31 +175,29 @@ class RelevanceIlc(_Recalled):
 
         Notes
         -----
-        A run's share is the sum of its weights under each of the disturbances; the
-        largest shares stay. For a single disturbance these are exactly the runs
-        most relevant for it.
+        A run's share is the sum of its weights under each of the disturbances; the largest shares
+        are kept. For a single disturbance these are exactly the runs most relevant for it.
         """
         given = None if disturbances is None else np.ravel(disturbances)
         return np.array(self._trim(keep, given), np.int64)
 
 
 class FlexibleIlc(_Recalled):
-    """Learning with a table of inputs over the disturbance (Flexible ILC).
+    """Flexible ILC: learning with a table of inputs over the disturbance.
 
     ``u' = (1 - t) L(u_a, e_a) + t L(u_b, e_b)``
 
-    with L the core law, a the last run under the tabulated disturbance nearest to
-    the coming one, b that under the nearest one beyond it, and t how far the
-    coming one lies from a to b.
+    with L the core law, a the last run under the tabulated disturbance nearest to the coming one, b
+    that under the nearest one beyond it, and t the interpolation factor from a to b.
 
     Parameters
     ----------
     library : Library or None
-        Runs of earlier campaigns; those that fit are read once, at the
-        first update, as `RelevanceIlc` does.
+        Runs of earlier campaigns; matching ones are read once, at the first update, as for
+        `RelevanceIlc`.
     core : Law or object
-        Law that proposes the next input from one run; a `NormOptimalIlc` with
-        s = r = 0 inverts the model, as the source does.
+        Law that computes the next input from one run; a `NormOptimalIlc` with s = r = 0 inverts the
+        model, as in the source.
     tolerance : float
         Distance up to which two disturbances are the same entry of the table.
     cell : str or None
@@ -218,9 +213,9 @@ class FlexibleIlc(_Recalled):
 
     Notes
     -----
-    The disturbance given to `update` is the coming run's, as with `RelevanceIlc`.
-    Beyond the table the nearest entry holds. The law uses two runs only, however
-    large their errors: it is here to compare with.
+    The disturbance given to `update` is the coming run's, as for `RelevanceIlc`. Beyond the table
+    the nearest entry is used. The law uses two runs only, however large their errors: it serves for
+    comparison.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""What makes a past run relevant for the coming one: `RelevanceWeights`."""
+"""Weights of the relevance of past runs: `RelevanceWeights`."""
 
 from __future__ import annotations
 
@@ -29,17 +29,15 @@ class RelevanceWeights:
     error_rate : float
         Weight of the error's rate.
     disturbance : float, array_like of float64, shape (n_disturbances,), or None
-        Weight of the distance in disturbance; one number holds for each of them,
-        None is 0.5.
+        Weight of the distance in disturbance; one number for all of them, None is 0.5.
     epsilon : float
         Added to every sum: below it runs count as equally good. Choose the
         weights in proportion to it.
     rate_filter_s : float
-        Time constant in seconds of the filter that gives the error's rate,
-        ``s / (rate_filter_s s + 1)``.
+        Time constant in seconds of the filter that computes the error's rate, ``s / (rate_filter_s
+        s + 1)``.
     error_gain, input_gain : float
-        Gains Gamma_1 of what the core law adds to an input, and Gamma_2 of the
-        input itself.
+        Gains Gamma_1 of the core law's correction, and Gamma_2 of the input.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Trajectories that hold the limits of every axis, and the geometry of contours."""
+"""Trajectories within the limits of every axis, and the geometry of contours."""
 
 from ilc_rt.trajectory.contour import (
     Arc,

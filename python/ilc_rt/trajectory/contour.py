@@ -1,4 +1,4 @@
-"""Geometry of contours: exact pieces, contour errors, coupling gains."""
+"""Geometry of contours: exact segments, contour errors, coupling gains."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ __all__ = ["Arc", "ContourError", "Line", "contour_error", "coupling_gains", "pr
 
 
 class Line(_native.Line):
-    """Straight piece of a contour.
+    """Straight segment of a contour.
 
     Parameters
     ----------
     from_m, to_m : sequence of 2 or 3 floats
-        Its ends in m.
+        End points in m.
 
     Raises
     ------
@@ -46,23 +46,23 @@ class Line(_native.Line):
 
 
 class Arc(_native.Arc):
-    """Circular piece of a contour, in any plane.
+    """Circular segment of a contour, in any plane.
 
     Parameters
     ----------
     from_m : sequence of 2 or 3 floats
-        Where it begins, in m.
+        Start point in m.
     centre_m : sequence of 2 or 3 floats
-        Its centre in m.
+        Centre in m.
     sweep_rad : float
-        How far it turns around the axis, in rad; up to a full turn either way.
+        Angle of rotation about the axis in rad; up to a full turn in either direction.
     axis : sequence of 3 floats
-        Around what it turns; perpendicular to the radius.
+        Axis of rotation, perpendicular to the radius.
 
     Raises
     ------
     ContourError
-        If the numbers describe no arc.
+        If the numbers do not describe an arc.
     ValueError, TypeError
         If a point has the wrong shape, dtype or a number that is not finite.
 
@@ -88,28 +88,27 @@ class Arc(_native.Arc):
 def contour_error(
     reference_m: ArrayLike | Sequence[Line | Arc], actual_m: ArrayLike, window: int | None = None
 ) -> NDArray[np.float64]:
-    """Return how far measured points are from a path.
+    """Return the distances of measured points from a path.
 
     Parameters
     ----------
     reference_m : ndarray of float64, shape (n_reference, n_axes), or list of Line and Arc
-        The path in m: as samples, joined by straight steps, or as exact pieces.
+        The path in m: as samples, joined by straight segments, or as exact segments.
     actual_m : ndarray of float64, shape (n_samples, n_axes)
         Measured points in m.
     window : int or None
-        For a sampled path of 1 to 12 axes: how many samples before and after its
-        own time a point is compared with. None, for 2 and 3 axes: the whole path,
-        by a spatial index.
+        For a sampled path of 1 to 12 axes: search window in samples before and after the same time.
+        None, for 2 and 3 axes: the whole path, with a spatial index.
 
     Returns
     -------
     ndarray of float64, shape (n_samples,)
-        Distances in m, exact for the path as it is given.
+        Distances in m, exact for the given path.
 
     Raises
     ------
     ContourError
-        If there is no path.
+        If the path is empty.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
@@ -140,8 +139,7 @@ def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]:
     Returns
     -------
     ndarray of float64, shape (n_samples, 2)
-        One pair a sample; where the reference rests, that of the nearest sample
-        that moves.
+        One pair per sample; where the reference is at rest, that of the nearest sample in motion.
 
     Raises
     ------
@@ -164,7 +162,7 @@ def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]:
 
 
 def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]:
-    """Return what takes the part along the path away from an error.
+    """Return the projection that removes the component of an error along the path.
 
     ``epsilon = (I - t t') e`` with t the unit tangent of the reference.
 
@@ -176,7 +174,7 @@ def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]:
     Returns
     -------
     ndarray of float64, shape (n_samples, n_axes, n_axes)
-        One symmetric matrix a sample.
+        One symmetric matrix per sample.
 
     Raises
     ------

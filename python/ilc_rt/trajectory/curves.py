@@ -1,4 +1,4 @@
-"""Smooth curves: splines and shapes in a plane, run as fast as every axis allows."""
+"""Smooth curves: splines and plane shapes, traversed as fast as every axis allows."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def spline(
 ) -> Trajectory:
     """Plan the smooth curve through points.
 
-    A natural cubic spline, run with curvature-limited speed.
+    A natural cubic spline, traversed at a curvature-limited speed.
 
     Parameters
     ----------
@@ -41,8 +41,7 @@ def spline(
     jerk_max_m_s3 : float or ndarray of float64, shape (n_axes,)
         Limit of each axis, in m/s^3.
     curvature_acceleration_max_m_s2 : float
-        Highest acceleration across the path, in m/s^2; by default as high as the
-        axes allow.
+        Highest centripetal acceleration, in m/s^2; by default limited only by the axes.
 
     Returns
     -------
@@ -51,7 +50,7 @@ def spline(
     Raises
     ------
     TrajectoryError
-        If a value is out of its range, or two neighbours are the same.
+        If a value is out of range, or two neighbouring points are equal.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
@@ -107,12 +106,11 @@ def butterfly(
     feed_m_s : float
         Highest speed along the path, in m/s.
     curvature_acceleration_max_m_s2 : float
-        Highest acceleration across the path, in m/s^2; by default as high as the
-        axes allow.
+        Highest centripetal acceleration, in m/s^2; by default limited only by the axes.
     scale_m : float
-        Size, in m.
+        Scale, in m.
     turns : float
-        Turns of t; 12 close the contour.
+        Revolutions of t; 12 close the contour.
     center_m : (float, float)
         Centre, in m.
 
@@ -123,7 +121,7 @@ def butterfly(
     Raises
     ------
     TrajectoryError
-        If a value is out of its range.
+        If a value is out of range.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
@@ -162,14 +160,14 @@ def spiral(
     curvature_acceleration_max_m_s2: float = math.inf,
     center_m: tuple[float, float] = (0.0, 0.0),
 ) -> Trajectory:
-    """Plan a spiral from its centre outwards, anticlockwise.
+    """Plan a spiral outwards from its centre, anticlockwise.
 
     ``r = pitch theta / (2 pi)``, with curvature-limited speed.
 
     Parameters
     ----------
     pitch_m : float
-        Distance of the turns, in m.
+        Pitch: distance between turns, in m.
     turns : float
         Number of turns.
     feed_m_s : float
@@ -183,8 +181,7 @@ def spiral(
     jerk_max_m_s3 : float or ndarray of float64, shape (2,)
         Limit of each axis, in m/s^3.
     curvature_acceleration_max_m_s2 : float
-        Highest acceleration across the path, in m/s^2; by default as high as the
-        axes allow.
+        Highest centripetal acceleration, in m/s^2; by default limited only by the axes.
     center_m : (float, float)
         Centre, in m.
 
@@ -195,7 +192,7 @@ def spiral(
     Raises
     ------
     TrajectoryError
-        If a value is out of its range.
+        If a value is out of range.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 

@@ -1,4 +1,4 @@
-"""Straight moves: limited in jerk, exponential/sigmoid, and with an oscillation along them."""
+"""Straight moves: jerk-limited (S-curve), exponential/sigmoid, and modulated."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ def jerk_limited(
     jerk_max_m_s3: float | ArrayLike,
     setting: str = "complete",
 ) -> Trajectory:
-    """Plan straight moves, each axis limited in jerk.
+    """Plan straight moves with jerk-limited (S-curve) axes.
 
-    Seven phases of jerk a move. What happens between moves is one of the two
-    settings of machine tools.
+    Seven phases of constant jerk per move. `setting` selects one of the two ways in which machine
+    tools join moves.
 
     Parameters
     ----------
     points_m : ndarray of float64, shape (n_points,) or (n_points, n_axes)
-        Start and the end of each move, in m.
+        Start, and end of each move, in m.
     feed_m_s : float or ndarray of float64, shape (n_points - 1,)
         Speed along each move, in m/s.
     dt_s : float
@@ -41,8 +41,8 @@ def jerk_limited(
     jerk_max_m_s3 : float or ndarray of float64, shape (n_axes,)
         Limit of each axis, in m/s^3.
     setting : str
-        ``"complete"``: every move is completed, an oscillation loses frequency.
-        ``"on_time"``: the next begins on time, an oscillation loses amplitude.
+        ``"complete"``: every move is completed, and an oscillation loses frequency. ``"on_time"``:
+        the next move starts on time, and an oscillation loses amplitude.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def jerk_limited(
     Raises
     ------
     TrajectoryError
-        If a value is out of its range.
+        If a value is out of range.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
@@ -95,17 +95,16 @@ def exponential_sigmoid(
 ) -> Trajectory:
     """Plan an exponential/sigmoid (E/S) move.
 
-    ``x = (m t)(1 - exp(-a t^3)) + A sin(w t)(1 - exp(-a t^2))`` at the start,
-    sigmoids where a line goes on or turns round, the mirror image of a start
-    where it ends. It is on its programmed path, and on time, soon after a start.
-    Each alpha is the largest that honours every limit.
+    ``x = (m t)(1 - exp(-a t^3)) + A sin(w t)(1 - exp(-a t^2))`` at the start, sigmoids where a line
+    continues or reverses, the mirror image of a start at the end. The motion is on its programmed
+    path and on time shortly after a start. Each alpha is the largest that satisfies every limit.
 
     Parameters
     ----------
     points_m : ndarray of float64, shape (n_points,) or (n_points, n_axes)
-        Start and the end of each leg, in m.
+        Start, and end of each leg, in m.
     feed_m_s : float or ndarray of float64, shape (n_points - 1,)
-        Speed of each leg, in m/s; a start overshoots it by 79 %.
+        Speed on each leg, in m/s; a start overshoots it by 79 %.
     dt_s : float
         Sample time in s.
     velocity_max_m_s : float or ndarray of float64, shape (n_axes,)
@@ -117,11 +116,11 @@ def exponential_sigmoid(
     amplitude_m : float or ndarray of float64, shape (n_points - 1,)
         Amplitude of the oscillation along each leg, in m.
     frequency_hz : float or ndarray of float64, shape (n_points - 1,)
-        Its frequency, in Hz.
+        Frequency of the oscillation, in Hz.
     alpha_max : float or dict of float, optional
-        No alpha above this is used, at every place or by the name of the place:
-        ``"start-up"``, ``"transition"``, ``"end"``. The largest that the limits
-        allow is not the one with the smallest `tracking_index`.
+        Upper bound of alpha, for all places or per place: ``"start-up"``, ``"transition"``,
+        ``"end"``. The largest alpha within the limits is not the one with the smallest
+        `tracking_index`.
 
     Returns
     -------
@@ -131,14 +130,14 @@ def exponential_sigmoid(
     Raises
     ------
     TrajectoryError
-        If no alpha holds the limits, or a value is out of its range.
+        If no alpha satisfies the limits, or a value is out of range.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
-    A start has to be over before its leg is: ``a T^3`` of at least 45, so that
-    its acceleration reaches about ``11 v / T`` in a leg of T seconds.
+    A start must end before its leg does: ``a T^3`` of at least 45, so that its acceleration reaches
+    about ``11 v / T`` on a leg of T seconds.
 
     References
     ----------
@@ -180,18 +179,17 @@ def modulated(
     jerk_max_m_s3: float | ArrayLike,
     interpolation: str = "exponential_sigmoid",
 ) -> Trajectory:
-    """Plan a modulated tool path: a feed with an oscillation along it.
+    """Plan a modulated tool path: a feed with an oscillation superimposed along it.
 
-    ``x = v t + A sin(w t)``, as a ramped sinusoid by the E/S interpolator, or as
-    the six-point sine that a numerical controller gets, by the jerk-limited
-    linear one.
+    ``x = v t + A sin(w t)``, as a ramped sinusoid by the E/S interpolator, or by the jerk-limited
+    linear interpolator as the six-point sine that a numerical controller receives.
 
     Parameters
     ----------
     points_m : ndarray of float64, shape (2,) or (2, n_axes)
         Start and end, in m.
     feed_m_s : float
-        Speed of the line, in m/s.
+        Feed speed, in m/s.
     amplitude_m : float
         Amplitude, in m.
     frequency_hz : float
@@ -205,8 +203,8 @@ def modulated(
     jerk_max_m_s3 : float or ndarray of float64, shape (n_axes,)
         Limit of each axis, in m/s^3.
     interpolation : str
-        ``"exponential_sigmoid"``, or ``"complete"`` or ``"on_time"`` for the
-        six-point sine in one of the two settings.
+        ``"exponential_sigmoid"``, or ``"complete"`` or ``"on_time"`` for the six-point sine with
+        one of the two settings.
 
     Returns
     -------
@@ -215,7 +213,7 @@ def modulated(
     Raises
     ------
     TrajectoryError
-        If no alpha holds the limits, or a value is out of its range.
+        If no alpha satisfies the limits, or a value is out of range.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
@@ -261,12 +259,12 @@ def sigmoid_pair(
     sine_offset_s: float,
     dt_s: float,
 ) -> Trajectory:
-    """Sample two legs on one axis, joined by sigmoids, every alpha given.
+    """Sample two legs on one axis, joined by sigmoids, with every alpha given.
 
     ``x = (x1 a/(a + exp(s c)) + x2 b/(b + exp(-s c))) (1 - exp(-a0 t^2))``
 
-    with c the time from the corner, ``a = |v2/v1|``, ``b = 1/a``, and
-    oscillations on x1 and x2 that fade before the corner and after it.
+    with c the time from the corner, ``a = |v2/v1|``, ``b = 1/a``, and oscillations on x1 and x2
+    that fade before and after the corner.
 
     Parameters
     ----------
@@ -275,41 +273,40 @@ def sigmoid_pair(
     amplitude_m : array_like of float64, shape (2,)
         Amplitude of each oscillation, in m.
     omega_rad_s : array_like of float64, shape (2,)
-        Its angular frequency, in rad/s.
+        Angular frequency of each oscillation, in rad/s.
     phase_zero_s : array_like of float64, shape (2,)
-        Time at which its phase is 0, in s.
+        Time at which the phase of each oscillation is 0, in s.
     corner_s : float
-        When the first leg gives way to the second, in s.
+        Time of the corner between the legs, in s.
     duration_s : float
-        Length of the motion, in s; it does not come to rest.
+        Length of the motion, in s; it does not end at rest.
     start_alpha : float
-        Of the start, a0 in 1/s^2.
+        Alpha of the start, a0 in 1/s^2.
     transition_alpha : float
-        Of the sigmoids between the legs, s in 1/s.
+        Alpha of the sigmoids between the legs, s in 1/s.
     sine_alpha : float
-        Of the sigmoids that fade the oscillations, in 1/s.
+        Alpha of the sigmoids that fade the oscillations, in 1/s.
     sine_offset_s : float
-        How far from the corner these are half open, in s.
+        Distance of their midpoints from the corner, in s.
     dt_s : float
         Sample time in s.
 
     Returns
     -------
     Trajectory
-        `programmed_m` is without start and transition.
+        `programmed_m` excludes start and transition.
 
     Raises
     ------
     TrajectoryError
-        If a velocity is 0, an alpha or a time is not above 0, or a number is not
-        finite.
+        If a velocity is 0, an alpha or a time is not positive, or a number is not finite.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
-    No limit is held: it is the thesis's own program, to compare with and to
-    make its reference again. `exponential_sigmoid` plans for a machine.
+    No limit is enforced: this is the program of the thesis, for comparison and to reproduce its
+    reference. To plan for a machine use `exponential_sigmoid`.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Programs of lines and arcs: rasters and part programs in G-code."""
+"""Programs of lines and arcs: rasters and G-code part programs."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def raster(
     there_and_back: bool = False,
     setting: str = "complete",
 ) -> Trajectory:
-    """Plan a raster: rows to and fro, and back if asked for.
+    """Plan a raster: rows in alternating directions, optionally retraced.
 
     Parameters
     ----------
     width_m : float
         Length of a row along the first axis, in m.
     pitch_m : float
-        Distance of the rows along the second axis, in m.
+        Row spacing along the second axis, in m.
     rows : int
         Number of rows.
     feed_m_s : float
@@ -48,7 +48,7 @@ def raster(
     start_m : (float, float)
         First corner, in m.
     there_and_back : bool
-        True to go the same way back to the start.
+        True to return to the start along the same path.
     setting : str
         ``"complete"`` or ``"on_time"``, as in `jerk_limited`.
 
@@ -59,7 +59,7 @@ def raster(
     Raises
     ------
     TrajectoryError
-        If a value is out of its range.
+        If a value is out of range.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 
@@ -106,20 +106,19 @@ def gcode(
     blend_s: float | None = None,
     block_delete: bool = False,
 ) -> Trajectory:
-    r"""Plan a part program in G-code.
+    r"""Plan a G-code part program.
 
-    G0 to G4, G17, G20, G21, G80, G90, G91, M2, M30; arcs by I and J, or R;
-    comments; words that ask for what is so anyway. The words mean what they
-    mean to LinuxCNC, or are refused.
+    G0 to G4, G17, G20, G21, G80, G90, G91, M2, M30; arcs by I and J, or R; comments; words that
+    request the default. Words have the meaning of LinuxCNC or are rejected.
 
     Parameters
     ----------
     text : str or bytes
-        The program; bytes may have any encoding that continues ASCII.
+        The program; bytes may have any encoding that extends ASCII.
     start_m : ndarray of float64, shape (n_axes,)
-        Where it begins, in m.
+        Start position, in m.
     feed_m_s : float
-        Speed until the first F, and of G0 unless `rapid_m_s` is given, in m/s.
+        Speed until the first F, and of G0 if `rapid_m_s` is not given, in m/s.
     dt_s : float
         Sample time in s.
     velocity_max_m_s : float or ndarray of float64, shape (n_axes,)
@@ -131,10 +130,9 @@ def gcode(
     rapid_m_s : float, optional
         Speed of G0, in m/s.
     blend_s : float, optional
-        Window that rounds the corners, in s; without it every move is at rest
-        at its end.
+        Window that rounds the corners, in s; without it every move ends at rest.
     block_delete : bool
-        True to leave out blocks that begin with /.
+        True to skip blocks that begin with / (block delete).
 
     Returns
     -------
@@ -144,7 +142,7 @@ def gcode(
     Raises
     ------
     TrajectoryError
-        If a word is not understood, with its line, or a limit would be broken.
+        If a word is not understood (with its line), or a limit would be exceeded.
     ValueError, TypeError
         If an array has the wrong shape, dtype or a number that is not finite.
 

@@ -1,4 +1,4 @@
-"""Sampled motions: `Trajectory`, and how well one follows its program."""
+"""Sampled motions: `Trajectory` and its tracking index."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Trajectory:
     """A planned motion, sampled.
 
-    The first and the last sample are at rest, but for `sigmoid_pair`.
+    It starts and ends at rest, except for `sigmoid_pair`.
 
     Attributes
     ----------
@@ -29,10 +29,10 @@ class Trajectory:
     programmed_m : ndarray of float64, shape (n_samples, n_axes)
         Positions in m at the same times without acceleration limits.
     alphas : list of tuple
-        Of an exponential/sigmoid motion: segment, place, the alpha chosen, and the
-        intervals of alpha that hold the limits.
+        For an exponential/sigmoid motion: segment, place, the chosen alpha, and the intervals of
+        alpha within the limits.
     computing_s : float
-        Time that planning took, in s.
+        Planning time, in s.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def tracking_index(
     Parameters
     ----------
     trajectory : Trajectory
-        The motion; `programmed_m` is what it is compared with.
+        The motion, compared with its `programmed_m`.
     k_e : float
         Weight of the tracking error.
     k_a : float
@@ -112,12 +112,12 @@ def tracking_index(
     Returns
     -------
     (float, float)
-        The parts of tracking and of acceleration; their sum is J.
+        The tracking part and the acceleration part; their sum is J.
 
     Raises
     ------
     TrajectoryError
-        If a weight is below 0 or not finite.
+        If a weight is negative or not finite.
     TypeError
         If `trajectory` is not a `Trajectory`.
 

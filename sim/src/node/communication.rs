@@ -35,11 +35,11 @@ const LOAD: i64 = 0x6461_6F6C;
 pub enum Incoming {
     /// Nothing.
     Nothing,
-    /// An NMT command was carried out.
+    /// An NMT command was executed.
     Nmt(NmtCommand),
-    /// Objects were written: by SDO, or by an RPDO that takes effect at once.
+    /// Objects were written: by SDO, or by an RPDO with immediate effect.
     Written,
-    /// SYNC, while operational: time to sample, take over and send.
+    /// SYNC, while operational: time to sample, take over targets and send.
     Sync,
 }
 
@@ -48,13 +48,13 @@ pub enum Incoming {
 pub enum Silence {
     /// Nothing is overdue.
     None,
-    /// An RPDO missed its deadline.
+    /// An RPDO timed out.
     Command,
     /// The heartbeat of the controller stopped.
     Heartbeat,
 }
 
-/// Objects that the communication itself uses.
+/// Objects used by the communication itself.
 #[derive(Clone, Copy, Debug)]
 struct Slots {
     register: Slot,
@@ -78,18 +78,18 @@ pub struct Communication {
     sdo: SdoServer,
     slots: Slots,
     heartbeat_us: u64,
-    /// Since this node produced its last SYNC, if it produces any.
+    /// Time since this node's last SYNC, if it produces SYNC.
     sync_us: u64,
-    /// Since the controller's last heartbeat; `None` until the first.
+    /// Time since the controller's last heartbeat; `None` before the first.
     controller_us: Option<u64>,
     last_emergency: Option<u16>,
 }
 
 impl Communication {
-    /// A node that has not booted yet.
+    /// Creates a node that has not booted yet.
     ///
     /// # Errors
-    /// The code that a missing object of the communication profile has.
+    /// The abort code of a missing object of the communication profile.
     pub fn new(node: NodeId, entries: Vec<Entry>) -> Result<Self, AbortCode> {
         let dictionary = Dictionary::new(entries);
         let slot = |index, sub| dictionary.find(ObjectAddress::new(index, sub));
@@ -123,22 +123,22 @@ impl Communication {
         })
     }
 
-    /// The node.
+    /// Returns the node number.
     pub fn node(&self) -> NodeId {
         self.node
     }
 
-    /// The NMT state.
+    /// Returns the NMT state.
     pub fn nmt(&self) -> NmtState {
         self.nmt
     }
 
-    /// The objects.
+    /// Returns the objects.
     pub fn dictionary(&self) -> &Dictionary {
         &self.dictionary
     }
 
-    /// The objects, for the device to show its values in.
+    /// Returns the objects, for the device to store its values.
     pub fn dictionary_mut(&mut self) -> &mut Dictionary {
         &mut self.dictionary
     }
@@ -148,7 +148,7 @@ impl Communication {
         self.pdos.has_deadline()
     }
 
-    /// Takes the last emergency sent since this was last asked.
+    /// Takes the last emergency sent since the last call.
     pub fn take_emergency(&mut self) -> Option<u16> {
         self.last_emergency.take()
     }
@@ -158,14 +158,14 @@ impl Communication {
         frame.id() == cob_id::of(cob_id::SDO_REQUEST, self.node)
     }
 
-    /// Sends boot-up and becomes pre-operational.
+    /// Sends the boot-up message and becomes pre-operational.
     pub fn boot(&mut self, out: &mut dyn FnMut(Frame)) {
         out(Heartbeat { node: self.node, state: NmtState::BootUp }.encode());
         self.nmt = NmtState::PreOperational;
         self.heartbeat_us = 0;
     }
 
-    /// Takes a frame from the bus.
+    /// Handles a frame from the bus.
     pub fn receive(&mut self, frame: &Frame, out: &mut dyn FnMut(Frame)) -> Incoming {
         if let Some((command, node)) = NmtCommand::decode(frame) {
             if node.is_none_or(|node| node == self.node) {
@@ -201,17 +201,17 @@ impl Communication {
         }
     }
 
-    /// Takes over the RPDOs that arrived since the last SYNC.
+    /// Applies the RPDOs that arrived since the last SYNC.
     pub fn apply_latched(&mut self) {
         self.pdos.apply_latched(&mut self.dictionary);
     }
 
-    /// Sends the TPDOs that are due at this SYNC.
+    /// Sends the TPDOs due at this SYNC.
     pub fn transmit_at_sync(&mut self, out: &mut dyn FnMut(Frame)) {
         self.pdos.transmit_at_sync(&self.dictionary, out);
     }
 
-    /// Lets time pass: heartbeat, event-driven TPDOs, and what is overdue.
+    /// Advances time: heartbeat, event-driven TPDOs, and timeouts.
     pub fn advance(&mut self, elapsed_us: u64, out: &mut dyn FnMut(Frame)) -> Silence {
         if self.nmt == NmtState::BootUp {
             return Silence::None;
@@ -244,7 +244,7 @@ impl Communication {
         Silence::None
     }
 
-    /// Sends an emergency message, unless stopped, and enters it in the history.
+    /// Sends an emergency message, unless stopped, and adds it to the history.
     pub fn emergency(&mut self, code: u16, out: &mut dyn FnMut(Frame)) {
         let group = if code >> 8 == 0x81 || code >> 8 == 0x82 {
             REGISTER_COMMUNICATION
@@ -265,7 +265,7 @@ impl Communication {
         }
     }
 
-    /// Puts a code at the head of the history, 0x1003.
+    /// Adds a code at the head of the history, 0x1003.
     fn remember(&mut self, code: u16) {
         for at in (1..self.slots.history.len()).rev() {
             let older = self.dictionary.number(self.slots.history[at - 1]);
@@ -332,7 +332,7 @@ impl Communication {
         i64::from(frame.id()) == identifier && frame.payload().len() <= 1
     }
 
-    /// Counts time and tells whether this node is to produce a SYNC now.
+    /// Advances time and returns true if this node must produce a SYNC now.
     fn is_sync_due(&mut self, elapsed_us: u64) -> bool {
         let produces = self.dictionary.number(self.slots.sync) & SYNC_PRODUCER != 0;
         let period_us =
@@ -349,7 +349,7 @@ impl Communication {
         is_due
     }
 
-    /// The node and period of the heartbeat that is watched, 0x1016:01.
+    /// Returns node and period of the consumed heartbeat, 0x1016:01.
     fn watched(&self) -> Option<(NodeId, u64)> {
         let [low, high, node, _] =
             u32::try_from(self.dictionary.number(self.slots.consumer)).unwrap_or(0).to_le_bytes();
@@ -380,7 +380,7 @@ impl Communication {
     }
 }
 
-/// The dictionary as the SDO server sees it, with the rules of process-data parameters.
+/// The dictionary for the SDO server, with the rules of process-data parameters.
 struct DictionaryAccess<'a> {
     dictionary: &'a mut Dictionary,
     written: Option<ObjectAddress>,

@@ -1,4 +1,4 @@
-//! The object dictionary: what a node has, who may write it, and what it is worth now.
+//! The object dictionary: objects, access rights and current values.
 
 use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
 
@@ -7,7 +7,7 @@ use super::value::Value;
 /// Access to an object by SDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Read, and it never changes.
+    /// Readable and constant.
     Constant,
     /// Read.
     ReadOnly,
@@ -33,9 +33,9 @@ pub enum Mappable {
 pub enum Allowed {
     /// All of its type.
     Any,
-    /// From … to.
+    /// A range, both ends included.
     Range(i64, i64),
-    /// These.
+    /// A list.
     OneOf(&'static [i64]),
 }
 
@@ -60,7 +60,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// An object that may be read.
+    /// Creates a read-only object.
     pub fn read_only(index: u16, sub: u8, name: &'static str, value: Value) -> Self {
         Self {
             address: ObjectAddress::new(index, sub),
@@ -75,35 +75,35 @@ impl Entry {
         }
     }
 
-    /// An object that never changes.
+    /// Creates a constant object.
     pub fn constant(index: u16, sub: u8, name: &'static str, value: Value) -> Self {
         Self { access: Access::Constant, ..Self::read_only(index, sub, name, value) }
     }
 
-    /// An object that may be read and written.
+    /// Creates a readable and writable object.
     pub fn read_write(index: u16, sub: u8, name: &'static str, value: Value) -> Self {
         Self { access: Access::ReadWrite, ..Self::read_only(index, sub, name, value) }
     }
 
-    /// The same, in PDOs.
+    /// Sets the PDOs that may carry it.
     #[must_use]
     pub fn mappable(self, mappable: Mappable) -> Self {
         Self { mappable, ..self }
     }
 
-    /// The same, taking only some values.
+    /// Sets the allowed values.
     #[must_use]
     pub fn allowing(self, allowed: Allowed) -> Self {
         Self { allowed, ..self }
     }
 
-    /// The present value.
+    /// Returns the current value.
     pub fn value(&self) -> Value {
         self.value
     }
 }
 
-/// The place of an object in its dictionary, found once.
+/// Index of an object in its dictionary, looked up once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Slot(usize);
 
@@ -119,13 +119,13 @@ pub struct Dictionary {
 }
 
 impl Dictionary {
-    /// Puts the objects in order.
+    /// Sorts the objects.
     pub fn new(mut entries: Vec<Entry>) -> Self {
         entries.sort_by_key(|entry| entry.address);
         Self { entries }
     }
 
-    /// All objects, in order.
+    /// Returns all objects, in order.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
@@ -147,17 +147,17 @@ impl Dictionary {
         }
     }
 
-    /// The object at `slot`.
+    /// Returns the object at `slot`.
     pub fn entry(&self, slot: Slot) -> &Entry {
         &self.entries[slot.0]
     }
 
-    /// The value at `slot`, as a number.
+    /// Returns the value at `slot`, as a number.
     pub fn number(&self, slot: Slot) -> i64 {
         self.entries[slot.0].value.number()
     }
 
-    /// Sets a value from inside the node, to the nearest one of its type.
+    /// Sets a value from inside the node, saturated to its type.
     pub fn set(&mut self, slot: Slot, number: i64) {
         let entry = &mut self.entries[slot.0];
         entry.value = entry.value.with_number(number);
@@ -166,7 +166,7 @@ impl Dictionary {
     /// Checks that `bytes` may be written to `slot` by SDO and returns the value they encode.
     ///
     /// # Errors
-    /// The abort code with which the write must be refused.
+    /// The abort code of the refusal.
     pub fn check(&self, slot: Slot, bytes: &[u8]) -> Result<Value, AbortCode> {
         let entry = self.entry(slot);
         if entry.access != Access::ReadWrite {
@@ -184,7 +184,7 @@ impl Dictionary {
         entry.written = true;
     }
 
-    /// Stores bytes that came in a PDO; what the object does not admit changes nothing.
+    /// Stores bytes from a PDO; values that the object does not allow are ignored.
     pub fn store_from_pdo(&mut self, slot: Slot, bytes: &[u8]) {
         let entry = self.entry(slot);
         if let Ok(value) = entry.value.decode_like(bytes)
@@ -194,12 +194,12 @@ impl Dictionary {
         }
     }
 
-    /// Tells whether the object was written since this was last asked, equal value or not.
+    /// Returns true if the object was written since the last call, even with an equal value.
     pub fn take_written(&mut self, slot: Slot) -> bool {
         std::mem::take(&mut self.entries[slot.0].written)
     }
 
-    /// Makes what users have written the values at power-on, as in a memory that keeps them.
+    /// Makes the written values the power-on values, as in non-volatile memory.
     pub fn save(&mut self) {
         for entry in &mut self.entries {
             if entry.access == Access::ReadWrite {
@@ -208,14 +208,14 @@ impl Dictionary {
         }
     }
 
-    /// Forgets what was saved; it shows at the next reset.
+    /// Restores the factory values, from the next reset on.
     pub fn restore_factory(&mut self) {
         for entry in &mut self.entries {
             entry.power_on = entry.factory;
         }
     }
 
-    /// Gives the objects from `first` to `last` their power-on values.
+    /// Resets the objects from `first` to `last` to their power-on values.
     pub fn reset(&mut self, first: u16, last: u16) {
         for entry in &mut self.entries {
             if (first..=last).contains(&entry.address.index) {

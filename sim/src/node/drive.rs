@@ -18,13 +18,13 @@ const HALT: u16 = 1 << 8;
 /// Parameters set by the maker of the drive and the integrator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveParameters {
-    /// Counts in one metre.
+    /// Counts per metre.
     pub counts_per_m: f64,
     /// Lowest position.
     pub position_min_m: f64,
     /// Highest position.
     pub position_max_m: f64,
-    /// Highest speed.
+    /// Velocity limit.
     pub velocity_max_m_s: f64,
     /// Deceleration of quick stop and fault reaction.
     pub deceleration_m_s2: f64,
@@ -53,22 +53,22 @@ pub struct DriveNode {
     pub(super) communication: Communication,
     pub(super) slots: DriveSlots,
     pub(super) parameters: DriveParameters,
-    /// As the dictionary has them; read again when it is written.
+    /// Cached from the dictionary; read again when it is written.
     pub(super) units: Units,
     pub(super) machine: StateMachine,
     pub(super) motion: Motion,
     pub(super) measured: Measured,
     pub(super) is_halted: bool,
-    /// Since the following error left its window.
+    /// Time since the following error left its window.
     pub(super) astray_us: u64,
     pub(super) has_following_error: bool,
 }
 
 impl DriveNode {
-    /// A drive that is powered but has not booted.
+    /// Creates a drive that is powered but has not booted.
     ///
     /// # Errors
-    /// The abort code of an object that is missing from the drive's own table.
+    /// The abort code of an object missing from the drive's own table.
     pub fn new(node: NodeId, parameters: DriveParameters) -> Result<Self, AbortCode> {
         let communication = Communication::new(node, drive_objects::all(node, &parameters))?;
         let slots = DriveSlots::find(communication.dictionary())?;
@@ -87,37 +87,37 @@ impl DriveNode {
         })
     }
 
-    /// The node.
+    /// Returns the node number.
     pub fn node(&self) -> NodeId {
         self.communication.node()
     }
 
-    /// The state of the drive.
+    /// Returns the state of the drive.
     pub fn state(&self) -> State {
         self.machine.state()
     }
 
-    /// The NMT state.
+    /// Returns the NMT state.
     pub fn nmt(&self) -> NmtState {
         self.communication.nmt()
     }
 
-    /// The objects.
+    /// Returns the objects.
     pub fn dictionary(&self) -> &Dictionary {
         self.communication.dictionary()
     }
 
-    /// Share of its force that the motor may use, 0 to 1.
+    /// Returns the motor's force limit as a share, 0 to 1.
     pub fn force_share(&self) -> f64 {
         self.units.force_share()
     }
 
-    /// Takes the last emergency sent since this was last asked.
+    /// Takes the last emergency sent since the last call.
     pub fn take_emergency(&mut self) -> Option<u16> {
         self.communication.take_emergency()
     }
 
-    /// Tells the drive what it measures from now on.
+    /// Sets the measurements from now on.
     pub fn measure(&mut self, measured: Measured) {
         self.measured = measured;
     }
@@ -128,7 +128,7 @@ impl DriveNode {
         self.communication.boot(out);
     }
 
-    /// Takes a frame from the bus.
+    /// Handles a frame from the bus.
     pub fn receive(&mut self, frame: &Frame, out: &mut dyn FnMut(Frame)) {
         if self.communication.is_question(frame) {
             self.show();
@@ -145,7 +145,7 @@ impl DriveNode {
                 self.heed_controlword(out);
             }
             Incoming::Sync => {
-                // In this order: sample, take over, send. What is sent is what was measured at SYNC.
+                // In this order: sample, take over, send. The values sent were measured at SYNC.
                 self.communication.apply_latched();
                 self.show_mode();
                 self.heed_controlword(out);
@@ -156,7 +156,7 @@ impl DriveNode {
         }
     }
 
-    /// Advances by one step of the drive's own loop and returns what it demands of its axis.
+    /// Advances by one step of the drive's own loop and returns the demand for its axis.
     pub fn step(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) -> Demand {
         self.show_statusword();
         match self.communication.advance(step_us.into(), out) {
@@ -193,7 +193,7 @@ impl DriveNode {
         }
     }
 
-    /// Does what 0x6007 says when the controller is gone while the drive has power over the axis.
+    /// Executes option 0x6007 when the controller is lost while the drive is energised.
     fn on_connection_loss(&mut self, code: u16, announce: Option<&mut dyn FnMut(Frame)>) {
         if !matches!(self.state(), State::OperationEnabled | State::QuickStopActive) {
             return;
@@ -226,7 +226,7 @@ impl DriveNode {
         self.heed_halt(controlword & HALT != 0);
     }
 
-    /// Runs the state machine and starts what its new state means for the motion.
+    /// Runs the state machine and starts the motion of the new state.
     fn command(&mut self, controlword: u16) {
         let before = self.state();
         let after = self.machine.command(controlword);
@@ -235,7 +235,7 @@ impl DriveNode {
         }
         match after {
             State::OperationEnabled => {
-                // A target from before must not move the axis: it counts from the next SYNC on.
+                // An earlier target must not move the axis: it counts from the next SYNC on.
                 self.forget_targets();
                 self.motion.hold(self.measured.position_m);
                 self.is_halted = false;
@@ -293,7 +293,7 @@ impl DriveNode {
         self.motion.ramp_down(self.measured.velocity_m_s, self.units.quick_deceleration_m_s2());
     }
 
-    /// Ends what a ramp was for.
+    /// Executes the transition after a ramp.
     fn end_ramp(&mut self) {
         if self.motion.is_ramping() {
             return;
@@ -315,7 +315,7 @@ impl DriveNode {
         }
     }
 
-    /// Enters the fault reaction. A drive without power over its axis only reports a lost command.
+    /// Enters the fault reaction. A drive that is not energised only reports a lost command.
     pub(super) fn fault(&mut self, code: u16) {
         if !matches!(self.state(), State::OperationEnabled | State::QuickStopActive) {
             return;
@@ -346,7 +346,7 @@ impl DriveNode {
         self.communication.dictionary_mut().set(slot, number);
     }
 
-    /// Shows what the drive measures and demands.
+    /// Stores measurements and demands in the dictionary.
     fn show(&mut self) {
         let units = &self.units;
         let Measured { position_m, velocity_m_s, force_n } = self.measured;

@@ -1,4 +1,4 @@
-//! The objects of a simulated drive, 0x6000 and above, and their places.
+//! The objects of a simulated drive, 0x6000 and above, and their slots.
 
 use ilc_rt::fieldbus::canopen::pdo::{MappedObject, PdoNumber, TYPE_EVERY_SYNC};
 use ilc_rt::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
@@ -13,24 +13,23 @@ use super::value::Value;
 pub const DEVICE_TYPE: u32 = 0x0002_0192;
 /// Event-driven transmission.
 const TYPE_EVENT: u8 = 255;
-/// Some masters take a TPDO that came twice for periodic, and then miss it on a quiet drive.
+/// Some masters treat a TPDO that arrived twice as periodic, and then miss it on a quiet drive.
 const DISPLAY_EVENT_MS: u16 = 100;
 
 /// Rated torque, and rated current, in thousandths.
 const RATED: u16 = 1000;
 /// Positions in counts of the encoder.
 pub(super) const UNIT_COUNTS: u32 = 0x00B5_0000;
-/// Velocities in counts of the encoder a second.
+/// Velocities in counts of the encoder per second.
 const UNIT_COUNTS_PER_S: u32 = 0x00B5_0300;
 /// Counts; metres with a prefix of 1, milli, micro and nano.
 const POSITION_UNITS: [i64; 5] = [0x00B5_0000, 0x0001_0000, 0xFD01_0000, 0xFA01_0000, 0xF701_0000];
-/// The same, a second.
+/// The same, per second.
 const VELOCITY_UNITS: [i64; 5] = [0x00B5_0300, 0x0001_0300, 0xFD01_0300, 0xFA01_0300, 0xF701_0300];
 
 /// Returns all objects of a drive.
 ///
-/// 0x6502 names the modes that are simulated and no others; option codes admit
-/// what is simulated.
+/// 0x6502 lists the simulated modes only; option codes allow the simulated reactions only.
 pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
     let mode_map = [mapped(objects::MODE_OF_OPERATION, 8)];
     let display_map = [mapped(objects::MODE_DISPLAY, 8), mapped(objects::ERROR_CODE, 16)];
@@ -58,23 +57,23 @@ const fn mapped(index: u16, bits: u8) -> MappedObject {
     MappedObject { address: ObjectAddress::new(index, 0), bits }
 }
 
-/// An object of this profile, by the name that the profile gives it.
+/// Creates an object of this profile, with the profile's name.
 fn object(index: u16, value: Value) -> Entry {
     Entry::read_only(index, 0, objects::name(index).unwrap_or("Object"), value)
 }
 
-/// An object that the controller writes, also in RPDOs.
+/// Creates an object that the controller writes, also by RPDO.
 fn input(index: u16, value: Value) -> Entry {
     let name = objects::name(index).unwrap_or("Object");
     Entry::read_write(index, 0, name, value).mappable(Mappable::Both)
 }
 
-/// An object that the drive shows, also in TPDOs.
+/// Creates an object that the drive provides, also by TPDO.
 fn output(index: u16, value: Value) -> Entry {
     object(index, value).mappable(Mappable::Transmit)
 }
 
-/// An object that is set up once.
+/// Creates an object that is configured once.
 fn setting(index: u16, sub: u8, value: Value) -> Entry {
     Entry::read_write(index, sub, objects::name(index).unwrap_or("Object"), value)
 }
@@ -82,7 +81,7 @@ fn setting(index: u16, sub: u8, value: Value) -> Entry {
 fn words_and_options() -> Vec<Entry> {
     let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.supported_bit());
     vec![
-        // 0: nothing, 1: fault, 2: disable voltage, 3: quick stop.
+        // 0: no action, 1: fault, 2: disable voltage, 3: quick stop.
         setting(objects::CONNECTION_LOSS_OPTION, 0, Value::I16(1)).allowing(Allowed::Range(0, 3)),
         output(objects::ERROR_CODE, Value::U16(0)),
         input(objects::CONTROLWORD, Value::U16(0)),
@@ -186,7 +185,7 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
     entries
 }
 
-/// The whole number nearest to a count, as wide as any object needs.
+/// Returns the integer nearest to a count, as wide as any object needs.
 #[expect(clippy::cast_possible_truncation, reason = "saturates; no count is NaN")]
 pub(super) fn rounded(counts: f64) -> i64 {
     counts.round() as i64
@@ -194,7 +193,7 @@ pub(super) fn rounded(counts: f64) -> i64 {
 
 macro_rules! slots {
     ($($name:ident = $index:expr, $sub:literal;)*) => {
-        /// The places of the objects that the drive uses, found once.
+        /// The slots of the objects that the drive uses, looked up once.
         #[derive(Clone, Copy, Debug)]
         pub(super) struct DriveSlots {
             $(pub(super) $name: Slot,)*

@@ -24,10 +24,10 @@ pub struct EncoderNode {
 }
 
 impl EncoderNode {
-    /// An encoder that is powered but has not booted.
+    /// Creates an encoder that is powered but has not booted.
     ///
     /// # Errors
-    /// The abort code of an object that is missing from the encoder's own table.
+    /// The abort code of an object missing from the encoder's own table.
     pub fn new(node: NodeId, counts_per_m: f64) -> Result<Self, AbortCode> {
         let index = objects::ENCODER_POSITIONS;
         let mut entries =
@@ -51,37 +51,37 @@ impl EncoderNode {
         Ok(Self { communication, positions, counts_per_m, measured_m: [0.0; 2] })
     }
 
-    /// The node.
+    /// Returns the node number.
     pub fn node(&self) -> NodeId {
         self.communication.node()
     }
 
-    /// The NMT state.
+    /// Returns the NMT state.
     pub fn nmt(&self) -> NmtState {
         self.communication.nmt()
     }
 
-    /// The objects.
+    /// Returns the objects.
     pub fn dictionary(&self) -> &Dictionary {
         self.communication.dictionary()
     }
 
-    /// Takes the last emergency sent since this was last asked.
+    /// Takes the last emergency sent since the last call.
     pub fn take_emergency(&mut self) -> Option<u16> {
         self.communication.take_emergency()
     }
 
-    /// Tells the encoder where the tool is from now on.
+    /// Sets the position of the tool from now on.
     pub fn measure(&mut self, measured_m: [f64; 2]) {
         self.measured_m = measured_m;
     }
 
-    /// Sends boot-up and becomes pre-operational.
+    /// Sends the boot-up message and becomes pre-operational.
     pub fn boot(&mut self, out: &mut dyn FnMut(Frame)) {
         self.communication.boot(out);
     }
 
-    /// Takes a frame from the bus.
+    /// Handles a frame from the bus.
     pub fn receive(&mut self, frame: &Frame, out: &mut dyn FnMut(Frame)) {
         if self.communication.is_question(frame) {
             self.show();
@@ -92,7 +92,7 @@ impl EncoderNode {
         }
     }
 
-    /// Lets time pass.
+    /// Advances time.
     pub fn step(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) {
         self.communication.advance(step_us.into(), out);
     }

@@ -1,7 +1,8 @@
 //! Simulated CANopen nodes: dictionary, SDO server, NMT slave, process data, and the CiA 402 drive.
 //!
-//! Nodes talk frames on one side and demands and measurements on the other; they know no plant and no
-//! clock, and after they are built they allocate nothing. Imported by `machine` and `eds`.
+//! Nodes exchange frames on one side and demands and measurements on the other; they are
+//! independent of plant and clock, and do not allocate after creation. Imported by `machine` and
+//! `eds`.
 //!
 //! Family: `drive`, `drive_objects` and `units`: the dictionary of a drive holds its parameters.
 

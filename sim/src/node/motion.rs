@@ -2,23 +2,23 @@
 
 use crate::plant::Demand;
 
-/// A ramp counts as over this long after its demand is zero, even if the axis still creeps.
+/// Time after which a ramp counts as over once its demand is zero, even if the axis still creeps.
 const SETTLE_MAX_S: f64 = 0.2;
-/// Share of the highest velocity below which an axis stands still.
+/// Share of the velocity limit below which an axis counts as at rest.
 const STANDSTILL: f64 = 1e-3;
 
-/// Limits that hold for every move, in SI units.
+/// Limits of every motion, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionLimits {
     /// Lowest position.
     pub position_min_m: f64,
     /// Highest position.
     pub position_max_m: f64,
-    /// Highest speed.
+    /// Velocity limit.
     pub velocity_max_m_s: f64,
-    /// Highest acceleration of a demand.
+    /// Acceleration limit of a demand.
     pub acceleration_max_m_s2: f64,
-    /// Highest deceleration of a demand.
+    /// Deceleration limit of a demand.
     pub deceleration_max_m_s2: f64,
 }
 
@@ -51,10 +51,10 @@ enum Phase {
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     phase: Phase,
-    /// Position given to the controller: the interpolated one, rate-limited and inside the limits.
+    /// Position passed to the controller: interpolated, rate-limited and within the limits.
     limited_m: f64,
     last_delta_m: f64,
-    /// Speed of the demand in the last step.
+    /// Velocity of the demand in the last step.
     rate_m_s: f64,
     is_limited: bool,
 }
@@ -72,7 +72,7 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// Takes the power off.
+    /// Disables the drive.
     pub fn off(&mut self) {
         *self = Self::default();
     }
@@ -86,13 +86,13 @@ impl Motion {
         self.is_limited = false;
     }
 
-    /// Brakes from the velocity the axis has.
+    /// Brakes from the current velocity of the axis.
     pub fn ramp_down(&mut self, velocity_m_s: f64, deceleration_m_s2: f64) {
         self.phase = Phase::Ramp { velocity_m_s, deceleration_m_s2, settling_s: 0.0 };
         self.is_limited = false;
     }
 
-    /// Takes over a position that is to be reached after `period_s`.
+    /// Sets a position target to be reached after `period_s`.
     pub fn position_target(&mut self, target_m: f64, period_s: f64) {
         let start_m = match self.phase {
             Phase::Position { .. } | Phase::Hold { .. } => {
@@ -104,7 +104,7 @@ impl Motion {
         self.phase = Phase::Position { start_m, end_m: target_m, elapsed_s: 0.0, period_s };
     }
 
-    /// Goes on for one more period as in the last one, then stays: a single target was lost.
+    /// Extrapolates for one more period, then holds: a single target was lost.
     pub fn extrapolate_once(&mut self, period_s: f64) {
         let Phase::Position { end_m, .. } = self.phase else { return };
         self.phase = Phase::Position {
@@ -116,19 +116,20 @@ impl Motion {
         self.last_delta_m = 0.0;
     }
 
-    /// Takes over a velocity.
+    /// Sets a velocity target.
     pub fn velocity_target(&mut self, velocity_m_s: f64) {
         if matches!(self.phase, Phase::Velocity { .. } | Phase::Hold { .. }) {
             self.phase = Phase::Velocity { velocity_m_s };
         }
     }
 
-    /// The interpolated position before limits; `None` if the drive does not control position.
+    /// Returns the interpolated position before limits; `None` if the drive does not control
+    /// position.
     pub fn demand_m(&self) -> Option<f64> {
         match self.phase {
             Phase::Position { start_m, end_m, elapsed_s, period_s } => {
                 let share = if period_s > 0.0 { (elapsed_s / period_s).min(1.0) } else { 1.0 };
-                // The end is taken as it is, so that it is met to the last bit.
+                // The end value itself, so that it is reached to the last bit.
                 Some(if share < 1.0 { start_m + (end_m - start_m) * share } else { end_m })
             }
             Phase::Hold { position_m } => Some(position_m),
@@ -136,7 +137,7 @@ impl Motion {
         }
     }
 
-    /// The velocity demand, where there is one.
+    /// Returns the velocity demand, 0 if there is none.
     pub fn demand_m_s(&self) -> f64 {
         match self.phase {
             Phase::Velocity { velocity_m_s } | Phase::Ramp { velocity_m_s, .. } => velocity_m_s,
@@ -147,7 +148,7 @@ impl Motion {
         }
     }
 
-    /// Returns whether a limit of the drive changed the demand.
+    /// Returns true if a limit of the drive changed the demand.
     pub fn is_limited(&self) -> bool {
         self.is_limited
     }
@@ -163,7 +164,7 @@ impl Motion {
     }
 
     /// Advances by one step of the drive's own loop and returns the demand for it. A ramp that has
-    /// come to standstill turns into a hold at the position where it did.
+    /// come to standstill becomes a hold at that position.
     pub fn step(
         &mut self,
         limits: &MotionLimits,
@@ -218,13 +219,13 @@ impl Motion {
         Demand::Velocity { velocity_m_s }
     }
 
-    /// The speed nearest to `wanted_m_s` that the acceleration limits let the demand have now.
+    /// Returns the velocity nearest to `wanted_m_s` within the acceleration limits.
     fn reachable_m_s(&self, wanted_m_s: f64, limits: &MotionLimits, dt_s: f64) -> f64 {
         let speeds_up = wanted_m_s.abs() > self.rate_m_s.abs();
         let max_m_s2 =
             if speeds_up { limits.acceleration_max_m_s2 } else { limits.deceleration_max_m_s2 };
         let change_m_s = max_m_s2 * dt_s;
-        // Compared first: what is within the limits must come out to the last bit.
+        // Compared first: a demand within the limits must pass to the last bit.
         if (wanted_m_s - self.rate_m_s).abs() <= change_m_s {
             wanted_m_s
         } else {
@@ -242,7 +243,7 @@ impl Motion {
         let inside_m = if matches!(self.phase, Phase::Hold { .. }) {
             wanted_m
         } else {
-            // An axis that stands outside the limits stays there until it is commanded back.
+            // An axis outside the limits stays there until it is commanded back.
             let (low_m, high_m) = (
                 limits.position_min_m.min(self.limited_m),
                 limits.position_max_m.max(self.limited_m),
@@ -329,7 +330,7 @@ mod tests {
             motion.step(&LIMITS, 0.3, 0.0, 0.0, 0.001);
             n_steps += 1;
         }
-        // One more where rounding leaves a remainder.
+        // One more if rounding leaves a remainder.
         assert!((10..=11).contains(&n_steps), "{n_steps}");
         assert_eq!(motion.demand_m(), Some(0.3));
     }

@@ -1,4 +1,4 @@
-//! Process data in motion: latches RPDOs until SYNC, sends TPDOs at SYNC or on change.
+//! PDO exchange: latches RPDOs until SYNC, sends TPDOs at SYNC or on change.
 
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::ObjectAddress;
@@ -11,10 +11,10 @@ use super::standard_objects::MAPPED_MAX;
 /// Highest synchronous transmission type.
 const SYNCHRONOUS_MAX: u8 = 240;
 
-/// A PDO as its parameters define it, resolved so that an exchange is a few copies.
+/// A PDO as defined by its parameters, resolved so that an exchange is a few copies.
 #[derive(Clone, Copy, Debug)]
 struct Pdo {
-    /// `None`: invalid.
+    /// `None`: disabled.
     cob_id: Option<u16>,
     transmission: u8,
     event_ms: u32,
@@ -25,7 +25,7 @@ struct Pdo {
     latched: Option<Frame>,
     last_sent: Option<Frame>,
     n_syncs: u8,
-    /// Since the last reception or transmission; `None` while the timer is not armed.
+    /// Time since the last reception or transmission; `None` while the timer is not armed.
     since_us: Option<u64>,
 }
 
@@ -106,11 +106,11 @@ impl Pdo {
 /// Meaning of a frame to the process data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
-    /// No PDO of this node.
+    /// Not a PDO of this node.
     Foreign,
     /// Kept until the next SYNC.
     Latched,
-    /// Taken over at once.
+    /// Applied at once.
     Applied,
     /// Shorter than its mapping: discarded.
     TooShort,
@@ -135,10 +135,10 @@ impl PdoEngine {
         engine
     }
 
-    /// Takes a frame that may be an RPDO.
+    /// Handles a frame that may be an RPDO.
     pub fn receive(&mut self, frame: &Frame, dictionary: &mut Dictionary) -> Received {
         let mut received = Received::Foreign;
-        // More than one PDO may listen to an identifier; each of them takes the frame.
+        // More than one PDO may have the same identifier; each of them takes the frame.
         for pdo in self.receive.iter_mut().filter(|pdo| pdo.cob_id == Some(frame.id())) {
             received = if frame.payload().len() < pdo.n_bytes {
                 Received::TooShort
@@ -156,7 +156,7 @@ impl PdoEngine {
         received
     }
 
-    /// Takes over the RPDOs that arrived since the last SYNC.
+    /// Applies the RPDOs that arrived since the last SYNC.
     pub fn apply_latched(&mut self, dictionary: &mut Dictionary) {
         for pdo in &mut self.receive {
             if let Some(frame) = pdo.latched.take() {
@@ -165,7 +165,7 @@ impl PdoEngine {
         }
     }
 
-    /// Sends the TPDOs that are due at this SYNC.
+    /// Sends the TPDOs due at this SYNC.
     pub fn transmit_at_sync(&mut self, dictionary: &Dictionary, out: &mut dyn FnMut(Frame)) {
         for pdo in &mut self.transmit {
             let Some(cob_id) = pdo.cob_id else { continue };
@@ -188,7 +188,7 @@ impl PdoEngine {
         }
     }
 
-    /// Sends the event-driven TPDOs that changed or whose timer ran out.
+    /// Sends the event-driven TPDOs that changed or whose timer expired.
     pub fn transmit_events(
         &mut self,
         elapsed_us: u64,

@@ -19,13 +19,13 @@ pub fn pdo_at(index: u16) -> Option<PdoNumber> {
     }
 }
 
-/// Checks a write of `number` to a process-data parameter; all others pass.
+/// Checks a write of `number` to a process-data parameter; all other objects pass.
 ///
-/// A mapping is written while the PDO is invalid and its number of objects is zero; the number that
-/// ends it is where the whole mapping is checked.
+/// A mapping is written while the PDO is disabled and its number of objects is zero; writing the
+/// final number checks the whole mapping.
 ///
 /// # Errors
-/// The abort code with which the write must be refused.
+/// The abort code of the refusal.
 pub fn check(
     dictionary: &Dictionary,
     address: ObjectAddress,
@@ -58,7 +58,7 @@ pub fn is_valid(dictionary: &Dictionary, pdo: PdoNumber) -> bool {
     parameter(dictionary, ObjectAddress::new(pdo.communication_index(), 1)) & COB_INVALID == 0
 }
 
-/// The present value of a parameter; 0 if the node has none.
+/// Returns the current value of a parameter; 0 if it does not exist.
 pub fn parameter(dictionary: &Dictionary, address: ObjectAddress) -> u32 {
     let number = dictionary.find(address).map_or(0, |slot| dictionary.number(slot));
     u32::try_from(number).unwrap_or(0)
@@ -66,7 +66,8 @@ pub fn parameter(dictionary: &Dictionary, address: ObjectAddress) -> u32 {
 
 fn check_cob_id(present: u32, wanted: u32) -> Result<(), AbortCode> {
     let identifier = wanted & !(COB_INVALID | COB_NO_RTR);
-    // Bit 29 asks for 29-bit identifiers; the others are kept for NMT, SYNC, EMCY, SDO and heartbeat.
+    // Bit 29 requests 29-bit identifiers; the others are reserved for NMT, SYNC, EMCY, SDO and
+    // heartbeat.
     let reserved = matches!(
         identifier,
         0..=0x17F | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..=0x77F | 0x780..

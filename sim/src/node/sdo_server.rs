@@ -1,4 +1,4 @@
-//! SDO server: answers every request, with an abort if need be.
+//! SDO server: answers every request, if necessary with an abort.
 
 use ilc_rt::fieldbus::canopen::AbortCode;
 use ilc_rt::fieldbus::canopen::sdo::{
@@ -12,17 +12,17 @@ pub trait Objects {
     /// Reads an object.
     ///
     /// # Errors
-    /// The abort code to answer with.
+    /// The abort code of the answer.
     fn read(&self, address: ObjectAddress) -> Result<Value, AbortCode>;
 
     /// Writes an object.
     ///
     /// # Errors
-    /// The abort code to answer with.
+    /// The abort code of the answer.
     fn write(&mut self, address: ObjectAddress, bytes: &[u8]) -> Result<(), AbortCode>;
 }
 
-/// The transfer that is under way.
+/// The transfer in progress.
 #[derive(Clone, Copy, Debug)]
 enum Transfer {
     None,
@@ -54,7 +54,7 @@ impl Default for SdoServer {
 }
 
 impl SdoServer {
-    /// Takes one request and returns the answer; an abort from the client has none.
+    /// Handles one request and returns the answer; an abort from the client has none.
     pub fn answer(&mut self, payload: &[u8], objects: &mut dyn Objects) -> Option<SdoResponse> {
         let Some(request) = SdoRequest::decode(payload) else {
             self.transfer = Transfer::None;
@@ -185,7 +185,7 @@ fn write_expedited(
     Ok(SdoResponse::Download(Turn::Initiate(address)))
 }
 
-/// The object that a request which cannot be decoded seems to speak of.
+/// Returns the object that a malformed request seems to name.
 fn address_of(payload: &[u8]) -> ObjectAddress {
     match payload {
         &[_, low, high, sub, ..] => ObjectAddress::new(u16::from_le_bytes([low, high]), sub),

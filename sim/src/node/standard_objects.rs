@@ -1,4 +1,4 @@
-//! The objects that every simulated node has: communication profile and process-data parameters.
+//! Objects of every simulated node: communication profile and process-data parameters.
 
 use ilc_rt::fieldbus::canopen::NodeId;
 use ilc_rt::fieldbus::canopen::pdo::{COB_INVALID, COB_NO_RTR, Direction, MappedObject, PdoNumber};
@@ -7,12 +7,12 @@ use ilc_rt::fieldbus::cia402::objects;
 use super::dictionary::{Allowed, Entry};
 use super::value::{Text, Value};
 
-/// Objects that one PDO can carry.
+/// Largest number of objects in a PDO.
 pub const MAPPED_MAX: u8 = 8;
 /// Entries of the error history, 0x1003.
 pub const HISTORY_MAX: u8 = 8;
 
-/// The power-on setting of a PDO.
+/// The power-on configuration of a PDO.
 #[derive(Clone, Copy, Debug)]
 pub struct PdoDefault<'a> {
     /// The PDO.
@@ -91,7 +91,7 @@ pub fn communication(
     entries
 }
 
-/// A text that users may write: the place to name a drive, and to try a segmented download on.
+/// A writable text: a name for the drive, and a test of segmented downloads.
 pub const LABEL: u16 = 0x2000;
 
 /// Returns the communication and mapping parameters of the four PDOs of each direction.

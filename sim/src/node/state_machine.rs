@@ -43,7 +43,7 @@ impl Request {
     }
 }
 
-/// State and edge memory of a drive.
+/// State of a drive, with the memory of the reset's edge.
 #[derive(Clone, Copy, Debug)]
 pub struct StateMachine {
     state: State,
@@ -58,22 +58,22 @@ impl Default for StateMachine {
 }
 
 impl StateMachine {
-    /// The state.
+    /// Returns the state.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// Transitions 0 and 1: the drive has tested itself.
+    /// Transitions 0 and 1: the self-test is done.
     pub fn initialised(&mut self) {
         if self.state == State::NotReadyToSwitchOn {
             self.state = State::SwitchOnDisabled;
         }
     }
 
-    /// Evaluates a controlword, also one equal to the last: masters repeat.
+    /// Evaluates a controlword, even if equal to the last: masters repeat it.
     ///
-    /// One transition per evaluation, except that "enable operation" takes both steps (3 and 4) from
-    /// ready to switch on. Bit 7 counts on its rising edge and in [`State::Fault`] only.
+    /// One transition per evaluation, except that "enable operation" takes both steps (3 and 4)
+    /// from ready to switch on. Bit 7 counts on its rising edge and in [`State::Fault`] only.
     pub fn command(&mut self, controlword: u16) -> State {
         let rises = controlword & FAULT_RESET & !self.previous != 0;
         self.previous = controlword;
@@ -81,7 +81,7 @@ impl StateMachine {
         self.state
     }
 
-    /// Transition 13, and 14 at once where nothing moves: the drive has a fault.
+    /// Transition 13, followed by 14 if nothing moves: the drive has a fault.
     pub fn fault(&mut self) {
         self.state = match self.state {
             State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive => {
@@ -102,7 +102,7 @@ impl StateMachine {
         }
     }
 
-    /// Transition 12 by itself: a quick stop that does not hold is over.
+    /// Automatic transition 12: a quick stop that does not hold is over.
     pub fn quick_stop_done(&mut self) {
         if self.state == State::QuickStopActive {
             self.state = State::SwitchOnDisabled;
@@ -141,8 +141,8 @@ fn next(state: State, request: Request, reset_rises: bool) -> State {
 mod tests {
     use super::*;
 
-    /// For each state, the state that follows each of: disable voltage, quick stop, shutdown, switch
-    /// on, enable operation, rising fault reset.
+    /// For each state, the state that follows each of: disable voltage, quick stop, shutdown,
+    /// switch on, enable operation, rising fault reset.
     #[test]
     fn every_transition_is_the_profiles() {
         use State::{

@@ -1,4 +1,4 @@
-//! Targets of a simulated drive: taken over at SYNC as its mode says, and watched.
+//! Targets of a simulated drive: applied at SYNC according to its mode, and monitored.
 
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::emcy;
@@ -7,7 +7,7 @@ use ilc_rt::fieldbus::cia402::{Mode, State};
 use super::drive::DriveNode;
 use super::drive_objects::rounded;
 
-/// The following-error monitor is off at this window.
+/// Value of the window that disables the following-error monitor.
 const WINDOW_OFF: i64 = 0xFFFF_FFFF;
 
 impl DriveNode {
@@ -17,7 +17,7 @@ impl DriveNode {
         dictionary.take_written(self.slots.target_velocity);
     }
 
-    /// Takes over the target of the active mode at SYNC.
+    /// Applies the target of the active mode at SYNC.
     pub(super) fn take_target(&mut self) {
         if self.state() != State::OperationEnabled || self.is_halted {
             self.forget_targets();
@@ -39,7 +39,7 @@ impl DriveNode {
                 self.number(self.slots.target_position) + self.number(self.slots.position_offset);
             self.motion.position_target(self.units.place_m(counts), self.period_s());
         } else if self.communication.has_deadline() {
-            // Without a promised deadline a target is there to stay, as when it is set by SDO.
+            // Without a timeout a target persists, e.g. when it is set by SDO.
             self.motion.extrapolate_once(self.period_s());
         }
     }
@@ -52,7 +52,7 @@ impl DriveNode {
         }
     }
 
-    /// Shows the mode that is active; a change under power begins with a hold.
+    /// Reports the active mode; a change while enabled begins with a hold.
     pub(super) fn show_mode(&mut self) {
         let dictionary = self.communication.dictionary_mut();
         if !dictionary.take_written(self.slots.mode) {
@@ -84,7 +84,7 @@ impl DriveNode {
         }
     }
 
-    /// Demand before limits minus actual position; 0 where position is not controlled.
+    /// Returns the demand before limits minus the actual position; 0 if position is not controlled.
     pub(super) fn following_error_counts(&self) -> f64 {
         let demand_m = self.motion.demand_m().unwrap_or(self.measured.position_m);
         self.units.distance(demand_m - self.measured.position_m)

@@ -4,14 +4,14 @@ use super::dictionary::{Dictionary, Slot};
 use super::drive_objects::{DriveSlots, UNIT_COUNTS, rounded};
 use super::motion::MotionLimits;
 
-/// Bit 7 of the polarity: positions count backwards.
+/// Bit 7 of the polarity: positions are inverted.
 const REVERSED_POSITION: i64 = 0x80;
-/// Bit 6 of the polarity: velocities count backwards.
+/// Bit 6 of the polarity: velocities are inverted.
 const REVERSED_VELOCITY: i64 = 0x40;
-/// A limit of 32 bits that is as high as it goes limits nothing.
+/// A 32-bit limit at its maximum is no limit.
 const NO_LIMIT: i64 = 0xFFFF_FFFF;
 
-/// The conversion between SI units and a drive's objects, read from its dictionary once for all.
+/// The conversion between SI units and a drive's objects, cached from its dictionary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
     position_per_m: f64,
@@ -26,7 +26,7 @@ pub struct Units {
 }
 
 impl Units {
-    /// Reads the conversion, and all that is converted by it and seldom changes.
+    /// Reads the conversion, and all rarely changing values that it converts.
     pub(super) fn read(dictionary: &Dictionary, slots: &DriveSlots, counts_per_m: f64) -> Self {
         let number = |slot: Slot| dictionary.number(slot);
         let ratio = |over: Slot, under: Slot| number(over) as f64 / number(under).max(1) as f64;
@@ -85,27 +85,27 @@ impl Units {
         }
     }
 
-    /// Limits of every move.
+    /// Returns the limits of every motion.
     pub(super) fn limits(&self) -> &MotionLimits {
         &self.limits
     }
 
-    /// Deceleration of the quick-stop ramp.
+    /// Returns the deceleration of the quick-stop ramp.
     pub(super) fn quick_deceleration_m_s2(&self) -> f64 {
         self.quick_deceleration_m_s2
     }
 
-    /// Deceleration of the slow-down ramp.
+    /// Returns the deceleration of the slow-down ramp.
     pub(super) fn slow_deceleration_m_s2(&self) -> f64 {
         self.slow_deceleration_m_s2
     }
 
-    /// Share of its force that the motor may use, 0 to 1.
+    /// Returns the motor's force limit as a share, 0 to 1.
     pub(super) fn force_share(&self) -> f64 {
         self.force_share
     }
 
-    /// A position as the drive shows it.
+    /// Converts a position to the drive's units.
     pub(super) fn position(&self, position_m: f64) -> i64 {
         let shown = rounded(position_m * self.position_per_m) - self.home_offset;
         match self.range {
@@ -114,22 +114,22 @@ impl Units {
         }
     }
 
-    /// The place that a target stands for.
+    /// Converts a target to a position.
     pub(super) fn place_m(&self, target: i64) -> f64 {
         (target + self.home_offset) as f64 / self.position_per_m
     }
 
-    /// A distance as the drive shows it.
+    /// Converts a distance to the drive's units.
     pub(super) fn distance(&self, distance_m: f64) -> f64 {
         distance_m * self.position_per_m
     }
 
-    /// A velocity as the drive shows it.
+    /// Converts a velocity to the drive's units.
     pub(super) fn velocity(&self, velocity_m_s: f64) -> i64 {
         rounded(velocity_m_s * self.velocity_per_m)
     }
 
-    /// The velocity that a number stands for.
+    /// Converts a number to a velocity.
     pub(super) fn velocity_m_s(&self, number: i64) -> f64 {
         number as f64 / self.velocity_per_m
     }

@@ -1,11 +1,11 @@
-//! Values of objects and their form on the wire.
+//! Values of objects and their encoding.
 
 use ilc_rt::fieldbus::canopen::AbortCode;
 
 /// Longest text in a dictionary, in bytes.
 pub const TEXT_MAX: usize = 32;
 
-/// A short text, in place.
+/// A short text, stored in place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Text {
     bytes: [u8; TEXT_MAX],
@@ -13,7 +13,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// Returns the text, cut to [`TEXT_MAX`] bytes.
+    /// Returns the text, truncated to [`TEXT_MAX`] bytes.
     pub fn new(text: &[u8]) -> Self {
         let len = text.len().min(TEXT_MAX);
         let mut bytes = [0; TEXT_MAX];
@@ -21,7 +21,7 @@ impl Text {
         Self { bytes, len }
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn as_bytes(&self) -> &[u8] {
         &self.bytes[..self.len]
     }
@@ -46,7 +46,7 @@ pub enum Value {
     Text(Text),
 }
 
-/// Bytes of a value on the wire.
+/// A value's bytes on the wire.
 #[derive(Clone, Copy, Debug)]
 pub struct Encoded {
     bytes: [u8; TEXT_MAX],
@@ -54,14 +54,14 @@ pub struct Encoded {
 }
 
 impl Encoded {
-    /// The bytes, little endian.
+    /// Returns the bytes, little-endian.
     pub fn as_bytes(&self) -> &[u8] {
         &self.bytes[..self.len]
     }
 }
 
 impl Value {
-    /// Number of bytes on the wire.
+    /// Returns the number of bytes on the wire.
     pub fn len(&self) -> usize {
         match self {
             Self::U8(_) | Self::I8(_) => 1,
@@ -76,7 +76,7 @@ impl Value {
         self.len() == 0
     }
 
-    /// The bytes on the wire.
+    /// Returns the bytes on the wire.
     pub fn encode(&self) -> Encoded {
         let bytes = match self {
             Self::Text(text) => return Encoded { bytes: text.bytes, len: text.len },
@@ -92,7 +92,7 @@ impl Value {
         Encoded { bytes: padded, len: self.len() }
     }
 
-    /// Returns the value of this one's type that `bytes` encode.
+    /// Decodes `bytes` as a value of the same type.
     ///
     /// # Errors
     /// [`AbortCode::TooLong`] or [`AbortCode::TooShort`] if the length is not that of the type.
@@ -120,7 +120,7 @@ impl Value {
         })
     }
 
-    /// The number; 0 for a text.
+    /// Returns the number; 0 for a text.
     pub fn number(&self) -> i64 {
         match *self {
             Self::U8(value) => value.into(),
@@ -133,7 +133,7 @@ impl Value {
         }
     }
 
-    /// The value of this one's type nearest to `number`; a text stays as it is.
+    /// Returns `number` saturated to the same type; a text is unchanged.
     #[must_use]
     pub fn with_number(&self, number: i64) -> Self {
         macro_rules! nearest {

@@ -1,4 +1,4 @@
-//! The cascade inside a drive: proportional position control around PI velocity control.
+//! The cascade inside a drive: P position control around PI velocity control.
 
 use super::Demand;
 
@@ -8,18 +8,18 @@ use super::Demand;
 /// position follows as `ω₀² / (s² + 2 δ ω₀ s + ω₀²)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveLoop {
-    /// Velocity asked for per position error.
+    /// Position gain: velocity per position error.
     pub position_gain_per_s: f64,
-    /// Force per velocity error.
+    /// Velocity gain: force per velocity error.
     pub velocity_gain_n_s_m: f64,
     /// Integral time of the velocity controller.
     pub integral_time_s: f64,
-    /// Largest force of the motor.
+    /// Force limit of the motor.
     pub force_max_n: f64,
 }
 
 impl DriveLoop {
-    /// The cascade tuned for a second-order response.
+    /// Returns the cascade tuned for a second-order response.
     pub fn tuned(
         mass_kg: f64,
         natural_rad_s: f64,
@@ -35,9 +35,10 @@ impl DriveLoop {
         }
     }
 
-    /// The force of the motor; `integral_n` is the state of the velocity controller.
+    /// Returns the force of the motor; `integral_n` is the state of the velocity controller.
     ///
-    /// At the force limit the integral takes up only what leads back from it (anti-windup).
+    /// At the force limit the integral accepts only errors that lead out of saturation
+    /// (anti-windup).
     pub(super) fn force_n(
         &self,
         demand: Demand,
@@ -57,7 +58,7 @@ impl DriveLoop {
             Demand::Velocity { velocity_m_s: wanted_m_s } => wanted_m_s,
         };
         let error_n = self.velocity_gain_n_s_m * (wanted_m_s - velocity_m_s);
-        // A demand that is not a number must not poison the state for good.
+        // A NaN demand must not corrupt the state permanently.
         if !error_n.is_finite() {
             return 0.0;
         }

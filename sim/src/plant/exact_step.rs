@@ -1,8 +1,9 @@
-//! Exact steps of a carriage with a mode: the solution of the linear motion under a constant force.
+//! Exact steps of a carriage with a flexible mode: the solution of the linear motion under a
+//! constant force.
 //!
-//! The carriage of mass `m_c` carries a mass `m_f` on a spring, so that fixed to the ground the mode
-//! has the stated frequency and damping: with deflection `q`,
-//! `m_c ẍ = F + k q + c q̇`, `m_f (ẍ + q̈) = −k q − c q̇`, `k = m_f ω²`, `c = 2 ζ m_f ω`.
+//! The carriage of mass `m_c` carries a mass `m_f` on a spring, with the stated frequency and
+//! damping while the carriage is fixed: with deflection `q`, `m_c ẍ = F + k q + c q̇`,
+//! `m_f (ẍ + q̈) = −k q − c q̇`, `k = m_f ω²`, `c = 2 ζ m_f ω`.
 
 /// Position and velocity of the carriage, deflection of the mode and its rate.
 pub(super) type State = [f64; 4];
@@ -63,7 +64,7 @@ impl ExactStep {
         }
     }
 
-    /// The state after a step under a constant net force on the carriage.
+    /// Returns the state after a step under a constant net force on the carriage.
     pub(super) fn free(&self, z: &State, force_n: f64) -> State {
         let mut next = [0.0; 4];
         for (row, next) in next.iter_mut().enumerate() {
@@ -80,18 +81,18 @@ impl ExactStep {
         [z[0], 0.0, a * z[2] + b * z[3], c * z[2] + d * z[3]]
     }
 
-    /// The net force that brings the carriage to rest at the end of the step.
+    /// Returns the net force that brings the carriage to rest at the end of the step.
     pub(super) fn stopping_force_n(&self, z: &State) -> f64 {
         -self.free(z, 0.0)[1] / self.force[1]
     }
 
-    /// The force of the mode on the carriage.
+    /// Returns the force of the mode on the carriage.
     pub(super) fn mode_force_n(&self, z: &State) -> f64 {
         self.stiffness_n_m * z[2] + self.damping_n_s_m * z[3]
     }
 }
 
-/// `e^{M t}` by scaling, a Taylor series and squaring.
+/// Returns `e^{M t}` by scaling, a Taylor series and squaring.
 fn exponential(rates: &Matrix, t_s: f64) -> Matrix {
     let largest = rates.iter().flatten().fold(0.0_f64, |max, value| max.max(value.abs()));
     let mut squarings = 0;

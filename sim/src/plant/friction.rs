@@ -1,24 +1,24 @@
-//! Stribeck friction that truly sticks.
+//! Stribeck friction with true stiction.
 //!
-//! An axis at rest stays where it is, exactly, until a force exceeds the static friction; a moving one
-//! is braked by `F_c + (F_s − F_c) exp(−(v/v_s)²)`, and friction never reverses it: where a whole step
-//! of it would, it takes just the force that stops the carriage at the end of the step.
+//! An axis at rest stays exactly where it is until a force exceeds the static friction; a moving
+//! one is braked by `F_c + (F_s − F_c) exp(−(v/v_s)²)`. Friction never reverses it: if a whole step
+//! would, friction is just the force that stops the carriage at the end of the step.
 
 use super::exact_step::{ExactStep, State};
 
-/// Friction of an axis, and the brake on top of it.
+/// Friction of an axis, including its brake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
     /// Coulomb friction.
     pub coulomb_n: f64,
-    /// Static friction, not less than the former.
+    /// Static friction, at least the Coulomb friction.
     pub static_n: f64,
     /// Stribeck velocity.
     pub stribeck_m_s: f64,
 }
 
 impl Friction {
-    /// Friction at a velocity other than 0, as a magnitude.
+    /// Returns the magnitude of friction at a velocity other than 0.
     pub fn sliding_n(&self, velocity_m_s: f64) -> f64 {
         let ratio = velocity_m_s / self.stribeck_m_s;
         // Beyond six Stribeck velocities the exponential is below the last bit of the sum.
@@ -29,7 +29,8 @@ impl Friction {
         }
     }
 
-    /// The state after a step under a motor force, with a brake force added to the friction.
+    /// Returns the state after a step under a motor force, with a brake force added to the
+    /// friction.
     pub(super) fn step(&self, step: &ExactStep, z: &State, motor_n: f64, brake_n: f64) -> State {
         let static_n = self.static_n + brake_n;
         let (sign, sliding_n) = if z[1] == 0.0 {
@@ -45,8 +46,8 @@ impl Friction {
         if sign * next[1] > 0.0 {
             return next;
         }
-        // In the direction of the old motion: what friction must take up so that the axis stops. If
-        // it turns round by itself, friction leaves it alone for this step: it must not push.
+        // In the direction of the previous motion: the force that friction must take up to stop the
+        // axis. If the axis reverses without it, friction is 0 for this step: it must not push.
         let stopping_n = step.stopping_force_n(z);
         if sign * (motor_n - stopping_n) < 0.0 {
             return step.free(z, motor_n);

@@ -1,5 +1,5 @@
-//! The gantry of Haas et al. (2016): axes with cascades, friction that sticks, a swinging crossbeam,
-//! and a right angle that is not quite right.
+//! The gantry of Haas et al. (2016): axes with cascades, stiction, a swinging crossbeam, and an
+//! orthogonality error.
 
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use super::friction::Friction;
 use super::noise::Noise;
 use super::{Demand, Plant};
 
-/// Step for which the axes are prepared; another one costs a preparation when it first occurs.
+/// Step that the axes are prepared for; another one costs a preparation when it first occurs.
 const STEP_S: f64 = 125e-6;
 
 /// One axis: mechanics, friction, and the drive's own loops.
@@ -31,7 +31,7 @@ pub struct GantryAxis {
 }
 
 impl GantryAxis {
-    /// An axis at rest at its start position.
+    /// Creates an axis at rest at its start position.
     pub fn new(simulation: &AxisSimulation) -> Self {
         let mechanics = Mechanics {
             carriage_kg: simulation.mass_kg - simulation.mode_mass_kg,
@@ -73,21 +73,20 @@ impl GantryAxis {
             &mut self.integral_n,
             dt_s,
         );
-        // The brake holds as much as the motor can pull.
+        // The brake holds as much as the motor's maximum force.
         let brake_n = if demand == Demand::Off { self.force_max_n } else { 0.0 };
         self.state = self.friction.step(&self.step, &self.state, self.force_n, brake_n);
     }
 }
 
-/// Axes under one tool: the crossbeam's mode and the error of the right angle are seen by the tool
-/// only.
+/// Axes under one tool: only the tool sees the crossbeam's mode and the orthogonality error.
 ///
 /// `tool_0 = x_0 + q_0 + orthogonality · x_1`, `tool_i = x_i + q_i`
 ///
-/// The drives control on the noisy position and on the true velocity, as drives filter theirs.
+/// The drives control the noisy position and the true velocity, as drives filter theirs.
 ///
 /// # Real Time
-/// [`Plant::step`] allocates nothing.
+/// [`Plant::step`] does not allocate.
 /// # Source
 /// - \[haas2016\], section 3.2: masses, bandwidth, the mode at 20 Hz, stiction, orthogonality.
 #[derive(Clone, Debug)]
@@ -99,13 +98,13 @@ pub struct Gantry {
 }
 
 impl Gantry {
-    /// The gantry that a cell description states.
+    /// Creates the gantry of a cell description.
     pub fn from_cell(cell: &Cell) -> Self {
         let axes: Vec<AxisSimulation> = cell.axes.iter().map(|axis| axis.simulation).collect();
         Self::new(&axes, &cell.simulation)
     }
 
-    /// A gantry of some axes; orthogonality couples the second into the first.
+    /// Creates a gantry of several axes; orthogonality couples the second into the first.
     pub fn new(axes: &[AxisSimulation], simulation: &Simulation) -> Self {
         Self {
             axes: axes.iter().map(GantryAxis::new).collect(),
@@ -115,12 +114,12 @@ impl Gantry {
         }
     }
 
-    /// Deflection of an axis' mode; 0 if there is no such axis.
+    /// Returns the deflection of an axis' mode; 0 if the axis does not exist.
     pub fn deflection_m(&self, axis: usize) -> f64 {
         self.axes.get(axis).map_or(0.0, |axis| axis.state[2])
     }
 
-    /// Sets the deflection of an axis' mode, as a hammer would, and its rate to 0.
+    /// Sets the deflection of an axis' mode, as after a hammer blow, and its rate to 0.
     pub fn deflect(&mut self, axis: usize, deflection_m: f64) {
         if let Some(axis) = self.axes.get_mut(axis) {
             (axis.state[2], axis.state[3]) = (deflection_m, 0.0);

@@ -1,7 +1,7 @@
 //! Plants of the simulated drives: mechanics with the drives' own control loops.
 //!
-//! A plant knows physics and nothing of buses or counts; the drives of the simulator own one and
-//! step it, and tests put one directly under a controller.
+//! A plant knows physics, not buses or counts; the simulator's drives own one and step it, and
+//! tests connect one directly to a controller.
 
 pub mod drive_loop;
 pub mod exact_step;
@@ -20,7 +20,7 @@ pub enum Demand {
     Position {
         /// Target position.
         position_m: f64,
-        /// Added to the velocity that the position controller asks for.
+        /// Feed-forward added to the position controller's output.
         velocity_m_s: f64,
     },
     /// Follow a velocity.
@@ -32,19 +32,19 @@ pub enum Demand {
 
 /// Axes with encoders, motors and a tool.
 pub trait Plant: Send {
-    /// Number of axes.
+    /// Returns the number of axes.
     fn n_axes(&self) -> usize;
-    /// Advances by `dt_s`; axis `i` follows `demand[i]`, and is off where there is none.
+    /// Advances by `dt_s`; axis `i` follows `demand[i]`, and is off without one.
     fn step(&mut self, demand: &[Demand], dt_s: f64);
-    /// Lets the motor of an axis use only this share of its force from now on, 0 to 1; a plant without
-    /// forces has nothing to limit.
+    /// Limits the force of an axis' motor to this share from now on, 0 to 1; a plant without forces
+    /// ignores it.
     fn limit_force(&mut self, _axis: usize, _share: f64) {}
-    /// Position at the axis' own encoder.
+    /// Returns the position at the axis' own encoder.
     fn encoder_m(&self, axis: usize) -> f64;
-    /// Velocity at the axis' own encoder.
+    /// Returns the velocity at the axis' own encoder.
     fn encoder_velocity_m_s(&self, axis: usize) -> f64;
-    /// Force of the motor during the last step.
+    /// Returns the force of the motor during the last step.
     fn force_n(&self, axis: usize) -> f64;
-    /// Coordinate of the tool centre point.
+    /// Returns a coordinate of the tool centre point.
     fn tool_m(&self, axis: usize) -> f64;
 }

@@ -1,4 +1,4 @@
-//! White noise from a small seeded generator: the same seed, the same bits.
+//! White noise from a small seeded generator: the same seed gives the same bits.
 
 /// `SplitMix64`, summed to a nearly normal variable.
 #[derive(Clone, Debug)]
@@ -19,8 +19,8 @@ impl Noise {
         z ^ (z >> 31)
     }
 
-    /// A variable of mean 0 and variance 1: twelve uniform ones, each of variance 1/12, from integers
-    /// only, so that it does not depend on a mathematical library.
+    /// Returns a variable of mean 0 and variance 1: the sum of twelve uniform ones of variance
+    /// 1/12, from integers only, so that it does not depend on a mathematical library.
     pub(super) fn normal(&mut self) -> f64 {
         let mut sum = 0_u64;
         for _ in 0..3 {

@@ -1,4 +1,5 @@
-//! Laws for an analysis: built apart from the objects that they describe, and asked by their trait.
+//! Laws for an analysis: built separately from their Python objects, and queried through their
+//! trait.
 
 use std::sync::Arc;
 
@@ -9,8 +10,8 @@ use super::{Call, Fits, PyLaw, Size};
 use crate::arguments::Arguments;
 use crate::python_law::{Channels, Frame, PythonLaw};
 
-/// Returns a law of its own for an analysis, for runs of this size: the object is not used, unless it is
-/// written in Python.
+/// Returns a separate law for an analysis, for runs of this size: the object itself is not used,
+/// unless it is written in Python.
 pub(crate) fn apart(
     name: &str,
     object: &Bound<'_, PyAny>,
@@ -27,7 +28,7 @@ pub(crate) fn apart(
     Ok((this.build)(&Call { arguments, size: Some(size), live: None })?.law)
 }
 
-/// Returns whether a law, or a law inside it, is written in Python.
+/// Returns true if a law, or its inner law, is written in Python.
 pub(crate) fn is_python(object: &Bound<'_, PyAny>) -> PyResult<bool> {
     match inside(object)? {
         Some(inner) => is_python(&inner),
@@ -35,7 +36,7 @@ pub(crate) fn is_python(object: &Bound<'_, PyAny>) -> PyResult<bool> {
     }
 }
 
-/// Returns the number of samples that a law, or a law inside it, was made for.
+/// Returns the number of samples that a law, or its inner law, was created for.
 pub(crate) fn samples_of(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     if let Ok(law) = object.cast::<PyLaw>()
         && let Fits::Fixed(n_samples, _) = law.get().fits
@@ -45,7 +46,7 @@ pub(crate) fn samples_of(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     inside(object)?.map_or(Ok(None), |inner| samples_of(&inner))
 }
 
-/// Returns the law inside a native one.
+/// Returns the inner law of a native one.
 fn inside<'py>(object: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyAny>>> {
     let Ok(law) = object.cast::<PyLaw>() else { return Ok(None) };
     let arguments = Arguments::new(law.get().arguments.bind(object.py()));

@@ -1,4 +1,4 @@
-//! Builders of what goes round another law: `gate`, `ladder`, `through_jacobian`.
+//! Builders of wrappers: `gate`, `ladder`, `through_jacobian`.
 
 use ilc_rt::learning::Law;
 use ilc_rt::learning::gate::{Gate, GateRule, GateState, Measure};
@@ -12,7 +12,7 @@ use crate::error::OrRaise;
 use crate::python_law::Channels;
 use crate::weights::read_matrices;
 
-/// A law round another one of any kind.
+/// The inner law of a wrapper, of any kind.
 type Inner = Box<dyn Law>;
 
 pub(super) fn gate(call: &Call<'_, '_>) -> PyResult<Built> {
@@ -88,7 +88,7 @@ impl Readable for Ladder<Inner> {
 pub(super) fn through_jacobian(call: &Call<'_, '_>) -> PyResult<Built> {
     let jacobians = read_matrices("jacobian", &call.arguments.get("jacobian")?)?;
     let (n_outputs, n_inputs) = jacobians.first().map_or((0, 0), nalgebra::DMatrix::shape);
-    // What the law inside learns from has the shape of the input.
+    // The inner law's error has the shape of the input.
     let inner = call.inner("law", Channels { n_inputs, n_outputs: n_inputs })?;
     let law = ThroughJacobian::new(inner, &jacobians).or_raise()?;
     Ok(Built { law: Box::new(law), fits: Fits::Channels(Channels { n_inputs, n_outputs }) })

@@ -1,4 +1,4 @@
-//! Builder of learning within bounds: `constrained`.
+//! Builder of constrained norm-optimal ILC: `constrained`.
 
 use ilc_rt::learning::law::constrained::{Bound as Limits, Bounds, Constrained, Limit, Status};
 use ilc_rt::learning::law::norm_optimal::Cost;
@@ -35,7 +35,7 @@ pub(super) fn constrained(call: &Call<'_, '_>) -> PyResult<Built> {
     let position = limits("position_bounds", n_inputs)?;
     let velocity = limits("velocity_bounds", n_inputs)?;
     let acceleration = limits("acceleration_bounds", n_inputs)?;
-    // Bounds of the output alone may come with the reference of the outputs as `reference`.
+    // Bounds of the output alone may use `reference` as the reference of the outputs.
     let is_setpoint = n_inputs == n_outputs
         || [&position, &velocity, &acceleration].iter().any(|bound| bound.is_some());
     let reference = signal("reference", if is_setpoint { n_inputs } else { n_outputs })?;
@@ -89,7 +89,7 @@ impl Readable for Constrained {
     }
 }
 
-/// Reads a bound b, for -b to b, or a pair (lower, upper) of which `None` is infinite.
+/// Reads a bound b, for -b to b, or a pair (lower, upper) in which `None` is infinite.
 fn read_limits(
     name: &str,
     object: &Bound<'_, PyAny>,

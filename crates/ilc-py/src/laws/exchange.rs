@@ -1,6 +1,6 @@
-//! The arrays of one update: from NumPy to a law and back.
+//! Exchange of an update's arrays between NumPy and a law.
 //!
-//! Arrays of float64 in row-major order are read where they lie. What takes long runs without the interpreter,
+//! Row-major arrays of float64 are read in place. Long updates run with the interpreter released,
 //! on a copy, as other Python threads may write into the arrays meanwhile.
 
 use ilc_rt::learning::LearningError;
@@ -11,10 +11,10 @@ use super::Readable;
 use crate::argument::{Layout, in_order, refuse_infinite};
 use crate::detached::detached;
 
-/// Values up to which an update is shorter than letting the interpreter go and copying.
+/// Number of values up to which an update is faster than releasing the interpreter and copying.
 const SHORT: usize = 2048;
 
-/// A signal of Python, read where it lies.
+/// A signal of Python, read in place.
 pub(super) struct Given<'py> {
     array: PyReadonlyArrayDyn<'py, f64>,
     layout: Layout,

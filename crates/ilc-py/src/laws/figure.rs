@@ -1,11 +1,11 @@
-//! What Python can read of a law beside its update.
+//! Figures of a law that Python can read.
 
 use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use crate::argument::give_signal;
 
-/// A figure of a law: what a property of its Python class returns.
+/// A figure of a law: the value of a property of its Python class.
 pub(crate) enum Figure {
     Absent,
     Number(f64),
@@ -39,7 +39,7 @@ impl Figure {
     }
 }
 
-/// A law as `Law` of Python keeps it; most have nothing but their update.
+/// A law as stored in Python's `Law`; most have only their update.
 pub(crate) trait Readable: Law {
     /// Returns the figure of this name, if the law has it.
     fn figure(&self, name: &str) -> Option<Figure> {
@@ -47,34 +47,34 @@ pub(crate) trait Readable: Law {
         None
     }
 
-    /// Returns whether the law calls another one, which may be written in Python.
+    /// Returns true if the law calls an inner law, which may be written in Python.
     fn has_inner(&self) -> bool {
         false
     }
 
-    /// Returns whether an update takes long, however short the run.
+    /// Returns true if an update is slow even for short runs.
     fn is_long(&self) -> bool {
         false
     }
 
-    /// Returns whether the law itself uses the measured disturbance of the coming run.
+    /// Returns true if the law uses the measured disturbance of the coming run.
     fn uses_disturbance(&self) -> bool {
         false
     }
 
-    /// Remembers a run made elsewhere.
+    /// Adds a run made elsewhere.
     fn remember(&mut self, u: &[f64], e: &[f64], disturbance: &[f64]) -> Result<(), LearningError> {
         let _ = (u, e, disturbance);
         Err(LearningError::Empty { what: "memory" })
     }
 
-    /// Returns numbers and weights of the remembered runs that count under a disturbance.
+    /// Returns indices and weights of the stored runs that count under a disturbance.
     fn relevant(&self, disturbance: &[f64]) -> Result<Vec<(usize, f64)>, LearningError> {
         let _ = disturbance;
         Err(LearningError::Empty { what: "memory" })
     }
 
-    /// Forgets all but the remembered runs that count most, and returns the numbers of those.
+    /// Keeps only the most relevant stored runs, and returns their indices.
     fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>, LearningError> {
         let _ = (keep, disturbances);
         Err(LearningError::Empty { what: "memory" })

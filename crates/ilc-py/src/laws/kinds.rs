@@ -1,4 +1,4 @@
-//! Builders of the laws that look at one run: `pd`, `error_feedforward`, `adjoint`, `model_inverse`.
+//! Builders of laws that use one run: `pd`, `error_feedforward`, `adjoint`, `model_inverse`.
 
 use ilc_rt::learning::law::adjoint::Adjoint;
 use ilc_rt::learning::law::error_feedforward::{ErrorFeedforward, Feedforward};

@@ -1,8 +1,8 @@
-//! `Law`: the one class of Python behind every learning law of the controller.
+//! `Law`: the native Python class behind every learning law.
 //!
-//! The typed classes of `ilc_rt.laws` derive from it. A kind of law is one line in [`BUILDERS`] and one small
-//! function that builds it from its arguments; here are the exchange of signals with NumPy, the size of the
-//! runs, pickling, and the way to the law for whoever analyses or runs it.
+//! The typed classes of `ilc_rt.laws` derive from it. A kind of law is one line in [`BUILDERS`] and
+//! one small function that builds it from its arguments; this file has the exchange of signals with
+//! NumPy, the size of the runs, pickling, and the access to the law for analysis and campaign.
 
 mod apart;
 mod around;
@@ -36,7 +36,7 @@ pub(crate) use figure::Readable;
 /// A function that builds a law from its arguments.
 type Build = fn(&Call<'_, '_>) -> PyResult<Built>;
 
-/// The kinds of law, and how each is built.
+/// The kinds of law with their builders.
 const BUILDERS: [(&str, Build); 14] = [
     ("pd", kinds::pd),
     ("error_feedforward", kinds::error_feedforward),
@@ -54,7 +54,7 @@ const BUILDERS: [(&str, Build); 14] = [
     ("flexible", recalled::flexible),
 ];
 
-/// The size of a run, as its signals show it.
+/// The size of a run, from its signals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Size {
     n_samples: usize,
@@ -67,29 +67,29 @@ impl Size {
         Self { n_samples: 1, channels: Channels { n_inputs: 1, n_outputs: 1 }, n_disturbances: 0 };
 }
 
-/// Which runs a law accepts.
+/// Sizes of runs that a law accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fits {
-    /// Those of one size.
+    /// One size.
     Fixed(usize, Channels),
-    /// Any whose error has the channels of the input. The law is built again for each other size, which it
-    /// cannot compare with those before.
+    /// Any size with the channels of the error equal to those of the input. The law is rebuilt for
+    /// each new size, which cannot be compared with earlier ones.
     Alike,
-    /// Any with these channels, likewise.
+    /// Any number of samples with these channels, likewise.
     Channels(Channels),
     /// Any, likewise.
     Any,
-    /// Any first one, and then those of its size until the law is reset.
+    /// Any size at first, and then that size until the law is reset.
     First,
 }
 
 /// One call of a builder.
 struct Call<'a, 'py> {
     arguments: Arguments<'a, 'py>,
-    /// The runs to come; `None` before the first one, when a law that fits any run is built for a single
-    /// sample: its arguments are checked, and its figures can be read.
+    /// Size of the coming runs; `None` before the first one, when a law that accepts any size is
+    /// built for a single sample: its arguments are checked, and its figures can be read.
     size: Option<Size>,
-    /// The frame of a law inside that is used where it is; `None` if the whole is built apart.
+    /// The frame of an inner law that is used in place; `None` if the whole is built separately.
     live: Option<&'a Arc<Frame>>,
 }
 
@@ -98,18 +98,18 @@ impl<'py> Call<'_, 'py> {
         self.arguments.py()
     }
 
-    /// Returns the size of the runs, of the smallest one before the first.
+    /// Returns the size of the runs, or the smallest one before the first.
     fn size(&self) -> Size {
         self.size.unwrap_or(Size::ONE)
     }
 
-    /// Returns the low-pass of a law; a single sample is too short for any.
+    /// Returns the Q-filter of a law; a single sample is too short for any.
     fn filter(&self, name: &str) -> PyResult<QFilter> {
         let filter = read_filter(name, self.arguments.given(name)?.as_ref())?;
         Ok(if self.size.is_some() { filter } else { QFilter::None })
     }
 
-    /// Returns the law inside this one: the object itself, or a copy of it that nobody else uses.
+    /// Returns the inner law: the object itself, or an exclusive copy.
     fn inner(&self, name: &str, channels: Channels) -> PyResult<Box<dyn Law>> {
         let object = self.arguments.get(name)?;
         match self.live {
@@ -121,7 +121,7 @@ impl<'py> Call<'_, 'py> {
     }
 }
 
-/// A law and which runs it accepts.
+/// A law and the runs it accepts.
 struct Built {
     law: Box<dyn Readable>,
     fits: Fits,
@@ -142,9 +142,9 @@ pub(crate) struct PyLaw {
 
 struct State {
     law: Box<dyn Readable>,
-    /// The runs that the law was built for; `None` before the first one.
+    /// Size that the law was built for; `None` before the first run.
     size: Option<Size>,
-    /// Disturbances announced before the first run.
+    /// Disturbances set before the first run.
     announced: Vec<Vec<f64>>,
 }
 
@@ -283,7 +283,7 @@ impl PyLaw {
         }
     }
 
-    /// Remember a run that was made elsewhere.
+    /// Add an earlier run, or one made elsewhere, to the memory.
     #[pyo3(signature = (u, e, disturbance=None))]
     fn _remember(
         &self,
@@ -354,7 +354,7 @@ impl PyLaw {
         (self.build)(&Call { arguments, size, live: Some(&self.frame) })
     }
 
-    /// Refuses a run that the law does not accept, and builds the law for one that it has not seen yet.
+    /// Refuses a run that the law does not accept, and builds the law for a new size.
     fn fit(
         &self,
         py: Python<'_>,
@@ -397,7 +397,7 @@ impl PyLaw {
         Ok(())
     }
 
-    /// Looks at the law.
+    /// Reads from the law.
     pub(crate) fn look<T>(
         &self,
         py: Python<'_>,

@@ -1,4 +1,4 @@
-//! Builders of norm-optimal learning: `norm_optimal`, and `contour`, `formation`, `dynamic` beside it.
+//! Builders of norm-optimal ILC: `norm_optimal`, `contour`, `formation`, `dynamic`.
 
 use ilc_rt::learning::LearningError;
 use ilc_rt::learning::law::dynamic::DynamicNormOptimal;
@@ -89,7 +89,7 @@ impl Readable for DynamicNormOptimal {
     }
 }
 
-/// Reads the filter of the error, its coupling and the weight of the error itself.
+/// Reads the filter of the error, its coupling and the weight of the unfiltered error.
 fn read_dynamic(a: Arguments<'_, '_>, n_samples: usize) -> PyResult<Dynamic> {
     let mut dynamic = Dynamic::new(a.model("filter")?).or_raise()?;
     if let Some(matrices) = a.maybe("coupling", read_matrices)? {
@@ -107,7 +107,7 @@ fn read_dynamic(a: Arguments<'_, '_>, n_samples: usize) -> PyResult<Dynamic> {
     Ok(dynamic)
 }
 
-/// Reads the models of several agents side by side; also their number and the outputs of each.
+/// Reads the block-diagonal model of several agents; also their number and the outputs of each.
 fn side_by_side(a: Arguments<'_, '_>) -> PyResult<(StateSpace, usize, usize)> {
     let models: Vec<Bound<'_, PyAny>> = a.get("models")?.extract()?;
     let Some((first, others)) = models.split_first() else {

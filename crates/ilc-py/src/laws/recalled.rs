@@ -1,4 +1,4 @@
-//! Builders of the laws that remember runs: `relevance` and `flexible`, filled from a library.
+//! Builders of laws with a memory of runs: `relevance` and `flexible`, filled from a library.
 
 use ilc_rt::learning::LearningError;
 use ilc_rt::learning::law::flexible::{Flexible, TableShape};
@@ -28,7 +28,7 @@ pub(super) fn relevance(call: &Call<'_, '_>) -> PyResult<Built> {
     }
     let size = call.size.unwrap_or(Size { n_disturbances: weights.disturbance.len(), ..Size::ONE });
     let (runs, library_dt_s) = earlier_runs(call)?;
-    // Without a weight of the rate, and before the first run, the sample time changes nothing.
+    // Without a weight of the rate, and before the first run, the sample time has no effect.
     let is_used = weights.error_rate > 0.0 && call.size.is_some();
     let dt_s = dt_s.or(library_dt_s).or((!is_used).then_some(1.0));
     let dt_s = dt_s.ok_or_else(|| no_sample_time(&weights))?;
@@ -49,7 +49,7 @@ pub(super) fn flexible(call: &Call<'_, '_>) -> PyResult<Built> {
     filled(call, law, &runs)
 }
 
-/// Returns the law once it remembers the runs of earlier campaigns.
+/// Returns the law with the runs of earlier campaigns in memory.
 fn filled<L: Readable + 'static>(
     call: &Call<'_, '_>,
     mut law: L,
@@ -62,7 +62,7 @@ fn filled<L: Readable + 'static>(
     Ok(Built { law: Box::new(law), fits: Fits::First })
 }
 
-/// Reads the runs of the library that are like those to come, and their sample time.
+/// Reads the runs of the library that match the coming ones, and their sample time.
 fn earlier_runs(call: &Call<'_, '_>) -> PyResult<(Vec<IterationRecord>, Option<f64>)> {
     let library = call.arguments.given("library")?;
     let task = Task { cell: call.arguments.maybe_text("cell")? };
@@ -152,7 +152,7 @@ fn read_weights(object: &Bound<'_, PyAny>) -> PyResult<RelevanceWeights> {
     .or_raise()
 }
 
-/// Refuses weights of the relevance that cannot be used.
+/// Refuses invalid weights of the relevance.
 #[pyfunction]
 pub(super) fn check_relevance_weights(weights: &Bound<'_, PyAny>) -> PyResult<()> {
     read_weights(weights).map(drop)

@@ -6,7 +6,7 @@ use super::telemetry::Telemetry;
 use crate::record::Event;
 use crate::servo::Sample;
 
-/// Samples of a batch on the network.
+/// Duration of a batch on the network.
 const BATCH_S: f64 = 0.05;
 
 /// Receivers of the events: an observer, and the network.
@@ -48,7 +48,7 @@ impl<'a> Announcer<'a> {
             | Event::End { .. } => "state",
         };
         if let Ok(text) = serde_json::to_string(event) {
-            // Progress is gone in a moment; a late joiner wants to know the state.
+            // Progress is short-lived; a late joiner wants the state.
             telemetry.send(key, text, key == "state" && !matches!(event, Event::Progress { .. }));
         }
     }

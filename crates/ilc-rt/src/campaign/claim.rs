@@ -1,7 +1,7 @@
 //! The claim to a campaign: two programs must not continue the same one.
 //!
-//! A name in the kernel's own space, which is free again the moment its owner ends, however it ends:
-//! no file is left behind that could outlive a killed process.
+//! A name in the kernel's abstract socket namespace, which is released the moment its owner ends,
+//! however it ends: no file is left behind that could outlive a killed process.
 
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::fs::MetadataExt;
@@ -11,7 +11,7 @@ use std::path::Path;
 use super::error::{CampaignError, ResumeError};
 use crate::record::fingerprint;
 
-/// Held for as long as the campaign goes on; without a socket if the system has none to give.
+/// Held while the campaign runs; without a socket if the system has none left.
 #[derive(Debug)]
 pub(super) struct Claim {
     _socket: Option<UnixListener>,
@@ -40,7 +40,7 @@ pub(super) fn claim(library: &Path, campaign: &str) -> Result<Claim, CampaignErr
             let (campaign, library) = (campaign.to_owned(), library.to_owned());
             Err(ResumeError::Claimed { campaign, library }.into())
         }
-        // What cannot be had for another reason must not keep anybody from working.
+        // A failure for any other reason must not block the campaign.
         socket => Ok(Claim { _socket: socket.ok() }),
     }
 }

@@ -4,7 +4,7 @@ use crate::config::Measure;
 use crate::record::{AxisKinds, Figures, IterationRecord, distances_m};
 use crate::servo::Sample;
 
-/// The run that is on.
+/// The current run.
 #[derive(Debug)]
 pub(super) struct Collector {
     n_samples: usize,
@@ -39,7 +39,7 @@ impl Collector {
         }
     }
 
-    /// Makes room for a run.
+    /// Prepares the record of a run.
     pub(super) fn begin(&mut self, index: u32) {
         let zeros = vec![0.0; self.n_samples * self.n_axes];
         self.record = IterationRecord {
@@ -53,7 +53,7 @@ impl Collector {
         (self.n_collected, self.n_missing) = (0, 0);
     }
 
-    /// Takes a sample of the run.
+    /// Adds a sample of the run.
     pub(super) fn take(&mut self, index: u32, k: u32, sample: &Sample) {
         let row = k as usize * self.n_axes;
         let record = &mut self.record;
@@ -71,8 +71,8 @@ impl Collector {
         self.n_missing += u32::from(sample.missing);
     }
 
-    /// Completes the record; `None` if samples were lost on the way here, as then nothing may be
-    /// learned from it.
+    /// Completes the record; `None` if samples were lost on the way, as then nothing may be learned
+    /// from it.
     pub(super) fn end(&mut self) -> Option<IterationRecord> {
         if self.n_collected != self.n_samples {
             return None;

@@ -6,25 +6,25 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::config::{Cell, read_file};
 
-/// Largest file that holds the disturbance of a run.
+/// Largest file with the disturbance of a run.
 const FILE_BYTES_MAX: u64 = 4096;
 
 /// Function from the number of the next run to its disturbance, or to the reason why it has none.
 type Ask = dyn FnMut(u32) -> Result<Vec<f64>, String> + Send;
 
-/// Measured disturbance of each run, one number for each quantity, e.g. a temperature; or nothing.
+/// Measured disturbance of each run, one number per quantity, e.g. a temperature; or none.
 ///
 /// Measured once before each run, in order, while the axes return: never in the loop.
 #[derive(Clone, Default)]
 pub struct Disturbance(Option<Arc<Mutex<Ask>>>);
 
 impl Disturbance {
-    /// Asks a function.
+    /// Creates a source that calls a function.
     pub fn measured(ask: impl FnMut(u32) -> Result<Vec<f64>, String> + Send + 'static) -> Self {
         Self(Some(Arc::new(Mutex::new(ask))))
     }
 
-    /// Reads the file that the cell names, unless a function is asked already.
+    /// Reads the file that the cell names, unless a function is given.
     #[must_use]
     pub(super) fn or_file(self, cell: &Cell) -> Self {
         match &cell.learning.disturbance_file {

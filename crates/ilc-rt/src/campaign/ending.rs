@@ -60,7 +60,7 @@ impl Running<'_> {
         self.runs.push((record.index, record.figures.clone()));
     }
 
-    /// Waits until all runs are stored, and tries once more to store those that could not be.
+    /// Waits until all runs are stored, and retries those that could not be.
     pub(super) fn flush(&mut self) {
         for event in self.keeper.flush() {
             self.on_stored(event);

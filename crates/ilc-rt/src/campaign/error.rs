@@ -19,7 +19,7 @@ pub enum CampaignError {
     /// The experiment is refused.
     #[error(transparent)]
     Identification(#[from] IdentificationError),
-    /// The disturbance of the first run could not be had.
+    /// The disturbance of the first run is unavailable.
     #[error("{0}")]
     Disturbance(String),
     /// The bus does not open.
@@ -30,7 +30,7 @@ pub enum CampaignError {
         /// Reason.
         source: OpenError,
     },
-    /// A node does not answer, or is not what the cell says.
+    /// A node does not answer, or differs from the cell description.
     #[error("{file}: {key} on {address}: {source}")]
     BringUp {
         /// Cell description.
@@ -52,7 +52,7 @@ pub enum CampaignError {
         file: String,
         /// Bus address.
         address: String,
-        /// Command that was heard from it.
+        /// Its command.
         heard: crate::fieldbus::bring_up::listen::Command,
     },
     /// The bus failed while the nodes were started.
@@ -71,7 +71,7 @@ pub enum CampaignError {
     /// There is no campaign to resume.
     #[error("--resume: {0}")]
     Resume(#[from] ResumeError),
-    /// A bus in one process was asked of a program that has no drives in it.
+    /// An in-process bus in a program without drives.
     #[error(
         "{place}: `{address}` has no drives in this program; allowed: {} (`ilc run` in Python runs \
          it with simulated drives)",
@@ -83,7 +83,7 @@ pub enum CampaignError {
         /// The address.
         address: String,
     },
-    /// Simulated drives could not be made of the cell.
+    /// Simulated drives could not be created from the cell.
     #[error("{file}: [simulation]: {reason}")]
     Simulation {
         /// Cell description.

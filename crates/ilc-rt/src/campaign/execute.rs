@@ -31,7 +31,7 @@ const MAILBOX: usize = 8192;
 /// called with every event.
 ///
 /// # Errors
-/// [`CampaignError`] before anything has moved. Whatever happens later brings the axes to rest and is
+/// [`CampaignError`] before anything has moved. Any later failure brings the axes to rest and is
 /// reported in the [`Outcome`].
 pub fn run(
     cell: &Cell,
@@ -52,8 +52,8 @@ pub fn run(
         }
         (cell.learning.law.as_str(), prepared.law)
     };
-    // Without a law there is nothing to roll back. A gate decides on its own: it knows the tolerance, and
-    // when the machine has changed.
+    // Without a law there is nothing to roll back. A gate decides on its own: it knows the
+    // tolerance, and detects a change of the machine.
     let growth_allowed = match &law {
         Some(law) if !law.handles_rollback() => cell.learning.rollback(),
         _ => f64::INFINITY,
@@ -67,7 +67,8 @@ pub fn run(
 /// `excitation`, with the experiment as its parameters.
 ///
 /// # Errors
-/// [`CampaignError`] before anything has moved, as for an experiment beyond the limits of its axis.
+/// [`CampaignError`] before anything has moved, e.g. for an experiment beyond the limits of its
+/// axis.
 pub fn identify(
     cell: &Cell,
     experiment: &Experiment,
@@ -80,7 +81,7 @@ pub fn identify(
         plan: planned.plan,
         law: None,
         input: Some(planned.input),
-        // Nothing is learned, so that there is nothing to roll back.
+        // Nothing is learned, so there is nothing to roll back.
         growth_allowed: f64::INFINITY,
     };
     let options = Options {
@@ -98,7 +99,7 @@ pub fn identify(
 struct Campaign {
     plan: Plan,
     law: Option<Box<dyn Law>>,
-    /// Input of the first run, if it is not to be zero.
+    /// Input of the first run, if it is not zero.
     input: Option<Vec<f64>>,
     /// Growth of the error at which the best input is restored.
     growth_allowed: f64,
@@ -137,8 +138,8 @@ fn execute(
     announcer.publish(&Event::State { state: StateName::BringingUp, iteration: first });
     nodes::start(cell, bus.as_mut(), session)?;
 
-    // Drives that were off do not begin where the last run left them. One run with the next input brings
-    // them there; it is not stored, as it says nothing about the law.
+    // After being switched off, drives start elsewhere than the last run left them. One run with
+    // the next input brings them there; it is not stored, as it says nothing about the law.
     let warm_up = u32::from(!resumed.runs.is_empty());
     plan.servo.runs = first - warm_up..options.iterations;
     if session.forgives_stalls() {
@@ -165,7 +166,7 @@ fn execute(
         (pacer, Some(report))
     };
     announcer.publish(&start_event(cell, options, &plan, first, granted));
-    // The loop reports changes only, and this is where it begins.
+    // The loop reports changes only, and this is its initial state.
     announcer.publish(&Event::State { state: StateName::Enabling, iteration: first });
 
     let parts = Parts { announcer, keeper, claim, policy, learner, mail };
@@ -202,7 +203,7 @@ fn begin_or_resume(
     let disturbance = options.disturbance.clone().or_file(cell);
     plan.meta.campaign =
         if options.resume { to_resume(library, plan)? } else { library.new_campaign()? };
-    // Claimed before it is read: what another program adds to it meanwhile would be made twice.
+    // Claimed before it is read: runs that another program adds meanwhile would be made twice.
     let held = claim(path, &plan.meta.campaign)?;
     if let Some(law) = law.as_deref_mut() {
         policy.recall(library, plan, law)?;

@@ -1,4 +1,4 @@
-//! Faults in their fields, for programs; `reason` makes the sentence of the same stop.
+//! Faults in fields, for programs; `reason` makes the sentence of the same stop.
 
 use crate::config::Cell;
 use crate::fieldbus::BusError;
@@ -7,7 +7,7 @@ use crate::interpolate::MAX_AXES;
 use crate::record::{Fault, FaultKind, LastCycles};
 use crate::servo::{Sample, StopReason, Stranger};
 
-/// The fields of a fault; `None` if the stop was asked for.
+/// Returns the fields of a fault; `None` for a requested stop.
 pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
     let of_axis = |kind, index: usize| {
         let axis = cell.axes.get(index);
@@ -110,7 +110,7 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
     })
 }
 
-/// The last cycles before a stop, one row each.
+/// Returns the last cycles before a stop, one row each.
 pub(super) fn last_cycles(samples: &[Sample], n_axes: usize) -> LastCycles {
     let rows = |of: fn(&Sample) -> &[f64; MAX_AXES]| {
         samples.iter().map(|sample| of(sample)[..n_axes].to_vec()).collect()

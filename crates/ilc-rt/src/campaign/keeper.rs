@@ -1,8 +1,8 @@
-//! Storage of the runs: on a thread of its own in real time, in line in lock-step.
+//! Storage of the runs: on its own thread in real time, in line in lock-step.
 //!
-//! Writing to a disk can take seconds when others write too. Meanwhile the loop's mailbox must be read and
-//! the next input handed over. A run that cannot be kept ends the campaign; those that come after it wait,
-//! so that the library never has a gap.
+//! Writing to a disk can take seconds when others write too. Meanwhile the loop's mailbox must be
+//! read and the next input passed on. A run that cannot be stored ends the campaign; later ones
+//! wait, so that the library never has a gap.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::record::{Figures, IterationRecord, Meta};
 pub(super) struct Stored {
     /// The run.
     pub(super) record: IterationRecord,
-    /// The law was asked about it, and its decision is to be added.
+    /// True if the law was asked about it, and its decision is to be added.
     pub(super) asked: bool,
     /// Its key, or the reason why it is not stored; `None` if an earlier one could not be stored.
     pub(super) result: Option<Result<i64, LibraryError>>,
@@ -35,7 +35,7 @@ pub(super) enum StoreEvent {
 
 /// Request to the library.
 pub(super) enum StoreRequest {
-    /// Append a run; whether the law was asked about it.
+    /// Append a run; true if the law was asked about it.
     Append(Box<IterationRecord>, bool),
     /// Add the law's decision to a stored run.
     Amend(i64, Figures),
@@ -43,9 +43,9 @@ pub(super) enum StoreRequest {
 
 /// The library, with the thread that writes to it.
 pub(super) enum Keeper {
-    /// In the caller's thread: the result is there at once.
+    /// In the caller's thread: the result is available at once.
     InLine { store: Store, done: VecDeque<StoreEvent> },
-    /// On a thread of its own.
+    /// On its own thread.
     Thread {
         requests: Option<Sender<StoreRequest>>,
         events: Receiver<StoreEvent>,
@@ -67,7 +67,8 @@ impl Keeper {
             .spawn(move || {
                 for request in received {
                     if let Some(came) = store.execute(request) {
-                        // There is no receiver after a panic of the campaign; the run is stored all the same.
+                        // There is no receiver after a panic of the campaign; the run is stored
+                        // nevertheless.
                         let _ = done.send(came);
                     }
                 }
@@ -117,7 +118,7 @@ impl Keeper {
         rest
     }
 
-    /// Tries once more to store a run, now that the axes are at rest.
+    /// Retries to store a run, now that the axes are at rest.
     pub(super) fn retry(&mut self, record: &IterationRecord) -> Option<i64> {
         match self {
             Self::InLine { store, .. } => store.library.append(&store.meta, record).ok(),

@@ -18,9 +18,9 @@ pub(super) struct UpdateResult {
     pub(super) input: Result<Vec<f64>, LearningError>,
     /// Computing time.
     pub(super) update_ms: f64,
-    /// Remark of the law, for people.
+    /// Status message of the law.
     pub(super) remark: Option<String>,
-    /// State of the law: learning, at rest, or rolling back.
+    /// State of the law: learning, paused, or rolling back.
     pub(super) standing: Standing,
 }
 
@@ -47,9 +47,9 @@ pub(super) enum LearningRequest {
 
 /// A law, with the thread that it computes on.
 pub(super) enum Learner {
-    /// In the caller's thread: the result is there at once, always at the same tick.
+    /// In the caller's thread: the result is available at once, always at the same tick.
     InLine { law: Box<dyn Law>, done: Option<UpdateResult> },
-    /// On a thread of its own: the loop's thread and the caller's go on meanwhile.
+    /// On its own thread: the loop's thread and the caller's continue meanwhile.
     Thread {
         requests: Option<Sender<LearningRequest>>,
         results: Receiver<UpdateResult>,
@@ -102,14 +102,14 @@ impl Learner {
             Self::Thread { requests: Some(requests), .. } => {
                 let (input, error, next_disturbance) =
                     (input.to_vec(), error.to_vec(), next_disturbance.to_vec());
-                // A thread that is gone never answers; the old input is then repeated and counted.
+                // A thread that has died never answers; the old input is then repeated and counted.
                 let _ = requests.send(LearningRequest::Learn { input, error, next_disturbance });
             }
             Self::Thread { .. } => {}
         }
     }
 
-    /// Sets the disturbance of the next run, where there is nothing to learn from the last one.
+    /// Sets the disturbance of the next run if there is nothing to learn from the last one.
     pub(super) fn set_disturbance(&mut self, next_disturbance: &[f64]) {
         match self {
             Self::InLine { law, .. } => set_disturbance(law.as_mut(), next_disturbance),
@@ -143,7 +143,7 @@ impl Learner {
 }
 
 impl Learner {
-    /// Waits for the update from the last run, so that the run's record says whether the law rolled back.
+    /// Waits for the update from the last run, so that the run's record states a rollback.
     pub(super) fn take_last(&mut self) -> Option<UpdateResult> {
         match self {
             Self::InLine { done, .. } => done.take(),

@@ -1,8 +1,8 @@
-//! The campaign: brings the nodes up, paces the loop, learns between runs, keeps every run, and publishes
-//! what happens.
+//! The campaign: brings the nodes up, paces the loop, learns between runs, stores every run, and
+//! publishes events.
 //!
-//! The owner of loop, library and telemetry; only `cli` and the Python bindings import it. Cold: it reads
-//! the loop's mailbox and never shares anything else with it.
+//! The owner of loop, library and telemetry; only `cli` and the Python bindings import it. Cold: it
+//! reads the loop's mailbox and never shares anything else with it.
 
 mod announce;
 mod claim;

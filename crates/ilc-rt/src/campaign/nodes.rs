@@ -49,7 +49,7 @@ pub(super) fn start(
     })
 }
 
-/// Listens before anything is sent: a bus with another master is left alone.
+/// Listens before anything is sent: a bus with another master is refused.
 fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
     let numbers = cell.axes.iter().map(|axis| axis.node);
     let numbers = numbers.chain(cell.tcp_encoder.iter().map(|tool| tool.node));
@@ -63,7 +63,7 @@ fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
     }
 }
 
-/// Returns what the drive of an axis is set up to.
+/// Returns the configuration of the drive of an axis.
 ///
 /// # Errors
 /// [`ConfigError`] for a node number or a scale that validation would have refused.
@@ -79,7 +79,8 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let unsigned = |value_si: f64| (value_si * axis.counts_per_m).round() as u32;
     let signed = |value_si: f64| scale.to_counts(value_si).unwrap_or(0);
-    // A drive brakes by itself when commands stop coming for as long as the loop waits for answers.
+    // A drive brakes on its own when commands stop arriving for as long as the loop waits for
+    // answers.
     let deadline_ms = f64::from(cell.safety.silent_cycles_max) * cell.cycle_s() * 1e3;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let deadline_ms = deadline_ms.ceil() as u16;

@@ -11,14 +11,14 @@ use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
 
 /// Period at which the mailbox of a loop on its own thread is read.
 const READ_EVERY: Duration = Duration::from_millis(2);
-/// Time before a tick at which the loop's thread stops sleeping and spins.
+/// Time before a tick at which the loop's thread stops sleeping and busy-waits.
 const SPIN: Nanos = Nanos::from_micros(100);
 
 /// The loop, on its own thread or in line.
 pub(super) enum Pacer {
-    /// On a thread of its own.
+    /// On its own thread.
     Clock { thread: Option<JoinHandle<LoopResult>> },
-    /// Here, a tick at a time.
+    /// In line, one tick at a time (lock-step).
     Answers { cycle: Option<Box<Cycle>> },
 }
 
@@ -44,8 +44,8 @@ impl Pacer {
                 // Set-up of the thread is over before the first tick; no tick waits for the report.
                 let _ = report.send(thread::enter(RtRequest::default()));
                 run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
-                // At once, and not when the campaign has put its things away: by then the nodes may have
-                // missed their commands, or be in another campaign.
+                // At once, not when the campaign has finished its clean-up: by then the nodes may
+                // have missed their commands, or be in another campaign.
                 LoopResult { released: release(cycle), timing: Some(timing) }
             })
             .map_err(|source| CampaignError::Thread { what: "servo", source })?;

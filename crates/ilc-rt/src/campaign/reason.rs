@@ -1,4 +1,4 @@
-//! Reason why the axes were stopped, as a sentence that names axis, node and numbers.
+//! Reason of a stop, as a sentence that names axis, node and numbers.
 
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::config::{AxisUnit, Cell};
@@ -6,7 +6,7 @@ use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
 use crate::servo::{StopReason, Stranger};
 
-/// The sentence for a reason to stop.
+/// Returns the sentence for a stop.
 pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> String {
     let axis = |index: usize| {
         cell.axes.get(index).map_or_else(
@@ -14,7 +14,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             |axis| format!("axis {} (node {})", axis.name, axis.node),
         )
     };
-    // In lock-step the loop waits for every answer, so that the count of cycles says nothing.
+    // In lock-step the loop waits for every answer, so the count of cycles is meaningless.
     let unanswered = |cycles: u32| {
         if session.lockstep {
             format!("no answer in {} s", cell.safety.answer_timeout_s)
@@ -141,14 +141,14 @@ fn forgiven(cell: &Cell, session: &Session) -> String {
     }
 }
 
-/// Describes the position of an axis that may not be switched on there.
+/// Describes the position of an axis that may not be enabled there.
 fn outside(cell: &Cell, axis: usize, position_m: f64) -> String {
     let Some(axis) = cell.axes.get(axis) else {
         return format!("axis {axis} is at {position_m}, outside its limits");
     };
     let unit = axis.unit.symbol();
     let (low, high) = (axis.limits.position_min_m, axis.limits.position_max_m);
-    // As the counts have it, without the digits that are only rounding.
+    // With the digits of a count, without those that are only rounding.
     let resolution = 10_f64.powf(axis.counts_per_m.log10().ceil());
     let position = (position_m * resolution).round() / resolution;
     format!(
@@ -178,7 +178,7 @@ fn strange(stranger: Stranger) -> String {
     }
 }
 
-/// A distance of an axis in thousandths of its unit.
+/// Formats a distance of an axis in thousandths of its unit.
 fn distance(cell: &Cell, axis: usize, distance: f64) -> String {
     let unit = cell.axes.get(axis).map_or(AxisUnit::M, |axis| axis.unit);
     format!("{:.3} m{}", distance * 1e3, unit.symbol())

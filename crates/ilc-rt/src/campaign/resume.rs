@@ -14,20 +14,20 @@ use crate::record::{Figures, IterationRecord, Meta};
 pub(super) struct Resumed {
     /// Number and figures of the stored runs.
     pub(super) runs: Vec<(u32, Figures)>,
-    /// Input of the next run, and the time that it took to learn it.
+    /// Input of the next run, and its computing time.
     pub(super) next: Option<(Vec<f64>, f64)>,
     /// Disturbance of the next run.
     pub(super) next_disturbance: Vec<f64>,
 }
 
 impl Resumed {
-    /// Returns the number of the first run to come.
+    /// Returns the number of the next run.
     pub(super) fn next_index(&self) -> u32 {
         self.runs.last().map_or(0, |(index, _)| index + 1)
     }
 }
 
-/// Returns the newest campaign of the same fingerprint, also of libraries of older versions.
+/// Returns the newest campaign of the same fingerprint, also from libraries of older versions.
 pub(super) fn to_resume(library: &Library, plan: &Plan) -> Result<String, CampaignError> {
     if let Some(campaign) = library.newest_campaign(&plan.meta.fingerprint)? {
         return Ok(campaign);
@@ -39,8 +39,8 @@ pub(super) fn to_resume(library: &Library, plan: &Plan) -> Result<String, Campai
 }
 
 impl RollbackPolicy {
-    /// Gives a law that weighs runs by their disturbance the stored runs of this cell, program and
-    /// measurement that were made before this campaign.
+    /// Passes stored runs of this cell, program and measurement from before this campaign to a law
+    /// that weights runs by their disturbance.
     pub(super) fn recall(
         &self,
         library: &Library,
@@ -66,10 +66,9 @@ impl RollbackPolicy {
         Ok(())
     }
 
-    /// Resumes the campaign of `meta`: its runs, and the input of the next one with the time that it took
-    /// to learn it.
+    /// Resumes the campaign of `meta`: its runs, and the next input with its computing time.
     ///
-    /// All runs pass through the law again, which then has the state of an unbroken campaign.
+    /// All runs pass through the law again, which then has the state of an uninterrupted campaign.
     pub(super) fn resume(
         &mut self,
         library: &Library,

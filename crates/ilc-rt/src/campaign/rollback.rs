@@ -1,11 +1,11 @@
-//! Decision on the input of the next run: learned, the best one so far, or the last one once more.
+//! Decision on the input of the next run: learned, the best one so far, or the last one again.
 
 use crate::record::{Figures, IterationRecord};
 use crate::servo::Mailbox;
 
-/// Times that the best input is restored before learning is switched off for good.
+/// Number of rollbacks after which learning is switched off.
 const ROLLBACKS_MAX: u32 = 2;
-/// Reason why learning is off then.
+/// Reason for learning being off.
 const GROWN: &str = "the error grew twice";
 
 /// Decision after a run.
@@ -33,13 +33,13 @@ pub(super) struct RollbackPolicy {
     rollback_ratio: f64,
     best: Option<Best>,
     rollbacks: u32,
-    /// Number of the table that the next run is to use.
+    /// Number of the table for the next run.
     promised: u32,
     late_updates: u32,
-    /// Computing time of each table handed to the loop; table n at n - 1.
+    /// Computing time of each table passed to the loop; table n at n - 1.
     update_ms: Vec<f64>,
     table_in_use: u32,
-    /// Overruns are no disturbance, as the plant stood still as well.
+    /// Overruns are not a disturbance, as the plant paused as well.
     forgives_overruns: bool,
 }
 
@@ -57,24 +57,24 @@ impl RollbackPolicy {
         }
     }
 
-    /// Sets whether overruns are forgiven, as where a computer that stalls stalls the plant too: its time
-    /// passes by SYNC, so that the samples of a run with overruns are those of one without.
+    /// Sets whether overruns are forgiven: true if a stall of the computer also stalls the plant,
+    /// whose time advances by SYNC, so that the samples are those of a run without overruns.
     pub(super) fn forgiving(self, forgives_overruns: bool) -> Self {
         Self { forgives_overruns, ..self }
     }
 
-    /// Returns whether computer or bus disturbed a run, so that it is no evidence.
+    /// Returns true if computer or bus disturbed a run, so that it is not evidence.
     pub(super) fn is_disturbed(&self, figures: &Figures) -> bool {
         figures.missing_samples > 0 || figures.overruns > 0 && !self.forgives_overruns
     }
 
-    /// Notes that a run began with a table.
+    /// Records that a run began with a table.
     pub(super) fn started(&mut self, table: u32) {
         self.table_in_use = table;
         self.late_updates += u32::from(table < self.promised);
     }
 
-    /// Notes that the law was asked for an update.
+    /// Records that the law was asked for an update.
     pub(super) fn asked(&mut self) {
         self.promised = self.next_number();
     }
@@ -93,13 +93,14 @@ impl RollbackPolicy {
             .unwrap_or(0.0);
     }
 
-    /// Decides what follows a run, and marks it if the best input is restored because of it.
+    /// Decides on the input after a run, and marks the run if the best input is restored because of
+    /// it.
     ///
-    /// Growth is measured in the RMS error over the best run so far. After two restorations the law
-    /// has shown that it does not converge here, and learning stays off. A run that computer or bus
-    /// disturbed (overruns, missing samples) is no evidence, for the law or against it, be it the first
-    /// or seemingly the best: its input is repeated. Nor is a larger error under another disturbance than
-    /// the best run's evidence against the law: it goes on learning.
+    /// Growth is measured in the RMS error over the best run so far. After two rollbacks the law
+    /// has failed to converge, and learning stays off. A run that computer or bus disturbed
+    /// (overruns, missing samples) is no evidence for or against the law, be it the first or
+    /// seemingly the best: its input is repeated. A larger error under another disturbance than the
+    /// best run's is no evidence against the law either: it continues to learn.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
         let rms = record.figures.judged_by();
         let off = self.rollbacks >= ROLLBACKS_MAX;
@@ -141,10 +142,11 @@ impl RollbackPolicy {
         }
     }
 
-    /// Hands the loop the input of its next run.
+    /// Passes the input of the next run to the loop.
     pub(super) fn send(&mut self, mail: &mut Mailbox, input: Vec<f64>, update_ms: f64) {
         let number = self.next_number();
-        // Refused only if two tables wait already; the run then repeats an input and is counted late.
+        // Refused only if two tables wait already; the run then repeats an input and is counted
+        // late.
         self.promised = number;
         if mail.send_table(number, input.into_boxed_slice()).is_ok() {
             self.update_ms.push(update_ms);
@@ -227,7 +229,7 @@ mod tests {
             record
         };
         let mut policy = RollbackPolicy::new(1.5);
-        // The first one neither, nor one that seems to be the best.
+        // Neither the first run nor one that seems to be the best.
         assert_eq!(policy.decide(&mut disturbed(0.1, 0, 1)), Decision::Hold);
         assert_eq!(policy.decide(&mut record(1.0)), Decision::Learn);
         let mut worse = disturbed(9.0, 3, 0);

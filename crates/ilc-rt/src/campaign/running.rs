@@ -46,18 +46,18 @@ pub(super) struct Running<'a> {
     pub(super) unjudged: VecDeque<(i64, usize)>,
     /// Updates from runs that are not stored yet, oldest first.
     pub(super) updates: VecDeque<UpdateResult>,
-    /// Updates that the law on its thread still owes.
+    /// Number of updates that the law's thread has not delivered yet.
     pub(super) awaited: u32,
     /// Latest remark of the law.
     remark: Option<String>,
-    /// Reason why no more runs can be stored: the axes are stopped, as nothing may be lost.
+    /// Reason why no more runs can be stored: the axes are stopped, so that no run is lost.
     pub(super) failure: Option<(FaultKind, String)>,
     pub(super) phase_iteration: u32,
     progress_every: u32,
     n_samples: usize,
 }
 
-/// Parts of a campaign that are made before its loop runs.
+/// Parts of a campaign that are created before its loop runs.
 pub(super) struct Parts<'a> {
     pub(super) announcer: Announcer<'a>,
     pub(super) keeper: Keeper,
@@ -173,7 +173,7 @@ impl Running<'_> {
         }
     }
 
-    /// Hands the loop the input of an update.
+    /// Passes the input of an update to the loop.
     fn send_update(&mut self, mut update: UpdateResult) -> UpdateResult {
         // Logged when it changes, not after every run.
         if update.remark != self.remark {

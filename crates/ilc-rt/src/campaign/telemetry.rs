@@ -1,7 +1,7 @@
 //! Telemetry: the events and samples of a cell, on Zenoh.
 //!
-//! A thread and a session of their own; the campaign hands over finished text through a bounded
-//! queue and drops what does not fit. Nothing here can hold up the loop, and nothing can command it.
+//! It has its own thread and session; the campaign passes formatted text through a bounded queue
+//! and drops what does not fit. It can neither delay nor command the loop.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
@@ -24,11 +24,11 @@ const CLOSE_MAX: Duration = Duration::from_secs(6);
 /// Time that subscribers may take to acknowledge the last message.
 const HEARD_MAX: Duration = Duration::from_secs(3);
 
-/// Time that the token outlives the last message: Zenoh sends declarations before data that waits, and a
-/// subscriber leaves when the token goes.
+/// Time that the token outlives the last message: Zenoh sends declarations before waiting data, and
+/// a subscriber leaves when the token disappears.
 const LINGER: Duration = Duration::from_millis(250);
 
-/// Something to publish.
+/// A message to publish.
 struct Message {
     key: &'static str,
     json: String,
@@ -40,13 +40,13 @@ struct Message {
 pub(super) struct Telemetry {
     queue: Option<SyncSender<Message>>,
     thread: Option<JoinHandle<()>>,
-    /// Never gets anything: the thread's end closes it.
+    /// Receives nothing: it closes when the thread ends.
     ended: Receiver<()>,
     dropped: u64,
 }
 
 impl Telemetry {
-    /// Starts the thread; the session opens there. A network that is not there is logged, not fatal.
+    /// Starts the thread, which opens the session. A missing network is logged, not fatal.
     pub(super) fn start(cell: &Cell) -> Result<Self, CampaignError> {
         let (queue, messages) = sync_channel(QUEUE);
         let (end, ended) = sync_channel::<()>(0);
@@ -72,7 +72,7 @@ impl Telemetry {
         match queue.try_send(Message { key, json, is_state }) {
             Ok(()) => {}
             Err(TrySendError::Full(_)) => self.dropped += 1,
-            // The thread has ended, and has said why.
+            // The thread has ended, and has logged the reason.
             Err(TrySendError::Disconnected(_)) => self.queue = None,
         }
     }
@@ -106,7 +106,7 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
     let alive = session.liveliness().declare_token(format!("{prefix}/alive")).wait()?;
     let latest: Arc<Mutex<Option<String>>> = Arc::default();
     let state_key = format!("{prefix}/state");
-    // A late joiner asks for the state and gets the latest.
+    // A late joiner queries the state and receives the latest.
     let answer = {
         let (latest, state_key) = (Arc::clone(&latest), state_key.clone());
         move |query: zenoh::query::Query| {
@@ -126,7 +126,7 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
             .congestion_control(if key == "servo" {
                 CongestionControl::Drop
             } else {
-                // Rare and not repeated, so worth waiting for a slow subscriber, here in this thread.
+                // Rare and not repeated, so worth waiting for a slow subscriber, in this thread.
                 CongestionControl::Block
             })
             .encoding(zenoh::bytes::Encoding::APPLICATION_JSON)

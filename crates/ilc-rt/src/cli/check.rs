@@ -1,4 +1,4 @@
-//! `ilc-rt check`: what a cell description would do, without touching a bus.
+//! `ilc-rt check`: dry run of a cell description, without opening a bus.
 
 use std::path::PathBuf;
 
@@ -80,7 +80,7 @@ fn describe(arguments: &CheckArguments) -> Result<(), DesignError> {
     Ok(())
 }
 
-/// Describes rollback, gate and ladder, which decide on the next input beside the law.
+/// Describes rollback, gate and ladder, which decide on the next input besides the law.
 fn learning(cell: &Cell) -> Vec<String> {
     let learning = &cell.learning;
     if learning.law == LawName::None {
@@ -129,7 +129,8 @@ fn path(cell: &Cell, plan: &Plan) -> String {
     format!("{kind}, {}", told.collect::<Vec<_>>().join(" and "))
 }
 
-/// Length of the path of some axes, and its longest step from one set point to the next.
+/// Returns the length of the path of some axes, and its longest step from one set point to the
+/// next.
 fn course(reference_m: &[f64], n_axes: usize, axes: &[usize]) -> (f64, f64) {
     let rows = || reference_m.chunks_exact(n_axes);
     let steps = rows()
@@ -138,8 +139,8 @@ fn course(reference_m: &[f64], n_axes: usize, axes: &[usize]) -> (f64, f64) {
     steps.fold((0.0, 0.0_f64), |(sum, most), step| (sum + step, most.max(step)))
 }
 
-/// A tolerance of the gate in the unit of the axes; both units where lengths and angles are judged by
-/// the same number.
+/// Formats a tolerance of the gate in the unit of the axes; in both units if lengths and angles
+/// share the figure.
 fn tolerance(cell: &Cell, value: f64) -> String {
     let has = |unit| cell.axes.iter().any(|axis| axis.unit == unit);
     let number = format!("{:.3}", value * 1e6);

@@ -19,7 +19,8 @@ pub(super) struct CompletionsArguments {
 pub(super) fn completions(arguments: &CompletionsArguments, mut command: Command) -> u8 {
     let mut script = Vec::new();
     generate(arguments.shell, &mut command, "ilc-rt", &mut script);
-    // The generator for bash says one name in two ways if it has a hyphen, and so completes no options.
+    // The generator for bash writes one name in two ways if it has a hyphen, and then completes no
+    // options.
     let script = String::from_utf8_lossy(&script).replace("ilc__subcmd__rt__", "ilc__rt__");
     if show::print(&script) { 0 } else { EXIT_FAILURE }
 }

@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 use super::show;
 use crate::record::{TEXT_MAX, printable, printable_json};
 
-/// Name of standard output in the place of a file.
+/// Name of standard output in place of a file.
 const STANDARD_OUTPUT: &str = "-";
 
-/// A place for figures that can be written, as far as the system can tell.
+/// A writable place for figures, as far as the system can tell.
 pub(super) struct FiguresFile {
     path: PathBuf,
     is_new: bool,
 }
 
 impl FiguresFile {
-    /// Opens the file without changing it; says in one line why it cannot be, if so. For `-` all other
-    /// lines go to standard error from now on, so that the figures stand alone, which they cannot beside
-    /// `events`.
+    /// Opens the file without changing it; otherwise prints the reason in one line. For `-` all
+    /// other lines go to standard error from now on, so that the figures stand alone, which they
+    /// cannot beside `events`.
     pub(super) fn reserve(path: &Path, events: bool) -> Option<Self> {
         if path.as_os_str() == STANDARD_OUTPUT {
             if events {
@@ -38,15 +38,15 @@ impl FiguresFile {
         }
     }
 
-    /// Leaves no trace of a file that was not there before.
+    /// Deletes a file that did not exist before.
     pub(super) fn give_up(&self) {
         if self.is_new {
-            // Nothing depends on it: what remains would be an empty file.
+            // A failure is harmless: an empty file remains.
             let _ = std::fs::remove_file(&self.path);
         }
     }
 
-    /// Writes the figures; returns whether they are there now.
+    /// Writes the figures; returns true on success.
     pub(super) fn write(&self, figures: &serde_json::Value) -> bool {
         let text = printable_json(&format!("{figures:#}\n"));
         if self.path.as_os_str() == STANDARD_OUTPUT {

@@ -40,7 +40,7 @@ pub struct IdentifyOptions {
     pub session: Session,
 }
 
-/// An experiment, and the model found by it.
+/// An experiment, and its model.
 type Found = (Experiment, Identified);
 
 /// Identifies an axis; returns the exit status.
@@ -64,7 +64,7 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> u8 {
             let doubt = found.as_ref().and_then(|(_, identified)| identified.doubt);
             let axis = found.as_ref().map_or_else(String::new, |(made, _)| made.axis.clone());
             let written = match (&file, &found) {
-                // The measurement is written all the same: it shows what is wrong.
+                // The measurement is written anyway: it shows the problem.
                 (Some(file), Some((made, identified))) => {
                     file.write(&figures(&cell, made, identified))
                 }
@@ -141,7 +141,7 @@ fn excite(
     Ok((outcome, Some(signals)))
 }
 
-/// Describes what was found; an output that does not follow its input has no figures of `[axis.model]`.
+/// Describes the result; without a response there is no `[axis.model]`.
 fn describe(experiment: &Experiment, found: &Identified) -> String {
     let worst = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
     let head = format!(
@@ -182,7 +182,7 @@ fn describe(experiment: &Experiment, found: &Identified) -> String {
     )
 }
 
-/// Returns the content of the file of `--json`, with the keys of that of `ilc identify`.
+/// Returns the content of the `--json` file, with the keys of `ilc identify`'s.
 fn figures(cell: &Cell, made: &Experiment, found: &Identified) -> serde_json::Value {
     let (fit, measured) = (&found.fit, &found.measured);
     serde_json::json!({

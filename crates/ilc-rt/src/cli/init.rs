@@ -10,7 +10,7 @@ use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
 use crate::config::Cell;
 use crate::schema::{inlined, template};
 
-/// The cell whose values the template has.
+/// The cell with the values of the template.
 const EXAMPLE: &str =
     include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/01_gantry.toml"));
 /// First lines of the template.
@@ -74,7 +74,7 @@ mod tests {
         }
         let longest = found.lines().map(|line| line.chars().count()).max();
         assert!(longest < Some(120), "{longest:?}");
-        // What is commented out can be had by taking the mark away.
+        // Uncommenting a section enables it.
         let pd =
             found.replace("# [learning.pd]", "[learning.pd]").replace("# kp = 0.5", "kp = 0.4");
         assert!((parse(&pd).learning.pd.kp - 0.4).abs() < 1e-12);

@@ -69,14 +69,14 @@ pub fn main() -> ExitCode {
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .without_time()
-        // A reader who has gone must not end the program: no complaint about complaints.
+        // A closed standard error must not end the program: errors of logging are ignored.
         .log_internal_errors(false)
         .with_target(false)
         .with_filter(filter.unwrap_or_else(|| Targets::new().with_target("ilc_rt", Level::INFO)));
     tracing_subscriber::registry().with(lines).init();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        // What is printed by --help and --version comes as an error as well.
+        // The output of --help and --version arrives as an error as well.
         Err(answer) if answer.exit_code() == 0 => {
             show::say(&answer.render().to_string().trim_end());
             return ExitCode::SUCCESS;

@@ -1,4 +1,5 @@
-//! Options as data: their description for other programs, and their parsing from those programs' words.
+//! Options as data: their description for other programs, and their parsing from those programs'
+//! words.
 //!
 //! `ilc` and the Python package offer the options of [`crate::campaign::Options`] and
 //! [`crate::identification::ExperimentOptions`] under the same names, with the same defaults and help.

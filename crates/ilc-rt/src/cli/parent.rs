@@ -1,12 +1,12 @@
-//! The program that started this one, and what to do when it is gone.
+//! The parent program, and the reaction to its end.
 
 use std::io::Read;
 
-/// Does something when the other end of standard input closes, as it does when the program that holds it
-/// ends, however it ends.
+/// Calls a function when the other end of standard input closes, which happens whenever the program
+/// that holds it ends.
 ///
 /// # Errors
-/// If the thread that waits cannot be started.
+/// If the waiting thread cannot be started.
 pub fn when_parent_ends(act: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     let wait = move || {
         let mut said = [0; 64];

@@ -1,12 +1,12 @@
-//! Numbers for people: three digits, a unit with a sensible prefix, and a change in percent.
+//! Formatting of numbers: three digits, a unit with a suitable prefix, and a change in percent.
 
-/// Change beyond which a percentage says nothing any more.
+/// Change beyond which a percentage is meaningless.
 const CHANGE_MAX_PERCENT: f64 = 1e4;
 
-/// A unit to print a quantity in that is kept in metres or radians.
+/// Display unit of a quantity in metres or radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Unit {
-    /// As it is written.
+    /// Its symbol.
     pub(super) symbol: &'static str,
     scale: f64,
     milli: &'static str,
@@ -14,12 +14,12 @@ pub(super) struct Unit {
 }
 
 impl Unit {
-    /// Micrometres, as errors usually are.
+    /// Micrometres, the usual unit of errors.
     pub(super) const LENGTH: Self = Self { symbol: "um", scale: 1e6, milli: "mm", nano: "nm" };
     /// Microradians.
     pub(super) const ANGLE: Self = Self { symbol: "urad", scale: 1e6, milli: "mrad", nano: "nrad" };
 
-    /// Returns this unit with the prefix that suits a quantity of this size.
+    /// Returns this unit with a suitable prefix for a quantity of this size.
     pub(super) fn for_size(self, value: f64) -> Self {
         match value.abs() {
             size if size >= 1e-2 && size.is_finite() => {
@@ -30,18 +30,18 @@ impl Unit {
         }
     }
 
-    /// A quantity as a number in this unit.
+    /// Formats a quantity as a number in this unit.
     pub(super) fn of(self, value: f64) -> String {
         digits(value * self.scale)
     }
 
-    /// A quantity as a number with its unit.
+    /// Formats a quantity as a number with its unit.
     pub(super) fn with(self, value: f64) -> String {
         format!("{} {}", self.of(value), self.symbol)
     }
 }
 
-/// Three significant digits without an exponent, where that is possible; `-` for what is no number.
+/// Formats three significant digits, if possible without an exponent; `-` for NaN and infinity.
 pub(super) fn digits(value: f64) -> String {
     match value.abs() {
         size if !size.is_finite() => "-".to_owned(),
@@ -54,13 +54,14 @@ pub(super) fn digits(value: f64) -> String {
     }
 }
 
-/// Change in percent; none where there is nothing to compare with, or no percentage tells it.
+/// Returns the change in percent; `None` without a reference value, or beyond a meaningful
+/// percentage.
 fn percent(before: f64, after: f64) -> Option<f64> {
     let percent = (after / before - 1.0) * 100.0;
     (before > 0.0 && percent.abs() <= CHANGE_MAX_PERCENT).then_some(percent)
 }
 
-/// A change with its sign: `-94.0 %`.
+/// Formats a change with its sign: `-94.0 %`.
 pub(super) fn change(before: f64, after: f64) -> Option<String> {
     percent(before, after).map(|percent| match format!("{percent:+.1} %") {
         zero if zero == "-0.0 %" || zero == "+0.0 %" => "0.0 %".to_owned(),
@@ -68,7 +69,7 @@ pub(super) fn change(before: f64, after: f64) -> Option<String> {
     })
 }
 
-/// A change in words: `94.0 % less`.
+/// Formats a change in words: `94.0 % less`.
 pub(super) fn less(before: f64, after: f64) -> Option<String> {
     percent(before, after).map(|percent| {
         let way = if percent > 0.0 { "more" } else { "less" };

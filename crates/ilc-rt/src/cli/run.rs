@@ -85,7 +85,7 @@ pub(super) fn say_event(event: &Event, stop: &AtomicI32) {
     if let Ok(text) = serde_json::to_string(event)
         && !show::say_json(&text)
     {
-        // The reader of the events is gone, and with it the one who would notice trouble.
+        // The reader of the events is gone, so trouble would go unnoticed.
         stop.store(SIGPIPE, Ordering::Relaxed);
     }
 }
@@ -108,8 +108,8 @@ pub(super) fn open(file: &Path, bus: Option<&str>) -> Result<(Cell, Box<dyn Bus>
     Ok((cell, bus))
 }
 
-/// Returns a number that signal handlers set: the loop reads it and brings the axes to rest. The end of a
-/// parent counts as a signal.
+/// Returns a number that signal handlers set: the loop reads it and brings the axes to rest. The
+/// end of a parent counts as a signal.
 pub(super) fn stop_on_signals(with_parent: bool) -> Arc<AtomicI32> {
     let stop = Arc::new(AtomicI32::new(0));
     if with_parent {
@@ -143,10 +143,10 @@ pub(super) fn stop_on_signals(with_parent: bool) -> Arc<AtomicI32> {
     stop
 }
 
-/// Returns whether a signal is ignored, as SIGHUP is under `nohup`: then it stays so.
+/// Returns true if a signal is ignored, e.g. SIGHUP under `nohup`: it then stays ignored.
 fn is_ignored(signal: i32) -> bool {
     #[expect(unsafe_code, reason = "neither the standard library nor signal-hook can ask")]
-    // SAFETY: zeros are a valid sigaction; with no new action the call only writes the present one.
+    // SAFETY: zeros are a valid sigaction; with no new action the call only writes the current one.
     unsafe {
         let mut present: libc::sigaction = std::mem::zeroed();
         libc::sigaction(signal, std::ptr::null(), &raw mut present) == 0
@@ -178,7 +178,7 @@ fn finish(figures_file: Option<&FiguresFile>, outcome: &Outcome) -> u8 {
     exit_status(outcome, written)
 }
 
-/// The exit status of a campaign; complains if a fault ended it.
+/// Returns the exit status of a campaign; prints an error if a fault ended it.
 pub(super) fn exit_status(outcome: &Outcome, written: bool) -> u8 {
     match outcome.status {
         EndStatus::Completed if written => 0,

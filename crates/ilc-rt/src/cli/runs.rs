@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use super::quantity::{Unit, change, digits, less};
 use crate::record::{AxisKinds, Figures};
 
-/// Part of the last run's error that a better one must have fallen to, to be worth a word.
+/// Share of the last run's error below which a better run is mentioned.
 const BEST_SHARE: f64 = 0.9;
 
-/// The runs of a campaign as they come.
+/// The runs of a campaign as they arrive.
 #[derive(Default)]
 pub(super) struct Runs {
     kinds: Option<AxisKinds>,
@@ -20,12 +20,12 @@ pub(super) struct Runs {
 }
 
 impl Runs {
-    /// A campaign begins: these are the units of its inputs.
+    /// Starts a campaign with the units of its inputs.
     pub(super) fn begin(&mut self, input_units: &[String], n_axes: usize) {
         self.kinds = Some(AxisKinds::new(input_units, n_axes));
     }
 
-    /// A row of the table, with the heading before the first one and a remark after it.
+    /// Returns a row of the table, with the heading before the first one and a remark after it.
     pub(super) fn row(&mut self, index: u32, figures: &Figures) -> String {
         self.ended.push((index, figures.clone()));
         let heading = heading(&self.columns());
@@ -122,13 +122,13 @@ impl Runs {
         )
     }
 
-    /// The largest of an error over the runs: its unit suits it.
+    /// Returns the largest value of an error over the runs, which determines its unit.
     fn size(&self, of: impl Fn(&Figures) -> Option<f64>) -> f64 {
         let errors = self.ended.iter().filter_map(|(_, figures)| of(figures));
         errors.filter(|error| error.is_finite()).fold(0.0, f64::max)
     }
 
-    /// Returns whether runs are compared by their contour error, as where every run has one.
+    /// Returns true if runs are compared by their contour error, i.e. if every run has one.
     fn by_contour(&self) -> bool {
         self.ended.iter().all(|(_, figures)| figures.contour_inf_m.is_some())
             && self.ended.first().is_some_and(|(_, first)| first.contour_inf_m > Some(0.0))
@@ -192,7 +192,7 @@ fn heading(columns: &[Column<'_>]) -> String {
     )
 }
 
-/// Largest tracking error of the axes of a kind.
+/// Returns the largest tracking error of the axes of a kind.
 fn largest(figures: &Figures, kinds: &AxisKinds, rotary: bool) -> Option<f64> {
     let axes = kinds.of_kind(rotary);
     axes.iter()

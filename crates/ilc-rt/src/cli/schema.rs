@@ -1,4 +1,4 @@
-//! `ilc-rt schema`: the JSON schema of the cell description, and the tables of documents that come from it.
+//! `ilc-rt schema`: the JSON schema of the cell description, and the derived tables of documents.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! Text for people: the table of runs, and lines on standard error.
+//! Printed text: the table of runs, and lines on standard error.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,8 +12,8 @@ pub(super) fn complain(line: &dyn std::fmt::Display) {
     let _ = writeln!(std::io::stderr(), "ilc-rt: {line}");
 }
 
-/// Prints one line on standard output; returns whether it could be written. A reader who has gone
-/// must not end the program while axes move.
+/// Prints one line on standard output; returns true on success. A closed output must not end the
+/// program while axes move.
 pub(super) fn say(line: &dyn std::fmt::Display) -> bool {
     let line = printable_lines(&line.to_string());
     if ASIDE.load(Ordering::Relaxed) {
@@ -22,21 +22,21 @@ pub(super) fn say(line: &dyn std::fmt::Display) -> bool {
     writeln!(std::io::stdout(), "{line}").is_ok()
 }
 
-/// Set where lines for people go to standard error, as figures go to standard output.
+/// True if readable lines go to standard error, as figures go to standard output.
 static ASIDE: AtomicBool = AtomicBool::new(false);
 
-/// Lets lines for people go to standard error from now on.
+/// Redirects readable lines to standard error from now on.
 pub(super) fn leave_standard_output() {
     ASIDE.store(true, Ordering::Relaxed);
 }
 
-/// Prints a text on standard output as it is; returns whether it could be written.
+/// Prints a text on standard output unchanged; returns true on success.
 pub(super) fn print(text: &str) -> bool {
     let mut out = std::io::stdout();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).is_ok()
 }
 
-/// Prints JSON in one line; returns whether it could be written.
+/// Prints JSON in one line; returns true on success.
 pub(super) fn say_json(text: &str) -> bool {
     writeln!(std::io::stdout(), "{}", printable_json(text)).is_ok()
 }

@@ -1,4 +1,4 @@
-//! The sections of a cell description that concern the machine: cell, bus, axes, safety.
+//! Sections of a cell description for the machine: cell, bus, axes, safety.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ pub use crate::interpolate::AxisUnit;
 use crate::schema::field_order;
 use crate::trajectory::kind::Program;
 
-/// A whole cell description, validated.
+/// A complete, validated cell description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
@@ -59,7 +59,7 @@ pub struct CellSection {
     pub cycle_us: u32,
 }
 
-/// `[bus]`: which bus and how much of it may be used.
+/// `[bus]`: address and load limit of the bus.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
@@ -89,10 +89,10 @@ fn default_load_max() -> f64 {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Axis {
-    /// Name, as `"x"`: 1 to 64 characters without control characters, no spaces around; no two axes of
-    /// one name, also without case and spaces.
+    /// Name, such as `"x"`: 1 to 64 characters without control characters, no leading or trailing
+    /// spaces; unique, ignoring case and spaces.
     pub name: String,
-    /// CANopen node of the drive, each once.
+    /// CANopen node of the drive, unique.
     #[schemars(range(min = 1, max = 127))]
     pub node: u8,
     /// Command interface. `csp`: the drive closes the position loop, the learned input (m) is added to
@@ -103,13 +103,13 @@ pub struct Axis {
     /// `_m_s`, … is in rad, rad/s, …
     #[serde(default)]
     pub unit: AxisUnit,
-    /// Counts of the drive's encoder in one metre (or radian); the farthest position and the highest
+    /// Encoder counts of the drive per metre (or radian); the farthest position and the highest
     /// speed must fit 32 bits.
     #[schemars(range(min = 1.0, max = 1e10))]
     pub counts_per_m: f64,
     /// `[axis.limits]`
     pub limits: Limits,
-    /// `[axis.model]`: what learning believes of the axis.
+    /// `[axis.model]`: the model that learning uses.
     pub model: AxisModel,
     /// `[axis.position_loop]`: for `interface = "csv"` only.
     pub position_loop: Option<PositionLoop>,
@@ -118,7 +118,7 @@ pub struct Axis {
     pub simulation: AxisSimulation,
 }
 
-/// `[axis.limits]`: what must never be exceeded.
+/// `[axis.limits]`: limits that are never exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
@@ -129,16 +129,16 @@ pub struct Limits {
     /// Highest position.
     #[schemars(range(min = -1000.0, max = 1000.0))]
     pub position_max_m: f64,
-    /// Highest speed.
+    /// Velocity limit.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub velocity_max_m_s: f64,
-    /// Highest acceleration, also of a controlled stop.
+    /// Acceleration limit, also of a controlled stop.
     #[schemars(range(min = 0.0001, max = 1e4))]
     pub acceleration_max_m_s2: f64,
-    /// Highest jerk.
+    /// Jerk limit.
     #[schemars(range(min = 0.001, max = 1e7))]
     pub jerk_max_m_s3: f64,
-    /// Distance between set point and encoder at which drive and controller fault.
+    /// Following error at which drive and controller fault.
     #[schemars(range(min = 1e-7, max = 1.0))]
     pub following_error_max_m: f64,
 }
@@ -157,8 +157,9 @@ pub struct AxisModel {
     /// Bandwidth of the drive's velocity loop, first order; csv only.
     #[schemars(range(min = 0.1, max = 1e4))]
     pub velocity_bandwidth_hz: Option<f64>,
-    /// Servo cycles from a command to its first effect, beyond the one of the sampler. A drive that
-    /// interpolates its set points adds one; a little more makes up for lags that the model leaves out.
+    /// Dead time: servo cycles from a command to its first effect, in addition to that of the
+    /// sampler. A drive that interpolates its set points adds one; a little more compensates
+    /// unmodelled lags.
     #[serde(default)]
     #[schemars(range(min = 0, max = 20))]
     pub delay_samples: u32,
@@ -169,16 +170,16 @@ pub struct AxisModel {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct PositionLoop {
-    /// Velocity per position error, kv.
+    /// Position gain kv: velocity per position error.
     #[schemars(range(min = 0.01, max = 1000.0))]
     pub gain_per_s: f64,
-    /// Share of the reference velocity that is fed forward, 0 to 1.
+    /// Velocity feed-forward, 0 to 1: share of the reference velocity.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub velocity_feedforward: f64,
 }
 
-/// `[tcp_encoder]`: a node that measures the tool centre point, one coordinate an axis.
+/// `[tcp_encoder]`: a node that measures the tool centre point, one coordinate per axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
@@ -186,24 +187,24 @@ pub struct TcpEncoder {
     /// CANopen node, 1 to 127.
     #[schemars(range(min = 1, max = 127))]
     pub node: u8,
-    /// Counts in one metre, both coordinates.
+    /// Counts per metre, both coordinates.
     #[schemars(range(min = 1.0, max = 1e10))]
     pub counts_per_m: f64,
 }
 
-/// `[safety]`: when to stop without being told.
+/// `[safety]`: conditions of a controlled stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Safety {
-    /// Cycles without any one PDO of a node before a controlled stop; drives stop as well when commands
-    /// stay away as long.
+    /// Cycles without any one PDO of a node before a controlled stop; drives stop after the same
+    /// time without commands.
     #[schemars(range(min = 1, max = 1000))]
     pub silent_cycles_max: u32,
-    /// Cycles missed in a row before a controlled stop.
+    /// Consecutive missed cycles before a controlled stop.
     #[schemars(range(min = 1, max = 10_000))]
     pub overrun_cycles_max: u32,
-    /// Longest time that a node may take to boot and to answer.
+    /// Time-out for a node to boot and to answer.
     #[schemars(range(min = 0.01, max = 60.0))]
     pub answer_timeout_s: f64,
 }
@@ -214,18 +215,18 @@ impl Default for Safety {
     }
 }
 
-/// `[telemetry]`: what is seen from outside, on Zenoh.
+/// `[telemetry]`: publication on Zenoh.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Telemetry {
     /// Publish on Zenoh.
     pub enabled: bool,
-    /// Zenoh endpoints to listen on, as `tcp/127.0.0.1:7447`.
+    /// Zenoh endpoints to listen on, e.g. `tcp/127.0.0.1:7447`.
     pub listen: Vec<String>,
     /// Zenoh endpoints to connect to.
     pub connect: Vec<String>,
-    /// Look for other programs by multicast.
+    /// Discover other programs by multicast.
     pub scouting: bool,
 }
 
@@ -264,17 +265,17 @@ impl Cell {
         Ok(cell)
     }
 
-    /// The servo cycle in seconds.
+    /// Returns the servo cycle in seconds.
     pub fn cycle_s(&self) -> f64 {
         f64::from(self.cell.cycle_us) * 1e-6
     }
 
-    /// Unit of each axis, in their order.
+    /// Returns the unit of each axis, in order.
     pub fn units(&self) -> Vec<AxisUnit> {
         self.axes.iter().map(|axis| axis.unit).collect()
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     pub fn n_axes(&self) -> usize {
         self.axes.len()
     }

@@ -3,13 +3,13 @@
 use crate::record::{TEXT_MAX, printable};
 use crate::schema::Violation;
 
-/// Most characters of a value that is refused.
+/// Largest number of characters shown of a refused value.
 const VALUE_MAX: usize = 80;
 
 /// A refused cell description.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConfigError {
-    /// The file could not be read.
+    /// An unreadable file.
     #[error("{file}: cannot be read: {reason}")]
     Read {
         /// The path as given.
@@ -17,24 +17,24 @@ pub enum ConfigError {
         /// Reason given by the operating system.
         reason: String,
     },
-    /// The text is not TOML, or a key is unknown, missing or of the wrong type.
+    /// Invalid TOML, or a key that is unknown, missing or of the wrong type.
     #[error("{file}:{line}: {key}: {reason}")]
     Syntax {
         /// The path as given.
         file: String,
         /// Line of the file, from 1.
         line: usize,
-        /// Table and key, as `[axis.limits] position_min_m`.
+        /// Table and key, e.g. `[axis.limits] position_min_m`.
         key: String,
         /// Reason, and what is allowed.
         reason: String,
     },
-    /// A value is out of its range, or two values contradict each other.
+    /// A value out of its range, or two contradictory values.
     #[error("{file}: {key} = {value}: {allowed}")]
     Value {
         /// The path as given.
         file: String,
-        /// Table and key, as `[[axis]] x: limits.position_min_m`.
+        /// Table and key, e.g. `[[axis]] x: limits.position_min_m`.
         key: String,
         /// The value found.
         value: String,
@@ -44,7 +44,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// Refuses a value of a file.
+    /// Returns the refusal of a value of a file.
     pub(crate) fn value(file: &str, violation: &Violation) -> Self {
         let Violation { key, value, allowed } = violation;
         Self::Value {

@@ -1,4 +1,4 @@
-//! Files that a cell description is read from, or names: regular ones of a bounded size.
+//! Files that contain a cell description, or that it names: regular ones of a bounded size.
 
 use std::fs::OpenOptions;
 use std::io::Read as _;
@@ -8,14 +8,14 @@ use std::path::{Component, Path};
 /// Largest cell description.
 pub const CELL_BYTES_MAX: u64 = 16 << 20;
 
-/// Reads a regular file of at most so many bytes.
+/// Reads a regular file of a bounded size.
 ///
 /// Pipes and devices are refused without waiting for them.
 ///
 /// # Errors
 /// The reason in a few words.
 pub fn read_file(path: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
-    // Without this the opening of a pipe waits for the one who writes to it.
+    // Otherwise opening a pipe would wait for its writer.
     let file = OpenOptions::new()
         .read(true)
         .custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY)
@@ -30,7 +30,7 @@ pub fn read_file(path: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
         return Err(too_large());
     }
     let mut bytes = Vec::new();
-    // The size may be another one by now, and some files do not tell theirs.
+    // The size may have changed since, and some files do not report theirs.
     file.take(bytes_max + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
     if bytes.len() as u64 > bytes_max {
         return Err(too_large());
@@ -38,7 +38,7 @@ pub fn read_file(path: &Path, bytes_max: u64) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// Reads a file that stands in the folder of a cell description, or below it.
+/// Reads a file in the folder of a cell description, or below it.
 ///
 /// # Errors
 /// The reason in a few words: a name or a link that leads out of the folder, or as [`read_file`].

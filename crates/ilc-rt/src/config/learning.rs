@@ -1,5 +1,5 @@
-//! `[learning]`: which law learns, from what, how far it may go, and what goes round it. The tables of
-//! the laws come from their catalogue.
+//! `[learning]`: the law, its measurement and bounds, and its wrappers. The tables of the laws come
+//! from their catalogue.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,39 +10,39 @@ use crate::learning::law::catalogue::{LawName, every_law};
 use crate::learning::law::{Json, LawParameters, LawTables};
 use crate::schema::field_order;
 
-/// Growth of the RMS error over the best run at which the best input is restored, if nothing is said.
+/// Default growth of the RMS error over the best run at which the best input is restored.
 const ROLLBACK_RATIO: f64 = 1.5;
 
 macro_rules! learning {
     ($(#[doc = $does:literal] $law:ident $name:ident $parameters:ty;)*) => {
-        /// `[learning]`: which law learns, from what, and how far it may go.
+        /// `[learning]`: the law, its measurement and its bounds.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields, default)]
         #[schemars(extend("x-order" = field_order::<Self>()))]
         pub struct Learning {
             /// The law.
             pub law: LawName,
-            /// The measurement whose error is learned from; `--measure` replaces it.
+            /// The measurement to learn from; `--measure` replaces it.
             pub measure: Measure,
-            /// Largest learned input of a csp axis.
+            /// Bound of the learned input of a csp axis.
             #[schemars(range(min = 0.0, max = 1.0))]
             pub input_max_m: f64,
-            /// Largest learned input of a csv axis.
+            /// Bound of the learned input of a csv axis.
             #[schemars(range(min = 0.0, max = 10.0))]
             pub input_max_m_s: f64,
-            /// Growth of the RMS error over the best run at which the best input is restored, 1.5 if not
-            /// given; after two restorations learning stays off. Not with a gate.
+            /// Growth of the RMS error over the best run at which the best input is restored
+            /// (rollback), 1.5 by default; after two rollbacks learning stays off. Not with a gate.
             #[schemars(range(min = 1.0, max = 1e3))]
             pub rollback_ratio: Option<f64>,
             /// Start the law even if the analysis predicts divergence.
             pub allow_divergent: bool,
-            /// File that holds the disturbance of the coming run: one number or more, as temperatures,
-            /// separated by blanks or commas. It is read before every run, for the laws that ask.
+            /// File with the disturbance of the coming run: one number or more, e.g. temperatures,
+            /// separated by blanks or commas. Read before every run, for the laws that use it.
             pub disturbance_file: Option<std::path::PathBuf>,
             $(#[doc = $does] pub $name: $parameters,)*
-            /// Several runs with the same input before each step of learning.
+            /// Ladder: several runs with the same input before each step of learning.
             pub ladder: Option<LadderRule>,
-            /// When the law learns, rests, or goes back to the best input.
+            /// Gate: stops learning at a tolerance, and rolls back to the best input.
             pub gate: Option<GateParameters>,
         }
 
@@ -76,19 +76,19 @@ macro_rules! learning {
 every_law!(learning);
 
 impl Learning {
-    /// Returns the growth of the RMS error over the best run at which the campaign restores the best
-    /// input, if no gate decides instead.
+    /// Returns the growth of the RMS error over the best run at which the campaign restores the
+    /// best input, unless a gate decides.
     pub fn rollback(&self) -> f64 {
         self.rollback_ratio.unwrap_or(ROLLBACK_RATIO)
     }
 
-    /// Returns the table of the law that is named as `Debug` prints it, `()` without one.
+    /// Returns the table of the named law as `Debug` prints it, `()` without one.
     pub(crate) fn table_debug(&self) -> String {
         self.parameters(self.law).map_or_else(|| "()".to_owned(), |table| format!("{table:?}"))
     }
 
-    /// Returns law and parameters as canonical JSON, which is the same if and only if they are: what a
-    /// campaign that goes on must have in common with the one before.
+    /// Returns law and parameters as canonical JSON: equal if and only if they are; a resumed
+    /// campaign must agree in it with the earlier one.
     pub fn law_json(&self) -> serde_json::Value {
         let parameters = |law: LawName| self.parameters(law).map(Json::json);
         let core = self.parameters(self.law).and_then(LawParameters::core);
@@ -102,7 +102,7 @@ impl Learning {
     }
 }
 
-/// Measurement that is learned from.
+/// Measurement to learn from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {

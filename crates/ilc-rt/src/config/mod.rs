@@ -1,7 +1,7 @@
 //! The cell description (TOML): typed, validated, and refused in one clear line.
 //!
-//! Whoever starts a cell reads it through [`Cell::load`]: design, the binary, the simulator
-//! and Python. It knows the numbers and their ranges, and nothing of how they are used.
+//! All programs read a cell through [`Cell::load`]: design, the binary, the simulator and Python.
+//! It knows the numbers and their ranges, not their use.
 //!
 //! Family: `cell`, `mode` and `validate`: a cell is checked where it is loaded, by what the mode of each axis
 //! demands.

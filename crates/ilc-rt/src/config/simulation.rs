@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Simulation {
-    /// Error of the right angle between the first two axes: `x_tcp += orthogonality_rad * y`.
+    /// Orthogonality error of the first two axes: `x_tcp += orthogonality_rad * y`.
     #[schemars(range(min = -0.1, max = 0.1))]
     pub orthogonality_rad: f64,
     /// Step of the drives' own control loops and of the integration.
@@ -27,19 +27,19 @@ impl Default for Simulation {
     }
 }
 
-/// `[axis.simulation]`: a mass in a cascade (P position, PI velocity), friction, and one mode that
-/// only the tool centre point sees.
+/// `[axis.simulation]`: a mass in a cascade (P position, PI velocity), friction, and one flexible
+/// mode that only the tool centre point sees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct AxisSimulation {
-    /// Moving mass, the mode's included.
+    /// Moving mass, including the mode's.
     #[schemars(range(min = 0.001, max = 1e5))]
     pub mass_kg: f64,
-    /// Natural frequency for which the cascade is tuned.
+    /// Natural frequency that the cascade is tuned for.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub natural_frequency_hz: f64,
-    /// Damping ratio for which the cascade is tuned.
+    /// Damping ratio that the cascade is tuned for.
     #[schemars(range(min = 0.05, max = 5.0))]
     pub damping: f64,
     /// Integral time of the velocity controller.
@@ -57,7 +57,7 @@ pub struct AxisSimulation {
     /// Stribeck velocity.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub stribeck_m_s: f64,
-    /// Part of the mass that swings as the mode; 0 for none.
+    /// Share of the mass in the flexible mode; 0 for none.
     #[schemars(range(min = 0.0, max = 9e4))]
     pub mode_mass_kg: f64,
     /// Natural frequency of the mode.

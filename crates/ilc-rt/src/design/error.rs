@@ -1,4 +1,4 @@
-//! Refusals of a cell description that cannot be worked out.
+//! Refusals of a cell description in design.
 
 use crate::config::ConfigError;
 use crate::fieldbus::bring_up::load::LoadError;
@@ -26,7 +26,7 @@ pub enum DesignError {
     Program {
         /// Cell description.
         file: String,
-        /// `[program]`, and which axis the number in the reason stands for.
+        /// `[program]`, with the name of the axis that the reason numbers.
         key: String,
         /// Reason.
         source: Box<TrajectoryError>,
@@ -48,7 +48,7 @@ pub enum DesignError {
     Table {
         /// Table.
         file: String,
-        /// Line, what is there, and what is allowed.
+        /// Line, content, and the allowed content.
         source: TableError,
     },
     /// The part program is refused.
@@ -56,7 +56,7 @@ pub enum DesignError {
     PartProgram {
         /// Part program.
         file: String,
-        /// Line, word, and what is allowed.
+        /// Line, word, and the allowed values.
         source: GcodeError,
     },
     /// The path leaves the range of an axis.
@@ -72,9 +72,9 @@ pub enum DesignError {
         unit: &'static str,
         /// The farthest position beyond the range.
         reached_m: f64,
-        /// Smallest allowed.
+        /// Smallest value allowed.
         low_m: f64,
-        /// Largest allowed.
+        /// Largest value allowed.
         high_m: f64,
     },
     /// The model of an axis is unusable.

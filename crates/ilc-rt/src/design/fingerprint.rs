@@ -1,13 +1,13 @@
-//! Fingerprint that a campaign shares with an earlier one if it can go on with it: a digest of cell, program,
-//! measurement, law and parameters, kept with every run. `plan` asks for it, `campaign` compares it.
+//! Fingerprint by which a campaign can be resumed: a digest of cell, program, measurement, law and
+//! parameters, stored with every run. `plan` computes it, `campaign` compares it.
 
 use serde_json::json;
 
 use crate::config::Cell;
 use crate::record::{Meta, fingerprint};
 
-/// Returns the digest of the canonical JSON of all that decides what a law learns; `law` and
-/// `parameters` are those of the law that will be used.
+/// Returns the digest of the canonical JSON of everything that determines what a law learns; `law`
+/// and `parameters` are those of the law in use.
 pub(super) fn of(cell: &Cell, meta: &Meta, law: &str, parameters: &str) -> String {
     let axes: Vec<_> = cell
         .axes
@@ -32,7 +32,7 @@ pub(super) fn of(cell: &Cell, meta: &Meta, law: &str, parameters: &str) -> Strin
         "parameters": parameters,
         "input_max_m": cell.learning.input_max_m,
         "input_max_m_s": cell.learning.input_max_m_s,
-        // Of weights that vary along the run the law's own parameters do not tell every number.
+        // For time-varying weights, the law's own parameters do not contain every number.
         "learning": is_named(cell, law).then(|| cell.learning.law_json()),
     });
     fingerprint(&whole.to_string())
@@ -42,10 +42,10 @@ fn is_named(cell: &Cell, law: &str) -> bool {
     law == cell.learning.law.as_str()
 }
 
-/// Returns the digest that versions up to 0.1 kept, made of `Debug` texts: for their libraries only.
+/// Returns the digest of versions up to 0.1, made of `Debug` texts: for their libraries only.
 ///
-/// A struct whose fields change must be written out here as it was; the test below has digests that
-/// those versions made.
+/// A struct whose fields change must be written out here in its old form; the test below has
+/// digests of those versions.
 pub(super) fn legacy(cell: &Cell, meta: &Meta, law: &str, parameters: &str) -> String {
     let axes: Vec<_> = cell
         .axes

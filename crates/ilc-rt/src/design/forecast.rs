@@ -1,5 +1,5 @@
 //! Predictions before the first run: the nominal model of learning, the error of a run without
-//! learning, and whether the law will converge.
+//! learning, and convergence of the law.
 
 use super::error::DesignError;
 use super::plan::model;
@@ -11,19 +11,19 @@ use crate::model::StateSpace;
 /// Returns the model from the learned input of all axes to their positions.
 ///
 /// # Errors
-/// [`DesignError::Model`] if the cell's figures make none.
+/// [`DesignError::Model`] if the cell's parameters give no model.
 pub fn learning_model(cell: &Cell) -> Result<StateSpace, DesignError> {
     model(cell).map_err(|source| DesignError::Model { file: file(cell), source })
 }
 
-/// Returns the error of a run without learning, by the model: set point minus response.
+/// Returns the predicted error of a run without learning: set point minus response.
 ///
-/// csp: `e = d - P d`, `d` being the way from the start. csv: `e = d - P (kv d + kf d/dt d)`.
+/// csp: `e = d - P d`, `d` being the distance from the start. csv: `e = d - P (kv d + kf d/dt d)`.
 ///
 /// # Shapes
 /// - `reference_m` and the result: `n_samples` x `n_axes`, time first
 /// # Errors
-/// [`DesignError::Model`] if the cell's figures make no model.
+/// [`DesignError::Model`] if the cell's parameters give no model.
 pub fn first_error(cell: &Cell, reference_m: &[f64]) -> Result<Vec<f64>, DesignError> {
     let n_axes = cell.n_axes();
     let way = |k: usize, axis: usize| reference_m[k * n_axes + axis] - reference_m[axis];
@@ -43,9 +43,9 @@ pub fn first_error(cell: &Cell, reference_m: &[f64]) -> Result<Vec<f64>, DesignE
     Ok(response.iter().enumerate().map(|(i, y)| way(i / n_axes, i % n_axes) - y).collect())
 }
 
-/// Refuses a law that will not converge with the cell's model, unless the cell allows it; returns the
-/// verdict as a sentence, and warnings: of one whose error will rise before it falls, and of a low-pass
-/// that lets through what the law cannot learn.
+/// Refuses a law that is predicted to diverge on the cell's model, unless the cell allows it;
+/// returns the verdict as a sentence, and warnings: of an error that will rise before it falls, and
+/// of a Q-filter whose cut-off is above the critical frequency.
 pub(super) fn judge(
     law: &mut dyn Law,
     cell: &Cell,

@@ -1,6 +1,6 @@
-//! From `[learning]` to the law that a campaign uses; refuses what cannot learn before anything moves.
+//! From `[learning]` to the law of a campaign; refuses a diverging one before anything moves.
 //!
-//! `plan` hands out what is made here.
+//! `plan` returns its results.
 
 use super::error::DesignError;
 use super::forecast;
@@ -14,15 +14,15 @@ use crate::learning::{Law, LearningError};
 /// A law that may start.
 #[expect(missing_debug_implementations, reason = "laws need not have one")]
 pub struct Prepared {
-    /// The law; `None` if nothing shall be learned.
+    /// The law; `None` for no learning.
     pub law: Option<Box<dyn Law>>,
     /// Verdict of the analysis, as a sentence; empty if there is none.
     pub verdict: String,
-    /// Findings that do not keep it from starting, a sentence each.
+    /// Warnings, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Makes the law that the cell names, with what goes round it, and asks the analysis.
+/// Creates the law that the cell names, with its wrappers, and analyses it.
 pub(super) fn prepare(cell: &Cell, reference_m: &[f64]) -> Result<Prepared, DesignError> {
     let n_samples = reference_m.len() / cell.n_axes();
     let Some(law) = build_law(cell, reference_m)? else {
@@ -51,7 +51,7 @@ fn build_law(cell: &Cell, reference_m: &[f64]) -> Result<Option<Box<dyn Law>>, D
     parameters.build(&context).map(Some).map_err(|source| refused(cell, source))
 }
 
-/// Puts the ladder next to the law, the gate round both: the gate judges every run, and the input that
+/// Wraps the law in its ladder, and both in the gate: the gate judges every run, and the input that
 /// it keeps or restores is not scaled by the ladder's gain.
 fn wrap_law(law: Box<dyn Law>, cell: &Cell) -> Result<Box<dyn Law>, LearningError> {
     let mut law = law;

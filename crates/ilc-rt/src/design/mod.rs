@@ -1,9 +1,9 @@
-//! From a cell description to laws, programs and forecasts, before anything moves.
+//! From a cell description to laws, programs and predictions, before anything moves.
 //!
 //! Checks and refuses; touches neither a bus nor a library. `identification`, `campaign`, `cli` and the
 //! Python bindings may import it. Cold.
 //!
-//! Family: `forecast`, `law` and `plan` work one cell description out together.
+//! Family: `forecast`, `law` and `plan` evaluate one cell description together.
 
 mod error;
 mod fingerprint;

@@ -1,4 +1,4 @@
-//! From a cell description to what the loop and the law are made of; refuses before anything moves.
+//! From a cell description to the parts of the loop and of learning; refuses before anything moves.
 
 use std::time::Duration;
 
@@ -17,10 +17,10 @@ use crate::rt::Nanos;
 use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
 use crate::trajectory::{AxisLimits, Interpolator};
 
-/// Time that drives may take to be switched on.
+/// Timeout for enabling the drives.
 const ENABLE_S: f64 = 3.0;
 
-/// Plan of a cell's runs: nothing in it can fail any more.
+/// Plan of a cell's runs: none of its parts can fail any more.
 #[derive(Debug)]
 pub struct Plan {
     /// The servo cycle's own description; runs are filled in by the campaign.
@@ -29,7 +29,7 @@ pub struct Plan {
     pub interpolator: Interpolator,
     /// Set points of a whole run, `n_samples * n_axes`.
     pub reference_m: Vec<f64>,
-    /// Measurement that is learned from.
+    /// Measurement to learn from.
     pub measure: Measure,
     /// Provenance of the records; the campaign's name is filled in by the campaign.
     pub meta: Meta,
@@ -43,8 +43,8 @@ impl Plan {
     /// Plans the runs of a cell, with another measurement to learn from if one is given.
     ///
     /// # Errors
-    /// [`DesignError`] for a program beyond the limits, an overloaded bus, or a measurement that
-    /// is not there.
+    /// [`DesignError`] for a program beyond the limits, an overloaded bus, or a missing
+    /// measurement.
     pub fn new(cell: &Cell, measure: Option<Measure>, lockstep: bool) -> Result<Self, DesignError> {
         crate::config::check(cell)?;
         let limits: Vec<AxisLimits> = cell.axes.iter().map(axis_limits).collect();
@@ -55,8 +55,8 @@ impl Plan {
         Self::with(cell, measure, lockstep, interpolator, program)
     }
 
-    /// Plans the runs of a cell with other set points than those of its program; `program` describes them
-    /// as JSON.
+    /// Plans the runs of a cell with other set points than those of its program; `program`
+    /// describes them as JSON.
     pub(crate) fn with(
         cell: &Cell,
         measure: Option<Measure>,
@@ -96,19 +96,19 @@ impl Plan {
         })
     }
 
-    /// Samples in a run.
+    /// Returns the number of samples in a run.
     pub fn n_samples(&self) -> usize {
         self.interpolator.n_samples()
     }
 
-    /// Makes the law that the cell names, with its ladder and its gate.
+    /// Creates the law that the cell names, with its ladder and its gate.
     ///
-    /// A law that will not converge with the cell's own model is refused, unless the cell says
-    /// `allow_divergent`. What else the analysis has to say is in [`Prepared::warnings`].
+    /// A law that is predicted to diverge on the cell's own model is refused, unless the cell sets
+    /// `allow_divergent`. Further results of the analysis are in [`Prepared::warnings`].
     ///
     /// # Errors
-    /// [`DesignError::Model`] or [`DesignError::Learning`] if model or weights are unusable, or
-    /// the law will not converge.
+    /// [`DesignError::Model`] or [`DesignError::Learning`] if model or weights are unusable, or the
+    /// law is predicted to diverge.
     pub fn law(&self, cell: &Cell) -> Result<Prepared, DesignError> {
         law::prepare(cell, &self.reference_m)
     }
@@ -122,7 +122,7 @@ impl Plan {
     }
 }
 
-/// The model that learning uses: the axes' closed loops side by side.
+/// Returns the model that learning uses: the axes' closed loops, block-diagonal.
 pub(super) fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
     let mut models =
         cell.axes.iter().map(|axis| mode::of(axis.interface).nominal_model(axis, cell.cycle_s()));
@@ -143,13 +143,14 @@ pub(crate) fn input_unit(axis: &Axis) -> &'static str {
     mode::of(axis.interface).input_unit(axis.unit)
 }
 
-/// Cyclic frames: a command and two answers a drive, one answer of the tool, SYNC, and room for one
-/// frame of something else.
+/// Cyclic frames: a command and two answers per drive, one answer of the tool, SYNC, and a reserve
+/// of one frame.
 fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
     let mut payloads = vec![0, 8];
     payloads.extend(cell.axes.iter().flat_map(|_| [8, 8, 8]));
     payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
-    // Only a real bus has bits; the others are as fast as the machine, and their load is stated for comparison.
+    // Only a real bus has a bit rate; the others are as fast as the machine, and their load is
+    // stated for comparison.
     if scheme_of(&cell.bus.address).is_some_and(|scheme| scheme.has_bits) {
         return load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, cell.bus.load_max)
             .map(|found| found.ratio());
@@ -217,7 +218,7 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
     })
 }
 
-/// The node of a number that validation has seen already.
+/// Returns the node of a validated number.
 pub(crate) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
     NodeId::new(number).ok_or_else(|| refused(cell, "node", &number, "1 to 127"))
 }

@@ -1,4 +1,4 @@
-//! From `[program]` to the interpolator, by the kind of its path, and to what the records keep of it.
+//! From `[program]` to the interpolator, by the kind of path, and to the path data of the records.
 
 use std::fmt::Write as _;
 
@@ -10,15 +10,15 @@ use crate::record::fingerprint;
 use crate::trajectory::kind::{Job, ProgramError};
 use crate::trajectory::{AxisLimits, Interpolator, TrajectoryError};
 
-/// How far set points may round beyond the range of an axis.
+/// Rounding tolerance of set points at the ends of an axis' range.
 const ROUNDING_M: f64 = 1e-12;
 
-/// Plans the program of a cell; its set points, whatever kind of path they belong to, are verified as
-/// they will be sent.
+/// Plans the program of a cell; the set points of every kind of path are verified as they will be
+/// sent.
 ///
 /// # Errors
-/// [`DesignError::Program`] for a path beyond the limits, [`DesignError::PartProgram`] for
-/// a G-code file that is refused, [`DesignError::Table`] for a table of set points.
+/// [`DesignError::Program`] for a path beyond the limits, [`DesignError::PartProgram`] for a
+/// refused G-code file, [`DesignError::Table`] for a refused table of set points.
 pub(super) fn interpolator(
     cell: &Cell,
     limits: &[AxisLimits],
@@ -75,8 +75,8 @@ pub(super) fn check_range(cell: &Cell, reference_m: &[f64]) -> Result<(), Design
     Ok(())
 }
 
-/// The program as the records keep it: every number of points, and of other paths the kind and the
-/// fingerprint of the set points.
+/// Returns the program as stored in records: every number of points; for other paths the kind and
+/// the fingerprint of the set points.
 pub(super) fn program_json(cell: &Cell, reference_m: &[f64]) -> String {
     let program = &cell.program;
     let segments: Vec<_> = program

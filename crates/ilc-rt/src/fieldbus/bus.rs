@@ -8,15 +8,15 @@ use super::frame::Frame;
 
 /// A bus that carries frames between the controller and its nodes.
 ///
-/// The contract, tested alike for every transport: frames of one sender arrive whole and in order; a
+/// The contract, tested for every transport: frames of one sender arrive whole and in order; a
 /// sender does not receive its own frames; `send` never waits for a receiver; `recv` with a zero
 /// timeout returns at once; foreign or malformed traffic is skipped, never an error.
 pub trait Bus: Send {
-    /// Hands a frame to the transport.
+    /// Passes a frame to the transport.
     ///
     /// # Errors
     /// [`BusError::Full`] if the transport's queue is full (the frame is dropped, not queued late);
-    /// [`BusError::Closed`] if the other side is gone for good; [`BusError::Os`] otherwise.
+    /// [`BusError::Closed`] if the other side is gone permanently; [`BusError::Os`] otherwise.
     fn send(&mut self, frame: &Frame) -> Result<(), BusError>;
 
     /// Returns the next frame, or `None` if none arrived within `timeout`.
@@ -36,7 +36,7 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
     }
 }
 
-/// Reason that a frame was not sent or received. `Copy`, so that the tick may carry it.
+/// Reason that a frame was not sent or received. `Copy`, so that the tick can carry it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BusError {
     /// The transmit queue is full.
@@ -45,7 +45,7 @@ pub enum BusError {
     /// The bus is closed.
     #[error("the bus is closed")]
     Closed,
-    /// The operating system refused, with its error number.
+    /// An error of the operating system, with its number.
     #[error("the operating system reported error {0} on the bus")]
     Os(i32),
 }

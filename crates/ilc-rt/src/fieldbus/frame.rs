@@ -1,4 +1,4 @@
-//! One classical CAN data frame with an 11-bit identifier: all that CANopen uses.
+//! A classical CAN data frame with an 11-bit identifier, as CANopen uses it.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -27,12 +27,12 @@ impl Frame {
         Some(Self { id, len: payload.len() as u8, data })
     }
 
-    /// The 11-bit identifier (COB-ID).
+    /// Returns the 11-bit identifier (COB-ID).
     pub fn id(&self) -> u16 {
         self.id
     }
 
-    /// The payload, 0 to 8 bytes.
+    /// Returns the payload, 0 to 8 bytes.
     pub fn payload(&self) -> &[u8] {
         &self.data[..usize::from(self.len)]
     }

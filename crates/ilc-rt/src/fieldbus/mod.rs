@@ -1,4 +1,4 @@
-//! The field bus: CAN frames, CANopen, CiA 402 drives and the transports that carry them.
+//! The fieldbus: CAN frames, CANopen, CiA 402 drives and their transports.
 //!
 //! For the servo loop (hot: frames, PDOs, statusword) and for set-up (cold: `bring_up`,
 //! `transport::opening`). Imports nothing above row 0 of the layer table; `servo`, `campaign` and the

@@ -1,24 +1,24 @@
 //! Search for the frequency band in which a model fits.
 //!
-//! Friction and modes outside the model spoil the fit of a wide band: acceleration grows with the square
-//! of the frequency, so that a narrower one leaves room for a larger amplitude.
+//! Friction and unmodelled modes spoil the fit of a wide band: acceleration grows with the square
+//! of the frequency, so a narrower band permits a larger amplitude.
 
 use std::f64::consts::TAU;
 
 use super::identified::{Described, Identified};
 use crate::config::{Axis, Cell};
 
-/// Upper ends of the bands, relative to the natural frequency that the cell names.
+/// Upper ends of the bands, relative to the natural frequency in the cell.
 const SHARES: [f64; 4] = [1.5, 1.0, 0.75, 0.5];
-/// Relative residual of a model up to which its band is good enough.
+/// Relative residual of a model up to which its band is accepted.
 const GOOD_RESIDUAL: f64 = 0.12;
 /// Lowest frequency, unless the axis is slow.
 const FROM_HZ: f64 = 1.0;
 /// Shortest period.
 const PERIOD_S: f64 = 8.0;
-/// Cycles of the lowest frequency that a period holds.
+/// Cycles of the lowest frequency per period.
 const CYCLES: f64 = 5.0;
-/// Upper end of the widest band, in cycles.
+/// Upper end of the widest band, in cycles per sample.
 const HIGHEST: f64 = 0.4;
 
 /// Frequency band of an excitation.
@@ -38,7 +38,7 @@ pub struct BandSearch {
     from_hz: f64,
     period_s: f64,
     highest_hz: f64,
-    /// Upper ends that are still to be tried, the next one last.
+    /// Upper ends still to be tried, the next one last.
     to_try_hz: Vec<f64>,
     /// Upper end of the narrowest band without a good model.
     spoilt_hz: f64,
@@ -46,7 +46,7 @@ pub struct BandSearch {
 }
 
 impl BandSearch {
-    /// Begins with a band up to 1.5 times the natural frequency that the cell names.
+    /// Starts with a band up to 1.5 times the natural frequency in the cell.
     pub fn new(cell: &Cell, axis: &Axis) -> Self {
         let expected_hz = match axis.position_loop {
             None => axis.model.natural_frequency_hz.unwrap_or(1.0),
@@ -71,18 +71,19 @@ impl BandSearch {
         Self { from_hz, period_s, highest_hz, to_try_hz, spoilt_hz: highest_hz, widened: false }
     }
 
-    /// Returns the next band to excite the axis in; `None` if nothing better is to be found.
+    /// Returns the next band to excite the axis in; `None` if no better one is expected.
     pub fn next_band(&mut self) -> Option<Band> {
         let to_hz = self.to_try_hz.pop()?;
         Some(Band { from_hz: self.from_hz, to_hz, period_s: self.period_s })
     }
 
-    /// Returns whether there is another band to try.
+    /// Returns true if there is another band to try.
     pub fn is_open(&self) -> bool {
         !self.to_try_hz.is_empty()
     }
 
-    /// Notes the model found in a band; returns whether it is better than the best one so far, `before`.
+    /// Records the model found in a band; returns true if it is better than the best one so far,
+    /// `before`.
     pub fn judge(&mut self, band: Band, found: &Identified, before: Option<&Identified>) -> bool {
         let good = found.doubt.is_none() && found.residual_rms() <= GOOD_RESIDUAL;
         if self.widened {

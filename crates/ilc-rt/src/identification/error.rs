@@ -6,7 +6,7 @@ use crate::model::ModelError;
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentificationError {
-    /// An experiment that the axis must not be asked for, or that shows nothing.
+    /// An experiment beyond the limits of the axis, or one without a result.
     #[error("{file}: axis {axis}: {what} = {value}; {allowed}")]
     Experiment {
         /// Cell description.
@@ -20,7 +20,7 @@ pub enum IdentificationError {
         /// Allowed values.
         allowed: String,
     },
-    /// The response that was measured cannot be fitted.
+    /// The measured response cannot be fitted.
     #[error("{file}: [axis.model]: {source}")]
     Model {
         /// Cell description.

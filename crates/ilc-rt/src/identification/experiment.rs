@@ -12,7 +12,7 @@ use crate::trajectory::Interpolator;
 
 /// Name of the law in the records of experiments.
 pub(crate) const LAW_NAME: &str = "excitation";
-/// Share of the largest amplitude that is used if none is asked for.
+/// Default amplitude as a share of the largest possible one.
 const AMPLITUDE_SHARE: f64 = 0.5;
 
 /// An experiment with one axis.
@@ -50,10 +50,11 @@ impl Experiment {
     /// Returns the experiment with half the largest amplitude that the limits of the axis allow.
     ///
     /// # Errors
-    /// [`IdentificationError::Experiment`] or [`IdentificationError::Model`] for an experiment that no
-    /// amplitude makes possible.
+    /// [`IdentificationError::Experiment`] or [`IdentificationError::Model`] for an experiment that
+    /// no amplitude makes possible.
     pub fn with_default_amplitude(mut self, cell: &Cell) -> Result<Self, IdentificationError> {
-        // Everything that is limited grows with the amplitude, so one try tells how far it may go.
+        // All limited quantities are proportional to the amplitude, so one try gives the largest
+        // one.
         self.excitation.amplitude = 1e-6;
         let (index, axis) = self.axis(cell)?;
         let signal = self.signal(cell)?;
@@ -72,8 +73,8 @@ impl Experiment {
     /// Compares what the excitation demands with the limits of the axis.
     ///
     /// # Errors
-    /// [`IdentificationError::Experiment`] with the demand that exceeds its limit by most, and the largest
-    /// amplitude that is allowed.
+    /// [`IdentificationError::Experiment`] with the most exceeded limit, and the largest possible
+    /// amplitude.
     pub fn check(&self, cell: &Cell) -> Result<(), IdentificationError> {
         let (index, axis) = self.axis(cell)?;
         let signal = self.signal(cell)?;
@@ -139,12 +140,12 @@ impl Experiment {
         })
     }
 
-    /// Returns the unit of the input, which is that of the amplitude.
+    /// Returns the unit of the input and of the amplitude.
     pub fn input_unit(&self, cell: &Cell) -> &'static str {
         self.axis(cell).map_or("", |(_, axis)| input_unit(axis))
     }
 
-    /// Lays the excitation out on the servo cycle.
+    /// Samples the excitation at the servo cycle.
     pub(crate) fn signal(&self, cell: &Cell) -> Result<ExcitationSignal, IdentificationError> {
         self.excitation.signal(cell.cycle_s()).map_err(|source| {
             if let ModelError::Parameter { what, value, allowed } = source {

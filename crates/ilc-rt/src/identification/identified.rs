@@ -9,12 +9,12 @@ use crate::model::identify::{
     VelocityLoopFit, doubt, fit_second_order, fit_velocity_loop, frequency_response, uncertainty,
 };
 
-/// Standard deviations of the measurement that the uncertainty allows for.
+/// Standard deviations of the measurement included in the uncertainty.
 const DEVIATIONS: f64 = 3.0;
-/// Residual relative to the best at which fewer cycles of delay are as good: the data hardly tell a
-/// cycle of delay from a lower natural frequency, and the plainer model learns as well.
+/// Residual relative to the best at which a shorter delay is preferred: the data hardly distinguish
+/// a cycle of delay from a lower natural frequency, and the simpler model learns as well.
 const WORTH_A_CYCLE: f64 = 1.05;
-/// Largest delay that a cell description takes, in cycles.
+/// Largest delay of a cell description, in cycles.
 const DELAY_MAX: usize = 20;
 /// Share of the input below which the output counts as at rest.
 const STILL: f64 = 1e-6;
@@ -22,7 +22,7 @@ const STILL: f64 = 1e-6;
 /// Form of the model that describes an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
-    /// Second order with any gain: not the axis of a cell.
+    /// Second order with any gain: not an axis of a cell.
     Free,
     /// Position loop of a csp axis: unit gain.
     Position,
@@ -38,7 +38,7 @@ pub enum Form {
 pub struct Identified {
     /// Response from the learned input to the measurement, in the band of the excitation.
     pub measured: FrequencyResponse,
-    /// Second-order model with delay, sampled with the servo cycle.
+    /// Second-order model with delay, discretised at the servo cycle.
     pub fit: SecondOrderFit,
     /// Model that `[axis.model]` can express: unit gain and whole cycles of delay.
     pub described: Described,
@@ -57,14 +57,14 @@ pub struct Identified {
 /// Model of an axis in a cell description.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Described {
-    /// Position loop of a csp axis, or an axis of no cell.
+    /// Position loop of a csp axis, or an axis without a cell.
     Position(SecondOrderFit),
     /// Velocity loop of a csv axis, in the position loop of the controller.
     Velocity(VelocityLoopFit),
 }
 
 impl Described {
-    /// Returns the figure that a cell description does not take, if there is one.
+    /// Returns the parameter out of the range of a cell description, if there is one.
     fn beyond_cell(&self) -> Option<Doubt> {
         let (first, second) = match self {
             Self::Position(fit) => (
@@ -98,8 +98,8 @@ impl Described {
     }
 }
 
-/// Fits the models of a form with the delays that are tried; the plainest of those that are as good as the
-/// best.
+/// Fits the models of a form with several delays; returns the simplest of those that are as good as
+/// the best.
 fn describe(
     measured: &FrequencyResponse,
     free: &SecondOrder,
@@ -126,7 +126,8 @@ fn describe(
     Ok(plainest(&tried).unwrap_or(tried[0]))
 }
 
-/// Returns the model of least delay among those that a cell takes and that leave least.
+/// Returns the model of least delay among those within a cell's range and with the smallest
+/// residuals.
 fn plainest(tried: &[Described]) -> Option<Described> {
     let possible = |described: &&Described| described.beyond_cell().is_none();
     let any = tried.iter().any(|each| possible(&each));
@@ -135,7 +136,7 @@ fn plainest(tried: &[Described]) -> Option<Described> {
     among().find(|each| each.residual_rms() <= WORTH_A_CYCLE * least).copied()
 }
 
-/// Returns the whole delays that are tried: from zero to two cycles beyond the one that was found.
+/// Returns the delays to try: from zero to two cycles beyond the identified one.
 fn delays(model: &SecondOrder, dt_s: f64) -> std::ops::Range<usize> {
     let found = (model.delay_s / dt_s).ceil().clamp(0.0, (DELAY_MAX - 2) as f64);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to 18")]
@@ -227,7 +228,7 @@ impl Identified {
         });
         Self::evaluate(
             column(&signals.input, 1.0),
-            // The set point rests, so that the error changes by the measurement.
+            // The set point is constant, so the error changes with the measurement.
             column(&signals.error_m, -1.0),
             signal.period_samples,
             (experiment.excitation.from_hz, experiment.excitation.to_hz),

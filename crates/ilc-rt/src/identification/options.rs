@@ -53,10 +53,11 @@ pub struct ExperimentOptions {
 }
 
 impl ExperimentOptions {
-    /// Returns the axis: the one that is named, or the only one.
+    /// Returns the named axis, or the only one.
     ///
     /// # Errors
-    /// [`IdentificationError::Experiment`] if the cell has no such axis, or several and none is named.
+    /// [`IdentificationError::Experiment`] if the cell has no such axis, or several and none is
+    /// named.
     pub fn axis<'a>(&self, cell: &'a Cell) -> Result<&'a Axis, IdentificationError> {
         let found = match (&self.axis, &cell.axes[..]) {
             (None, [axis]) => Some(axis),
@@ -75,8 +76,8 @@ impl ExperimentOptions {
         })
     }
 
-    /// Returns the experiment in a band, or in a default one; given options replace the band's own values.
-    /// Its amplitude is half of the largest one unless it is given.
+    /// Returns the experiment in a band, or in a default one; given options replace the band's own
+    /// values. The default amplitude is half of the largest one.
     ///
     /// # Errors
     /// [`IdentificationError::Experiment`] if it is beyond a limit of the axis.

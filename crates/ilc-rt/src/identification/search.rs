@@ -7,15 +7,15 @@ use super::identified::Identified;
 use super::options::ExperimentOptions;
 use crate::config::Cell;
 
-/// Identifies an axis: `excite` executes an experiment (`None` if it was stopped), `report` is given a
-/// sentence on each band.
+/// Identifies an axis: `excite` executes an experiment (`None` if it was stopped), `report`
+/// receives a sentence on each band.
 ///
 /// With a highest frequency in the options there is one experiment; without one, bands are searched by
 /// [`BandSearch`].
 ///
 /// # Errors
-/// [`IdentificationError`] for an axis or an amplitude that cannot be used and for signals that cannot be
-/// fitted; whatever `excite` fails with.
+/// [`IdentificationError`] for an unusable axis or amplitude and for signals that cannot be fitted;
+/// any error of `excite`.
 pub fn identify<E: From<IdentificationError>>(
     cell: &Cell,
     options: &ExperimentOptions,

@@ -5,7 +5,7 @@ use rusqlite::ErrorCode;
 /// Reason that the library cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
-    /// SQLite refused.
+    /// An error of SQLite.
     #[error("library {path}: {source}")]
     Sqlite {
         /// File.
@@ -13,7 +13,7 @@ pub enum LibraryError {
         /// Error of SQLite.
         source: rusqlite::Error,
     },
-    /// Another program is writing, and did so for longer than the time-out.
+    /// Another program was writing for longer than the time-out.
     #[error("library {path}: locked by another program that is writing to it")]
     Locked {
         /// File.
@@ -30,7 +30,7 @@ pub enum LibraryError {
         /// Error of SQLite.
         source: rusqlite::Error,
     },
-    /// The file is there and is not a library of this program.
+    /// The file exists and is not a library of this program.
     #[error(
         "library {path}: {found}; allowed: a library of this program, or a new file in a folder \
          that exists and can be written"
@@ -41,7 +41,7 @@ pub enum LibraryError {
         /// Its state instead.
         found: String,
     },
-    /// The file, or the folder of a library that is to grow, cannot be written.
+    /// The file, or the folder of a growing library, cannot be written.
     #[error("library {path}: cannot be written: {found}")]
     ReadOnly {
         /// File.
@@ -49,13 +49,13 @@ pub enum LibraryError {
         /// Obstacle.
         found: &'static str,
     },
-    /// There is no such file.
+    /// A missing file.
     #[error("library {path}: no such library")]
     Missing {
         /// File.
         path: String,
     },
-    /// There is a file, but nothing was put into it yet.
+    /// A file without contents.
     #[error("library {path}: an empty file; there is no run in it")]
     Empty {
         /// File.
@@ -77,7 +77,7 @@ pub enum LibraryError {
         /// Version of this program.
         expected: i64,
     },
-    /// The campaign has a run of this number already.
+    /// The campaign already has a run of this number.
     #[error(
         "library {path}: campaign {campaign} has a run {index} already; is another program going \
          on with it?"
@@ -90,15 +90,15 @@ pub enum LibraryError {
         /// Number of the run.
         index: u32,
     },
-    /// There is no such row.
+    /// A missing row.
     #[error("library {path}: no iteration with id {id}")]
     NoSuchRow {
         /// File.
         path: String,
-        /// Key that was asked for.
+        /// Requested key.
         id: i64,
     },
-    /// There is no such disturbance.
+    /// An invalid disturbance.
     #[error("library {path}: {what}")]
     Disturbance {
         /// File.
@@ -106,7 +106,7 @@ pub enum LibraryError {
         /// Problem, and allowed values.
         what: String,
     },
-    /// The stored arrays do not have the digest that was stored with them.
+    /// The stored arrays do not match their stored digest.
     #[error("library {path}: iteration {id} is damaged: its arrays do not match its digest")]
     Damaged {
         /// File.
@@ -129,7 +129,7 @@ pub enum LibraryError {
     },
 }
 
-/// Turns what SQLite said about a file into an error of the library.
+/// Converts an error of SQLite for a file.
 pub(super) fn told(path: &str, source: rusqlite::Error) -> LibraryError {
     let path = path.to_owned();
     match source.sqlite_error_code() {

@@ -1,11 +1,11 @@
-//! The columns of a run's figures, as the struct describes them, and their values.
+//! Columns and values of a run's figures, derived from the struct.
 
 use rusqlite::types::{Value, ValueRef};
 use serde_json::{Map, Value as Json};
 
 use crate::record::{Field, FieldKind, Figures, figure_fields};
 
-/// The type of a figure's column in a new file.
+/// Returns the column type of a figure in a new file.
 pub(super) fn column_type(field: &Field) -> &'static str {
     match (field.kind, field.is_required) {
         (FieldKind::Real, true) => "REAL NOT NULL",
@@ -15,7 +15,7 @@ pub(super) fn column_type(field: &Field) -> &'static str {
     }
 }
 
-/// Names and values of all figures; lists are JSON, and a number that is not finite is NULL.
+/// Returns names and values of all figures; lists are JSON, and a non-finite number is NULL.
 pub(super) fn values(figures: &Figures) -> Vec<(&'static str, Value)> {
     let described = serde_json::to_value(figures).unwrap_or_default();
     let value = |field: &'static Field| {
@@ -34,7 +34,7 @@ pub(super) fn values(figures: &Figures) -> Vec<(&'static str, Value)> {
     figure_fields().iter().map(value).collect()
 }
 
-/// Reads the figures of a row; those that an older file does not have keep their default.
+/// Reads the figures of a row; those missing in an older file keep their default.
 pub(super) fn read(row: &rusqlite::Row<'_>) -> rusqlite::Result<Figures> {
     let mut described = Map::new();
     for field in figure_fields() {

@@ -1,8 +1,8 @@
-//! The file of a library: what it is before anything is written to it, and whether it is still there.
+//! The file of a library: its identity before anything is written, and its continued existence.
 //!
-//! A file that another program keeps its data in must never be changed, not even by switching
-//! its journal on. So it is looked at through a connection that cannot write, and only what has the mark
-//! and the table of this program is opened for more.
+//! A data file of another program must never be changed, not even by switching its journal on. So
+//! the file is examined through a read-only connection, and opened for writing only if it has the
+//! mark and the table of this program.
 
 use std::fmt::Write as _;
 use std::fs::Metadata;
@@ -17,28 +17,28 @@ use super::row::{ARRAYS, COLUMNS};
 use super::schema;
 use crate::record::figure_fields;
 
-/// Time-out for another process that is writing: a run that cannot be kept has to stop the axes.
+/// Time-out for another writing process: a run that cannot be stored has to stop the axes.
 pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
-/// The name that stands for a library in memory.
+/// The name of a library in memory.
 pub(super) const IN_MEMORY: &str = ":memory:";
 
 /// Target of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// Nothing, or a file without a byte.
+    /// No file, or one of 0 bytes.
     Nothing,
-    /// A database that nothing was put into yet, as one whose making was interrupted.
+    /// A database without contents, e.g. after an interrupted creation.
     Empty,
     /// A library of this version.
     Library(i64),
 }
 
-/// Looks at a path without changing anything.
+/// Inspects a path without changing anything.
 ///
 /// # Errors
-/// [`LibraryError::Foreign`] for whatever is no library; [`LibraryError::Version`] for one of a later
-/// version; [`LibraryError::Open`] if it cannot be read.
+/// [`LibraryError::Foreign`] for a file that is not a library; [`LibraryError::Version`] for one of
+/// a later version; [`LibraryError::Open`] if it cannot be read.
 pub(super) fn inspect(path: &Path) -> Result<Found, LibraryError> {
     let Some(metadata) = metadata(path)? else { return Ok(Found::Nothing) };
     if metadata.len() == 0 {
@@ -47,7 +47,7 @@ pub(super) fn inspect(path: &Path) -> Result<Found, LibraryError> {
     look(path).map(|(_, found)| found)
 }
 
-/// Opens a library for reading only; leaves no trace beside it.
+/// Opens a library read-only; leaves no trace beside it.
 ///
 /// # Errors
 /// [`LibraryError::Missing`], or as [`inspect`].
@@ -66,7 +66,7 @@ pub(super) fn reader(path: &Path) -> Result<(Connection, i64), LibraryError> {
     }
 }
 
-/// Opens a file for writing, making it if it is not there. To be called after [`inspect`].
+/// Opens a file for writing, creating it if it is missing. To be called after [`inspect`].
 ///
 /// # Errors
 /// [`LibraryError::Open`] or [`LibraryError::ReadOnly`].
@@ -77,26 +77,27 @@ pub(super) fn writer(path: &Path) -> Result<Connection, LibraryError> {
         | OpenFlags::SQLITE_OPEN_CREATE
         | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let connection = Connection::open_with_flags(plain(path), flags).map_err(fail)?;
-    // What cannot be written is opened for reading, without a word.
+    // SQLite silently opens an unwritable file for reading.
     if connection.is_readonly("main").map_err(fail)? {
         return Err(LibraryError::ReadOnly { path: name, found: "the file is read-only" });
     }
     Ok(connection)
 }
 
-/// Identity of the file that a path leads to: device and number; `None` if it leads nowhere.
+/// Identity of the file behind a path: device and number; `None` if there is no file.
 pub(super) fn identity(path: &Path) -> Option<(u64, u64)> {
     std::fs::metadata(path).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
-/// The file beside a library that ends in `ending`.
+/// Returns the path of the file beside a library that ends in `ending`.
 pub(super) fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     name.into()
 }
 
-/// Target of a path, if it is a regular file. Only looked at, as opening a pipe would wait.
+/// Target of a path, if it is a regular file. The path is only examined, since opening a pipe would
+/// block.
 fn metadata(path: &Path) -> Result<Option<Metadata>, LibraryError> {
     let name = || path.display().to_string();
     let foreign = |found: &str| LibraryError::Foreign { path: name(), found: found.to_owned() };
@@ -112,9 +113,9 @@ fn metadata(path: &Path) -> Result<Option<Metadata>, LibraryError> {
     }
 }
 
-/// Connects for reading and looks at what is there. Where no writer has left a log, nothing beside the
-/// file is made or asked for, so that an archive that cannot be written is read as well; and what is
-/// that of another program is not even asked for its log.
+/// Connects read-only and examines the file. If no writer has left a log, no side files are created
+/// or needed, so that an archive without write permission can be read; for a file of another
+/// program not even the log is opened.
 fn look(path: &Path) -> Result<(Connection, Found), LibraryError> {
     let at_rest = connect(path, true).and_then(|connection| tell(connection, path));
     let log = std::fs::metadata(beside(path, "-wal"));
@@ -148,7 +149,7 @@ fn connect(path: &Path, at_rest: bool) -> Result<Connection, LibraryError> {
     };
     let connection = connection.map_err(fail)?;
     connection.busy_timeout(BUSY_TIMEOUT).map_err(fail)?;
-    // The first look at the file: until now nothing was read.
+    // The first access to the file: until now nothing was read.
     connection.query_row("SELECT count(*) FROM sqlite_master", [], |_| Ok(())).map_err(fail)?;
     Ok(connection)
 }
@@ -158,7 +159,7 @@ fn tell(connection: Connection, path: &Path) -> Result<(Connection, Found), Libr
     Ok((connection, found))
 }
 
-/// Tells a library by its mark, its version and the columns of its table.
+/// Identifies a library by its application id, its version and the columns of its table.
 pub(super) fn found(connection: &Connection, path: &Path) -> Result<Found, LibraryError> {
     let name = path.display().to_string();
     let fail = |source| LibraryError::Open { path: name.clone(), source };
@@ -171,7 +172,7 @@ pub(super) fn found(connection: &Connection, path: &Path) -> Result<Found, Libra
     if mark == 0 && version == 0 && n_objects == 0 {
         return Ok(Found::Empty);
     }
-    // Libraries of before had no mark; their table distinguishes them from other databases.
+    // Older libraries had no mark; their table distinguishes them from other databases.
     let may_be_ours = mark == schema::MARK
         || mark == 0 && (n_objects == 0 || has_columns(connection).map_err(fail)?);
     if may_be_ours && version > schema::VERSION {
@@ -203,7 +204,7 @@ fn has_columns(connection: &Connection) -> rusqlite::Result<bool> {
     Ok(wanted.all(|column| names.iter().any(|name| name == column)))
 }
 
-/// A path that SQLite takes as it is: an absolute one is no address, whatever its letters.
+/// Returns a path that SQLite takes literally: an absolute one is never parsed as a URI.
 fn plain(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
@@ -232,7 +233,7 @@ mod tests {
     use super::super::tests::{meta, record};
     use super::*;
 
-    /// A folder of its own, gone when dropped.
+    /// A temporary folder, deleted when dropped.
     struct Folder(PathBuf);
 
     impl Folder {

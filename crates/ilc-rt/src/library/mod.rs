@@ -1,7 +1,8 @@
 //! The iteration library: every run of every campaign, in one SQLite file.
 //!
-//! The campaign appends the moment a run ends; Python and `--resume` read. Writers and readers of
-//! several processes may share a file (write-ahead log); a killed process loses nothing it appended.
+//! The campaign appends a run the moment it ends; Python and `--resume` read. Writers and readers
+//! of several processes may share a file (write-ahead log); a killed process loses nothing it
+//! appended.
 
 mod error;
 mod figures;

@@ -1,4 +1,4 @@
-//! Finding the runs that were made under a disturbance like the coming one.
+//! Recall of runs made under a similar disturbance.
 
 use rusqlite::params;
 
@@ -14,7 +14,7 @@ pub struct Task {
     pub cell: Option<String>,
 }
 
-/// A run, and how far its disturbance is from the one asked for.
+/// A run, and the distance of its disturbance from the requested one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Near {
     /// The run, without its arrays.
@@ -24,11 +24,11 @@ pub struct Near {
 }
 
 impl Library {
-    /// Returns the `top` runs nearest in disturbance, the nearest one first; of equally near ones the
-    /// older. Runs without a disturbance, or with another number of them, are left out.
+    /// Returns the `top` runs nearest in disturbance, the nearest one first; of equally near ones
+    /// the older. Runs without a disturbance, or with another number of them, are omitted.
     ///
     /// # Errors
-    /// [`LibraryError::Disturbance`] if a number is not finite or there is none;
+    /// [`LibraryError::Disturbance`] for a missing or non-finite disturbance;
     /// [`LibraryError::Sqlite`] if the file cannot be read.
     pub fn recall(
         &self,
@@ -57,9 +57,9 @@ impl Library {
             .collect()
     }
 
-    /// Returns the keys of the runs that a law can learn a task from, oldest first, and the sample time
-    /// of the newest one: all of this size, with this number of disturbances, of the same cell,
-    /// program, measurement and sample time as the newest run of this size.
+    /// Returns the keys of the runs that a law can learn a task from, oldest first, and the sample
+    /// time of the newest one: all of this size, with this number of disturbances, of the same
+    /// cell, program, measurement and sample time as the newest run of this size.
     ///
     /// # Errors
     /// [`LibraryError::Sqlite`] if the file cannot be read.

@@ -1,14 +1,14 @@
-//! One row of the table, as it is written and read.
+//! One row of the table: writing and reading.
 
 use super::figures;
 use crate::record::{AxisKinds, IterationRecord, Meta, distances_m};
 
-/// One kept run with its provenance.
+/// One stored run with its provenance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Key in the library.
     pub id: i64,
-    /// When it was appended, UTC.
+    /// Time of appending, UTC.
     pub created_utc: String,
     /// Provenance.
     pub meta: Meta,
@@ -95,12 +95,12 @@ pub(super) fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::
     })
 }
 
-/// Returns whether a row was written before each axis had figures of its own.
+/// Returns true if a row was written before figures per axis existed.
 pub(super) fn is_old(row: &Row) -> bool {
     row.record.figures.axes_tracking_inf_m.is_empty() && row.meta.n_axes > 0
 }
 
-/// Computes the figures of a run that was kept before each axis had its own: from its arrays, which the
+/// Computes the figures of a run stored before figures per axis existed: from its arrays, which the
 /// row must have.
 pub(super) fn refresh(row: &mut Row) {
     let kinds = AxisKinds::new(&row.meta.input_units, row.meta.n_axes);

@@ -1,4 +1,4 @@
-//! The tables, how they come to be, and how older ones are brought up to date.
+//! The tables: creation, and upgrade of older ones.
 
 use std::fmt::Write as _;
 
@@ -10,18 +10,18 @@ use crate::record::{Field, figure_fields};
 
 /// Mark of this program's files, in SQLite's `application_id`: "ILCL".
 pub(super) const MARK: i64 = 0x494C_434C;
-/// The version from which on there is an index of disturbances.
+/// First version with an index of disturbances.
 pub(super) const INDEXED: i64 = 2;
 
 /// Version of the schema, in SQLite's `user_version`.
 pub(super) const VERSION: i64 = 3;
 /// The oldest version that [`bring_up_to_date`] knows.
 ///
-/// Version 1 had the column for the disturbance, and nothing in it. Version 2 had a contour error for
-/// every run, also for paths without a contour, no figures for single axes, and no word on the learning.
+/// Version 1 had an unused column for the disturbance. Version 2 had a contour error for every run,
+/// also for paths without a contour, no figures of individual axes, and no status of the learning.
 pub(super) const OLDEST: i64 = 1;
 
-/// Indices, made where they are not there.
+/// Indices, created if missing.
 const INDICES: &str = "
 CREATE INDEX IF NOT EXISTS iteration_by_fingerprint ON iteration (fingerprint, id);
 CREATE INDEX IF NOT EXISTS iteration_by_disturbance ON iteration (cell, disturbance)
@@ -41,13 +41,13 @@ fn table() -> String {
     table + "    UNIQUE (campaign, iteration)\n);"
 }
 
-/// Sets what must be said before the first page of a file is written: the pages of runs that are deleted
-/// can be given back to the system.
+/// Sets the options that must precede the first page of a file: pages of deleted runs can be
+/// returned to the system (incremental vacuum).
 pub(super) fn prepare(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "auto_vacuum", "INCREMENTAL")
 }
 
-/// Makes the tables of a new file, or gives those of an older version what they lack: all or nothing.
+/// Creates the tables of a new file, or upgrades those of an older version: all or nothing.
 ///
 /// No run is rewritten: what older runs lack is computed when they are read.
 pub(super) fn bring_up_to_date(connection: &Connection) -> rusqlite::Result<()> {
@@ -65,8 +65,8 @@ pub(super) fn bring_up_to_date(connection: &Connection) -> rusqlite::Result<()> 
     transaction.commit()
 }
 
-/// Takes the constraint from the contour errors, by the procedure that SQLite documents for it: the
-/// rows stay as they are.
+/// Removes the constraint on contour errors, by the procedure that SQLite documents: the rows are
+/// unchanged.
 fn allow_no_contour(connection: &Connection) -> rusqlite::Result<()> {
     let version: i64 = connection.pragma_query_value(None, "schema_version", |row| row.get(0))?;
     connection.execute_batch("PRAGMA writable_schema = ON")?;
@@ -82,7 +82,7 @@ fn allow_no_contour(connection: &Connection) -> rusqlite::Result<()> {
     connection.execute_batch("PRAGMA writable_schema = RESET")
 }
 
-/// Figures that a file does not have, as it was made before them.
+/// Returns the figures missing in an older file.
 pub(super) fn missing(connection: &Connection) -> rusqlite::Result<Vec<&'static Field>> {
     let mut statement = connection.prepare("SELECT name FROM pragma_table_info('iteration')")?;
     let there: Vec<String> =
@@ -90,7 +90,7 @@ pub(super) fn missing(connection: &Connection) -> rusqlite::Result<Vec<&'static 
     Ok(figure_fields().iter().filter(|field| !there.contains(&field.name)).collect())
 }
 
-/// The columns of a run without its arrays, also in an older file that can only be read.
+/// Returns the columns of a run without its arrays, also for an older, read-only file.
 pub(super) fn columns(connection: &Connection) -> rusqlite::Result<String> {
     let missing = missing(connection)?;
     let mut columns: Vec<String> = COLUMNS.map(|(name, _)| name.to_owned()).into();

@@ -15,9 +15,9 @@ use super::row::{
 use super::schema;
 use crate::record::{Figures, IterationRecord, Meta};
 
-/// Time-out after one that was in vain.
+/// Time-out after a failed attempt.
 const HURRIED: Duration = Duration::from_millis(200);
-/// SQLite's extended code for a row that is there already.
+/// SQLite's extended code for a row that already exists.
 const UNIQUE: i32 = rusqlite::ffi::SQLITE_CONSTRAINT_UNIQUE;
 
 /// An open iteration library.
@@ -27,16 +27,16 @@ pub struct Library {
     pub(super) path: String,
     /// Path and identity of the file that runs are written to.
     file: Option<(PathBuf, (u64, u64))>,
-    /// Version of the schema in the file; below the newest only if it is read.
+    /// Schema version of the file; below the newest only if read-only.
     pub(super) version: i64,
 }
 
 impl Library {
-    /// Opens a library for reading and writing, creating file and tables if they are not there.
+    /// Opens a library for reading and writing, creating file and tables if they are missing.
     ///
     /// # Errors
-    /// [`LibraryError::Foreign`] for a file that is no library of this program, which is left as it is;
-    /// [`LibraryError::Version`] if it has a later version; [`LibraryError::Open`],
+    /// [`LibraryError::Foreign`] for a file that is not a library of this program, which is left
+    /// unchanged; [`LibraryError::Version`] if it has a later version; [`LibraryError::Open`],
     /// [`LibraryError::ReadOnly`] or [`LibraryError::Locked`] if it cannot be written.
     pub fn open(path: &Path) -> Result<Self, LibraryError> {
         if path.as_os_str() == file::IN_MEMORY {
@@ -56,10 +56,11 @@ impl Library {
         connection.pragma_update(None, "journal_mode", "WAL").map_err(fail)?;
         // FULL: an appended run survives not only a kill but a power cut.
         connection.pragma_update(None, "synchronous", "FULL").map_err(fail)?;
-        // Asked once more, as what a killed process had begun is undone when the file is opened.
+        // Checked again, as an interrupted operation of a killed process is undone when the file is
+        // opened.
         let is_newest = file::found(&connection, path)? == Found::Library(schema::VERSION);
         if is_newest && schema::missing(&connection).map_err(fail)?.is_empty() {
-            // A program that cannot write must hear of it now, and not when the first run is to be kept.
+            // A program that cannot write must fail now, not when the first run is stored.
             connection.execute_batch("BEGIN IMMEDIATE; ROLLBACK").map_err(fail)?;
         } else {
             schema::bring_up_to_date(&connection).map_err(fail)?;
@@ -72,17 +73,18 @@ impl Library {
         })
     }
 
-    /// Opens a library for reading only; nothing is made or changed, also beside the file.
+    /// Opens a library read-only; nothing is created or changed, also beside the file.
     ///
     /// # Errors
-    /// [`LibraryError::Missing`]; [`LibraryError::Empty`]; [`LibraryError::Foreign`] for a file that is no library;
-    /// [`LibraryError::Version`] if it has a later version; [`LibraryError::Open`] if it cannot be read.
+    /// [`LibraryError::Missing`]; [`LibraryError::Empty`]; [`LibraryError::Foreign`] for a file
+    /// that is not a library; [`LibraryError::Version`] if it has a later version;
+    /// [`LibraryError::Open`] if it cannot be read.
     pub fn read(path: &Path) -> Result<Self, LibraryError> {
         let (connection, version) = file::reader(path)?;
         Ok(Self { connection, path: path.display().to_string(), file: None, version })
     }
 
-    /// Opens a library in memory, which is gone when dropped.
+    /// Opens a library in memory, deleted when dropped.
     ///
     /// # Errors
     /// [`LibraryError::Open`] if SQLite refuses.
@@ -94,11 +96,11 @@ impl Library {
         Ok(Self { connection, path, file: None, version: schema::VERSION })
     }
 
-    /// Keeps one run and returns its key.
+    /// Stores one run and returns its key.
     ///
     /// # Errors
-    /// [`LibraryError::Taken`] if the campaign has a run of this number already;
-    /// [`LibraryError::Gone`] if the file is not there any more; [`LibraryError::Locked`] or
+    /// [`LibraryError::Taken`] if the campaign already has a run of this number;
+    /// [`LibraryError::Gone`] if the file does not exist any more; [`LibraryError::Locked`] or
     /// [`LibraryError::Sqlite`] if it cannot be written.
     pub fn append(&self, meta: &Meta, record: &IterationRecord) -> Result<i64, LibraryError> {
         let n_samples = record.reference_m.len() / meta.n_axes.max(1);
@@ -148,7 +150,7 @@ impl Library {
         Ok(id)
     }
 
-    /// Makes sure that what was written is where others will look for it.
+    /// Ensures that the file written to is still the one at the path.
     fn require_file(&self) -> Result<(), LibraryError> {
         let Some((path, identity)) = &self.file else { return Ok(()) };
         let is_there =
@@ -156,7 +158,7 @@ impl Library {
         if is_there { Ok(()) } else { Err(LibraryError::Gone { path: self.path.clone() }) }
     }
 
-    /// Lists the runs kept, oldest first, without their arrays; of one campaign if asked.
+    /// Lists the stored runs, oldest first, without their arrays; optionally those of one campaign.
     ///
     /// # Errors
     /// [`LibraryError::Sqlite`] if the file cannot be read.
@@ -175,7 +177,7 @@ impl Library {
         Ok(rows)
     }
 
-    /// Replaces the figures of a stored run, as the law decided on it later.
+    /// Replaces the figures of a stored run after a later decision of the law.
     ///
     /// # Errors
     /// [`LibraryError::Sqlite`] if the file cannot be written.
@@ -199,7 +201,7 @@ impl Library {
         Ok(row)
     }
 
-    /// Reads one run with its arrays, as they are.
+    /// Reads one run with its arrays, unchecked.
     fn load_unchecked(&self, id: i64) -> Result<Row, LibraryError> {
         let arrays = ARRAYS.map(|(name, _)| name).join(", ");
         let query = format!("SELECT {}, {arrays} FROM iteration WHERE id = ?1", self.columns()?);
@@ -234,7 +236,7 @@ impl Library {
         schema::columns(&self.connection).map_err(|source| self.fail(source))
     }
 
-    /// Returns the number that the next run of a campaign gets.
+    /// Returns the number of the next run of a campaign.
     ///
     /// # Errors
     /// [`LibraryError::Sqlite`] if the file cannot be read.
@@ -277,9 +279,9 @@ impl Library {
             .map_err(|source| self.fail(source))
     }
 
-    /// Waits for other programs no longer than an instant from now on.
+    /// Shortens the timeout for other processes from now on.
     pub fn hurry(&self) {
-        // What cannot be set leaves the longer wait, which is not wrong.
+        // If it cannot be set, the longer timeout remains, which is not wrong.
         let _ = self.connection.busy_timeout(HURRIED);
     }
 

@@ -1,4 +1,4 @@
-//! The library as a whole: what is stored comes back, also from files of older versions.
+//! Tests of the library as a whole: stored data are read back, also from files of older versions.
 
 use std::path::{Path, PathBuf};
 
@@ -82,7 +82,7 @@ fn the_newest_campaign_is_found_by_fingerprint() {
     assert_eq!(library.newest_campaign("g").unwrap(), None);
 }
 
-/// Makes a file as the first two versions did, with one run.
+/// Creates a file like the first two versions, with one run.
 fn old_file(
     name: &str,
     version: i64,
@@ -155,7 +155,7 @@ fn a_file_of_the_first_version_is_brought_up_to_date() {
 
 #[test]
 fn an_older_run_without_a_contour_is_told_as_one() {
-    // One axis of two moves: what was kept as contour error is rounding.
+    // One of two axes moves: the stored contour error is rounding.
     let straight = IterationRecord { reference_m: vec![0.0, 0.5, 0.02, 0.5], ..record(0) };
     let path = old_file("straight", 2, &meta("a"), &straight, 1e-20);
     let library = Library::open(&path).unwrap();
@@ -196,7 +196,7 @@ fn a_file_that_is_no_library_is_refused() {
     assert!(refused.unwrap_err().to_string().contains("not a database"));
 }
 
-/// The table as versions 1 and 3 of the schema made it.
+/// The table as created by versions 1 and 3 of the schema.
 fn old_table(version: i64) -> String {
     let contour = if version == 1 { " NOT NULL" } else { "" };
     let later = if version == 1 {

@@ -1,4 +1,4 @@
-//! Deleting the runs that have least to say.
+//! Deletion of the least relevant runs.
 
 use std::collections::HashSet;
 
@@ -11,10 +11,10 @@ use super::schema;
 use super::store::Library;
 use crate::learning::law::relevance::shares;
 
-/// Pages given back in one transaction.
+/// Pages returned in one transaction.
 const STEP_PAGES: u32 = 1024;
 
-/// Runs as far as trimming looks at them.
+/// The part of a run that trimming needs.
 struct Candidate {
     id: i64,
     error_square: f64,
@@ -22,19 +22,20 @@ struct Candidate {
 }
 
 impl Library {
-    /// Deletes all runs of a task but the `keep` ones most relevant for what has been met so far, and
-    /// returns how many were deleted.
+    /// Deletes all runs of a task except the `keep` most relevant ones, and returns the number of
+    /// deleted runs.
     ///
-    /// A run's relevance under a disturbance is that of DPW-ILC, `1 / (E_j + |d - d_j|^2 + epsilon)`,
-    /// with the square of its RMS error and each disturbance in units of their mean and variance over
-    /// these runs, and `epsilon` = 1e-6. Its share is the sum of its normalised relevance under the
-    /// disturbances of all runs; the largest shares stay, of equal ones the newer. Among runs without a
-    /// disturbance those with the smallest error stay. `O(n_runs^2)` with a disturbance.
+    /// A run's relevance under a disturbance is that of DPW-ILC,
+    /// `1 / (E_j + |d - d_j|^2 + epsilon)`, with the square of its RMS error and each disturbance
+    /// in units of their mean and variance over these runs, and `epsilon` = 1e-6. Its share is the
+    /// sum of its normalised relevance under the disturbances of all runs; the largest shares are
+    /// kept, of equal ones the newer. Among runs without a disturbance those with the smallest
+    /// error are kept. `O(n_runs^2)` with a disturbance.
     ///
     /// # Errors
     /// [`LibraryError::Disturbance`] if runs have different numbers of disturbances;
     /// [`LibraryError::Sqlite`] if the file cannot be written: nothing is deleted then;
-    /// [`LibraryError::NotShrunk`] if the runs are deleted, but their space could not be given back.
+    /// [`LibraryError::NotShrunk`] if the runs are deleted, but their space cannot be returned.
     /// # Source
     /// - \[dimarco2016\], Eq. (4.12), (4.13), and Sec. 5.1: trimming as future work.
     pub fn trim(&self, keep: usize, task: &Task) -> Result<usize, LibraryError> {
@@ -83,17 +84,18 @@ impl Library {
         Ok(n_deleted)
     }
 
-    /// Gives the pages of deleted runs back to the system. The runs that stay are never at stake: SQLite
-    /// changes the file by transactions, and one that is killed has not happened.
+    /// Returns the pages of deleted runs to the system. The remaining runs are never at risk:
+    /// SQLite changes the file in transactions, and an interrupted one is undone.
     fn shrink(&self) -> rusqlite::Result<()> {
         let whole: i64 =
             self.connection.pragma_query_value(None, "auto_vacuum", |row| row.get(0))?;
         if whole == 0 {
-            // A file of before, made without the books that giving back single pages needs.
+            // An older file, without the bookkeeping of incremental vacuum.
             schema::prepare(&self.connection)?;
             self.connection.execute_batch("VACUUM")?;
         } else {
-            // In small steps: a campaign that keeps its run meanwhile must not wait for all of them.
+            // In small steps: a campaign that keeps its run meanwhile must not wait for all of
+            // them.
             while self.free_pages()? > 0 {
                 let mut step =
                     self.connection.prepare(&format!("PRAGMA incremental_vacuum({STEP_PAGES})"))?;
@@ -101,7 +103,7 @@ impl Library {
                 while rows.next()?.is_some() {}
             }
         }
-        // The file itself grows smaller when the log is written back; readers may hold that up.
+        // The file shrinks when the log is written back; readers may delay that.
         self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(()))
     }
 
@@ -137,7 +139,7 @@ impl Library {
     }
 }
 
-/// Returns a scale to divide by: what is all zero needs none.
+/// Returns a scale to divide by: 1 for zero.
 fn positive(scale: f64) -> f64 {
     if scale > 0.0 { scale } else { 1.0 }
 }

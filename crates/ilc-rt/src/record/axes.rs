@@ -1,7 +1,7 @@
 //! Units of the axes of a record, and the comparison of like with like: lengths with lengths, angles with
 //! angles.
 
-/// Range of a coordinate from which on an axis moves: below it there is rounding, and no machine.
+/// Smallest range of a coordinate that counts as motion: below it is rounding.
 const MOVES_M: f64 = 1e-9;
 
 /// The kind of each axis: linear, in metres, or rotary, in radians.
@@ -11,13 +11,13 @@ pub struct AxisKinds {
 }
 
 impl AxisKinds {
-    /// Reads the kinds from the units of the learned inputs; an axis without one is linear.
+    /// Derives the kinds from the units of the learned inputs; an axis without one is linear.
     pub fn new(input_units: &[String], n_axes: usize) -> Self {
         let unit = |axis: usize| input_units.get(axis).map_or("m", String::as_str);
         Self { rotary: (0..n_axes).map(|axis| unit(axis).starts_with("rad")).collect() }
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     pub fn n_axes(&self) -> usize {
         self.rotary.len()
     }
@@ -32,21 +32,21 @@ impl AxisKinds {
         self.rotary.contains(&true) && self.rotary.contains(&false)
     }
 
-    /// Axes of this kind, in their order.
+    /// Returns the axes of this kind, in order.
     pub fn of_kind(&self, rotary: bool) -> Vec<usize> {
         (0..self.n_axes()).filter(|&axis| self.rotary[axis] == rotary).collect()
     }
 
-    /// The axes that one figure over several axes is made of: the linear ones, or all of a cell that has
-    /// only rotary ones.
+    /// Returns the axes of a figure over several axes: the linear ones, or all of a cell with
+    /// rotary ones only.
     pub fn comparable(&self) -> Vec<usize> {
         self.of_kind(self.all_rotary())
     }
 
-    /// Returns whether a path has a contour to leave: two linear axes or more move along it.
+    /// Returns true if a path has a contour: at least two linear axes move along it.
     ///
-    /// If one axis alone moves, the distance across the path is the position of axes that stand still, and
-    /// what is left of the distance is rounding, or over-travel at an end.
+    /// If only one axis moves, the distance across the path is the position of the axes at rest,
+    /// and the remaining distance is rounding, or over-travel at an end.
     ///
     /// # Shapes
     /// - `reference_m`: `n_samples * n_axes`, time first
@@ -60,7 +60,7 @@ impl AxisKinds {
         self.of_kind(false).iter().filter(|axis| moves(axis)).count() >= 2
     }
 
-    /// Some axes of a signal, time first.
+    /// Returns some axes of a signal, time first.
     pub fn columns(&self, signal: &[f64], axes: &[usize]) -> Vec<f64> {
         let rows = signal.chunks_exact(self.n_axes().max(1));
         rows.flat_map(|row| axes.iter().map(|&axis| row[axis])).collect()
@@ -94,7 +94,7 @@ mod tests {
         assert!(!kinds(&["rad", "rad"]).has_contour(&diagonal));
         assert!(!kinds(&["m", "rad"]).has_contour(&diagonal));
         assert!(!kinds(&["m"]).has_contour(&[0.0, 0.01]));
-        // Rounding of a program in inches is no movement.
+        // Rounding of a program in inches is not motion.
         assert!(!kinds(&["m", "m"]).has_contour(&[0.0, 0.0, 0.01, 3e-17]));
         let plane_and_turn = [0.0, 0.0, 0.0, 0.01, 0.02, 1.0];
         assert!(kinds(&["m", "m", "rad"]).has_contour(&plane_and_turn));

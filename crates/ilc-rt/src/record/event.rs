@@ -9,7 +9,7 @@ use super::fault::Fault;
 use super::figures::Figures;
 use crate::rt::{LatencyFigures, RtReport};
 
-/// One thing that happened; JSON with the field `event` naming it.
+/// An event; JSON with the field `event` as its name.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
@@ -23,17 +23,17 @@ pub enum Event {
         n_samples: usize,
         /// Number of axes.
         n_axes: usize,
-        /// Their names.
+        /// Names of the axes.
         axis_names: Vec<String>,
         /// Unit of each axis' learned input.
         input_units: Vec<String>,
         /// Servo cycle.
         cycle_s: f64,
-        /// Number of the first run to come; above 0 when resumed.
+        /// Number of the first run; above 0 when resumed.
         first_index: u32,
         /// Runs in the whole campaign.
         iterations: u32,
-        /// Measurement learned from.
+        /// Measurement to learn from.
         measure: String,
         /// Law.
         law: String,
@@ -61,7 +61,7 @@ pub enum Event {
         /// Samples in a run.
         n_samples: usize,
     },
-    /// A run ended and is kept.
+    /// A run ended and is stored.
     Iteration {
         /// Row in the library.
         id: i64,
@@ -73,7 +73,7 @@ pub enum Event {
         #[serde(flatten)]
         figures: Figures,
     },
-    /// The law decided on a run that was published before, as it computed meanwhile.
+    /// The law decided on a run that was already published, as it was still computing.
     Judged {
         /// Row in the library.
         id: i64,
@@ -95,7 +95,7 @@ pub enum Event {
         #[schemars(with = "serde_json::Value")]
         execution_us: LatencyFigures,
     },
-    /// Something stopped the axes.
+    /// A fault stopped the axes.
     Fault {
         /// One sentence.
         reason: String,
@@ -114,23 +114,23 @@ pub enum Event {
     },
 }
 
-/// States of a cell as others see them.
+/// States of a cell, as published.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum StateName {
     /// Nodes are reset, checked and configured.
     BringingUp,
-    /// Drives are switched on, holding their position.
+    /// Drives are enabled, holding their position.
     Enabling,
-    /// Axes go to the start.
+    /// Axes move to the start.
     Returning,
     /// Axes rest at the start.
     Settling,
-    /// A run is on.
+    /// A run is in progress.
     Running,
-    /// Axes are brought to rest ahead of time.
+    /// Axes are being stopped early.
     Stopping,
-    /// Drives are off.
+    /// Drives are disabled.
     Stopped,
 }
 
@@ -140,7 +140,7 @@ pub enum StateName {
 pub enum EndStatus {
     /// All runs were made.
     Completed,
-    /// It was asked to stop.
+    /// A stop was requested.
     Interrupted,
     /// A fault stopped it.
     Fault,

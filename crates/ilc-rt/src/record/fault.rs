@@ -1,9 +1,9 @@
-//! A fault in its fields: what happened, where, with which numbers, and the cycles before it.
+//! A fault in fields: kind, place, numbers, and the cycles before it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The cause of a controlled stop that was not asked for.
+/// The cause of a controlled stop that was not requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
@@ -13,9 +13,10 @@ pub enum FaultKind {
     NotEnabled,
     /// A drive did not answer; `value` is the number of cycles.
     SilentDrive,
-    /// One of the PDOs of a drive did not come; `code` is its number, `value` the number of cycles.
+    /// One of the PDOs of a drive is missing; `code` is its number, `value` the number of cycles.
     SilentPdo,
-    /// A PDO has another length than its mapping; `code` is its number, `value` its bytes, `limit` 8.
+    /// A PDO has a different length than its mapping; `code` is its number, `value` its bytes,
+    /// `limit` 8.
     WrongLength,
     /// The tool measurement did not answer; `value` is the number of cycles.
     SilentTool,
@@ -25,9 +26,9 @@ pub enum FaultKind {
     NodeStopped,
     /// Another master commands on the bus.
     OtherMaster,
-    /// Command and encoder came too far apart.
+    /// Command and encoder differ too much.
     FollowingError,
-    /// An axis stands outside its limits before its drive is switched on; `limit` is the nearer one.
+    /// An axis is outside its limits before its drive is enabled; `limit` is the nearer one.
     OutsideLimits,
     /// A position jumped farther than the axis can move.
     PositionJump,
@@ -56,15 +57,15 @@ pub enum FaultKind {
 pub struct Fault {
     /// Cause.
     pub kind: FaultKind,
-    /// Name of the axis, if it is one axis.
+    /// Name of the axis, if it concerns one axis.
     pub axis: Option<String>,
-    /// CANopen node, if it is one node.
+    /// CANopen node, if it concerns one node.
     pub node: Option<u8>,
-    /// Number that the kind says.
+    /// Number defined by the kind.
     pub code: Option<u32>,
-    /// Quantity that was found.
+    /// Value found.
     pub value: Option<f64>,
-    /// Limit that it exceeds.
+    /// Limit exceeded.
     pub limit: Option<f64>,
     /// Unit of both.
     pub unit: Option<String>,
@@ -72,25 +73,25 @@ pub struct Fault {
     pub cycles: LastCycles,
 }
 
-/// Servo cycles in a row, oldest first; one row per cycle, one column per axis.
+/// Consecutive servo cycles, oldest first; one row per cycle, one column per axis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct LastCycles {
     /// Count of SYNCs at the first one; absent without cycles.
     pub first_sync: Option<u64>,
     /// Set points without the learned input.
     pub reference_m: Vec<Vec<f64>>,
-    /// Learned input as it was applied.
+    /// Learned input as applied.
     pub input: Vec<Vec<f64>>,
     /// Encoders.
     pub encoder_m: Vec<Vec<f64>>,
     /// Tool centre point; zeros without such a measurement.
     pub tool_m: Vec<Vec<f64>>,
-    /// True for a cycle whose measurement has not come: the last one known stands in for it.
+    /// True for a cycle whose measurement has not arrived: the last known one stands in for it.
     pub missing: Vec<bool>,
 }
 
 impl Fault {
-    /// A fault without further fields.
+    /// Creates a fault without further fields.
     pub fn new(kind: FaultKind) -> Self {
         let cycles = LastCycles::default();
         Self {

@@ -1,4 +1,5 @@
-//! The fields of a described struct with their types, for what derives from it: columns, classes, tables.
+//! The fields of a described struct with their types, for columns, classes and tables derived from
+//! it.
 
 use std::sync::OnceLock;
 

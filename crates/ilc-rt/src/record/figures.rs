@@ -1,4 +1,4 @@
-//! The figures of one run, and the two norms they are made of.
+//! The figures of one run, and their two norms.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,19 +7,19 @@ use super::axes::AxisKinds;
 use crate::schema::field_order;
 use crate::trajectory::contour_error_m;
 
-/// Farthest that a tool is looked for along the path, before or after its own time.
+/// Time window, before and after its own time, in which a point is compared with the path.
 const CONTOUR_WINDOW_S: f64 = 0.25;
-/// Distance below which there is rounding of positions, and nothing that was measured: a picometre.
+/// Distance below which there is only rounding: a picometre.
 const ROUNDING_M: f64 = 1e-12;
 
 /// Figures of one run; lengths in metres, angles in radians.
 ///
-/// Lengths and angles are never combined in one figure: one over several axes is over the linear ones, or,
-/// where all are rotary, over all of them and in radians.
+/// Lengths and angles are never combined in one figure: one over several axes is over the linear
+/// ones, or, if all are rotary, over all of them and in radians.
 ///
-/// This struct is the one description of the figures: columns of the library, events, JSON files and the
-/// Python class derive from it. A new field is a new figure everywhere; give it `#[serde(default)]`, as
-/// runs that are stored do not have it.
+/// This struct is the single description of the figures: columns of the library, events, JSON files
+/// and the Python class derive from it. A new field is a new figure everywhere; it needs
+/// `#[serde(default)]`, as stored runs do not have it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Figures {
@@ -27,9 +27,10 @@ pub struct Figures {
     pub tracking_inf_m: f64,
     /// RMS over time of the Euclidean norm of the tracking error.
     pub tracking_rms_m: f64,
-    /// Largest distance of the tool from the reference path; absent where the path has no contour.
+    /// Largest contour error: distance of the tool from the reference path; absent if the path has
+    /// no contour.
     pub contour_inf_m: Option<f64>,
-    /// RMS of that distance.
+    /// RMS of the contour error.
     pub contour_rms_m: Option<f64>,
     /// Largest absolute tracking error of each axis, in its own unit.
     #[serde(default)]
@@ -42,30 +43,30 @@ pub struct Figures {
     pub encoder_tracking_inf_m: f64,
     /// Largest absolute tracking error of any axis at the tool; absent without such a measurement.
     pub tool_tracking_inf_m: Option<f64>,
-    /// Servo cycles that began a whole cycle late or more.
+    /// Servo cycles that began at least a whole cycle late.
     #[serde(default)]
     pub overruns: u32,
-    /// Samples whose measurement never arrived; the last one known stands in for them.
+    /// Samples whose measurement never arrived; the last known one stands in for them.
     #[serde(default)]
     pub missing_samples: u32,
     /// Runs so far that repeated the old input because the learning update was late.
     #[serde(default)]
     pub late_updates: u32,
-    /// Time of the learning update that made the input of this run; 0 without one.
+    /// Computing time of the learning update for this run's input; 0 without one.
     #[serde(default)]
     pub update_ms: f64,
-    /// True if the error had grown so far that the best input was restored after this run.
+    /// True if the best input was restored after this run (rollback), as the error had grown.
     #[serde(default)]
     pub rolled_back: bool,
     /// True if nothing was learned from this run and learning is off, as the error had grown.
     #[serde(default)]
     pub learning_off: bool,
-    /// Reason of the decision on the next input, where the law alone did not decide; one sentence.
+    /// Reason of the decision on the next input, unless the law alone decided; one sentence.
     pub remark: Option<String>,
 }
 
 impl Figures {
-    /// Takes the tracking error that was learned from, `n_samples * n_axes`.
+    /// Sets the tracking error that was learned from, `n_samples * n_axes`.
     pub fn set_tracking(&mut self, error_m: &[f64], kinds: &AxisKinds) {
         let axis = |axis| kinds.columns(error_m, &[axis]);
         let axes = || 0..kinds.n_axes();
@@ -77,8 +78,8 @@ impl Figures {
         self.tracking_rms_m = rms(&error_m, comparable.len());
     }
 
-    /// Takes where the axes were, at the encoders and, if it is measured (`tool_m` is not empty), at the
-    /// tool.
+    /// Sets the positions of the axes, at the encoders and, if measured (`tool_m` is not empty), at
+    /// the tool.
     pub fn set_places(
         &mut self,
         reference_m: &[f64],
@@ -95,7 +96,7 @@ impl Figures {
         self.tool_tracking_inf_m = (!tool_m.is_empty()).then(|| largest(tool_m));
     }
 
-    /// Takes the distances from the path; none where it has no contour.
+    /// Sets the distances from the path; empty if it has no contour.
     pub fn set_contour(&mut self, contour_m: &[f64]) {
         let measured = |value: f64| if value < ROUNDING_M { 0.0 } else { value };
         let there = !contour_m.is_empty();
@@ -103,8 +104,8 @@ impl Figures {
         self.contour_rms_m = there.then(|| measured(rms(contour_m, 1)));
     }
 
-    /// Returns the figure that a run is judged by, all axes together: a number to compare runs with, without a unit of its
-    /// own where axes differ in theirs.
+    /// Returns the figure by which a run is judged, over all axes: a number to compare runs with,
+    /// without a unit where the axes have different units.
     pub fn judged_by(&self) -> f64 {
         if self.axes_tracking_rms_m.is_empty() {
             return self.tracking_rms_m;
@@ -113,8 +114,8 @@ impl Figures {
     }
 }
 
-/// Distances of measured points from the path near their own time, in the linear axes; empty where the
-/// path has no contour.
+/// Returns the distances of measured points from the path near their own time, in the linear axes;
+/// empty if the path has no contour.
 ///
 /// # Shapes
 /// - `reference_m`, `measured_m`: `n_samples * n_axes`, time first; returns `n_samples` or nothing
@@ -137,12 +138,12 @@ pub fn distances_m(
     contour_error_m(reference_m, measured_m, kinds.n_axes(), window)
 }
 
-/// Largest absolute value; 0 for an empty array.
+/// Returns the largest absolute value; 0 for an empty array.
 pub fn infinity_norm(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |largest, value| f64::max(largest, value.abs()))
 }
 
-/// `sqrt(1/N sum_k |x_k|^2)` with `N` rows of `n_columns`; 0 for an empty array.
+/// Returns `sqrt(1/N sum_k |x_k|^2)` with `N` rows of `n_columns`; 0 for an empty array.
 pub fn rms(values: &[f64], n_columns: usize) -> f64 {
     let n_rows = values.len() / n_columns.max(1);
     if n_rows == 0 {

@@ -1,4 +1,4 @@
-//! The record of one run: arrays on the servo grid, and where they came from.
+//! The record of one run: arrays on the servo grid, and their provenance.
 
 use sha2::{Digest, Sha256};
 
@@ -11,13 +11,13 @@ pub struct Meta {
     pub cell: String,
     /// Identifier of the campaign.
     pub campaign: String,
-    /// Hash of everything that the input depends on: axes, program, law; equal means comparable.
+    /// Hash of everything that affects the input: axes, program, law; equal means comparable.
     pub fingerprint: String,
     /// Name of the law.
     pub law: String,
     /// Parameters of the law as JSON.
     pub law_parameters: String,
-    /// `encoder` or `tcp`: what was learned from.
+    /// Measurement learned from: `encoder` or `tcp`.
     pub measure: String,
     /// The program's segments as JSON.
     pub program: String,
@@ -25,7 +25,7 @@ pub struct Meta {
     pub cycle_s: f64,
     /// Number of axes.
     pub n_axes: usize,
-    /// Their names.
+    /// Names of the axes.
     pub axis_names: Vec<String>,
     /// Unit of each axis' learned input: `m`, `m/s`, `rad` or `rad/s`.
     pub input_units: Vec<String>,
@@ -34,8 +34,8 @@ pub struct Meta {
 /// One run.
 ///
 /// # Shapes
-/// All arrays are time first, `n_samples * n_axes`, row by row; `contour_m` is `n_samples`, or empty
-/// where the path has no contour.
+/// All arrays are time first, `n_samples * n_axes`, row by row; `contour_m` is `n_samples`, or
+/// empty if the path has no contour.
 /// # Units
 /// Positions and errors in metres. `input` in metres (csp) or metres per second (csv).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +44,7 @@ pub struct IterationRecord {
     pub index: u32,
     /// Set points of the program, without the learned input.
     pub reference_m: Vec<f64>,
-    /// Learned input as it was applied.
+    /// Learned input as applied.
     pub input: Vec<f64>,
     /// Positions measured in the drives.
     pub encoder_m: Vec<f64>,
@@ -62,7 +62,7 @@ pub struct IterationRecord {
 }
 
 impl IterationRecord {
-    /// SHA-256 over index and arrays: equal exactly if two runs are the same bit by bit.
+    /// Returns the SHA-256 over index and arrays: equal exactly if two runs are bit-identical.
     pub fn digest(&self) -> String {
         let mut hash = Sha256::new();
         hash.update(self.index.to_le_bytes());
@@ -79,7 +79,7 @@ impl IterationRecord {
                 hash.update(value.to_le_bytes());
             }
         }
-        // Only where there is one, so that runs kept before disturbances were still match.
+        // Only if there is one, so that runs stored before disturbances existed still match.
         for value in &self.disturbance {
             hash.update(value.to_le_bytes());
         }
@@ -87,7 +87,7 @@ impl IterationRecord {
     }
 }
 
-/// SHA-256 of a text, in hexadecimal.
+/// Returns the SHA-256 of a text, in hexadecimal.
 pub fn fingerprint(text: &str) -> String {
     hex(&Sha256::digest(text.as_bytes()))
 }

@@ -1,6 +1,6 @@
 //! Records of iterations: their arrays, their figures, and the events that report them.
 //!
-//! The campaign fills it, the library keeps it, telemetry and Python read it. Imports signal,
+//! The campaign fills it, the library stores it, telemetry and Python read it. Imports signal,
 //! trajectory and models at most; never the loop, the library or the bus.
 
 mod axes;

@@ -1,13 +1,13 @@
-//! Texts that came from elsewhere, as they may be shown: nothing in them does anything but being read.
+//! Display of untrusted texts: without control characters.
 
 use std::fmt::Write as _;
 
-/// Most characters of a name.
+/// Largest number of characters of a name.
 pub const NAME_MAX: usize = 64;
 /// Largest number of characters of a foreign text in a line for people.
 pub const TEXT_MAX: usize = 400;
 
-/// Format characters of Unicode: among them those that turn the direction of writing around.
+/// Unicode format characters, including those that reverse the direction of writing.
 const FORMAT: [(char, char); 14] = [
     ('\u{ad}', '\u{ad}'),
     ('\u{600}', '\u{605}'),
@@ -31,8 +31,8 @@ pub fn is_hidden(character: char) -> bool {
         || FORMAT.iter().any(|(first, last)| (*first..=*last).contains(&character))
 }
 
-/// A text in one line in which every character is seen: an escape character is `\x1b`. What is longer than
-/// `length_max` characters ends in three dots.
+/// Returns a text in one line with every character visible: an escape character is `\x1b`. A text
+/// longer than `length_max` characters is truncated with three dots.
 pub fn printable(text: &str, length_max: usize) -> String {
     let mut seen = String::new();
     for (place, character) in text.chars().enumerate() {
@@ -45,7 +45,7 @@ pub fn printable(text: &str, length_max: usize) -> String {
     seen
 }
 
-/// A text whose line breaks stay and whose other hidden characters are seen.
+/// Returns a text with its line breaks, and with other hidden characters visible.
 pub fn printable_lines(text: &str) -> String {
     let mut seen = String::with_capacity(text.len());
     for character in text.chars() {
@@ -58,8 +58,8 @@ pub fn printable_lines(text: &str) -> String {
     seen
 }
 
-/// JSON as it may be printed: hidden characters in it, which stand in strings only, are written as
-/// escapes that mean the same.
+/// Returns printable JSON: hidden characters, which occur in strings only, are written as
+/// equivalent escapes.
 pub fn printable_json(text: &str) -> String {
     let mut seen = String::with_capacity(text.len());
     for character in text.chars() {

@@ -1,4 +1,4 @@
-//! Values against the ranges of their schema.
+//! Checks values against the ranges of their schema.
 
 use std::fmt::Write as _;
 
@@ -9,10 +9,10 @@ use toml::Value;
 
 use super::{ORDER, inlined};
 
-/// A value that its schema does not allow.
+/// A value out of its schema's range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation {
-    /// Table and key, as `[axis.limits] jerk_max_m_s3`.
+    /// Table and key, e.g. `[axis.limits] jerk_max_m_s3`.
     pub key: String,
     /// The value found.
     pub value: String,
@@ -20,11 +20,11 @@ pub struct Violation {
     pub allowed: String,
 }
 
-/// Checks every number of a value against the range that its schema gives; `table` is where the value
-/// stands, as `learning.pd`, and empty for a whole file.
+/// Checks every number of a value against the range in its schema; `table` is the place of the
+/// value, e.g. `learning.pd`, and empty for a whole file.
 ///
 /// # Errors
-/// [`Violation`] for the first number, in the order of the fields, that is not finite or out of its
+/// [`Violation`] for the first number, in the order of the fields, that is not finite or out of
 /// range.
 pub fn check<T: Serialize + JsonSchema>(value: &T, table: &str) -> Result<(), Violation> {
     let found = Value::try_from(value).map_err(|error| Violation {

@@ -1,11 +1,11 @@
-//! Reading a schema: the table at a path, its keys in order, and what is said of each in words.
+//! Reading of a schema: the table at a path, its keys in order, and their descriptions.
 
 use serde_json::Value;
 
 use super::ORDER;
 use super::check::Range;
 
-/// A table or a key of a schema in which every nested one is in its place.
+/// A table or a key of an inlined schema.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node<'a> {
     pub(super) name: &'a str,
@@ -16,7 +16,7 @@ pub(super) struct Node<'a> {
 /// Kind of value that a key holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// A number, a text, a list of such, …
+    /// A number, a text, or a list of them.
     Value,
     /// A table.
     Table,
@@ -29,13 +29,13 @@ impl<'a> Node<'a> {
         Self { name: "", schema, is_required: true }
     }
 
-    /// Returns the table at a path, as `learning.pd`.
+    /// Returns the table at a path, e.g. `learning.pd`.
     pub(super) fn at(self, path: &str) -> Option<Self> {
         let mut names = path.split('.');
         names.try_fold(self, |node, name| node.keys().into_iter().find(|key| key.name == name))
     }
 
-    /// Returns the keys in the order of their declaration; those of the elements of an array of tables.
+    /// Returns the keys in the order of declaration; for an array of tables, those of its elements.
     pub(super) fn keys(self) -> Vec<Self> {
         let table = self.table();
         let names = table[ORDER].as_array().into_iter().flatten().filter_map(Value::as_str);
@@ -72,7 +72,7 @@ impl<'a> Node<'a> {
             .join(" ")
     }
 
-    /// Returns the default as TOML has it; `None` if there is none.
+    /// Returns the default in TOML syntax; `None` if there is none.
     pub(super) fn default(self) -> Option<String> {
         let value = self.schema.get("default").filter(|value| !value.is_null())?;
         toml::Value::try_from(value).ok().map(|value| value.to_string())
@@ -95,7 +95,7 @@ impl<'a> Node<'a> {
         found == kind || found.as_array().is_some_and(|all| all.iter().any(|one| one == kind))
     }
 
-    /// Returns what is allowed, in words; empty if anything of its type is.
+    /// Returns the allowed values in words; empty if the type allows any.
     pub(super) fn allowed(self) -> String {
         let choices = self.choices();
         if !choices.is_empty() {

@@ -1,17 +1,17 @@
-//! The fields of a struct in the order of their declaration, as serde knows them.
+//! The fields of a struct in the order of declaration, as serde knows them.
 
 use serde::de::value::Error;
 use serde::de::{Deserialize, Deserializer, Error as _, Visitor};
 
-/// Returns the names of a struct's fields as a file has them; empty for other types.
+/// Returns the names of a struct's fields in a file; empty for other types.
 pub fn field_order<'de, T: Deserialize<'de>>() -> &'static [&'static str] {
     let mut fields: &'static [&'static str] = &[];
-    // It always refuses: the names are all that is asked for.
+    // It always refuses: only the names are needed.
     let _ = T::deserialize(Names(&mut fields));
     fields
 }
 
-/// A source of no data that notes which fields it is asked for.
+/// A source without data that records the requested fields.
 struct Names<'a>(&'a mut &'static [&'static str]);
 
 impl<'de> Deserializer<'de> for Names<'_> {

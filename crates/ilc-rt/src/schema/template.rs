@@ -11,14 +11,15 @@ use super::node::{Kind, Node};
 /// Longest line of a comment.
 const WIDTH: usize = 100;
 
-/// Returns a file with all keys of a schema, of which those of `example` have values.
+/// Returns a file with all keys of a schema; those of `example` have values.
 pub fn template(schema: &Json, example: &Table) -> String {
     let mut text = String::new();
     write_table(&mut text, Node::root(schema), "", Some(example), true);
     text
 }
 
-/// Writes the keys of a table, then its tables; `is_told` unless the same table was explained before.
+/// Writes the keys of a table, then its tables; `is_told` unless the same table was explained
+/// before.
 fn write_table(text: &mut String, table: Node, path: &str, example: Option<&Table>, is_told: bool) {
     let keys = table.keys();
     for key in keys.iter().filter(|key| key.kind() == Kind::Value) {

@@ -1,4 +1,4 @@
-//! The middle of a tick: what the axes do next, and the set point that follows from it.
+//! The middle of a tick: transitions of the phase, and the resulting set point.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -9,14 +9,14 @@ use super::phase::Phase;
 use crate::fieldbus::cia402::State;
 use crate::interpolate::PointToPoint;
 
-/// Rest of the axes after a stop before the drives are switched off.
+/// Time at rest after a stop before the drives are switched off.
 const REST_S: f64 = 0.1;
-/// Longest time of the drives to switch off.
+/// Time-out for the drives to switch off.
 const DISABLE_S: f64 = 0.5;
 
 impl Cycle {
-    /// Moves the phase on and sets reference and learned input of this tick; returns run and sample
-    /// if a run is on.
+    /// Advances the phase and sets reference and learned input of this tick; returns run and sample
+    /// during a run.
     pub(super) fn advance(&mut self) -> Option<(u32, u32)> {
         let dt_s = self.spec.cycle.as_secs_f64();
         match self.phase {
@@ -81,7 +81,7 @@ impl Cycle {
 
     fn enabling(&mut self, ticks: u32) {
         for axis in 0..self.n_axes() {
-            // Until a drive follows, its command is where it is: nothing can jump when it does.
+            // Until a drive is enabled, its command is its position: the transfer is bumpless.
             if !self.drives[axis].enabled() {
                 let encoder_m = self.drives[axis].encoder_m;
                 self.reference.position_m[axis] = encoder_m;
@@ -95,7 +95,7 @@ impl Cycle {
         }
     }
 
-    /// Takes it that an axis has been commanded to stand at a place for long.
+    /// Assumes that an axis has been commanded to a position for long.
     fn hold(&mut self, axis: usize, position_m: f64) {
         let command = mode::of(self.spec.axes[axis].mode).hold(position_m);
         for past in &mut self.commanded {
@@ -123,7 +123,7 @@ impl Cycle {
         let n_axes = self.n_axes();
         if let Err(axis) = self.input.follow(&row[..n_axes]) {
             self.begin_stop(StopReason::NotFinite { axis });
-            // The stop has taken over the learned input, so the set point of this tick is the stop's.
+            // The stop has absorbed the learned input, so the set point of this tick is the stop's.
             return self.advance();
         }
         self.reference = self.interpolator.next();

@@ -12,8 +12,8 @@ use crate::fieldbus::canopen::sync;
 use crate::fieldbus::cia402::{Controlword, State, next_command};
 
 impl Cycle {
-    /// Sends every drive its command, then SYNC. A frame that the bus has no room for is one that
-    /// the drive misses: it goes on for a cycle by itself, and its silence is noticed if that lasts.
+    /// Sends every drive its command, then SYNC. A frame that the bus cannot take is missed by the
+    /// drive: it extrapolates for a cycle, and a persistent silence is detected.
     pub(super) fn command(&mut self) {
         let mut newest = self.commanded[0];
         let mut fault = None;
@@ -44,7 +44,7 @@ impl Cycle {
         }
     }
 
-    /// The bounded target of an axis, in the unit of its mode.
+    /// Returns the bounded target of an axis, in the unit of its mode.
     fn target(&mut self, axis: usize) -> f64 {
         let spec = &self.spec.axes[axis];
         let drive = &self.drives[axis];
@@ -76,7 +76,7 @@ impl Cycle {
             return Controlword::DISABLE_VOLTAGE;
         };
         match self.phase {
-            // No drive is switched on before all are known to stand where they may.
+            // No drive is enabled before all are known to be within their limits.
             Phase::Enabling { .. } if !self.all_heard() => Controlword::DISABLE_VOLTAGE,
             Phase::Enabling { .. } if state == State::Fault => {
                 Controlword::fault_reset_after(drive.sent.controlword)
@@ -85,7 +85,7 @@ impl Cycle {
             | Phase::Returning(_)
             | Phase::Settling { .. }
             | Phase::Running { .. } => next_command(state),
-            // What has switched itself off in a stop stays off.
+            // A drive that has disabled itself in a stop stays off.
             Phase::Stopping { .. } => match state {
                 State::OperationEnabled => Controlword::ENABLE_OPERATION,
                 State::QuickStopActive => Controlword::QUICK_STOP,
@@ -101,7 +101,7 @@ impl Cycle {
         }
     }
 
-    /// Returns whether every drive has told its state and position.
+    /// Returns true if every drive has reported its state and position.
     fn all_heard(&self) -> bool {
         self.drives[..self.n_axes()].iter().all(|drive| drive.heard)
     }

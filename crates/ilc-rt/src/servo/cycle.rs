@@ -15,37 +15,37 @@ use crate::fieldbus::Bus;
 use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
 use crate::rt::Nanos;
 
-/// Longest fade of the learned input after a run.
+/// Longest fade-out of the learned input after a run.
 const FADE_MAX_S: f64 = 0.2;
 
 /// True if the loop has more to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TickStatus {
-    /// Tick on.
+    /// Continue with the next tick.
     Running,
-    /// Drives are off, or lost; there is nothing more to do.
+    /// Drives are disabled, or lost; there is nothing more to do.
     Stopped,
 }
 
-/// The servo cycle and all that it needs, sized when it is made.
+/// The servo cycle with its state, sized at creation.
 ///
 /// # Real Time
-/// [`Cycle::tick`] allocates nothing, takes no lock, reads no clock and cannot panic.
+/// [`Cycle::tick`] does not allocate, take locks, read clocks or panic.
 pub struct Cycle {
     pub(super) bus: Box<dyn Bus>,
     pub(super) spec: ServoSpec,
     pub(super) mail: LoopSide,
     pub(super) drives: [Drive; MAX_AXES],
     pub(super) tool_m: [f64; MAX_AXES],
-    /// Length of the tool's last PDO that could not be read, if there was one.
+    /// Length of the tool's last unreadable PDO, if there was one.
     pub(super) tool_unreadable: Option<u8>,
     pub(super) pending: PendingCycles,
     pub(super) interpolator: Interpolator,
     pub(super) input: LearnedInput,
     pub(super) phase: Phase,
     pub(super) reference: Setpoint,
-    /// The last three commands of each axis, newest first, m or m/s as it takes them: where a stop has
-    /// to begin.
+    /// The last three commands of each axis, newest first, in m or m/s by its mode: the initial
+    /// state of a stop.
     pub(super) commanded: [[f64; MAX_AXES]; 3],
     pub(super) gates: [Gate; MAX_AXES],
     pub(super) run: u32,
@@ -67,7 +67,7 @@ impl std::fmt::Debug for Cycle {
 }
 
 impl Cycle {
-    /// Makes the cycle on a bus whose nodes have been brought up. Cold.
+    /// Creates the cycle on a bus whose nodes have been brought up. Cold.
     ///
     /// # Shapes
     /// - `spec.axes`, `spec.start_m`: one entry for each axis of `interpolator`
@@ -121,12 +121,12 @@ impl Cycle {
         }
     }
 
-    /// The servo cycle.
+    /// Returns the servo cycle time.
     pub fn period(&self) -> Nanos {
         self.spec.cycle
     }
 
-    /// One servo cycle; `missed` cycles before it were skipped because it came too late.
+    /// Runs one servo cycle; `missed` cycles before it were skipped because it started too late.
     pub fn tick(&mut self, missed: u32) -> TickStatus {
         self.stall.note(missed);
         self.run_overruns = self.run_overruns.saturating_add(missed);
@@ -167,17 +167,17 @@ impl Cycle {
         TickStatus::Running
     }
 
-    /// Gives the bus back when the loop is over.
+    /// Returns the bus when the loop is over.
     pub fn into_bus(self) -> Box<dyn Bus> {
         self.bus
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     pub(super) fn n_axes(&self) -> usize {
         self.spec.axes.len().min(MAX_AXES)
     }
 
-    /// Position that each axis is commanded to, m: of a velocity axis, its reference.
+    /// Returns the commanded position of each axis, m: for a velocity axis, its reference.
     pub(super) fn commanded_position_m(&self) -> [f64; MAX_AXES] {
         let mut position_m = self.reference.position_m;
         for (axis, spec) in self.spec.axes.iter().enumerate().take(MAX_AXES) {
@@ -187,13 +187,13 @@ impl Cycle {
         position_m
     }
 
-    /// Swaps in the newest input table, if one is waiting, and tells which one this run uses.
+    /// Swaps in the newest input table, if one is waiting, and reports the one that this run uses.
     pub(super) fn take_table(&mut self) {
         self.mail.newest_table(&mut self.table);
         self.mail.tell(Message::RunStarted { run: self.run, table: self.table.number });
     }
 
-    /// The row of the input table for a sample; empty where the table ends.
+    /// Returns the row of the input table for a sample; zero beyond the table's end.
     pub(super) fn table_row(&self, sample: usize) -> [f64; MAX_AXES] {
         let mut row = [0.0; MAX_AXES];
         let n_axes = self.n_axes();
@@ -204,7 +204,7 @@ impl Cycle {
         row
     }
 
-    /// Passes on every cycle that is complete.
+    /// Passes on every complete cycle.
     fn give_out(&mut self) {
         self.pending.watch_lag();
         while let Some((sample, last_of_run)) = self.pending.take() {

@@ -1,20 +1,19 @@
-//! The last gate before the bus: what leaves it is within the limits of its axis, whatever the sum of
-//! program and learned input asks for.
+//! The last gate before the bus: its output is within the limits of the axis for any sum of program
+//! and learned input.
 //!
-//! A command that keeps the limits passes bit for bit. One that does not is followed as closely as the
-//! axis' own acceleration allows, and met again without a step. Limits of position are kept by braking
-//! ahead of them; an axis that stands outside is never pulled in by them, it is only kept from going
-//! farther out.
+//! A command within the limits passes bit for bit. Another one is followed as closely as the axis'
+//! own acceleration allows, and caught up with without a step. Position limits are kept by braking
+//! ahead of them; an axis outside is never pulled in by them, only kept from going farther out.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use crate::interpolate::AxisLimits;
 
-/// Multiple of the acceleration limit of the axis at which a command may change while it keeps all other
-/// limits.
+/// Multiple of the acceleration limit of the axis by which a command may change while it keeps all
+/// other limits.
 ///
-/// The program keeps the acceleration limit. What is learned on top of it makes up for the lag of the
-/// drive, and so changes faster than the axis will ever move: that shall pass.
+/// The program respects the acceleration limit. The learned input on top of it compensates for the
+/// lag of the drive, and so changes faster than the axis will ever move: that has to pass.
 const LEARNED_SHARE: f64 = 4.0;
 
 /// Limits that a gate keeps.
@@ -27,8 +26,8 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Highest velocity from which an axis still comes to rest within `distance_m`, a cycle of moving
-    /// on included: `v T/2 + v^2/2a = d`.
+    /// Returns the highest velocity from which an axis still comes to rest within `distance_m`,
+    /// including one cycle of delay: `v T/2 + v^2/2a = d`.
     fn braking_m_s(&self, distance_m: f64, acceleration_m_s2: f64) -> f64 {
         let (half_s, distance_m) = (0.5 * self.dt_s, distance_m.max(0.0));
         let root = half_s * half_s + 2.0 * distance_m / acceleration_m_s2;
@@ -39,20 +38,20 @@ impl Bounds {
 /// The gate of an axis.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gate {
-    /// Last position asked for.
+    /// Last requested position.
     asked_m: f64,
-    /// True if the command is not yet what is asked for.
+    /// True if the command differs from the requested one.
     behind: bool,
 }
 
 impl Gate {
-    /// Begins at a command that has been given.
+    /// Starts at the current command.
     pub(super) fn begin(&mut self, command_m: f64) {
         *self = Self { asked_m: command_m, behind: false };
     }
 
-    /// The position to command where `wanted_m` is asked for; `last` are the two commands before,
-    /// newest first. What is not a number stays so.
+    /// Returns the position command for the request `wanted_m`; `last` are the two previous
+    /// commands, newest first. NaN passes through.
     pub(super) fn position_m(&mut self, wanted_m: f64, last: [f64; 2], bounds: &Bounds) -> f64 {
         if !wanted_m.is_finite() {
             return wanted_m;
@@ -73,19 +72,20 @@ impl Gate {
         let wanted_m_s = (inside_m - at_m) / dt_s;
         let catching_up = self.behind || cut;
         let reach = if catching_up { own } else { LEARNED_SHARE * own } * dt_s;
-        // A count of rounding must not hold a command back that keeps the limits.
+        // Rounding by a count must not restrict a command that is within the limits.
         let slack = 1e-9 * top_m_s;
         let free = wanted_m_s <= up_m_s + slack
             && wanted_m_s >= down_m_s - slack
             && (wanted_m_s - before_m_s).abs() <= reach + slack
-            // What is met must be met at its own speed, or the next cycle would step.
+            // It must be caught up with at its own velocity, or the next cycle would step.
             && (!catching_up || (wanted_m_s - asked_m_s).abs() <= reach + slack);
         if free {
             self.behind = cut;
             return inside_m;
         }
         self.behind = true;
-        // Half of the acceleration closes the gap; the other half is for what is asked to accelerate.
+        // Half of the acceleration closes the gap; the other half is for the acceleration of the
+        // request.
         let gap_m = inside_m - at_m - asked_m_s * dt_s;
         let closing_m_s = bounds.braking_m_s(gap_m.abs(), 0.5 * own).copysign(gap_m);
         let next_m_s = (asked_m_s + closing_m_s)
@@ -98,7 +98,7 @@ impl Gate {
         (at_m + next_m_s * dt_s).max(low_m).min(high_m)
     }
 
-    /// The velocity to command where `wanted_m_s` is asked for of an axis that is at `at_m`.
+    /// Returns the velocity command for the request `wanted_m_s` of an axis at `at_m`.
     pub(super) fn velocity_m_s(wanted_m_s: f64, last_m_s: f64, at_m: f64, bounds: &Bounds) -> f64 {
         if !wanted_m_s.is_finite() {
             return wanted_m_s;
@@ -135,7 +135,7 @@ mod tests {
         dt_s: 0.002,
     };
 
-    /// The commands where `wanted_m` is asked for from a rest at `start_m`.
+    /// Returns the commands for the request `wanted_m`, from rest at `start_m`.
     fn commands(start_m: f64, n: usize, wanted_m: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut gate = Gate::default();
         gate.begin(start_m);

@@ -1,4 +1,5 @@
-//! The learned input on its way to the axes: bounded, never a step, and faded out after a run.
+//! Application of the learned input to the axes: bounded, rate-limited (bumpless), and faded out
+//! after a run.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -17,7 +18,7 @@ pub(super) struct LearnedInput {
 }
 
 impl LearnedInput {
-    /// `max` bounds the input, `step_max` its change in a tick; a fade takes `fade_ticks`.
+    /// Creates it with bound `max`, rate limit `step_max` per tick, and a fade-out of `fade_ticks`.
     pub(super) fn new(max: [f64; MAX_AXES], step_max: [f64; MAX_AXES], fade_ticks: u32) -> Self {
         Self {
             max,
@@ -29,7 +30,7 @@ impl LearnedInput {
         }
     }
 
-    /// The input of this tick.
+    /// Returns the input of this tick.
     pub(super) fn value(&self) -> [f64; MAX_AXES] {
         self.value
     }
@@ -37,7 +38,7 @@ impl LearnedInput {
     /// Takes one row of the table, bounded.
     ///
     /// # Errors
-    /// The axis whose entry is not finite; its input stays as it was.
+    /// The axis with a non-finite entry; its input stays unchanged.
     pub(super) fn follow(&mut self, row: &[f64]) -> Result<(), usize> {
         let mut bad = Ok(());
         for (axis, &wanted) in row.iter().enumerate().take(MAX_AXES) {
@@ -53,7 +54,7 @@ impl LearnedInput {
         bad
     }
 
-    /// Moves on towards no input, along a half cosine from where the run left it.
+    /// Fades the input out, along half a cosine from its value at the end of the run.
     pub(super) fn fade(&mut self) {
         if self.fade_tick >= self.fade_ticks {
             return;

@@ -12,29 +12,29 @@ use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::{NmtCommand, NmtState, NodeId};
 use crate::interpolate::MAX_AXES;
 
-/// One servo cycle as it was: what was asked and what was measured at the same SYNC.
+/// One servo cycle: commands and measurements of the same SYNC.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// Count of SYNCs since the loop began.
     pub sync: u64,
-    /// Run and sample in it, while a run is on.
+    /// Run and sample number, during a run.
     pub at: Option<(u32, u32)>,
     /// Set points without the learned input.
     pub reference_m: [f64; MAX_AXES],
-    /// Learned input as it was applied.
+    /// Learned input as applied.
     pub input: [f64; MAX_AXES],
     /// Encoders.
     pub encoder_m: [f64; MAX_AXES],
     /// Tool centre point; zeros without such a measurement.
     pub tool_m: [f64; MAX_AXES],
-    /// True if a measurement never came and an older one stands here.
+    /// True if a measurement never arrived and an older one is in its place.
     pub missing: bool,
 }
 
-/// Reason of a stop ahead of time.
+/// Reason of a premature stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StopReason {
-    /// Asked to, with the number of the signal.
+    /// Requested, with the number of the signal.
     Asked(i32),
     /// A drive reported a fault; its last emergency code, or 0 if it sent none.
     DriveFault {
@@ -42,14 +42,14 @@ pub enum StopReason {
         axis: usize,
         /// Emergency code of the drive.
         code: u16,
-        /// Distance of demand and position that the drive reported last.
+        /// Following error that the drive reported last.
         following_error_m: f64,
     },
     /// A drive did not reach, or left, operation enabled.
     NotEnabled {
         /// Axis.
         axis: usize,
-        /// Its statusword.
+        /// Statusword of the drive.
         statusword: u16,
     },
     /// A drive did not answer.
@@ -59,7 +59,7 @@ pub enum StopReason {
         /// Cycles without an answer.
         cycles: u32,
     },
-    /// One of a drive's two PDOs did not come, the other one did.
+    /// One of a drive's two PDOs is missing, the other one is not.
     SilentPdo {
         /// Axis.
         axis: usize,
@@ -68,7 +68,7 @@ pub enum StopReason {
         /// Cycles without it.
         cycles: u32,
     },
-    /// A PDO of a node cannot be read, as it has another length than its mapping.
+    /// A PDO of a node is unreadable, as its length differs from its mapping.
     WrongLength {
         /// CANopen node.
         node: u8,
@@ -87,7 +87,7 @@ pub enum StopReason {
         /// CANopen node.
         node: u8,
     },
-    /// A node says that it is no longer operational.
+    /// A node reports that it is not operational any more.
     NodeStopped {
         /// CANopen node.
         node: u8,
@@ -96,14 +96,14 @@ pub enum StopReason {
     },
     /// Another master commands on the bus.
     OtherMaster(Stranger),
-    /// Command and encoder came too far apart.
+    /// Command and encoder differ too much.
     FollowingError {
         /// Axis.
         axis: usize,
-        /// Distance found.
+        /// Following error.
         error_m: f64,
     },
-    /// An axis stands outside its limits before its drive is switched on.
+    /// An axis is outside its limits before its drive is enabled.
     OutsideLimits {
         /// Axis.
         axis: usize,
@@ -114,7 +114,7 @@ pub enum StopReason {
     Jump {
         /// Axis.
         axis: usize,
-        /// By how much, from one answer to the next.
+        /// Size of the jump, from one answer to the next.
         step_m: f64,
     },
     /// A number in the command was not finite.
@@ -152,7 +152,7 @@ pub enum Stranger {
 }
 
 impl StopReason {
-    /// The axis whose measurement has failed, or may have, if it is for that.
+    /// Returns the axis whose measurement has failed, or may have, if that is the reason.
     pub(super) fn distrusted(self) -> Option<usize> {
         match self {
             Self::SilentAxis { axis, .. }
@@ -191,20 +191,20 @@ pub enum Message {
         /// Number of the table.
         table: u32,
     },
-    /// All samples of a run are out.
+    /// All samples of a run have been sent.
     RunEnded {
         /// Run.
         run: u32,
         /// Cycles in it that began a whole cycle late.
         overruns: u32,
     },
-    /// A cycle before a stop, complete or not; they come oldest first, and then the stop.
+    /// A cycle before a stop, complete or not; oldest first, followed by the stop.
     Before(Sample),
     /// The axes are being stopped.
     Stopping(StopReason),
 }
 
-/// An input table on its way into the loop, or the one it replaced on its way back.
+/// An input table on its way into the loop, or the replaced one on its way back.
 #[derive(Debug)]
 pub(super) struct Table {
     pub(super) number: u32,
@@ -230,12 +230,12 @@ pub struct LoopSide {
     dropped: u64,
 }
 
-/// Returns the two sides; `capacity` messages may wait, and `stop` is set to a signal's number to
-/// bring the axes to rest.
+/// Returns the two sides; `capacity` messages may wait, and setting `stop` to a signal's number
+/// stops the axes.
 pub fn mailbox(capacity: usize, stop: Arc<AtomicI32>) -> (Mailbox, LoopSide) {
     let (messages_in, messages_out) = RingBuffer::new(capacity);
     let (tables_in, tables_out) = RingBuffer::new(2);
-    // One more than can be under way, so that handing one back never fails.
+    // One more than can be in transit, so that returning one never fails.
     let (spent_in, spent_out) = RingBuffer::new(4);
     (
         Mailbox {
@@ -249,15 +249,15 @@ pub fn mailbox(capacity: usize, stop: Arc<AtomicI32>) -> (Mailbox, LoopSide) {
 }
 
 impl Mailbox {
-    /// The next message, if there is one.
+    /// Returns the next message, if there is one.
     pub fn read(&mut self) -> Option<Message> {
         self.messages.pop().ok()
     }
 
-    /// Hands the loop the input of the next run; returns it if two are waiting already.
+    /// Passes the input of the next run to the loop; returns it if two are already waiting.
     ///
     /// # Errors
-    /// The table itself, untouched.
+    /// The unchanged table.
     pub fn send_table(&mut self, number: u32, input: Box<[f64]>) -> Result<(), Box<[f64]>> {
         while self.spent.pop().is_ok() {}
         self.tables.push(Table { number, input }).map_err(|refused| match refused {
@@ -265,14 +265,14 @@ impl Mailbox {
         })
     }
 
-    /// Asks the loop to bring the axes to rest, as if the signal of this number had come.
+    /// Requests a stop of the axes, as if the signal of this number had arrived.
     pub fn stop(&self, signal: i32) {
         self.stop.store(signal, Ordering::Relaxed);
     }
 }
 
 impl LoopSide {
-    /// Reports; counts messages without room.
+    /// Sends a message; messages without room are counted.
     #[expect(clippy::large_types_passed_by_value, reason = "it moves into the ring")]
     pub(super) fn tell(&mut self, message: Message) {
         if self.messages.push(message).is_err() {
@@ -280,13 +280,13 @@ impl LoopSide {
         }
     }
 
-    /// The newest input table that is waiting; what it replaces goes back to be freed elsewhere.
+    /// Takes the newest waiting input table; the replaced one goes back to be freed elsewhere.
     pub(super) fn newest_table(&mut self, current: &mut Table) -> bool {
         let mut changed = false;
         while !self.spent.is_full() {
             let Ok(table) = self.tables.pop() else { break };
             let old = std::mem::replace(current, table);
-            // There is room, checked above; the box must not be freed in the loop.
+            // There is space, checked above; the box must not be freed in the loop.
             if let Err(rtrb::PushError::Full(old)) = self.spent.push(old) {
                 std::mem::forget(old);
             }
@@ -295,7 +295,7 @@ impl LoopSide {
         changed
     }
 
-    /// The signal that asked to stop, or 0.
+    /// Returns the signal that requested a stop, or 0.
     pub(super) fn asked_to_stop(&self) -> i32 {
         self.stop.load(Ordering::Relaxed)
     }

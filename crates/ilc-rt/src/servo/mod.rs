@@ -1,7 +1,7 @@
 //! The servo cycle: receive, measure, control, add the learned input, limit, send.
 //!
-//! Hot from end to end and ignorant of learning: it is handed a table of inputs and gives back
-//! samples. The campaign sets it up, paces it (on the clock or in lock-step) and reads its mailbox.
+//! Hot throughout and independent of learning: it receives a table of inputs and returns samples.
+//! The campaign sets it up, paces it (by the clock or in lock-step) and reads its mailbox.
 
 mod advance;
 mod command;

@@ -4,26 +4,26 @@
 
 use crate::fieldbus::cia402::{CommandRpdo1, Controlword, State, StatusTpdo1, Statusword};
 
-/// One drive as last heard.
+/// The last known state of one drive.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Drive {
-    /// True if it has answered at all.
+    /// True if it has ever answered.
     pub(super) heard: bool,
     /// Last statusword.
     pub(super) statusword: u16,
     /// Last position.
     pub(super) encoder_m: f64,
-    /// Last distance of demand and position as the drive sees it.
+    /// Last following error reported by the drive.
     pub(super) following_error_m: f64,
-    /// Last emergency code since it was switched on.
+    /// Last emergency code since it was enabled.
     pub(super) emergency: Option<u16>,
-    /// True if it is lost and shall only be told to stop.
+    /// True if it is lost and only gets commands to stop.
     pub(super) lost: bool,
-    /// True if what it measures is not to be trusted any more.
+    /// True if its measurements are no longer trusted.
     pub(super) distrusted: bool,
-    /// Distance of the last two positions, if it is farther than the axis can move.
+    /// Distance between the last two positions, if it exceeds the possible motion of the axis.
     pub(super) jump_m: Option<f64>,
-    /// Length of the last TPDO1 and TPDO2 that could not be read, if there was one.
+    /// Length of the last unreadable TPDO1 and TPDO2, if there was one.
     pub(super) unreadable: [Option<u8>; 2],
     /// Last command sent.
     pub(super) sent: CommandRpdo1,
@@ -51,19 +51,19 @@ impl Default for Drive {
 }
 
 impl Drive {
-    /// Takes over a status, its position already in metres.
+    /// Stores a status, its position already in metres.
     pub(super) fn status(&mut self, status: StatusTpdo1, encoder_m: f64) {
         let was_enabled = self.enabled();
         self.heard = true;
         self.statusword = status.statusword.0;
         self.encoder_m = encoder_m;
         if self.enabled() && !was_enabled {
-            // What was reported before it could be switched on is not the cause of a later fault.
+            // Reports from before it could be enabled are not the cause of a later fault.
             self.emergency = None;
         }
     }
 
-    /// The state that its statusword tells, if it tells one.
+    /// Returns the state in its statusword, if it is defined.
     pub(super) fn state(&self) -> Option<State> {
         Statusword(self.statusword).state()
     }

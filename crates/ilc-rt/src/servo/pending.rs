@@ -1,27 +1,27 @@
-//! Puts each answer with the SYNC that asked for it, also when it comes a cycle or two late.
+//! Assigns each answer to its SYNC, also when it arrives a cycle or two late.
 //!
-//! A node sends each of its PDOs once for every SYNC and in order, so that the n-th one belongs to the
-//! n-th SYNC. That holds for sure whenever every SYNC has been answered. While one is not, it is not
-//! known whether its answer is late or lost, and what comes meanwhile is held back: once all are there
-//! they were late, and belong where they stand; if as many stay behind for a while as answers flow, so
-//! many were lost, and each answer belongs to the SYNC before it came. What cannot be told apart, or
-//! comes without having been asked for, makes its samples missing.
+//! A node sends each of its PDOs once for every SYNC and in order, so that the n-th one belongs to
+//! the n-th SYNC. That is certain whenever every SYNC has been answered. While one is not, its
+//! answer may be late or lost, and later ones are held back: once all have arrived they were late,
+//! and keep their places; if the same number stays missing for a while although answers arrive,
+//! those were lost, and each answer belongs to the SYNC before it. Ambiguous or unrequested answers
+//! make their samples missing.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::mailbox::Sample;
 use crate::interpolate::MAX_AXES;
 
-/// Cycles that may wait for their answers.
+/// Largest number of cycles that wait for their answers.
 const DEPTH: usize = 64;
-/// Age at which a cycle is given out although an answer is missing.
+/// Age at which a cycle is passed on in spite of a missing answer.
 const PATIENCE: u64 = 40;
 /// Ticks with an answer that a PDO must lag before the difference counts as lost.
 const LAG_TICKS: u32 = 8;
-/// Most parts of an answer: two PDOs a drive, and the tool.
+/// Largest number of parts of an answer: two PDOs per drive, and the tool.
 const PARTS_MAX: usize = 2 * MAX_AXES + 1;
 
-/// A PDO that is expected after every SYNC.
+/// A PDO expected after every SYNC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// State and position of an axis.
@@ -35,12 +35,12 @@ pub(super) enum Part {
 #[derive(Clone, Copy, Debug, Default)]
 struct PendingCycle {
     sample: Sample,
-    /// Position that each axis was commanded to, m.
+    /// Commanded position of each axis, m.
     commanded_m: [f64; MAX_AXES],
     last_of_run: bool,
-    /// SYNCs sent when each part came; 0 if it has not.
+    /// SYNCs sent when each part arrived; 0 if it has not.
     came: [u64; PARTS_MAX],
-    /// True if something in this cycle makes its measurement worthless.
+    /// True if this cycle's measurement is invalid.
     spoiled: bool,
 }
 
@@ -48,7 +48,7 @@ struct PendingCycle {
 #[derive(Clone, Copy, Debug, Default)]
 struct Lag {
     answers: u64,
-    /// SYNCs whose answers are known for sure.
+    /// SYNCs whose answers are certain.
     settled: u64,
     /// Ticks with an answer since then, and the smallest lag in them.
     ticks: u32,
@@ -59,7 +59,7 @@ struct Lag {
     given_up: bool,
 }
 
-/// The cycles under way.
+/// The cycles in transit.
 #[derive(Clone, Debug)]
 pub(super) struct PendingCycles {
     ring: [PendingCycle; DEPTH],
@@ -86,9 +86,9 @@ impl PendingCycles {
         }
     }
 
-    /// Notes what goes out with the next SYNC: the sample, and the position that each axis is
-    /// commanded to, m. Its measurement fields hold the newest ones known, which stand in should an
-    /// answer never come.
+    /// Records the data of the next SYNC: the sample, and the commanded position of each axis, m.
+    /// Its measurement fields hold the newest known ones, which stand in should an answer never
+    /// arrive.
     pub(super) fn send(
         &mut self,
         mut sample: Sample,
@@ -105,17 +105,17 @@ impl PendingCycles {
         }
     }
 
-    /// Makes the cycle that is sent next worthless: it was commanded on what is too old.
+    /// Invalidates the next cycle: it was commanded on stale measurements.
     pub(super) fn spoil_next(&mut self) {
         self.spoil_next = true;
     }
 
-    /// Notes an answer: the position of an axis, or the coordinates of the tool.
+    /// Records an answer: the position of an axis, or the coordinates of the tool.
     pub(super) fn answer(&mut self, part: Part, value: [f64; 2]) {
         let Some(number) = self.number(part) else { return };
         let lag = &mut self.lags[number];
         if lag.answers >= self.sent {
-            // Nothing asked for it: of two answers to one SYNC it is not known which is right.
+            // Unrequested: of two answers to one SYNC the right one is unknown.
             if self.sent > self.given {
                 self.ring[index(self.sent - 1)].spoiled = true;
             }
@@ -132,7 +132,7 @@ impl PendingCycles {
         }
     }
 
-    /// The last cycles that were sent, oldest first, also those that wait for answers.
+    /// Returns the last cycles that were sent, oldest first, including those that wait for answers.
     pub(super) fn last(&self, n_cycles: u64) -> impl Iterator<Item = Sample> + '_ {
         let first = self.sent.saturating_sub(n_cycles.min(DEPTH as u64));
         (first..self.sent).map(|sync| {
@@ -142,24 +142,24 @@ impl PendingCycles {
         })
     }
 
-    /// Position that an axis had been commanded to at the SYNC that its newest answer belongs to, m.
+    /// Returns the position that an axis was commanded to at the SYNC of its newest answer, m.
     pub(super) fn answered_command_m(&self, axis: usize) -> Option<f64> {
         let number = self.number(Part::Status(axis))?;
         let sync = self.lags[number].answers.checked_sub(1)?;
         Some(self.ring[index(sync)].commanded_m[axis])
     }
 
-    /// SYNCs that a part has not answered.
+    /// Returns the number of SYNCs that a part has not answered.
     pub(super) fn lag(&self, part: Part) -> u64 {
         self.number(part).map_or(0, |number| self.sent - self.lags[number].answers)
     }
 
-    /// SYNCs sent since a part last came.
+    /// Returns the SYNCs sent since a part last arrived.
     pub(super) fn silence(&self, part: Part) -> u64 {
         self.number(part).map_or(0, |number| self.lags[number].silent)
     }
 
-    /// Returns whether a part that is not given up has stayed away for the last `n_cycles` SYNCs.
+    /// Returns true if a part that is not given up has been missing for the last `n_cycles` SYNCs.
     pub(super) fn waits(&self, n_cycles: u64) -> bool {
         self.lags[..self.n_parts].iter().any(|lag| !lag.given_up && lag.silent >= n_cycles)
     }
@@ -169,7 +169,7 @@ impl PendingCycles {
         self.number(part).is_some_and(|number| self.lags[number].given_up)
     }
 
-    /// No longer waits for a part that is silent: the stop that follows needs many ticks.
+    /// Stops waiting for a silent part: the stop that follows needs many ticks.
     pub(super) fn give_up(&mut self, part: Part) {
         if let Some(number) = self.number(part) {
             self.lags[number].given_up = true;
@@ -181,7 +181,7 @@ impl PendingCycles {
         self.lags[..self.n_parts].iter().all(|lag| lag.given_up || lag.answers == self.sent)
     }
 
-    /// Once a tick, after receiving: finds out what has been late and what is lost.
+    /// Decides, once per tick after receiving, which answers are late and which are lost.
     pub(super) fn watch_lag(&mut self) {
         for number in 0..self.n_parts {
             let lag = &mut self.lags[number];
@@ -191,7 +191,7 @@ impl PendingCycles {
                 (lag.settled, lag.ticks) = (self.sent, 0);
                 continue;
             }
-            // While nothing comes it may all be on its way yet.
+            // While nothing arrives all of it may still be in transit.
             if !came {
                 continue;
             }
@@ -204,8 +204,8 @@ impl PendingCycles {
         }
     }
 
-    /// Takes it that `lost` answers of a part will never come, and puts those that came since with the
-    /// SYNCs before them.
+    /// Assumes that `lost` answers of a part will never arrive, and assigns those that arrived
+    /// since to the SYNCs before them.
     fn skip(&mut self, number: usize, lost: u64) {
         let (settled, answers) = (self.lags[number].settled, self.lags[number].answers);
         let part = self.part(number);
@@ -225,7 +225,7 @@ impl PendingCycles {
             write(&mut cycle.sample, part, value);
         }
         if !clear {
-            // Two came at once, so that it is not known which SYNC each belongs to.
+            // Two arrived at once, so their SYNCs are unknown.
             for sync in settled.max(self.given)..self.sent {
                 self.ring[index(sync)].came[number] = 0;
             }
@@ -238,7 +238,8 @@ impl PendingCycles {
         }
     }
 
-    /// The next cycle that is complete, or too old to wait for; and whether it ends its run.
+    /// Returns the next cycle that is complete, or too old to wait for; and true if it ends its
+    /// run.
     pub(super) fn take(&mut self) -> Option<(Sample, bool)> {
         if self.given == self.sent {
             return None;
@@ -248,7 +249,7 @@ impl PendingCycles {
             .iter()
             .zip(&cycle.came)
             .all(|(lag, came)| *came > 0 && self.given < lag.settled);
-        // What is settled and has not come never will.
+        // A settled cycle whose answer has not arrived never gets one.
         let hopeless = self.lags[..self.n_parts].iter().all(|lag| self.given < lag.settled);
         if !complete && !hopeless && self.sent - self.given <= PATIENCE {
             return None;

@@ -4,42 +4,42 @@
 
 use crate::interpolate::{ControlledStop, PointToPoint};
 
-/// The phase of the cell, with what it needs to go on.
+/// The phase of the cell, with its state.
 #[derive(Clone, Copy, Debug)]
 #[expect(clippy::large_enum_variant, reason = "one of them, in the loop's own memory")]
 pub(super) enum Phase {
-    /// Drives are switched on, holding their position.
+    /// Drives are enabled, holding their position.
     Enabling { ticks: u32 },
-    /// Axes go to the start.
+    /// Axes move to the start.
     Returning(PointToPoint),
     /// Axes rest at the start.
     Settling { ticks_left: u32 },
-    /// A run is on.
+    /// A run is in progress.
     Running { sample: u32 },
-    /// Axes are brought to rest ahead of time.
+    /// Axes are being stopped early.
     Stopping { stop: ControlledStop, rest_ticks: u32 },
-    /// Drives are switched off.
+    /// Drives are being disabled.
     Disabling { ticks: u32 },
-    /// Drives are off, or lost.
+    /// Drives are disabled, or lost.
     Stopped,
 }
 
 /// The name of a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhaseName {
-    /// Drives are switched on, holding their position.
+    /// Drives are enabled, holding their position.
     Enabling,
-    /// Axes go to the start.
+    /// Axes move to the start.
     Returning,
     /// Axes rest at the start.
     Settling,
-    /// A run is on.
+    /// A run is in progress.
     Running,
-    /// Axes are brought to rest ahead of time.
+    /// Axes are being stopped early.
     Stopping,
-    /// Drives are switched off.
+    /// Drives are being disabled.
     Disabling,
-    /// Drives are off, or lost.
+    /// Drives are disabled, or lost.
     Stopped,
 }
 

@@ -8,19 +8,19 @@ use crate::rt::{Latency, MonotonicClock, Nanos};
 /// Timing of the loop.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
-    /// From a tick's place on the grid to its beginning.
+    /// Wake-up latency: from a tick's time on the grid to its start.
     pub wake_late: Latency,
-    /// From a tick's beginning to its end.
+    /// Execution time of a tick.
     pub execution: Latency,
 }
 
-/// Ticks until the axes are at rest and the drives off.
+/// Ticks until the axes are at rest and the drives disabled.
 ///
-/// A tick that begins a whole cycle late or more skips the cycles it missed, so that the loop keeps
-/// its phase and never sends two commands at once.
+/// A tick that begins at least a whole cycle late skips the cycles it missed, so that the loop
+/// keeps its phase and never sends two commands at once.
 ///
 /// # Real Time
-/// Hot: call it in a thread of its own, made ready with [`crate::rt::thread::enter`].
+/// Hot: call it in its own thread, prepared by [`crate::rt::thread::enter`].
 pub fn run_on_clock(cycle: &mut Cycle, clock: &MonotonicClock, timing: &mut Timing) {
     let period = cycle.period();
     let mut due = clock.now().plus(period);

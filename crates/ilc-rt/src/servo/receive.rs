@@ -1,4 +1,4 @@
-//! The first half of a tick: what came over the bus, and what is wrong with it.
+//! The first half of a tick: received frames, and fault detection.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -15,20 +15,20 @@ use crate::fieldbus::cia402::pdo_map::{DRIVE_MOTION_PDO, ENCODER_PDO, STATUS_PDO
 use crate::fieldbus::cia402::{DriveMotionTpdo2, EncoderSample, State, StatusTpdo1};
 use crate::fieldbus::{Bus, Frame};
 
-/// Most frames taken in one tick, so that a babbling bus cannot hold the loop.
+/// Largest number of frames per tick, so that a babbling bus cannot stall the loop.
 const FRAMES_MAX: usize = 256;
-/// Ways at full speed that an axis may be ahead of its last position.
+/// Distance, in cycles at full velocity, that an axis may be ahead of its last position.
 const JUMP_WAYS: f64 = 2.0;
-/// Share of the following error allowed that it may be ahead beyond that, for noise.
+/// Share of the allowed following error that it may be ahead beyond that, for noise.
 const JUMP_SHARE: f64 = 0.1;
-/// Share of the following error allowed by which an axis may stand outside its limits at the start: one
-/// that has been at its limit rests as far from it as noise and friction say.
+/// Share of the allowed following error that an axis may be outside its limits at the start: one
+/// that has been at its limit rests off it by noise and friction.
 const OUTSIDE_SHARE: f64 = 0.02;
-/// Cycles without an answer after which a position is too old to blame the drive for its distance.
+/// Cycles without an answer after which a position is too old to be used for the following error.
 const STALE_CYCLES: u64 = 5;
 
 impl Cycle {
-    /// Takes every frame that is there; paced by answers, waits until all have come.
+    /// Takes every available frame; paced by answers, waits until all have arrived.
     pub(super) fn receive(&mut self) -> Result<(), StopReason> {
         let mut left = Ok(());
         for _ in 0..FRAMES_MAX {
@@ -42,7 +42,7 @@ impl Cycle {
                 Err(error) => return Err(StopReason::Bus(error)),
             }
         }
-        // Answers may lie behind the flood.
+        // Answers may be behind the flood.
         self.pending.spoil_next();
         left
     }
@@ -94,7 +94,7 @@ impl Cycle {
                 return true;
             }
             if let Some(extra) = DriveMotionTpdo2::decode(frame, spec.node) {
-                // In a fault it has no demand any more; what led there is the last one before.
+                // In a fault it has no demand any more; the last following error before counts.
                 if !drive.faulted() {
                     drive.following_error_m = spec.scale.to_si(extra.following_error_counts);
                 }
@@ -129,9 +129,9 @@ impl Cycle {
             || self.spec.tool.is_some_and(|tool| tool.node == node)
     }
 
-    /// The first thing that is a reason to stop.
+    /// Returns the first reason to stop.
     pub(super) fn find_fault(&mut self) -> Option<StopReason> {
-        // Asked in every phase: a node that is lost must not be waited for again.
+        // Checked in every phase: a lost node must not be waited for again.
         let silence = self.find_silence();
         if matches!(self.phase, Phase::Disabling { .. } | Phase::Stopped) {
             return None;
@@ -162,7 +162,8 @@ impl Cycle {
             {
                 return Some(StopReason::OutsideLimits { axis, position_m });
             }
-            // A fault from before is reset on the way; what is not enabled in time is refused.
+            // An earlier fault is reset during enabling; a drive that is not enabled in time is
+            // refused.
             if ticks <= self.spec.enable_ticks || drive.enabled() {
                 return None;
             }
@@ -190,8 +191,8 @@ impl Cycle {
         if let Some(step_m) = drive.jump_m {
             return Some(StopReason::Jump { axis, step_m });
         }
-        // A position that came late answers an earlier command; one that has not come for long is held
-        // against the newest.
+        // A late position answers an earlier command; one that is long overdue is compared with the
+        // newest.
         let silence = self.pending.silence(Part::Status(axis));
         let stale = silence > STALE_CYCLES;
         let commanded_m = match self.pending.answered_command_m(axis) {

@@ -1,4 +1,4 @@
-//! Silence: each PDO of each node is waited for, and named when it stays away.
+//! Detection of silence: each PDO of each node is monitored, and named when it is missing.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -9,13 +9,13 @@ use super::pending::Part;
 use super::phase::Phase;
 use super::spec::Pace;
 
-/// Cycles that a position may be old when a velocity is computed from it in a run that counts.
+/// Largest age in cycles of a position from which a velocity is computed in a valid run.
 const OLD_CYCLES: u64 = 2;
 
 impl Cycle {
-    /// The first part that has been silent for too long, each one told once.
+    /// Returns the first part that has been silent for too long, each one once.
     pub(super) fn find_silence(&mut self) -> Option<StopReason> {
-        // Paced by answers, the wait is over when this is asked: one unanswered SYNC is silence.
+        // Paced by answers, the wait is already over: one unanswered SYNC is silence.
         let max = match self.spec.pace {
             Pace::Answers(_) => 0,
             Pace::Clock => u64::from(self.spec.silent_cycles_max),
@@ -30,7 +30,7 @@ impl Cycle {
                 found = found.or(Some(self.silent_part(axis, part, silence)));
                 self.pending.give_up(part);
                 if part == Part::Status(axis) {
-                    // Its state is not known any more, so that it can only be told to stop.
+                    // Its state is unknown, so it can only be commanded to stop.
                     self.drives[axis].lost = true;
                 }
             }
@@ -50,7 +50,7 @@ impl Cycle {
         found
     }
 
-    /// Returns the reason that a part of an axis stays away, as far as it is known.
+    /// Returns the reason for the silence of a part of an axis, as far as it is known.
     fn silent_part(&self, axis: usize, part: Part, silence: u64) -> StopReason {
         let (pdo, other) = match part {
             Part::DriveMotion(_) => (2, Part::Status(axis)),
@@ -60,7 +60,7 @@ impl Cycle {
             let node = self.spec.axes[axis].node.get();
             return StopReason::WrongLength { node, pdo, n_bytes };
         }
-        // Both fall silent together if the node does; a cycle between them is chance.
+        // Both fall silent together if the node does; a cycle of difference is chance.
         if 2 * self.pending.silence(other) > silence {
             return self.silent_axis(axis, silence);
         }
@@ -76,7 +76,7 @@ impl Cycle {
         }
     }
 
-    /// Notes whether this cycle of a run is commanded on a position that is too old.
+    /// Records if this cycle of a run is commanded on a stale position.
     pub(super) fn watch_age(&mut self) {
         if !matches!(self.phase, Phase::Running { .. }) {
             return;

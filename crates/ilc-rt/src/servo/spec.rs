@@ -25,11 +25,11 @@ pub struct AxisSpec {
     pub position_min_m: f64,
     /// Highest position.
     pub position_max_m: f64,
-    /// Distance of command and encoder at which the axes stop.
+    /// Largest following error.
     pub following_error_max_m: f64,
-    /// Position loop of a velocity-commanded drive; not used otherwise.
+    /// Position loop of a velocity-commanded drive; ignored otherwise.
     pub position_loop: PositionLoop,
-    /// Largest learned input: m (position-commanded) or m/s (velocity-commanded).
+    /// Bound of the learned input: m (position-commanded) or m/s (velocity-commanded).
     pub input_max: f64,
 }
 
@@ -45,9 +45,10 @@ pub struct ToolSpec {
 /// Source of the pace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// The clock; answers that are not there are late.
+    /// The clock; answers that have not arrived are late.
     Clock,
-    /// The nodes' answers; there is no clock, and a node that is silent for this long is lost.
+    /// The nodes' answers (lock-step); there is no clock, and a node that is silent for this long
+    /// is lost.
     Answers(Duration),
 }
 
@@ -66,17 +67,17 @@ pub struct ServoSpec {
     pub runs: std::ops::Range<u32>,
     /// Start of each run.
     pub start_m: Vec<f64>,
-    /// Speed of the move to the start.
+    /// Velocity of the move to the start.
     pub return_feed_m_s: f64,
-    /// Rest between the arrival at the start and the run.
+    /// Settling time between the arrival at the start and the run.
     pub settle_ticks: u32,
-    /// Longest time of a drive to be switched on.
+    /// Time-out for a drive to switch on.
     pub enable_ticks: u32,
     /// Consecutive unanswered cycles at which a node is lost.
     pub silent_cycles_max: u32,
     /// Consecutive overrun cycles at which the axes stop.
     pub overrun_cycles_max: u32,
-    /// Cycles for which the loop holds still, sending nothing, when nodes stop answering; 0 where nodes
-    /// are real and would move on by themselves.
+    /// Cycles for which the loop pauses, sending nothing, when nodes stop answering; 0 for real
+    /// nodes, which would move on.
     pub hold_cycles_max: u32,
 }

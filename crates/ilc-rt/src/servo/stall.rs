@@ -1,21 +1,21 @@
-//! Stalls of the computer: how late the loop itself was, and when to hold still for stalled nodes.
+//! Stalls of the computer: lateness of the loop itself, and pauses for stalled nodes.
 //!
-//! Simulated drives share the computer with the loop, and their time passes by SYNC. If they stop
-//! answering they are stalled like everything else, so that the loop may hold still: it sends nothing,
-//! no set point is skipped, and the motion pauses in the plant as it does here. A real drive goes on
-//! moving; there [`ServoSpec::hold_cycles_max`](super::ServoSpec::hold_cycles_max) is 0.
+//! Simulated drives share the computer with the loop, and their time advances by SYNC. If they stop
+//! answering they are stalled like everything else, so the loop may pause: it sends nothing, no set
+//! point is skipped, and the motion pauses in the plant as in the loop. A real drive keeps moving;
+//! there [`ServoSpec::hold_cycles_max`](super::ServoSpec::hold_cycles_max) is 0.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-/// Unanswered cycles after which the loop holds still: more than an answer is ever late.
+/// Unanswered cycles after which the loop pauses: more than an answer is ever late.
 pub(super) const HOLD_AFTER: u64 = 5;
-/// Cycles for which a stall is remembered as the cause of what a drive reports.
+/// Cycles for which a stall is remembered as the cause of a drive's report.
 const BLAMED_FOR: u32 = 25;
 
 /// Stalls of the loop itself.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stall {
-    /// Cycles missed in a row, up to now.
+    /// Consecutive cycles missed so far.
     streak: u32,
     /// The last streak, and the cycles since it ended.
     last: u32,
@@ -24,7 +24,7 @@ pub(super) struct Stall {
 }
 
 impl Stall {
-    /// Notes the cycles that were missed before a tick.
+    /// Records the cycles missed before a tick.
     pub(super) fn note(&mut self, missed: u32) {
         if missed > 0 {
             self.streak = self.streak.saturating_add(missed);
@@ -35,17 +35,19 @@ impl Stall {
         }
     }
 
-    /// Cycles missed in a row, up to now.
+    /// Consecutive cycles missed so far.
     pub(super) fn streak(&self) -> u32 {
         self.streak
     }
 
-    /// Cycles of the stall that a drive's complaint of missing commands is due to, if there was one.
+    /// Returns the cycles of the stall that explains a drive's report of missing commands, if there
+    /// was one.
     pub(super) fn blamed(&self) -> Option<u32> {
         (self.last > 1 && self.since <= BLAMED_FOR).then_some(self.last)
     }
 
-    /// Returns whether to hold still in this tick, as nodes do not answer and patience is left.
+    /// Returns true to hold still in this tick, while nodes do not answer and the stall is
+    /// tolerated.
     pub(super) fn holds(&mut self, nodes_wait: bool, max: u32) -> bool {
         if !nodes_wait {
             self.held = 0;

@@ -1,9 +1,8 @@
-//! Begin of a stop: every axis to rest from what it was commanded, whatever has failed.
+//! Start of a stop: every axis ramps from its last command to rest, for any failure.
 //!
 //! A stop is open loop in both modes. Its set points start from the last commands, learned input
-//! included, so that nothing steps; and no measurement takes part in it, so that one that froze, is
-//! late or is false can neither drive the axis on nor hold it back. Only then are the drives told to
-//! let go.
+//! included, so that nothing steps; no measurement takes part in it, so that a frozen, late or
+//! false one can neither drive the axis on nor hold it back. Only then are the drives disabled.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -13,11 +12,11 @@ use super::mode;
 use super::phase::Phase;
 use crate::interpolate::{ControlledStop, MAX_AXES};
 
-/// Cycles before a stop that are reported with it.
+/// Number of cycles before a stop that are reported with it.
 pub(super) const CYCLES_TOLD: u64 = 32;
 
 impl Cycle {
-    /// Begins a controlled stop of all axes, unless one is under way or nothing moves any more.
+    /// Begins a controlled stop of all axes, unless one is in progress or nothing moves any more.
     pub(super) fn begin_stop(&mut self, reason: StopReason) {
         if let Some(reason) = self.better_reason(reason) {
             self.stopping = Some(reason);
@@ -50,7 +49,7 @@ impl Cycle {
             position_m[axis] = mode.position_m(last[0], position_m[axis]);
             [velocity_m_s[axis], acceleration_m_s2[axis]] = mode.motion(last, dt_s);
         }
-        // It is part of the last commands, from which the stop goes on.
+        // It is part of the last commands, from which the stop continues.
         self.input.absorb();
         let stop = ControlledStop::new(
             &position_m,

@@ -1,6 +1,7 @@
-//! Another master on the bus: what this controller alone may send, seen coming from another node.
+//! Another master on the bus: frames that only this controller may send, received from another
+//! node.
 //!
-//! No transport hands a sender its own frames, so each of these that is received was sent by another.
+//! No transport returns a sender's own frames, so each of these was sent by another master.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -13,8 +14,8 @@ use crate::fieldbus::canopen::{NmtCommand, NodeId, cob_id, sync};
 const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
 
 impl Cycle {
-    /// Returns what a frame shows of another master, if anything. Traffic with nodes that are not of this cell is
-    /// no business of this controller.
+    /// Returns the trace of another master in a frame, if any. Traffic with nodes outside this cell
+    /// is ignored.
     pub(super) fn stranger(&self, frame: &Frame) -> Option<Stranger> {
         if sync::is_sync(frame) {
             return Some(Stranger::Sync);
@@ -31,8 +32,8 @@ impl Cycle {
         RPDOS.iter().find_map(|base| to(*base)).map(Stranger::Command)
     }
 
-    /// Returns the cause of a stop if a later frame names it: a drive that was silent reports
-    /// that it was stopped or restarted, or a command to it is seen.
+    /// Returns the cause of a stop if a later frame names it: a silent drive reports that it was
+    /// stopped or restarted, or a command to it is seen.
     pub(super) fn better_reason(&self, later: StopReason) -> Option<StopReason> {
         let silent: NodeId = match self.stopping? {
             StopReason::SilentAxis { axis, .. } => self.spec.axes.get(axis)?.node,

@@ -1,11 +1,11 @@
-//! Refusals of a plan, as values; `refusal` makes the sentence.
+//! Errors of plans, as values; `refusal` makes the sentence.
 
 use crate::interpolate::{MoveError, Quantity};
 
 /// A refused plan; axes and segments count from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TrajectoryError {
-    /// A move, its limits or its points.
+    /// A move, its limits or its points are refused.
     Move(MoveError),
     /// The number of limits is not the number of coordinates.
     LimitCount {
@@ -42,16 +42,16 @@ pub enum TrajectoryError {
         /// The two axes, from 0.
         plane: [usize; 2],
     },
-    /// The ends of an arc are not equally far from its centre.
+    /// The radii at start and end of an arc disagree.
     Arc {
         /// Index of the segment.
         segment: usize,
-        /// Distance of the start.
+        /// Radius at the start.
         from_radius: f64,
-        /// Distance of the end.
+        /// Radius at the end.
         to_radius: f64,
     },
-    /// An arc where only lines can be.
+    /// An arc where only lines are supported.
     NotStraight {
         /// Index of the segment.
         segment: usize,
@@ -70,7 +70,7 @@ pub enum TrajectoryError {
         /// The value given.
         frequency_hz: f64,
     },
-    /// A row of set points that is too far from those before it.
+    /// A row of set points that violates a limit.
     Row {
         /// Index of the row; those after the last one are the rest at the end.
         row: usize,
@@ -83,7 +83,7 @@ pub enum TrajectoryError {
         /// The limit.
         limit: f64,
     },
-    /// A set point of a planned path that is too far from those before it.
+    /// A set point of a planned path that violates a limit.
     SetPoint {
         /// Time from the first set point.
         at_s: f64,
@@ -96,7 +96,7 @@ pub enum TrajectoryError {
         /// The limit.
         limit: f64,
     },
-    /// No α holds the limits.
+    /// No α satisfies the limits.
     Alpha {
         /// Index of the segment.
         segment: usize,
@@ -104,25 +104,25 @@ pub enum TrajectoryError {
         place: &'static str,
         /// The α that comes nearest.
         alpha: f64,
-        /// The limit that it breaks most.
+        /// The most violated limit.
         quantity: Quantity,
         /// The value reached.
         reached: f64,
         /// The limit along the path.
         limit: f64,
     },
-    /// The programmed oscillation breaks a limit, whatever its start.
+    /// The programmed oscillation violates a limit, whatever its start.
     Programmed {
         /// Index of the segment.
         segment: usize,
-        /// The limit that it breaks.
+        /// The violated limit.
         quantity: Quantity,
         /// The value reached.
         reached: f64,
         /// The limit along the path.
         limit: f64,
     },
-    /// The largest α wanted is so small that an end is not over within its leg.
+    /// The requested upper bound of α is so small that an end does not fit its leg.
     AlphaMax {
         /// Index of the segment.
         segment: usize,
@@ -130,10 +130,10 @@ pub enum TrajectoryError {
         place: &'static str,
         /// The value given.
         value: f64,
-        /// The smallest that is over in time.
+        /// Smallest value that fits.
         min: f64,
     },
-    /// A leg is over before its ends can be.
+    /// A leg is too short for its ends.
     Hurried {
         /// Index of the segment.
         segment: usize,
@@ -142,7 +142,7 @@ pub enum TrajectoryError {
         /// The duration that both ends need.
         needs_s: f64,
     },
-    /// A parameter of a shape is not usable.
+    /// A parameter of a shape is out of range.
     Shape {
         /// Name of the parameter.
         name: &'static str,
@@ -151,16 +151,16 @@ pub enum TrajectoryError {
         /// The values allowed.
         allowed: &'static str,
     },
-    /// A curve has a point at which its direction is not defined.
+    /// A curve has a point with undefined direction.
     Cusp {
-        /// Where.
+        /// Position along the curve.
         at: f64,
     },
-    /// No speed was found at which a curve holds the limits.
+    /// No speed was found at which a curve satisfies the limits.
     Unproven {
         /// Index of the axis.
         axis: usize,
-        /// Where, along the curve.
+        /// Position along the curve.
         at: f64,
         /// The limit concerned.
         quantity: Quantity,
@@ -168,32 +168,32 @@ pub enum TrajectoryError {
         reached: f64,
         /// The limit.
         limit: f64,
-        /// Attempts made.
+        /// Number of attempts.
         rounds: usize,
     },
-    /// There is no segment.
+    /// A path without segments.
     Empty,
-    /// The cycle, a dwell or the blend window is not in its range.
+    /// The cycle, a dwell or the blend window is out of range.
     Time {
         /// `cycle`, `sample time`, `dwell`, `dwell before`, `dwell after` or `blend window`.
         name: &'static str,
         /// The value given.
         value_s: f64,
-        /// Smallest allowed.
+        /// Smallest value allowed.
         low_s: f64,
-        /// Largest allowed.
+        /// Largest value allowed.
         high_s: f64,
     },
-    /// The run has more samples than a plan may hold.
+    /// The run has too many samples.
     TooLong {
         /// Its duration.
         duration_s: f64,
-        /// Samples it would have.
+        /// Samples of the run.
         n_samples: f64,
-        /// Samples allowed.
+        /// Largest number of samples.
         n_samples_max: usize,
     },
-    /// A blended path would break a limit of an axis.
+    /// A blended path violates a limit of an axis.
     Exceeds {
         /// Index of the axis.
         axis: usize,
@@ -203,17 +203,17 @@ pub enum TrajectoryError {
         reached: f64,
         /// The limit.
         limit: f64,
-        /// Factor on every feed at which all limits hold; 0 if none was found.
+        /// Factor on every feed that satisfies all limits; 0 if none was found.
         feed_factor: f64,
         /// The feed of the fastest segment times that factor.
         feed_admissible: f64,
-        /// A blend window at which all limits hold at the programmed feed, if one was found.
+        /// A blend window that satisfies all limits at the programmed feed, if one was found.
         window_admissible_s: Option<f64>,
     },
 }
 
 impl TrajectoryError {
-    /// The axis of the refusal, if it concerns a single one.
+    /// Returns the axis concerned, if it is a single one.
     pub fn axis(&self) -> Option<usize> {
         match *self {
             Self::Move(refused) => refused.axis(),

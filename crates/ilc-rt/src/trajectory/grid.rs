@@ -1,15 +1,15 @@
-//! The grid of a run: servo cycles, and the whole cycles that cover a time.
+//! The time grid of a run: servo cycles, and the whole cycles that cover a time.
 
 use super::error::TrajectoryError;
 
-/// Most samples of one run.
+/// Largest number of samples of one run.
 pub(super) const N_SAMPLES_MAX: usize = 10_000_000;
-/// Servo cycles that a plan accepts.
+/// Range of servo cycles.
 pub(super) const CYCLE_S: (f64, f64) = (1e-5, 1.0);
 /// Longest rest before or after the motion.
 pub(super) const DWELL_MAX_S: f64 = 3600.0;
 
-/// Refuses a time that is not finite or not in its range.
+/// Refuses a time that is not finite or out of range.
 pub(super) fn check_time(
     name: &'static str,
     value_s: f64,
@@ -22,7 +22,7 @@ pub(super) fn check_time(
     }
 }
 
-/// Whole cycles that cover a duration.
+/// Returns the number of whole cycles that cover a duration.
 ///
 /// # Errors
 /// [`TrajectoryError::TooLong`] if a run may not have so many samples.
@@ -40,7 +40,7 @@ pub(super) fn n_ticks(duration_s: f64, cycle_s: f64) -> Result<usize, Trajectory
     }
 }
 
-/// The first tick at or after a time, on the grid as the tick computes it.
+/// Returns the first tick at or after a time, on the grid as the tick computes it.
 ///
 /// # Errors
 /// As [`n_ticks`].

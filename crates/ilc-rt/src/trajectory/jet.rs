@@ -1,5 +1,5 @@
-//! A function of time with its first three derivatives, so that velocity, acceleration and jerk are
-//! exact and are written once. Read by the other files of this folder.
+//! A function of time with its first three derivatives (jet), so that velocity, acceleration and
+//! jerk are exact. Used by the other files of this folder.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -8,17 +8,17 @@ use std::ops::{Add, Mul, Neg, Sub};
 pub struct Jet(pub [f64; 4]);
 
 impl Jet {
-    /// A constant.
+    /// Returns a constant.
     pub fn constant(value: f64) -> Self {
         Self([value, 0.0, 0.0, 0.0])
     }
 
-    /// `offset + rate t` at the time where its value is `value`.
+    /// Returns `offset + rate t` at the time where its value is `value`.
     pub fn line(value: f64, rate: f64) -> Self {
         Self([value, rate, 0.0, 0.0])
     }
 
-    /// `f(self)`, from `f` and its derivatives at the value of `self` (Faà di Bruno).
+    /// Returns `f(self)`, from `f` and its derivatives at the value of `self` (Faà di Bruno).
     #[must_use]
     pub fn compose(self, [f0, f1, f2, f3]: [f64; 4]) -> Self {
         let [_, u1, u2, u3] = self.0;
@@ -30,28 +30,28 @@ impl Jet {
         ])
     }
 
-    /// `sin(self)`.
+    /// Returns `sin(self)`.
     #[must_use]
     pub fn sin(self) -> Self {
         let (s, c) = self.0[0].sin_cos();
         self.compose([s, c, -s, -c])
     }
 
-    /// `1 - exp(-self)`, exact where it is small.
+    /// Returns `1 - exp(-self)`, accurate for small values.
     #[must_use]
     pub fn rise(self) -> Self {
         let e = (-self.0[0]).exp();
         self.compose([-(-self.0[0]).exp_m1(), e, -e, e])
     }
 
-    /// `exp(-self)`.
+    /// Returns `exp(-self)`.
     #[must_use]
     pub fn decay(self) -> Self {
         let e = (-self.0[0]).exp();
         self.compose([e, -e, e, -e])
     }
 
-    /// `1 / (1 + exp(-self))`, with no overflow at either end.
+    /// Returns `1 / (1 + exp(-self))`, without overflow at either end.
     #[must_use]
     pub fn logistic(self) -> Self {
         let x = self.0[0];
@@ -66,19 +66,19 @@ impl Jet {
         self.compose([s, slope, slope * tilt, slope * (tilt * tilt - 2.0 * slope)])
     }
 
-    /// `self` to the power of 2.
+    /// Returns the square.
     #[must_use]
     pub fn squared(self) -> Self {
         self * self
     }
 
-    /// `self` to the power of 3.
+    /// Returns the cube.
     #[must_use]
     pub fn cubed(self) -> Self {
         self * self * self
     }
 
-    /// The same function read backwards in time.
+    /// Returns the same function reversed in time.
     #[must_use]
     pub fn reversed(self) -> Self {
         let [value, first, second, third] = self.0;

@@ -1,4 +1,5 @@
-//! Jerk-limited linear interpolation of a program of moves, in the two settings that machines have.
+//! Jerk-limited linear interpolation of a program of moves, in the two settings of machine
+//! controllers.
 //!
 //! A move takes longer than `length / feed`. Either every move is completed, and an oscillating
 //! program loses frequency; or the next one starts on time, and it loses amplitude.
@@ -19,7 +20,7 @@ use self::to_rest::{AxisState, ToRest};
 pub enum LinearSetting {
     /// At the end of the one before it: amplitude is kept, frequency falls.
     CompleteEveryMove,
-    /// At the time that the program has for it: frequency is kept, amplitude falls.
+    /// At its programmed time: frequency is kept, amplitude falls.
     StartOnTime,
 }
 
@@ -32,7 +33,7 @@ pub enum LinearSetting {
 enum Course {
     /// Straight, from rest to rest.
     Straight(Line, JerkLimited),
-    /// Every axis from the state that it is in.
+    /// Every axis from its current state.
     Axes([ToRest; MAX_AXES]),
 }
 
@@ -55,9 +56,9 @@ pub struct Linear {
 impl Linear {
     /// Plans a program.
     ///
-    /// A move from rest is seven phases of jerk along its line, synchronised over the axes by being
-    /// one profile. A move that begins while the axes are still moving takes each axis from its state
-    /// to the target, all arriving together where that is possible.
+    /// A move from rest has seven phases of jerk along its line, synchronised over the axes by a
+    /// common profile. A move that begins while the axes are still moving takes each axis from its
+    /// state to the target, all arriving together if possible.
     ///
     /// # Shapes
     /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`](crate::interpolate::MAX_AXES)
@@ -66,7 +67,7 @@ impl Linear {
     /// # Errors
     /// [`TrajectoryError`] for values out of range.
     /// # Source
-    /// - [dimarco2016], Chapter 2: both settings and what they cost
+    /// - [dimarco2016], Chapter 2: both settings and their costs
     pub fn plan(
         start_m: &[f64],
         segments: &[PathSegment],
@@ -124,15 +125,16 @@ impl Linear {
         self.duration_s
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     pub fn n_axes(&self) -> usize {
         self.n_axes
     }
 
-    /// The state at a time from the start; at rest before it and, at the last target, after the end.
+    /// Returns the state at a time from the start; at rest before it and, at the last target, after
+    /// the end.
     ///
     /// # Real Time
-    /// Hot, allocates nothing.
+    /// Hot: does not allocate.
     pub fn at(&self, t_s: f64) -> MotionState {
         let at = self.moves.partition_point(|planned| planned.start_s <= t_s).max(1) - 1;
         let mut found = MotionState::at_rest([0.0; MAX_AXES]);
@@ -162,7 +164,7 @@ impl Linear {
     }
 }
 
-/// The state of every axis at a time of the run that is not before the move.
+/// Returns the state of every axis at a time of the run not before the move.
 fn state(planned: &Move, t_s: f64) -> [AxisState; MAX_AXES] {
     let t_s = t_s - planned.start_s;
     match &planned.course {
@@ -183,7 +185,7 @@ fn state(planned: &Move, t_s: f64) -> [AxisState; MAX_AXES] {
     }
 }
 
-/// Every axis to the end of a line, all arriving with the slowest.
+/// Moves every axis to the end of a line, all arriving with the slowest.
 fn together(
     now: &[AxisState; MAX_AXES],
     line: &Line,

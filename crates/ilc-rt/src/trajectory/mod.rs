@@ -1,7 +1,7 @@
 //! From a program of segments to set points, and the geometry of contours. Cold.
 //!
-//! Planning answers with a [`TrajectoryError`] or with an [`Interpolator`], which gives one set point
-//! a tick. It stands on row 1: `design` and the Python bindings import it, and it imports only
+//! Planning returns a [`TrajectoryError`] or an [`Interpolator`], which yields one set point per
+//! tick. It stands on row 1: `design` and the Python bindings import it, and it imports only
 //! `interpolate`, the cell description included.
 
 pub mod contour;

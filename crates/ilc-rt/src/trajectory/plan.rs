@@ -1,7 +1,7 @@
-//! From a path, a rest or a sampled motion to the [`Interpolator`] that plays it.
+//! From a path, a dwell or a sampled motion to an [`Interpolator`].
 //!
-//! `design` and the Python glue plan here; the loop only plays. Whatever a run was planned by, its set
-//! points are verified before they are played.
+//! `design` and the Python bindings plan here; the loop only plays. The set points of every kind of
+//! plan are verified before they are played.
 
 use super::error::TrajectoryError;
 use super::grid::{CYCLE_S, DWELL_MAX_S, check_time, n_ticks, n_ticks_after};
@@ -14,20 +14,20 @@ use crate::interpolate::table::Table;
 use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, MoveError, Setpoint};
 
 impl Interpolator {
-    /// Plans a run; every set point that it will give holds the limits of every axis.
+    /// Plans a run; every set point satisfies the limits of every axis.
     ///
-    /// With exact stops each segment is a jerk-limited move, no faster than its feed. A blended path
-    /// keeps its feed, through an average of the window and a second, shorter one that planning
-    /// chooses for the jerk; its set points are generated here once and their finite differences
-    /// over the cycle compared with the limits.
+    /// With exact stops each segment is a jerk-limited move, no faster than its feed. A blended
+    /// path keeps its feed, through an average over the window and a second, shorter one that
+    /// planning chooses for the jerk; its set points are generated once and their finite
+    /// differences over the cycle compared with the limits.
     ///
     /// # Shapes
     /// - `limits`: one entry for each coordinate of `spec.start_m`, 1 to [`MAX_AXES`]
     /// # Real Time
-    /// Cold: allocates, and walks through a blended run several times.
+    /// Cold: allocates, and traverses a blended run several times.
     /// # Errors
     /// [`TrajectoryError`] for values out of range, and [`TrajectoryError::Exceeds`] for a blended
-    /// path that breaks a limit: it is refused with the feed that would do, never slowed down.
+    /// path that violates a limit: it is refused with the admissible feed, never slowed down.
     pub fn plan(
         spec: &PathSpec,
         limits: &[AxisLimits],
@@ -49,18 +49,18 @@ impl Interpolator {
         };
         let n_samples = rest_tick + n_ticks(spec.dwell_after_s, cycle_s)? + 1;
         let plan = Self::new(motion, n_axes, cycle_s, n_samples);
-        // A blended path has been through its proof already.
+        // A blended path is verified already.
         if spec.blend_s.is_none() { plan.verified(limits) } else { Ok(plan) }
     }
 
-    /// Rests at a point for some samples, as while an axis is identified.
+    /// Holds a point for some samples, e.g. while an axis is identified.
     ///
     /// # Shapes
-    /// - `at_m`: one coordinate for each axis, 1 to [`MAX_AXES`]
+    /// - `at_m`: one coordinate per axis, 1 to [`MAX_AXES`]
     /// # Real Time
     /// Cold.
     /// # Errors
-    /// [`TrajectoryError`] for another number of axes, a point or cycle out of range, or no samples.
+    /// [`TrajectoryError`] for another number of axes, a point or cycle out of range, or 0 samples.
     pub fn hold(at_m: &[f64], n_samples: usize, cycle_s: f64) -> Result<Self, TrajectoryError> {
         let n_axes = at_m.len();
         if !(1..=MAX_AXES).contains(&n_axes) {
@@ -74,12 +74,12 @@ impl Interpolator {
         Ok(Self::new(Motion::Hold(setpoint), n_axes, cycle_s, n_samples))
     }
 
-    /// Plays a motion that was worked out beforehand, from rest to rest, with rests around it.
+    /// Plays a precomputed motion, from rest to rest, with dwells around it.
     ///
     /// # Real Time
     /// Cold: copies the motion.
     /// # Errors
-    /// [`TrajectoryError`] for a rest out of range, a motion of no samples, or too many.
+    /// [`TrajectoryError`] for a dwell out of range, or a motion with 0 or too many samples.
     pub fn play(
         motion: &SampledMotion,
         dwell_before_s: f64,
@@ -97,15 +97,15 @@ impl Interpolator {
         Ok(Self::new(Motion::Table(table), n_axes, cycle_s, n_samples))
     }
 
-    /// Verifies the set points of the run, whatever it was planned by: their finite differences over
-    /// the cycle, from rest to rest, are within the limits.
+    /// Verifies the set points of the run, whatever its plan: their finite differences over the
+    /// cycle, from rest to rest, are within the limits.
     ///
     /// # Shapes
-    /// - `limits`: one entry an axis
+    /// - `limits`: one entry per axis
     /// # Real Time
-    /// Cold: allocates, and walks through the run.
+    /// Cold: allocates, and traverses the run.
     /// # Errors
-    /// [`TrajectoryError::SetPoint`] for the first set point that breaks a limit.
+    /// [`TrajectoryError::SetPoint`] for the first set point that violates a limit.
     pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, TrajectoryError> {
         if limits.len() != self.n_axes() {
             let (found, expected) = (limits.len(), self.n_axes());

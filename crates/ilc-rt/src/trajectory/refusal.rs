@@ -1,7 +1,7 @@
-//! The sentence of a refusal: the value, its unit and what is allowed.
+//! The sentence of a refusal: the value, its unit and the allowed ones.
 //!
-//! A rotary axis is measured in radians, and only the cell knows which one is rotary: where a refusal is
-//! shown, [`TrajectoryError::in_units`] takes the units of the axes; without them they are metres.
+//! A rotary axis is measured in radians, and only the cell knows the rotary ones: for display,
+//! [`TrajectoryError::in_units`] takes the units of the axes; the default is metres.
 
 use std::fmt;
 
@@ -16,7 +16,7 @@ pub struct Refusal<'a> {
 }
 
 impl TrajectoryError {
-    /// The refusal with the units in which the axes are measured.
+    /// Returns the refusal with the units of the axes.
     pub fn in_units<'a>(&'a self, units: &'a [AxisUnit]) -> Refusal<'a> {
         Refusal { error: self, units }
     }
@@ -229,7 +229,7 @@ impl fmt::Display for Refusal<'_> {
     }
 }
 
-/// A computed number to six digits.
+/// Formats a computed number to six digits.
 struct Figure(f64);
 
 impl fmt::Display for Figure {

@@ -1,28 +1,28 @@
 //! Verification of set points against the limits, by their finite differences over the cycle.
 //!
-//! A plan knows derivatives at places; a drive gets positions, one a cycle. Every path, whatever it was
-//! planned by, is accepted only after its own set points have been through here, with rest before the
+//! A plan knows derivatives at points; a drive gets positions, one per cycle. Every path, whatever
+//! its plan, is accepted only after its own set points have been checked here, with rest before the
 //! first and after the last.
 
 use super::error::TrajectoryError;
 use crate::interpolate::{AxisLimits, MAX_AXES, Quantity};
 
-/// Relative excess that still counts as holding a limit.
+/// Relative violation of a limit that is tolerated.
 pub(super) const TOLERANCE: f64 = 1e-9;
-/// Rows of rest after the last one that count too: the last jerk is felt when the acceleration is back
-/// at 0.
+/// Rows of rest after the last one that count too: the last jerk acts until the acceleration is
+/// back at 0.
 pub(super) const ROWS_AFTER: usize = 3;
 
 /// Velocity, acceleration and jerk over the cycle, row by row, from rest at the first.
 #[derive(Clone, Debug)]
 pub(super) struct Differences {
     dt_s: f64,
-    /// Position, velocity and acceleration of the row before.
+    /// Position, velocity and acceleration of the previous row.
     before: [[f64; 3]; MAX_AXES],
 }
 
 impl Differences {
-    /// Begins at rest at a point of up to [`MAX_AXES`] coordinates.
+    /// Starts at rest at a point of up to [`MAX_AXES`] coordinates.
     pub(super) fn from_rest(first_m: &[f64], dt_s: f64) -> Self {
         let mut before = [[0.0; 3]; MAX_AXES];
         for (axis, &position_m) in before.iter_mut().zip(first_m) {
@@ -31,7 +31,7 @@ impl Differences {
         Self { dt_s, before }
     }
 
-    /// Velocity, acceleration and jerk of each axis on the way to the next row.
+    /// Returns velocity, acceleration and jerk of each axis on the way to the next row.
     pub(super) fn next(&mut self, row_m: &[f64]) -> [[f64; 3]; MAX_AXES] {
         let mut found = [[0.0; 3]; MAX_AXES];
         for ((before, found), &position_m) in self.before.iter_mut().zip(&mut found).zip(row_m) {
@@ -50,7 +50,7 @@ pub(super) fn rounding_noise(farthest_m: f64, order: usize, dt_s: f64) -> f64 {
     8.0 * f64::EPSILON * (2.0 + farthest_m) / dt_s.powi(power)
 }
 
-/// A row at which a limit is broken.
+/// A row at which a limit is violated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Excess {
     pub(super) row: usize,
@@ -60,24 +60,24 @@ pub(super) struct Excess {
     pub(super) limit: f64,
 }
 
-/// Compares rows with limits, and notes each excess.
+/// Compares rows with limits, and records each violation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Verification<'a> {
     pub(super) limits: &'a [AxisLimits],
     pub(super) dt_s: f64,
-    /// Farthest position of an axis, and what its rounding may be that of: where a motion is computed
-    /// from the time, the way that is gone meanwhile.
+    /// Farthest position of an axis, and the position that its rounding refers to: if a motion is
+    /// computed from the time, including the distance travelled meanwhile.
     pub(super) farthest_m: f64,
 }
 
 impl<'a> Verification<'a> {
-    /// For the rows of a table, whose positions are what they are.
+    /// Creates the verification of a table's rows, whose positions are exact.
     pub(super) fn of_rows(position_m: &[f64], limits: &'a [AxisLimits], dt_s: f64) -> Self {
         let farthest_m = position_m.iter().fold(0.0_f64, |most, p| most.max(p.abs()));
         Self { limits, dt_s, farthest_m }
     }
 
-    /// For rows that are computed from their time, which is rounded as well.
+    /// Creates the verification of rows computed from their time, which is rounded as well.
     pub(super) fn of_motion(position_m: &[f64], limits: &'a [AxisLimits], dt_s: f64) -> Self {
         let table = Self::of_rows(position_m, limits, dt_s);
         let lasts_s = position_m.len() as f64 / limits.len().max(1) as f64 * dt_s;
@@ -85,7 +85,7 @@ impl<'a> Verification<'a> {
         Self { farthest_m: table.farthest_m + gone_m, ..table }
     }
 
-    /// The first excess; none if every limit holds at every row.
+    /// Returns the first violation; `None` if every limit is satisfied at every row.
     pub(super) fn first_excess(&self, position_m: &[f64]) -> Option<Excess> {
         let mut first = None;
         self.each_excess(position_m, |excess| {
@@ -95,7 +95,7 @@ impl<'a> Verification<'a> {
         first
     }
 
-    /// Every excess in order, until `goes_on` does not want more.
+    /// Visits every violation in order, while `goes_on` returns true.
     pub(super) fn each_excess(&self, position_m: &[f64], mut goes_on: impl FnMut(Excess) -> bool) {
         let n_axes = self.limits.len();
         let Some(first_m) = position_m.get(..n_axes) else { return };
@@ -124,7 +124,7 @@ impl<'a> Verification<'a> {
         }
     }
 
-    /// Refuses a planned motion at its first excess.
+    /// Refuses a planned motion at its first violation.
     ///
     /// # Errors
     /// [`TrajectoryError::SetPoint`] with the time, the value and the limit.
@@ -184,7 +184,7 @@ mod tests {
                 }
             }
         }
-        // Stopping at once from full speed is seen after the last row.
+        // Stopping at once from full speed is detected after the last row.
         let rows: Vec<f64> = (0..n).map(|k| 0.5 * (k as f64 * dt_s).powi(2)).collect();
         let found = Verification::of_rows(&rows, &[LIMITS], dt_s).first_excess(&rows).unwrap();
         assert_eq!((found.row, found.quantity), (n, Quantity::Acceleration));

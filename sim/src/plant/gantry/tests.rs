@@ -1,4 +1,5 @@
-//! The gantry against closed forms: second-order response, stick, decay, energy, determinism.
+//! Tests of the gantry against closed forms: second-order response, stiction, decay, energy,
+//! determinism.
 
 use super::*;
 
@@ -33,7 +34,8 @@ fn an_ideal_axis_answers_a_step_as_the_second_order_model() {
         let mut worst = 0.0_f64;
         for n in 1..=4000_u32 {
             gantry.step(&position(0.01), STEP_S);
-            // The drive samples: on average its force is half a step late, which the model is not.
+            // The drive samples: on average its force is delayed by half a step, which the model
+            // omits.
             let wanted = 0.01 * second_order(f64::from(n) * STEP_S, w, damping);
             worst = worst.max((gantry.encoder_m(0) - wanted).abs());
         }
@@ -115,7 +117,7 @@ fn a_sliding_axis_stops_where_friction_says_and_sticks() {
 
 #[test]
 fn friction_never_adds_energy() {
-    // A carriage with its mode ringing hard enough to shake it loose, no motor.
+    // A carriage whose mode rings hard enough to shake it loose, without motor force.
     let friction = Friction { coulomb_n: 60.0, static_n: 100.0, stribeck_m_s: 0.002 };
     let mechanics =
         Mechanics { carriage_kg: 120.0, mode_kg: 30.0, mode_rad_s: TAU * 20.0, mode_damping: 0.0 };

@@ -1,4 +1,5 @@
-//! Cyclic synchronous velocity: the learned input is added to the output of the position loop here.
+//! Cyclic synchronous velocity: the learned input is added to the output of the controller's
+//! position loop.
 
 use std::f64::consts::TAU;
 
@@ -28,8 +29,8 @@ impl ModeDesign for Csv {
         true
     }
 
-    /// `G / (1 + kv z^-1 G)` with `G = a / (s (s + a))`, as the position that the loop here sees is one
-    /// cycle old; with a zero-order hold.
+    /// `G / (1 + kv z^-1 G)` with `G = a / (s (s + a))`, as the position in the controller's loop
+    /// is one cycle old; with a zero-order hold.
     fn nominal_model(&self, axis: &Axis, cycle_s: f64) -> Result<StateSpace, ModelError> {
         let bandwidth = TAU * axis.model.velocity_bandwidth_hz.unwrap_or(1.0);
         let velocity = from_transfer_function(&[bandwidth], &[1.0, bandwidth, 0.0], None)?;
@@ -59,7 +60,7 @@ impl ModeDesign for Csv {
                 "m/s^2",
             ),
         ];
-        // The input moves the axis by no more than it takes the position loop to hold against it.
+        // The input moves the axis only until the position loop counteracts it.
         (peaks.value / gain_per_s(axis), demands)
     }
 }

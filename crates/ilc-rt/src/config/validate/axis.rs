@@ -7,9 +7,9 @@ use crate::record::{NAME_MAX, is_hidden};
 /// Highest CANopen node number.
 const NODE_MAX: u8 = 127;
 
-/// Names: each once, and none that does more than being read.
+/// Checks names: unique, and without control characters.
 ///
-/// Names that differ in case or spaces only would share a column of a table, or a file.
+/// Names that differ only in case or spaces would share a column of a table, or a file.
 pub(super) fn names(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let mut taken: Vec<(String, &str)> = Vec::new();
     for axis in &cell.axes {
@@ -37,7 +37,7 @@ pub(super) fn names(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Nodes: each once.
+/// Checks nodes: unique.
 pub(super) fn nodes(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let mut taken: Vec<(u8, String)> = Vec::new();
     let axes = cell.axes.iter().map(|axis| (axis.node, format!("[[axis]] {} node", axis.name)));
@@ -56,7 +56,7 @@ pub(super) fn nodes(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Ranges of an axis, and what its interface needs.
+/// Checks the ranges of an axis, and the requirements of its interface.
 pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
     let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
     let l = &axis.limits;
@@ -118,8 +118,8 @@ fn check_simulation(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
     v.range(&at("simulation.coulomb_n"), s.coulomb_n, 0.0, s.force_max_n)?;
     v.range(&at("simulation.static_n"), s.static_n, s.coulomb_n, s.force_max_n)?;
     v.range(&at("simulation.mode_mass_kg"), s.mode_mass_kg, 0.0, 0.9 * s.mass_kg)?;
-    // Anywhere that can be told in counts: that a real axis may stand outside its limits when it is
-    // switched on is worth trying.
+    // Any position that can be expressed in counts: an axis that starts outside its limits is worth
+    // simulating.
     let farthest_m = f64::from(i32::MAX) / axis.counts_per_m;
     v.range(&at("simulation.position_start_m"), s.position_start_m, -farthest_m, farthest_m)
 }

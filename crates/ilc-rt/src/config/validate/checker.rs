@@ -1,4 +1,4 @@
-//! The one way to refuse a value: file, key, value, and what is allowed.
+//! Refusal of a value: file, key, value, and the allowed values.
 
 use crate::config::{Cell, ConfigError};
 use crate::schema::{self, Violation};
@@ -29,7 +29,7 @@ impl Checker {
         if holds { Ok(()) } else { Err(self.refuse(key, value, allowed)) }
     }
 
-    /// Refuses the first number that is out of the range that its field states.
+    /// Refuses the first number out of the range of its field.
     pub(super) fn ranges(&self, cell: &Cell) -> Result<(), ConfigError> {
         self.allow(schema::check(cell, ""))
     }
@@ -38,7 +38,7 @@ impl Checker {
         found.map_err(|violation| ConfigError::value(&self.file, &violation))
     }
 
-    /// Refuses what is not a finite number from `low` to `high`.
+    /// Refuses a number that is not finite from `low` to `high`.
     pub(super) fn range(
         &self,
         key: &str,

@@ -1,10 +1,10 @@
-//! Contradictions within `[learning]`, its laws, and what goes round them.
+//! Contradictions within `[learning]`, its laws, and their wrappers.
 
 use super::checker::Checker;
 use crate::config::{Cell, ConfigError, LawName, Measure, mode};
 use crate::learning::law::{LawAxis, LawCell, LawTables};
 
-/// Contradictions of the learning; those of the other laws' tables too, so that a slip shows at once.
+/// Checks for contradictions, also in the tables of other laws, so that a slip shows at once.
 pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let l = &cell.learning;
     if let Some(ratio) = l.rollback_ratio {
@@ -42,7 +42,7 @@ pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
 }
 
 impl Cell {
-    /// Returns the cell as a law sees it.
+    /// Returns the part of the cell that laws use.
     pub fn for_laws(&self) -> LawCell<'_> {
         LawCell {
             axes: self

@@ -12,7 +12,7 @@ use crate::trajectory::MAX_AXES;
 
 use checker::Checker;
 
-/// Keys of earlier versions, and their names of today.
+/// Keys of earlier versions, and their current names.
 const RENAMED: [(&str, &str); 1] =
     [("curvature_acceleration_m_s2", "curvature_acceleration_max_m_s2")];
 
@@ -51,7 +51,7 @@ pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigE
 /// Checks every range and every pair of values that must agree; for cells changed after loading.
 ///
 /// # Errors
-/// [`ConfigError::Value`] for the first value that is not allowed.
+/// [`ConfigError::Value`] for the first invalid value.
 pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     let v = Checker { file: cell.file.display().to_string() };
     let name = &cell.cell.name;

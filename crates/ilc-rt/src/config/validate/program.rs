@@ -4,7 +4,7 @@ use super::checker::Checker;
 use crate::config::{Cell, ConfigError};
 use crate::trajectory::kind::Key;
 
-/// Ranges of the program, and what its kind of path needs.
+/// Checks the ranges of the program, and the requirements of its kind of path.
 pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let program = &cell.program;
     v.range("[program] blend_s", program.blend_s, cell.cycle_s(), 1.0)?;
@@ -16,7 +16,7 @@ pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Refuses keys that the kind of path does not read, and the lack of those that it needs.
+/// Rejects keys that the kind of path does not read, and missing ones that it requires.
 fn check_kind(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let program = &cell.program;
     let kind = program.kind.entry();

@@ -13,14 +13,14 @@ use crate::fieldbus::cia402::{Controlword, Mode, State, Statusword, objects, pdo
 /// Time that the following error may exceed its window before the drive faults (object 0x6066), in ms.
 pub const FOLLOWING_ERROR_TIME_MS: u16 = 10;
 
-/// Time for a drive that was left moving to come to rest before its power is taken.
+/// Time for a drive that was left moving to come to rest before its power is switched off.
 const REST: Duration = Duration::from_millis(500);
-/// Period at which a question is repeated whose answer takes time.
+/// Polling period of a request whose completion takes time.
 const ASK_EVERY: Duration = Duration::from_millis(1);
 
-/// Number of questions answered twice that proves two nodes.
+/// Number of doubly answered requests that proves two nodes.
 const TWIN_QUESTIONS: u32 = 4;
-/// Time after an answer for which a second one is awaited.
+/// Time after an answer during which a second one is awaited.
 const TWIN_WAIT: Duration = Duration::from_millis(20);
 
 /// Configuration of a drive.
@@ -38,20 +38,20 @@ pub struct DriveSetup {
     pub position_min_counts: i32,
     /// Highest position, in counts.
     pub position_max_counts: i32,
-    /// Highest speed, in counts/s.
+    /// Velocity limit, in counts/s.
     pub velocity_max_counts_s: u32,
-    /// Highest acceleration, in counts/s²: the deceleration of every stop.
+    /// Acceleration limit, in counts/s²: the deceleration of every stop.
     pub acceleration_max_counts_s2: u32,
-    /// The SI unit, coded as in object 0x60A8, that one count is, if it is one.
+    /// The SI unit equal to one count, coded as in object 0x60A8, if there is one.
     pub position_unit: Option<u32>,
-    /// The SI unit, coded as in object 0x60A9, that one count per second is, if it is one.
+    /// The SI unit equal to one count per second, coded as in object 0x60A9, if there is one.
     pub velocity_unit: Option<u32>,
-    /// Period of the drive's heartbeat, in milliseconds; 0: none (lock-step).
+    /// Heartbeat period of the drive, in milliseconds; 0: off (lock-step).
     pub heartbeat_ms: u16,
     /// Time without a command after which the drive stops, in milliseconds; 0: never
     /// (lock-step).
     pub rpdo_deadline_ms: u16,
-    /// Longest time of the drive to boot, and to answer each question.
+    /// Time-out for the drive to boot, and to answer each request.
     pub answer_timeout: Duration,
 }
 
@@ -62,7 +62,7 @@ pub struct DriveIdentity {
     pub device_type: u32,
     /// Supported drive modes, object 0x6502.
     pub supported_modes: u32,
-    /// Vendor, product, revision and serial number, object 0x1018; 0 where the node gives none.
+    /// Vendor, product, revision and serial number, object 0x1018; 0 where not supported.
     pub identity: [u32; 4],
 }
 
@@ -71,19 +71,19 @@ pub struct DriveIdentity {
 pub struct EncoderIdentity {
     /// Device type, object 0x1000.
     pub device_type: u32,
-    /// Vendor, product, revision and serial number, object 0x1018; 0 where the node gives none.
+    /// Vendor, product, revision and serial number, object 0x1018; 0 where not supported.
     pub identity: [u32; 4],
 }
 
-/// Resets a drive, checks what it is and configures it; it is left pre-operational and without power.
+/// Resets a drive, checks its identity and configures it; leaves it pre-operational and disabled.
 ///
-/// Reset communication, boot-up, identity (0x1000 profile 402, 0x6502), power off, PDOs (all switched
-/// off, then those of the loop mapped), and every object that shapes motion or the stop after a fault:
-/// read, corrected where it is wrong, read again. NMT start is the caller's, for all nodes at once.
-/// Frames of others that arrive meanwhile are discarded.
+/// Reset communication, boot-up, identity (0x1000 profile 402, 0x6502), power off, PDOs (all
+/// disabled, then those of the loop mapped), and every object that shapes motion or the stop after
+/// a fault: read, corrected where wrong, read again. NMT start is left to the caller, for all nodes
+/// at once. Foreign frames that arrive meanwhile are discarded.
 ///
 /// # Errors
-/// [`BringUpError`] names node, object or step, what was found and what was needed.
+/// [`BringUpError`] names node, object or step, the value found and the value required.
 pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, BringUpError> {
     let node = setup.node;
     let period = interpolation_period(setup.cycle_us)
@@ -121,10 +121,11 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     Ok(DriveIdentity { device_type, supported_modes, identity })
 }
 
-/// Resets an encoder node, checks what it is and maps its two positions; it is left pre-operational.
+/// Resets an encoder node, checks its identity and maps its two positions; leaves it
+/// pre-operational.
 ///
 /// # Errors
-/// [`BringUpError`] names node, step, what was expected and what was found.
+/// [`BringUpError`] names node, step, the value expected and the value found.
 pub fn bring_up_encoder(
     bus: &mut dyn Bus,
     node: NodeId,
@@ -142,7 +143,7 @@ pub fn bring_up_encoder(
     Ok(EncoderIdentity { device_type, identity })
 }
 
-/// Sends reset communication and waits for the boot-up that follows it, not one from before.
+/// Sends reset communication and waits for the following boot-up, not an earlier one.
 fn reset(bus: &mut dyn Bus, node: NodeId, timeout: Duration) -> Result<(), BringUpError> {
     let failed = |source| BringUpError::Bus { node, step: "reset", source };
     while bus.recv(Duration::ZERO).map_err(failed)?.is_some() {}
@@ -162,7 +163,7 @@ fn reset(bus: &mut dyn Bus, node: NodeId, timeout: Duration) -> Result<(), Bring
     }
 }
 
-/// Returns `(value, exponent)` with `value * 10^exponent` seconds equal to the cycle, if there is one.
+/// Returns `(value, exponent)` with `value * 10^exponent` seconds equal to the cycle, if it exists.
 fn interpolation_period(cycle_us: u32) -> Option<(u8, i8)> {
     [(-3_i8, 1000_u32), (-4, 100), (-5, 10), (-6, 1)].into_iter().find_map(|(exponent, unit_us)| {
         let value = u8::try_from(cycle_us / unit_us).ok()?;
@@ -182,8 +183,8 @@ impl Remote<'_> {
         }
     }
 
-    /// Asks a question a few times and refuses a node that answers it twice each time: it is two. Once
-    /// would not do, as a bus may well carry a frame twice.
+    /// Repeats a request a few times and refuses a node that always answers twice: it is two nodes.
+    /// A single duplicate may come from the bus.
     fn refuse_twins(&mut self, timeout: Duration) -> Result<(), BringUpError> {
         for _ in 0..TWIN_QUESTIONS {
             if self.client.count_answers(self.bus, objects::DEVICE_TYPE, timeout, TWIN_WAIT) < 2 {
@@ -202,7 +203,7 @@ impl Remote<'_> {
         Ok(identity)
     }
 
-    /// Clears every heartbeat that the node watches: the one of a master that is gone would stop it.
+    /// Clears every consumed heartbeat: that of a missing master would stop the node.
     fn forget_heartbeats(&mut self) -> Result<(), BringUpError> {
         let step = "watched heartbeats";
         let n_watched = self.find(step, objects::CONSUMER_HEARTBEAT, 0)?.unwrap_or(0);
@@ -212,13 +213,13 @@ impl Remote<'_> {
         Ok(())
     }
 
-    /// Brings a drive that an earlier master left under power to rest, and takes its power.
+    /// Stops a drive that an earlier master left enabled, and disables it.
     fn take_power(&mut self, setup: &DriveSetup) -> Result<(), BringUpError> {
         if !has_power(self.state()?.1) {
             return Ok(());
         }
-        // How to brake may have been left wrong as well. What is refused now is reported later, when the
-        // whole list is gone through.
+        // The braking objects may have been left wrong as well. A refusal here is reported later,
+        // after the whole list.
         for setting in settings::reactions(setup) {
             match self.ensure(&setting) {
                 Ok(_) | Err(BringUpError::Value { .. }) => {}
@@ -233,7 +234,7 @@ impl Remote<'_> {
         Err(BringUpError::UnderPower { node: self.node, statusword: word })
     }
 
-    /// Writes a controlword and waits until the drive has no power any more, or the time is over.
+    /// Writes a controlword and waits until the drive is disabled, or the timeout.
     fn command(
         &mut self,
         controlword: Controlword,
@@ -256,7 +257,7 @@ impl Remote<'_> {
         Ok((word, word.state()))
     }
 
-    /// Sets the mode and waits until the drive shows it.
+    /// Sets the mode and waits until the drive reports it.
     fn set_mode(&mut self, mode: Mode, timeout: Duration) -> Result<(), BringUpError> {
         let step = "mode of operation";
         self.write(step, objects::MODE_OF_OPERATION, 0, &mode.code().to_le_bytes())?;

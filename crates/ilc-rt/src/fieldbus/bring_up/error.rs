@@ -10,7 +10,7 @@ use crate::fieldbus::cia402::{Mode, Statusword};
 /// Reason that a node cannot be brought up: node, step, expected and found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BringUpError {
-    /// Nothing came after the reset.
+    /// No boot-up after the reset.
     #[error(
         "node {node}: no boot-up within {timeout:?} after reset; is it powered, on this bus and set to this number?"
     )]
@@ -20,7 +20,7 @@ pub enum BringUpError {
         /// Time waited.
         timeout: Duration,
     },
-    /// Two nodes have the same number.
+    /// Two nodes with the same number.
     #[error(
         "two nodes answer as node {node}: each question is answered twice; give one of them another \
          number, or stop the second simulator"
@@ -29,57 +29,57 @@ pub enum BringUpError {
         /// The number.
         node: NodeId,
     },
-    /// The node is of another kind.
+    /// A node of another kind.
     #[error(
         "node {node}: device type: expected profile {expected}, found {found} (0x1000 = 0x{device_type:08X})"
     )]
     Profile {
         /// The node.
         node: NodeId,
-        /// Profile number that was expected.
+        /// Profile number expected.
         expected: u16,
-        /// Profile number that was found.
+        /// Profile number found.
         found: u16,
         /// The whole object.
         device_type: u32,
     },
-    /// The drive lacks the mode.
+    /// A drive without the mode.
     #[error(
         "node {node}: supported modes: expected {mode}, found 0x6502 = 0x{supported:08X}, which lacks it"
     )]
     ModeNotSupported {
         /// The node.
         node: NodeId,
-        /// The mode that was asked for.
+        /// Requested mode.
         mode: Mode,
         /// Object 0x6502.
         supported: u32,
     },
-    /// The drive does not show the mode it was set to.
+    /// A drive that does not report the requested mode.
     #[error(
         "node {node}: mode of operation: expected {mode}, found 0x6061 = {found} after {timeout:?}"
     )]
     ModeNotShown {
         /// The node.
         node: NodeId,
-        /// The mode that was asked for.
+        /// Requested mode.
         mode: Mode,
         /// Object 0x6061.
         found: i8,
         /// Time waited.
         timeout: Duration,
     },
-    /// 0x60C2 cannot hold the cycle.
+    /// A cycle that 0x60C2 cannot represent.
     #[error(
         "node {node}: interpolation period: a cycle of {cycle_us} us is not 1 to 255 times a power of ten; choose one that is, as 2000"
     )]
     Cycle {
         /// The node.
         node: NodeId,
-        /// The cycle that was asked for.
+        /// Requested cycle.
         cycle_us: u32,
     },
-    /// An object has a value with which the drive must not run, and cannot be given another one.
+    /// An object with a value that must not be used, and that cannot be changed.
     #[error("node {node}: object {object} ({name}): found {found}, needed {needed}{}", because(*refusal))]
     Value {
         /// The node.
@@ -92,10 +92,11 @@ pub enum BringUpError {
         found: String,
         /// Value needed.
         needed: String,
-        /// Reason of the node not to take another value, if it was asked to and gave one.
+        /// Reason why the node rejects another value, if it was asked to take one and gave a
+        /// reason.
         refusal: Option<AbortCode>,
     },
-    /// An object that is needed is not there.
+    /// A missing object.
     #[error("node {node}: object {object} ({name}): the node has none, and needs it {purpose}")]
     Missing {
         /// The node.
@@ -107,7 +108,7 @@ pub enum BringUpError {
         /// Purpose.
         purpose: &'static str,
     },
-    /// The drive keeps its power.
+    /// A drive that cannot be disabled.
     #[error(
         "node {node}: the drive was left under power and does not let go: found {} \
          (0x6041 = 0x{:04X}), needed switch on disabled; switch it off and on again",
@@ -120,7 +121,7 @@ pub enum BringUpError {
         /// Object 0x6041.
         statusword: Statusword,
     },
-    /// A question to the node failed.
+    /// A failed SDO request.
     #[error("{source} (step: {step})")]
     Sdo {
         /// Step.
@@ -128,7 +129,7 @@ pub enum BringUpError {
         /// Error, with node and object.
         source: SdoError,
     },
-    /// The bus failed.
+    /// A failure of the bus.
     #[error("node {node}: {step}: {source}")]
     Bus {
         /// The node.

@@ -6,7 +6,7 @@ use crate::fieldbus::canopen::pdo::PdoNumber;
 use crate::fieldbus::canopen::{NmtCommand, NodeId, cob_id, sync};
 use crate::fieldbus::{Bus, BusError, Frame};
 
-/// Time that a bus is listened to: several cycles of any servo loop, and two heartbeats of 100 ms.
+/// Listening time: several cycles of any servo loop, and two heartbeats of 100 ms.
 pub const LISTEN: Duration = Duration::from_millis(250);
 
 /// Traffic that only a master sends.
@@ -18,7 +18,7 @@ pub enum Command {
     Nmt,
     /// Process data to this node.
     Rpdo(NodeId),
-    /// A question to this node.
+    /// An SDO request to this node.
     Sdo(NodeId),
 }
 
@@ -34,7 +34,7 @@ impl std::fmt::Display for Command {
 }
 
 impl Command {
-    /// The command that a frame is; `nodes` are those whose process data is looked for.
+    /// Returns the command in a frame; `nodes` are those whose process data counts.
     pub fn of(frame: &Frame, nodes: &[NodeId]) -> Option<Self> {
         if sync::is_sync(frame) {
             return Some(Self::Sync);
@@ -54,7 +54,7 @@ impl Command {
 
 /// Listens for a while and returns the first command of another master, if one comes.
 ///
-/// A bus in memory has no other master on it: nothing is awaited.
+/// A bus in memory has no other master: no wait.
 ///
 /// # Errors
 /// [`BusError`] if the bus fails.
@@ -66,7 +66,7 @@ pub fn other_master(
     heard(bus, span, |frame| Command::of(frame, nodes))
 }
 
-/// Listens for a while, without sending anything, and returns the first node of `nodes` that is heard.
+/// Listens for a while, without sending, and returns the first node of `nodes` that is heard.
 ///
 /// # Errors
 /// [`BusError`] if the bus fails.
@@ -78,7 +78,7 @@ pub fn present(
     heard(bus, span, |frame| sender(frame, nodes))
 }
 
-/// The node of `nodes` that sent a frame, if one of them did.
+/// Returns the node of `nodes` that sent a frame, if any.
 pub fn sender(frame: &Frame, nodes: &[NodeId]) -> Option<NodeId> {
     let services = [cob_id::SDO_RESPONSE, cob_id::HEARTBEAT, cob_id::EMCY];
     nodes.iter().copied().find(|&node| {

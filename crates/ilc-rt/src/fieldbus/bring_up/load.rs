@@ -1,16 +1,16 @@
 //! Bus load of the frames of one cycle on classical CAN.
 //!
-//! Checked when a cell is loaded: a bus that is too full shows up on the machine as late set-points and
-//! lost drives, long after the mistake was made. The counts are the worst case of bit stuffing, so that
-//! a cell that passes here fits whatever the payloads are.
+//! Checked when a cell is loaded: an overloaded bus shows on the machine as late set points and
+//! lost drives, long after the mistake. The counts are worst-case bit stuffing, so that a cell that
+//! passes fits with any payload.
 
 use crate::fieldbus::frame::PAYLOAD_MAX;
 
-/// Bits of a frame without payload: 34 stuffable bits of header and CRC, at most 8 stuff bits, 13 bits
-/// of tail and interframe space.
+/// Bits of a frame without payload: 34 stuffable bits of header and CRC, at most 8 stuff bits, 13
+/// bits of tail and interframe space.
 const EMPTY_FRAME_BITS: u64 = 55;
 
-/// Bits that one byte of payload adds: 8 and at most 2 stuff bits.
+/// Bits per byte of payload: 8 and at most 2 stuff bits.
 const BITS_PER_BYTE: u64 = 10;
 
 /// Bus load of the frames of one cycle.
@@ -23,7 +23,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// The share of the bus that is used, 0 to 1.
+    /// Returns the used share of the bus, 0 to 1.
     pub fn ratio(&self) -> f64 {
         self.bits_per_cycle as f64 / self.bits_available
     }
@@ -49,33 +49,33 @@ pub enum LoadError {
         /// Largest allowed share of the bus, 0 to 1.
         load_max: f64,
     },
-    /// A payload that a classical frame cannot carry.
+    /// A payload beyond a classical frame.
     #[error("a payload of {len} bytes does not fit a classical CAN frame: 0 to 8 are allowed")]
     Payload {
-        /// Length asked for, in bytes.
+        /// Requested length, in bytes.
         len: usize,
     },
     /// A cycle time that is not a positive number.
     #[error("a cycle of {cycle_s} s is not possible: it must be a positive number of seconds")]
     Cycle {
-        /// Cycle time asked for, in seconds.
+        /// Requested cycle time, in seconds.
         cycle_s: f64,
     },
     /// A bit rate outside classical CAN.
     #[error("{bitrate_bit_s} bit/s is not a bit rate of classical CAN: 1 to 1000000 are allowed")]
     BitRate {
-        /// Bit rate asked for, in bit/s.
+        /// Requested bit rate, in bit/s.
         bitrate_bit_s: u32,
     },
     /// A limit outside (0, 1].
     #[error("a load limit of {load_max} is not possible: above 0 and up to 1 are allowed")]
     Limit {
-        /// Limit asked for.
+        /// Requested limit.
         load_max: f64,
     },
 }
 
-/// Returns the bits that a classical 11-bit frame occupies at worst, interframe space included.
+/// Returns the worst-case bits of a classical 11-bit frame, including interframe space.
 ///
 /// `bits = 55 + 10 n` for `n` bytes of payload.
 pub const fn frame_bits(payload_bytes: usize) -> u64 {
@@ -92,8 +92,8 @@ pub const fn frame_bits(payload_bytes: usize) -> u64 {
 /// # Units
 /// - `payloads` in bytes, `cycle_s` in seconds, `bitrate_bit_s` in bit/s, `load_max` from 0 to 1.
 /// # Errors
-/// - [`LoadError::TooMuch`] with the bits per cycle and the limit; the others name the argument that
-///   cannot be.
+/// - [`LoadError::TooMuch`] with the bits per cycle and the limit; the others name the invalid
+///   argument.
 pub fn check(
     payloads: &[usize],
     cycle_s: f64,
@@ -115,7 +115,8 @@ pub fn check(
     let bits_per_cycle = payloads.iter().map(|&len| frame_bits(len)).sum();
     let available = f64::from(bitrate_bit_s) * cycle_s;
     let allowed = load_max * available;
-    // Half a bit of slack: a cycle of 1 ms is not a binary fraction, and a full bus is a whole number.
+    // Half a bit of tolerance: a cycle of 1 ms is not a binary fraction, and a full bus is a whole
+    // number.
     if bits_per_cycle as f64 > allowed + 0.5 {
         return Err(LoadError::TooMuch { bits_per_cycle, allowed, available, load_max });
     }
@@ -126,7 +127,7 @@ pub fn check(
 mod tests {
     use super::*;
 
-    /// SYNC, a reserve frame, and for each axis the given frames.
+    /// SYNC, a reserve frame, and the given frames per axis.
     fn cycle(n_axes: usize, axis: &[usize]) -> Vec<usize> {
         let mut payloads = vec![0, 8];
         for _ in 0..n_axes {

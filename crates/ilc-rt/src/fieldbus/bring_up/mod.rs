@@ -1,7 +1,7 @@
 //! Cold: the bring-up of nodes over SDO, and the checks of a bus before the loop begins.
 //!
-//! For `campaign`, the simulator and tests; nothing here is called in a tick. Imports the codecs of
-//! `canopen` and `cia402`, and the bus.
+//! For `campaign`, the simulator and tests; never called in a tick. Imports the codecs of `canopen`
+//! and `cia402`, and the bus.
 //!
 //! Family: `drive`, `scaling` and `settings`: a drive is brought up from its own set-up.
 

@@ -1,4 +1,4 @@
-//! Process data of a node: what others left switched on goes off, what the loop needs is mapped.
+//! PDO configuration of a node: PDOs left by others are disabled, those of the loop mapped.
 
 use super::error::BringUpError;
 use super::remote::Remote;
@@ -7,17 +7,17 @@ use crate::fieldbus::canopen::pdo::{
     COB_INVALID, COB_NO_RTR, Direction, MappedObject, PdoNumber, TYPE_EVERY_SYNC,
 };
 
-/// PDOs that a node may have in each direction.
+/// Largest number of PDOs per direction.
 const PDOS_MAX: u16 = 512;
-/// PDOs that are looked for even where one before them is missing.
+/// PDOs that are probed even if an earlier one is missing.
 const PDOS_USUAL: u16 = 4;
 /// In a COB-ID entry: the identifier.
 const IDENTIFIER: u32 = 0x1FFF_FFFF;
 
-/// Switches every PDO of the node off, on whatever identifier it is.
+/// Disables every PDO of the node, whatever its identifier.
 ///
-/// An RPDO that another master has left would take its targets from the bus, and a TPDO would cost bus
-/// time that the load check does not know.
+/// A left-over RPDO would take targets of another master from the bus, and a TPDO would cost bus
+/// time unknown to the load check.
 pub(super) fn close_all(remote: &mut Remote<'_>) -> Result<(), BringUpError> {
     for first in [PdoNumber::receive(0), PdoNumber::transmit(0)] {
         for offset in 0..PDOS_MAX {
@@ -36,9 +36,9 @@ pub(super) fn close_all(remote: &mut Remote<'_>) -> Result<(), BringUpError> {
     Ok(())
 }
 
-/// Maps a PDO that is switched off, and switches it on: transmission type, times, objects, identifier.
+/// Maps a disabled PDO and enables it: transmission type, times, objects, identifier.
 ///
-/// A command is to come at least every `deadline_ms`, if that is not 0.
+/// A command is expected at least every `deadline_ms`, unless that is 0.
 pub(super) fn open(
     remote: &mut Remote<'_>,
     number: PdoNumber,

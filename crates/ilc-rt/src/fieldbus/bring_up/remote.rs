@@ -1,4 +1,4 @@
-//! One node during its bring-up: reads, writes, and objects that must hold a value.
+//! A node during bring-up: reads, writes, and objects with required values.
 
 use super::error::BringUpError;
 use super::sdo_client::{SdoClient, SdoError};
@@ -6,7 +6,7 @@ use super::setting::{self, Absence, Kind, Need, Setting};
 use crate::fieldbus::Bus;
 use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
 
-/// One node during its bring-up.
+/// A node during bring-up.
 pub(super) struct Remote<'a> {
     pub(super) bus: &'a mut dyn Bus,
     pub(super) client: SdoClient,
@@ -25,7 +25,7 @@ impl Remote<'_> {
             .map_err(|source| BringUpError::Sdo { step, source })
     }
 
-    /// Reads an object that the node need not have.
+    /// Reads an optional object.
     pub(super) fn find(
         &mut self,
         step: &'static str,
@@ -51,7 +51,7 @@ impl Remote<'_> {
             .map_err(|source| BringUpError::Sdo { step, source })
     }
 
-    /// Writes an object, and returns why the node did not take it, if it said why.
+    /// Writes an object, and returns the node's reason for refusing, if it gave one.
     fn try_write(&mut self, setting: &Setting) -> Result<Option<AbortCode>, BringUpError> {
         let ObjectAddress { index, sub } = setting.address;
         let bytes = setting.kind.encode(setting.need.value());
@@ -62,14 +62,14 @@ impl Remote<'_> {
         }
     }
 
-    /// Sees to it that an object holds what is needed, and returns what it holds; `None` if the node
-    /// has no such object and needs none.
+    /// Ensures that an object holds a required value, and returns its value; `None` if the object
+    /// is missing and optional.
     ///
-    /// A right value is not written again: some drives wear their memory by every write.
+    /// A correct value is not written again: some drives wear out their memory with every write.
     ///
     /// # Errors
-    /// [`BringUpError::Value`] if it holds something else and keeps it, [`BringUpError::Missing`] if it
-    /// is needed and not there.
+    /// [`BringUpError::Value`] if it keeps another value, [`BringUpError::Missing`] if it is
+    /// missing and required.
     pub(super) fn ensure(&mut self, setting: &Setting) -> Result<Option<i64>, BringUpError> {
         let mut refusal = None;
         for is_written in [false, true] {
@@ -82,7 +82,7 @@ impl Remote<'_> {
                 Err(SdoError::Aborted { code, .. }) if is_absent(code) => {
                     return self.absent(setting);
                 }
-                // Nothing can be read back, so that the node's word has to do.
+                // Write-only objects cannot be read back; the node's confirmation has to suffice.
                 Err(SdoError::Aborted { code: AbortCode::WriteOnly, .. }) => {
                     return match self.try_write(setting)? {
                         None => Ok(Some(setting.need.value())),
@@ -103,7 +103,7 @@ impl Remote<'_> {
         Ok(None)
     }
 
-    /// Sees to a whole list, in its order.
+    /// Ensures a whole list, in order.
     pub(super) fn ensure_all(&mut self, settings: &[Setting]) -> Result<(), BringUpError> {
         settings.iter().try_for_each(|setting| self.ensure(setting).map(|_| ()))
     }

@@ -1,4 +1,4 @@
-//! The factors of a drive: one count of its bus must be one count of the cell description.
+//! Scaling factors of a drive: one count on its bus must be one count of the cell description.
 
 use super::drive::DriveSetup;
 use super::error::BringUpError;
@@ -6,15 +6,15 @@ use super::remote::Remote;
 use super::setting::{Kind, Need, Setting};
 use crate::fieldbus::cia402::objects;
 
-/// A ratio that a node does not have.
+/// The ratio of a missing object.
 const UNITY: [u32; 2] = [1, 1];
 
-/// Checks that a drive counts as its encoder does, and that its velocities are of the same counts; then
-/// sees to the speed limit of the motor, which is in revolutions.
+/// Checks that the drive counts encoder increments, and that its velocities use the same counts;
+/// then sets the speed limit of the motor, which is in revolutions.
 ///
 /// `position = increments * feed constant / (encoder resolution * gear ratio)`
 ///
-/// Factors of position are compared and never written: they belong to the mechanics, and a drive may
+/// Position factors are compared and never written: they belong to the mechanics, and a drive may
 /// lose its reference when they change.
 pub(super) fn check(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), BringUpError> {
     let resolution = remote.ratio(objects::ENCODER_RESOLUTION)?;
@@ -50,8 +50,8 @@ pub(super) fn check(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), B
     }
     let home = Setting::new(objects::HOME_OFFSET, 0, Kind::I32, Need::Exactly(0));
     match remote.find(home.name(), objects::HOME_OFFSET, 0)? {
-        // Written, it would move the coordinates of an axis that was set up with it, at once or at
-        // the next homing: it is not known which.
+        // Writing it would shift the coordinates of an axis that was set up with it, at once or at
+        // the next homing; which of the two is unknown.
         Some(found) if found != 0 => {
             let found = home.shown(found.cast_signed().into());
             let needed = "0; positions would be shifted against the cell description".to_owned();

@@ -17,39 +17,39 @@ const UPLOAD_MAX: usize = 65_536;
 /// Reason that an object was not read or written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SdoError {
-    /// The node refused.
+    /// The node aborted the transfer.
     #[error("node {node}: object {address}: refused with abort code {code}")]
     Aborted {
-        /// The node that was asked.
+        /// The node.
         node: NodeId,
         /// The object.
         address: ObjectAddress,
-        /// The node's reason.
+        /// The abort code.
         code: AbortCode,
     },
-    /// The node did not answer this question.
+    /// The node did not answer this request.
     #[error(
         "node {node}: object {address}: no answer within {timeout:?}, tried {TRIES} times{}",
         beside(*other)
     )]
     Timeout {
-        /// The node that was asked.
+        /// The node.
         node: NodeId,
         /// The object.
         address: ObjectAddress,
         /// Time-out of each attempt.
         timeout: Duration,
-        /// Last frame from the node instead.
+        /// Last frame received from the node instead.
         other: Option<Stray>,
     },
-    /// The node answered against the protocol.
+    /// The node violated the protocol.
     #[error("node {node}: object {address}: expected {expected}, found {found}")]
     Protocol {
-        /// The node that was asked.
+        /// The node.
         node: NodeId,
         /// The object.
         address: ObjectAddress,
-        /// Demand of the protocol.
+        /// Expectation of the protocol.
         expected: &'static str,
         /// Frame or data found.
         found: String,
@@ -57,28 +57,28 @@ pub enum SdoError {
     /// The bus failed.
     #[error("node {node}: object {address}: {source}")]
     Bus {
-        /// The node that was asked.
+        /// The node.
         node: NodeId,
         /// The object.
         address: ObjectAddress,
-        /// The failure of the bus.
+        /// The bus error.
         source: BusError,
     },
 }
 
-/// A frame on the node's answer channel that answered no question of this client.
+/// A frame on the node's answer channel that answers no request of this client.
 ///
-/// It may answer another master on the bus, a second node of the same number may have sent it, or it
-/// is the late answer to a question that was given up.
+/// It may answer another master on the bus, come from a second node of the same number, or be the
+/// late answer to a request that timed out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stray {
-    /// It speaks of another object.
+    /// About another object.
     Object(ObjectAddress),
-    /// It speaks of this object, but answers another request, as a write where a read was asked.
+    /// About this object, but for another request, e.g. a write instead of a read.
     Request,
-    /// It is a segment of another transfer, or one that has come already.
+    /// A segment of another transfer, or a duplicate.
     Segment,
-    /// It is no SDO message.
+    /// Not an SDO message.
     Garbage,
 }
 
@@ -99,8 +99,8 @@ fn beside(other: Option<Stray>) -> String {
 
 /// Reads and writes objects of one node, one at a time.
 ///
-/// Only what answers the question counts: the right kind of answer, for the same object, or the next
-/// segment of the transfer. Everything else on the node's channel is ignored until the time-out.
+/// Only matching answers count: the right kind, for the same object, or the next segment of the
+/// transfer. All other messages on the node's channel are ignored until the timeout.
 #[derive(Clone, Copy, Debug)]
 pub struct SdoClient {
     node: NodeId,
@@ -108,15 +108,15 @@ pub struct SdoClient {
 }
 
 impl SdoClient {
-    /// A client for `node` that waits `timeout` for each answer.
+    /// Creates a client for `node` with a timeout for each answer.
     pub fn new(node: NodeId, timeout: Duration) -> Self {
         Self { node, timeout }
     }
 
-    /// Reads an object, expedited or segmented as the node likes; the bytes are little endian.
+    /// Reads an object, expedited or segmented as the node chooses; the bytes are little-endian.
     ///
     /// # Errors
-    /// [`SdoError`] if the node refuses, stays silent or breaks the protocol, or the bus fails.
+    /// [`SdoError`] if the node aborts, does not answer or violates the protocol, or the bus fails.
     pub fn upload(&self, bus: &mut dyn Bus, index: u16, sub: u8) -> Result<Vec<u8>, SdoError> {
         self.with_retry(bus, ObjectAddress::new(index, sub), Self::upload_once)
     }
@@ -134,8 +134,8 @@ impl SdoClient {
         Ok(bytes.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte)))
     }
 
-    /// Reads sub-index 0 of an object once and counts the answers until `wait` after the first; 0 if
-    /// none came in time, or the bus failed, as the next question will tell.
+    /// Reads sub-index 0 of an object once and counts the answers until `wait` after the first; 0
+    /// after a timeout, or if the bus failed, which the next request reports.
     pub(crate) fn count_answers(
         &self,
         bus: &mut dyn Bus,
@@ -169,10 +169,10 @@ impl SdoClient {
         }
     }
 
-    /// Writes an object: expedited up to four bytes, segmented beyond; little endian.
+    /// Writes an object: expedited up to four bytes, else segmented; little-endian.
     ///
     /// # Errors
-    /// [`SdoError`] if the node refuses, stays silent or breaks the protocol, or the bus fails.
+    /// [`SdoError`] if the node aborts, does not answer or violates the protocol, or the bus fails.
     pub fn download(
         &self,
         bus: &mut dyn Bus,
@@ -185,7 +185,8 @@ impl SdoClient {
         })
     }
 
-    /// Runs a transfer, and again after a time-out, as one lost frame must not stop a machine.
+    /// Runs a transfer, and repeats it after a time-out, since one lost frame must not stop a
+    /// machine.
     fn with_retry<T>(
         &self,
         bus: &mut dyn Bus,
@@ -198,7 +199,7 @@ impl SdoClient {
             let Err(error) = &outcome else { return outcome };
             match error {
                 SdoError::Aborted { .. } | SdoError::Bus { .. } => return outcome,
-                // The server may be in the middle of the old transfer: tell it that it is over.
+                // The server may be in the middle of the old transfer: abort it.
                 SdoError::Timeout { .. } => {
                     self.send(bus, address, SdoRequest::Abort(address, AbortCode::Timeout))?;
                     if tried == TRIES {
@@ -287,7 +288,8 @@ impl SdoClient {
         Ok(())
     }
 
-    /// Discards what arrived before the transfer, so that a late answer is not taken for a new one.
+    /// Discards frames that arrived before the transfer, so that a late answer is not taken for a
+    /// new one.
     fn drain(&self, bus: &mut dyn Bus, address: ObjectAddress) -> Result<(), SdoError> {
         while bus.recv(Duration::ZERO).map_err(|source| self.bus(address, source))?.is_some() {}
         Ok(())
@@ -303,8 +305,9 @@ impl SdoClient {
             .map_err(|source| self.bus(address, source))
     }
 
-    /// Sends a request and waits for its answer, past all other traffic. An abort answers if it names
-    /// the object, any other answer if `answers` says so and it does not name another object.
+    /// Sends a request and waits for its answer, skipping all other traffic. An abort counts if it
+    /// names the object, any other answer if `answers` accepts it and it does not name another
+    /// object.
     fn ask(
         &self,
         bus: &mut dyn Bus,
@@ -340,7 +343,7 @@ impl SdoClient {
                     },
                 }
             }
-            // A bus that babbles must not hold the question indefinitely.
+            // A babbling bus must not block the request indefinitely.
             if frame.is_none() || left.is_zero() {
                 let (node, timeout) = (self.node, self.timeout);
                 return Err(SdoError::Timeout { node, address, timeout, other });
@@ -357,7 +360,7 @@ impl SdoClient {
     }
 }
 
-/// The object that an answer names, if it is of a kind that names one.
+/// Returns the object that an answer names, if its kind has one.
 fn named(answer: &SdoResponse) -> Option<ObjectAddress> {
     match *answer {
         SdoResponse::Upload(Data::Expedited(address, _) | Data::Initiate(address, _))

@@ -1,9 +1,9 @@
-//! One object of a node that must hold a certain value, and what is done to see to it.
+//! An object of a node with a required value.
 
 use crate::fieldbus::canopen::ObjectAddress;
 use crate::fieldbus::cia402::objects;
 
-/// Share by which a rate may differ from what was written: drives keep rates in units of their own.
+/// Relative tolerance of a rate after writing: drives store rates in their own units.
 const RATE_TOLERANCE: f64 = 0.01;
 
 /// The type of an object.
@@ -18,7 +18,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Bytes on the wire.
+    /// Returns the number of bytes.
     pub(super) const fn len(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -27,8 +27,7 @@ impl Kind {
         }
     }
 
-    /// The number that `bytes` encode; a node that sends more than the type holds did not say how
-    /// many of them count.
+    /// Decodes `bytes`; if a node sends more than the type holds, it did not indicate the size.
     pub(super) fn decode(self, bytes: &[u8]) -> i64 {
         let n_bytes = bytes.len().min(self.len());
         let bits = 64 - 8 * n_bytes.max(1);
@@ -40,31 +39,32 @@ impl Kind {
         }
     }
 
-    /// The bytes of `number`, little endian.
+    /// Encodes `number`, little-endian.
     pub(super) fn encode(self, number: i64) -> Vec<u8> {
         number.to_le_bytes()[..self.len()].to_vec()
     }
 }
 
-/// Allowed values of an object, and the one that is written if it holds another.
+/// Allowed values of an object, and the one written if it holds another.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Need {
-    /// This one.
+    /// Exactly this value.
     Exactly(i64),
-    /// This rate, as nearly as the drive can keep it.
+    /// This rate, as accurately as the drive can store it.
     Near(i64),
-    /// This one or a higher one.
+    /// This value or a higher one.
     AtLeast(i64),
-    /// So much that it never matters; if the node does not take that, at least the other one.
+    /// A value so large that it never takes effect; if the node refuses it, at least the second
+    /// one.
     Ample(i64, i64),
-    /// This one or a lower one.
+    /// This value or a lower one.
     AtMost(i64),
     /// One of these; the first one is written.
     OneOf(Vec<i64>),
 }
 
 impl Need {
-    /// The value to write.
+    /// Returns the value to write.
     pub(super) fn value(&self) -> i64 {
         match self {
             Self::Exactly(value)
@@ -91,7 +91,7 @@ impl Need {
         }
     }
 
-    /// Returns whether the node may run with what it holds after it was asked to hold the best.
+    /// Returns true if the node may run with its value after the best one was requested.
     pub(super) fn bears(&self, found: i64) -> bool {
         match self {
             Self::Ample(_, min) => found >= *min,
@@ -103,13 +103,13 @@ impl Need {
 /// Reaction to a node without the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Absence {
-    /// It has no such feature, so that there is nothing to be set.
+    /// The feature does not exist, so there is nothing to set.
     Harmless,
-    /// The node is refused; it needs the object for this.
+    /// The node is refused, for this purpose of the object.
     Refused(&'static str),
 }
 
-/// An object and what it must hold.
+/// An object with its required value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Setting {
     pub(super) address: ObjectAddress,
@@ -119,24 +119,24 @@ pub(super) struct Setting {
 }
 
 impl Setting {
-    /// A setting that a node need not have.
+    /// Creates the setting of an optional object.
     pub(super) fn new(index: u16, sub: u8, kind: Kind, need: Need) -> Self {
         let address = ObjectAddress::new(index, sub);
         Self { address, kind, need, absence: Absence::Harmless }
     }
 
-    /// The same, refusing a node without it.
+    /// Makes the object required.
     #[must_use]
     pub(super) fn needed(self, purpose: &'static str) -> Self {
         Self { absence: Absence::Refused(purpose), ..self }
     }
 
-    /// The object's name.
+    /// Returns the object's name.
     pub(super) fn name(&self) -> &'static str {
         name(self.address)
     }
 
-    /// A value as this object's are written.
+    /// Formats a value of this object.
     pub(super) fn shown(&self, value: i64) -> String {
         shown(self.address, self.kind, value)
     }
@@ -157,7 +157,7 @@ impl Setting {
     }
 }
 
-/// The name of an object, or of the record it belongs to.
+/// Returns the name of an object, or of its record.
 pub(super) fn name(address: ObjectAddress) -> &'static str {
     let of_record = match address.index {
         0x1400..=0x15FF => objects::name(objects::RPDO_COMMUNICATION),
@@ -169,7 +169,7 @@ pub(super) fn name(address: ObjectAddress) -> &'static str {
     of_record.unwrap_or("an object of the cell description")
 }
 
-/// A number as people read it: bits and identifiers in hexadecimal.
+/// Formats a number for reading: bits and identifiers in hexadecimal.
 pub(super) fn shown(address: ObjectAddress, kind: Kind, value: i64) -> String {
     let is_code = matches!(
         (address.index, address.sub),
@@ -210,7 +210,7 @@ mod tests {
                 assert_eq!(kind.decode(&kind.encode(number)), number, "{kind:?}");
             }
         }
-        // Four bytes whose count was not told.
+        // Four bytes without an indicated size.
         assert_eq!(Kind::I16.decode(&[0xFE, 0xFF, 0, 0]), -2);
         assert_eq!(Kind::U32.decode(&[7]), 7);
         assert_eq!(Kind::I32.decode(&[]), 0);

@@ -1,29 +1,29 @@
-//! Values that every node and every drive must hold before it may run: the tables, and their reasons.
+//! Required values of every node and every drive: the tables, with reasons.
 //!
-//! A drive keeps what an earlier master wrote: offsets that shift each target, limits that clip it, a
-//! deceleration so low that a quick stop never ends. So each object that shapes motion is read at
-//! bring-up, corrected where it is wrong and can be, and is a reason to refuse the drive otherwise.
+//! A drive keeps what an earlier master wrote: offsets that shift each target, limits that clip it,
+//! a deceleration so low that a quick stop never ends. So each object that shapes motion is read at
+//! bring-up and corrected if it is wrong; if it cannot be corrected the drive is rejected.
 
 use super::drive::{DriveSetup, FOLLOWING_ERROR_TIME_MS};
 use super::setting::{Kind, Need, Setting};
 use crate::fieldbus::canopen::{NodeId, cob_id};
 use crate::fieldbus::cia402::objects;
 
-/// The maximum torque that is a drive's own, in thousandths of its rated torque.
+/// The drive's own maximum torque, in thousandths of its rated torque.
 const RATED: i64 = 1000;
-/// Longest inhibit time of emergency messages that still tells of a fault in time, in 0.1 ms.
+/// Longest inhibit time of emergency messages that still reports a fault in time, in 0.1 ms.
 const EMCY_INHIBIT_MAX: i64 = 100;
-/// Multiple of the axis' limit at which a drive's own limit of acceleration never acts: a drive that
-/// interpolates linearly changes its speed within one step of its loop, a small part of a cycle.
+/// Multiple of the axis' limit at which a drive's own acceleration limit never acts: a drive that
+/// interpolates linearly changes its velocity within one step of its loop, a small part of a cycle.
 const ACCELERATION_AMPLE: i64 = 100;
-/// Multiple that a drive must allow at least, as the learned input comes on top of the set points.
+/// Smallest multiple that a drive must allow, as the learned input is added to the set points.
 const ACCELERATION_MIN: i64 = 2;
 /// The unit of positions: counts, as CiA 303-2 codes increments.
 const UNIT_COUNTS: i64 = 0x00B5_0000;
 /// The unit of velocities: counts per second.
 const UNIT_COUNTS_PER_S: i64 = 0x00B5_0300;
 
-/// Returns what the communication of every node must hold.
+/// Returns the required communication objects of every node.
 pub(super) fn communication(node: NodeId, heartbeat_ms: u16, cycle_us: u32) -> Vec<Setting> {
     use Kind::{U8, U16, U32};
     let exactly = |index, sub, kind, value| Setting::new(index, sub, kind, Need::Exactly(value));
@@ -31,27 +31,26 @@ pub(super) fn communication(node: NodeId, heartbeat_ms: u16, cycle_us: u32) -> V
         // Bit 30 would make the node a second producer of SYNC.
         exactly(objects::COB_ID_SYNC, 0, U32, cob_id::SYNC.into()),
         Setting::new(objects::CYCLE_PERIOD, 0, U32, Need::OneOf(vec![0, cycle_us.into()])),
-        // A window or a counter would make the node discard a SYNC, or what came with it.
+        // A window or a counter would make the node discard a SYNC, or the data with it.
         exactly(objects::SYNC_WINDOW, 0, U32, 0),
         exactly(objects::SYNC_COUNTER_OVERFLOW, 0, U8, 0),
-        // Node guarding is not spoken here, so that a node that waits for it would stop.
+        // Node guarding is not supported, so a node that waits for it would stop.
         exactly(objects::GUARD_TIME, 0, U16, 0),
         exactly(objects::LIFE_TIME_FACTOR, 0, U8, 0),
         exactly(objects::COB_ID_EMCY, 0, U32, cob_id::of(cob_id::EMCY, node).into()),
         Setting::new(objects::INHIBIT_TIME_EMCY, 0, U16, Need::AtMost(EMCY_INHIBIT_MAX)),
-        // To pre-operational or to stopped: a node that lost its controller must not go on.
+        // To pre-operational or stopped: a node that lost its controller must not continue.
         Setting::new(objects::ERROR_BEHAVIOUR, 1, U8, Need::OneOf(vec![0, 2])),
         exactly(objects::PRODUCER_HEARTBEAT, 0, U16, heartbeat_ms.into()),
     ]
 }
 
-/// Returns what a heartbeat that the node watches must hold, entry by entry: nothing, as the controller
-/// sends none.
+/// Returns the required consumer heartbeat entry: empty, as the controller sends no heartbeat.
 pub(super) fn watched_heartbeat(sub: u8) -> Setting {
     Setting::new(objects::CONSUMER_HEARTBEAT, sub, Kind::U32, Need::Exactly(0))
 }
 
-/// Returns how a drive must come to rest, whatever the reason.
+/// Returns the required settings of every kind of stop.
 pub(super) fn reactions(setup: &DriveSetup) -> Vec<Setting> {
     use Kind::{I16, U32};
     let option = |index, values: &[i64]| Setting::new(index, 0, I16, Need::OneOf(values.to_vec()));
@@ -62,11 +61,11 @@ pub(super) fn reactions(setup: &DriveSetup) -> Vec<Setting> {
         rate(objects::QUICK_STOP_DECELERATION),
         rate(objects::PROFILE_DECELERATION),
         rate(objects::PROFILE_ACCELERATION),
-        // Fault or quick stop; not to go on, nor to coast.
+        // Fault or quick stop; neither continue nor coast.
         option(objects::CONNECTION_LOSS_OPTION, &[1, 3]),
         // The quick-stop ramp, then off or held.
         option(objects::QUICK_STOP_OPTION, &[2, 6]),
-        // Sent to an axis at rest: off at once, or by a ramp.
+        // Applied to an axis at rest: disabled at once, or by a ramp.
         option(objects::SHUTDOWN_OPTION, &[0, 1]),
         option(objects::DISABLE_OPTION, &[1, 0]),
         option(objects::HALT_OPTION, &[1, 2]),
@@ -74,7 +73,7 @@ pub(super) fn reactions(setup: &DriveSetup) -> Vec<Setting> {
     ]
 }
 
-/// Returns what else of a drive shapes how it follows its targets.
+/// Returns the other settings that affect the following of targets.
 pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
     use Kind::{I32, U8, U16, U32};
     let at_least = |index, kind, value| Setting::new(index, 0, kind, Need::AtLeast(value));
@@ -89,7 +88,7 @@ pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
         Setting::new(objects::POLARITY, 0, U8, Need::Exactly(0)),
         limit(1, min),
         limit(2, max),
-        // Where positions wrap round; never inside the axis' range.
+        // Wrap-around of positions; never inside the axis' range.
         Setting::new(objects::POSITION_RANGE_LIMIT, 1, I32, Need::AtMost(i32::MIN.into())),
         Setting::new(objects::POSITION_RANGE_LIMIT, 2, I32, Need::AtLeast(i32::MAX.into())),
         at_least(objects::MAX_VELOCITY, U32, velocity),
@@ -116,7 +115,7 @@ pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
     ]
 }
 
-/// Returns what is added to every target: nothing. Looked at last, as setting a mode may touch it.
+/// Returns the required offsets of targets: 0. Checked last, as setting a mode may change them.
 pub(super) fn offsets() -> [Setting; 3] {
     let none = |index, kind| Setting::new(index, 0, kind, Need::Exactly(0));
     [
@@ -126,7 +125,7 @@ pub(super) fn offsets() -> [Setting; 3] {
     ]
 }
 
-/// Returns the interpolation period; a drive without it goes by the SYNCs that come.
+/// Returns the interpolation period; a drive without it uses the period of SYNC.
 pub(super) fn interpolation((value, exponent): (u8, i8)) -> [Setting; 2] {
     let part = |sub, kind, value| {
         Setting::new(objects::INTERPOLATION_PERIOD, sub, kind, Need::Exactly(value))
@@ -134,7 +133,7 @@ pub(super) fn interpolation((value, exponent): (u8, i8)) -> [Setting; 2] {
     [part(1, Kind::U8, value.into()), part(2, Kind::I8, exponent.into())]
 }
 
-/// 0 is a drive that does not say.
+/// 0 means unspecified.
 fn unit(index: u16, counts: i64, other: Option<u32>) -> Setting {
     let mut allowed = vec![counts, 0];
     allowed.extend(other.map(i64::from));

@@ -1,4 +1,4 @@
-//! The predefined connection set: which identifier belongs to which service of which node.
+//! The predefined connection set: identifiers of the services of each node.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -33,7 +33,7 @@ pub fn node_of(service: u16, id: u16) -> Option<NodeId> {
 }
 
 /// Returns the frame of `service` of `node`. All services here are at most 0x700, so the identifier
-/// fits 11 bits; a payload over 8 bytes gives an empty NMT frame, which no node heeds.
+/// fits 11 bits; a payload over 8 bytes gives an empty NMT frame, which all nodes ignore.
 pub(crate) fn frame(service: u16, node: NodeId, payload: &[u8]) -> Frame {
     Frame::new(of(service, node), payload).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! Emergency messages: why a node faulted, in the moment it does.
+//! Emergency messages (EMCY): the reason of a node's fault.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -6,19 +6,19 @@ use super::cob_id;
 use super::node_id::NodeId;
 use crate::fieldbus::Frame;
 
-/// No error any more.
+/// No error (error reset).
 pub const CODE_RESET: u16 = 0x0000;
 /// A PDO shorter than its mapping was not processed.
 pub const CODE_PDO_LENGTH: u16 = 0x8210;
-/// An RPDO with a deadline did not come in time.
+/// An RPDO timed out.
 pub const CODE_RPDO_TIMEOUT: u16 = 0x8250;
 /// A SYNC was longer or shorter than the node expects.
 pub const CODE_SYNC_LENGTH: u16 = 0x8240;
-/// Communication was lost, as the drive profile names it.
+/// Communication was lost, as defined by the drive profile.
 pub const CODE_COMMUNICATION: u16 = 0x7500;
 /// The consumed heartbeat of another node stopped.
 pub const CODE_HEARTBEAT: u16 = 0x8130;
-/// Demand and actual position are too far apart.
+/// Following error: demand and actual position differ too much.
 pub const CODE_FOLLOWING_ERROR: u16 = 0x8611;
 
 /// An emergency message.
@@ -30,7 +30,7 @@ pub struct Emergency {
     pub code: u16,
     /// Error register, object 0x1001.
     pub register: u8,
-    /// The maker's own bytes.
+    /// Manufacturer-specific bytes.
     pub vendor: [u8; 5],
 }
 
@@ -56,7 +56,8 @@ impl Emergency {
     }
 }
 
-/// Returns what an error code (EMCY, object 0x603F) means, in words; by its group if it is not known.
+/// Returns the meaning of an error code (EMCY, object 0x603F) in words; that of its group for an
+/// unknown one.
 pub fn meaning(code: u16) -> &'static str {
     match code {
         CODE_RESET => "error reset",
@@ -78,7 +79,7 @@ pub fn meaning(code: u16) -> &'static str {
     }
 }
 
-/// Current, and voltage.
+/// Current and voltage.
 fn power(code: u16) -> &'static str {
     match code {
         0x2110 | 0x2130..=0x213F => "short circuit or earth leakage at the input",
@@ -131,7 +132,7 @@ fn temperature(code: u16) -> &'static str {
     }
 }
 
-/// Hardware and software of the device itself.
+/// Hardware and software of the device.
 fn device(code: u16) -> &'static str {
     match code {
         0x5100..=0x51FF => "supply of the drive's electronics",

@@ -1,8 +1,8 @@
 //! CANopen services: NMT, SYNC, SDO, PDO, heartbeat and EMCY.
 //!
-//! Codecs shared by the controller and the simulated nodes, so that both sides name a byte the same
-//! way; imported by `cia402`, `servo`, `bring_up` and the simulator. All files are hot: values in, values
-//! out.
+//! Codecs shared by the controller and the simulated nodes, so that both agree on every byte;
+//! imported by `cia402`, `servo`, `bring_up` and the simulator. All files are hot: values in,
+//! values out.
 
 pub mod cob_id;
 pub mod emcy;

@@ -14,7 +14,7 @@ pub enum NmtCommand {
     Start = 0x01,
     /// Go to Stopped: only NMT and heartbeat remain.
     Stop = 0x02,
-    /// Go to Pre-operational: SDO, no PDO.
+    /// Go to Pre-operational: SDO, but no PDO.
     PreOperational = 0x80,
     /// Restart the node as after power-on.
     ResetNode = 0x81,
@@ -28,7 +28,7 @@ impl NmtCommand {
         Frame::new(cob_id::NMT, &[self as u8, node.map_or(0, NodeId::get)]).unwrap_or_default()
     }
 
-    /// Returns command and node (`None`: all nodes), or `None` if `frame` is no NMT command.
+    /// Returns command and node (`None`: all nodes), or `None` if `frame` is not an NMT command.
     pub fn decode(frame: &Frame) -> Option<(Self, Option<NodeId>)> {
         let (cob_id::NMT, &[command, number]) = (frame.id(), frame.payload()) else {
             return None;
@@ -48,7 +48,7 @@ impl NmtCommand {
     }
 }
 
-/// The NMT state of a node, as its heartbeat tells it.
+/// The NMT state of a node, as reported by its heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum NmtState {
@@ -56,9 +56,9 @@ pub enum NmtState {
     BootUp = 0x00,
     /// NMT and heartbeat only.
     Stopped = 0x04,
-    /// Everything, PDOs included.
+    /// All services, including PDOs.
     Operational = 0x05,
-    /// SDO, no PDO.
+    /// SDO, but no PDO.
     PreOperational = 0x7F,
 }
 

@@ -12,7 +12,7 @@ impl NodeId {
         if number >= 1 && number <= 127 { Some(Self(number)) } else { None }
     }
 
-    /// The number, 1 to 127.
+    /// Returns the number, 1 to 127.
     pub const fn get(self) -> u8 {
         self.0
     }

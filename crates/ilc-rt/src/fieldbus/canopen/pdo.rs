@@ -1,4 +1,4 @@
-//! Process data: where PDOs live in the object dictionary, on the bus, and how a mapping is written.
+//! Process data (PDO): objects of the dictionary, identifiers and mapping entries.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -6,9 +6,9 @@ use super::cob_id;
 use super::node_id::NodeId;
 use super::sdo::ObjectAddress;
 
-/// In a COB-ID entry: this PDO does not exist (bit 31).
+/// In a COB-ID entry: the PDO is disabled (bit 31).
 pub const COB_INVALID: u32 = 0x8000_0000;
-/// In a COB-ID entry: no remote frames (bit 30); set by all who follow CiA 301 version 4.
+/// In a COB-ID entry: no remote frames (bit 30); set by all devices that follow CiA 301 version 4.
 pub const COB_NO_RTR: u32 = 0x4000_0000;
 /// Transmission type 1: at every SYNC.
 pub const TYPE_EVERY_SYNC: u8 = 1;
@@ -32,17 +32,17 @@ pub struct PdoNumber {
 }
 
 impl PdoNumber {
-    /// RPDO1 … RPDO4 with `offset` 0 … 3.
+    /// Returns RPDO1 … RPDO4 for `offset` 0 … 3.
     pub const fn receive(offset: u8) -> Self {
         Self { direction: Direction::Receive, offset: offset & 3 }
     }
 
-    /// TPDO1 … TPDO4 with `offset` 0 … 3.
+    /// Returns TPDO1 … TPDO4 for `offset` 0 … 3.
     pub const fn transmit(offset: u8) -> Self {
         Self { direction: Direction::Transmit, offset: offset & 3 }
     }
 
-    /// The identifier of the predefined connection set.
+    /// Returns the identifier of the predefined connection set.
     pub const fn default_cob_id(self, node: NodeId) -> u16 {
         let first = match self.direction {
             Direction::Receive => cob_id::RPDO1,
@@ -51,7 +51,7 @@ impl PdoNumber {
         cob_id::of(first + 0x100 * self.offset as u16, node)
     }
 
-    /// Index of the communication parameters: 0x1400 or 0x1800 and following.
+    /// Returns the index of the communication parameters: from 0x1400 or 0x1800.
     pub const fn communication_index(self) -> u16 {
         let first = match self.direction {
             Direction::Receive => 0x1400,
@@ -60,7 +60,7 @@ impl PdoNumber {
         first + self.offset as u16
     }
 
-    /// Index of the mapping: 0x1600 or 0x1A00 and following.
+    /// Returns the index of the mapping: from 0x1600 or 0x1A00.
     pub const fn mapping_index(self) -> u16 {
         self.communication_index() + 0x200
     }
@@ -86,12 +86,12 @@ pub struct MappedObject {
 }
 
 impl MappedObject {
-    /// The mapping entry: `index << 16 | sub << 8 | bits`.
+    /// Returns the mapping entry: `index << 16 | sub << 8 | bits`.
     pub const fn entry(self) -> u32 {
         (self.address.index as u32) << 16 | (self.address.sub as u32) << 8 | self.bits as u32
     }
 
-    /// The object of a mapping entry.
+    /// Returns the object of a mapping entry.
     #[expect(clippy::cast_possible_truncation, reason = "the fields are cut out")]
     pub const fn from_entry(entry: u32) -> Self {
         let address = ObjectAddress::new((entry >> 16) as u16, (entry >> 8) as u8);

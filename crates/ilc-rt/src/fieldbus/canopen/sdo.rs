@@ -1,14 +1,14 @@
 //! SDO messages of both directions: expedited and segmented transfers and aborts.
 //!
 //! One request and one response type, used by the client of the controller and by the server of the
-//! simulated nodes. Block transfer is not spoken: it decodes to `None`, which a server answers with
-//! [`AbortCode::UnknownCommand`].
+//! simulated nodes. Block transfer is not supported: it decodes to `None`, which a server answers
+//! with [`AbortCode::UnknownCommand`].
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::sdo_abort::AbortCode;
 
-/// Bytes that a segment carries at most.
+/// Largest number of bytes in a segment.
 pub const SEGMENT_MAX: usize = 7;
 
 /// Index and sub-index of an object; displayed as `0x6041:00`.
@@ -21,7 +21,7 @@ pub struct ObjectAddress {
 }
 
 impl ObjectAddress {
-    /// The object at `index`, `sub`.
+    /// Creates the address of the object at `index`, `sub`.
     pub const fn new(index: u16, sub: u8) -> Self {
         Self { index, sub }
     }
@@ -50,12 +50,12 @@ impl Expedited {
         Some(Self { bytes, len, size_indicated: true })
     }
 
-    /// The data; all four bytes if the sender did not say how many count.
+    /// Returns the data; all four bytes if the size is not indicated.
     pub fn data(&self) -> &[u8] {
         &self.bytes[..usize::from(self.len)]
     }
 
-    /// Returns whether the sender said how many bytes count.
+    /// Returns true if the sender stated the number of valid bytes.
     pub fn size_indicated(&self) -> bool {
         self.size_indicated
     }
@@ -78,7 +78,7 @@ impl Expedited {
 pub struct Segment {
     /// Alternates from segment to segment, first `false`.
     pub toggle: bool,
-    /// No more segments follow.
+    /// True for the last segment.
     pub last: bool,
     bytes: [u8; SEGMENT_MAX],
     len: u8,
@@ -93,7 +93,7 @@ impl Segment {
         Some(Self { toggle, last, bytes, len })
     }
 
-    /// The data.
+    /// Returns the data.
     pub fn data(&self) -> &[u8] {
         &self.bytes[..usize::from(self.len)]
     }
@@ -119,7 +119,7 @@ impl Segment {
 pub enum Data {
     /// All 1 to 4 bytes of an object.
     Expedited(ObjectAddress, Expedited),
-    /// The object comes in segments, with the number of bytes if it was given.
+    /// Start of a segmented transfer, with the number of bytes if indicated.
     Initiate(ObjectAddress, Option<u32>),
     /// One segment of the object.
     Segment(Segment),
@@ -147,13 +147,13 @@ impl Data {
     }
 }
 
-/// The side of a transfer that asks for data or confirms them: an upload of the client, a download of the
-/// server.
+/// The side of a transfer that requests or confirms data: an upload of the client, a download of
+/// the server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// The object may be sent.
+    /// Request for, or confirmation of, the start of a transfer.
     Initiate(ObjectAddress),
-    /// A segment, by its toggle: the next one to be sent, or the one that was taken.
+    /// A segment, by its toggle bit: the next one requested, or the one confirmed.
     Segment(bool),
 }
 
@@ -173,7 +173,7 @@ pub enum SdoRequest {
     Download(Data),
     /// Read.
     Upload(Turn),
-    /// Give up.
+    /// Abort.
     Abort(ObjectAddress, AbortCode),
 }
 
@@ -184,12 +184,12 @@ pub enum SdoResponse {
     Upload(Data),
     /// Confirmation of a write, or permission to send its segments.
     Download(Turn),
-    /// Refused.
+    /// Abort.
     Abort(ObjectAddress, AbortCode),
 }
 
 impl SdoRequest {
-    /// The message of 8 bytes.
+    /// Returns the message of 8 bytes.
     pub fn encode(self) -> [u8; 8] {
         match self {
             Self::Download(data) => data.encode(0x20),
@@ -198,7 +198,7 @@ impl SdoRequest {
         }
     }
 
-    /// The request, or `None` if `payload` is not 8 bytes or of a service not spoken here.
+    /// Returns the request, or `None` if `payload` is not 8 bytes or of an unsupported service.
     pub fn decode(payload: &[u8]) -> Option<Self> {
         let message: [u8; 8] = payload.try_into().ok()?;
         Some(match message[0] >> 5 {
@@ -216,7 +216,7 @@ impl SdoRequest {
 }
 
 impl SdoResponse {
-    /// The message of 8 bytes.
+    /// Returns the message of 8 bytes.
     pub fn encode(self) -> [u8; 8] {
         match self {
             Self::Upload(data) => data.encode(0x40),
@@ -225,7 +225,7 @@ impl SdoResponse {
         }
     }
 
-    /// The response, or `None` if `payload` is not 8 bytes or of a service not spoken here.
+    /// Returns the response, or `None` if `payload` is not 8 bytes or of an unsupported service.
     pub fn decode(payload: &[u8]) -> Option<Self> {
         let message: [u8; 8] = payload.try_into().ok()?;
         Some(match message[0] >> 5 {

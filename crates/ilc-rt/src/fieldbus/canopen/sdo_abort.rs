@@ -16,7 +16,7 @@ macro_rules! abort_codes {
             /// All named codes.
             pub const NAMED: &'static [Self] = &[$(Self::$name),*];
 
-            /// The code on the wire.
+            /// Returns the code on the wire.
             pub const fn code(self) -> u32 {
                 match self {
                     $(Self::$name => $code,)*
@@ -24,7 +24,7 @@ macro_rules! abort_codes {
                 }
             }
 
-            /// The name of a code on the wire.
+            /// Returns the name of a code on the wire.
             pub const fn from_code(code: u32) -> Self {
                 match code {
                     $($code => Self::$name,)*
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn every_code_is_told_with_number_and_meaning() {
-        // CiA 301, table 22, all of it.
+        // CiA 301, table 22, complete.
         for (code, text) in [
             (0x0503_0000, "0x05030000 (toggle bit not alternated)"),
             (0x0504_0002, "0x05040002 (invalid block size)"),

@@ -10,7 +10,7 @@ pub fn frame() -> Frame {
     Frame::new(cob_id::SYNC, &[]).unwrap_or_default()
 }
 
-/// Tells whether `frame` is a SYNC, with or without counter.
+/// Returns true if `frame` is a SYNC, with or without counter.
 pub fn is_sync(frame: &Frame) -> bool {
     frame.id() == cob_id::SYNC && frame.payload().len() <= 1
 }

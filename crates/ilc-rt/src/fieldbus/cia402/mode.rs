@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::objects;
 
-/// A cyclic synchronous mode of operation: the input of a drive, and where the learned input enters.
+/// A cyclic synchronous mode of operation: the input of a drive, and the entry point of the learned
+/// input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[repr(i8)]
@@ -23,7 +24,7 @@ impl Mode {
     /// All modes.
     pub const ALL: [Self; 2] = [Self::Csp, Self::Csv];
 
-    /// The mode's name in a cell description.
+    /// Returns the mode's name in a cell description.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Csp => "csp",
@@ -31,7 +32,7 @@ impl Mode {
         }
     }
 
-    /// The objects of a command, of 16, 32 and 16 bits.
+    /// Returns the objects of a command, of 16, 32 and 16 bits.
     pub const fn command_objects(self) -> [u16; 3] {
         let target = match self {
             Self::Csp => objects::TARGET_POSITION,
@@ -40,17 +41,17 @@ impl Mode {
         [objects::CONTROLWORD, target, objects::TORQUE_OFFSET]
     }
 
-    /// The value of objects 0x6060 and 0x6061.
+    /// Returns the value of objects 0x6060 and 0x6061.
     pub const fn code(self) -> i8 {
         self as i8
     }
 
-    /// The mode of a value of 0x6060 or 0x6061, if it is one of these.
+    /// Returns the mode of a value of 0x6060 or 0x6061, if supported.
     pub fn from_code(code: i8) -> Option<Self> {
         Self::ALL.into_iter().find(|mode| mode.code() == code)
     }
 
-    /// The mode's bit in object 0x6502.
+    /// Returns the mode's bit in object 0x6502.
     pub const fn supported_bit(self) -> u32 {
         1 << (self.code() - 1)
     }

@@ -1,4 +1,4 @@
-//! The objects of the dictionary, each index once, with its name.
+//! The objects of the dictionary: index and name, once.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -6,7 +6,7 @@ macro_rules! objects {
     ($($constant:ident = $index:literal, $name:literal;)*) => {
         $(#[doc = $name] pub const $constant: u16 = $index;)*
 
-        /// Returns the name of the object at `index`, if it is one of this file.
+        /// Returns the name of the object at `index`, if it is listed here.
         pub const fn name(index: u16) -> Option<&'static str> {
             match index {
                 $($index => Some($name),)*

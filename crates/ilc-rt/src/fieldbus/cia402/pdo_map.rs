@@ -7,7 +7,7 @@
 //! | TPDO1 | 6041 statusword | 6064 position | 6077 torque |
 //!
 //! TPDO2 is 606C velocity and 60F4 following error, 32 bits each; TPDO1 of an encoder node is two
-//! positions of 32 bits. Little endian throughout.
+//! positions of 32 bits. Little-endian throughout.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -100,7 +100,7 @@ impl CommandRpdo1 {
         )
     }
 
-    /// Returns the command if `frame` is one to `node`.
+    /// Returns the command if `frame` is a command to `node`.
     pub fn decode(frame: &Frame, node: NodeId) -> Option<Self> {
         let (word, target_counts, torque_offset) =
             split_word_long_word(payload(frame, COMMAND_PDO, node)?);
@@ -118,7 +118,7 @@ impl StatusTpdo1 {
         )
     }
 
-    /// Returns the status if `frame` is one from `node`.
+    /// Returns the status if `frame` is a status of `node`.
     pub fn decode(frame: &Frame, node: NodeId) -> Option<Self> {
         let (word, position_counts, torque) =
             split_word_long_word(payload(frame, STATUS_PDO, node)?);
@@ -136,7 +136,7 @@ impl DriveMotionTpdo2 {
         )
     }
 
-    /// Returns the data if `frame` is such data from `node`.
+    /// Returns the data if `frame` is motion data of `node`.
     pub fn decode(frame: &Frame, node: NodeId) -> Option<Self> {
         let (velocity_counts_s, following_error_counts) =
             split_two_longs(payload(frame, DRIVE_MOTION_PDO, node)?);
@@ -150,7 +150,7 @@ impl EncoderSample {
         frame(ENCODER_PDO, node, two_longs(self.x_counts, self.y_counts))
     }
 
-    /// Returns the sample if `frame` is one from `node`.
+    /// Returns the sample if `frame` is a sample of `node`.
     pub fn decode(frame: &Frame, node: NodeId) -> Option<Self> {
         let (x_counts, y_counts) = split_two_longs(payload(frame, ENCODER_PDO, node)?);
         Some(Self { x_counts, y_counts })

@@ -13,9 +13,9 @@ pub struct Controlword(pub u16);
 /// The state of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// Starting up; leaves by itself.
+    /// Starting up; left automatically.
     NotReadyToSwitchOn,
-    /// Switch-on disabled: idle, no power.
+    /// Switch-on disabled: idle, without power.
     SwitchOnDisabled,
     /// Ready to switch on: power may be applied.
     ReadyToSwitchOn,
@@ -25,9 +25,9 @@ pub enum State {
     OperationEnabled,
     /// Stopping, or stopped and held, after a quick stop.
     QuickStopActive,
-    /// Stopping after a fault; leaves by itself.
+    /// Stopping after a fault; left automatically.
     FaultReactionActive,
-    /// Faulted, no power; left by a fault reset only.
+    /// Faulted, without power; left by a fault reset only.
     Fault,
 }
 
@@ -82,16 +82,16 @@ impl Statusword {
     pub const VOLTAGE_ENABLED: u16 = 1 << 4;
     /// Bit 7: warning.
     pub const WARNING: u16 = 1 << 7;
-    /// Bit 9: the drive heeds the controlword.
+    /// Bit 9: the drive obeys the controlword.
     pub const REMOTE: u16 = 1 << 9;
-    /// Bit 11: a limit of the drive is acting.
+    /// Bit 11: a limit of the drive is active.
     pub const INTERNAL_LIMIT: u16 = 1 << 11;
     /// Bit 12 in cyclic modes: the drive follows the target.
     pub const FOLLOWS_TARGET: u16 = 1 << 12;
     /// Bit 13 in CSP: following error.
     pub const FOLLOWING_ERROR: u16 = 1 << 13;
 
-    /// The state, or `None` for a combination of bits that no state has.
+    /// Returns the state, or `None` for an undefined combination of bits.
     pub fn state(self) -> Option<State> {
         State::ALL.into_iter().find(|state| {
             let (mask, value) = state.coding();
@@ -121,10 +121,10 @@ impl Controlword {
     /// Bit 8: halt.
     pub const HALT: u16 = 1 << 8;
 
-    /// The command that resets a fault, given the controlword sent before: bit 7 must rise, so it
-    /// is lowered for one command if it is up.
+    /// Returns the command that resets a fault, given the previous controlword: bit 7 must rise, so
+    /// it is lowered for one command if it is set.
     ///
-    /// Sent every cycle until the drive leaves [`State::Fault`], it tries again every second cycle.
+    /// Sent every cycle until the drive leaves [`State::Fault`], it retries every second cycle.
     pub const fn fault_reset_after(previous: Self) -> Self {
         if previous.0 & Self::FAULT_RESET.0 == 0 {
             Self::FAULT_RESET
@@ -136,9 +136,9 @@ impl Controlword {
 
 /// Returns the command that takes a drive in `state` one step nearer to operation enabled.
 ///
-/// A fault is not reset on the way, as no person has looked at it: in [`State::Fault`] the command is
-/// [`Controlword::DISABLE_VOLTAGE`], which also arms the edge of [`Controlword::fault_reset_after`].
-/// A quick stop is left through switch-on disabled.
+/// A fault is not reset on the way, since no person has examined it: in [`State::Fault`] the
+/// command is [`Controlword::DISABLE_VOLTAGE`], which also arms the edge of
+/// [`Controlword::fault_reset_after`]. A quick stop is left through switch-on disabled.
 pub const fn next_command(state: State) -> Controlword {
     match state {
         State::SwitchOnDisabled => Controlword::SHUTDOWN,

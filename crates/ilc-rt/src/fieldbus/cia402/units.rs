@@ -1,4 +1,4 @@
-//! The border between SI units and the counts of a drive. Nothing else converts.
+//! Conversion between SI units and the counts of a drive, in this place only.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -23,8 +23,8 @@ impl Scale {
 
     /// Returns the nearest count of a position (m) or velocity (m/s).
     ///
-    /// Values beyond 32 bits give the nearest end. Not a number gives `None`, never 0: zero is a
-    /// place, and a drive sent there moves.
+    /// Values beyond 32 bits saturate. NaN gives `None`, never 0: zero is a position, and a drive
+    /// commanded there moves.
     pub fn to_counts(self, value_si: f64) -> Option<i32> {
         if value_si.is_nan() {
             return None;
@@ -38,9 +38,9 @@ impl Scale {
         f64::from(counts) / self.counts_per_m
     }
 
-    /// Returns the SI units that one count and one count per second are, coded as in objects 0x60A8 and
-    /// 0x60A9, if a count is a power of ten of the unit; `unit` is that of the axis without prefix, as
-    /// [`UNIT_METRE`].
+    /// Returns the SI units equal to one count and to one count per second, coded as in objects
+    /// 0x60A8 and 0x60A9, if a count is a power of ten of the unit; `unit` is that of the axis
+    /// without prefix, e.g. [`UNIT_METRE`].
     pub fn si_units(self, unit: u32) -> Option<(u32, u32)> {
         (-9..=6_i8).find_map(|prefix| {
             let exact = 10.0_f64.powi((-prefix).into());
@@ -50,14 +50,14 @@ impl Scale {
         })
     }
 
-    /// Counts in one metre.
+    /// Returns the counts per metre.
     pub fn counts_per_m(self) -> f64 {
         self.counts_per_m
     }
 }
 
-/// Returns `value / rated` in thousandths, saturating at 16 bits; 0 if that is not a number, as no
-/// force is the safe feed-forward.
+/// Returns `value / rated` in thousandths, saturating at 16 bits; 0 for NaN, as no force is the
+/// safe feed-forward.
 pub fn per_mille(value: f64, rated: f64) -> i16 {
     let ratio = value / rated * 1000.0;
     #[expect(clippy::cast_possible_truncation, reason = "saturates; NaN gives 0, as documented")]

@@ -1,8 +1,8 @@
 //! Wakes a receiver that waits for a ring buffer to fill.
 //!
-//! A ring buffer alone can only be asked again and again. The bell lets the receiver sleep meanwhile and
-//! costs the sender one atomic exchange, plus one non-blocking system call if a receiver does sleep. A
-//! socket pair rather than a condition variable: no lock on either side.
+//! A ring buffer alone can only be polled. The bell lets the receiver sleep meanwhile and costs the
+//! sender one atomic exchange, plus one non-blocking system call if a receiver sleeps. A socket
+//! pair rather than a condition variable: no lock on either side.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -32,7 +32,7 @@ pub(super) struct Bell {
 /// Returns the two ends of a bell.
 ///
 /// # Errors
-/// The system's error if it has no descriptors left.
+/// The system's error if there are no descriptors left.
 pub(super) fn bell() -> io::Result<(Ringer, Bell)> {
     let (ringer, bell) = UnixStream::pair()?;
     ringer.set_nonblocking(true)?;
@@ -42,10 +42,10 @@ pub(super) fn bell() -> io::Result<(Ringer, Bell)> {
 }
 
 impl Ringer {
-    /// Wakes the receiver if it waits; call it after the buffer was filled.
+    /// Wakes the receiver if it waits; called after the buffer was filled.
     pub(super) fn ring(&self) {
-        // Orders the filling before the look at `waiting`, against the reverse order in `Bell::wait`:
-        // one of the two sides is bound to see the other.
+        // Orders the filling before the read of `waiting`, against the reverse order in
+        // `Bell::wait`: at least one of the two sides sees the other.
         fence(Ordering::SeqCst);
         if self.waiting.load(Ordering::Relaxed) && self.waiting.swap(false, Ordering::AcqRel) {
             // A full socket has rung already; a closed one has no receiver to wake.
@@ -58,8 +58,8 @@ impl Bell {
     /// Waits until `take` returns something or the deadline has passed.
     ///
     /// # Errors
-    /// What `take` returns, [`BusError::Closed`] if the sender's end is gone, or [`BusError::Os`] if the
-    /// system refuses to wait.
+    /// The result of `take`, [`BusError::Closed`] if the sender's end is gone, or [`BusError::Os`]
+    /// if the system refuses to wait.
     pub(super) fn wait<T>(
         &mut self,
         deadline: Deadline,
@@ -79,13 +79,13 @@ impl Bell {
                 return take();
             }
             if self.is_closed() {
-                // The last thing before the sender went may have come after the look above.
+                // The sender's last frame may have arrived after the check above.
                 return take()?.map_or(Err(BusError::Closed), |last| Ok(Some(last)));
             }
         }
     }
 
-    /// Takes what has rung off the socket; true if the sender's end is gone.
+    /// Drains the socket; returns true if the sender's end is gone.
     fn is_closed(&self) -> bool {
         let mut rung = [0; 16];
         matches!((&self.socket).read(&mut rung), Ok(0))

@@ -1,9 +1,8 @@
-//! Buses in memory: a pair of endpoints for two threads, and a far side that answers in the caller's
-//! thread.
+//! Buses in memory: a pair of endpoints for two threads, and a responder in the caller's thread.
 //!
-//! [`pair`] connects two threads of one process. [`InProcess`] has no thread at all: what is sent is
-//! answered before `send` returns, so a run is the same run every time, as fast as the processor allows.
-//! The simulated drives are run on it in lock-step.
+//! [`pair`] connects two threads of one process. [`InProcess`] has no thread at all: each frame is
+//! answered before `send` returns, so a run is deterministic, and as fast as the processor allows.
+//! The simulated drives run on it in lock-step.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -19,8 +18,8 @@ use crate::fieldbus::{Bus, BusError, Frame};
 
 /// One end of a bus between two threads.
 ///
-/// The fields are dropped in this order: the queues are given up before the bell of the peer falls
-/// silent, so that a peer that it wakes finds them given up.
+/// The fields are dropped in this order: the queues are abandoned before the peer's bell closes, so
+/// that a peer woken by it finds them abandoned.
 #[derive(Debug)]
 pub struct Loopback {
     outgoing: Outbox,
@@ -28,12 +27,12 @@ pub struct Loopback {
     peer: Ringer,
 }
 
-/// Returns the two ends of a bus that holds up to `capacity` frames each way.
+/// Returns the two ends of a bus that holds up to `capacity` frames in each direction.
 ///
 /// # Real Time
 /// Cold: allocates both directions.
 /// # Errors
-/// The system's error if it has no descriptors left for waking a receiver.
+/// The system's error if there are no descriptors left for waking a receiver.
 pub fn pair(capacity: usize) -> io::Result<(Loopback, Loopback)> {
     let (to_right, from_left) = RingBuffer::new(capacity);
     let (to_left, from_right) = RingBuffer::new(capacity);
@@ -64,13 +63,13 @@ impl Bus for Loopback {
 
 /// The far side of an [`InProcess`] bus.
 pub trait Responder: Send {
-    /// Takes a frame that was sent and hands each answer to `reply`, in order.
+    /// Receives a frame and passes each answer to `reply`, in order.
     fn receive(&mut self, frame: &Frame, reply: &mut dyn FnMut(Frame));
 }
 
 /// A bus whose far side runs in the caller's thread, inside `send`.
 ///
-/// `recv` never waits, whatever its time-out: nothing can arrive unless something is sent.
+/// `recv` never waits, whatever its timeout: nothing can arrive unless something is sent.
 pub struct InProcess<R> {
     responder: R,
     /// Both ends of the queue of answers.
@@ -86,22 +85,22 @@ impl<R: Responder> InProcess<R> {
         Self { responder, replies: RingBuffer::new(capacity) }
     }
 
-    /// The far side, to look at.
+    /// Returns the far side, for reading.
     pub fn responder(&self) -> &R {
         &self.responder
     }
 
-    /// The far side, to change.
+    /// Returns the far side, for changing.
     pub fn responder_mut(&mut self) -> &mut R {
         &mut self.responder
     }
 }
 
 impl<R: Responder> Bus for InProcess<R> {
-    /// Hands a frame to the responder and queues its answers.
+    /// Passes a frame to the responder and queues its answers.
     ///
     /// # Errors
-    /// [`BusError::Full`] if an answer did not fit: the frame was received, that answer is lost.
+    /// [`BusError::Full`] if an answer did not fit: the frame was received, the answer is lost.
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let replies = &mut self.replies.0;
         let mut fits = true;

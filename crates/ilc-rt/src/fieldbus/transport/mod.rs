@@ -1,10 +1,11 @@
-//! The carriers of frames: a real CAN interface, UDP multicast, Zenoh, and memory.
+//! The transports: a real CAN interface, UDP multicast, Zenoh, and memory.
 //!
-//! Each file is one carrier behind the [`Bus`](super::Bus) trait, hot in `send` and `recv`; `opening`,
-//! which is cold, turns an address of a cell description into one. Used by `servo`, `campaign`, the
-//! simulator and the tools, which know the address and nothing else of the carrier.
+//! Each file is one transport behind the [`Bus`](super::Bus) trait, hot in `send` and `recv`;
+//! `opening`, which is cold, opens the address of a cell description. Used by `servo`, `campaign`,
+//! the simulator and the tools, which know nothing but the address.
 //!
-//! Family: `opening`, `socketcan`, `udp_multicast` and `zenoh`: each carrier is opened cold, by what it is made of.
+//! Family: `opening`, `socketcan`, `udp_multicast` and `zenoh`: each carrier is opened cold, from
+//! its parts.
 
 mod doorbell;
 pub mod loopback;

@@ -1,4 +1,4 @@
-//! The bounded queue of frames between an endpoint and another thread: full is an error, never a wait.
+//! Bounded queue of frames between an endpoint and another thread: full is an error, never a wait.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -10,7 +10,7 @@ use super::doorbell::Bell;
 use super::wait::Deadline;
 use crate::fieldbus::{BusError, Frame};
 
-/// The end that frames are put into.
+/// The sending end.
 #[derive(Debug)]
 pub(super) struct Outbox(Producer<Frame>);
 
@@ -22,7 +22,7 @@ impl Outbox {
     /// Puts a frame in.
     ///
     /// # Errors
-    /// [`BusError::Closed`] if the other end is gone, [`BusError::Full`] if there is no room.
+    /// [`BusError::Closed`] if the other end is gone, [`BusError::Full`] if the queue is full.
     pub(super) fn put(&mut self, frame: &Frame) -> Result<(), BusError> {
         if self.0.is_abandoned() {
             return Err(BusError::Closed);
@@ -31,9 +31,10 @@ impl Outbox {
     }
 }
 
-/// The end that frames are taken from, and the bell that tells of them.
+/// The receiving end, with the bell that announces frames.
 ///
-/// The fields are dropped in this order, so that the thread that fills the queue finds it given up first.
+/// The fields are dropped in this order, so that the thread that fills the queue notices first that
+/// it was abandoned.
 #[derive(Debug)]
 pub(super) struct Inbox {
     frames: Consumer<Frame>,
@@ -45,7 +46,7 @@ impl Inbox {
         Self { frames, bell }
     }
 
-    /// Takes the next frame, or `None` if none came in time.
+    /// Takes the next frame, or returns `None` after the timeout.
     ///
     /// # Errors
     /// [`BusError::Closed`] if the other end is gone and all its frames are taken; [`BusError::Os`] if
@@ -53,7 +54,7 @@ impl Inbox {
     pub(super) fn take(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
         let frames = &mut self.frames;
         let mut take = || {
-            // Asked before the queue is looked at: the peer may send its last frame and go in between.
+            // Checked before the queue: the peer may send its last frame and close in between.
             let abandoned = frames.is_abandoned();
             match frames.pop() {
                 Ok(frame) => Ok(Some(frame)),

@@ -1,7 +1,7 @@
 //! A CAN interface of Linux, real or virtual, through a raw socket.
 //!
-//! Classical frames with 11-bit identifiers only: extended, remote and error frames are skipped, and FD
-//! frames never reach a socket that did not ask for them. The kernel hands a frame that is sent here to
+//! Classical frames with 11-bit identifiers only: extended, remote and error frames are skipped,
+//! and FD frames never reach a socket that did not request them. The kernel passes a sent frame to
 //! every other socket on the interface, but not back to this one.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
@@ -18,10 +18,11 @@ use super::super::frame::Frame;
 use super::opening::OpenError;
 use super::wait::Deadline;
 
-/// Room for about a thousand frames that arrive while the receiver is away.
+/// Receive buffer for about a thousand frames.
 const RECEIVE_BUFFER_BYTES: usize = 1 << 20;
 
-/// Foreign frames skipped in one `recv` without a wait, so that a flood cannot hold a tick.
+/// Limit on foreign frames skipped in one `recv` without waiting, so that a flood cannot stall a
+/// tick.
 const SKIP_MAX: usize = 256;
 
 /// `ARPHRD_CAN` of Linux: the type of a CAN interface in `/sys/class/net/*/type`.
@@ -38,12 +39,13 @@ impl SocketCan {
     /// # Real Time
     /// Cold.
     /// # Errors
-    /// [`OpenError::NoCan`] if the kernel has no CAN, [`OpenError::NoInterface`] with those that there
-    /// are, [`OpenError::Os`] for what else the system refuses.
+    /// [`OpenError::NoCan`] if the kernel has no CAN, [`OpenError::NoInterface`] with the existing
+    /// ones, [`OpenError::Os`] for other errors of the system.
     pub fn open(interface: &str) -> Result<Self, OpenError> {
         let os =
             |action| move |source| OpenError::os(format_args!("can:{interface}"), action, source);
-        // Asked first: without CAN in the kernel the interface is missing too, which is not the cause.
+        // Checked first: without CAN in the kernel the interface is missing too, which is not the
+        // cause.
         let can = socket2::Domain::from(libc::AF_CAN);
         let raw = socket2::Protocol::from(libc::CAN_RAW);
         if let Err(source) = socket2::Socket::new(can, socket2::Type::RAW, Some(raw)) {
@@ -70,7 +72,7 @@ impl SocketCan {
         Ok(Self { socket })
     }
 
-    /// The next CANopen frame that is there already.
+    /// Returns the next CANopen frame that has already arrived.
     fn next(&self, skip_max: usize) -> Result<Next, BusError> {
         for _ in 0..skip_max {
             match self.socket.read_frame() {
@@ -92,15 +94,16 @@ impl SocketCan {
 /// Result of a look at the socket.
 enum Next {
     Frame(Frame),
-    /// Nothing is there.
+    /// Empty.
     Empty,
-    /// Only foreign frames so far; there may be more behind them.
+    /// Only foreign frames so far; there may be more.
     Skipped,
 }
 
 impl Bus for SocketCan {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        // A `Frame` always has 11 bits of identifier and up to 8 bytes; the type does not say so.
+        // A `Frame` always has 11 bits of identifier and up to 8 bytes; the type does not express
+        // it.
         let data = StandardId::new(frame.id())
             .and_then(|id| CanDataFrame::new(id, frame.payload()))
             .ok_or(BusError::Os(libc::EINVAL))?;
@@ -141,7 +144,7 @@ fn bus_error(error: &io::Error) -> BusError {
         Some(libc::ENOBUFS | libc::EAGAIN) => BusError::Full,
         Some(libc::ENETDOWN | libc::ENODEV | libc::ENXIO) => BusError::Closed,
         Some(errno) => BusError::Os(errno),
-        // Only a short read or write has no number; a raw CAN socket does neither.
+        // Only a short read or write has no number; a raw CAN socket never does either.
         None => BusError::Os(libc::EIO),
     }
 }

@@ -1,8 +1,8 @@
 //! One CAN frame in one datagram, as python-can's `udp_multicast` interface writes it.
 //!
-//! A msgpack map from the names of `can.Message`'s fields to their values. python-can refuses a map with
-//! names it does not know, so [`encode()`] writes its eleven and no other; [`decode()`] passes over what it
-//! does not know, in any order, and refuses what is not a classical data frame with an 11-bit identifier.
+//! A msgpack map from the names of `can.Message`'s fields to their values. python-can refuses a map
+//! with unknown names, so [`encode()`] writes exactly its eleven; [`decode()`] skips unknown names,
+//! accepts any order, and refuses anything but a classical data frame with an 11-bit identifier.
 //!
 //! Source: python-can 4, `can/interfaces/udp_multicast/utils.py`, `pack_message` and `unpack_message`.
 
@@ -14,10 +14,10 @@ use rmp::encode::{self, RmpWrite};
 
 use super::super::frame::{Frame, PAYLOAD_MAX};
 
-/// Bytes that are enough for every encoded frame; the longest takes 162.
+/// Buffer size for every encoded frame; the longest takes 162.
 pub const ENCODED_MAX_BYTES: usize = 256;
 
-/// The encoding of one frame.
+/// An encoded frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Encoded {
     bytes: [u8; ENCODED_MAX_BYTES],
@@ -25,7 +25,7 @@ pub struct Encoded {
 }
 
 impl Encoded {
-    /// The datagram.
+    /// Returns the datagram.
     pub fn as_bytes(&self) -> &[u8] {
         &self.bytes[..self.len]
     }
@@ -39,13 +39,13 @@ pub fn encode(frame: &Frame) -> Option<Encoded> {
     Some(Encoded { bytes, len })
 }
 
-/// Writes the map and returns how many bytes of `bytes` are left.
+/// Writes the map and returns the number of bytes of `bytes` left.
 fn write(bytes: &mut [u8], frame: &Frame) -> Option<usize> {
     let payload = frame.payload();
     let mut rest = bytes;
     let out = &mut rest;
     encode::write_map_len(out, 11).ok()?;
-    // The receiver puts its own time of arrival here.
+    // The receiver replaces it by its own time of arrival.
     key(out, "timestamp")?;
     encode::write_f64(out, 0.0).ok()?;
     key(out, "arbitration_id")?;
@@ -74,8 +74,8 @@ fn flag<W: RmpWrite>(out: &mut W, name: &str, value: bool) -> Option<()> {
     encode::write_bool(out, value).ok()
 }
 
-/// Returns the frame in a datagram, or `None` if there is none that belongs on a CANopen bus: malformed
-/// bytes, extended, remote, error and FD frames, or a length that is not that of the data.
+/// Returns the frame in a datagram, or `None` if it contains no CANopen frame: malformed bytes,
+/// extended, remote, error and FD frames, or a length that does not match the data.
 pub fn decode(datagram: &[u8]) -> Option<Frame> {
     let mut bytes = Bytes::new(datagram);
     let n_entries = decode::read_map_len(&mut bytes).ok()?;
@@ -86,13 +86,13 @@ pub fn decode(datagram: &[u8]) -> Option<Frame> {
     if bytes.remaining_slice().is_empty() { fields.frame() } else { None }
 }
 
-/// The fields of `can.Message` that decide whether and which frame it is.
+/// The fields of `can.Message` that determine the frame.
 #[derive(Default)]
 struct Fields<'a> {
     arbitration_id: u32,
     /// Extended, remote, error or FD.
     foreign: bool,
-    /// python-can takes a message that does not say so for extended.
+    /// python-can treats a message without this field as extended.
     standard: bool,
     dlc: Option<u32>,
     data: &'a [u8],
@@ -126,14 +126,14 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// The next `n` bytes, or `None` if there are fewer.
+/// Returns the next `n` bytes, or `None` if there are fewer.
 fn take<'a>(bytes: &mut Bytes<'a>, n: u32) -> Option<&'a [u8]> {
     let (head, tail) = bytes.remaining_slice().split_at_checked(n as usize)?;
     *bytes = Bytes::new(tail);
     Some(head)
 }
 
-/// Passes over one value of any kind, in one pass: nested values are counted, not recursed into, so that
+/// Skips one value of any kind, in one pass: nested values are counted, not recursed into, so that
 /// no datagram can exhaust the stack.
 fn skip(bytes: &mut Bytes<'_>) -> Option<()> {
     let mut n_values: u64 = 1;
@@ -172,7 +172,7 @@ fn skip(bytes: &mut Bytes<'_>) -> Option<()> {
     Some(())
 }
 
-/// Adds the values inside an array or map to those still to pass over; it has no bytes of its own.
+/// Adds the values inside an array or map to those still to skip; it has no bytes of its own.
 fn count(n_values: &mut u64, n_inside: u64) -> u32 {
     *n_values += n_inside;
     0
@@ -190,7 +190,8 @@ mod tests {
 
     use super::*;
 
-    /// A datagram as python-can wrote it, for `Message(arbitration_id=0x181, data=[1, 2, 3])`.
+    /// Returns a datagram as written by python-can for
+    /// `Message(arbitration_id=0x181, data=[1, 2, 3])`.
     fn from_python_can() -> Vec<u8> {
         let mut bytes = Vec::new();
         encode::write_map_len(&mut bytes, 11).unwrap();

@@ -1,9 +1,9 @@
 //! CAN over UDP multicast, wire-compatible with python-can's `udp_multicast` interface.
 //!
-//! Two sockets: one bound to the group, shared with every other process on the port, and one with a port
-//! of its own to send from, by which its frames are known when they come back. With a time-to-live of 0
-//! (the default) everything goes through the loopback interface, which needs no network and cannot leave
-//! the host: a simulated bus must not command the drives of another machine.
+//! Two sockets: one bound to the group, shared with every other process on the port, and one with
+//! its own port to send from, which identifies its frames when they come back. With a time-to-live
+//! of 0 (the default) everything goes through the loopback interface, which needs no network and
+//! cannot leave the host: a simulated bus must not command the drives of another machine.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -23,16 +23,17 @@ use super::wait::Deadline;
 /// python-can's port for this interface.
 pub const DEFAULT_PORT: u16 = 43113;
 
-/// Frames stay on this host unless the address says otherwise.
+/// Default time-to-live: frames stay on this host.
 pub const DEFAULT_TTL: u8 = 0;
 
-/// Room for some thousands of frames that arrive while the receiver is away; the system may grant less.
+/// Receive buffer for some thousands of frames; the system may grant less.
 const RECEIVE_BUFFER_BYTES: usize = 4 << 20;
 
-/// Own and foreign datagrams skipped in one `recv` without a wait, so that a flood cannot hold a tick.
+/// Limit on own and foreign datagrams skipped in one `recv` without waiting, so that a flood cannot
+/// stall a tick.
 const SKIP_MAX: usize = 256;
 
-/// Bytes read of a datagram: twice what an FD frame takes; what is cut off is no frame of ours.
+/// Bytes read of a datagram: twice the size of an FD frame; a longer one is not a valid frame.
 const DATAGRAM_MAX_BYTES: usize = 512;
 
 /// An endpoint on a multicast group.
@@ -52,7 +53,7 @@ impl UdpMulticast {
     /// # Real Time
     /// Cold.
     /// # Errors
-    /// [`OpenError::Os`] with the step that the system refused.
+    /// [`OpenError::Os`] with the failed step.
     pub fn open(group: Ipv4Addr, port: u16, ttl: u8) -> Result<Self, OpenError> {
         let os = |action| {
             move |source| {
@@ -65,7 +66,7 @@ impl UdpMulticast {
         Ok(Self { receiver, sender, own })
     }
 
-    /// Returns the next frame of another sender that is there already.
+    /// Returns the next frame from another sender, if one has arrived.
     fn next(&self) -> Result<Next, BusError> {
         for _ in 0..SKIP_MAX {
             let mut datagram = [0; DATAGRAM_MAX_BYTES];
@@ -88,9 +89,9 @@ impl UdpMulticast {
 /// Result of a look at the socket.
 enum Next {
     Frame(Frame),
-    /// Nothing is there.
+    /// Empty.
     Empty,
-    /// Only own and foreign datagrams so far; there may be more behind them.
+    /// Only own and foreign datagrams so far; there may be more.
     Skipped,
 }
 
@@ -121,7 +122,7 @@ impl Bus for UdpMulticast {
 
 fn receiver(group: Ipv4Addr, port: u16, ttl: u8) -> io::Result<UdpSocket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
-    // python-can sets both; the system lets sockets share a port only if all of them do.
+    // python-can sets both; the system lets sockets share a port only if all of them set them.
     socket.set_reuse_address(true)?;
     socket.set_reuse_port(true)?;
     socket.set_recv_buffer_size(RECEIVE_BUFFER_BYTES)?;
@@ -129,7 +130,8 @@ fn receiver(group: Ipv4Addr, port: u16, ttl: u8) -> io::Result<UdpSocket> {
     socket.bind(&SockAddr::from(SocketAddrV4::new(group, port)))?;
     if ttl == 0 {
         socket.join_multicast_v4(&group, &Ipv4Addr::LOCALHOST)?;
-        // Those who send through a network interface are heard too, if there is one: python-can does.
+        // Frames sent through a network interface are received too, if there is one: python-can
+        // sends so.
         let _ = socket.join_multicast_v4(&group, &Ipv4Addr::UNSPECIFIED);
     } else {
         socket.join_multicast_v4(&group, &Ipv4Addr::UNSPECIFIED)?;

@@ -1,7 +1,7 @@
-//! Waiting until a descriptor is readable, no longer than asked.
+//! Waits until a descriptor is readable, with a timeout.
 //!
-//! The one place where a transport waits. A wait with a time-out is the operating system's: what is left
-//! of it after a foreign frame was skipped is measured with the system's clock, and nothing else is.
+//! The only place where a transport waits. The timeout is the operating system's; the remainder
+//! after a skipped foreign frame is measured with the system's clock.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use super::super::bus::BusError;
 
-/// The end of a wait.
+/// End of a wait.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Deadline {
     end: Option<Instant>,
@@ -38,7 +38,7 @@ impl Deadline {
         }
     }
 
-    /// Waits until `descriptor` is readable; `false` if the deadline came first.
+    /// Waits until `descriptor` is readable; returns `false` at the deadline.
     ///
     /// # Errors
     /// [`BusError::Os`] if the system refuses to wait.
@@ -52,8 +52,8 @@ impl Deadline {
             };
             let mut entry =
                 libc::pollfd { fd: descriptor.as_raw_fd(), events: libc::POLLIN, revents: 0 };
-            // SAFETY: `entry` and `left` are valid for the whole call, the count of entries is 1, and a
-            // null signal mask means that the mask is left alone.
+            // SAFETY: `entry` and `left` are valid for the whole call, the count of entries is 1,
+            // and a null signal mask leaves the mask unchanged.
             let ready =
                 unsafe { libc::ppoll(&raw mut entry, 1, &raw const left, std::ptr::null()) };
             if ready > 0 {

@@ -15,10 +15,10 @@ use super::super::frame::{Frame, PAYLOAD_MAX};
 use super::opening::{Ends, Link, OpenError, ZenohSettings};
 use super::queue::{Inbox, Outbox};
 
-/// Bytes of the identifier in front of the payload.
+/// Bytes of the identifier before the payload.
 const ID_BYTES: usize = 2;
 
-/// Time that [`ZenohBus::open`] waits for an endpoint that the address says to connect to.
+/// Time that [`ZenohBus::open`] waits for an endpoint named in the address.
 const CONNECT_WAIT: Duration = Duration::from_secs(3);
 
 /// An endpoint on a Zenoh key expression.
@@ -29,16 +29,15 @@ pub struct ZenohBus {
 }
 
 impl ZenohBus {
-    /// Opens a session of its own and joins the bus.
+    /// Opens its own session and joins the bus.
     ///
-    /// If the settings name an endpoint to connect to, waits up to three seconds until an endpoint on the
-    /// other side listens to this bus, and goes on without if none does.
+    /// If the settings name an endpoint to connect to, waits up to three seconds until an endpoint
+    /// on the other side listens to this bus, and continues without it after that.
     ///
     /// # Real Time
     /// Cold: starts threads.
     /// # Errors
-    /// [`OpenError::Zenoh`] with the step that Zenoh refused, such as listening on an endpoint that is
-    /// taken.
+    /// [`OpenError::Zenoh`] with the failed step, e.g. listening on an endpoint in use.
     pub fn open(settings: &ZenohSettings) -> Result<Self, OpenError> {
         let Ends { outgoing, incoming, link } = Link::open(settings)?;
         let bus = Self { outgoing, incoming, link };
@@ -48,7 +47,7 @@ impl ZenohBus {
         Ok(bus)
     }
 
-    /// Waits until another endpoint receives what is sent here; false if none did in time.
+    /// Waits until another endpoint receives the frames sent here; returns false after the timeout.
     ///
     /// # Real Time
     /// Cold: sleeps.
@@ -75,7 +74,7 @@ impl fmt::Debug for ZenohBus {
     }
 }
 
-/// Returns the bytes of a frame on Zenoh and how many of them count.
+/// Returns the bytes of a frame on Zenoh and their number.
 pub(super) fn encode(frame: &Frame) -> ([u8; ID_BYTES + PAYLOAD_MAX], usize) {
     let mut bytes = [0; ID_BYTES + PAYLOAD_MAX];
     let payload = frame.payload();
@@ -85,7 +84,7 @@ pub(super) fn encode(frame: &Frame) -> ([u8; ID_BYTES + PAYLOAD_MAX], usize) {
     (bytes, len)
 }
 
-/// Returns the frame in a sample, or `None` if there is none.
+/// Returns the frame in a sample, or `None` if it is invalid.
 pub(super) fn decode(bytes: &[u8]) -> Option<Frame> {
     let (id, payload) = bytes.split_first_chunk::<ID_BYTES>()?;
     Frame::new(u16::from_le_bytes(*id), payload)

@@ -1,4 +1,4 @@
-//! Gradient learning: the error, run backward through the model.
+//! Adjoint (gradient) ILC: the error, run backward through the model.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,18 +11,19 @@ use crate::learning::{Law, LearningError, LowPass};
 use crate::model::{ModelError, StateSpace};
 use crate::schema::{Violation, field_order};
 
-/// `[learning.adjoint]`: the gain, and a low-pass if one is wanted.
+/// `[learning.adjoint]`: the gain, and an optional low-pass.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct AdjointParameters {
-    /// Step down the gradient, below `2 / |P|^2` unless there is a low-pass; half of that if not given.
+    /// Step of the gradient descent, below `2 / |P|^2` unless there is a low-pass; half of that by
+    /// default.
     #[schemars(range(min = 1e-12, max = 1e12))]
     pub gain: Option<f64>,
-    /// Order of the zero-phase Butterworth low-pass.
+    /// Order of the zero-phase Butterworth low-pass (Q-filter).
     #[schemars(range(min = 1, max = 12))]
     pub order: usize,
-    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate; no low-pass if not given.
+    /// Cut-off of the low-pass, 0.001 to 0.95 of the Nyquist frequency; no low-pass by default.
     pub cutoff_hz: Option<f64>,
 }
 
@@ -58,24 +59,24 @@ impl LawParameters for AdjointParameters {
     }
 }
 
-/// Gradient learning: one step down the squared error.
+/// Adjoint (gradient) ILC: one step of gradient descent on the squared error.
 ///
-/// `u_{j+1} = Q (u_j + alpha P' e_j)`, `P` the lifted operator of the model
+/// `u_{j+1} = Q (u_j + alpha P' e_j)`, `P` the lifted system of the model
 ///
-/// With the model right and without filter, `|e|` falls in every run if `0 < alpha < 2 / |P|^2`:
-/// `e_{j+1} = (I - alpha P P') e_j`. It falls quickly where the model's gain is near its largest and
-/// slowly elsewhere, and is the least sensitive of the model-based laws to noise and to a wrong
-/// model: it converges as long as the real axis stays within 90 degrees of the model. Delays and
-/// the pairing of samples are in `P` already.
+/// With an exact model and without filter, `|e|` falls in every run (monotone convergence) if
+/// `0 < alpha < 2 / |P|^2`: `e_{j+1} = (I - alpha P P') e_j`. It falls quickly where the model's
+/// gain is near its maximum and slowly elsewhere. Of the model-based laws this is the most robust
+/// against noise and model errors: it converges as long as the phase of the real axis stays within
+/// 90 degrees of the model. Delays and the pairing of samples are part of `P`.
 ///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` through a
-/// backward simulation.
+/// Cold path. Allocates at creation, never in [`Law::update`]; `O(n_samples)` through a backward
+/// simulation.
 /// # Source
-/// - \[barton2010\], Ch. 3: the lifted operator; the law is the gradient of Eq. (3.13) with Q = I,
-///   S = R = 0.
+/// - \[barton2010\], Ch. 3: the lifted system; the law is the gradient of Eq. (3.13) with Q = I, S
+///   = R = 0.
 #[derive(Debug, Clone)]
 pub struct Adjoint {
     operator: Operator,
@@ -89,15 +90,15 @@ pub struct Adjoint {
 }
 
 impl Adjoint {
-    /// Makes the law for runs of `n_samples` samples; without a gain it takes `1 / |P|^2`, half the
+    /// Creates the law for runs of `n_samples` samples; the default gain is `1 / |P|^2`, half the
     /// limit.
     ///
     /// # Errors
-    /// - [`LearningError::Parameter`] for a gain that is not positive and finite, or a model that
-    ///   answers to nothing or without bound.
-    /// - [`LearningError::GainBound`] for a gain from the limit on and no filter.
-    /// - [`LearningError::Empty`] for no samples, inputs or outputs; [`LearningError::TooMany`] for more
-    ///   than a million values.
+    /// - [`LearningError::Parameter`] for a gain that is not positive and finite, or a model with a
+    ///   zero or unbounded response.
+    /// - [`LearningError::GainBound`] for a gain at or above the limit without filter.
+    /// - [`LearningError::Empty`] for 0 samples, inputs or outputs; [`LearningError::TooMany`] for
+    ///   more than a million values.
     /// - [`LearningError::Model`] for a continuous model.
     /// - [`LearningError::Signal`] if the run is too short for the filter.
     pub fn new(
@@ -115,7 +116,7 @@ impl Adjoint {
             ("n_inputs", n_inputs),
             ("n_outputs", n_outputs),
         ])?;
-        // The norm takes a hundred products and keeps twenty signals.
+        // The norm takes a hundred products and stores twenty signals.
         let allowed = 1_000_000 / n_inputs.max(n_outputs);
         if n_samples > allowed {
             return Err(LearningError::TooMany { what: "n_samples", value: n_samples, allowed });
@@ -125,7 +126,7 @@ impl Adjoint {
             return Err(LearningError::Parameter { what: "gain", value, allowed });
         }
         let mut operator = Operator::new(model);
-        // The bound from above: a limit that is a little too low is safe, one too high is none.
+        // The upper bound of the norm: a slightly low limit is safe, a high one is not.
         let found = operator.norm(n_samples);
         let norm = found.value + found.error;
         let gain_limit = 2.0 / (norm * norm);
@@ -146,8 +147,8 @@ impl Adjoint {
         self.gain
     }
 
-    /// Returns `2 / |P|^2`, the gain from which on the error grows; in long runs up to about one part in
-    /// 1000 less, as `|P|` is then known to within a bound only.
+    /// Returns `2 / |P|^2`, the gain above which the error grows; in long runs up to about one part
+    /// in 1000 less, as only a bound of `|P|` is known.
     pub fn gain_limit(&self) -> f64 {
         self.gain_limit
     }

@@ -1,38 +1,43 @@
-//! The catalogue of the laws that a cell can name. A law is added by a line here and a file beside it.
+//! The catalogue of the laws that a cell can name. A new law needs a line here and a file beside
+//! it.
 //!
-//! `config` makes the tables of `[learning]` from it, and with them the schema of the cell description,
-//! its documents and what is checked; the tests that go over all laws read it.
+//! `config` makes the tables of `[learning]` from it, and with them the schema of the cell
+//! description, its documents and its checks; the tests over all laws read it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Calls a macro with every law: what it does, its name in Rust and in a cell, its parameters.
+/// Calls a macro with every law: its summary, its names in Rust and in a cell, its parameters.
 macro_rules! every_law {
     ($macro:ident) => {
         $macro! {
-            /// The input that a quadratic cost over the whole run asks for; with `rate` it is CO-ILC.
+            /// Norm-optimal ILC: minimises a quadratic cost over the whole run; with `rate` it is
+            /// CO-ILC.
             NormOptimal norm_optimal crate::learning::law::norm_optimal::NormOptimalParameters;
-            /// Proportional-derivative learning from the error some samples ahead, each axis on its own.
+            /// Proportional-derivative learning from the error some samples ahead, each axis
+            /// separately.
             Pd pd crate::learning::law::pd::PdParameters;
-            /// Norm-optimal learning within bounds of input and set point.
+            /// Constrained norm-optimal ILC: within bounds of input and set point.
             Constrained constrained crate::learning::law::constrained::ConstrainedParameters;
-            /// Down the gradient: the error run backward through the model.
+            /// Adjoint (gradient) ILC: the error run backward through the model.
             Adjoint adjoint crate::learning::law::adjoint::AdjointParameters;
-            /// With the inverse of the model.
+            /// Model-inverse ILC.
             ModelInverse model_inverse crate::learning::law::model_inverse::ModelInverseParameters;
-            /// By adding the filtered error up; for cells of csv axes only.
+            /// Adds up the filtered error (feed-forward, parallel); for cells of csv axes only.
             ErrorFeedforward error_feedforward
                 crate::learning::law::error_feedforward::ErrorFeedforwardParameters;
-            /// Norm-optimal learning that weighs the low frequencies of the error.
+            /// Norm-optimal ILC with a dynamic weight on the low frequencies of the error.
             Dynamic dynamic crate::learning::law::dynamic::DynamicParameters;
-            /// Norm-optimal learning of several machines that keep a formation.
+            /// Norm-optimal ILC of several machines in formation.
             Formation formation crate::learning::law::formation::FormationParameters;
             /// Another law, fed with the tool's errors through the inverse of a Jacobian matrix.
             ThroughJacobian through_jacobian
                 crate::learning::law::through_jacobian::ThroughJacobianParameters;
-            /// From all past runs, weighted by how like their disturbance was and how small their error.
+            /// Relevance-weighted ILC (DPW-ILC): from all past runs, weighted by the similarity of
+            /// their disturbance and the size of their error.
             Relevance relevance crate::learning::law::relevance::RelevanceParameters;
-            /// One input for each disturbance met, interpolated between the nearest two.
+            /// Flexible ILC: one input for each disturbance met, interpolated between the nearest
+            /// two.
             Flexible flexible crate::learning::law::flexible::FlexibleParameters;
         }
     };
@@ -54,7 +59,7 @@ macro_rules! names {
             /// Every law that a cell can name.
             pub const ALL: &[Self] = &[$(Self::$law),*];
 
-            /// Returns the name as a cell description has it.
+            /// Returns the name in a cell description.
             pub fn as_str(self) -> &'static str {
                 match self {
                     $(Self::$law => stringify!($name),)*

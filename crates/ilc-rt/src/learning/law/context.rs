@@ -1,6 +1,6 @@
 //! Context in which a law is built and its parameters are checked: cell, model, set points of a run.
 //!
-//! `config` and `design` fill it in from a cell description; the laws read it.
+//! `config` and `design` create it from a cell description; the laws read it.
 
 use std::fmt::Debug;
 
@@ -12,7 +12,7 @@ use crate::learning::{Law, LearningError};
 use crate::model::StateSpace;
 use crate::schema::Violation;
 
-/// An axis as a law sees it.
+/// The part of an axis that laws use.
 #[derive(Clone, Copy, Debug)]
 pub struct LawAxis<'a> {
     /// Name.
@@ -20,31 +20,31 @@ pub struct LawAxis<'a> {
     /// The learned input is added to the set point of a drive that closes the position loop; otherwise
     /// it is added to the output of the position loop in the controller.
     pub corrects_set_point: bool,
-    /// Largest learned input.
+    /// Bound of the learned input.
     pub input_max: f64,
     /// Lowest position.
     pub position_min: f64,
     /// Highest position.
     pub position_max: f64,
-    /// Highest speed.
+    /// Velocity limit.
     pub velocity_max: f64,
-    /// Highest acceleration.
+    /// Acceleration limit.
     pub acceleration_max: f64,
 }
 
-/// A cell as a law sees it.
+/// The part of a cell that laws use.
 #[derive(Clone, Debug)]
 pub struct LawCell<'a> {
     /// The axes, in the order of the channels.
     pub axes: Vec<LawAxis<'a>>,
     /// Sample time.
     pub cycle_s: f64,
-    /// The parameters of every law, for those that go round another one.
+    /// The parameters of every law, for wrappers of another one.
     pub tables: &'a dyn LawTables,
 }
 
 impl LawCell<'_> {
-    /// Refuses a law for its name.
+    /// Returns the refusal of a law by its name.
     pub(super) fn unfit(law: LawName, allowed: impl Into<String>) -> Violation {
         violation("[learning] law", law.as_str(), allowed)
     }
@@ -55,7 +55,7 @@ impl LawCell<'_> {
 pub struct LawContext<'a> {
     /// The cell.
     pub cell: &'a LawCell<'a>,
-    /// The response from the learned inputs to the positions of all axes.
+    /// The model from the learned inputs to the positions of all axes.
     pub model: &'a StateSpace,
     /// Set points, `n_samples` x `n_axes`.
     pub reference_m: &'a [f64],
@@ -72,7 +72,7 @@ impl LawContext<'_> {
         self.reference_m.len() / self.n_axes().max(1)
     }
 
-    /// Builds the law that another one goes round.
+    /// Builds the inner law of a wrapper.
     ///
     /// # Errors
     /// As [`LawParameters::build`].
@@ -90,27 +90,27 @@ pub trait LawTables: Debug {
     fn parameters(&self, law: LawName) -> Option<&dyn LawParameters>;
 }
 
-/// The parameters of a law: what a table of a cell description holds.
+/// The parameters of a law: a table of a cell description.
 pub trait LawParameters: Json + Debug {
-    /// Checks what the ranges of the fields do not say, whether the law is named or not.
+    /// Checks rules beyond the ranges of the fields, also for a law that is not in use.
     ///
     /// # Errors
-    /// [`Violation`] for the first value that is not allowed.
+    /// [`Violation`] for the first invalid value.
     fn check(&self, cell: &LawCell) -> Result<(), Violation> {
         let _ = cell;
         Ok(())
     }
 
-    /// Checks what the law requires of the cell that names it.
+    /// Checks the law's requirements on the cell that names it.
     ///
     /// # Errors
-    /// [`Violation`] for the first requirement that is not met.
+    /// [`Violation`] for the first unsatisfied requirement.
     fn requires(&self, cell: &LawCell) -> Result<(), Violation> {
         let _ = cell;
         Ok(())
     }
 
-    /// Returns the law that this one goes round.
+    /// Returns the inner law of a wrapper.
     fn core(&self) -> Option<LawName> {
         None
     }
@@ -121,7 +121,7 @@ pub trait LawParameters: Json + Debug {
     /// [`BuildError`] for parameters that do not suit the run or the model.
     fn build(&self, context: &LawContext) -> Result<Box<dyn Law>, BuildError>;
 
-    /// Returns cells in which the law learns, for the tests that go over all laws.
+    /// Returns cells in which the law learns, for the tests over all laws.
     fn examples(&self) -> &'static [Example];
 }
 
@@ -132,7 +132,7 @@ pub struct Example {
     pub is_parallel: bool,
     /// Text that follows `[learning]`, the law's name included.
     pub learning: &'static str,
-    /// Share of the first run's RMS error that may be left after five updates.
+    /// Largest share of the first run's RMS error left after five updates.
     pub error_left: f64,
 }
 
@@ -193,7 +193,7 @@ pub(super) fn needs_inputs(law: LawName, cell: &LawCell) -> Result<(), Violation
     Err(LawCell::unfit(law, allowed))
 }
 
-/// Checks that a law can go round another one.
+/// Checks that a law can be the inner law of a wrapper.
 pub(super) fn check_core(key: &str, core: LawName, cell: &LawCell) -> Result<(), Violation> {
     match cell.tables.parameters(core) {
         Some(parameters) if parameters.core().is_none() => Ok(()),

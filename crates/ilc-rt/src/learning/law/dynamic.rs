@@ -1,4 +1,4 @@
-//! Norm-optimal learning that weighs the error through a filter.
+//! Norm-optimal ILC with a dynamic (frequency-dependent) weight of the error.
 
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -13,15 +13,15 @@ use crate::model::{StateSpace, TimeVarying, from_transfer_function};
 use crate::schema::{Violation, field_order};
 use crate::signal::{Section, butterworth};
 
-/// `[learning.dynamic]`: weights of the low-passed error, of the error itself and of the input.
+/// `[learning.dynamic]`: weights of the low-passed error, of the unfiltered error and of the input.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct DynamicParameters {
-    /// Weight of the next error behind the low-pass.
+    /// Weight of the low-passed next error.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub q: f64,
-    /// Weight of the next error itself.
+    /// Weight of the unfiltered next error.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub plain: f64,
     /// Weight of the next input.
@@ -36,7 +36,7 @@ pub struct DynamicParameters {
     /// Order of the causal Butterworth low-pass of each axis' error.
     #[schemars(range(min = 1, max = 12))]
     pub order: usize,
-    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate.
+    /// Cut-off of the low-pass, 0.001 to 0.95 of the Nyquist frequency.
     pub cutoff_hz: f64,
 }
 
@@ -72,7 +72,7 @@ impl LawParameters for DynamicParameters {
 }
 
 impl DynamicParameters {
-    /// Returns the low-passes of all axes side by side.
+    /// Returns the low-passes of all axes, block-diagonal.
     fn filter(&self, context: &LawContext) -> Result<StateSpace, LearningError> {
         let dt_s = context.cell.cycle_s;
         let one = || StateSpace::static_gain(DMatrix::identity(1, 1), Some(dt_s));
@@ -88,19 +88,19 @@ impl DynamicParameters {
     }
 }
 
-/// Norm-optimal learning with a dynamic weight, exact and in linear time.
+/// Norm-optimal ILC with a dynamic weight, exact and in linear time.
 ///
 /// `J = sum_k |w[k]|^2_q + |z[k]|^2_plain + |u'[k]|^2_s + |v[k]|^2_r + rate^2 |v[k] - v[k-1]|^2`,
 /// `w = F (G z)`
 ///
-/// Since `w = F G e - F G P v`, this is norm-optimal learning from the filtered error for the model
-/// with the filter behind it: whatever delay plant and filter have together is paired there.
+/// Since `w = F G e - F G P v`, this is norm-optimal ILC from the filtered error, for the model in
+/// series with the filter: the total delay of plant and filter is paired there.
 ///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs` of the plant;
-///   `q` of the cost weighs the outputs of the filter
+///   `q` of the cost weights the outputs of the filter
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` time and memory.
+/// Cold path. Allocates at creation, never in [`Law::update`]; `O(n_samples)` time and memory.
 /// # Source
 /// - \[barton2010\], Eq. (J.10) to (J.23).
 #[derive(Debug)]
@@ -112,10 +112,10 @@ pub struct DynamicNormOptimal {
 }
 
 impl DynamicNormOptimal {
-    /// Makes the law: factorises the problem for runs of `n_samples` samples.
+    /// Creates the law: factorises the problem for runs of `n_samples` samples.
     ///
     /// # Errors
-    /// - [`LearningError::Model`] unless the filter fits the plant's outputs and sample time.
+    /// - [`LearningError::Model`] unless the filter matches the plant's outputs and sample time.
     /// - otherwise as [`NormOptimal::new`].
     pub fn new<'a>(
         model: impl Into<Plant<'a>>,
@@ -200,7 +200,7 @@ mod tests {
         from_transfer_function(&[1.0 - pole], &[1.0, -pole], Some(0.1)).unwrap()
     }
 
-    /// A fast axis and a slow one, the slow one a sample late.
+    /// A fast axis and a slow one, the slow one delayed by a sample.
     fn plant() -> StateSpace {
         let fast = from_transfer_function(&[0.5, 0.2], &[1.0, -0.5, 0.1], Some(0.1)).unwrap();
         fast.append(&low_pass(0.9).delayed(1).unwrap()).unwrap()
@@ -342,7 +342,7 @@ mod tests {
                 Some(*at)
             }).flatten().collect();
             let gains = Contour::new(&path, 2).unwrap().couplings();
-            // The fast axis through T_fast / T_slow with a low-pass, the slow one as it is.
+            // The fast axis through T_fast / T_slow with a low-pass, the slow one unfiltered.
             let fast = from_transfer_function(&[3.0, -2.4], &[1.0, -0.4], Some(0.1)).unwrap();
             let fast = fast.series(&low_pass(0.6703)).unwrap();
             let one = StateSpace::static_gain(DMatrix::identity(1, 1), Some(0.1)).unwrap();

@@ -1,4 +1,4 @@
-//! Feed-forward learned from the filtered error: the open-loop P-type law of the parallel structure.
+//! Feed-forward learned from the filtered error: P-type ILC of the parallel structure.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,22 +14,22 @@ use crate::schema::{Violation, field_order};
 
 /// `[learning.error_feedforward]`: gain, lead, and the zero-phase Butterworth low-pass of the error.
 ///
-/// Only with `interface = "csv"` on every axis: what is learned is added to the output of the position
-/// loop in the controller, which goes on acting on the error itself.
+/// Only with `interface = "csv"` on every axis: the learned input is added to the output of the
+/// controller's position loop, which keeps acting on the error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct ErrorFeedforwardParameters {
-    /// Learned speed per error.
+    /// Learned velocity per error.
     #[schemars(range(min = 1e-6, max = 1e4))]
     pub gain_per_s: f64,
-    /// Lead of the error over the input.
+    /// Lead (look-ahead) of the error over the input.
     #[schemars(range(min = 0, max = 1000))]
     pub lead_samples: usize,
-    /// Order of the zero-phase Butterworth low-pass.
+    /// Order of the zero-phase Butterworth low-pass (Q-filter).
     #[schemars(range(min = 1, max = 12))]
     pub order: usize,
-    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate.
+    /// Cut-off of the low-pass, 0.001 to 0.95 of the Nyquist frequency.
     pub cutoff_hz: f64,
 }
 
@@ -46,7 +46,7 @@ impl LawParameters for ErrorFeedforwardParameters {
 
     fn requires(&self, cell: &LawCell) -> Result<(), Violation> {
         let law = LawName::ErrorFeedforward;
-        // The law adds to the output of a controller that goes on acting on the error itself.
+        // The law adds to the output of a controller that keeps acting on the error.
         if let Some(axis) = cell.axes.iter().find(|axis| axis.corrects_set_point) {
             return Err(LawCell::unfit(
                 law,
@@ -60,7 +60,8 @@ impl LawParameters for ErrorFeedforwardParameters {
         needs_inputs(law, cell)
     }
 
-    /// The loop clamps the input to its bound; the law knows it, so that it does not wind up beyond.
+    /// The loop saturates the input at its bound; the law knows the bound, so that it does not wind
+    /// up (anti-windup).
     fn build(&self, context: &LawContext) -> Result<Box<dyn Law>, BuildError> {
         let Self { gain_per_s, lead_samples, order, cutoff_hz } = *self;
         let input_max = context.cell.axes.iter().map(|axis| axis.input_max);
@@ -83,7 +84,7 @@ impl LawParameters for ErrorFeedforwardParameters {
     }
 }
 
-/// The numbers of an [`ErrorFeedforward`] law.
+/// Parameters of an [`ErrorFeedforward`] law.
 ///
 /// # Units
 /// - `gain_per_s`: input units per error unit; `input_max` in input units
@@ -91,25 +92,25 @@ impl LawParameters for ErrorFeedforwardParameters {
 pub struct Feedforward {
     /// Learning gain, in the paper phi.
     pub gain_per_s: f64,
-    /// Samples by which the error is taken ahead: 1 for an axis without delay.
+    /// Samples by which the error is taken ahead: 1 for an axis without dead time.
     pub lead_samples: usize,
-    /// Largest magnitude of the learned feed-forward; infinite for none.
+    /// Bound of the learned feed-forward; infinite for unlimited.
     pub input_max: f64,
 }
 
-/// Open-loop learning from the filtered error, each channel on its own.
+/// Open-loop learning from the filtered error, each channel separately.
 ///
 /// `w_j[k] = clamp(w_{j-1}[k] + phi (Q e_{j-1})[k + lead])`, the drive being given `w_j + C e_j`
 ///
-/// The filter sees the error alone, so that what was learned stays: it does not fade as it does in a
-/// law that filters its input each time. Beyond the end of the run the filtered error is held. The
-/// limit keeps the feed-forward out of the drive's saturation; [`ErrorFeedforward::n_limited`] says
-/// how often it had to.
+/// Only the error is filtered, so what was learned stays: it does not decay as in a law that
+/// filters its input each time. Beyond the end of the run the filtered error is held. The bound
+/// keeps the feed-forward out of the drive's saturation (anti-windup);
+/// [`ErrorFeedforward::n_limited`] returns how often it was active.
 ///
 /// # Shapes
 /// - `input` (w), `error`, `next`: `n_samples` x `n_channels`
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples n_channels)`.
+/// Cold path. Allocates at creation, never in [`Law::update`]; `O(n_samples n_channels)`.
 /// # Source
 /// - \[filter-based\], Eq. (2), with the lead of Eq. (9) and the filter of Section 4.
 #[derive(Debug)]
@@ -124,11 +125,12 @@ pub struct ErrorFeedforward {
 }
 
 impl ErrorFeedforward {
-    /// Makes the law for runs of `n_samples` samples of `n_channels` axes.
+    /// Creates the law for runs of `n_samples` samples of `n_channels` axes.
     ///
     /// # Errors
-    /// - [`LearningError::Parameter`] for a gain that is not finite, or a limit that is not positive.
-    /// - [`LearningError::Empty`] for no samples or no channels.
+    /// - [`LearningError::Parameter`] for a gain that is not finite, or a bound that is not
+    ///   positive.
+    /// - [`LearningError::Empty`] for 0 samples or channels.
     /// - [`LearningError::Signal`] if the run is too short for the filter.
     pub fn new(
         rule: Feedforward,
@@ -151,12 +153,12 @@ impl ErrorFeedforward {
         Ok(Self { rule, n_samples, n_channels, q_filter, runner, filtered, n_limited: 0 })
     }
 
-    /// Returns how many values of the last input stand at the limit.
+    /// Returns the number of saturated values of the last input.
     pub fn n_limited(&self) -> usize {
         self.n_limited
     }
 
-    /// Makes the law without its limit, with another filter.
+    /// Creates the law without its bound, with another filter.
     fn unlimited(&self, q_filter: QFilter) -> Option<Box<dyn Law>> {
         let rule = Feedforward { input_max: f64::INFINITY, ..self.rule };
         let law = Self::new(rule, self.n_samples, self.n_channels, q_filter).ok()?;

@@ -2,16 +2,16 @@
 
 use crate::learning::LearningError;
 
-/// Remembers the disturbance of the run that is over and of the one to come.
+/// Stores the disturbance of the finished run and of the coming one.
 ///
-/// Each run is announced once, before it begins: what was announced last is the coming run's, what
-/// was announced before it the finished run's. Between two updates without an announcement the
-/// disturbance is taken to have stayed as it was.
+/// Each disturbance is set once, before its run: the last one set is that of the coming run, the
+/// one before it that of the finished run. If none is set between two updates, the disturbance is
+/// assumed unchanged.
 #[derive(Debug)]
 pub(super) struct Expectation {
     finished: Option<Vec<f64>>,
     coming: Option<Vec<f64>>,
-    /// Room for the two that are not there yet.
+    /// Spare buffers for the two that are not set yet.
     spare: Vec<Vec<f64>>,
     is_new: bool,
     n_disturbances: usize,
@@ -32,7 +32,7 @@ impl Expectation {
         expectation
     }
 
-    /// Forgets every announcement. Without disturbances there is nothing to be told.
+    /// Forgets all disturbances. A law without disturbances needs none.
     pub(super) fn forget(&mut self) {
         self.spare.extend(self.finished.take().into_iter().chain(self.coming.take()));
         if self.n_disturbances == 0 {
@@ -42,7 +42,7 @@ impl Expectation {
         self.refused = None;
     }
 
-    /// A run is about to begin under this disturbance. What is wrong with it shows in the update.
+    /// Sets the disturbance of the next run. An invalid one is reported by the update.
     pub(super) fn announce(&mut self, disturbance: &[f64]) {
         if let Err(refused) = check(disturbance, self.n_disturbances) {
             self.refused = Some(refused);
@@ -55,8 +55,8 @@ impl Expectation {
         self.is_new = true;
     }
 
-    /// Returns the disturbances of the finished run, if it is known, and of the coming one; the
-    /// coming run begins with that.
+    /// Returns the disturbances of the finished run, if it is known, and of the coming one; then
+    /// the coming run begins.
     pub(super) fn settle(&mut self) -> Result<(Option<&[f64]>, &[f64]), LearningError> {
         if let Some(refused) = self.refused.take() {
             return Err(refused);
@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(told.settle().unwrap(), (Some([20.0].as_slice()), [25.0].as_slice()));
         told.announce(&[30.0]);
         assert_eq!(told.settle().unwrap(), (Some([25.0].as_slice()), [30.0].as_slice()));
-        // Nothing was said: it stays.
+        // None was set: it is unchanged.
         assert_eq!(told.settle().unwrap(), (Some([30.0].as_slice()), [30.0].as_slice()));
         // A run from which nothing was learned.
         told.announce(&[35.0]);

@@ -1,4 +1,4 @@
-//! Flexible learning: a table of learned inputs over the disturbance, and interpolation in it.
+//! Flexible ILC: a table of learned inputs over the disturbance, with interpolation.
 
 use std::fmt;
 
@@ -15,14 +15,14 @@ use crate::schema::{Violation, field_order};
 
 /// `[learning.flexible]`: the core law and the resolution of the table.
 ///
-/// The runs of this cell, program and measurement that the library holds are entered at the start.
+/// The runs of this cell, program and measurement in the library are entered at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct FlexibleParameters {
     /// The law that proposes an input after each run, with the parameters of its own table.
     pub core: LawName,
-    /// Numbers that describe the disturbance of a run, as temperatures.
+    /// Number of disturbances of a run, e.g. temperatures.
     #[schemars(range(min = 0, max = 7))]
     pub disturbances: usize,
     /// Distance up to which two disturbances are the same entry of the table.
@@ -75,33 +75,33 @@ pub struct TableShape {
     pub n_inputs: usize,
     /// Channels of the error.
     pub n_outputs: usize,
-    /// Numbers that describe the disturbance of a run.
+    /// Number of disturbances of a run.
     pub n_disturbances: usize,
     /// Distance up to which two disturbances are the same entry of the table.
     pub tolerance: f64,
 }
 
-/// Learning with one input for each disturbance met, interpolated between the nearest two.
+/// Flexible ILC: one input for each disturbance met, interpolated between the nearest two.
 ///
 /// `u_i = (1 - t) p_a + t p_b`, `t = (d - d_a)(d_b - d_a) / |d_b - d_a|^2`, at most 1
 ///
-/// A table holds for each disturbance what the core law proposed after the last run under it; a core
+/// For each disturbance a table holds the core law's proposal after the last run under it; a core
 /// that inverts the model (norm-optimal without `s` and `r`) makes these the optimal inputs. `a` is
-/// the entry nearest to the coming disturbance `d`, `b` the nearest one on the other side of `d` (for
-/// more than one disturbance: among those with `(d - d_a)(d_b - d_a) > 0`). Beyond the table the
-/// nearest entry holds: nothing is extrapolated. Unlike [`Relevance`](super::relevance::Relevance)
-/// it uses two runs only and does not ask how well they went.
+/// the entry nearest to the coming disturbance `d`, `b` the nearest one on the other side of `d`
+/// (for more than one disturbance: among those with `(d - d_a)(d_b - d_a) > 0`). Beyond the table
+/// the nearest entry is used: there is no extrapolation. Unlike
+/// [`Relevance`](super::relevance::Relevance) it uses two runs only, whatever their errors.
 ///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`; disturbance:
 ///   `n_disturbances`
 /// # Real Time
-/// Cold path. `O(n_samples + n_entries)`. An update allocates where the table grows: a block of about
-/// a megabyte at a time.
+/// Cold path. `O(n_samples + n_entries)`. An update allocates when the table grows: a block of
+/// about a megabyte at a time.
 /// # Source
 /// - \[hoelzle2012\] as described in \[dimarco2016\], Sec. 3.2: tabulated disturbances, plant
-///   inversion, interpolation between the nearest two. The mapping from disturbance to plant that the
-///   original assumes known is left to the core law.
+///   inversion, interpolation between the nearest two. The mapping from disturbance to plant, known
+///   in the original, is left to the core law.
 pub struct Flexible {
     core: Box<dyn Law>,
     shape: TableShape,
@@ -112,10 +112,10 @@ pub struct Flexible {
 }
 
 impl Flexible {
-    /// Makes the law around a core law, with an empty table.
+    /// Creates the law around a core law, with an empty table.
     ///
     /// # Errors
-    /// - [`LearningError::Empty`] for no samples or channels.
+    /// - [`LearningError::Empty`] for 0 samples or channels.
     /// - [`LearningError::Parameter`] for a tolerance that is negative or not finite.
     pub fn new(core: Box<dyn Law>, shape: TableShape) -> Result<Self, LearningError> {
         let TableShape { n_samples, n_inputs, n_outputs, n_disturbances, tolerance } = shape;
@@ -141,21 +141,21 @@ impl Flexible {
         })
     }
 
-    /// Returns how many disturbances the table has an input for.
+    /// Returns the number of disturbances in the table.
     pub fn len(&self) -> usize {
         self.inputs.len()
     }
 
-    /// Returns whether the table is empty.
+    /// Returns true if the table is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Enters a run that was made elsewhere or earlier into the table.
+    /// Enters an earlier run, or one made elsewhere, into the table.
     ///
     /// # Errors
-    /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Disturbance`], or
-    ///   what the core law says.
+    /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Disturbance`],
+    ///   or any error of the core law.
     pub fn remember(
         &mut self,
         input: &[f64],
@@ -181,7 +181,7 @@ impl Flexible {
         &self.disturbances[number * width..][..width]
     }
 
-    /// Puts the proposal in the place of its disturbance.
+    /// Stores the proposal for its disturbance.
     fn enter(&mut self, disturbance: &[f64]) {
         let nearest = self.nearest(disturbance);
         let reach = self.shape.tolerance * self.shape.tolerance;
@@ -200,8 +200,8 @@ impl Flexible {
         (0..self.len()).min_by(|&a, &b| of(a).total_cmp(&of(b)))
     }
 
-    /// Returns the nearest entry on the other side of a disturbance than `a`, and how far towards it
-    /// the disturbance lies.
+    /// Returns the nearest entry on the other side of a disturbance than `a`, and the interpolation
+    /// factor.
     fn beyond(&self, a: usize, disturbance: &[f64]) -> Option<(usize, f64)> {
         let from = self.entry(a);
         let share = |number: usize| {
@@ -218,7 +218,7 @@ impl Flexible {
     }
 }
 
-/// Squared distance of two disturbances.
+/// Returns the squared distance of two disturbances.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
@@ -316,7 +316,7 @@ mod tests {
     }
 
     fn next_at(law: &mut Flexible, coming: &[f64]) -> f64 {
-        // A run whose disturbance was not announced enters nothing.
+        // A run without a disturbance is not entered.
         let mut next = [0.0];
         law.told.forget();
         law.set_disturbance(coming);

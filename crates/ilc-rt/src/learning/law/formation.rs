@@ -1,4 +1,4 @@
-//! Norm-optimal learning of several machines that keep a formation: the law of
+//! Norm-optimal ILC of several machines in formation: the law of
 //! [`norm_optimal`](super::norm_optimal) with the weights of [`Formation`].
 
 use nalgebra::DMatrix;
@@ -11,15 +11,17 @@ use crate::learning::Law;
 use crate::learning::weights::{Formation, Weight};
 use crate::schema::{Violation, field_order};
 
-/// `[learning.formation]`: weights of each agent's own error, of the centre's and of the formation's.
+/// `[learning.formation]`: weights of each agent's own error, of the centre's and of the
+/// formation's.
 ///
-/// `Q = q I + centre K' K + formation F' F`, F the differences of the errors of every two agents, K the
-/// mean of all agents' errors. An agent is a group of axes; each group has as many, in the same order.
+/// `Q = q I + centre K' K + formation F' F`, F the differences of the errors of every two agents, K
+/// the mean of all agents' errors. An agent is a group of axes; all groups have the same number, in
+/// the same order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct FormationParameters {
-    /// The agents, as `[["x1", "y1"], ["x2", "y2"]]`: every axis of the cell once.
+    /// The agents, e.g. `[["x1", "y1"], ["x2", "y2"]]`: every axis of the cell once.
     pub agents: Vec<Vec<String>>,
     /// Weight of each agent's own error.
     #[schemars(range(min = 0.0, max = 1e12))]

@@ -1,6 +1,6 @@
-//! Many inputs of the same length, kept for the laws that learn from all of them.
+//! Storage of many inputs of equal length, for laws that learn from all of them.
 
-/// Size of a block: growth allocates this much, and never moves what is there.
+/// Block size: growth allocates this much, and never moves existing rows.
 const BLOCK_BYTES: usize = 1 << 20;
 
 /// Rows of equal length in flat blocks.
@@ -13,13 +13,13 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    /// For rows of `length` values.
+    /// Creates storage for rows of `length` values.
     pub(super) fn new(length: usize) -> Self {
         let rows_per_block = (BLOCK_BYTES / (8 * length.max(1))).max(1);
         Self { length, rows_per_block, n_rows: 0, blocks: Vec::new() }
     }
 
-    /// Makes room for `n_rows` in all.
+    /// Reserves space for `n_rows` in all.
     pub(super) fn reserve(&mut self, n_rows: usize) {
         while self.blocks.len() * self.rows_per_block < n_rows {
             self.blocks.push(Vec::with_capacity(self.rows_per_block * self.length));
@@ -53,7 +53,7 @@ impl Inputs {
         }
     }
 
-    /// Drops all rows but these, given in rising order.
+    /// Keeps only these rows, given in ascending order.
     pub(super) fn retain(&mut self, kept: &[usize]) {
         for (to, &from) in kept.iter().enumerate() {
             if to != from {

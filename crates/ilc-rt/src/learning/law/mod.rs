@@ -1,7 +1,8 @@
-//! The laws, one a file: a [`Law`](super::Law) and the parameters that a cell description gives it,
-//! listed in [`catalogue`]. `config`, `design` and the Python bindings import them.
+//! The laws, one per file: a [`Law`](super::Law) and its parameters in a cell description, listed
+//! in [`catalogue`]. `config`, `design` and the Python bindings import them.
 //!
-//! Family: every file here, as the catalogue lists the laws, and a law is built from what the catalogue gives.
+//! Family: every file here, since the catalogue lists the laws, and a law is built from types of
+//! the catalogue.
 
 pub mod adjoint;
 pub mod catalogue;

@@ -1,4 +1,4 @@
-//! Learning with the model's inverse: the whole error at once, where the inverse is stable.
+//! Model-inverse ILC: removes the whole error at once, if the inverse is stable.
 
 use nalgebra::DMatrix;
 
@@ -21,11 +21,11 @@ pub struct ModelInverseParameters {
     /// Share of the predicted error that one update removes.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 2.0))]
     pub gain: f64,
-    /// Order of the zero-phase Butterworth low-pass.
+    /// Order of the zero-phase Butterworth low-pass (Q-filter).
     #[schemars(range(min = 1, max = 12))]
     pub order: usize,
-    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate: the inverse amplifies noise
-    /// where the axis is slow.
+    /// Cut-off of the low-pass, 0.001 to 0.95 of the Nyquist frequency: the inverse amplifies noise
+    /// where the plant's gain is small.
     pub cutoff_hz: f64,
 }
 
@@ -62,29 +62,29 @@ impl LawParameters for ModelInverseParameters {
     }
 }
 
-/// A zero nearer to the unit circle than this counts as on it: the inverse would ring for the whole
-/// run.
+/// A zero nearer to the unit circle counts as on it: the inverse would ring for the whole run.
 const STABLE: f64 = 1.0 - 1e-7;
-/// Below this ratio of its singular values the matrix of first effects counts as singular.
+/// Smallest ratio of singular values of the first Markov parameters; below it they count as
+/// singular.
 const SINGULAR: f64 = 1e-12;
 
-/// Learning with the inverse of the model.
+/// Model-inverse ILC.
 ///
-/// `u_{j+1} = Q (u_j + alpha P^{-1} e_j)`: with `alpha = 1`, the model right and no filter, the error
-/// is gone after one run
+/// `u_{j+1} = Q (u_j + alpha P^{-1} e_j)`: with `alpha = 1`, an exact model and no filter, the
+/// error is zero after one run
 ///
-/// Each output is paired with the first sample at which it answers to the input (1 later without
+/// Each output is paired with the first sample at which it responds to the input (1 later without
 /// delay), so that the inverse is causal: `v[k] = D~^{-1} (e~[k] - C~ x[k])`,
 /// `x[k+1] = A x[k] + B v[k]` with `C~_i = C_i A^{l_i}`, `D~_i = C_i A^{l_i - 1} B`,
 /// `e~_i[k] = e_i[k + l_i]`. Beyond the end of the run the error is held at its last value. The
-/// inverse amplifies noise where the model's gain is small: there the filter belongs.
+/// inverse amplifies noise where the model's gain is small: a Q-filter is needed there.
 ///
 /// # Shapes
 /// - `input`, `error`, `next`: `n_samples` x `n_channels`
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)`.
+/// Cold path. Allocates at creation, never in [`Law::update`]; `O(n_samples)`.
 /// # Source
-/// - \[barton2010\], Eq. (3.13) to (3.15), whose limit for S = R = 0 it is.
+/// - \[barton2010\], Eq. (3.13) to (3.15), as the limit S = R = 0.
 #[derive(Debug, Clone)]
 pub struct ModelInverse {
     inverse: Operator,
@@ -97,13 +97,13 @@ pub struct ModelInverse {
 }
 
 impl ModelInverse {
-    /// Makes the law for runs of `n_samples` samples.
+    /// Creates the law for runs of `n_samples` samples.
     ///
     /// # Errors
     /// - [`LearningError::NonMinimumPhase`] if the inverse is unstable; it names the outermost zero.
     /// - [`LearningError::NotSquare`] or [`LearningError::NoInverse`] if there is no inverse.
     /// - [`LearningError::Parameter`] unless `0 < gain < 2`.
-    /// - [`LearningError::Empty`] for no samples or no channels.
+    /// - [`LearningError::Empty`] for 0 samples or channels.
     /// - [`LearningError::Model`] for a continuous model.
     /// - [`LearningError::Signal`] if the run is too short for the filter.
     pub fn new(
@@ -142,8 +142,7 @@ impl ModelInverse {
     }
 }
 
-/// Returns the inverse of the model whose outputs come as many samples early as they answer late,
-/// and these numbers.
+/// Returns the inverse of the model with its outputs advanced by their delays, and the delays.
 fn inverse(model: &StateSpace, dt_s: f64) -> Result<(StateSpace, Vec<usize>), LearningError> {
     let mut shifts = Vec::new();
     let (mut c, mut d) = (model.c().clone(), model.d().clone());
@@ -158,7 +157,7 @@ fn inverse(model: &StateSpace, dt_s: f64) -> Result<(StateSpace, Vec<usize>), Le
         }
         shifts.push(shift);
     }
-    // Rows are scaled to their own size first: a small gain of one axis is not a singular matrix.
+    // Rows are normalised first: a small gain of one axis is not a singular matrix.
     let scaled = DMatrix::from_rows(&d.row_iter().map(|row| row / row.norm()).collect::<Vec<_>>());
     let sizes = scaled.svd(false, false).singular_values;
     let first_effect = d.try_inverse().filter(|_| sizes.min() > SINGULAR * sizes.max()).ok_or(
@@ -298,7 +297,7 @@ mod tests {
         };
         let line = refuse(&[1.0, -1.5], &[1.0, -0.5, 0.06]);
         assert!(line.contains("a zero at 1.500000 +0.000000i, 1.500000"), "{line}");
-        // The sampled double integrator has its zero on the circle.
+        // The discrete double integrator has its zero on the unit circle.
         let line = refuse(&[0.5, 0.5], &[1.0, -2.0, 1.0]);
         assert!(line.contains("zero at -1.000000 "), "{line}");
         let line = refuse(&[1.0, 0.0, 2.25], &[1.0, -0.5, 0.06, 0.0]);

@@ -1,4 +1,4 @@
-//! Proportional-derivative learning with a low-pass filter.
+//! PD-type ILC with a low-pass Q-filter.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,13 +20,14 @@ pub struct PdParameters {
     /// Derivative gain, per sample difference.
     #[schemars(range(min = -1e3, max = 1e3))]
     pub kd: f64,
-    /// Lead of the error over the input: the relative degree of the axis, 1 without delay.
+    /// Lead (look-ahead) of the error over the input: the relative degree of the axis, 1 without
+    /// delay.
     #[schemars(range(min = 0, max = 1000))]
     pub lead_samples: usize,
-    /// Order of the zero-phase Butterworth low-pass.
+    /// Order of the zero-phase Butterworth low-pass (Q-filter).
     #[schemars(range(min = 1, max = 12))]
     pub order: usize,
-    /// Cut-off of the low-pass, 0.001 to 0.95 of half the sample rate.
+    /// Cut-off of the low-pass, 0.001 to 0.95 of the Nyquist frequency.
     pub cutoff_hz: f64,
 }
 
@@ -58,7 +59,7 @@ impl LawParameters for PdParameters {
     }
 }
 
-/// The numbers of a [`Pd`] law.
+/// Gains and lead of a [`Pd`] law.
 ///
 /// # Units
 /// - `kp`, `kd`: input units per error unit
@@ -68,11 +69,12 @@ pub struct PdGains {
     pub kp: f64,
     /// Gain of the error's difference from one sample to the next.
     pub kd: f64,
-    /// Samples by which the error is taken ahead: the relative degree of the axis, 1 without delay.
+    /// Samples by which the error is taken ahead: the relative degree of the axis, 1 without dead
+    /// time.
     pub lead_samples: usize,
 }
 
-/// Proportional-derivative learning, each channel on its own.
+/// Proportional-derivative learning, each channel separately.
 ///
 /// `u_{j+1}[n] = Q (u_j[n] + kp e_j[n + lead] + kd (e_j[n + lead] - e_j[n + lead - 1]))`
 ///
@@ -82,7 +84,7 @@ pub struct PdGains {
 /// # Shapes
 /// - `input`, `error`, `next`: `n_samples` x `n_channels`
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples n_channels)`.
+/// Cold path. Allocates at creation, never in [`Law::update`]; `O(n_samples n_channels)`.
 /// # Source
 /// - \[haas2016\], Eq. (4); \[dimarco2016\], Eq. (3.2).
 #[derive(Debug)]
@@ -95,11 +97,11 @@ pub struct Pd {
 }
 
 impl Pd {
-    /// Makes the law for runs of `n_samples` samples of `n_channels` axes.
+    /// Creates the law for runs of `n_samples` samples of `n_channels` axes.
     ///
     /// # Errors
     /// - [`LearningError::Parameter`] for a gain that is not finite.
-    /// - [`LearningError::Empty`] for no samples or no channels.
+    /// - [`LearningError::Empty`] for 0 samples or channels.
     /// - [`LearningError::Signal`] if the run is too short for the filter.
     pub fn new(
         gains: PdGains,

@@ -1,5 +1,4 @@
-//! The filter through which a law passes what it learned, of whatever kind; every law with a filter
-//! takes this one.
+//! The Q-filter of a law, of any kind; every law with a filter uses this one.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
@@ -13,17 +12,17 @@ use crate::signal::{
 /// Filter of a law.
 #[derive(Debug, Clone, PartialEq)]
 pub enum QFilter {
-    /// None: the law converges only where the model allows it.
+    /// No filter: the law converges only where the model allows it.
     None,
-    /// Forward and backward: no lag.
+    /// Forward and backward: zero-phase.
     ZeroPhase(Vec<Section>),
-    /// Forward only, from rest: lags, shown for comparison.
+    /// Forward only, from rest: lags; for comparison.
     Causal(Vec<Section>),
-    /// Gaussian: no lag and no overshoot.
+    /// Gaussian: zero-phase, without overshoot.
     Gaussian(GaussianFilter),
-    /// Zero-phase with another cut-off on each segment of the run.
+    /// Zero-phase with a different cut-off on each segment of the run.
     Switched(SwitchedFilter),
-    /// Symmetric taps: no lag.
+    /// Symmetric FIR: zero-phase.
     Fir(FirFilter),
 }
 
@@ -31,7 +30,7 @@ impl QFilter {
     /// Returns a zero-phase Butterworth low-pass.
     ///
     /// # Errors
-    /// - [`SignalError`] for an order or a cut-off that makes none.
+    /// - [`SignalError`] for an invalid order or cut-off.
     pub fn low_pass(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Self, SignalError> {
         Ok(Self::ZeroPhase(butterworth(order, cutoff_hz, dt_s)?))
     }
@@ -54,10 +53,11 @@ impl QFilter {
         }))
     }
 
-    /// Returns the highest frequency that one pass lets through with `1 / sqrt 2` or more, for signals
-    /// sampled every `dt_s`: the cut-off of a low-pass, the highest one of a switched filter.
+    /// Returns the highest frequency that one pass lets through with `1 / sqrt 2` or more, for
+    /// signals sampled every `dt_s`: the cut-off of a low-pass, the highest one of a switched
+    /// filter.
     ///
-    /// `None` without a filter, or for one that lets nothing through as well as that.
+    /// `None` without a filter, or for one whose gain is below that at every frequency.
     pub fn cutoff_hz(&self, dt_s: f64) -> Option<f64> {
         match self {
             Self::None => None,
@@ -117,7 +117,7 @@ impl QFilter {
     }
 }
 
-/// Finds where a response on the unit circle last falls below `1 / sqrt 2`, from above.
+/// Returns the highest frequency at which a response on the unit circle falls below `1 / sqrt 2`.
 fn highest_passed_hz(dt_s: f64, response: impl Fn(Complex<f64>) -> Complex<f64>) -> Option<f64> {
     const STEPS: usize = 4096;
     let passes =
@@ -151,9 +151,10 @@ impl QRunner {
     /// # Shapes
     /// - `signal`: time first, `n_samples` x `n_channels`
     /// # Real Time
-    /// Cold path, but allocates nothing.
+    /// Cold path, but does not allocate.
     /// # Errors
-    /// - [`SignalError::Length`] if the signal has another length than the filter was set up for.
+    /// - [`SignalError::Length`] if the signal has a different length than the filter was set up
+    ///   for.
     pub fn apply(&mut self, signal: &mut [f64], n_channels: usize) -> Result<(), SignalError> {
         (0..n_channels).try_for_each(|channel| match &mut self.0 {
             Kind::None => Ok(()),
@@ -170,13 +171,14 @@ impl QRunner {
         })
     }
 
-    /// Applies the transpose of the filter to every channel in place, for the analysis of laws that
-    /// filter; returns whether there is one for this kind.
+    /// Applies the transpose (adjoint) of the filter to every channel in place, for the analysis of
+    /// laws; returns true if this kind has one.
     ///
     /// # Shapes
     /// - as [`QRunner::apply`]
     /// # Errors
-    /// - [`SignalError::Length`] if the signal has another length than the filter was set up for.
+    /// - [`SignalError::Length`] if the signal has a different length than the filter was set up
+    ///   for.
     pub fn apply_transposed(
         &mut self,
         signal: &mut [f64],

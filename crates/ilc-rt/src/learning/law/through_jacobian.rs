@@ -1,4 +1,4 @@
-//! Learning in the joints from errors at the tool.
+//! Learning in joint space from errors at the tool.
 
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -13,7 +13,7 @@ use crate::schema::{Violation, field_order};
 use crate::learning::error::{check, check_adjoint};
 use crate::learning::{Law, LearningError};
 
-/// Largest ratio of singular values of a Jacobian that may still be inverted.
+/// Largest condition number of a Jacobian that is inverted.
 const CONDITION_MAX: f64 = 1e6;
 
 /// `[learning.through_jacobian]`: a law of the axes, fed with errors measured at the tool.
@@ -23,7 +23,7 @@ const CONDITION_MAX: f64 = 1e6;
 pub struct ThroughJacobianParameters {
     /// The law of the axes, with the parameters of its own table.
     pub core: LawName,
-    /// Motion of each coordinate of the tool (rows) for that of each axis (columns), as
+    /// Motion of each coordinate of the tool (rows) per motion of each axis (columns), e.g.
     /// `[[1.0, 0.01], [0.0, 1.0]]`.
     pub jacobian: Vec<Vec<f64>>,
 }
@@ -76,26 +76,26 @@ impl LawParameters for ThroughJacobianParameters {
 
 /// Any law of the joints, fed with errors measured at the tool.
 ///
-/// `e_joint[k] = J_k^+ e_tool[k]`: the joint motion that would make the error, to first order, and the
-/// smallest one if there are more joints than coordinates. The law itself has joints as inputs and
-/// outputs.
+/// `e_joint[k] = J_k^+ e_tool[k]` (pseudo-inverse): to first order the joint motion that causes the
+/// error, the smallest one if there are more joints than coordinates. The inner law has joints as
+/// inputs and outputs.
 ///
-/// One Jacobian does for runs of any length; one a sample for runs of just so many samples. Several
-/// mechanisms side by side have theirs on the diagonal of one matrix.
+/// One Jacobian serves runs of any length; one per sample serves runs of exactly that length.
+/// Several mechanisms are block-diagonal in one matrix.
 ///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_joints`; `error`: `n_samples` x `n_coordinates`
 /// # Units
-/// - `error` in metres; what the law sees in radians (or the unit of the joints)
+/// - `error` in metres; the inner law's error in radians (or the unit of the joints)
 /// # Real Time
-/// Cold path. Allocates when it is made, and in the first [`Law::update`] of a run of another length.
+/// Cold path. Allocates at creation, and in the first [`Law::update`] of a run of another length.
 /// # Source
-/// - \[barton2010\], Sect. 8.2: one matrix for the whole working area; here also one a sample.
+/// - \[barton2010\], Sect. 8.2: one matrix for the whole workspace; here also one per sample.
 pub struct ThroughJacobian<L = Box<dyn Law>> {
     law: L,
     n_joints: usize,
     n_coordinates: usize,
-    /// One pseudo-inverse for all samples, or one a sample; by rows.
+    /// One pseudo-inverse for all samples, or one per sample; row-major.
     inverses: Vec<f64>,
     joint_error: Vec<f64>,
 }
@@ -109,12 +109,12 @@ impl<L: Law> std::fmt::Debug for ThroughJacobian<L> {
 }
 
 impl<L: Law> ThroughJacobian<L> {
-    /// Wraps a law of the joints; `jacobians` holds one matrix for all samples, or one a sample.
+    /// Wraps a law of the joints; `jacobians` holds one matrix for all samples, or one per sample.
     ///
     /// # Errors
-    /// - [`LearningError::Empty`] if there is no matrix.
+    /// - [`LearningError::Empty`] without a matrix.
     /// - [`LearningError::Weight`] for matrices of different or empty shape.
-    /// - [`LearningError::Parameter`] for a matrix that cannot be inverted, or is not finite.
+    /// - [`LearningError::Parameter`] for a matrix that is singular or not finite.
     pub fn new(law: L, jacobians: &[DMatrix<f64>]) -> Result<Self, LearningError> {
         let found = jacobians.len();
         let Some(first) = jacobians.first() else {
@@ -143,17 +143,17 @@ impl<L: Law> ThroughJacobian<L> {
         &self.law
     }
 
-    /// Returns the law of the joints, to look into it.
+    /// Returns the law of the joints, mutably.
     pub fn law_mut(&mut self) -> &mut L {
         &mut self.law
     }
 
-    /// Returns the joints and the coordinates of the tool.
+    /// Returns the numbers of joints and of tool coordinates.
     pub fn shape(&self) -> (usize, usize) {
         (self.n_joints, self.n_coordinates)
     }
 
-    /// Samples of a run: as many as there are matrices, or those of `input` if one does for all.
+    /// Returns the samples of a run: the number of matrices, or that of `input` if one serves all.
     fn n_samples(&self, input: &[f64]) -> usize {
         match self.inverses.len() / (self.n_joints * self.n_coordinates) {
             1 => (input.len() / self.n_joints).max(1),
@@ -332,7 +332,7 @@ mod tests {
         let mut input = vec![0.0; 3 * n_samples];
         let mut worst = Vec::new();
         for _ in 0..12 {
-            // Joints that move 10 percent too little and 5 mrad beside.
+            // Joints that move 10 percent too little and 5 mrad off.
             let error: Vec<f64> = (0..n_samples)
                 .flat_map(|k| {
                     let joints = std::array::from_fn(|joint| {

@@ -1,6 +1,6 @@
 //! Reasons not to use an identified model.
 //!
-//! `identification` asks it before it offers a model to a cell description.
+//! `identification` checks it before it proposes a model for a cell description.
 
 use super::FrequencyResponse;
 
@@ -12,10 +12,10 @@ const RESIDUAL_MAX: f64 = 0.25;
 /// Reason not to use a model.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Doubt {
-    /// There is no output.
+    /// Zero output.
     #[error("the output does not answer at any frequency: the axis sticks or is not connected")]
     Silent,
-    /// Most of the output is not due to the input.
+    /// Most of the output is not caused by the input.
     #[error(
         "the output hardly follows the input (median coherence {median:.2}, {COHERENCE_MIN} is \
          needed): the axis sticks or the amplitude is lost in noise"
@@ -24,7 +24,7 @@ pub enum Doubt {
         /// Median of the coherence in the band.
         median: f64,
     },
-    /// The response is that of something else.
+    /// The model does not describe the response.
     #[error(
         "the model leaves {:.0} % unexplained ({:.0} % at most): friction, or a resonance that the \
          model does not have",
@@ -35,21 +35,21 @@ pub enum Doubt {
         /// Weighted RMS of the fit's residual, relative to the response.
         residual_rms: f64,
     },
-    /// A cell description does not take such a model.
+    /// A model out of the range of a cell description.
     #[error("the fit has {what} {value:.4}, a cell takes {low} to {high}")]
     BeyondCell {
         /// Name of the figure, with its unit.
         what: &'static str,
-        /// The figure.
+        /// Its value.
         value: f64,
-        /// Smallest value that a cell takes.
+        /// Smallest value in a cell.
         low: f64,
-        /// Largest value that a cell takes.
+        /// Largest value in a cell.
         high: f64,
     },
 }
 
-/// Returns what speaks against a model with that residual; `None` if nothing does.
+/// Returns the objection to a model with that residual; `None` if there is none.
 ///
 /// No output at all, a coherence with a median below 0.7, or a relative residual above 0.25.
 pub fn doubt(measured: &FrequencyResponse, residual_rms: f64) -> Option<Doubt> {

@@ -1,17 +1,17 @@
-//! The whole input of an experiment: periods of a waveform that begin and end at rest.
+//! The whole input of an experiment: periods of a waveform, from rest to rest.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Spacing, multisine, swept_sine};
 use crate::model::ModelError;
 
-/// Most samples of an experiment.
+/// Largest number of samples of an experiment.
 const SAMPLES_MAX: f64 = 4e6;
-/// Cycles of the lowest frequency that a period holds at least.
+/// Smallest number of cycles of the lowest frequency per period.
 const CYCLES_MIN: f64 = 5.0;
-/// Share of the Nyquist frequency up to which is excited.
+/// Largest excited frequency as a share of the Nyquist frequency.
 const NYQUIST_SHARE: f64 = 0.9;
-/// Part of a sweep's period in which the axis comes to rest again.
+/// Share of a sweep's period in which the axis comes to rest.
 const REST: f64 = 0.2;
 
 /// Waveform of one period.
@@ -26,7 +26,7 @@ pub enum Waveform {
     Multisine,
 }
 
-/// An experiment's input: waveform, size, band, and how often it is repeated.
+/// An experiment's input: waveform, amplitude, band, and number of periods.
 ///
 /// # Units
 /// - `amplitude` (the peak) in the unit of the input: m or m/s; the rest as named
@@ -40,9 +40,9 @@ pub struct Excitation {
     pub from_hz: f64,
     /// Highest frequency.
     pub to_hz: f64,
-    /// Length of a period, the rest of a sweep included.
+    /// Length of a period, including the rest of a sweep.
     pub period_s: f64,
-    /// Periods that are evaluated: what differs between them is noise.
+    /// Evaluated periods: their scatter is noise.
     pub periods: usize,
 }
 
@@ -51,20 +51,20 @@ pub struct Excitation {
 pub struct ExcitationSignal {
     /// The input, from rest to rest.
     pub values: Vec<f64>,
-    /// First sample of the first period that is evaluated.
+    /// First sample of the first evaluated period.
     pub first_sample: usize,
     /// Samples in a period.
     pub period_samples: usize,
-    /// Periods that are evaluated.
+    /// Evaluated periods.
     pub periods: usize,
 }
 
 impl Excitation {
-    /// Lays the excitation out on a sample grid.
+    /// Samples the excitation.
     ///
-    /// Sweeps rest at the end of each period, so every period is evaluated. A multisine goes on
-    /// without rest: one more period, faded in, comes first, in which the axis settles, and a quarter
-    /// of one fades out at the end.
+    /// Sweeps rest at the end of each period, so every period is evaluated. A multisine has no
+    /// rest: one more period, faded in, comes first, in which the axis reaches its steady state,
+    /// and a quarter of one fades out at the end.
     ///
     /// # Units
     /// - `dt_s` in seconds
@@ -146,18 +146,18 @@ impl Excitation {
 }
 
 impl ExcitationSignal {
-    /// Returns the samples that are evaluated: whole periods.
+    /// Returns the evaluated samples: whole periods.
     pub fn evaluated(&self) -> std::ops::Range<usize> {
         self.first_sample..self.first_sample + self.period_samples * self.periods
     }
 }
 
-/// A half cosine from 0 to 1.
+/// Returns half a cosine from 0 to 1.
 pub(super) fn rise(share: f64) -> f64 {
     0.5 * (1.0 - (std::f64::consts::PI * share.clamp(0.0, 1.0)).cos())
 }
 
-/// Checks peak and band of a waveform.
+/// Checks amplitude and band of a waveform.
 pub(super) fn check(amplitude: f64, band_hz: (f64, f64), dt_s: f64) -> Result<(), ModelError> {
     let (from_hz, to_hz) = band_hz;
     if !(dt_s.is_finite() && dt_s > 0.0) {

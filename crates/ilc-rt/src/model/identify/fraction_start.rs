@@ -1,4 +1,4 @@
-//! Starts for the fit of a second-order model: linear fits, one for each possible delay.
+//! Initial values for the fit of a second-order model: linear fits, one for each possible delay.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,14 +7,14 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::FrequencyResponse;
 use crate::model::unwrap_phase;
 
-/// Delays tried over the range that the phase leaves open.
+/// Delays tried over the range that the phase permits.
 const DELAYS: usize = 24;
-/// By what part of that range it is widened at either end.
+/// Relative extension of that range at either end.
 const MARGIN: f64 = 0.3;
-/// Rounds of a linear fit, each weighted by the last one's denominator.
+/// Rounds of a linear fit, each weighted by the previous denominator.
 const ROUNDS: usize = 6;
 
-/// A second-order fraction to begin from, its gain left to the caller.
+/// An initial second-order fraction, without its gain.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Begin {
     pub(super) w0_rad_s: f64,
@@ -26,11 +26,11 @@ pub(super) struct Begin {
 
 /// Returns a fraction for each delay.
 ///
-/// Over the band a fraction with two poles turns the phase by 0 to half a turn; the rest is the delay,
-/// which therefore lies in a range of half the inverse of the band's width. For each delay in it the
-/// fraction is found by Sanathanan's and Koerner's linear rounds, wherever its natural frequency lies:
-/// in the band, below or above. The hold of a sampled axis is divided out before, without what it
-/// folds.
+/// Over the band a fraction with two poles turns the phase by 0 to 180 degrees; the remainder is
+/// due to the delay, which therefore is in a range of half the inverse of the band's width. For
+/// each delay in it the fraction is found by the linear rounds of Sanathanan and Koerner, wherever
+/// its natural frequency is: in the band, below or above. The zero-order hold is divided out first,
+/// without its aliasing.
 ///
 /// # Source
 /// - \[sanathanan1963\].
@@ -79,7 +79,7 @@ fn begin(
                 if half == 0.0 { 1.0 } else { half.sin() / half }
             });
             let late_s = delay_s + 0.5 * dt_s.unwrap_or(0.0);
-            // Where a hold passes nothing there is nothing to divide by.
+            // Where the hold's gain vanishes there is nothing to divide by.
             let gain = if held.abs() < 0.05 { 0.05 } else { held };
             h * Complex::new(0.0, TAU * f * late_s).exp() / gain
         })

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Most steps.
+/// Largest number of steps.
 const STEPS_MAX: usize = 200;
-/// Relative decrease of the cost below which the search is over.
+/// Relative decrease of the cost at which the search ends.
 const DECREASE: f64 = 1e-14;
-/// Largest damping: no step is left that helps.
+/// Largest damping: no step reduces the cost any more.
 const DAMPING_MAX: f64 = 1e12;
 
 /// A minimum.
@@ -15,14 +15,14 @@ pub(super) struct Minimum {
     pub(super) parameters: Vec<f64>,
     /// Sum of the squares of the residuals.
     pub(super) cost: f64,
-    /// Standard deviation of each parameter, from the residuals that are left.
+    /// Standard deviation of each parameter, from the remaining residuals.
     pub(super) deviation: Vec<f64>,
 }
 
-/// Searches from `start` for the parameters of least squared residuals (Levenberg and Marquardt).
+/// Minimises the squared residuals from `start` (Levenberg-Marquardt).
 ///
-/// Derivatives are central differences; parameters are expected to be of the order of 1. Residuals
-/// that are not finite count as infinitely bad.
+/// Derivatives are central differences; parameters should be of the order of 1. Non-finite
+/// residuals count as infinitely bad.
 pub(super) fn minimize(start: &[f64], residuals: &dyn Fn(&[f64]) -> DVector<f64>) -> Minimum {
     let size = |r: &DVector<f64>| {
         let cost = r.norm_squared();

@@ -1,9 +1,9 @@
-//! Identification: from an excitation and what an axis made of it to a model and what is left over.
+//! Identification: from an excitation and the response of an axis to a model and its residual.
 //!
-//! One file a step: [`Excitation`] lays out the input, [`frequency_response`] compares output with
-//! input and says how far it can be trusted, [`fit_second_order`] and [`fit_rational`] find a model,
-//! and [`uncertainty`] bounds what the model does not explain. Cold, for set-up only; `identification`,
-//! `cli` and the Python bindings may import it.
+//! One file per step: [`Excitation`] makes the input, [`frequency_response`] estimates the response
+//! and its coherence, [`fit_second_order`] and [`fit_rational`] fit a model, and [`uncertainty`]
+//! bounds the residual. Cold, for set-up only; `identification`, `cli` and the Python bindings may
+//! import it.
 //!
 //! Family: `excitation` is a `multisine` or a `swept_sine`, which share its checks.
 

@@ -1,4 +1,4 @@
-//! Many sines at once, with phases that keep the peak low.
+//! Multisine: many sines at once, with phases that keep the peak low.
 
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
@@ -6,10 +6,12 @@ use rustfft::num_complex::Complex;
 use super::excitation::{check, refused};
 use crate::model::ModelError;
 
-/// Returns one period of a sum of sines of equal size, one at each harmonic of the period in a band.
+/// Returns one period of a sum of sines of equal amplitude, one at each harmonic of the period in a
+/// band.
 ///
-/// `u[k] = c sum_h cos(2 pi h k / N + phi_h)`, `phi_i = - pi i (i - 1) / H` for the i-th of `H` lines,
-/// with `c` such that the peak is `amplitude`, and shifted in time to begin at its smallest value.
+/// `u[k] = c sum_h cos(2 pi h k / N + phi_h)`, `phi_i = - pi i (i - 1) / H` for the i-th of `H`
+/// lines, with `c` such that the peak is `amplitude`, and shifted in time to begin at its smallest
+/// value.
 ///
 /// # Shapes
 /// - returns `n_samples`

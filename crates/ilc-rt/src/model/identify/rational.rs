@@ -1,4 +1,4 @@
-//! Fit of a fraction of any order, for axes with more than one resonance.
+//! Fit of a rational transfer function of any order, for axes with more than one resonance.
 
 use std::f64::consts::TAU;
 
@@ -10,35 +10,36 @@ use crate::model::{ModelError, StateSpace, from_transfer_function};
 
 /// Highest order.
 const POLES_MAX: usize = 20;
-/// Rounds of linear fits, each weighted by the last one's denominator.
+/// Rounds of linear fits, each weighted by the previous denominator.
 const ROUNDS: usize = 40;
 
-/// Residual up to which a fit without reflected poles is not questioned.
+/// Residual up to which a fit without reflected poles is accepted.
 const GOOD: f64 = 0.25;
-/// By what factor the residual of a lower degree must be smaller to be taken.
+/// Factor by which the residual of a lower degree must be smaller to be preferred.
 const LOWER_IS_BETTER: f64 = 0.1;
 /// Residual above which a fit has failed.
 const HOPELESS: f64 = 3.0;
 
-/// A fitted fraction.
+/// A fitted rational transfer function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RationalFit {
     /// The model, stable, without the delay.
     pub model: StateSpace,
-    /// The delay that was taken out beforehand.
+    /// The delay that was removed beforehand.
     pub delay_s: f64,
-    /// Poles that came out unstable and were reflected.
+    /// Number of unstable poles that were reflected.
     pub reflected_poles: usize,
     /// Weighted RMS of the relative difference of measurement and model.
     pub residual_rms: f64,
 }
 
-/// Fits a stable fraction to a frequency response.
+/// Fits a stable rational transfer function to a frequency response.
 ///
-/// `min sum_k w_k |ln (H_k exp(j w_k tau) / G(f_k))|^2` over fractions `G = N / D` of the given degrees,
-/// begun by Sanathanan's and Koerner's rounds `min sum_k w_k |(N - H D) / (H D_before)|^2`. The powers
-/// are those of `s / w_ref`, or of `(z - 1) / (T w_ref)` if sampled, so that nothing cancels at high
-/// sample rates. Unstable poles are reflected and the numerator fitted again.
+/// `min sum_k w_k |ln (H_k exp(j w_k tau) / G(f_k))|^2` over fractions `G = N / D` of the given
+/// degrees, started with the rounds of Sanathanan and Koerner
+/// `min sum_k w_k |(N - H D) / (H D_before)|^2`. The powers are those of `s / w_ref`, or of
+/// `(z - 1) / (T w_ref)` if discrete, so that nothing cancels at high sample rates. Unstable poles
+/// are reflected and the numerator fitted again.
 ///
 /// # Shapes
 /// - `measured`: more frequencies than half the number of coefficients, without 0 Hz
@@ -79,9 +80,9 @@ pub fn fit_rational(
     let measured = &measured.answered();
     measured.check(n_zeros + n_poles + 1)?;
     let mut best = fit_degrees(measured, (n_zeros, n_poles), delay_s, dt_s);
-    // With more poles than the response has some of them have nowhere to be: they come out anywhere,
-    // also unstable, and their reflection is another model. The fraction of lower degree, which is one
-    // of those asked for, has no such poles.
+    // With more poles than the response has, the excess ones are arbitrary, even unstable, and
+    // their reflection is another model. The fraction of lower degree, which is one of the
+    // requested ones, has no such poles.
     let is_good = |fit: &RationalFit| fit.reflected_poles == 0 && fit.residual_rms < GOOD;
     for fewer in (1..n_poles).rev() {
         if best.as_ref().is_ok_and(is_good) {
@@ -148,7 +149,7 @@ struct Problem {
     root_weight: Vec<f64>,
     n_zeros: usize,
     n_poles: usize,
-    /// Rate that the variable of the polynomials is measured in.
+    /// Frequency unit of the polynomials' variable.
     w_ref: f64,
     dt_s: Option<f64>,
 }
@@ -179,7 +180,7 @@ impl Problem {
         }
     }
 
-    /// Numerator and denominator at once, the denominator's weight from the round before.
+    /// Fits numerator and denominator at once, with the weight from the previous denominator.
     fn linear_rounds(&self) -> Result<Fraction, ModelError> {
         let mut before: Vec<f64> =
             self.points.iter().map(|p| p.norm().max(1.0).powi(exponent(self.n_poles))).collect();
@@ -212,7 +213,7 @@ impl Problem {
         best.map(|(_, fraction)| fraction).ok_or(NO_SOLUTION)
     }
 
-    /// Reflects unstable poles and fits the numerator to what they have become.
+    /// Reflects unstable poles and fits the numerator again.
     fn stabilize(&self, fraction: &mut Fraction) -> Result<usize, ModelError> {
         let mut poles = roots(&fraction.denominator)?;
         let reflected = self.unstable(&poles);
@@ -348,7 +349,7 @@ fn solve(
     Ok(x.iter().zip(&sizes).map(|(x, size)| x / size).collect())
 }
 
-/// The roots of a polynomial whose highest coefficient is 1.
+/// Returns the roots of a monic polynomial.
 fn roots(rising: &[f64]) -> Result<Vec<Complex<f64>>, ModelError> {
     let n = rising.len() - 1;
     if n == 0 {

@@ -1,26 +1,26 @@
-//! The frequency response that a measurement shows, and how far it can be trusted.
+//! Estimate of the frequency response from a measurement, with its coherence.
 
 use nalgebra::Complex;
 
 use super::spectra::{Averaging, Spectra};
 use crate::model::ModelError;
 
-/// Frequencies whose share of the largest input power is below this are not measured at all.
+/// Frequencies with an input power below this share of the largest are skipped.
 const EXCITED: f64 = 1e-16;
-/// Coherence from which on an estimate counts as perfect; differences beyond are the model's.
+/// Coherence above which an estimate counts as perfect; remaining differences are the model's.
 const COHERENCE_MAX: f64 = 0.9999;
 
 /// A measured frequency response.
 ///
 /// # Shapes
-/// - all vectors have one entry for each frequency, rising
+/// - all vectors have one entry per frequency, ascending
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrequencyResponse {
     /// Frequencies.
     pub frequency_hz: Vec<f64>,
     /// Output over input.
     pub response: Vec<Complex<f64>>,
-    /// Share of the output's power that follows the input, 0 to 1.
+    /// Share of the output's power that depends linearly on the input, 0 to 1.
     pub coherence: Vec<f64>,
     /// Independent averages behind each estimate.
     pub n_averages: f64,
@@ -28,8 +28,8 @@ pub struct FrequencyResponse {
 
 /// Estimates the frequency response from input and output.
 ///
-/// `H_1 = S_uy / S_uu`, `gamma^2 = |S_uy|^2 / (S_uu S_yy)`; frequencies that the input does not hold are
-/// left out. With a single average the coherence is 1 and says nothing.
+/// `H_1 = S_uy / S_uu`, `gamma^2 = |S_uy|^2 / (S_uu S_yy)`; frequencies without excitation are
+/// omitted. With a single average the coherence is always 1.
 ///
 /// # Shapes
 /// - `input`, `output`: one channel each, of the same length
@@ -37,7 +37,8 @@ pub struct FrequencyResponse {
 /// - `dt_s` in seconds
 /// # Errors
 /// - [`ModelError::Length`] if the signals differ in length, [`ModelError::NotFinite`],
-///   [`ModelError::SampleTime`], or [`ModelError::Parameter`] if they hold no segment or no input.
+///   [`ModelError::SampleTime`], or [`ModelError::Parameter`] if they contain no segment or no
+///   input.
 /// # Source
 /// - \[pintelon2012\], section 2.5; \[bendat2010\], sections 6.1 and 9.1.
 pub fn frequency_response(
@@ -83,7 +84,7 @@ pub fn frequency_response(
         let cross = spectra.cross[bin];
         measured.frequency_hz.push(bin as f64 / (spectra.n as f64 * dt_s));
         measured.response.push(cross / uu);
-        // Of an output that is zero nothing follows the input.
+        // A zero output does not depend on the input.
         let coherence = if yy > 0.0 { cross.norm_sqr() / (uu * yy) } else { 0.0 };
         measured.coherence.push(coherence.min(1.0));
     }
@@ -91,7 +92,7 @@ pub fn frequency_response(
 }
 
 impl FrequencyResponse {
-    /// Returns the part in a band, both ends included.
+    /// Returns the part in a band, including both ends.
     ///
     /// # Units
     /// - `from_hz`, `to_hz` in Hz
@@ -112,7 +113,7 @@ impl FrequencyResponse {
         }
     }
 
-    /// Returns the part that answers at all: a response of 0 has no logarithm to fit.
+    /// Returns the part with a non-zero response: a response of 0 has no logarithm.
     pub(super) fn answered(&self) -> Self {
         let answers: Vec<usize> =
             (0..self.response.len()).filter(|&i| self.response[i].norm() > 0.0).collect();
@@ -125,13 +126,14 @@ impl FrequencyResponse {
         }
     }
 
-    /// Returns the middle of the band, where a model is put of which nothing is known.
+    /// Returns the centre of the band, the default of a natural frequency.
     pub(super) fn middle_hz(&self) -> f64 {
         let ends = (self.frequency_hz.first(), self.frequency_hz.last());
         if let (Some(low), Some(high)) = ends { (low * high).sqrt() } else { 1.0 }
     }
 
-    /// Returns the relative standard deviation of each estimate, of magnitude as of phase in rad.
+    /// Returns the relative standard deviation of each estimate's magnitude, and of its phase in
+    /// rad.
     ///
     /// `sigma = sqrt((1 - gamma^2) / (2 gamma^2 n))`
     ///
@@ -145,10 +147,10 @@ impl FrequencyResponse {
         self.coherence.iter().map(deviation).collect()
     }
 
-    /// Returns the weight of each estimate in a fit: the inverse of its variance, up to a factor.
+    /// Returns the weight of each estimate in a fit: its inverse variance, up to a factor.
     ///
-    /// `w = gamma^2 / (1 - gamma^2)`, bounded where the coherence is perfect, and 1 throughout if there
-    /// was a single average
+    /// `w = gamma^2 / (1 - gamma^2)`, bounded for a perfect coherence, and 1 throughout for a
+    /// single average
     pub fn weights(&self) -> Vec<f64> {
         if self.n_averages < 1.5 {
             return vec![1.0; self.coherence.len()];
@@ -197,7 +199,7 @@ impl FrequencyResponse {
             if !(0.0..=1.0).contains(&c) {
                 return bad("coherence", c);
             }
-            // Without coherence a response of 0 is what a silent axis shows; with it, a contradiction.
+            // Without coherence a response of 0 is that of a silent axis; with it, a contradiction.
             if g.norm() <= 0.0 && c > 0.0 {
                 return Err(ModelError::Parameter {
                     what: "response",
@@ -222,7 +224,7 @@ mod tests {
         let period = multisine(1e-3, (1.0, 60.0), 2000, 2e-3).unwrap();
         let u = period.repeat(4);
         let y = axis.simulate(&u, None).unwrap();
-        // The first period holds the transient.
+        // The first period contains the transient.
         let averaging = Averaging::Periods { period_samples: 2000 };
         let found = frequency_response(&u[2000..], &y[2000..], 2e-3, averaging).unwrap();
         assert_eq!(found.frequency_hz.len(), 237);

@@ -1,6 +1,7 @@
-//! Second-order model with delay, which most axes are near to: gain, natural frequency, damping and delay.
+//! Second-order model with delay, adequate for most axes: gain, natural frequency, damping and
+//! delay.
 //!
-//! `fit` finds it in a frequency response, from the starts of `starts`.
+//! `fit` fits it to a frequency response, from the initial values of `starts`.
 
 mod fit;
 mod starts;
@@ -17,7 +18,7 @@ pub use fit::{Known, SecondOrderFit, fit_second_order};
 
 /// A second-order model with delay.
 ///
-/// `G(s) = K w0^2 / (s^2 + 2 delta w0 s + w0^2) exp(-s tau)`; if sampled, the fraction is that of a
+/// `G(s) = K w0^2 / (s^2 + 2 delta w0 s + w0^2) exp(-s tau)`; if discrete, the fraction with a
 /// zero-order hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SecondOrder {
@@ -27,7 +28,7 @@ pub struct SecondOrder {
     pub natural_frequency_hz: f64,
     /// Damping ratio `delta`.
     pub damping: f64,
-    /// Delay `tau`, beyond that of the hold if sampled.
+    /// Delay (dead time) `tau`, beyond that of the hold if discrete.
     pub delay_s: f64,
     /// Sample time of the hold; `None` for a continuous model.
     pub dt_s: Option<f64>,
@@ -36,7 +37,7 @@ pub struct SecondOrder {
 /// A second-order model prepared for evaluation at many frequencies.
 struct Shape {
     model: SecondOrder,
-    /// `(b_1 z + b_2) / (z^2 + a_1 z + a_2)` of the sampled fraction.
+    /// `(b_1 z + b_2) / (z^2 + a_1 z + a_2)` of the discrete fraction.
     sampled: Option<[f64; 4]>,
 }
 
@@ -77,11 +78,11 @@ impl SecondOrder {
         frequency_hz.iter().map(|f| shape.at(*f)).collect()
     }
 
-    /// Returns the model in state space: sampled with whole samples of delay, or continuous without
-    /// the delay, which has no state space there.
+    /// Returns the state-space model: discrete with whole samples of delay, or continuous without
+    /// the delay.
     ///
     /// # Errors
-    /// - [`ModelError::Parameter`] unless frequency and damping can be used.
+    /// - [`ModelError::Parameter`] for an invalid frequency or damping.
     pub fn state_space(&self) -> Result<StateSpace, ModelError> {
         let mut fraction = second_order(TAU * self.natural_frequency_hz, self.damping)?;
         fraction.c *= self.gain;

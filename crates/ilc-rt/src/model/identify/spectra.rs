@@ -10,13 +10,13 @@ use crate::model::ModelError;
 /// Division of two signals into segments that are averaged over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Averaging {
-    /// Whole periods of a periodic excitation, as they are: exact, without leakage.
+    /// Whole periods of a periodic excitation, unwindowed: exact, without leakage.
     Periods {
         /// Samples in a period.
         period_samples: usize,
     },
-    /// Welch's method for any excitation: overlapping segments, without their mean, under a Hann
-    /// window.
+    /// Welch's method for any excitation: overlapping segments with their mean removed, under a
+    /// Hann window.
     Welch {
         /// Samples in a segment.
         segment_samples: usize,
@@ -25,9 +25,9 @@ pub enum Averaging {
     },
 }
 
-/// Averages over all pieces, for frequencies 0 to Nyquist.
+/// Averages over all segments, for frequencies 0 to Nyquist.
 pub(super) struct Spectra {
-    /// Samples in a piece.
+    /// Samples in a segment.
     pub(super) n: usize,
     /// Power of the input.
     pub(super) input: Vec<f64>,
@@ -35,13 +35,13 @@ pub(super) struct Spectra {
     pub(super) output: Vec<f64>,
     /// Cross power, `conj(U) Y`.
     pub(super) cross: Vec<Complex<f64>>,
-    /// Independent pieces that the average is worth.
+    /// Equivalent number of independent segments.
     pub(super) n_averages: f64,
 }
 
 impl Spectra {
     /// # Errors
-    /// [`ModelError::Length`] or [`ModelError::Parameter`] if the signals hold no piece.
+    /// [`ModelError::Length`] or [`ModelError::Parameter`] if the signals contain no segment.
     pub(super) fn of(u: &[f64], y: &[f64], averaging: Averaging) -> Result<Self, ModelError> {
         let n = match averaging {
             Averaging::Periods { period_samples: n }

@@ -1,19 +1,19 @@
-//! A sine whose frequency rises, with smooth ends.
+//! Swept sine (chirp) with smooth ends.
 
 use std::f64::consts::TAU;
 
 use super::excitation::{check, refused, rise};
 use crate::model::ModelError;
 
-/// Share of the sweep that either end fades in and out, at constant frequency.
+/// Share of the sweep for fading in and out, each at constant frequency.
 const RAMP: f64 = 0.1;
 
 /// Rise of the frequency over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spacing {
-    /// By the same number of hertz in the same time.
+    /// Equal increments of frequency in equal times.
     Linear,
-    /// By the same factor in the same time: low frequencies get more time.
+    /// Equal ratios of frequency in equal times: low frequencies get more time.
     Logarithmic,
 }
 
@@ -77,7 +77,7 @@ mod tests {
             [(Spacing::Linear, 20.5), (Spacing::Logarithmic, 40.0_f64.sqrt())]
         {
             let u = swept_sine(1.0, (1.0, 40.0), n, dt_s, spacing).unwrap();
-            // Zero crossings upwards around the middle.
+            // Upward zero crossings around the middle.
             let ups: Vec<f64> = (9_000..11_000)
                 .filter(|&k| u[k] <= 0.0 && u[k + 1] > 0.0)
                 .map(|k| k as f64 + u[k] / (u[k] - u[k + 1]))

@@ -1,31 +1,31 @@
-//! Bound of the model error, for a robust-convergence test.
+//! Bound of the model error, for a test of robust convergence.
 
 use nalgebra::Complex;
 
 use super::FrequencyResponse;
 use crate::model::ModelError;
 
-/// Half the width over which the bound is the largest one: a sixth of an octave.
+/// Half the width of the moving maximum: a sixth of an octave.
 const HALF_WIDTH: f64 = 1.122_462_048_309_373;
 
 /// A bound of the multiplicative uncertainty, `|H(f) / G(f) - 1| <= bound(f)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uncertainty {
-    /// Frequencies, rising.
+    /// Frequencies, ascending.
     pub frequency_hz: Vec<f64>,
     /// Bound at each of them.
     pub bound: Vec<f64>,
 }
 
-/// Bounds what a model leaves over of a measured frequency response.
+/// Bounds the residual of a model over a measured frequency response.
 ///
-/// `bound(f) = max { |H/G - 1| + z sigma |H/G| }` over a third of an octave around `f`: the difference
-/// that was seen, and `z` standard deviations of the measurement itself.
+/// `bound(f) = max { |H/G - 1| + z sigma |H/G| }` over a third of an octave around `f`: the
+/// observed difference, plus `z` standard deviations of the measurement.
 ///
 /// # Shapes
 /// - `model`: the model's response at `measured.frequency_hz`
 /// # Units
-/// - `deviations` (`z`) without unit
+/// - `deviations` (`z`), dimensionless
 /// # Errors
 /// - [`ModelError::Length`] if the lengths differ; [`ModelError::NotFinite`] or
 ///   [`ModelError::Parameter`] for a model that is 0 somewhere, or `deviations` below 0.
@@ -51,7 +51,7 @@ pub fn uncertainty(
     let sigma = measured.relative_deviation();
     let mut pointwise = Vec::with_capacity(model.len());
     for (row, ((h, g), sigma)) in measured.response.iter().zip(model).zip(&sigma).enumerate() {
-        // What does not answer is off by all that the model says, whatever that is.
+        // Without a response the relative error is 1.
         let ratio = if h.norm() > 0.0 { h / g } else { Complex::new(0.0, 0.0) };
         let spread = if h.norm() > 0.0 { deviations * sigma * ratio.norm() } else { 0.0 };
         let value = (ratio - 1.0).norm() + spread;

@@ -1,4 +1,4 @@
-//! Fit of a velocity loop behind a position loop whose gain is known: what a csv axis is.
+//! Fit of a velocity loop behind a position loop of known gain: the model of a csv axis.
 
 use std::f64::consts::TAU;
 
@@ -9,15 +9,15 @@ use super::excitation::refused;
 use super::least_squares::{Minimum, minimize};
 use crate::model::ModelError;
 
-/// Bandwidths tried over the band, and above it, to begin from.
+/// Initial bandwidths over the band, and above it.
 const BANDWIDTHS: usize = 8;
 /// Bandwidths may lie outside the band by this factor.
 const BEYOND_BAND: f64 = 100.0;
 
 /// A first-order velocity loop with delay, in a position loop that is closed in the controller.
 ///
-/// `G / (1 + kv z^-1 G)`, `G` the zero-order hold of `K a / (s (s + a)) exp(-s tau)`: the position that
-/// the controller sees is one cycle old.
+/// `G / (1 + kv z^-1 G)`, `G` the zero-order hold of `K a / (s (s + a)) exp(-s tau)`: the position
+/// in the controller is one cycle old.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VelocityLoop {
     /// Gain `K` of the velocity loop.
@@ -174,7 +174,7 @@ impl VelocityLoop {
 
     /// `Z{a / (s (s + a))} = T / (z - 1) - (1 - E) / (a (z - E))`, `E = exp(-a T)`
     fn at(&self, frequency_hz: f64) -> Complex<f64> {
-        // The open loop integrates: at rest the position loop alone is left.
+        // The open loop integrates: at frequency zero only the position loop remains.
         if frequency_hz.abs() < f64::MIN_POSITIVE {
             return Complex::new(self.position_gain_per_s.recip(), 0.0);
         }

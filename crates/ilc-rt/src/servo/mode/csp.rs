@@ -1,4 +1,4 @@
-//! Cyclic synchronous position: the command is the set point and the learned input.
+//! Cyclic synchronous position: the command is the set point plus the learned input.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -19,7 +19,7 @@ impl AxisMode for Csp {
     }
 
     fn target(&self, now: &Moment<'_>, gate: &mut Gate) -> f64 {
-        // Until it follows, an axis is commanded to where it is, wherever that may be.
+        // Until it is enabled, an axis is commanded to its own position, wherever that is.
         if matches!(now.phase, Phase::Enabling { .. }) && !now.enabled {
             return now.encoder_m;
         }

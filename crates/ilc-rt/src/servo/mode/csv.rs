@@ -1,4 +1,5 @@
-//! Cyclic synchronous velocity: the command is the output of the position loop here and the learned input.
+//! Cyclic synchronous velocity: the command is the output of the controller's position loop plus
+//! the learned input.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -21,7 +22,7 @@ impl AxisMode for Csv {
     fn target(&self, now: &Moment<'_>, _gate: &mut Gate) -> f64 {
         match now.phase {
             Phase::Enabling { .. } | Phase::Disabling { .. } | Phase::Stopped => 0.0,
-            // Open loop: what is measured may be what failed.
+            // Open loop: the measurement may have failed.
             Phase::Stopping { .. } => now.reference_m_s,
             Phase::Returning(_) | Phase::Settling { .. } | Phase::Running { .. } => {
                 let control = now.spec.position_loop.command_m_s(

@@ -1,7 +1,8 @@
-//! Modes of operation in the loop, one a file: target, step of the learned input, begin of a stop.
+//! Modes of operation in the loop, one per file: target, rate limit of the learned input, start of
+//! a stop.
 //!
-//! For the other files of `servo`, which ask [`of`] and never what mode it is. The cold half, from the unit
-//! of the input to the nominal model, is `config::mode`.
+//! For the other files of `servo`, which ask [`of`] and never distinguish modes. The cold half,
+//! from the unit of the input to the nominal model, is `config::mode`.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -32,36 +33,36 @@ pub(super) struct Moment<'a> {
 
 /// The behaviour of a mode; commands are in its own unit.
 pub(super) trait AxisMode: Sync {
-    /// Largest change of the learned input in a cycle.
+    /// Returns the rate limit of the learned input per cycle.
     fn input_step_max(&self, limits: &AxisLimits, dt_s: f64) -> f64;
 
-    /// Command of an axis at rest.
+    /// Returns the command of an axis at rest.
     fn hold(&self, position_m: f64) -> f64;
 
-    /// Bounded command of a tick; one that is not finite stays so.
+    /// Returns the bounded command of a tick; NaN passes through.
     fn target(&self, now: &Moment<'_>, gate: &mut Gate) -> f64;
 
-    /// Command of a tick without a finite one: on as before. `last` are the last three, newest first.
+    /// Extrapolates the last three commands, newest first, for a tick without a finite one.
     fn extrapolate(&self, last: [f64; 3]) -> f64;
 
-    /// Writes a command into the frame of the drive; what is not a number leaves the last one there.
+    /// Writes a command into the frame of the drive; NaN keeps the last one.
     fn write(&self, command: f64, scale: Scale, frame: &mut CommandRpdo1) {
         if let Some(counts) = scale.to_counts(command) {
             frame.target_counts = counts;
         }
     }
 
-    /// Position that an axis is commanded to.
+    /// Returns the position that an axis is commanded to.
     fn position_m(&self, command: f64, reference_m: f64) -> f64;
 
-    /// Velocity and acceleration of the last three commands: a stop begins with them.
+    /// Returns velocity and acceleration of the last three commands: the initial state of a stop.
     fn motion(&self, last: [f64; 3], dt_s: f64) -> [f64; 2];
 
     /// Returns whether the command is computed from the measured position.
     fn closes_position_loop(&self) -> bool;
 }
 
-/// The behaviour of a mode.
+/// Returns the behaviour of a mode.
 pub(super) fn of(mode: Mode) -> &'static dyn AxisMode {
     match mode {
         Mode::Csp => &csp::Csp,

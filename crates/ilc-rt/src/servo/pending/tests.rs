@@ -1,4 +1,4 @@
-//! Answers in time, late, lost, doubled.
+//! Answers in time, late, lost, duplicated.
 
 use std::collections::BTreeSet;
 
@@ -29,7 +29,7 @@ fn a_late_answer_lands_in_its_own_cycle() {
     assert!(pending.all_answered());
 }
 
-/// Lets `n` cycles pass; `deliver` says which answers of PDO 1 come in the tick after each SYNC.
+/// Lets `n` cycles pass; `deliver` selects the answers of PDO 1 in the tick after each SYNC.
 fn pass(n: u64, mut deliver: impl FnMut(u64, &mut Vec<u64>)) -> Vec<Sample> {
     let mut pending = PendingCycles::new(1, false);
     let mut out = Vec::new();
@@ -49,7 +49,7 @@ fn pass(n: u64, mut deliver: impl FnMut(u64, &mut Vec<u64>)) -> Vec<Sample> {
     out
 }
 
-/// Cycles whose measurement is missing; no other may be wrong.
+/// Returns the cycles with missing measurements; no other may be wrong.
 fn missing(samples: &[Sample]) -> BTreeSet<u64> {
     for sample in samples.iter().filter(|sample| !sample.missing) {
         assert_eq!(sample.encoder_m[0], sample.sync as f64, "in the wrong cycle");
@@ -102,7 +102,7 @@ fn whatever_comes_and_does_not_nothing_is_put_in_the_wrong_cycle_for_long() {
             state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         state >> 33
     };
-    // Losses far enough from each other to be told apart.
+    // Losses far enough apart to be distinguished.
     let lost: BTreeSet<u64> = (1..40).map(|n| n * 50 + random() % 20).collect();
     let out = pass(2100, |sync, coming| {
         if !lost.contains(&sync) {
@@ -110,7 +110,7 @@ fn whatever_comes_and_does_not_nothing_is_put_in_the_wrong_cycle_for_long() {
         }
     });
     assert_eq!(missing(&out), lost);
-    // Losses at random, close to each other: missing at least, and never believed to be right.
+    // Random losses, close to each other: at least marked as missing, never taken for valid.
     let out = pass(5000, |sync, coming| {
         if random() % 12 > 0 {
             coming.push(sync);

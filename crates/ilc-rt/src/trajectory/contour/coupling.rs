@@ -4,7 +4,7 @@ use super::tangent::path_tangents;
 
 /// Returns the unit tangent of the reference at each sample; zeros if it never moves.
 ///
-/// That of [`path_tangents`], an array a sample.
+/// That of [`path_tangents`], one array per sample.
 pub fn tangents<const N: usize>(reference_m: &[[f64; N]]) -> Vec<[f64; N]> {
     match path_tangents(reference_m.as_flattened(), N) {
         Some(tangents) => tangents.as_chunks().0.to_vec(),
@@ -18,19 +18,19 @@ pub fn tangents<const N: usize>(reference_m: &[[f64; N]]) -> Vec<[f64; N]> {
 /// right of the path.
 ///
 /// # Shapes
-/// - `reference_m`: `n_samples`; one pair a sample, zeros if the reference never moves
+/// - `reference_m`: `n_samples`; one pair per sample, zeros if the reference never moves
 /// # Source
 /// - \[barton2010\], Eq. (4.1) to (4.3)
 pub fn coupling_gains(reference_m: &[[f64; 2]]) -> Vec<[f64; 2]> {
     tangents(reference_m).iter().map(|tangent| [-tangent[1], tangent[0]]).collect()
 }
 
-/// Returns at each sample what is left of an error when its part along the path is taken away.
+/// Returns at each sample the projection of an error onto the normal of the path.
 ///
 /// `epsilon = (I - t t') e`; for two axes this is `c c'` of [`coupling_gains`].
 ///
 /// # Shapes
-/// - `reference_m`: `n_samples`; one symmetric `N x N` matrix a sample, by rows
+/// - `reference_m`: `n_samples`; one symmetric `N x N` matrix per sample, row-major
 /// # Source
 /// - \[barton2010\], Eq. (4.2), for any number of axes
 pub fn across<const N: usize>(reference_m: &[[f64; N]]) -> Vec<[[f64; N]; N]> {

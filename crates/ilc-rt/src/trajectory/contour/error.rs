@@ -5,10 +5,10 @@ use thiserror::Error;
 /// A refused path or arc.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum ContourError {
-    /// There is no sample.
+    /// A path without samples.
     #[error("a path of 0 samples; at least 1 is needed")]
     Empty,
-    /// A coordinate is not a number.
+    /// A coordinate that is infinite or NaN.
     #[error("sample {sample}, axis {}: {value}; only finite values are allowed", axis + 1)]
     NotFinite {
         /// The sample.
@@ -18,7 +18,7 @@ pub enum ContourError {
         /// The value given.
         value: f64,
     },
-    /// The numbers describe no arc.
+    /// Numbers that do not define an arc.
     #[error("arc: {reason}")]
     Arc {
         /// The rule, as a sentence.

@@ -1,8 +1,8 @@
-//! The geometry of contours: distance to a path, and which way is across it. Cold.
+//! The geometry of contours: distance to a path, its tangent and its normal. Cold.
 //!
-//! Three ways to measure, from the same points: to the path near each point's own time
-//! ([`contour_error_m`]), to a whole sampled path ([`SampledPath`]), and to exact lines and arcs
-//! ([`Shape`]); [`coupling`] gives what learning and cross-coupled control weight with.
+//! The distance is measured in three ways, from the same points: to the path near each point's own
+//! time ([`contour_error_m`]), to a whole sampled path ([`SampledPath`]), and to exact lines and
+//! arcs ([`Shape`]); [`coupling`] gives the weights of learning and of cross-coupled control.
 
 pub mod coupling;
 mod error;

@@ -1,4 +1,4 @@
-//! The nearest point of a whole sampled path, by a spatial index.
+//! The nearest point of a whole sampled path, by a spatial index (k-d tree).
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
@@ -11,32 +11,32 @@ pub struct Nearest<const N: usize> {
     pub distance_m: f64,
     /// The nearest point of the path.
     pub foot_m: [f64; N],
-    /// Its place along the path: the sample before it and the share of the step to the next.
+    /// Its position along the path: the sample before it plus the fraction of the step to the next.
     pub sample: f64,
 }
 
 /// The polyline through the samples of a path, with an index over its pieces.
 ///
-/// Long steps are cut, so that no piece is longer than the mean step: then the piece that is nearest
-/// has its middle within half a mean step of the nearest middle, and a query looks at those alone.
-/// The result is exact for the polyline.
+/// Long steps are cut, so that no piece is longer than the mean step: then the midpoint of the
+/// nearest piece is within half a mean step of the nearest midpoint, and a query examines only
+/// those. The result is exact for the polyline.
 ///
 /// # Real Time
-/// Cold. `O(n log n)` to make; `O(log n)` a query near the path.
+/// Cold. `O(n log n)` to create; `O(log n)` per query near the path.
 #[derive(Debug)]
 pub struct SampledPath<const N: usize> {
     samples_m: Vec<[f64; N]>,
-    /// The step that each piece is part of.
+    /// The step that each piece belongs to.
     steps: Vec<usize>,
     index: Option<ImmutableKdTree<f64, N>>,
     piece_max_m: f64,
 }
 
 impl<const N: usize> SampledPath<N> {
-    /// Makes the index over the samples of a path, time first.
+    /// Creates the index over the samples of a path, time first.
     ///
     /// # Errors
-    /// - [`ContourError::NotFinite`] for a sample that is not a number.
+    /// - [`ContourError::NotFinite`] for a sample that is infinite or NaN.
     /// - [`ContourError::Empty`] without samples.
     pub fn new(samples_m: &[[f64; N]]) -> Result<Self, ContourError> {
         if samples_m.is_empty() {
@@ -85,7 +85,7 @@ impl<const N: usize> SampledPath<N> {
         let Some(index) = &self.index else { return Some(rest) };
         let query = index.query(point_m);
         let middle = query.nearest_one::<SquaredEuclidean<f64>>().execute().distance.sqrt();
-        // A little more than half a piece, so that rounding of a square root hides nothing.
+        // Slightly more than half a piece, so that rounding of a square root hides nothing.
         let reach_m = (middle + 0.5 * self.piece_max_m) * (1.0 + 1e-12);
         let near = index
             .query(point_m)

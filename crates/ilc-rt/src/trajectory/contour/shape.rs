@@ -25,11 +25,12 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// Makes the arc that begins at `from_m` and turns by `sweep_rad` around an axis through a centre.
+    /// Creates the arc that begins at `from_m` and turns by `sweep_rad` around an axis through a
+    /// centre.
     ///
     /// # Errors
     /// - [`ContourError::Arc`] for a radius or an axis of length 0, an axis that is not
-    ///   perpendicular to the radius, a sweep of 0 or more than a full turn, or what is not finite.
+    ///   perpendicular to the radius, a sweep of 0 or more than a full turn, or a non-finite value.
     pub fn new(
         from_m: [f64; 3],
         centre_m: [f64; 3],
@@ -58,7 +59,7 @@ impl Arc {
     }
 }
 
-/// One piece of a contour as it was programmed.
+/// One piece of a programmed contour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// Straight.
@@ -68,7 +69,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Returns the distance of a point to the nearest point of the piece, its ends included.
+    /// Returns the distance of a point to the nearest point of the piece, including its ends.
     ///
     /// # Units
     /// - metres
@@ -99,7 +100,7 @@ impl Shape {
     /// Returns the exact contour error of each point: its distance to the nearest of several pieces.
     ///
     /// # Shapes
-    /// - one distance a point; infinite without pieces, NaN for a point that is not finite
+    /// - one distance per point; infinite without pieces, NaN for a non-finite point
     pub fn contour_error_m(shapes: &[Self], points_m: &[[f64; 3]]) -> Vec<f64> {
         points_m
             .iter()
@@ -123,7 +124,7 @@ fn arc_distance_m(arc: &Arc, point_m: [f64; 3]) -> f64 {
     if angle < 0.0 {
         angle += std::f64::consts::TAU;
     }
-    // On the axis every point of the circle is as near.
+    // For a point on the axis, every point of the circle is equally near.
     if angle <= arc.sweep_rad || in_plane <= 0.0 {
         return (in_plane - arc.radius_m).hypot(height);
     }

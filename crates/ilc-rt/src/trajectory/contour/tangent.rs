@@ -1,24 +1,24 @@
-//! Direction of a sampled path, also where it rests.
+//! Tangent of a sampled path, also where it rests.
 //!
-//! `contour` and the weights of learning that tell along from across may import it.
+//! `contour` and contour weights of learning may import it.
 
-/// A step counts as rest below this part of the longest step ...
+/// A step counts as rest below this share of the longest step ...
 const REST: f64 = 1e-9;
-/// ... or below this part of the largest coordinate: the rounding of the coordinates themselves.
+/// ... or below this share of the largest coordinate: rounding of the coordinates.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
-/// Two steps count as a reversal if they cancel to less than this part of their lengths.
+/// Two steps count as a reversal if their sum is below this share of their lengths.
 const REVERSAL: f64 = 1e-6;
 
-/// Returns the unit tangent of a path at each of its samples; `None` if the path never moves.
+/// Returns the unit tangent of a path at each sample; `None` if the path never moves.
 ///
-/// `t[k] = (r[k+1] - r[k-1]) / |r[k+1] - r[k-1]|`; at the ends of the run and where the path turns
-/// back on itself the one step that is left or that arrives. Where the path rests the tangent is
-/// undefined: there the one nearest in time holds, of two equally near ones the earlier.
+/// `t[k] = (r[k+1] - r[k-1]) / |r[k+1] - r[k-1]|`; at the ends of the run and where the path
+/// reverses, the remaining or arriving step. Where the path rests the tangent is undefined: the one
+/// nearest in time is used, the earlier of two equally near ones.
 ///
 /// # Shapes
 /// - `reference`: `n_samples` x `n_axes`, time first; the result alike
 /// # Units
-/// - `reference` in the same unit for all axes, as metres; the result without unit
+/// - `reference` in the same unit for all axes, e.g. metres; the result is dimensionless
 /// # Real Time
 /// Cold; `O(n_samples)`.
 /// # Source
@@ -70,7 +70,7 @@ fn hold_nearest(known: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
 }
 
 fn length(step: &[f64]) -> f64 {
-    // Scaled, so that the squares of very short and very long steps neither vanish nor overflow.
+    // Scaled, so that the squares of very short and very long steps neither underflow nor overflow.
     let scale = step.iter().fold(0.0, |scale: f64, value| scale.max(value.abs()));
     if scale > 0.0 {
         scale * step.iter().map(|value| (value / scale).powi(2)).sum::<f64>().sqrt()
@@ -105,7 +105,7 @@ mod tests {
         let y = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0];
         let path: Vec<f64> = x.iter().zip(&y).flat_map(|(x, y)| [*x, *y]).collect();
         let found = path_tangents(&path, 2).unwrap();
-        // Samples 2 and 6 still see a step; 4 lies halfway and takes the earlier.
+        // Samples 2 and 6 still have a step; 4 lies halfway and takes the earlier tangent.
         let along_x = [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
         let expected: Vec<f64> = along_x.iter().flat_map(|x| [*x, 1.0 - x]).collect();
         close(&found, &expected);

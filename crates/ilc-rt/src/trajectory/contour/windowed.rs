@@ -1,29 +1,29 @@
-//! Contour error near a point's own time: how far measured points are from where they should have
-//! been, give or take a window. Cold.
+//! Contour error near a point's own time: distance of the measured points from the reference path
+//! within a time window. Cold.
 
 use crate::interpolate::MAX_AXES;
 
 /// Distance of each measured point to the path near its own time.
 ///
 /// The path is the polyline through the reference samples from `window` before to `window` after
-/// the sample of the same time; the distance is exact (point to segment), for 1 to
-/// [`MAX_AXES`] axes. Points that repeat while the path rests count as points.
+/// the sample of the same time; the distance is exact (point to segment), for 1 to [`MAX_AXES`]
+/// axes. Repeated points while the path rests count as points.
 ///
 /// # Shapes
-/// - `reference_m`, `actual_m`: `n_samples * n_axes`, time first; a trailing part of a sample is not
-///   read, and measured samples after the end of the reference belong to its last sample
-/// - returns one distance for each measured sample; NaN for one that is not finite, or if there is no
+/// - `reference_m`, `actual_m`: `n_samples * n_axes`, time first; a trailing part of a sample is
+///   ignored, and measured samples after the end of the reference belong to its last sample
+/// - returns one distance for each measured sample; NaN for one that is not finite, or without a
 ///   reference; nothing for another number of axes
 /// # Real Time
-/// Cold. About `O(n_samples log window)`: where the path is farther away than the best distance so
-/// far, the search skips ahead by as much as the path could have come nearer.
+/// Cold. About `O(n_samples log window)`: if the path is farther away than the best distance so
+/// far, the search skips ahead by as many samples as the path needs to come nearer.
 pub fn contour_error_m(
     reference_m: &[f64],
     actual_m: &[f64],
     n_axes: usize,
     window: usize,
 ) -> Vec<f64> {
-    // A width known to the compiler makes the inner loop several times as fast.
+    // A width known at compile time makes the inner loop several times as fast.
     match n_axes {
         1 => distances_m::<1>(reference_m, actual_m, window),
         2 => distances_m::<2>(reference_m, actual_m, window),
@@ -55,7 +55,7 @@ fn distances_m<const N: usize>(reference_m: &[f64], actual_m: &[f64], window: us
 /// The polyline through the reference samples.
 struct Path<'a, const N: usize> {
     samples_m: &'a [[f64; N]],
-    /// Longest step from one sample to the next: no path comes nearer faster.
+    /// Longest step from one sample to the next: the path cannot approach faster.
     step_max_m: f64,
 }
 
@@ -70,7 +70,7 @@ impl<'a, const N: usize> Path<'a, N> {
         distance_m(point_m, &self.samples_m[k])
     }
 
-    /// Distance to the segment between samples `k` and `k + 1`.
+    /// Returns the distance to the segment between samples `k` and `k + 1`.
     fn to_segment_m(&self, point_m: &[f64; N], k: usize) -> f64 {
         let (from, to) = (&self.samples_m[k], &self.samples_m[k + 1]);
         let (mut length_squared, mut projection) = (0.0, 0.0);
@@ -87,7 +87,7 @@ impl<'a, const N: usize> Path<'a, N> {
         )
     }
 
-    /// Distance to the part of the path within `window` samples of sample `k`.
+    /// Returns the distance to the part of the path within `window` samples of sample `k`.
     fn distance_m(&self, point_m: &[f64; N], k: usize, window: usize) -> f64 {
         if self.samples_m.is_empty() || point_m.iter().any(|p| !p.is_finite()) {
             return f64::NAN;
@@ -112,7 +112,8 @@ impl<'a, const N: usize> Path<'a, N> {
         best_m
     }
 
-    /// After so many samples from sample `k` the path can be at `best_m` at the earliest.
+    /// Returns the number of samples after `k` at which the path can be at `best_m` at the
+    /// earliest.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -142,7 +143,7 @@ mod tests {
         (0..n_samples).flat_map(|k| [f64::from(k) * 0.01, 0.0]).collect()
     }
 
-    /// Every segment of the window, without skipping.
+    /// Examines every segment of the window, without skipping.
     fn exhaustive(reference_m: &[f64], actual_m: &[f64], window: usize) -> Vec<f64> {
         let path = Path::<2>::new(reference_m.as_chunks().0);
         let distance = |(k, point): (usize, &[f64; 2])| {
@@ -155,7 +156,7 @@ mod tests {
         actual_m.as_chunks().0.iter().enumerate().map(distance).collect()
     }
 
-    /// Rests, goes along a square with a diagonal, and rests again.
+    /// A contour that rests, follows a square with a diagonal, and rests again.
     fn contour() -> Vec<f64> {
         let corners: [[f64; 2]; 6] =
             [[0.08, 0.0], [0.08, 0.04], [0.06, 0.06], [0.0, 0.06], [0.0, 0.0], [0.08, 0.0]];

@@ -1,26 +1,26 @@
-//! The distance along a curve, and the parameter at a distance, to rounding.
+//! Arc length of a curve, and the parameter at an arc length, to rounding.
 
 use super::Curve;
 use super::frame::norm;
 use crate::trajectory::error::TrajectoryError;
 
-/// Abscissae and weights of Gauss's rule of eight points on -1 to 1, the positive half.
+/// Abscissae and weights of the eight-point Gauss rule on -1 to 1, the positive half.
 const GAUSS: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),
     (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
-/// Halvings of an interval whose length is not yet exact.
+/// Largest number of bisections of an interval whose length is not yet exact.
 const DEPTH: usize = 14;
 /// Relative error of a length.
 const EXACT: f64 = 1e-13;
-/// Relative step at which a parameter is found: below it is rounding.
+/// Relative step below which a parameter has converged: rounding.
 const SETTLED: f64 = 1e-14;
-/// Newton steps to the parameter at a distance.
+/// Newton steps to the parameter at an arc length.
 const NEWTON_STEPS: usize = 40;
 
-/// Parameters and distances at the ends of intervals on which one Gauss rule is exact.
+/// Parameters and arc lengths at the ends of intervals on which one Gauss rule is exact.
 #[derive(Clone, Debug)]
 pub(super) struct ArcLength {
     knots: Vec<(f64, f64)>,
@@ -40,7 +40,7 @@ impl ArcLength {
     /// Measures a curve.
     ///
     /// # Errors
-    /// [`TrajectoryError::Cusp`] for a curve that stands still, or has no finite length.
+    /// [`TrajectoryError::Cusp`] for a curve whose derivative vanishes, or without finite length.
     pub(super) fn new(curve: &impl Curve) -> Result<Self, TrajectoryError> {
         let breaks = curve.breaks();
         let mut knots = vec![(breaks.first().copied().unwrap_or(0.0), 0.0)];
@@ -70,7 +70,7 @@ impl ArcLength {
         self.knots.last().map_or(0.0, |last| last.1)
     }
 
-    /// The parameter at a distance from the start.
+    /// Returns the parameter at a distance from the start.
     pub(super) fn parameter(&self, curve: &impl Curve, s_m: f64) -> f64 {
         let after = self.knots.partition_point(|knot| knot.1 <= s_m);
         let (Some(&(from, from_m)), Some(&(to, to_m))) =

@@ -6,10 +6,10 @@ use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::jet::Jet;
 
-/// Turns after which the contour closes; `sin⁵(t/12)` has this period.
+/// Number of turns after which the contour closes; `sin⁵(t/12)` has this period.
 const TURNS_MAX: f64 = 12.0;
 
-/// `x = scale r sin t`, `y = scale r cos t`, for whole or broken turns from `t = 0`.
+/// `x = scale r sin t`, `y = scale r cos t`, for whole or fractional turns from `t = 0`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Butterfly {
     scale_m: f64,
@@ -18,10 +18,10 @@ pub struct Butterfly {
 }
 
 impl Butterfly {
-    /// The contour around a centre.
+    /// Creates the contour around a centre.
     ///
     /// # Errors
-    /// [`TrajectoryError::Shape`] for a scale or turns that are out of range.
+    /// [`TrajectoryError::Shape`] for a scale or number of turns out of range.
     /// # Source
     /// - [filter-ilc]: the contour of its experiments, `scale = 1.85 mm`
     pub fn new(scale_m: f64, turns: f64, center_m: [f64; 2]) -> Result<Self, TrajectoryError> {

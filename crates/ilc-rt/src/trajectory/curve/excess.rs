@@ -1,4 +1,4 @@
-//! Excesses of a planned run over its limits, tick by tick, and how much slower it has to be for them.
+//! Excesses of a planned run over its limits, tick by tick, and the slow-down that removes them.
 
 use super::frame::{Frame, norm};
 use super::speed::RunLimits;
@@ -12,7 +12,7 @@ use crate::trajectory::verify::Verification;
 pub(super) const SOUGHT: f64 = 1.0 - 2e-3;
 pub(super) const KEPT: f64 = 1.0 - 5e-4;
 
-/// A value beyond its limit, and the factor on the speed that brings it back.
+/// A value beyond its limit, and the factor on the speed that removes the excess.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Excess {
     pub(super) slower: f64,
@@ -22,7 +22,7 @@ pub(super) struct Excess {
     pub(super) quantity: Quantity,
 }
 
-/// The worst excess of every tick over its share of the limits.
+/// Returns the worst violation at every tick of its share of the limits.
 pub(super) fn of_ticks(
     ticks: &[Tick],
     frames: &[Frame],
@@ -60,7 +60,7 @@ pub(super) fn of_ticks(
         .collect()
 }
 
-/// The worst excess of the set points at every tick, by their differences.
+/// Returns the worst violation of the set points at every tick, by their differences.
 pub(super) fn of_set_points(motion: &SampledMotion, limits: &[AxisLimits]) -> Vec<Option<Excess>> {
     let mut found: Vec<Option<Excess>> = vec![None; motion.n_samples()];
     let last = motion.n_samples() - 1;
@@ -111,7 +111,7 @@ pub(super) fn slow_down(
         }
     }
     for (speed, factor) in speed.iter_mut().zip(factor) {
-        // A little more than asked for, as a slower place also means a steeper way to it.
+        // Slightly more than required, as a slower point also needs a steeper approach.
         *speed *= if factor < 1.0 { factor * 0.995 } else { 1.0 };
     }
 }

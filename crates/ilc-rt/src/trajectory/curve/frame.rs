@@ -1,9 +1,9 @@
-//! Tangent, curvature and its change along the path, from derivatives by any parameter.
+//! Tangent, curvature and its derivative along the path, from derivatives by any parameter.
 
 use super::Derivatives;
 use crate::interpolate::MAX_AXES;
 
-/// Derivatives of the point by the distance along the curve.
+/// Derivatives of the point by the arc length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub(super) point_m: [f64; MAX_AXES],
@@ -15,18 +15,18 @@ pub(super) struct Frame {
     pub(super) twist: [f64; MAX_AXES],
 }
 
-/// The inner product of two vectors of the tick.
+/// Returns the inner product of two vectors.
 pub(super) fn dot(a: &[f64; MAX_AXES], b: &[f64; MAX_AXES]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Length of a vector of the tick.
+/// Returns the length of a vector.
 pub(super) fn norm(a: &[f64; MAX_AXES]) -> f64 {
     dot(a, a).sqrt()
 }
 
 impl Frame {
-    /// The frame between two places, as far along as the fraction.
+    /// Interpolates the frame between two points.
     pub(super) fn between(frames: &[Self], at: f64) -> Self {
         #[expect(
             clippy::cast_possible_truncation,
@@ -46,7 +46,7 @@ impl Frame {
         }
     }
 
-    /// `T = r'/q`, `K = (r'' - T (T·r''))/q²` and `dK/ds`, with `q = |r'|`.
+    /// Creates the frame: `T = r'/q`, `K = (r'' - T (T·r''))/q²` and `dK/ds`, with `q = |r'|`.
     pub(super) fn new([point_m, first, second, third]: Derivatives) -> Self {
         let q = norm(&first);
         let tangent = first.map(|value| value / q);
@@ -63,15 +63,15 @@ impl Frame {
         Self { point_m, tangent, bend, twist }
     }
 
-    /// Velocity, acceleration and jerk of an axis at speed `v`, acceleration `a` and jerk `j` along
-    /// the path: `T v`, `T a + K v²`, `T j + 3 K v a + K' v³`.
+    /// Returns velocity, acceleration and jerk of an axis at speed `v`, acceleration `a` and jerk
+    /// `j` along the path: `T v`, `T a + K v²`, `T j + 3 K v a + K' v³`.
     pub(super) fn axis(&self, axis: usize, v: f64, a: f64, j: f64) -> [f64; 3] {
         let (t, k, w) = (self.tangent[axis], self.bend[axis], self.twist[axis]);
         [t * v, t * a + k * v * v, t * j + 3.0 * k * v * a + w * v * v * v]
     }
 }
 
-/// Axes of a shape that lies in a plane.
+/// Pads the axes of a planar shape.
 pub(super) fn flat(values: [[f64; 2]; 4]) -> Derivatives {
     values.map(|[x, y]| {
         let mut point = [0.0; MAX_AXES];

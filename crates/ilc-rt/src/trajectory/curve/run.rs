@@ -14,17 +14,17 @@ use crate::trajectory::grid::{CYCLE_S, check_time, n_ticks};
 use crate::trajectory::motion::{MotionState, SampledMotion};
 use crate::trajectory::path::check_limits;
 
-/// Places on the curve at which the speed limit is computed.
+/// Number of points on the curve at which the speed limit is computed.
 const PLACES: usize = 4_000;
-/// Most places, for long curves.
+/// Largest number of points, for long curves.
 const PLACES_MAX: usize = 60_000;
 /// Distance from a turn, in steps between places, at which its direction is taken.
 const EDGE_SHARE: f64 = 1e-3;
-/// Attempts that slow down only where a limit is broken, and attempts in all.
+/// Attempts that slow down only where a limit is violated, and attempts in all.
 const LOCAL_ROUNDS: usize = 16;
 const ROUNDS: usize = 40;
 
-/// A planned run: one row a tick.
+/// A planned run: one row per tick.
 #[derive(Clone, Debug)]
 pub struct Run {
     motion: SampledMotion,
@@ -32,17 +32,17 @@ pub struct Run {
 }
 
 impl Run {
-    /// Plans a run: `v` is at most the feed, `√(a_c/κ)`, and what every axis allows, rises and falls
-    /// with limited acceleration and jerk, and the finished set points are verified: slower, first
-    /// where a limit is broken and then everywhere, until each axis holds velocity, acceleration and
-    /// jerk at every tick and over every cycle. Where the curve turns back, or bends more tightly than
-    /// the plan can see, it comes to rest.
+    /// Plans a run: `v` is at most the feed, `√(a_c/κ)`, and what every axis allows, with limited
+    /// acceleration and jerk. The finished set points are verified, and slowed down, first where a
+    /// limit is violated and then everywhere, until each axis keeps velocity, acceleration and jerk
+    /// at every tick and over every cycle. Where the curve turns back, or bends too tightly for the
+    /// plan, it comes to rest.
     ///
     /// # Real Time
     /// Cold: allocates.
     /// # Errors
-    /// [`TrajectoryError`] for values out of range, a curve that stands still, or limits that no
-    /// speed holds.
+    /// [`TrajectoryError`] for values out of range, a curve with a vanishing derivative, or limits
+    /// that no speed satisfies.
     /// # Source
     /// - [filter-ilc]: curvature-limited speed
     pub fn plan(
@@ -103,18 +103,19 @@ impl Run {
         Err(refused.unwrap_or(TrajectoryError::Empty))
     }
 
-    /// The set points.
+    /// Returns the set points.
     pub fn motion(&self) -> &SampledMotion {
         &self.motion
     }
 
-    /// Length of the curve.
+    /// Returns the length of the curve.
     pub fn length_m(&self) -> f64 {
         self.length_m
     }
 }
 
-/// Plans one piece from rest to rest, `before_m` along the curve; gives its set points and its length.
+/// Plans one piece from rest to rest, `before_m` along the curve; returns its set points and its
+/// length.
 fn plan_piece<C: Curve>(
     piece: &Piece<C>,
     limits: &RunLimits,
@@ -125,7 +126,7 @@ fn plan_piece<C: Curve>(
     let length_m = measured.total_m();
     let n_places = places(length_m, limits.feed_m_s, dt_s);
     let step_m = length_m / (n_places - 1) as f64;
-    // In a turn the curve has no direction: it has that of a place nearby.
+    // In a turn the direction of the curve is undefined: that of a nearby point is used.
     let frame = |s_m: f64, edge_m: f64| {
         let [low_m, high_m] = [edge_m, length_m - edge_m];
         let inside_m = match piece.turns {
@@ -143,7 +144,7 @@ fn plan_piece<C: Curve>(
     let lowest =
         |of: fn(&AxisLimits) -> f64| limits.axes.iter().map(of).fold(f64::INFINITY, f64::min);
     let jerk = JERK_SHARE * lowest(|axis| axis.jerk_max_m_s3);
-    // Not more than what the jerk lets a change of speed by the feed make use of.
+    // Not more than the jerk limit can use within a change of speed by the feed.
     let mut acceleration =
         (SHARE * lowest(|axis| axis.acceleration_max_m_s2)).min((jerk * limits.feed_m_s).sqrt());
     let mut window = ticks_at_least(2.0 * acceleration / (jerk * dt_s));
@@ -225,12 +226,12 @@ fn plan_piece<C: Curve>(
     }))
 }
 
-/// The derivatives at a distance from the start.
+/// Returns the derivatives at a distance from the start.
 fn curve_at(curve: &impl Curve, measured: &ArcLength, s_m: f64) -> super::Derivatives {
     curve.at(measured.parameter(curve, s_m))
 }
 
-/// A few places for each tick of the feed, but never too few nor too many.
+/// A few points per tick of the feed, within bounds.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

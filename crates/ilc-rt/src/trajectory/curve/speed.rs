@@ -1,27 +1,28 @@
-//! The speed that the limits allow on a curve, place by place.
+//! Speed allowed by the limits along a curve.
 
 use super::frame::{Frame, norm};
 use crate::interpolate::AxisLimits;
 
-/// Shares of acceleration for the bend and for speeding up, of jerk for each of its three parts.
+/// Shares of the acceleration for the curvature and for speeding up, of the jerk for each of its
+/// three parts.
 pub(super) const SHARE: f64 = 0.7;
 pub(super) const JERK_SHARE: f64 = 0.4;
-/// Share of the feed below which going round a bend takes longer than coming to rest in it.
+/// Share of the feed below which coming to rest in a bend is faster than passing through it.
 const CREEP_SHARE: f64 = 0.05;
 
 /// Limits of a run along a curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunLimits {
-    /// Programmed speed: never exceeded along the path.
+    /// Programmed feed: never exceeded along the path.
     pub feed_m_s: f64,
-    /// Highest acceleration across the path, `v² κ`; infinite to leave it to the axes' own limits.
+    /// Highest centripetal acceleration, `v² κ`; infinite for the limits of the axes alone.
     pub curvature_acceleration_max_m_s2: f64,
     /// Limits of the axes.
     pub axes: Vec<AxisLimits>,
 }
 
 impl RunLimits {
-    /// The radius of a bend that no axis goes round faster than at a small share of the feed.
+    /// Radius of a bend that no axis passes faster than at a small share of the feed.
     pub(super) fn creep_radius_m(&self) -> f64 {
         let v = CREEP_SHARE * self.feed_m_s;
         let tightest = |axis: &AxisLimits| {
@@ -31,11 +32,11 @@ impl RunLimits {
         self.axes.iter().map(tightest).fold(0.0, f64::max)
     }
 
-    /// The speed that one place allows.
+    /// Returns the speed limit at one point.
     pub(super) fn speed_m_s(&self, here: &Frame) -> f64 {
         let mut speed = self.feed_m_s;
         let mut lower = |bound: f64| {
-            // Not `f64::min`, which would lose what is not a number, and with it the refusal.
+            // Not `f64::min`, which would drop a NaN, and with it the refusal.
             if bound < speed || bound.is_nan() {
                 speed = bound;
             }
@@ -51,8 +52,8 @@ impl RunLimits {
     }
 }
 
-/// The speed that a run reaches at each place from rest in a turn, or to rest: it is slow there by
-/// itself, and the tightest bend, which is there, slows down nothing else.
+/// Speed of a run at each point after starting at rest in a turn, or before stopping in one: it is
+/// low there anyway, so the tight bend slows down nothing else.
 pub(super) fn launch_speeds(
     turns: [bool; 2],
     n_places: usize,

@@ -1,4 +1,4 @@
-//! A spiral of constant pitch from its centre outwards, anticlockwise.
+//! A spiral of constant pitch from its centre outwards, counter-clockwise.
 
 use std::f64::consts::TAU;
 
@@ -17,12 +17,12 @@ pub struct Spiral {
 }
 
 impl Spiral {
-    /// A spiral of some turns.
+    /// Creates a spiral with a number of turns.
     ///
     /// # Errors
-    /// [`TrajectoryError::Shape`] for a pitch or turns that are out of range.
+    /// [`TrajectoryError::Shape`] for a pitch or number of turns out of range.
     /// # Source
-    /// - [barton2010], Section 8.1.2: from the centre, anticlockwise
+    /// - [barton2010], Section 8.1.2: from the centre, counter-clockwise
     pub fn new(pitch_m: f64, turns: f64, center_m: [f64; 2]) -> Result<Self, TrajectoryError> {
         if !is_positive(pitch_m) || pitch_m > 10.0 {
             return Err(TrajectoryError::Shape {

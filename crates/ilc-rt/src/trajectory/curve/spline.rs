@@ -1,19 +1,19 @@
-//! The natural cubic spline through points: the smoothest curve of second order that passes them.
+//! The natural cubic spline through points: the interpolant of least curvature.
 
 use super::{Curve, Derivatives};
 use crate::interpolate::{MAX_AXES, MoveError};
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::path::point;
 
-/// Most points.
+/// Largest number of points.
 const POINTS_MAX: usize = 100_000;
 
 /// A cubic in each axis between every two points; position, tangent and curvature are continuous.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spline {
     n_axes: usize,
-    /// Parameter of each point: the square root of the chords, added up, so that a short chord next
-    /// to a long one makes no loop.
+    /// Parameter of each point: cumulative square roots of the chords (centripetal), so that a
+    /// short chord next to a long one makes no loop.
     knots: Vec<f64>,
     points_m: Vec<[f64; MAX_AXES]>,
     /// Second derivatives at the points.
@@ -21,11 +21,11 @@ pub struct Spline {
 }
 
 impl Spline {
-    /// The spline through points of equal numbers of coordinates.
+    /// Creates the spline through points of equal dimension.
     ///
     /// # Errors
-    /// [`TrajectoryError`] for fewer than two points, coordinates that are out of range, and two
-    /// neighbours that are the same.
+    /// [`TrajectoryError`] for fewer than two points, coordinates out of range, and two equal
+    /// neighbours.
     pub fn through(points_m: &[Vec<f64>]) -> Result<Self, TrajectoryError> {
         let n_axes = points_m.first().map_or(0, Vec::len);
         if !(1..=MAX_AXES).contains(&n_axes) {

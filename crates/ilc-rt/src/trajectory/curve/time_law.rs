@@ -1,7 +1,7 @@
-//! Distance over time along a curve: as fast as a speed limit over the distance allows, with limited
+//! Time law along a curve: as fast as a speed limit over the distance allows, with limited
 //! acceleration and jerk along the path, from rest to rest.
 //!
-//! The speed limit becomes a speed by one sweep forward and one backward; walked through in ticks and
+//! One forward and one backward sweep turn the speed limit into a speed; traversed in ticks and
 //! averaged twice over a window, its jerk is limited. Averages of the distance stay on the curve.
 
 /// One tick: distance, speed, acceleration, and the jerk until the next tick.
@@ -17,9 +17,9 @@ pub(super) struct Tick {
 pub(super) struct TimeLaw<'a> {
     pub(super) length_m: f64,
     pub(super) speed_m_s: &'a [f64],
-    /// Acceleration limits at the same places.
+    /// Acceleration limits at the same points.
     pub(super) acceleration_m_s2: &'a [f64],
-    /// Ticks of each of the two averages.
+    /// Length of each of the two averages in ticks.
     pub(super) window: usize,
     pub(super) dt_s: f64,
 }
@@ -29,8 +29,8 @@ impl TimeLaw<'_> {
         self.length_m / (self.speed_m_s.len() - 1) as f64
     }
 
-    /// The speed at each distance: never above the limit within the reach of the averages, and
-    /// `v²` rising and falling by `2 a ds` at most.
+    /// Returns the speed at each distance: never above the limit within the reach of the averages,
+    /// with `v²` changing by at most `2 a ds`.
     fn swept(&self) -> Vec<f64> {
         let n = self.speed_m_s.len();
         let fastest = self.speed_m_s.iter().fold(0.0_f64, |most, v| most.max(*v));
@@ -63,7 +63,7 @@ impl TimeLaw<'_> {
         self.swept().windows(2).map(|pair| 2.0 * step_m / (pair[0] + pair[1])).sum()
     }
 
-    /// The motion tick by tick; the last tick is at rest at the end.
+    /// Returns the motion tick by tick; the last tick is at rest at the end.
     pub(super) fn ticks(&self) -> Vec<Tick> {
         let speed = self.walked();
         let m = self.window as f64;
@@ -90,7 +90,7 @@ impl TimeLaw<'_> {
             let gained = 0.5 * h * (now.v + next.v) - h * h * (next.a - now.a) / 12.0;
             ticks[k + 1].s = now.s + gained;
         }
-        // What rounding has added up to, as a factor of all.
+        // Accumulated rounding, as a factor of all.
         let factor = self.length_m / ticks[n].s;
         for tick in &mut ticks {
             tick.s = (tick.s * factor).clamp(0.0, self.length_m);
@@ -99,7 +99,7 @@ impl TimeLaw<'_> {
         ticks
     }
 
-    /// The mean speed of each tick.
+    /// Returns the mean speed of each tick.
     fn walked(&self) -> Vec<f64> {
         let swept = self.swept();
         let step_m = self.step_m();
@@ -124,7 +124,7 @@ impl TimeLaw<'_> {
     }
 }
 
-/// The smallest value within `reach` of each place.
+/// Returns the smallest value within `reach` of each point.
 fn sliding_minimum(values: &[f64], reach: usize) -> Vec<f64> {
     let mut best: std::collections::VecDeque<usize> = std::collections::VecDeque::new();
     let mut next = 0;

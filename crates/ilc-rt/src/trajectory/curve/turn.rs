@@ -1,16 +1,16 @@
 //! Cuts of a curve where it turns back or bends too tightly to be run through: there the axes come
 //! to rest.
 //!
-//! By the parameter a curve slows down where it turns back: its first derivative is smallest, and across
-//! the second one. The radius of the bend is there `|r'|²/|r''|`; in a cusp, as when an axis reverses,
-//! it is 0 and the direction flips from one place to the next.
+//! With respect to its parameter, a curve slows down where it reverses: its first derivative is
+//! smallest, and orthogonal to the second one. The radius of curvature there is `|r'|²/|r''|`; in a
+//! cusp, e.g. when an axis reverses, it is 0 and the direction flips from one point to the next.
 
 use super::frame::{dot, norm};
 use super::{Curve, Derivatives};
 
-/// Places between two breaks at which the slope of the parameter speed is looked at.
+/// Points between two breaks at which the slope of the parameter speed is evaluated.
 const LOOKS: usize = 16;
-/// Halvings of an interval around a slowest place.
+/// Bisections of an interval around a minimum.
 const HALVINGS: usize = 60;
 
 /// Part of a curve.
@@ -36,7 +36,7 @@ impl<C: Curve> Curve for Piece<'_, C> {
     }
 }
 
-/// The parts between bends of less than a radius.
+/// Returns the parts between bends of less than a radius.
 pub(super) fn pieces<C: Curve>(curve: &C, radius_m: f64) -> Vec<Piece<'_, C>> {
     let breaks = curve.breaks();
     let turns = turns(curve, &breaks, radius_m);
@@ -60,7 +60,7 @@ pub(super) fn pieces<C: Curve>(curve: &C, radius_m: f64) -> Vec<Piece<'_, C>> {
     pieces
 }
 
-/// Parameters between the ends at which the curve bends more tightly.
+/// Returns the interior parameters at which the curve bends more tightly.
 fn turns(curve: &impl Curve, breaks: &[f64], radius_m: f64) -> Vec<f64> {
     let (Some(&first), Some(&last)) = (breaks.first(), breaks.last()) else { return Vec::new() };
     // The derivative of half the square of the parameter speed.
@@ -122,7 +122,7 @@ mod tests {
                 assert!(spline.at(turn)[1][0].abs() < 1e-12, "it stands still there");
             }
         }
-        // Exactly at a point, by symmetry.
+        // Exact at a point, by symmetry.
         let found = cuts(&[vec![0.0], vec![0.05], vec![0.0]], 1e-9);
         assert_eq!(found.len(), 1, "{found:?}");
     }

@@ -1,9 +1,10 @@
-//! The largest α that honours every limit.
+//! Search of the largest admissible α.
 //!
-//! The peaks of velocity, acceleration and jerk are not monotone in α: an oscillation and a start can
-//! help or hurt each other. So α is scanned, every crossing bracketed and bisected, dips and humps
-//! between two points of the scan looked into, and all admissible intervals reported. An end is checked together
-//! with the other end of its leg wherever both are felt, on the motion that will be executed.
+//! The peaks of velocity, acceleration and jerk are not monotone in α: an oscillation and a start
+//! may amplify or cancel each other. So α is scanned, every crossing bracketed and bisected, minima
+//! and maxima between two points of the scan refined, and all admissible intervals reported. An end
+//! is checked together with the other end of its leg where their effects overlap, on the executed
+//! motion.
 
 use super::leg::{End, Leg};
 use super::peaks::{GOLDEN, peaks};
@@ -11,16 +12,16 @@ use crate::interpolate::PathLimits;
 use crate::interpolate::Quantity;
 use crate::trajectory::error::TrajectoryError;
 
-/// Scan points in a decade of α.
+/// Scan points per decade of α.
 const PER_DECADE: f64 = 12.0;
-/// A hump of the scan is looked into above this.
+/// A maximum of the scan is refined above this.
 const NEAR: f64 = 0.9;
-/// Golden sections of a dip or a hump.
+/// Golden-section steps of a minimum or maximum.
 const SECTIONS: usize = 16;
 /// Bisections of a crossing.
 const STEPS: usize = 32;
 
-/// An interval of α in which every limit holds.
+/// An interval of α in which every limit is satisfied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AlphaInterval {
     /// Smallest α.
@@ -29,27 +30,27 @@ pub struct AlphaInterval {
     pub to: f64,
 }
 
-/// A place where α is to be chosen: one end of one leg, or of two that meet.
+/// A place with an α to choose: one end of one leg, or of two that meet.
 pub(super) struct Place<'a> {
-    /// The legs that end here, each with the end that is here.
+    /// The legs that end here, each with the end concerned.
     pub(super) legs: &'a [(Leg, usize)],
     pub(super) limits: PathLimits,
-    /// Share of each limit that is kept free: for the rounding of a peak, or for the ends to come.
+    /// Margin of each limit: for the rounding of a peak, or for later ends.
     pub(super) margin: f64,
-    /// No α above this is wanted.
+    /// Requested upper bound of α.
     pub(super) alpha_max: f64,
-    /// Number of the first leg, for the refusal.
+    /// Index of the first leg, for the refusal.
     pub(super) segment: usize,
     pub(super) name: &'static str,
 }
 
 impl Place<'_> {
-    /// The largest admissible α, and all admissible intervals from the smallest on.
+    /// Returns the largest admissible α, and all admissible intervals in ascending order.
     ///
     /// # Errors
-    /// [`TrajectoryError::Alpha`] with the limit that is nearest to hold if no α is admissible,
+    /// [`TrajectoryError::Alpha`] with the limit nearest to being satisfied if no α is admissible,
     /// [`TrajectoryError::Hurried`] if a leg is too short for any, [`TrajectoryError::AlphaMax`] if
-    /// the largest wanted is too small for the leg.
+    /// the upper bound is too small for the leg.
     pub(super) fn choose(&self) -> Result<(f64, Vec<AlphaInterval>), TrajectoryError> {
         let smallest = self.smallest()?;
         if self.alpha_max.is_nan() || self.alpha_max < smallest {
@@ -81,8 +82,8 @@ impl Place<'_> {
         }
     }
 
-    /// Adds the lowest point of every dip that stays above 1 on the scan, and the highest of every
-    /// hump that stays below: there may be an interval, or a gap, between two points.
+    /// Adds the minimum of every dip above 1 of the scan, and the maximum of every hump below:
+    /// there may be an interval, or a gap, between two points.
     fn look_between(&self, found: &mut Vec<(f64, f64)>) {
         let turns: Vec<(f64, f64, f64)> = found
             .windows(3)
@@ -118,7 +119,7 @@ impl Place<'_> {
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
 
-    /// The admissible intervals between the points of a scan, their ends bisected and exact.
+    /// Returns the admissible intervals between the points of a scan, with bisected, exact ends.
     fn intervals(&self, found: &[(f64, f64)]) -> Vec<AlphaInterval> {
         let holds: Vec<bool> =
             found.iter().map(|&(alpha, ratio)| ratio <= 1.0 && self.holds(alpha)).collect();
@@ -139,7 +140,7 @@ impl Place<'_> {
         intervals
     }
 
-    /// The last α from `inside` towards `outside` that holds.
+    /// Returns the last admissible α from `inside` towards `outside`.
     fn bisect(&self, inside: f64, outside: f64) -> f64 {
         let (mut holds, mut breaks) = (inside, outside);
         for _ in 0..STEPS {
@@ -153,7 +154,7 @@ impl Place<'_> {
         self.excess(alpha, true).0 <= 1.0 - self.margin
     }
 
-    /// The largest ratio of a peak to its limit; `exact` refines each peak.
+    /// Returns the largest ratio of a peak to its limit; `exact` refines each peak.
     fn excess(&self, alpha: f64, exact: bool) -> (f64, Quantity, f64, f64) {
         let limits = [
             (Quantity::Velocity, self.limits.velocity_m_s),
@@ -174,8 +175,8 @@ impl Place<'_> {
         worst
     }
 
-    /// The smallest α whose deviation is gone at the other end, and whose clearance leaves the other
-    /// end its half of the leg.
+    /// Returns the smallest α whose deviation has decayed at the other end, and whose clearance
+    /// leaves the other end its half of the leg.
     fn smallest(&self) -> Result<f64, TrajectoryError> {
         let mut smallest = 1e-12_f64;
         for (leg, which) in self.legs {
@@ -202,7 +203,7 @@ impl Place<'_> {
         Ok(smallest)
     }
 
-    /// An α above which jerk is beyond its limit for certain.
+    /// Returns an α above which jerk certainly exceeds its limit.
     fn largest(&self) -> f64 {
         let mut largest = f64::INFINITY;
         for (leg, which) in self.legs {

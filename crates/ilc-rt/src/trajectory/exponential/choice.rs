@@ -5,24 +5,24 @@ use super::leg::{End, Leg, PlacedLeg};
 use crate::interpolate::{AxisLimits, PathLimits};
 use crate::trajectory::error::TrajectoryError;
 
-/// Distance kept from a limit, relative: far above the rounding of a peak.
+/// Relative distance from a limit: far above the rounding of a peak.
 pub(super) const MARGIN: f64 = 1e-10;
 
-/// The α of one place, and the intervals in which it might be.
+/// The α of one place, and its admissible intervals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AlphaChoice {
-    /// Segment at whose start, or in front of whose end, it is.
+    /// Segment at whose start, or before whose end, it is.
     pub segment: usize,
     /// `start-up`, `transition` or `end`.
     pub place: &'static str,
-    /// The α used: the largest admissible. In s⁻³ (and s⁻² for the oscillation) for start-up and end,
-    /// in s⁻¹ for a transition.
+    /// The α used: the largest admissible one. In s⁻³ (and s⁻² for the oscillation) for start-up
+    /// and end, in s⁻¹ for a transition.
     pub alpha: f64,
-    /// All admissible intervals, from the smallest on.
+    /// All admissible intervals in ascending order.
     pub admissible: Vec<AlphaInterval>,
 }
 
-/// The largest α wanted at each kind of place; infinite for as large as the limits allow.
+/// Upper bounds of α for each kind of place; infinite for as large as the limits allow.
 ///
 /// # Units
 /// - as in [`AlphaChoice::alpha`]
@@ -30,7 +30,7 @@ pub struct AlphaChoice {
 pub struct AlphaMax {
     /// At starts from rest.
     pub start_up: f64,
-    /// At a corner where a line goes on, or turns round.
+    /// At a corner where a line continues, or reverses.
     pub transition: f64,
     /// At ends at rest.
     pub end: f64,
@@ -42,7 +42,7 @@ impl Default for AlphaMax {
     }
 }
 
-/// Chooses the α of each place, one after the other, and enters it in the legs.
+/// Chooses the α of each place in order, and sets it in the legs.
 pub(super) fn choose(
     legs: &mut [PlacedLeg],
     limits: &[AxisLimits],
@@ -56,7 +56,7 @@ pub(super) fn choose(
         let after = (i < n_legs).then_some((i, 0));
         let joined = after.is_some_and(|(at, _)| legs[at].leg.ends[0] != End::Rest);
         let members: Vec<(usize, usize)> = before.into_iter().chain(after).collect();
-        // Legs that are not joined end and start apart from each other.
+        // Without a transition between them, legs end and start independently.
         let groups: Vec<Vec<(usize, usize)>> = if joined {
             vec![members]
         } else {
@@ -72,7 +72,7 @@ pub(super) fn choose(
             let along = PathLimits::along(&legs[segment].line.direction, limits, f64::INFINITY);
             let near: Vec<(Leg, usize)> =
                 members.iter().map(|&(at, which)| (legs[at].leg, which)).collect();
-            // An end has none after it on its leg.
+            // No further end follows on its leg.
             let margin = if name == "end" { MARGIN } else { reserve };
             let place = Place { legs: &near, limits: along, margin, alpha_max, segment, name };
             let (alpha, admissible) = place.choose()?;

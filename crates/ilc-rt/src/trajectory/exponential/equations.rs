@@ -1,8 +1,8 @@
-//! Equations 2.2 to 2.18 of the thesis, with their derivatives. Nothing here knows of limits.
+//! Equations 2.2 to 2.18 of the thesis with their derivatives, independent of limits.
 //!
-//! Corrected against the print: `x_L(0) = 0` whatever `b` is, and with `b ≠ 0` the start jerk is
-//! `6 α b`; the acceleration 2.10 has one minus; 2.11 is ½ at `c`; the exponents of 2.12 and 2.13
-//! have opposite signs.
+//! Corrections of the print: `x_L(0) = 0` for any `b`, and with `b ≠ 0` the start jerk is `6 α b`;
+//! the acceleration 2.10 has one minus; 2.11 is ½ at `c`; the exponents of 2.12 and 2.13 have
+//! opposite signs.
 
 use crate::trajectory::jet::Jet;
 
@@ -49,8 +49,8 @@ pub(super) fn weight_after(t_s: f64, ratio: f64, alpha: f64) -> Jet {
     Jet::line(alpha * t_s - ratio.ln(), alpha).logistic()
 }
 
-/// Blending ratio at a transition: `|v₂/v₁|` where the direction turns round, so that the velocity is
-/// 0 there, and 1 where it goes on. A move that ends (`v₂ = 0`) has no ratio and is not a transition.
+/// Blending ratio at a transition: `|v₂/v₁|` at a reversal, so that the velocity is 0 there, and 1
+/// otherwise. A move that ends (`v₂ = 0`) has no ratio and is not a transition.
 ///
 /// # Source
 /// - [dimarco2016], Eq. 2.15 and the listing of Appendix A
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
     use crate::interpolate::random::Random;
 
-    /// Compares each derivative with a central difference of the one before it.
+    /// Compares each derivative with a central difference of the previous one.
     fn assert_consistent(function: impl Fn(f64) -> Jet, t: f64, scale_s: f64) {
         let h = 1e-5 * scale_s;
         let (low, mid, high) = (function(t - h), function(t), function(t + h));

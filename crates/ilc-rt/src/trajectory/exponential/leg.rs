@@ -1,8 +1,9 @@
-//! One straight leg of an E/S move along its direction, and what its two ends do to it.
+//! One straight leg of an E/S move along its direction, and the effects of its two ends.
 //!
-//! The programmed motion is `v t + A sin(ω t)`. Each end adds a deviation from the line and a window
-//! on the oscillation. A deviation is gone at the other end, and a window is multiplied by one that
-//! is shut there: so the leg is at rest, or at its corner, exactly, whatever α each end has.
+//! The programmed motion is `v t + A sin(ω t)`. Each end adds a deviation from the line and a
+//! window on the oscillation. A deviation has decayed at the other end, and a window is multiplied
+//! by one that is closed there: so the leg is exactly at rest, or at its corner, whatever α each
+//! end has.
 
 use super::equations::weight_after;
 use crate::interpolate::line::Line;
@@ -10,7 +11,7 @@ use crate::trajectory::jet::Jet;
 
 /// Exponent at which exponentials count as gone: `e^{-45}` is below the rounding of 1.
 pub(super) const GONE: f64 = 45.0;
-/// `∛45`: where `e^{-x³}` is gone.
+/// `∛45`: where `e^{-x³}` has decayed.
 const GONE_CUBE_ROOT: f64 = 3.556_893_304_490_063;
 /// Clearance of the oscillation from a corner, in units of `1/α`, beyond `A/v`.
 const CLEARANCE: f64 = 4.0;
@@ -20,8 +21,8 @@ const CLEARANCE: f64 = 4.0;
 pub(super) enum End {
     /// From rest, or to rest as its mirror image: Eq. 2.3, α in s⁻³.
     Rest,
-    /// Into or out of a neighbour on the same line, whose velocity along this leg is given: Eq. 2.12
-    /// and 2.13, α in s⁻¹.
+    /// Into or out of a neighbour on the same line, with its velocity along this leg: Eq. 2.12 and
+    /// 2.13, α in s⁻¹.
     Transition {
         /// Velocity of the neighbour along the direction of this leg.
         neighbour_m_s: f64,
@@ -30,7 +31,7 @@ pub(super) enum End {
     },
 }
 
-/// A leg with the numbers that its motion is made of.
+/// A leg with the parameters of its motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
     pub(super) feed_m_s: f64,
@@ -38,11 +39,11 @@ pub(super) struct Leg {
     pub(super) omega_rad_s: f64,
     pub(super) duration_s: f64,
     pub(super) ends: [End; 2],
-    /// α of the first and of the last end; an end without one is not there yet.
+    /// α of the first and of the last end; `None` while it is not chosen.
     pub(super) alpha: [Option<f64>; 2],
 }
 
-/// A leg with its line, and the time at which it starts.
+/// A leg with its line, and its start time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlacedLeg {
     pub(super) leg: Leg,
@@ -61,8 +62,8 @@ impl Leg {
         let deviation = match self.ends[which] {
             End::Rest => -(tau * v) * (tau.cubed() * alpha).decay(),
             End::Transition { neighbour_m_s, ratio } => {
-                // Of the neighbour's weight at the distance tau from the corner; its ratio is the
-                // other way round when time is.
+                // The neighbour's weight at the distance tau from the corner; its ratio is inverted
+                // if time is reversed.
                 let ratio = if which == 0 { ratio } else { 1.0 / ratio };
                 let neighbour = Jet::constant(1.0) - weight_after(tau_s, ratio, alpha);
                 tau * (neighbour_m_s - v) * neighbour
@@ -128,9 +129,10 @@ impl Leg {
         }
     }
 
-    /// The motion along the leg at a time from its first end.
+    /// Returns the motion along the leg at a time from its first end.
     ///
-    /// The position is counted from the nearer end, which `from_end` names, so that both are exact.
+    /// The position is relative to the nearer end, given by `from_end`, so that both ends are
+    /// exact.
     pub(super) fn at(&self, t_s: f64) -> (Jet, bool) {
         let left_s = self.duration_s - t_s;
         let (first, opening) = self.end(0, t_s);
@@ -150,7 +152,7 @@ impl Leg {
         (motion, from_end)
     }
 
-    /// The programmed position, without any end.
+    /// Returns the programmed position, without any end.
     pub(super) fn programmed_m(&self, t_s: f64) -> f64 {
         self.feed_m_s * t_s + self.amplitude_m * (self.omega_rad_s * t_s).sin()
     }

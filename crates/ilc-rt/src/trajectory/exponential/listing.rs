@@ -1,5 +1,5 @@
-//! The program of the thesis's Appendix A: two legs on one axis, every α given. Nothing is limited:
-//! for a motion that is to be exactly what somebody else's was, read by the Python glue.
+//! The program of the thesis's Appendix A: two legs on one axis, every α given. Not limited: it
+//! reproduces a published motion exactly; used by the Python bindings.
 
 use super::equations::{weight_after, weight_before};
 use crate::interpolate::MAX_AXES;
@@ -39,7 +39,7 @@ pub struct Listing {
 }
 
 impl Listing {
-    /// The numbers printed in the listing.
+    /// Returns the parameters printed in the listing.
     #[cfg(test)]
     fn printed() -> Self {
         Self {
@@ -65,10 +65,10 @@ impl Listing {
         }
     }
 
-    /// Position, velocity, acceleration and jerk at a time from the start.
+    /// Returns position, velocity, acceleration and jerk at a time from the start.
     ///
     /// # Real Time
-    /// Hot, allocates nothing.
+    /// Hot: does not allocate.
     /// # Source
     /// - [dimarco2016], Appendix A
     pub fn at(&self, t_s: f64) -> Jet {
@@ -83,7 +83,7 @@ impl Listing {
         let [first, second] = &self.legs;
         let closing = weight_before(from_corner_s + self.sine_offset_s, 1.0, self.sine_alpha);
         let opening = weight_after(from_corner_s - self.sine_offset_s, 1.0, self.sine_alpha);
-        // The listing corrects every transition, whichever way it goes on.
+        // The listing corrects every transition, reversing or not.
         let ratio = (second.velocity_m_s / first.velocity_m_s).abs();
         let joined = path(first, closing)
             * weight_before(from_corner_s, ratio, self.transition_alpha)
@@ -101,13 +101,13 @@ impl Listing {
             + leg.amplitude_m * (leg.omega_rad_s * (t_s - leg.phase_zero_s)).sin()
     }
 
-    /// Samples the motion from its start on.
+    /// Samples the motion from its start.
     ///
     /// # Real Time
     /// Cold: allocates.
     /// # Errors
-    /// [`TrajectoryError`] for a velocity of 0, an α or a time that is not above 0, or a number that
-    /// is not finite.
+    /// [`TrajectoryError`] for a velocity of 0, an α or a time that is not positive, or a
+    /// non-finite number.
     pub fn sample(&self, duration_s: f64, dt_s: f64) -> Result<SampledMotion, TrajectoryError> {
         let refuse = |name, value, allowed| Err(TrajectoryError::Shape { name, value, allowed });
         for (name, value) in [
@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(n_samples, 1401);
         let motion = listing.sample(14.0, 0.01).unwrap();
         assert_eq!((motion.n_samples(), motion.n_axes), (1401, 1));
-        // Between start and transition it is on its program, and turns round before the corner.
+        // Between start and transition it follows its program, and reverses before the corner.
         for k in [200, 250, 1150, 1300] {
             let miss = motion.position_m[k] - motion.programmed_m[k];
             assert!(miss.abs() < 0.1, "{k}: {miss}");

@@ -1,19 +1,19 @@
-//! Peaks of velocity, acceleration and jerk of one end of a leg. Cold; read by the search of α.
+//! Peaks of velocity, acceleration and jerk at one end of a leg. Cold; used by the search of α.
 //!
-//! The end is sampled in pieces between the times at which something begins, and the largest samples
-//! are refined: so that a limit is held between two samples too.
+//! The end is sampled in pieces between the times at which an effect begins, and the largest
+//! samples are refined, so that a limit holds between two samples, too.
 
 use super::leg::Leg;
 
 /// `(√5 - 1)/2`.
 pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
-/// Least samples of a piece.
+/// Smallest number of samples of a piece.
 const SAMPLES: f64 = 160.0;
 /// Samples of one period of an oscillation.
 const SAMPLES_A_PERIOD: f64 = 32.0;
-/// Most samples of a piece.
+/// Largest number of samples of a piece.
 const SAMPLES_MAX: f64 = 20_000.0;
-/// Peaks looked into of one end and quantity.
+/// Peaks refined per end and quantity.
 const CANDIDATES: usize = 4;
 
 /// A sample of a piece, and the times on either side of it within that piece.
@@ -23,8 +23,8 @@ struct Sample {
     neighbours: [Option<usize>; 2],
 }
 
-/// Largest absolute velocity, acceleration and jerk of one end and of a period after it; with what
-/// the other end does there, if it has its α already.
+/// Returns the largest absolute velocity, acceleration and jerk of one end and of the period after
+/// it, including the effect of the other end if its α is already chosen.
 pub(super) fn peaks(leg: &Leg, which: usize, exact: bool) -> [f64; 3] {
     let value = |tau_s: f64| leg.at(if which == 0 { tau_s } else { leg.duration_s - tau_s }).0.0;
     let mut samples: Vec<Sample> = Vec::new();
@@ -59,10 +59,10 @@ pub(super) fn peaks(leg: &Leg, which: usize, exact: bool) -> [f64; 3] {
     })
 }
 
-/// The pieces in which an end is looked at, in the time from it, each with its number of steps.
+/// Returns the pieces to sample, in the time from the end, each with its number of steps.
 ///
-/// They meet where a window opens, as the jerk jumps there, and where something is over: the ends may
-/// be much quicker than the leg, or one than the other.
+/// They meet where a window opens, as the jerk jumps there, and where an effect has decayed: the
+/// ends may be much faster than the leg, or one than the other.
 fn pieces(leg: &Leg, which: usize) -> Vec<(f64, f64, usize)> {
     let (deviation_s, window_s) = leg.reach_s(which);
     let other = 1 - which;
@@ -100,7 +100,7 @@ fn pieces(leg: &Leg, which: usize) -> Vec<(f64, f64, usize)> {
         .collect()
 }
 
-/// The largest value in an interval with one maximum.
+/// Returns the largest value in an interval with one maximum.
 fn refined(value: impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
     let mut best = 0.0_f64;
     for _ in 0..24 {

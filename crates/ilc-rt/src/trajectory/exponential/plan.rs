@@ -1,4 +1,4 @@
-//! An E/S move of several legs: which end is what, its α, and the motion at any time.
+//! An E/S move of several legs: the kind and α of each end, and the motion at any time.
 
 use super::choice::{AlphaChoice, AlphaMax, MARGIN, choose};
 use super::equations::blending_ratio;
@@ -11,22 +11,22 @@ use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::motion::MotionState;
 use crate::trajectory::path::{PathSegment, checked_lines};
 
-/// Directions closer than this are the same line.
+/// Directions closer than this count as the same line.
 const SAME_LINE: f64 = 1e-9;
-/// Shares of each limit that an end keeps free for the ends after it, tried one after the other. None
-/// unless a leg is so short that its ends reach into each other.
+/// Shares of each limit that an end reserves for later ends, tried in order. Zero, except for a leg
+/// so short that its ends overlap.
 const RESERVES: [f64; 3] = [MARGIN, 1e-3, 0.03];
 
 /// A straight leg with an oscillation along it, as modulated tool paths have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModulatedSegment {
-    /// End point, one coordinate an axis.
+    /// End point, one coordinate per axis.
     pub to_m: Vec<f64>,
-    /// Speed of the line.
+    /// Feed of the line.
     pub feed_m_s: f64,
     /// Amplitude along the line; 0 for none.
     pub amplitude_m: f64,
-    /// Frequency of the oscillation; not read if the amplitude is 0.
+    /// Frequency of the oscillation; ignored if the amplitude is 0.
     pub frequency_hz: f64,
 }
 
@@ -42,10 +42,10 @@ pub struct ExponentialSigmoid {
 impl ExponentialSigmoid {
     /// Plans a move in which every leg keeps its programmed time, `length / feed`.
     ///
-    /// Each start, transition and end gets the largest α at which no axis exceeds a limit; one α
-    /// holds for all axes, so that a leg stays straight. The oscillation is 0 near corners, so that
-    /// it passes none. A leg may be so short that its ends reach into each other; they are then
-    /// checked together, the earlier one having the larger α.
+    /// Each start, transition and end gets the largest α at which no axis exceeds a limit; all axes
+    /// share one α, so that a leg stays straight. The oscillation is 0 near corners, so that it
+    /// does not overshoot them. If a leg is so short that its ends overlap, they are checked
+    /// together, the earlier one having the larger α.
     ///
     /// # Shapes
     /// - `limits`: one entry for each coordinate of `start_m`, 1 to [`MAX_AXES`]
@@ -53,9 +53,9 @@ impl ExponentialSigmoid {
     /// Cold: allocates, and searches.
     /// # Errors
     /// [`TrajectoryError`] for values out of range; [`TrajectoryError::Programmed`] for an
-    /// oscillation beyond the limits; [`TrajectoryError::Alpha`] if no α holds them (a start
-    /// overshoots its feed by 79 %, and has to be over within its leg);
-    /// [`TrajectoryError::Hurried`] for a leg that is over before its ends are.
+    /// oscillation beyond the limits; [`TrajectoryError::Alpha`] if no α satisfies them (a start
+    /// overshoots its feed by 79 %, and has to decay within its leg); [`TrajectoryError::Hurried`]
+    /// for a leg that is too short for its ends.
     /// # Source
     /// - [dimarco2016], Section 2.1
     pub fn plan(
@@ -66,16 +66,16 @@ impl ExponentialSigmoid {
         Self::plan_below(start_m, segments, limits, &AlphaMax::default())
     }
 
-    /// Plans like [`plan`](Self::plan), with no α above what is wanted: a gentler move than the
-    /// limits allow can cost less (Fig. 2.15).
+    /// Plans like [`plan`](Self::plan), with upper bounds of α: a gentler move than the limits
+    /// allow can have a lower cost (Fig. 2.15).
     ///
     /// # Shapes
     /// - as [`plan`](Self::plan)
     /// # Real Time
     /// Cold: allocates, and searches.
     /// # Errors
-    /// As [`plan`](Self::plan); [`TrajectoryError::AlphaMax`] for one so small that an end is not
-    /// over within its leg.
+    /// As [`plan`](Self::plan); [`TrajectoryError::AlphaMax`] for a bound so small that an end does
+    /// not fit its leg.
     /// # Source
     /// - [dimarco2016], Section 2.3.3
     pub fn plan_below(
@@ -118,7 +118,7 @@ impl ExponentialSigmoid {
         Err(first_refusal.unwrap_or(TrajectoryError::Empty))
     }
 
-    /// Every α, and the intervals in which it might be.
+    /// Returns every α with its admissible intervals.
     pub fn choices(&self) -> &[AlphaChoice] {
         &self.choices
     }
@@ -128,15 +128,15 @@ impl ExponentialSigmoid {
         self.duration_s
     }
 
-    /// Number of axes.
+    /// Returns the number of axes.
     pub fn n_axes(&self) -> usize {
         self.n_axes
     }
 
-    /// The state at a time from the start; at rest before it and after the end.
+    /// Returns the state at a time from the start; at rest before it and after the end.
     ///
     /// # Real Time
-    /// Hot, allocates nothing; a few exponentials.
+    /// Hot: does not allocate; a few exponentials.
     pub fn at(&self, t_s: f64) -> MotionState {
         let Some((placed, local_s)) = self.find(t_s) else {
             return MotionState::at_rest(match (self.legs.first(), self.legs.last()) {
@@ -170,7 +170,7 @@ impl ExponentialSigmoid {
         position_m
     }
 
-    /// The leg of a time within the move, and the time from its start.
+    /// Returns the leg at a time within the move, and the time from its start.
     fn find(&self, t_s: f64) -> Option<(&PlacedLeg, f64)> {
         if !(0.0..self.duration_s).contains(&t_s) {
             return None;
@@ -181,7 +181,7 @@ impl ExponentialSigmoid {
     }
 }
 
-/// Each leg in time, with what its ends are.
+/// Places each leg in time, with the kinds of its ends.
 fn placed(
     segments: &[ModulatedSegment],
     lines: &[Line],

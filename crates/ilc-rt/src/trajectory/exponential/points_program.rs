@@ -1,20 +1,20 @@
-//! Modulated tool path (MTP) programs: what an operator would write for a numerical controller.
+//! Programs of a modulated tool path (MTP), as an operator would write them for a CNC.
 //!
-//! A feed with an oscillation along it breaks chips. As a program it is a row of straight moves,
-//! usually six a period. Cold.
+//! An oscillation along the feed breaks chips. As a program it is a sequence of straight moves,
+//! usually six per period. Cold.
 
 use super::plan::ModulatedSegment;
 use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::path::PathSegment;
 
-/// Points a period of the customary program.
+/// Points per period of the usual program.
 pub const POINTS_A_PERIOD: usize = 6;
-/// Most moves of a program.
+/// Largest number of moves of a program.
 const MOVES_MAX: f64 = 1e6;
 
-/// The straight moves that a controller gets for a modulated leg: points at equal times on
-/// `v t + A sin(ω t)`, each move with the speed that takes it there on time.
+/// Returns the straight moves of a modulated leg: points at equal times on `v t + A sin(ω t)`, each
+/// move with the speed that takes it there on time.
 ///
 /// # Errors
 /// [`TrajectoryError`] for values out of range, or more than a million moves.
@@ -78,7 +78,7 @@ pub fn points_program(
             start_m.iter().zip(&along).map(|(from, share)| from + share * s_m / length_m).collect()
         };
         let feed_m_s = (s_m - before_m).abs() / (t_s - before_s);
-        // Two neighbours may fall on one point where the tool stands still.
+        // Two neighbours may coincide where the tool is at rest.
         if feed_m_s > 0.0 {
             moves.push(PathSegment::line(to_m, feed_m_s));
         }

@@ -1,4 +1,4 @@
-//! The butterfly contour, its first point at the start.
+//! The butterfly contour, with its first point at the start.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub struct ButterflySection {
     /// Size.
     #[schemars(range(max = 10.0), extend("exclusiveMinimum" = 0.0))]
     pub scale_m: f64,
-    /// Turns of t; 12 close the contour.
+    /// Revolutions of t; 12 close the contour.
     #[schemars(range(max = 12.0), extend("exclusiveMinimum" = 0.0))]
     pub turns: f64,
 }

@@ -1,4 +1,4 @@
-//! A part program in G-code.
+//! A G-code part program.
 
 use super::{Corner, FileKind, Job, Key, Kind, ProgramError};
 use crate::interpolate::{AxisUnit, Interpolator};

@@ -1,4 +1,4 @@
-//! A program with everything that planning it needs, and the steps that several kinds share.
+//! A program with everything needed to plan it, and the planning steps common to several kinds.
 
 use super::program::{Program, Segment};
 use crate::interpolate::{AxisLimits, AxisUnit, Interpolator};
@@ -22,7 +22,7 @@ pub enum ProgramError {
     Table(#[from] TableError),
 }
 
-/// A program, the machine that it is for, and the content of its file.
+/// A program with its machine, and the content of its file.
 #[derive(Clone, Copy, Debug)]
 pub struct Job<'a> {
     /// `[program]`
@@ -35,24 +35,24 @@ pub struct Job<'a> {
     pub axis_names: &'a [&'a str],
     /// Servo cycle.
     pub cycle_s: f64,
-    /// Content of `file`; empty for kinds without one.
+    /// Content of `file`; empty for kinds without a file.
     pub text: &'a [u8],
 }
 
 impl Job<'_> {
-    /// The start in the plane of the first two axes.
+    /// Start in the plane of the first two axes.
     pub(super) fn start_m(&self) -> [f64; 2] {
         let start_m = &self.program.start_m;
         [start_m[0], start_m.get(1).copied().unwrap_or(0.0)]
     }
 
-    /// The speed along a segment.
+    /// Speed along a segment.
     pub(super) fn feed_m_s(&self, segment: &Segment) -> f64 {
         segment.feed_m_s.unwrap_or(self.program.feed_m_s)
     }
 
-    /// Plans lines and arcs; `rapid` names those of them that go as fast as the axes allow, up to their
-    /// feed.
+    /// Plans lines and arcs; `rapid` marks the segments that move as fast as the axes allow, up to
+    /// their feed.
     pub(super) fn along_segments(
         &self,
         segments: Vec<PathSegment>,

@@ -1,11 +1,11 @@
 //! The kinds of path that `[program]` can name: a file and a line of the list below each.
 //!
-//! A kind has the table of its own numbers, says which other keys it reads, and plans a [`Job`].
-//! `config` composes the cell description of it, `design` plans by it, and documents and the tests that
-//! go over all kinds read it.
+//! A kind has the table of its own numbers, declares the other keys that it reads, and plans a
+//! [`Job`]. `config` builds the cell description from the kinds, `design` plans with them, and
+//! documents and the tests over all kinds read them.
 //!
-//! Family: every file here, as the program is composed of the tables of its kinds, and a kind plans from
-//! the whole of it.
+//! Family: every file here, since the program consists of the tables of its kinds, and a kind plans
+//! from all of it.
 
 mod butterfly;
 mod gcode;
@@ -30,16 +30,16 @@ pub use spiral::SpiralSection;
 
 use crate::interpolate::Interpolator;
 
-/// A kind of path, as the list has it.
+/// A kind of path, as an entry of the list.
 #[derive(Debug)]
 pub struct Kind {
-    /// The keys and tables of `[program]` that it reads, of those that not every kind does.
+    /// Keys and tables of `[program]` that it reads, apart from those common to all kinds.
     pub reads: &'static [Key],
-    /// Those of them that it cannot do without.
+    /// Required keys among them.
     pub needs: &'static [Key],
-    /// The part program or table that `file` names.
+    /// Part program or table named by `file`.
     pub file: Option<FileKind>,
-    /// True for a shape in a plane, which needs a cell of two axes.
+    /// True for a plane shape, which requires a cell of two axes.
     pub is_plane: bool,
     /// Plans a run.
     pub plan: fn(&Job) -> Result<Interpolator, ProgramError>,
@@ -51,10 +51,10 @@ pub struct Kind {
     pub example_file: &'static str,
 }
 
-/// A file that a program names.
+/// A file named by a program.
 #[derive(Clone, Copy, Debug)]
 pub struct FileKind {
-    /// The name of its content, as `G-code`.
+    /// Name of its content, such as `G-code`.
     pub content: &'static str,
     /// Largest size.
     pub bytes_max: u64,
@@ -75,7 +75,7 @@ macro_rules! kinds {
             /// Every kind.
             pub const ALL: &[Self] = &[$(Self::$kind),*];
 
-            /// The name as a cell description has it.
+            /// Name in a cell description.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$kind => stringify!($file),)*
@@ -108,6 +108,6 @@ kinds! {
     Modulated modulated;
     /// A part program, `file`.
     Gcode gcode;
-    /// Set points, one row a servo cycle, `file`.
+    /// Set points, one row per servo cycle, `file`.
     Table table;
 }

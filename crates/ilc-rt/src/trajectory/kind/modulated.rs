@@ -1,4 +1,4 @@
-//! Straight legs with an oscillation along them, by exponentials and sigmoids.
+//! Straight legs with an oscillation superimposed along them, exponential/sigmoid.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

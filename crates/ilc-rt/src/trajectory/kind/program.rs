@@ -1,4 +1,4 @@
-//! `[program]` of a cell description: the keys that every kind of path reads, and those of some.
+//! `[program]` of a cell description: the keys common to all kinds of path, and those of some.
 
 use std::path::{Path, PathBuf};
 
@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::{ButterflySection, ModulatedSection, PathKind, RasterSection, SpiralSection};
 use crate::schema::field_order;
 
-/// `[program]`: where the tool goes.
+/// `[program]`: the path of the tool.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Program {
-    /// Start and end of each run's return move, one coordinate an axis.
+    /// Start of each run and end of its return move, one coordinate per axis.
     pub start_m: Vec<f64>,
-    /// Speed along the path where a segment names none.
+    /// Feed along the path for segments without their own.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub feed_m_s: f64,
     /// Kind of path.
@@ -24,13 +24,14 @@ pub struct Program {
     /// Part program of `kind = "gcode"`, set points of `kind = "table"`; in the folder of the cell
     /// description, or below it.
     pub file: Option<PathBuf>,
-    /// Speed of G0; `feed_m_s` if it is not given.
+    /// Speed of G0; `feed_m_s` by default.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub rapid_m_s: Option<f64>,
-    /// Leaves out blocks of the part program that begin with `/`.
+    /// Skips blocks of the part program that begin with `/`.
     #[serde(default)]
     pub block_delete: bool,
-    /// Highest acceleration across a smooth curve; the axes' own limits if it is not given.
+    /// Largest centripetal acceleration of a smooth curve; by default only the axes' own limits
+    /// apply.
     #[schemars(range(min = 1e-6, max = 1e4))]
     pub curvature_acceleration_max_m_s2: Option<f64>,
     /// `[program.butterfly]`
@@ -41,22 +42,23 @@ pub struct Program {
     pub raster: Option<RasterSection>,
     /// `[program.modulated]`
     pub modulated: Option<ModulatedSection>,
-    /// The way in which corners are taken; not read where there are none.
+    /// Corner mode; ignored without corners.
     #[serde(default = "default_corner")]
     pub corner: Corner,
     /// Length of the averaging window of `corner = "blend"`.
     #[serde(default = "default_blend_s")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub blend_s: f64,
-    /// Rest at the start that belongs to the run, so that learning can prepare.
+    /// Dwell at the start, part of the run, so that learning can act ahead of the motion
+    /// (look-ahead).
     #[serde(default = "default_dwell_before_s")]
     #[schemars(range(min = 0.0, max = 10.0))]
     pub dwell_before_s: f64,
-    /// Rest at the end that belongs to the run.
+    /// Dwell at the end, part of the run.
     #[serde(default = "default_dwell_after_s")]
     #[schemars(range(min = 0.0, max = 10.0))]
     pub dwell_after_s: f64,
-    /// Rest between the return to the start and the next run: the gap in which learning computes.
+    /// Settling time between the return to the start and the next run, in which learning computes.
     #[serde(default = "default_settle_s")]
     #[schemars(range(min = 0.0, max = 60.0))]
     pub settle_s: f64,
@@ -65,7 +67,7 @@ pub struct Program {
     pub segments: Vec<Segment>,
 }
 
-/// A key or table of `[program]` that not every kind of path reads.
+/// A key or table of `[program]` that only some kinds of path read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
     /// `[[program.segment]]`
@@ -91,7 +93,8 @@ pub enum Key {
 }
 
 impl Program {
-    /// Every key that not every kind reads, its name in a cell description, and true if it is given.
+    /// Every key that only some kinds read: its name in a cell description, and true if it is
+    /// given.
     pub fn given(&self) -> [(Key, &'static str, bool); 10] {
         let is_extra = |s: &Segment| s.center_m.is_some() || s.clockwise || s.dwell_s > 0.0;
         let extra = self.segments.iter().any(is_extra);
@@ -110,12 +113,12 @@ impl Program {
         ]
     }
 
-    /// The averaging window of blended corners; `None` for exact stops.
+    /// Averaging window of blended corners; `None` for exact stops.
     pub fn window_s(&self) -> Option<f64> {
         (self.corner == Corner::Blend).then_some(self.blend_s)
     }
 
-    /// `file`; empty if there is none.
+    /// `file`; empty if not given.
     pub fn file_name(&self) -> &Path {
         self.file.as_deref().unwrap_or(Path::new(""))
     }
@@ -146,9 +149,9 @@ fn default_settle_s() -> f64 {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Segment {
-    /// End point, one coordinate an axis.
+    /// End point, one coordinate per axis.
     pub to_m: Vec<f64>,
-    /// Speed along this segment.
+    /// Feed along this segment.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub feed_m_s: Option<f64>,
     /// Centre of an arc, in the first two axes.
@@ -156,17 +159,17 @@ pub struct Segment {
     /// Clockwise instead of anticlockwise.
     #[serde(default)]
     pub clockwise: bool,
-    /// Rest at its end.
+    /// Dwell at its end.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub dwell_s: f64,
 }
 
-/// The way in which corners are taken.
+/// Corner mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Corner {
-    /// Come to rest at every corner.
+    /// Exact stop at every corner.
     ExactStop,
     /// Keep the feed and round the corner within the averaging window.
     Blend,

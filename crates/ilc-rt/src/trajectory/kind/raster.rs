@@ -1,4 +1,4 @@
-//! A raster: rows to and fro, and back to the start.
+//! A raster: parallel rows in alternating directions, and back to the start.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ pub struct RasterSection {
     /// Number of rows.
     #[schemars(range(min = 1, max = 10_000))]
     pub rows: usize,
-    /// Goes the same way back to the start.
+    /// Returns to the start along the same path.
     #[serde(default)]
     pub there_and_back: bool,
 }
@@ -48,8 +48,8 @@ fn plan(job: &Job) -> Result<Interpolator, ProgramError> {
 }
 
 impl RasterSection {
-    /// Rows of `width_m` along the first axis, `pitch_m` apart along the second; with `there_and_back`
-    /// the same way backwards to the start.
+    /// Returns rows of `width_m` along the first axis, `pitch_m` apart along the second; with
+    /// `there_and_back` the same way backward to the start.
     ///
     /// # Errors
     /// [`TrajectoryError::Shape`] for sizes or rows out of range.

@@ -9,7 +9,7 @@ use crate::schema::field_order;
 use crate::trajectory::curve::Spiral;
 use crate::trajectory::error::TrajectoryError;
 
-/// `[program.spiral]`: from its centre, anticlockwise.
+/// `[program.spiral]`: from its centre, counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]

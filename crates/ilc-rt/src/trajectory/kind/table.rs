@@ -1,4 +1,4 @@
-//! Set points, one row a servo cycle, from the start of the program.
+//! Set points, one row per servo cycle, from the start of the program.
 
 use super::{FileKind, Job, Key, Kind, ProgramError};
 use crate::interpolate::Interpolator;
@@ -20,7 +20,7 @@ pub(super) const KIND: Kind = Kind {
     example_file: "x,y\n0.0,0.0\n0.0,0.0\n",
 };
 
-/// Refuses a table that does not begin where the axes rest before a run.
+/// Rejects a table that does not start where the axes rest before a run.
 fn plan(job: &Job) -> Result<Interpolator, ProgramError> {
     let table = read_table(job.text, job.axis_names)?;
     let starts = table.position_m.iter().zip(&job.program.start_m);

@@ -12,7 +12,7 @@ fn six_point(frequency_hz: f64) -> Vec<PathSegment> {
     points_program(&[0.0], &segment, 6).unwrap()
 }
 
-/// Amplitude and duration of what comes out, in the middle of the motion.
+/// Amplitude and duration of the result, in the middle of the motion.
 fn oscillation(plan: &Linear) -> (f64, f64) {
     let n = 20_000;
     let duration_s = plan.duration_s();

@@ -1,8 +1,8 @@
-//! One axis from any state to rest at a target, limited in velocity, acceleration and jerk: what is
-//! planned when a move begins before the one in front of it is complete.
+//! One axis from any state to rest at a target, limited in velocity, acceleration and jerk: planned
+//! when a move begins before the previous one is complete.
 //!
-//! The axis goes to a cruising velocity and from it to rest. The distance of the two ramps grows with
-//! that velocity, so that one bisection finds the one which arrives.
+//! The axis goes to a cruising velocity and from it to rest. The distance of the two ramps grows
+//! with that velocity, so a bisection finds the one that arrives.
 
 use crate::interpolate::AxisLimits;
 
@@ -19,7 +19,7 @@ pub(super) struct AxisState {
 }
 
 impl AxisState {
-    /// The state after `t` under constant jerk.
+    /// Returns the state after `t` under constant jerk.
     fn after(self, t: f64, j: f64) -> Self {
         let Self { p, v, a, .. } = self;
         Self {
@@ -39,10 +39,10 @@ pub(super) struct ToRest {
     target_m: f64,
 }
 
-/// A ramp to a velocity: three phases of duration and jerk.
+/// Returns a ramp to a velocity: three phases of duration and jerk.
 fn ramp(v: f64, a: f64, to: f64, limits: &AxisLimits) -> [(f64, f64); 3] {
     let (most, jerk) = (limits.acceleration_max_m_s2, limits.jerk_max_m_s3);
-    // What would be missing if the acceleration were taken back at once.
+    // Remaining change of velocity if the acceleration were ramped down at once.
     let missing = to - v - a * a.abs() / (2.0 * jerk);
     let sign = if missing < 0.0 { -1.0 } else { 1.0 };
     let (gap, a) = (sign * (to - v), sign * a);
@@ -54,10 +54,9 @@ fn ramp(v: f64, a: f64, to: f64, limits: &AxisLimits) -> [(f64, f64); 3] {
 }
 
 impl ToRest {
-    /// Plans the fastest such motion; `duration_s`, if it is longer, is waited for by cruising
-    /// slower.
+    /// Plans the fastest such motion; a longer `duration_s` is met by cruising slower.
     ///
-    /// The state must itself be within the limits, and able to stay within them.
+    /// The state must be within the limits, and able to stay within them.
     pub(super) fn plan(
         start: AxisState,
         target_m: f64,
@@ -78,7 +77,7 @@ impl ToRest {
                 let middle = 0.5 * (below + above);
                 if reaches(middle) <= distance { below = middle } else { above = middle }
             }
-            // The one of the two that falls short in its own direction: what is left is cruised.
+            // The one of the two that falls short in its own direction: the remainder is cruised.
             if above > 0.0 { below.max(0.0) } else { above }
         };
         let cruised = |cruise: f64| {
@@ -118,7 +117,7 @@ impl ToRest {
         self.phases.iter().fold(self.start, |state, &(t, j)| state.after(t, j))
     }
 
-    /// The state at a time from the start; exactly at rest at the target when it is over.
+    /// Returns the state at a time from the start; exactly at rest at the target when it is over.
     pub(super) fn at(&self, t_s: f64) -> AxisState {
         let (mut state, mut left_s) = (self.start, t_s);
         for (duration_s, jerk) in self.phases {

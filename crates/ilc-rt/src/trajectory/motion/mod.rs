@@ -1,6 +1,7 @@
-//! Whole motions as tables: sampled from a plan, or given as rows of set points; how well one tracks.
+//! Whole motions as tables: sampled from a plan, or given as rows of set points; their tracking
+//! index.
 //!
-//! Every kind of plan that is not walked along tick by tick becomes a [`SampledMotion`].
+//! Every kind of plan that is not evaluated tick by tick becomes a [`SampledMotion`].
 
 mod sampled;
 mod set_points;

@@ -14,12 +14,12 @@ pub struct MotionState {
     pub velocity_m_s: [f64; MAX_AXES],
     /// Acceleration.
     pub acceleration_m_s2: [f64; MAX_AXES],
-    /// Jerk; at a switch, of one of the two sides.
+    /// Jerk; at a switching time, that of one of the two sides.
     pub jerk_m_s3: [f64; MAX_AXES],
 }
 
 impl MotionState {
-    /// At rest.
+    /// Returns a state at rest.
     pub fn at_rest(position_m: [f64; MAX_AXES]) -> Self {
         Self {
             position_m,
@@ -30,7 +30,7 @@ impl MotionState {
     }
 }
 
-/// A motion as tables of equal length, time first, `n_axes` a row.
+/// A motion as tables of equal length, time first, rows of `n_axes`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SampledMotion {
     /// Time between two samples.
@@ -74,16 +74,15 @@ impl SampledMotion {
         Ok(motion)
     }
 
-    /// Verifies the set points: their finite differences over the sample time, from rest to rest, are
-    /// within the limits.
+    /// Verifies the set points: their finite differences over the sample time, from rest to rest,
+    /// are within the limits.
     ///
     /// # Shapes
-    /// - `limits`: one entry an axis
+    /// - `limits`: one entry per axis
     /// # Real Time
     /// Cold.
     /// # Errors
-    /// [`TrajectoryError::SetPoint`] for the first set point that
-    /// breaks a limit.
+    /// [`TrajectoryError::SetPoint`] for the first set point that violates a limit.
     pub fn verified(self, limits: &[AxisLimits]) -> Result<Self, TrajectoryError> {
         if limits.len() != self.n_axes {
             let (found, expected) = (limits.len(), self.n_axes);
@@ -93,7 +92,7 @@ impl SampledMotion {
         Ok(self)
     }
 
-    /// Adds a motion that begins where the other one rests.
+    /// Appends a motion that begins where the first one rests.
     pub(in crate::trajectory) fn append(&mut self, next: &Self) {
         let skipped = if self.position_m.is_empty() { 0 } else { next.n_axes };
         self.position_m.extend_from_slice(&next.position_m[skipped..]);
@@ -102,7 +101,7 @@ impl SampledMotion {
         self.programmed_m.extend_from_slice(&next.programmed_m[skipped..]);
     }
 
-    /// Number of samples.
+    /// Returns the number of samples.
     pub fn n_samples(&self) -> usize {
         self.position_m.len() / self.n_axes.max(1)
     }

@@ -1,6 +1,6 @@
-//! A motion that is given set point by set point, and the proof that it holds the limits. Cold.
+//! A motion given as set points, and its verification against the limits. Cold.
 //!
-//! For programs that come as a table instead of a path. The campaign calls it.
+//! For programs that are tables instead of paths. The campaign calls it.
 
 use crate::interpolate::AxisLimits;
 use crate::interpolate::{MAX_AXES, MoveError};
@@ -9,20 +9,21 @@ use crate::trajectory::grid::{CYCLE_S, N_SAMPLES_MAX, check_time};
 use crate::trajectory::motion::SampledMotion;
 use crate::trajectory::verify::{Excess, Verification};
 
-/// Makes a motion of its set points, one a cycle, from rest at the first to rest at the last.
+/// Creates a motion from set points, one per cycle, from rest at the first to rest at the last.
 ///
-/// The set points are neither smoothed nor slowed down: where they would break a limit they are
-/// refused. Velocities are central differences, and 0 at both ends.
+/// The set points are neither smoothed nor slowed down: they are refused if they violate a limit.
+/// Velocities are central differences, and 0 at both ends.
 ///
 /// # Shapes
-/// - `position_m`: `n_samples * n_axes`, time first; `limits`: one entry an axis, 1 to [`MAX_AXES`]
+/// - `position_m`: `n_samples * n_axes`, time first; `limits`: one entry per axis, 1 to
+///   [`MAX_AXES`]
 /// # Real Time
 /// Cold: allocates.
 /// # Errors
 /// - [`MoveError::Axes`], [`TrajectoryError::Empty`] and [`TrajectoryError::TooLong`] for a table
-///   of no or too many columns or rows.
-/// - [`TrajectoryError::Row`] for the first row at which velocity, acceleration or jerk over the cycle
-///   break a limit.
+///   without or with too many columns or rows.
+/// - [`TrajectoryError::Row`] for the first row at which velocity, acceleration or jerk over the
+///   cycle violate a limit.
 pub fn set_points(
     position_m: &[f64],
     limits: &[AxisLimits],

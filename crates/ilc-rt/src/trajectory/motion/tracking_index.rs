@@ -1,4 +1,4 @@
-//! The index `J` by which interpolators are compared: tracking and acceleration, weighted.
+//! The tracking index `J` that compares interpolators: weighted tracking error and acceleration.
 
 use crate::trajectory::error::TrajectoryError;
 
@@ -12,13 +12,14 @@ pub struct TrackingIndex {
 }
 
 impl TrackingIndex {
-    /// `J = ∫ [k_e (y_des - y)² + k_a ÿ²] dt` by the trapezoidal rule.
+    /// Returns `J = ∫ [k_e (y_des - y)² + k_a ÿ²] dt` by the trapezoidal rule.
     ///
     /// # Shapes
-    /// - all three slices: `n_samples * n_axes`, equal in length; the squares of all axes are added
+    /// - all three slices: `n_samples * n_axes`, equal in length; the squares of all axes are
+    ///   summed
     /// # Errors
-    /// [`TrajectoryError::Shape`] for a weight or sample time that is not a number of its range, or
-    /// for slices of different lengths.
+    /// [`TrajectoryError::Shape`] for a weight or sample time out of range, or slices of different
+    /// lengths.
     /// # Source
     /// - [dimarco2016], Eq. 2.19
     pub fn of(
@@ -63,7 +64,7 @@ impl TrackingIndex {
         Ok(index)
     }
 
-    /// `J`.
+    /// Returns `J`.
     pub fn total(&self) -> f64 {
         self.tracking + self.acceleration
     }

@@ -1,7 +1,8 @@
-//! The windows of a blended path: verified against the limits, with a remedy where none holds.
+//! The windows of a blended path: verified against the limits, with a proposal if they are
+//! violated.
 //!
-//! The set points are generated once, as the loop will generate them, and their finite differences
-//! over the cycle are compared with the limits: nothing is estimated.
+//! The set points are generated once, exactly as in the loop, and their finite differences over the
+//! cycle are compared with the limits: nothing is estimated.
 
 use super::spec::feed_max_m_s;
 use crate::interpolate::blend::Blend;
@@ -13,10 +14,10 @@ use crate::trajectory::verify::{Differences, ROWS_AFTER, TOLERANCE, rounding_noi
 
 /// Longest blend window.
 const WINDOW_MAX_S: f64 = 10.0;
-/// Steps of each bracketing search for a remedy.
+/// Steps of each bracketing search for a proposal.
 const SEARCH_STEPS: usize = 12;
 
-/// A limit that the set points break.
+/// A violated limit.
 #[derive(Clone, Copy, Debug)]
 struct Excess {
     axis: usize,
@@ -25,7 +26,7 @@ struct Excess {
     limit: f64,
 }
 
-/// The legs of a path to blend, the time at which they begin, and their limits.
+/// The legs of a path to blend, their start time, and their limits.
 pub(in crate::trajectory) struct BlendedPath<'a> {
     pub(in crate::trajectory) legs: &'a [Leg],
     pub(in crate::trajectory) start_s: f64,
@@ -34,11 +35,12 @@ pub(in crate::trajectory) struct BlendedPath<'a> {
 }
 
 impl BlendedPath<'_> {
-    /// Finds the second window for which every limit holds, as short as a bracketing search finds
-    /// it, and gives the plan with the tick at which it is at rest at its end.
+    /// Finds a second window that satisfies every limit, as short as a bracketing search finds it,
+    /// and returns the plan with the tick at which it is at rest at its end.
     ///
     /// # Errors
-    /// [`TrajectoryError::Exceeds`] with the worst excess and the feed and window that would do.
+    /// [`TrajectoryError::Exceeds`] with the worst violation and the largest feed and shortest
+    /// window that satisfy the limits.
     pub(in crate::trajectory) fn plan(
         &self,
         window_s: f64,
@@ -60,7 +62,7 @@ impl BlendedPath<'_> {
         self.candidate(window, holds)
     }
 
-    /// The plan for a pair of windows, and the tick at which it is at rest at its end.
+    /// Returns the plan for a pair of windows, and the tick at which it is at rest at its end.
     fn candidate(&self, window: usize, rounding: usize) -> Result<(Blend, usize), TrajectoryError> {
         let blend = Blend::plan(
             self.legs,
@@ -73,7 +75,8 @@ impl BlendedPath<'_> {
         Ok((blend, rest_tick))
     }
 
-    /// The worst excess of a pair of windows, relative to its limit; none if every limit holds.
+    /// Returns the worst violation of a pair of windows, relative to its limit; `None` if every
+    /// limit is satisfied.
     fn excess(&self, window: usize, rounding: usize) -> Result<Option<Excess>, TrajectoryError> {
         let (mut blend, rest_tick) = self.candidate(window, rounding)?;
         let peaks = peaks(&mut blend, self.limits.len(), rest_tick, self.cycle_s);
@@ -93,7 +96,7 @@ impl BlendedPath<'_> {
         Ok(worst)
     }
 
-    /// The error with what would help; both remedies are themselves proven before they are named.
+    /// Returns the error with proposals; both are verified first.
     fn refusal(&self, excess: Excess, window: usize) -> TrajectoryError {
         let Excess { axis, quantity, reached, limit } = excess;
         let feed_factor = self.feed_factor(limit / reached, window);
@@ -116,7 +119,8 @@ impl BlendedPath<'_> {
         matches!(BlendedPath { legs: &legs, ..*self }.excess(window, window), Ok(None))
     }
 
-    /// The largest factor on all feeds that holds every limit, from below; 0 if none is found.
+    /// Returns the largest factor on all feeds that satisfies every limit, from below; 0 if none is
+    /// found.
     fn feed_factor(&self, guess: f64, window: usize) -> f64 {
         let (mut holds, mut broken) = (guess * (1.0 - TOLERANCE), 1.0);
         let mut attempts = 0;
@@ -138,8 +142,8 @@ impl BlendedPath<'_> {
         matches!(self.excess(window, window), Ok(None))
     }
 
-    /// A longer window that holds every limit; none up to the longest one allowed, and none if a
-    /// segment by itself is too fast for an axis, as averaging does not slow a straight line down.
+    /// Returns a longer window that satisfies every limit; `None` if the longest one does not, or
+    /// if a segment alone is too fast for an axis, as averaging does not slow down a straight line.
     fn window_ticks(&self, window: usize, ratio: f64) -> Option<usize> {
         for leg in self.legs {
             let path = leg.element.limits(self.limits, leg.feed_m_s);
@@ -190,7 +194,7 @@ fn peaks(blend: &mut Blend, n_axes: usize, rest_tick: usize, cycle_s: f64) -> Pe
     peaks
 }
 
-/// A window as whole cycles, rounded up.
+/// Converts a window to whole cycles, rounded up.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

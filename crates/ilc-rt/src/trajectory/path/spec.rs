@@ -9,33 +9,33 @@ use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::grid::{CYCLE_S, DWELL_MAX_S, check_time};
 use crate::trajectory::verify::TOLERANCE;
 
-/// Farthest position of a plan; the blend's fixed-point numbers hold it with room to spare.
+/// Farthest position of a plan; within the range of the blend's fixed-point numbers.
 pub(in crate::trajectory) const POSITION_MAX_M: f64 = 4096.0;
 
 /// A move along a line or an arc.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathSegment {
-    /// End point, one coordinate an axis.
+    /// End point, one coordinate per axis.
     pub to_m: Vec<f64>,
-    /// Speed along the segment.
+    /// Feed along the segment.
     pub feed_m_s: f64,
     /// The arc; `None` for a line.
     pub arc: Option<ArcSpec>,
-    /// Rest at its end.
+    /// Dwell at its end.
     pub dwell_s: f64,
 }
 
 impl PathSegment {
-    /// A straight move without rest.
+    /// Returns a straight move without dwell.
     pub fn line(to_m: Vec<f64>, feed_m_s: f64) -> Self {
         Self { to_m, feed_m_s, arc: None, dwell_s: 0.0 }
     }
 }
 
-/// An arc in the plane of two axes; the others go along in proportion.
+/// An arc in the plane of two axes; the other axes move in proportion (helix).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArcSpec {
-    /// The two axes; anticlockwise is from the first to the second.
+    /// The two axes; counter-clockwise is from the first to the second.
     pub plane: [usize; 2],
     /// Centre, in the two axes.
     pub center_m: [f64; 2],
@@ -46,16 +46,16 @@ pub struct ArcSpec {
 /// A run from rest to rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathSpec {
-    /// Start, one coordinate an axis.
+    /// Start, one coordinate per axis.
     pub start_m: Vec<f64>,
     /// Moves in order.
     pub segments: Vec<PathSegment>,
     /// Length of the window within which corners are rounded at the feed, in whole cycles rounded up;
     /// `None` to come to rest at every corner, with the feed as an upper bound.
     pub blend_s: Option<f64>,
-    /// Rest at the start that belongs to the run.
+    /// Dwell at the start, part of the run.
     pub dwell_before_s: f64,
-    /// Rest at the end that belongs to the run.
+    /// Dwell at the end, part of the run.
     pub dwell_after_s: f64,
 }
 
@@ -63,7 +63,7 @@ impl PathSpec {
     /// Checks every value, and returns each segment as a leg.
     ///
     /// # Errors
-    /// [`TrajectoryError`] for the first value that is out of its range.
+    /// [`TrajectoryError`] for the first value out of range.
     pub(in crate::trajectory) fn legs(
         &self,
         limits: &[AxisLimits],
@@ -78,12 +78,12 @@ impl PathSpec {
         checked_legs(&self.start_m, &self.segments, limits)
     }
 
-    /// Refuses feeds at which an axis would have to be faster than it may: a plan with exact stops
-    /// would be slower instead. Segments that are `rapid` are not looked at.
+    /// Refuses feeds at which an axis would exceed its velocity limit; a plan with exact stops
+    /// would silently be slower. `rapid` segments are skipped.
     ///
     /// # Errors
-    /// [`TrajectoryError::Exceeds`] for the axis that a feed is most too high for, with the factor on
-    /// every feed that would do; others for values out of range.
+    /// [`TrajectoryError::Exceeds`] for the axis whose limit is exceeded most, with the admissible
+    /// factor on every feed; others for values out of range.
     pub fn check_feeds(
         &self,
         limits: &[AxisLimits],
@@ -165,7 +165,7 @@ fn checked_legs(
     Ok(legs)
 }
 
-/// The feed of the fastest leg.
+/// Returns the feed of the fastest leg.
 pub(super) fn feed_max_m_s(legs: &[Leg]) -> f64 {
     legs.iter().fold(0.0, |highest, leg| highest.max(leg.feed_m_s))
 }
@@ -186,7 +186,7 @@ pub(in crate::trajectory) fn checked_lines(
         .collect()
 }
 
-/// Refuses a number of axes or limits that cannot be, and limits that are not positive.
+/// Refuses an invalid number of axes or limits, and limits that are not positive.
 pub(in crate::trajectory) fn check_limits(
     n_axes: usize,
     limits: &[AxisLimits],
@@ -203,7 +203,7 @@ pub(in crate::trajectory) fn check_limits(
     Ok(())
 }
 
-/// A point in the array of the tick; unused axes are 0.
+/// Returns a point as an array of all axes; unused axes are 0.
 pub(in crate::trajectory) fn point(
     coordinates_m: &[f64],
 ) -> Result<[f64; MAX_AXES], TrajectoryError> {

@@ -63,7 +63,7 @@ fn assert_holds(plan: &Interpolator, limits: &[AxisLimits], what: &str) {
 fn the_example_contour_is_blended_at_its_feed() {
     let plan = Interpolator::plan(&contour(Some(0.04), 0.1), &gantry(), CYCLE_S).unwrap();
     assert_holds(&plan, &gantry(), "contour");
-    // 268.28 mm at 0.1 m/s, two rests, and a little more than the window.
+    // 268.28 mm at 0.1 m/s, two dwells, and slightly more than the window.
     let motion_s = 0.268_284_27 / 0.1 + 0.3 + 0.04;
     let lasts_s = (plan.n_samples() - 1) as f64 * CYCLE_S;
     assert!((lasts_s - motion_s).abs() < 0.015, "{lasts_s} s");
@@ -72,7 +72,8 @@ fn the_example_contour_is_blended_at_its_feed() {
     assert!((found[0] - 0.1).abs() < 1e-9, "the feed is kept on the straight");
     assert!((found[1] - 2.5).abs() < 1e-6, "0.1 m/s in 40 ms");
     assert!((found[2] - 625.0).abs() < 1e-3, "two ticks are the shortest second window that does");
-    // A right corner is cut by feed * window / 4 / sqrt(2) at most, and a little for the second.
+    // A right-angled corner is cut by at most feed * window / 4 / sqrt(2), plus a little for the
+    // second.
     let nearest = |x: f64, y: f64| {
         reference.chunks(2).map(|p| (p[0] - x).hypot(p[1] - y)).fold(f64::INFINITY, f64::min)
     };
@@ -158,7 +159,7 @@ fn velocities_are_the_slope_of_the_positions() {
         let setpoints: Vec<Setpoint> = (0..plan.n_samples()).map(|_| plan.next()).collect();
         for around in setpoints.windows(3) {
             let slope = (around[2].position_m[0] - around[0].position_m[0]) / (2.0 * CYCLE_S);
-            // A jerk of 1000 m/s3 bends the slope by j dt^2 / 6 at most.
+            // A jerk of 1000 m/s3 changes the slope by at most j dt^2 / 6.
             assert!((around[1].velocity_m_s[0] - slope).abs() < 1e-3, "{around:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! One block of a part program: its words, each at most once, and of each modal group one.
+//! One block of a part program: its words, each letter at most once, and one word per modal group.
 
 use super::code::{CODES, Code, Motion, code, tenths};
 use super::error::GcodeError;
@@ -10,7 +10,7 @@ pub(super) const AXES: [u8; 6] = *b"XYZABC";
 /// Largest number of a word.
 const NUMBER_MAX: f64 = 1e9;
 
-/// A word: its number, and how it is written.
+/// A word: its number, and its spelling.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Word<'a> {
     pub(super) number: f64,
@@ -32,7 +32,7 @@ pub(super) struct Block<'a> {
     pub(super) incremental: Option<bool>,
     pub(super) ends: bool,
     words: [Option<Word<'a>>; 26],
-    /// The groups of which there is a word.
+    /// The modal groups with a word, as bits.
     groups: u32,
     /// The motion word, or the first word of all.
     head: &'a [u8],
@@ -44,10 +44,10 @@ impl<'a> Block<'a> {
         Self { line, ..Self::default() }
     }
 
-    /// Adds a word; `exact` tells whether the path comes to rest at its corners.
+    /// Adds a word; `exact` is true if the path comes to rest at its corners.
     ///
     /// # Errors
-    /// [`GcodeError`] for a word that is not understood, or stands twice.
+    /// [`GcodeError`] for a word that is unknown or repeated.
     pub(super) fn take(&mut self, token: &Token<'a>, exact: bool) -> Result<(), GcodeError> {
         let letter = token.text[0].to_ascii_uppercase();
         let refuse = |allowed: String| {
@@ -64,7 +64,7 @@ impl<'a> Block<'a> {
         if !b"GMNFSTPIJKR".contains(&letter) && !AXES.contains(&letter) {
             return refuse("allowed words: G M X Y Z A B C I J K R F P S T N".to_owned());
         }
-        // Blanks do not count; the tokens have nothing else that is not ASCII.
+        // Blanks are ignored; the tokens contain no other non-ASCII characters.
         let digits: String = token.text[1..]
             .iter()
             .filter(|b| b.is_ascii_graphic())
@@ -159,13 +159,13 @@ impl<'a> Block<'a> {
         letters.iter().any(|&letter| self.word(letter).is_some())
     }
 
-    /// The refusal of a word of this block.
+    /// Returns the refusal of a word of this block.
     pub(super) fn refuse(&self, letter: u8, allowed: impl Into<String>) -> GcodeError {
         let written = self.word(letter).map_or(self.head, |word| word.text);
         GcodeError { line: self.line, word: shown(written), allowed: allowed.into() }
     }
 
-    /// The refusal of the block as a whole, told by its motion or its first word.
+    /// Returns the refusal of the whole block, named by its motion or its first word.
     pub(super) fn refuse_all(&self, allowed: impl Into<String>) -> GcodeError {
         GcodeError { line: self.line, word: shown(self.head), allowed: allowed.into() }
     }

@@ -13,7 +13,7 @@ pub(super) enum Motion {
     Arc { clockwise: bool },
 }
 
-/// A G or M word that is understood.
+/// A supported G or M word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Code {
     /// G0 to G3.
@@ -26,7 +26,7 @@ pub(super) enum Code {
     Inches(bool),
     /// G91 (true) or G90.
     Incremental(bool),
-    /// G61 and G61.1 (true) or G64: whether each corner is reached exactly.
+    /// G61 and G61.1 (true) or G64: exact stops at corners.
     ExactCorners(bool),
     /// M2 or M30.
     End,
@@ -46,7 +46,7 @@ pub(super) fn code(letter: u8, tenths: u32) -> Option<(Code, u32)> {
         (b'G', 20 | 30) => (Move(Motion::Arc { clockwise: tenths == 20 }), 1),
         (b'G', 800) => (NoMotion, 1),
         (b'G', 40) => (Dwell, 0),
-        // No offset of the axes is ever set.
+        // No axis offset is ever set.
         (b'G', 921 | 922) => (AsItIs, 0),
         (b'G', 170) => (AsItIs, 2),
         (b'G', 900 | 910) => (Incremental(tenths == 910), 3),
@@ -55,9 +55,9 @@ pub(super) fn code(letter: u8, tenths: u32) -> Option<(Code, u32)> {
         (b'G', 200 | 210) => (Inches(tenths == 200), 6),
         (b'G', 400) => (AsItIs, 7),
         (b'G', 490) => (AsItIs, 8),
-        // Canned cycles, whose return level these are, are refused.
+        // Canned cycles, whose return level these set, are refused.
         (b'G', 980 | 990) => (AsItIs, 10),
-        // The first work coordinates, which are those of the machine.
+        // The first work coordinate system, which is that of the machine.
         (b'G', 540) => (AsItIs, 12),
         (b'G', 610 | 611 | 640) => (ExactCorners(tenths != 640), 13),
         (b'G', 970) => (AsItIs, 14),
@@ -71,8 +71,8 @@ pub(super) fn code(letter: u8, tenths: u32) -> Option<(Code, u32)> {
     })
 }
 
-/// The number of a G or M word in tenths: `1`, `01`, `1.`, `1.0` and `+1` are 10. None for what is
-/// below 0, has a second place after the point, or is longer than any.
+/// Parses the number of a G or M word to tenths: `1`, `01`, `1.`, `1.0` and `+1` are 10. `None` for
+/// a negative number, a second decimal, or too many digits.
 pub(super) fn tenths(number: &str) -> Option<u32> {
     let number = number.strip_prefix('+').unwrap_or(number);
     let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
@@ -83,7 +83,7 @@ pub(super) fn tenths(number: &str) -> Option<u32> {
     let whole = whole.trim_start_matches('0');
     let tenth = match fraction.trim_start_matches('0') {
         "" => 0,
-        // `90.10` is not written for `90.1` by anyone who means it.
+        // `90.10` is no usual spelling of `90.1`.
         _ if fraction.len() == 1 => fraction.parse().ok()?,
         _ => return None,
     };

@@ -1,4 +1,4 @@
-//! The refusal of a part program.
+//! Error of a part program.
 
 /// A refused program: the line from 1, the word, and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

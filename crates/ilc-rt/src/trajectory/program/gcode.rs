@@ -1,5 +1,5 @@
-//! A subset of G-code (RS274/NGC) as LinuxCNC reads it: lines, arcs in the XY plane, dwells, units,
-//! absolute and incremental. What is not understood is refused where it stands.
+//! A subset of G-code (RS274/NGC) as interpreted by LinuxCNC: lines, arcs in the XY plane, dwells,
+//! units, absolute and incremental. Unsupported words are refused with their line.
 
 use super::block::Block;
 use super::error::GcodeError;
@@ -8,13 +8,13 @@ use super::part_program::{GcodeProgram, GcodeSetting};
 use super::text::{shown, without_mark};
 use super::token::{Kind, Token, Tokens};
 
-/// Reads a program: UTF-8 or any encoding that continues ASCII, as comments may hold any bytes.
+/// Reads a program: UTF-8 or any extension of ASCII, as comments may hold any bytes.
 ///
 /// A program that begins with `%` ends with the next `%`; any program ends with M2 or M30, or with
-/// the text. What follows its end is not read.
+/// the text. The text after its end is ignored.
 ///
 /// # Errors
-/// [`GcodeError`] for the first word that is not understood, or not allowed where it is.
+/// [`GcodeError`] for the first word that is unsupported, or not allowed in its place.
 pub fn read_gcode(text: &[u8], setting: &GcodeSetting) -> Result<GcodeProgram, GcodeError> {
     let text = without_mark(text).map_err(|reason| GcodeError {
         line: 1,
@@ -52,11 +52,11 @@ pub fn read_gcode(text: &[u8], setting: &GcodeSetting) -> Result<GcodeProgram, G
 /// End of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ended {
-    /// With its line.
+    /// At the end of its line.
     Line,
-    /// With the text.
+    /// At the end of the text.
     Text,
-    /// It is the `%` that ends the program.
+    /// At the `%` that ends the program.
     Program,
 }
 
@@ -112,7 +112,7 @@ fn read_block<'a>(
     Ok((block, Ended::Text))
 }
 
-/// The refusal of a character that begins no word.
+/// Returns the refusal of a character that begins no word.
 fn stray(token: &Token) -> GcodeError {
     let allowed = match token.text[0] {
         b'#' | b'=' | b'<' | b'>' => "parameters are not read: write a number after the letter",

@@ -1,6 +1,6 @@
-//! Programs as text: part programs that say where the tool goes, and tables of set points. Cold.
+//! Programs as text: part programs, and tables of set points. Cold.
 //!
-//! Both are read from bytes, whatever they are: what cannot be meant is refused with its line.
+//! Both are read from arbitrary bytes: invalid text is refused with its line.
 
 mod block;
 mod code;

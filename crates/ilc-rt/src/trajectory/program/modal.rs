@@ -11,23 +11,23 @@ use crate::trajectory::path::{ArcSpec, POSITION_MAX_M, PathSegment, point};
 /// Millimetres and inches.
 const MM_M: f64 = 1e-3;
 const INCH_M: f64 = 0.0254;
-/// Most moves of a program.
+/// Largest number of moves of a program.
 const MOVES_MAX: usize = 250_000;
 /// Longest dwell.
 const DWELL_MAX_S: f64 = 3600.0;
-/// Tolerance on a radius that is too short whatever its decimals are, as in LinuxCNC, and the
-/// most that they can explain.
+/// Tolerance on a radius that is too short regardless of its decimals, as in LinuxCNC, and the
+/// largest one that they can explain.
 const SHORT_M: f64 = 1.27e-6;
 const SHORT_MAX_M: f64 = 1.27e-5;
 /// Worst effect on half a chord of rounding the last decimal of end points and radius.
 const ROUNDED: f64 = 0.5 + std::f64::consts::FRAC_1_SQRT_2;
 
-/// The speed of G1 to G3.
+/// The feed of G1 to G3.
 #[derive(Clone, Copy, Debug)]
 enum Feed {
     /// Along the whole path, until the first F.
     Path(f64),
-    /// Of the linear axes, or of the rotary ones where they move alone.
+    /// Of the linear axes, or of the rotary ones if only they move.
     Programmed { linear_m_s: f64, rotary_rad_s: f64 },
 }
 
@@ -56,10 +56,10 @@ impl<'a> Modal<'a> {
         }
     }
 
-    /// Carries out one block.
+    /// Executes one block.
     ///
     /// # Errors
-    /// [`GcodeError`] for a word that is not allowed where it is.
+    /// [`GcodeError`] for a word that is not allowed in its place.
     pub(super) fn block(&mut self, block: &Block) -> Result<(), GcodeError> {
         if let Some(feed) = block.number(b'F') {
             if feed <= 0.0 {
@@ -95,7 +95,7 @@ impl<'a> Modal<'a> {
         Ok(())
     }
 
-    /// `G4 P`, in seconds.
+    /// Executes `G4 P`, in seconds.
     fn dwell(&mut self, block: &Block) -> Result<(), GcodeError> {
         match block.number(b'P') {
             Some(seconds) if (0.0..=DWELL_MAX_S).contains(&seconds) => {
@@ -165,8 +165,8 @@ impl<'a> Modal<'a> {
         Ok(())
     }
 
-    /// The speed along the path of all axes at which those that F counts have it: the linear axes,
-    /// or, where none of them moves, the rotary ones.
+    /// Returns the speed along the path of all axes for a feed of the linear axes, or, if none of
+    /// them moves, of the rotary ones.
     fn feed_along(&self, to_m: &[f64], arc: Option<ArcSpec>) -> f64 {
         let (linear_m_s, rotary_rad_s) = match self.feed {
             Feed::Path(feed_m_s) => return feed_m_s,
@@ -194,7 +194,8 @@ impl<'a> Modal<'a> {
         }
     }
 
-    /// The centre, from I and J (from the start) or from R (below 0 for the longer way round).
+    /// Returns the centre, from I and J (relative to the start) or from R (below 0 for the longer
+    /// way round).
     fn arc(&self, block: &Block, to_m: &[f64], clockwise: bool) -> Result<ArcSpec, GcodeError> {
         let (&[x, y, ..], &[to_x, to_y, ..]) = (&self.position_m[..], to_m) else {
             return Err(block.refuse_all("arcs need two axes"));
@@ -246,20 +247,20 @@ impl<'a> Modal<'a> {
             );
             return Err(block.refuse(b'R', allowed));
         }
-        // A radius that is as short as rounding explains is that of a semicircle.
+        // A radius short of a semicircle by no more than rounding means a semicircle.
         let reach_m = (radius_m.abs() - half_m).max(0.0) * (radius_m.abs() + half_m);
         let side = if clockwise { -1.0 } else { 1.0 } * radius_m.signum();
         let height = side * reach_m.sqrt() / (2.0 * half_m);
         Ok([0.5 * (x + to_x) - dy * height, 0.5 * (y + to_y) + dx * height])
     }
 
-    /// How much shorter than half the chord a radius may be: what the last decimal that is written
+    /// Returns the largest shortfall of a radius from half the chord that the last decimal written
     /// in the block explains.
     fn short_m(&self, block: &Block) -> f64 {
         let words = [b'X', b'Y', b'R'].into_iter().filter_map(|letter| block.word(letter));
         let places = words.map(|word| word.places).max().unwrap_or(0);
         let last_m = self.unit_m * 0.1_f64.powi(i32::try_from(places).unwrap_or(i32::MAX));
-        // Numbers without decimals are meant as they are.
+        // Numbers without decimals are taken as exact.
         if places < 2 { SHORT_M } else { (ROUNDED * last_m).clamp(SHORT_M, SHORT_MAX_M) }
     }
 }

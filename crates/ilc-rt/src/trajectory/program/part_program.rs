@@ -1,8 +1,8 @@
-//! A part program as it is read: the setting that it is read with, and the moves that come out.
+//! A part program after reading: its settings and its moves.
 
 use crate::trajectory::path::PathSegment;
 
-/// The setting that a program is read with.
+/// The settings for reading a program.
 #[derive(Clone, Copy, Debug)]
 pub struct GcodeSetting<'a> {
     /// Start, one coordinate an axis: X Y Z A B C are the first six.
@@ -15,7 +15,7 @@ pub struct GcodeSetting<'a> {
     pub rotary: &'a [bool],
     /// True if the path comes to rest at its corners (G61, G61.1), false if it rounds them (G64).
     pub exact_corners: bool,
-    /// Leaves out blocks that begin with `/`; LinuxCNC's switch is off at first.
+    /// Skips blocks that begin with `/`; LinuxCNC's switch is off by default.
     pub block_delete: bool,
 }
 
@@ -28,6 +28,6 @@ pub struct GcodeProgram {
     pub lines: Vec<usize>,
     /// True for each move that is rapid (G0).
     pub rapid: Vec<bool>,
-    /// Rest before the first move.
+    /// Dwell before the first move.
     pub dwell_before_s: f64,
 }

@@ -1,12 +1,12 @@
-//! Set points as text: one row a servo cycle, one column an axis, separated by commas. Cold.
+//! Set points as text: one row per servo cycle, one column per axis, separated by commas. Cold.
 //!
-//! The campaign reads the file of `kind = "table"` with it. A head line is optional; where there is
-//! one it must name the axes in order, so that exchanged columns are refused instead of driven.
+//! The campaign reads the file of `kind = "table"` with it. A header line is optional; if present
+//! it must name the axes in order, so that swapped columns are refused instead of driven.
 
 use super::text::{shown, without_mark};
 use crate::trajectory::grid::N_SAMPLES_MAX;
 
-/// A refused table: the line from 1, what is there, and what is allowed.
+/// A refused table: the line from 1, its content, and the allowed one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {found}: {allowed}")]
 pub struct TableError {
@@ -18,7 +18,7 @@ pub struct TableError {
     pub allowed: String,
 }
 
-/// Set points, and where they stand in the text.
+/// Set points with their lines in the text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SetPointTable {
     /// Positions, `n_rows * n_axes`, time first.
@@ -27,13 +27,13 @@ pub struct SetPointTable {
     pub lines: Vec<usize>,
 }
 
-/// Reads a table of set points; `#` begins a comment, and lines without set points are passed over.
+/// Reads a table of set points; `#` begins a comment, and lines without set points are skipped.
 ///
-/// The text is UTF-8, with or without its mark; comments may hold any bytes.
+/// The text is UTF-8, with or without a byte order mark; comments may hold any bytes.
 ///
 /// # Errors
-/// [`TableError`] for the first line that has not one finite number for each axis, for a head line
-/// with other names, and for more than ten million rows.
+/// [`TableError`] for the first line without exactly one finite number per axis, for a header with
+/// other names, and for more than ten million rows.
 pub fn read_table(text: &[u8], axis_names: &[&str]) -> Result<SetPointTable, TableError> {
     let mut table = SetPointTable::default();
     let text = without_mark(text).map_err(|reason| TableError {
@@ -100,7 +100,7 @@ pub fn read_table(text: &[u8], axis_names: &[&str]) -> Result<SetPointTable, Tab
     Ok(table)
 }
 
-/// Lines that end with `\n`, `\r\n` or `\r`.
+/// Splits at `\n`, `\r\n` or `\r`.
 fn lines(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = Some(text);
     std::iter::from_fn(move || {
@@ -115,7 +115,7 @@ fn lines(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     })
 }
 
-/// A cell without the quotation marks that some programs put around it.
+/// Removes the quotation marks that some programs put around a cell.
 fn bare(cell: &str) -> &str {
     cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')).unwrap_or(cell)
 }

@@ -1,9 +1,9 @@
 //! Encoding of program files, and the form in which a piece of one is shown.
 
-/// Most characters of the text that a refusal shows.
+/// Largest number of characters of the text in a refusal.
 const SHOWN_MAX: usize = 40;
 
-/// The text behind a byte order mark of UTF-8, which editors and spreadsheets put in front.
+/// Removes a byte order mark of UTF-8, as written by editors and spreadsheets.
 ///
 /// # Errors
 /// Refusal of a text in UTF-16 or UTF-32.
@@ -20,7 +20,7 @@ pub(super) fn without_mark(text: &[u8]) -> Result<&[u8], &'static str> {
     Ok(text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text))
 }
 
-/// A piece of the text in one line and without control characters, as an error shows it.
+/// Returns a piece of the text in one line and without control characters, for an error.
 pub(super) fn shown(text: &[u8]) -> String {
     let text = String::from_utf8_lossy(&text[..text.len().min(8 * SHOWN_MAX)]);
     let mut shown = String::new();

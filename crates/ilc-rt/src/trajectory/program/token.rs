@@ -1,8 +1,8 @@
-//! The tokens of a part program. They lose nothing: one after the other they are the text.
+//! The tokens of a part program. Lossless: concatenated they are the text.
 //!
 //! A word is a letter and its number; blanks may stand anywhere in it, as in RS274/NGC, where
-//! `G0 x +0. 12 34y 7` is `G0 X0.1234 Y7`. What cannot be a token of the language is one of its own
-//! kind, so that the reader refuses it where it stands.
+//! `G0 x +0. 12 34y 7` is `G0 X0.1234 Y7`. Invalid characters are a token of their own kind, so
+//! that the reader refuses them with their line.
 
 /// Kind of a token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub(super) enum Kind {
     LineEnd,
     /// `( … )` or `; …` to the end of the line.
     Comment,
-    /// `( …` that does not end in its line.
+    /// `( …` without its end in the line.
     OpenComment,
     /// `( … (`: comments do not nest.
     NestedComment,
@@ -48,7 +48,7 @@ impl<'a> Tokens<'a> {
         Self { rest: text, line: 1 }
     }
 
-    /// The line that is being read, from 1.
+    /// Returns the current line, from 1.
     pub(super) fn line(&self) -> usize {
         self.line
     }
@@ -67,7 +67,7 @@ impl<'a> Iterator for Tokens<'a> {
     }
 }
 
-/// Kind and length of the first token.
+/// Returns kind and length of the first token.
 fn first(text: &[u8]) -> Option<(Kind, usize)> {
     let found = match *text.first()? {
         b'\r' if text.get(1) == Some(&b'\n') => (Kind::LineEnd, 2),
@@ -78,7 +78,7 @@ fn first(text: &[u8]) -> Option<(Kind, usize)> {
         b'%' => (Kind::Percent, 1),
         b'/' => (Kind::Slash, 1),
         byte if byte.is_ascii_alphabetic() => (Kind::Word, word(text)),
-        // A character of several bytes stays whole, to be shown.
+        // A multi-byte character stays whole, for display.
         byte if byte >= 0xc0 => (Kind::Stray, 1 + count(&text[1..], |next| next & 0xc0 == 0x80)),
         _ => (Kind::Stray, 1),
     };
@@ -94,7 +94,8 @@ fn comment(text: &[u8]) -> (Kind, usize) {
     }
 }
 
-/// Length of a letter and its number: a sign, then digits with at most one point, blanks among them.
+/// Returns the length of a letter and its number: a sign, then digits with at most one point, with
+/// blanks among them.
 fn word(text: &[u8]) -> usize {
     let (mut length, mut number, mut point) = (1, false, false);
     for (at, &byte) in text.iter().enumerate().skip(1) {

@@ -1,3 +1,3 @@
-//! Promises that every kind of trajectory keeps.
+//! Tests of the guarantees of every kind of trajectory.
 
 mod promises;

@@ -1,5 +1,5 @@
-//! The promise of the whole folder: over more than a million random moves of every kind no limit is
-//! exceeded beyond 1e-9 of itself, nothing is not a number, and nothing lasts less than no time.
+//! The guarantee of the whole folder: over more than a million random moves of every kind no limit
+//! is exceeded by more than 1e-9 of itself, every value is finite, and no duration is negative.
 
 use crate::interpolate::random::Random;
 use crate::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
@@ -122,7 +122,7 @@ fn random_exponential_sigmoid_moves() {
                     assert_state(&plan.at(t), &limits, &(t, &program, &limits));
                 }
                 for choice in plan.choices() {
-                    // Dense where the ends are felt.
+                    // Dense where the ends have an effect.
                     let corner_s = if choice.place == "start-up" { 0.0 } else { duration_s };
                     for k in 0..500 {
                         let t = (corner_s - duration_s * 0.2 * f64::from(k) / 500.0).abs();

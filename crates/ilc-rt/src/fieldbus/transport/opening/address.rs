@@ -1,4 +1,4 @@
-//! Bus addresses as they stand in a cell description or on a command line.
+//! Bus addresses in a cell description or on a command line.
 
 use std::str::FromStr;
 
@@ -7,7 +7,7 @@ use super::error::OpenError;
 use super::scheme::{Parts, Place, Scheme};
 use crate::fieldbus::Bus;
 
-/// A bus address, taken apart and checked.
+/// A parsed and checked bus address.
 #[derive(Debug)]
 pub struct Address {
     scheme: &'static Scheme,
@@ -15,7 +15,7 @@ pub struct Address {
 }
 
 impl Address {
-    /// The kind of bus.
+    /// Returns the kind of bus.
     pub fn scheme(&self) -> &'static Scheme {
         self.scheme
     }
@@ -29,7 +29,7 @@ impl Address {
     ///
     /// # Errors
     /// [`OpenError`]: one line with the address, what is wrong with it and what is allowed. A bus with
-    /// both ends in one process cannot be opened by its address.
+    /// both ends are in one process, so the address alone is not enough.
     pub fn open(&self) -> Result<Box<dyn Bus>, OpenError> {
         self.place.open()
     }
@@ -46,14 +46,14 @@ impl FromStr for Address {
     }
 }
 
-/// The kind of bus that an address names in front of its colon, if there is such a kind.
+/// Returns the kind of bus in front of an address's colon, if it exists.
 pub fn scheme_of(address: &str) -> Option<&'static Scheme> {
     let (name, _) = address.split_once(':')?;
     SCHEMES.into_iter().find(|scheme| scheme.name == name)
 }
 
-/// The syntax of the addresses that are allowed, as a sentence lists them; without those of buses in
-/// one process where a program has no drives in it.
+/// Returns the syntax of the allowed addresses, as a sentence lists them; without in-process buses
+/// for a program without drives.
 pub fn syntaxes(with_in_process: bool) -> String {
     let known = SCHEMES.iter().filter(|scheme| with_in_process || !scheme.in_process);
     let known: Vec<&str> = known.map(|scheme| scheme.syntax).collect();

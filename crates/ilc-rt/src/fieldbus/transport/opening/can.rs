@@ -5,7 +5,7 @@ use super::scheme::{Parts, Place, Scheme};
 use crate::fieldbus::Bus;
 use crate::fieldbus::transport::SocketCan;
 
-/// Longest name of a network interface in Linux (`IFNAMSIZ` without its zero).
+/// Longest name of a network interface in Linux (`IFNAMSIZ` without the terminating zero).
 const INTERFACE_NAME_MAX: usize = 15;
 
 /// A CAN interface of Linux.

@@ -8,13 +8,13 @@ use super::address::syntaxes;
 /// Reason that a bus cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// Not the address of any kind of bus.
+    /// An unknown kind of bus.
     #[error("`{address}` is not a bus address: allowed are {}", syntaxes(true))]
     Scheme {
         /// The address as given.
         address: String,
     },
-    /// A part of the address has a value that is not allowed.
+    /// A part of the address with an invalid value.
     #[error("`{address}`: {part} `{value}` is not allowed: {allowed}")]
     Part {
         /// The address as given.
@@ -26,7 +26,7 @@ pub enum OpenError {
         /// Allowed values of the part.
         allowed: &'static str,
     },
-    /// A bus in one process, by its address.
+    /// An in-process bus, by its address alone.
     #[error(
         "`{address}` cannot be opened by its address alone: its other end lives in the same process, \
          which makes both ends with `loopback::pair` or `loopback::InProcess`"
@@ -35,27 +35,27 @@ pub enum OpenError {
         /// The address as given.
         address: String,
     },
-    /// The kernel has no CAN.
+    /// A kernel without CAN.
     #[error(
         "`can:{interface}`: the kernel of this machine has no CAN (socket family AF_CAN); \
          `tests/vcan/run` provides one for tests, `udp:` and `zenoh:` work without"
     )]
     NoCan {
-        /// Interface asked for.
+        /// Requested interface.
         interface: String,
     },
-    /// No such interface.
+    /// A missing interface.
     #[error(
         "`can:{interface}`: there is no such CAN interface; this machine has {}",
         list(available)
     )]
     NoInterface {
-        /// Interface asked for.
+        /// Requested interface.
         interface: String,
         /// CAN interfaces of this machine.
         available: Vec<String>,
     },
-    /// The operating system refused.
+    /// An error of the operating system.
     #[error("`{address}`: {action} failed: {source}")]
     Os {
         /// The address, as far as it is known.
@@ -65,7 +65,7 @@ pub enum OpenError {
         /// Error of the system.
         source: io::Error,
     },
-    /// Zenoh refused.
+    /// An error of Zenoh.
     #[error("`zenoh:{key}`: {action} failed: {reason}")]
     Zenoh {
         /// Key expression of the bus.
@@ -78,7 +78,7 @@ pub enum OpenError {
 }
 
 impl OpenError {
-    /// Returns the system's error at an address, for hot files, which make no text themselves.
+    /// Returns the system's error at an address, for hot files, which format no text.
     pub(in crate::fieldbus::transport) fn os(
         address: fmt::Arguments<'_>,
         action: &'static str,

@@ -1,10 +1,11 @@
-//! Cold: the kinds of bus there are, their addresses, and the opening of the bus that an address names.
+//! Cold: the kinds of bus, their addresses, and the opening of a bus by its address.
 //!
-//! For `campaign`, the programs and the Python bindings, which know the address and nothing else of a
-//! transport. A new transport is an endpoint beside this folder, a file in it that describes and opens
-//! it, and a line in [`SCHEMES`].
+//! For `campaign`, the programs and the Python bindings, which know nothing but the address. A new
+//! transport is an endpoint beside this folder, a file in it that describes and opens it, and a
+//! line in [`SCHEMES`].
 //!
-//! Family: `address`, `error` and `scheme`: an address is read by its scheme, and refused with the list of them.
+//! Family: `address`, `error` and `scheme`: an address is parsed by its scheme, and rejected with
+//! the list of schemes.
 
 mod address;
 mod can;
@@ -22,10 +23,10 @@ pub use scheme::Scheme;
 pub use zenoh::ZenohSettings;
 pub(super) use zenoh_link::{Ends, Link};
 
-/// All kinds of bus, in the order in which help texts and documents name them.
+/// All kinds of bus, in the order of help texts and documents.
 pub static SCHEMES: [&Scheme; 4] = [&can::SCHEME, &udp::SCHEME, &zenoh::SCHEME, &loopback::SCHEME];
 
-/// Opens the bus that an address names.
+/// Opens a bus by its address.
 ///
 /// # Errors
 /// [`OpenError`]: one line with the address, what is wrong with it and what is allowed.

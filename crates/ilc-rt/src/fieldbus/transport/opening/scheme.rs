@@ -1,4 +1,4 @@
-//! One kind of bus, described once: help texts, errors, documents and Python read it.
+//! The description of a kind of bus, for help texts, errors, documents and Python.
 
 use std::fmt;
 
@@ -7,20 +7,19 @@ use crate::fieldbus::Bus;
 
 /// One kind of bus.
 pub struct Scheme {
-    /// Name in front of the colon of an address.
+    /// Name before the colon of an address.
     pub name: &'static str,
     /// Syntax of an address, its parts in capitals.
     pub syntax: &'static str,
-    /// An address that is allowed.
+    /// A valid address.
     pub example: &'static str,
-    /// Carrier of the frames, in a few words of Markdown.
+    /// Carrier of the frames, as short Markdown.
     pub summary: &'static str,
-    /// True if the bus carries a number of bits in a cycle: its load is checked, and its drives are taken
-    /// for real ones.
+    /// True if the bus has a bit rate: its load is checked, and its drives are assumed to be real.
     pub has_bits: bool,
     /// True if both ends are in one process, so that an address alone opens nothing.
     pub in_process: bool,
-    /// Reads an address of this kind.
+    /// Parses an address of this kind.
     pub(super) parse: fn(&Parts<'_>) -> Result<Box<dyn Place>, OpenError>,
 }
 
@@ -30,7 +29,7 @@ impl fmt::Debug for Scheme {
     }
 }
 
-/// The place that an address names, checked.
+/// A checked place of an address.
 pub(super) trait Place: fmt::Debug {
     /// Opens the bus.
     fn open(&self) -> Result<Box<dyn Bus>, OpenError>;
@@ -48,20 +47,20 @@ pub(super) struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// Splits what follows the colon of an address.
+    /// Splits the part after the colon of an address.
     pub(super) fn new(address: &'a str, rest: &'a str) -> Self {
         let (place, options) = rest.split_once('?').unwrap_or((rest, ""));
         Self { address, place, options }
     }
 
-    /// The options; an endpoint may itself contain `=`, so that only the first one separates.
+    /// Returns the options; an endpoint may itself contain `=`, so only the first one separates.
     pub(super) fn options(self) -> impl Iterator<Item = Result<(&'a str, &'a str), OpenError>> {
         self.options.split('&').filter(|option| !option.is_empty()).map(move |option| {
             option.split_once('=').ok_or_else(|| self.refuse("option", option, "write NAME=VALUE"))
         })
     }
 
-    /// The error for a part with a value that is not allowed.
+    /// Returns the error for a part with an invalid value.
     pub(super) fn refuse(
         &self,
         part: &'static str,

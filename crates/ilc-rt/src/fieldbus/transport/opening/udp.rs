@@ -8,7 +8,7 @@ use crate::fieldbus::Bus;
 use crate::fieldbus::transport::UdpMulticast;
 use crate::fieldbus::transport::udp_multicast::{DEFAULT_PORT, DEFAULT_TTL};
 
-/// A group of UDP multicast.
+/// A UDP multicast group.
 pub(super) static SCHEME: Scheme = Scheme {
     name: "udp",
     syntax: "udp:GROUP[:PORT][?ttl=N]",
@@ -23,7 +23,7 @@ pub(super) static SCHEME: Scheme = Scheme {
 struct Multicast {
     group: Ipv4Addr,
     port: u16,
-    /// Routers that the frames may cross, plus one; 0 keeps them on this host.
+    /// Time-to-live: network hops of the frames; 0 keeps them on this host.
     ttl: u8,
 }
 
@@ -43,7 +43,7 @@ fn parse(parts: &Parts<'_>) -> Result<Box<dyn Place>, OpenError> {
 
 fn read(parts: &Parts<'_>) -> Result<Multicast, OpenError> {
     let place = parts.place;
-    // In brackets or without, with a port or without: only IPv6 has two colons.
+    // With or without brackets, with or without a port: only IPv6 has two colons.
     if place.starts_with('[') || place.matches(':').count() > 1 {
         return Err(parts.refuse("group", place, "an IPv4 group, 224.0.0.0 to 239.255.255.255"));
     }

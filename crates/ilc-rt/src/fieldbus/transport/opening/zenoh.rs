@@ -19,17 +19,17 @@ pub(super) static SCHEME: Scheme = Scheme {
     parse: |parts| Ok(Box::new(ZenohSettings::read(parts)?)),
 };
 
-/// A `zenoh:` address in its parts.
+/// A parsed `zenoh:` address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ZenohSettings {
     /// Key expression of the bus, without wildcards.
     pub key: String,
-    /// Zenoh endpoints to listen on, such as `tcp/127.0.0.1:7447`; if empty, a free port of the
-    /// host's own address.
+    /// Zenoh endpoints to listen on, e.g. `tcp/127.0.0.1:7447`; if empty, a free port of the host's
+    /// own address.
     pub listen: Vec<String>,
     /// Zenoh endpoints to connect to.
     pub connect: Vec<String>,
-    /// True if to look for other endpoints on this host by multicast.
+    /// True to discover other endpoints on this host by multicast.
     pub scouting: bool,
 }
 
@@ -97,7 +97,7 @@ impl ZenohSettings {
     }
 }
 
-/// Returns whether Zenoh takes a text for one key, and `KEY/*` for the keys under it.
+/// Returns true if Zenoh accepts a text as one key, and `KEY/*` as the keys below it.
 fn is_key(text: &str) -> bool {
     let is_part = |part: &str| {
         !part.is_empty()

@@ -1,7 +1,7 @@
-//! The Zenoh side of a `zenoh:` bus: session, publisher's thread and subscriber. Cold.
+//! The Zenoh side of a `zenoh:` bus: session, publisher thread and subscriber. Cold.
 //!
-//! Zenoh allocates and locks, so all of it stays behind the two ring buffers that `transport::zenoh` holds
-//! the other ends of.
+//! Zenoh allocates and locks, so it stays behind two ring buffers; `transport::zenoh` holds their
+//! other ends.
 
 use std::sync::atomic::{AtomicBool, Ordering, fence};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -22,17 +22,17 @@ use crate::fieldbus::transport::doorbell::{Bell, Ringer, bell};
 use crate::fieldbus::transport::queue::{Inbox, Outbox};
 use crate::fieldbus::transport::zenoh::{decode, encode};
 
-/// Frames that a ring buffer holds each way.
+/// Frames per ring buffer.
 const RING_FRAMES: usize = 4096;
 
-/// Period at which [`Link::wait_for_peer`] looks.
+/// Polling period of [`Link::wait_for_peer`].
 const POLL: Duration = Duration::from_millis(1);
 
 /// Time that a peer may leave its frames unread before they are dropped.
 const STALL_US: u32 = 100_000;
 
-/// Multicast group in which endpoints of buses look for each other. Not the one of all Zenoh programs: a
-/// bus shall not be found by what merely watches, and be carried off the host by it.
+/// Multicast group for the discovery of bus endpoints. Not that of all Zenoh programs: a bus must
+/// not be found by a mere monitor, and be carried off the host by it.
 const GROUP: &str = "224.0.0.224:7448";
 
 /// The caller's ends of an open link.
@@ -42,7 +42,7 @@ pub(in crate::fieldbus::transport) struct Ends {
     pub(in crate::fieldbus::transport) link: Link,
 }
 
-/// An open session with its publisher's thread; closes both when dropped.
+/// An open session with its publisher thread; closes both when dropped.
 pub(in crate::fieldbus::transport) struct Link {
     session: Session,
     publisher: Option<JoinHandle<()>>,
@@ -53,16 +53,16 @@ pub(in crate::fieldbus::transport) struct Link {
 #[derive(Debug, Default)]
 struct Shared {
     closing: AtomicBool,
-    /// The publisher sleeps or is about to; set before its last look at the buffer.
+    /// True while the publisher sleeps or is about to; set before its last check of the buffer.
     parked: AtomicBool,
     matched: AtomicBool,
 }
 
 impl Link {
-    /// Opens a session of its own and joins the bus.
+    /// Opens its own session and joins the bus.
     ///
     /// # Errors
-    /// [`OpenError::Zenoh`] with the step that Zenoh refused.
+    /// [`OpenError::Zenoh`] with the failed step.
     pub(in crate::fieldbus::transport) fn open(
         settings: &ZenohSettings,
     ) -> Result<Ends, OpenError> {
@@ -100,7 +100,7 @@ impl Link {
         Ok(Ends { outgoing: Outbox::new(outgoing), incoming: Inbox::new(incoming, bell), link })
     }
 
-    /// Waits until another endpoint receives what is published; false if none did in time.
+    /// Waits until another endpoint receives the published frames; returns false after the timeout.
     pub(in crate::fieldbus::transport) fn wait_for_peer(&self, timeout: Duration) -> bool {
         let end = Instant::now() + timeout;
         while !self.shared.matched.load(Ordering::Acquire) {
@@ -112,10 +112,10 @@ impl Link {
         true
     }
 
-    /// Wakes the publisher if it sleeps; call it after the outgoing buffer was filled. Hot: one fence,
-    /// and a system call only if the publisher does sleep.
+    /// Wakes the publisher if it sleeps; called after the outgoing buffer was filled. Hot: one
+    /// fence, and a system call only if the publisher sleeps.
     pub(in crate::fieldbus::transport) fn wake_publisher(&self) {
-        // Orders the filling before the look at `parked`, against the reverse order in `publish`.
+        // Orders the filling before the read of `parked`, against the reverse order in `publish`.
         fence(Ordering::SeqCst);
         if self.shared.parked.load(Ordering::Relaxed)
             && let Some(publisher) = &self.publisher
@@ -130,7 +130,7 @@ impl Drop for Link {
         self.shared.closing.store(true, Ordering::SeqCst);
         if let Some(publisher) = self.publisher.take() {
             publisher.thread().unpark();
-            // It panics only if Zenoh does, and the bus is going anyway.
+            // It panics only if Zenoh does, and the bus is closing anyway.
             let _ = publisher.join();
         }
         let _ = self.session.close().wait();
@@ -142,17 +142,17 @@ fn config(settings: &ZenohSettings) -> zenoh::Result<zenoh::Config> {
         listen: &settings.listen,
         connect: &settings.connect,
         scouting: settings.scouting,
-        // Endpoints on other hosts are named, never found.
+        // Endpoints on other hosts are given, never discovered.
         scouting_off_host: false,
         group: Some(GROUP),
     };
     let mut config = reach.configuration()?;
     let mut set =
         |key: &str, value: serde_json::Value| config.insert_json5(key, &value.to_string());
-    // Express frames travel one by one, so the queue counts frames; Zenoh takes 16 at most.
+    // Express frames are sent one by one, so the queue counts frames; Zenoh takes 16 at most.
     set("transport/link/tx/queue/size/real_time", 16.into())?;
-    // The publisher's thread may wait where the caller's may not. Beyond this a peer has stalled, and its
-    // frames are dropped so that the others get theirs.
+    // The publisher's thread may wait where the caller's may not. After this time a peer counts as
+    // stalled, and its frames are dropped so that the others receive theirs.
     set("transport/link/tx/queue/congestion_control/drop/wait_before_drop", STALL_US.into())?;
     Ok(config)
 }
@@ -160,7 +160,7 @@ fn config(settings: &ZenohSettings) -> zenoh::Result<zenoh::Config> {
 fn subscribe(session: &Session, key: &str) -> zenoh::Result<(Bell, Consumer<Frame>)> {
     let (ringer, bell) = bell()?;
     let (sink, incoming) = RingBuffer::new(RING_FRAMES);
-    // Zenoh may call from several of its threads; only they ever meet at this lock.
+    // Zenoh may call from several of its threads; only they contend for this lock.
     let sink = Mutex::new((sink, ringer));
     session
         .declare_subscriber(format!("{key}/*"))
@@ -174,7 +174,8 @@ fn subscribe(session: &Session, key: &str) -> zenoh::Result<(Bell, Consumer<Fram
 fn deliver(sink: &Mutex<(Producer<Frame>, Ringer)>, sample: &Sample) {
     if let Some(frame) = decode(&sample.payload().to_bytes()) {
         let mut sink = sink.lock().unwrap_or_else(PoisonError::into_inner);
-        // A receiver that is a whole buffer behind loses the newest, as on any CAN controller.
+        // A receiver that is a whole buffer behind loses the newest frame, as on any CAN
+        // controller.
         if sink.0.push(frame).is_ok() {
             sink.1.ring();
         }
@@ -188,20 +189,20 @@ fn watch_matching(publisher: &Publisher<'_>, shared: &Arc<Shared>) -> zenoh::Res
         .callback(move |status| watched.matched.store(status.matching(), Ordering::Release))
         .background()
         .wait()?;
-    // Subscribers that were there before the listener was.
+    // Subscribers that existed before the listener.
     if publisher.matching_status().wait()?.matching() {
         shared.matched.store(true, Ordering::Release);
     }
     Ok(())
 }
 
-/// Publishes what is sent, in the link's own thread, until the link closes.
+/// Publishes outgoing frames, in the link's own thread, until the link closes.
 fn publish(publisher: &Publisher<'_>, mut to_publish: Consumer<Frame>, shared: &Shared) {
     loop {
         while let Ok(frame) = to_publish.pop() {
             let (bytes, len) = encode(&frame);
             if publisher.put(&bytes[..len]).wait().is_err() {
-                // The session is closed; giving the buffer up closes the bus for the caller.
+                // The session is closed; dropping the buffer closes the bus for the caller.
                 return;
             }
         }

@@ -1,25 +1,27 @@
-//! Reach of a Zenoh session, and bounds on what strangers may take: the settings that every
-//! session of this program has in common. Cold.
+//! Reach of a Zenoh session, and limits on foreign traffic: the settings common to all sessions of
+//! this program. Cold.
 //!
-//! By default nothing leaves the host: a session listens on the host's own address, and looks for others
-//! by multicast on the loopback interface. No session tells its peers of other peers (gossip), unless
-//! its endpoints are all named: what one session knows of this host, another one must not carry off it.
+//! By default nothing leaves the host: a session listens on the host's own address, and discovers
+//! others by multicast on the loopback interface. No session tells its peers of other peers
+//! (gossip), unless its endpoints are all given: knowledge about this host must not be carried off
+//! it by another session.
 
 use serde_json::Value;
 
-/// The address that a session listens on if none is named: a free port that only this host reaches.
+/// The default address of a session: a free port that only this host reaches.
 const HOST_ONLY: &str = "tcp/127.0.0.1:0";
-/// The interface on which sessions of this host find each other.
+/// The interface on which sessions of this host discover each other.
 const HOST_INTERFACE: &str = "127.0.0.1";
-/// Longest message taken from a peer, in bytes: a frame of a bus has ten, and a question of a monitor none.
+/// Longest message accepted from a peer, in bytes: a frame of a bus has ten, and a query of a
+/// monitor none.
 const MESSAGE_MAX: usize = 1 << 16;
-/// Peers at a time.
+/// Largest number of peers at a time.
 const SESSIONS_MAX: usize = 64;
-/// Connections at a time that have not said who they are.
+/// Largest number of connections that are not yet identified.
 const PENDING_MAX: usize = 16;
 /// Longest time of such a connection.
 const ACCEPT_MAX_MS: u64 = 2_000;
-/// Time that a peer that does not read may hold up reliable data before it is dropped.
+/// Time that a peer that does not read may block reliable data before it is dropped.
 const BLOCK_MAX_US: u64 = 1_000_000;
 
 /// Reach of a session.
@@ -29,11 +31,11 @@ pub(crate) struct Reach<'a> {
     pub(crate) listen: &'a [String],
     /// Endpoints to connect to.
     pub(crate) connect: &'a [String],
-    /// True if to look for others by multicast.
+    /// True to discover others by multicast.
     pub(crate) scouting: bool,
     /// True if multicast may leave the host where endpoints are named.
     pub(crate) scouting_off_host: bool,
-    /// Multicast group, if not that of all Zenoh programs.
+    /// Multicast group; `None` for that of all Zenoh programs.
     pub(crate) group: Option<&'a str>,
 }
 
@@ -91,12 +93,12 @@ pub(crate) fn stays_on_host(endpoint: &str) -> bool {
         })
 }
 
-/// Returns what Zenoh says without the places in its own source that it adds.
+/// Returns Zenoh's message without its source locations.
 pub(crate) fn reason(error: &zenoh::Error) -> String {
     without_places(&error.to_string())
 }
 
-/// Takes every ` at FILE.rs:LINE.` out of a text, and line ends.
+/// Removes every ` at FILE.rs:LINE.` and line end from a text.
 fn without_places(text: &str) -> String {
     let mut words = Vec::new();
     for word in text.split_whitespace() {

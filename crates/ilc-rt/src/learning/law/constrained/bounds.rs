@@ -1,19 +1,19 @@
-//! Bounds as the user gives them, and what can be wrong with them.
+//! Bounds as given by the user, and their errors.
 
 use thiserror::Error;
 
 use super::solver::{Band, Bands, Places};
 use crate::learning::LearningError;
 
-/// One side of a bound: for every channel and sample alike, or for each; infinite where there is
+/// One side of a bound: the same for every channel and sample, or for each; infinite where there is
 /// none.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Limit {
     /// The same number everywhere.
     Scalar(f64),
-    /// One number a sample, the same for every channel.
+    /// One number per sample, the same for every channel.
     PerSample(Vec<f64>),
-    /// One number a channel, the same at every sample.
+    /// One number per channel, the same at every sample.
     PerChannel(Vec<f64>),
     /// One number for each sample and channel, time first.
     Full(Vec<f64>),
@@ -30,15 +30,15 @@ pub struct Bound {
 
 /// The bounds of the next run.
 ///
-/// Before the run the input is 0 and the set-point stands at the reference's first value: so the
-/// first sample's step is the input itself, and the first two accelerations start from rest. Where a
-/// run begins otherwise, make the bounds of those samples infinite.
+/// Before the run the input is 0 and the set point is the reference's first value: so the first
+/// sample's step is the input itself, and the first two accelerations start from rest. If a run
+/// begins otherwise, make the bounds of those samples infinite.
 ///
 /// # Units
 /// - those of the input (for the set-point: of the reference, which must be the same), per second
 ///   and per second squared for velocity and acceleration; `output` in those of the output
 /// # Source
-/// - \[haas2016\], section 4: constraints on set points as the way ahead.
+/// - \[haas2016\], section 4: constraints on set points, proposed as future work.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Bounds {
     /// Of the next input `u'`.
@@ -47,26 +47,26 @@ pub struct Bounds {
     pub change: Option<Bound>,
     /// Of the change of the input from sample to sample, `u'[k] - u'[k-1]`.
     pub step: Option<Bound>,
-    /// Of the set-point `r + u'`.
+    /// Of the set point `r + u'`.
     pub position: Option<Bound>,
     /// Of its first difference over the sample time.
     pub velocity: Option<Bound>,
     /// Of its second difference over the square of the sample time.
     pub acceleration: Option<Bound>,
-    /// Of the predicted output `r - z`. Samples that come before the input's first effect are as
-    /// they are.
+    /// Of the predicted output `r - z`. Samples before the input's first effect cannot be changed.
     pub output: Option<Bound>,
-    /// The reference `r` of each input, `n_samples` x `n_inputs`: needed for bounds of the set-point.
+    /// The reference `r` of each input, `n_samples` x `n_inputs`: required for bounds of the set
+    /// point.
     pub reference: Option<Vec<f64>>,
-    /// The reference of each output, `n_samples` x `n_outputs`, if it is not `reference`: one of them
-    /// is needed for bounds of the output.
+    /// The reference of each output, `n_samples` x `n_outputs`, if it differs from `reference`: one
+    /// of them is required for bounds of the output.
     pub output_reference: Option<Vec<f64>>,
 }
 
 /// Refused bounds, or bounds that cannot be honoured in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum BoundsError {
-    /// A limit that is no limit.
+    /// An invalid limit.
     #[error(
         "the {side} {what} bound is {value} at sample {sample}, channel {channel}; a finite number, \
          or infinity away from the other side, is needed"
@@ -76,14 +76,14 @@ pub enum BoundsError {
         what: &'static str,
         /// Its side.
         side: &'static str,
-        /// Where.
+        /// Index.
         sample: usize,
-        /// Where.
+        /// Index.
         channel: usize,
         /// Value found.
         value: f64,
     },
-    /// The lower limit above the upper one.
+    /// A lower limit above the upper one.
     #[error(
         "the lower {what} bound {lower} lies above the upper one {upper} at sample {sample}, channel \
          {channel}"
@@ -91,54 +91,54 @@ pub enum BoundsError {
     Crossed {
         /// Name of the bound.
         what: &'static str,
-        /// Where.
+        /// Index.
         sample: usize,
-        /// Where.
+        /// Index.
         channel: usize,
         /// The lower limit.
         lower: f64,
         /// The upper limit.
         upper: f64,
     },
-    /// Two bounds that exclude each other.
+    /// Two contradictory bounds.
     #[error(
         "{first} and {second} bounds leave no value for the input at sample {sample}, channel \
          {channel}: at least {lower} and at most {upper}"
     )]
     Disjoint {
-        /// One bound.
+        /// First bound.
         first: &'static str,
-        /// The other.
+        /// Second bound.
         second: &'static str,
-        /// Where.
+        /// Index.
         sample: usize,
-        /// Where.
+        /// Index.
         channel: usize,
         /// Least that they require of the input (for the rates: of its step).
         lower: f64,
         /// Largest value that they allow.
         upper: f64,
     },
-    /// Bounds of the value that the bounds of the steps keep the input from reaching.
+    /// Bounds of the value that the bounds of the steps make unreachable.
     #[error(
         "the input must lie in [{least}, {most}] at sample {sample}, channel {channel}, but from 0 \
          before the run its steps reach only [{lowest}, {highest}]"
     )]
     OutOfReach {
-        /// Where.
+        /// Index.
         sample: usize,
-        /// Where.
+        /// Index.
         channel: usize,
-        /// Least value that is reached.
+        /// Smallest reachable value.
         lowest: f64,
-        /// Largest value that is reached.
+        /// Largest reachable value.
         highest: f64,
-        /// Least value that is allowed.
+        /// Smallest allowed value.
         least: f64,
-        /// Largest value that is allowed.
+        /// Largest allowed value.
         most: f64,
     },
-    /// No reference for a bound that needs one.
+    /// A missing reference for a bound that needs one.
     #[error("a {what} bound needs the reference")]
     NoReference {
         /// Name of the bound.
@@ -184,7 +184,7 @@ impl Limit {
         Err(LearningError::Length { what, found, n_samples, n_channels })
     }
 
-    /// JSON has no infinity: no limit is `null`, and limits that vary are only counted.
+    /// JSON has no infinity: a missing limit is `null`, and varying limits are only counted.
     fn describe(&self) -> String {
         match self {
             Self::Scalar(value) if value.is_finite() => format!("{value}"),
@@ -201,7 +201,7 @@ impl Limit {
 }
 
 impl Bound {
-    /// The same limits for every channel and sample.
+    /// Creates the same limits for every channel and sample.
     pub fn within(lower: f64, upper: f64) -> Self {
         Self { lower: Limit::Scalar(lower), upper: Limit::Scalar(upper) }
     }
@@ -239,14 +239,14 @@ impl Bound {
     }
 }
 
-/// The larger magnitude of two limits, of those that are finite.
+/// Returns the larger magnitude of two limits, considering finite ones only.
 fn magnitude(lower: f64, upper: f64) -> f64 {
     let finite = |value: f64| if value.is_finite() { value.abs() } else { 0.0 };
     finite(lower).max(finite(upper))
 }
 
 impl Bounds {
-    /// Refuses bounds that do not fit the run or have crossed sides.
+    /// Refuses bounds of the wrong shape, or with crossed sides.
     pub(super) fn check(&self, extent: Extent) -> Result<(), LearningError> {
         let Extent { n_samples, n_inputs, n_outputs, .. } = extent;
         for (what, bound, n_channels) in self.named(extent) {

@@ -13,11 +13,10 @@ use crate::learning::law::norm_optimal::Cost;
 use crate::learning::law::norm_optimal::decouple::Part;
 use crate::learning::law::norm_optimal::relative_degree::relative_degrees;
 
-/// Weight of inputs that reach nothing within the run and that nothing else determines, as a part of
-/// the largest weight.
+/// Relative weight of inputs that have no effect within the run and are otherwise undetermined.
 const FREE: f64 = 1e-8;
 
-/// The problem of one group, its sizes still open.
+/// The problem of one group, with sizes not yet fixed.
 struct Problem<'a> {
     a: DMatrix<f64>,
     b: DMatrix<f64>,
@@ -27,11 +26,11 @@ struct Problem<'a> {
     cost: Cost,
     bounds: &'a Bounds,
     extent: Extent,
-    /// Samples at the end that model and weights need not determine.
+    /// Samples at the end that model and weights may leave undetermined.
     free_samples: usize,
 }
 
-/// Makes the solver of a group.
+/// Creates the solver of a group.
 pub(super) fn solver(
     part: Part,
     bounds: &Bounds,
@@ -41,7 +40,7 @@ pub(super) fn solver(
     let model = plant.borrow().at(0);
     let is_mixed = cost.q.is_mixed(outputs.len());
     let degrees = relative_degrees(plant.borrow(), extent.n_samples)?;
-    // A weight between outputs weighs samples of the same time, so they must be shifted alike.
+    // A weight between outputs applies to samples of the same time, so they must be shifted alike.
     let least = degrees.iter().flatten().copied().min().unwrap_or(0);
     let shifts: Vec<usize> =
         degrees.iter().map(|degree| if is_mixed { least } else { degree.unwrap_or(0) }).collect();
@@ -67,7 +66,7 @@ pub(super) fn solver(
     sized((n, m, p, delays), &Problem { a, b, c, d, places, cost, bounds, extent, free_samples })
 }
 
-/// Chooses the smallest solver that holds the problem; what it has too much of stays zero.
+/// Selects the smallest solver that fits the problem; excess dimensions stay zero.
 fn sized(
     (n, m, p, delays): (usize, usize, usize, usize),
     problem: &Problem<'_>,
@@ -147,7 +146,7 @@ impl Problem<'_> {
         Ok(Box::new(interior))
     }
 
-    /// The weights at one sample, and that of the input alone.
+    /// Returns the weights at one sample, and that of the input alone.
     fn weighing<const M: usize, const P: usize>(
         &self,
         k: usize,
@@ -171,7 +170,7 @@ impl Problem<'_> {
                 change[i][j] = hold[i][j] + cost.r.entry(k, i, j);
             }
         }
-        // Inputs that only fill up the size stay at zero.
+        // Inputs that only pad the size stay at zero.
         for (i, row) in change.iter_mut().enumerate().skip(places.inputs.len()) {
             row[i] = 1.0;
         }
@@ -182,7 +181,7 @@ impl Problem<'_> {
     }
 }
 
-/// Returns a matrix as an array, filled up with zeros.
+/// Returns a matrix as an array, padded with zeros.
 fn array<const R: usize, const C: usize>(matrix: &DMatrix<f64>) -> [[f64; C]; R] {
     std::array::from_fn(|row| {
         std::array::from_fn(|col| matrix.get((row, col)).copied().unwrap_or(0.0))

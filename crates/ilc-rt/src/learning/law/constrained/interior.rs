@@ -1,45 +1,47 @@
-//! The interior point: Mehrotra's predictor and corrector, with a Riccati recursion as the linear
-//! solution.
+//! Interior-point method: Mehrotra's predictor-corrector, with a Riccati recursion as linear
+//! solver.
 
 use super::riccati::{Gain, Plant, Pull, Weighing};
 use super::rows::Rows;
 use super::solver::{Bands, Outcome, Places, Solver};
 use crate::learning::sweep::Run;
 
-/// Gap at which the search ends, as a part of the cost ...
+/// Duality gap at which the search ends, relative to the cost ...
 const GAP: f64 = 1e-13;
-/// ... and the one that is good enough where rounding lets it shrink no further.
+/// ... and the accepted one if rounding prevents a smaller one.
 const GAP_ENOUGH: f64 = 1e-9;
-/// An iteration that leaves more of the gap than this has met rounding.
+/// An iteration that reduces the gap by less than this factor is limited by rounding.
 const STALLED: f64 = 0.9;
 /// Part of the cost before learning that counts as zero.
 const FLOOR: f64 = 1e-12;
-/// Part of the first violation that may be left when the search ends.
+/// Share of the initial infeasibility that may remain when the search ends.
 const RESIDUAL: f64 = 1e-11;
-/// Iterations after which a search is given up, and a careful one.
+/// Largest number of iterations of a search, and of a careful one.
 const MAX_ITERATIONS: usize = 60;
 const MAX_CAREFUL_ITERATIONS: usize = 120;
-/// Part of the way to the border that a step may go, at first and near the end.
+/// Share of the step to the boundary, at first and near the end.
 const MARGIN: f64 = 0.995;
 const MARGIN_LATE: f64 = 0.9999;
-/// In a careful search a corrected step that is shorter than this, or widens the gap, is replaced by
-/// one towards the middle: where single products of slack and multiplier lie far below the others,
-/// corrections may lead round in a circle for ever.
+/// In a careful search, a corrected step that is shorter than this, or increases the gap, is
+/// replaced by a centring step: if single products of slack and multiplier are far below the
+/// others, corrections may cycle.
 const SHORT: f64 = 0.1;
-/// That step aims at least at this part of the mean product ...
+/// Centring parameter of that step: at least this share of the mean product ...
 const CENTRING: f64 = 0.3;
-/// ... and once so many iterations in a row have not brought the gap to a new low, it is the only one.
+/// ... and once this many consecutive iterations have not reduced the gap to a new minimum, only
+/// centring steps are taken.
 const LOST: usize = 8;
-/// The products of slack and multiplier start at this part of the cost before learning, in sum ...
+/// Initial sum of the products of slack and multiplier, relative to the cost before learning (cold
+/// start) ...
 const START: f64 = 0.3;
-/// ... and, coming from an earlier solution, at this part.
+/// ... and for a warm start from an earlier solution.
 const WARM_START: f64 = 0.1;
 
 /// One group of axes: `N` states, `M` inputs, `P` outputs, `NS` states with the delayed changes.
 #[derive(Debug)]
 pub(super) struct Interior<const N: usize, const M: usize, const P: usize, const NS: usize> {
     pub(super) plant: Plant<N, M, P>,
-    /// The different weights, and which of them holds at each sample.
+    /// The distinct weights, and their index at each sample.
     pub(super) weighings: Vec<Weighing<M, P>>,
     pub(super) which: Vec<usize>,
     /// Weight of the input alone, at each of `weighings`.
@@ -51,7 +53,7 @@ pub(super) struct Interior<const N: usize, const M: usize, const P: usize, const
     pub(super) plain: Vec<Gain<M, NS>>,
     pub(super) gains: Vec<Gain<M, NS>>,
     pub(super) kappa: Vec<[f64; M]>,
-    /// Error at the samples that the input reaches, and the same weighted.
+    /// Error at the samples that the input affects, and its weighted value.
     pub(super) error: Vec<[f64; P]>,
     pub(super) weighted: Vec<[f64; P]>,
     /// `-S u`.
@@ -60,21 +62,21 @@ pub(super) struct Interior<const N: usize, const M: usize, const P: usize, const
     /// Current point of the search: the change of the input and the output that it causes.
     pub(super) v: Vec<[f64; M]>,
     pub(super) output: Vec<[f64; P]>,
-    /// The step from there.
+    /// The search step.
     pub(super) v_step: Vec<[f64; M]>,
     pub(super) output_step: Vec<[f64; P]>,
     /// Gradient of the cost there.
     pub(super) pulls: Vec<Pull<M, P>>,
-    /// Input that the last solution gave, from which the next search may start.
+    /// Input of the last solution, for a warm start.
     pub(super) last: Vec<[f64; M]>,
     pub(super) has_last: bool,
     pub(super) cost: f64,
     pub(super) cost_before: f64,
-    /// The size of the cost that the search has to do with.
+    /// The reference size of the cost.
     pub(super) worth: f64,
 }
 
-/// The parts of an [`Interior`] that are given from outside.
+/// The externally given parts of an [`Interior`].
 pub(super) struct Parts<const N: usize, const M: usize, const P: usize> {
     pub(super) plant: Plant<N, M, P>,
     pub(super) weighings: Vec<Weighing<M, P>>,
@@ -126,13 +128,14 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         interior
     }
 
-    /// Returns the last sample before the final `free` ones whose input nothing determines.
+    /// Returns the last sample before the final `free` ones whose input is undetermined.
     pub(super) fn undetermined(&self, free: usize) -> Option<usize> {
         let end = self.plain.len() - free.min(self.plain.len() - 1);
         (0..end).rev().find(|k| self.plain[*k].vanished())
     }
 
-    /// Weighs the change of inputs that reach nothing within the run, so that they stay as they were.
+    /// Adds a weight on the change of inputs without effect within the run, so that they stay
+    /// unchanged.
     pub(super) fn settle_free(&mut self, weight: f64) {
         for k in 0..self.which.len() {
             if self.plain[k].vanished() {
@@ -150,10 +153,10 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         std::mem::swap(&mut self.plain, &mut self.gains);
     }
 
-    /// Runs the iterations from the point where slacks and multipliers stand.
+    /// Iterates from the current slacks and multipliers.
     ///
-    /// A careful search takes more of them, and ends where corrections alone do not: about once in
-    /// ten thousand random problems.
+    /// A careful search takes more iterations, and converges where corrections alone do not: about
+    /// once in ten thousand random problems.
     fn search(&mut self, is_careful: bool) -> (bool, usize, f64) {
         let n_limits = self.rows.count();
         let mut residual = 1.0;
@@ -210,7 +213,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
         self.relax();
         let mut outcome = Outcome { is_solved: true, iterations: 0, gap: 0.0 };
         if !self.rows.fit() {
-            // A cost that bounds alone cause counts as well.
+            // A cost caused by the bounds alone counts as well.
             let stiffness = self.plain[0].stiffness();
             let overshoot = self.rows.overshoot(|_| 1.0);
             self.worth = self.cost_before + 0.5 * stiffness * overshoot * overshoot;
@@ -254,7 +257,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Solver
         for k in 0..self.v.len() {
             for (i, channel) in self.places.inputs.iter().enumerate() {
                 let mut next = self.input[k][i] + self.v[k][i];
-                // The sum rounds once more.
+                // The sum is rounded again.
                 if let Some(band) = &self.bands.input {
                     let (low, high) = band.at(k * M + i);
                     next = next.max(low).min(high);

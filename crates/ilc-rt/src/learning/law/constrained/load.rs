@@ -1,5 +1,5 @@
-//! From the signals of a run to the problem of the interior point, and from its solution back to an
-//! input that keeps every promise.
+//! From the signals of a run to the interior-point problem, and from its solution to an input
+//! within all bounds.
 
 #![expect(clippy::needless_range_loop, reason = "channels are written with their indices")]
 
@@ -12,7 +12,7 @@ use crate::learning::sweep::Run;
 const EXCESS: f64 = 1e-9;
 
 impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {
-    /// Takes over the signals of a run: what pulls at the input, and where the limits lie from here.
+    /// Loads the signals of a run: the gradient, and the limits relative to the current input.
     pub(super) fn load(&mut self, run: &Run) {
         let n_samples = self.which.len();
         self.cost_before = 0.0;
@@ -42,7 +42,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         self.limit();
     }
 
-    /// Sets the limits of all rows for the input at hand.
+    /// Sets the limits of all rows for the current input.
     fn limit(&mut self) {
         let Self { rows, bands, input, error, .. } = self;
         let zero = [0.0; M];
@@ -80,8 +80,8 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         }
     }
 
-    /// Clips what rounding left outside of the bounds of input and change; returns whether all bounds
-    /// hold then.
+    /// Clips rounding errors at the bounds of input and change; returns true if all bounds hold
+    /// then.
     pub(super) fn vet(&mut self) -> bool {
         let mut largest = 0.0_f64;
         for (k, v) in self.v.iter_mut().enumerate() {

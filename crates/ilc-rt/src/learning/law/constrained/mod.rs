@@ -1,10 +1,10 @@
-//! Norm-optimal learning within bounds.
+//! Constrained norm-optimal ILC.
 //!
-//! The cost of norm-optimal learning, minimised over the inputs that the machine can take: bounds of
-//! the input, of its change and steps, of the set-point's position, velocity and acceleration and of
-//! the predicted output. `design` and the Python bindings may import it.
+//! The cost of norm-optimal ILC, minimised over the feasible inputs: bounds of the input, of its
+//! change and steps, of the set point's position, velocity and acceleration and of the predicted
+//! output (a quadratic program). `design` and the Python bindings may import it.
 //!
-//! Family: `bounds` and `solver`: the solver refuses with the error of the bounds that it is given.
+//! Family: `bounds` and `solver`: the solver refuses with the error of its bounds.
 
 mod bounds;
 mod group;
@@ -34,37 +34,40 @@ use solver::Solver;
 /// Outcome of the last update.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Status {
-    /// There was none.
+    /// No update yet.
     Untried,
     /// The next input is optimal within the bounds.
     Solved,
-    /// The bounds cannot be honoured from this input; it was kept.
+    /// The bounds are infeasible from this input; it was kept.
     Infeasible(BoundsError),
-    /// No optimum was found, most likely because the bounds contradict each other; the input was kept.
+    /// No optimum was found, most likely because the bounds contradict each other; the input was
+    /// kept.
     MaxIterations,
 }
 
-/// Norm-optimal learning within bounds, in linear time.
+/// Constrained norm-optimal ILC, in linear time.
 ///
-/// `u_{j+1} = u_j + argmin_v J(v)` over all `v` for which every bound holds.
+/// `u_{j+1} = u_j + argmin_v J(v)` over all `v` that satisfy every bound.
 ///
-/// A primal-dual interior point finds the minimum; its linear systems are solved by a Riccati
-/// recursion, bounds entering as outputs with weights of their own, so that time and memory grow
-/// linearly with the run. Bounds that are not reached cost nothing: the law then is
-/// [`NormOptimal`](super::norm_optimal::NormOptimal). Each search starts from the last solution.
+/// A primal-dual interior-point method finds the minimum; its linear systems are solved by a
+/// Riccati recursion, with bounds as weighted virtual outputs, so that time and memory grow
+/// linearly with the run. Inactive bounds cost nothing: the law then is
+/// [`NormOptimal`](super::norm_optimal::NormOptimal). Each search is warm-started from the last
+/// solution.
 ///
-/// The next input exceeds no bound by more than 1e-9 of its size. If no such input is found, the next
-/// input is the old one and [`Constrained::status`] says so.
+/// The next input exceeds no bound by more than 1e-9 of its size. If no such input is found, the
+/// old input is kept and [`Constrained::status`] reports it.
 ///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` time an iteration,
-/// of which there are at most 60 in a search; one from the last solution that fails starts over, and
-/// then once more with care, in at most 240 iterations altogether.
+/// Cold path. Allocates in the constructor, never in [`Law::update`]; `O(n_samples)` time per
+/// iteration, of which there are at most 60 in a search; if a search from the last solution (warm
+/// start) fails, it starts over, and then once more with care, in at most 240 iterations
+/// altogether.
 /// # Source
-/// - \[haas2016\], section 4: constraints on set points. \[mehrotra1992\]: the interior point.
-///   \[rao1998\]: its linear system as a Riccati recursion.
+/// - \[haas2016\], section 4: constraints on set points. \[mehrotra1992\]: the interior-point
+///   method. \[rao1998\]: its linear system as a Riccati recursion.
 #[derive(Debug)]
 pub struct Constrained {
     model: StateSpace,
@@ -78,14 +81,14 @@ pub struct Constrained {
 }
 
 impl Constrained {
-    /// Makes the law for runs of `n_samples` samples; `cost` is a [`Cost`] or
+    /// Creates the law for runs of `n_samples` samples; `cost` is a [`Cost`] or
     /// [`Weights`](super::norm_optimal::Weights).
     ///
     /// # Errors
-    /// - [`LearningError::Weight`] or [`LearningError::Parameter`] for a weight that is none.
-    /// - [`LearningError::Bounds`] or [`LearningError::Length`] for bounds that contradict each other,
-    ///   or do not fit.
-    /// - [`LearningError::Empty`] for no samples, or a model without inputs or outputs.
+    /// - [`LearningError::Weight`] or [`LearningError::Parameter`] for an invalid weight.
+    /// - [`LearningError::Bounds`] or [`LearningError::Length`] for bounds that are contradictory
+    ///   or of the wrong shape.
+    /// - [`LearningError::Empty`] for 0 samples, or a model without inputs or outputs.
     /// - [`LearningError::Undetermined`] if `s`, `r` and `rate` are zero and the model does not
     ///   determine the input.
     /// - [`LearningError::Model`] for a continuous model.
@@ -118,7 +121,7 @@ impl Constrained {
         Ok(Self { model: model.clone(), cost, bounds, extent, solvers, status, iterations, gap })
     }
 
-    /// Returns how the last update ended.
+    /// Returns the outcome of the last update.
     pub fn status(&self) -> Status {
         self.status
     }
@@ -131,13 +134,13 @@ impl Constrained {
         NormOptimal::new(&self.model, self.extent.n_samples, self.cost.clone())
     }
 
-    /// Returns the iterations of the last update, those of the group of axes that took most; 0 if no
-    /// bound was reached.
+    /// Returns the iterations of the last update, for the group of axes that took most; 0 if no
+    /// bound was active.
     pub fn iterations(&self) -> usize {
         self.iterations
     }
 
-    /// Returns by how much the cost may exceed the least possible one, as a part of it.
+    /// Returns the relative duality gap: a bound on the excess cost, relative to the minimum.
     pub fn gap(&self) -> f64 {
         self.gap
     }

@@ -14,9 +14,9 @@ use crate::schema::{Violation, field_order};
 
 /// `[learning.constrained]`: the weights of norm-optimal learning and its bounds.
 ///
-/// The input is bounded by `input_max_m` and `input_max_m_s` of `[learning]`, the corrected set point
-/// of a csp axis by the position limits of its axis. Where no input honours all bounds the input stays
-/// as it was, and a line of the log says why.
+/// The input is bounded by `input_max_m` and `input_max_m_s` of `[learning]`, the corrected set
+/// point of a csp axis by the position limits of its axis. If no input satisfies all bounds the
+/// input is kept, and the log states the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
@@ -45,12 +45,12 @@ pub struct ConstrainedParameters {
     /// Largest change of the input of a csv axis from sample to sample.
     #[schemars(range(min = 1e-12, max = 10.0))]
     pub step_max_m_s: Option<f64>,
-    /// Largest speed of the corrected set point of csp axes, at most the least of their limits; the
-    /// limit of each axis if not given.
+    /// Velocity limit of the corrected set point of csp axes, at most the smallest of their limits;
+    /// each axis' own limit by default.
     #[schemars(range(min = 1e-6))]
     pub velocity_max_m_s: Option<f64>,
-    /// Largest acceleration of the corrected set point of csp axes, at most the least of their limits;
-    /// the limit of each axis if not given.
+    /// Acceleration limit of the corrected set point of csp axes, at most the smallest of their
+    /// limits; each axis' own limit by default.
     #[schemars(range(min = 1e-4))]
     pub acceleration_max_m_s2: Option<f64>,
 }
@@ -73,7 +73,7 @@ impl Default for ConstrainedParameters {
 }
 
 impl LawParameters for ConstrainedParameters {
-    /// No set point exceeds the limits of its axis, so that a wider bound would mean nothing.
+    /// No set point exceeds the limits of its axis, so a wider bound would have no effect.
     fn check(&self, cell: &LawCell) -> Result<(), Violation> {
         let least = |limit: fn(&LawAxis) -> f64| {
             let csp = cell.axes.iter().filter(|axis| axis.corrects_set_point);
@@ -119,8 +119,8 @@ impl LawParameters for ConstrainedParameters {
 }
 
 impl ConstrainedParameters {
-    /// Turns what the cell allows of each axis into bounds of the input; those of a set point only where
-    /// the input is added to one.
+    /// Converts the limits of each axis into bounds of the input; those of a set point only if the
+    /// input is added to one.
     fn bounds(&self, context: &LawContext) -> Bounds {
         let axes = &context.cell.axes;
         let each =

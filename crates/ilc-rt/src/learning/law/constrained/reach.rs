@@ -6,21 +6,21 @@ use crate::learning::sweep::Run;
 
 /// Returns the first sample that no input can reach within its bounds.
 ///
-/// From 0 before the run, the values that the steps allow are an interval; the bounds of the value
-/// cut it, and what is left is where the next step starts from.
+/// From 0 before the run, the values reachable by the steps are an interval; the bounds of the
+/// value intersect it, and the next step starts from the intersection.
 pub(super) fn conflict(
     bands: &Bands,
     inputs: &[usize],
     width: usize,
     run: &Run,
 ) -> Option<BoundsError> {
-    // Without them nothing depends on the run: it was checked when the law was made.
+    // Without them nothing depends on the run: it was checked when the law was created.
     bands.change.as_ref()?;
     let before = |k: usize, i: usize| run.input[k * run.n_inputs + inputs[i]];
     search(bands, inputs, width, &before)
 }
 
-/// The same before any run, bounds of the change aside.
+/// The same before any run, without bounds of the change.
 pub(super) fn standing_conflict(
     bands: &Bands,
     inputs: &[usize],

@@ -1,4 +1,4 @@
-//! One sample of the Riccati recursion, with sizes known to the compiler.
+//! One sample of the Riccati recursion, with sizes known at compile time.
 //!
 //! The delayed changes of the input in the state are selectors, so their rows and columns are never
 //! multiplied; only `interior` imports this.
@@ -27,11 +27,12 @@ pub(super) struct Weighing<const M: usize, const P: usize> {
     pub(super) bend: [f64; M],
 }
 
-/// Feedback and Cholesky factor of one sample; the state is `(x, v_-, v_--)`, as far as it goes.
+/// Feedback and Cholesky factor of one sample; the state is `(x, v_-, v_--)`, truncated to its
+/// size.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gain<const M: usize, const NS: usize> {
     pub(super) feedback: [[f64; NS]; M],
-    /// Lower factor of `H`, its diagonal inverted; 0 there marks a direction that costs nothing.
+    /// Lower factor of `H`, its diagonal inverted; 0 there marks a direction without cost.
     lower: [[f64; M]; M],
 }
 
@@ -52,12 +53,12 @@ impl<const M: usize, const P: usize> Pull<M, P> {
 impl<const M: usize, const NS: usize> Gain<M, NS> {
     pub(super) const NONE: Self = Self { feedback: [[0.0; NS]; M], lower: [[0.0; M]; M] };
 
-    /// Returns whether some direction of the input costs nothing.
+    /// Returns true if some direction of the input has no cost.
     pub(super) fn vanished(&self) -> bool {
         (0..M).any(|i| self.lower[i][i] <= 0.0)
     }
 
-    /// Returns the first entry of `H`, what a change of the input costs.
+    /// Returns the first entry of `H`, the cost of a change of the input.
     pub(super) fn stiffness(&self) -> f64 {
         if self.lower[0][0] > 0.0 { self.lower[0][0].powi(-2) } else { 0.0 }
     }
@@ -122,10 +123,10 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         (ns - N) / M
     }
 
-    /// Replaces the cost of the state by that of one sample earlier and writes the gain between.
+    /// Replaces the cost-to-go by that of one sample earlier and writes the gain between.
     ///
-    /// Joseph's form, a sum of squares: weights of rows near their bound grow beyond 1e10, and a
-    /// difference of such numbers would lose everything else.
+    /// Joseph form, a sum of squares: weights of rows near their bound grow beyond 1e10, and a
+    /// difference of such numbers would cancel all digits.
     #[inline(always)]
     pub(super) fn earlier<const NS: usize>(
         &self,
@@ -137,7 +138,7 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         self.follow(weighing, cost, gain);
     }
 
-    /// Writes the gain, given the cost of the next state.
+    /// Writes the gain, given the cost-to-go of the next state.
     #[inline(always)]
     fn answer<const NS: usize>(
         &self,
@@ -150,7 +151,7 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         let delays = Self::delays(NS);
         let (one, two) = (N, N + M);
 
-        // `reach = B' Pi_xx + Pi_1x`, the cost that v has on the next x.
+        // `reach = B' Pi_xx + Pi_1x`, the cost of v on the next x.
         let mut reach = [[0.0; N]; M];
         for i in 0..M {
             if delays > 0 {
@@ -220,7 +221,7 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         gain.feedback = feedback;
     }
 
-    /// Replaces the cost of the next state by that of this one, given the gain between.
+    /// Replaces the cost-to-go of the next state by that of this one, given the gain between.
     #[inline(always)]
     fn follow<const NS: usize>(
         &self,
@@ -234,7 +235,7 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         let (one, two) = (N, N + M);
         let feedback = &gain.feedback;
 
-        // The next state as a function of this one: x+ by `moved`, v by `answer`, v_- by itself.
+        // The next state as a function of this one: x+ by `moved`, v by `answer`, v_- directly.
         let mut moved = [[0.0; NS]; N];
         let mut answer = [[0.0; NS]; M];
         for i in 0..M {
@@ -332,7 +333,7 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         }
     }
 
-    /// Replaces the slope of the cost by that of one sample earlier; returns `kappa = H^-1 g`.
+    /// Replaces the gradient of the cost by that of one sample earlier; returns `kappa = H^-1 g`.
     #[inline(always)]
     pub(super) fn backward<const NS: usize>(
         &self,
@@ -414,7 +415,7 @@ impl<const N: usize, const M: usize, const P: usize> Plant<N, M, P> {
         })
     }
 
-    /// Moves the state on by one sample.
+    /// Advances the state by one sample.
     #[inline(always)]
     pub(super) fn forward<const NS: usize>(&self, state: &mut [f64; NS], v: &[f64; M]) {
         let delays = Self::delays(NS);

@@ -1,7 +1,7 @@
-//! The rows of the bounds: their limits, slacks and multipliers, and what the interior point does to
-//! all of them alike.
+//! The rows of the bounds: limits, slacks and multipliers, and the interior-point operations on
+//! them.
 
-/// Kinds of rows: what is bounded at a sample.
+/// Kinds of rows; first the change of the input.
 pub(super) const CHANGE: usize = 0;
 /// The difference from the sample before.
 pub(super) const STEP: usize = 1;
@@ -12,7 +12,7 @@ pub(super) const OUTPUT: usize = 3;
 
 /// Distance of a slack from zero at the start, relative to the width between two limits.
 const START_WIDTH: f64 = 0.1;
-/// The same, as a part of the largest overshoot of any row of its kind.
+/// Initial slack relative to the largest violation of any row of its kind.
 const START_OVERSHOOT: f64 = 0.1;
 
 /// One side of all rows: `slack = limit - T v` for the upper one, `T v - limit` for the lower one.
@@ -20,9 +20,9 @@ const START_OVERSHOOT: f64 = 0.1;
 pub(super) struct Side {
     /// +1 for the upper side, -1 for the lower.
     sign: f64,
-    /// 1 where there is a limit, 0 where there is none.
+    /// 1 with a limit, 0 without.
     is_on: Vec<f64>,
-    /// The limit; 0 where there is none.
+    /// The limit; 0 without.
     pub(super) limit: Vec<f64>,
     slack: Vec<f64>,
     multiplier: Vec<f64>,
@@ -50,7 +50,7 @@ impl Side {
         }
     }
 
-    /// Sets the limit of a row; an infinite one is none.
+    /// Sets the limit of a row; an infinite one means no limit.
     pub(super) fn set(&mut self, row: usize, limit: f64) {
         let is_on = limit.is_finite();
         self.is_on[row] = if is_on { 1.0 } else { 0.0 };
@@ -70,8 +70,8 @@ impl Side {
         self.slack.iter().zip(&self.multiplier).map(|(s, l)| s * l).sum()
     }
 
-    /// Adds this side's share to the weight and the pull of each row; `centre` is the product of
-    /// slack and multiplier that is aimed at.
+    /// Adds this side's share to the weight and the gradient of each row; `centre` is the target of
+    /// the product of slack and multiplier.
     fn weigh(
         &self,
         at: &[f64],
@@ -95,8 +95,8 @@ impl Side {
         }
     }
 
-    /// Computes the steps of slack and multiplier that belong to the `steps` of the rows; returns the
-    /// largest part by which one of them would shrink.
+    /// Computes the steps of slack and multiplier for the `steps` of the rows; returns the largest
+    /// relative decrease of one of them.
     fn step(&mut self, at: &[f64], steps: &[f64], centre: f64, is_corrector: bool) -> f64 {
         let order = if is_corrector { 1.0 } else { 0.0 };
         let n = steps.len();
@@ -117,7 +117,7 @@ impl Side {
             if !is_corrector {
                 second[row] = ds * dl;
             }
-            // Where there is no limit the second quotient is 0/0, which `max` passes over.
+            // Without a limit the second quotient is 0/0, which `max` ignores.
             shrink = shrink.max(-ds * inverse[row]).max(-dl / multiplier[row]);
         }
         shrink
@@ -142,8 +142,9 @@ impl Side {
         }
     }
 
-    /// Starts slacks and multipliers with the product `centre`: a slack is the room that there is, or
-    /// `least` where that is less; if `keep`, it is what goes with the multiplier of the last search.
+    /// Initialises slacks and multipliers with the product `centre`: a slack is the distance to the
+    /// limit, at least `least`; if `keep`, it follows from the multiplier of the last search (warm
+    /// start).
     fn start(&mut self, values: &[f64], least: &[f64], centre: f64, keep: bool) {
         for (row, value) in values.iter().enumerate() {
             if self.is_on[row] <= 0.0 {
@@ -172,16 +173,16 @@ pub(super) struct Rows {
     pub(super) sigma: Vec<f64>,
     /// That weight times the row's target.
     pub(super) pull: Vec<f64>,
-    /// `T v` at the point where the search is.
+    /// `T v` at the iterate.
     pub(super) values: Vec<f64>,
-    /// `T dv` of the step that was computed last.
+    /// `T dv` of the last computed step.
     pub(super) steps: Vec<f64>,
-    /// The least slack to start with; then the size against which an overshoot is judged.
+    /// The smallest initial slack; later the reference size of a violation.
     least: Vec<f64>,
 }
 
 impl Rows {
-    /// Makes the rows: `counts[kind]` numbers for each kind that is bounded somewhere.
+    /// Creates the rows: `counts[kind]` numbers for each bounded kind.
     pub(super) fn new(counts: [usize; 4]) -> Self {
         let mut begin = [None; 4];
         let mut ranges = Vec::new();
@@ -211,7 +212,7 @@ impl Rows {
         self.upper.count() + self.lower.count()
     }
 
-    /// Returns whether no row overshoots its limits.
+    /// Returns true if no row violates its limits.
     pub(super) fn fit(&self) -> bool {
         let fits = |side: &Side| {
             let room =
@@ -221,7 +222,7 @@ impl Rows {
         fits(&self.upper) && fits(&self.lower)
     }
 
-    /// Returns the largest overshoot of any row, relative to the size of its limits.
+    /// Returns the largest violation of any row, relative to the size of its limits.
     pub(super) fn overshoot(&self, size_of_kind: impl Fn(usize) -> f64) -> f64 {
         let mut worst = 0.0_f64;
         for range in &self.ranges {
@@ -235,7 +236,7 @@ impl Rows {
         worst
     }
 
-    /// Starts the slacks and multipliers around the computed values.
+    /// Initialises the slacks and multipliers around the computed values.
     pub(super) fn start(&mut self, centre: f64, is_warm: bool) {
         for range in &self.ranges {
             let overshoot = range.clone().fold(0.0_f64, |worst, row| {
@@ -258,7 +259,7 @@ impl Rows {
         self.upper.complementarity() + self.lower.complementarity()
     }
 
-    /// Writes weights and pulls for the next solution.
+    /// Writes weights and gradients for the next solution.
     pub(super) fn weigh(&mut self, centre: f64, is_corrector: bool) {
         self.sigma.fill(0.0);
         self.pull.fill(0.0);
@@ -267,20 +268,20 @@ impl Rows {
         }
     }
 
-    /// Computes the steps to the solution; returns the part of them that keeps every slack and
-    /// multiplier positive, at most 1 once `margin` is kept.
+    /// Computes the steps to the solution; returns the step length that keeps every slack and
+    /// multiplier positive, at most 1 with `margin` applied.
     pub(super) fn step(&mut self, centre: f64, is_corrector: bool, margin: f64) -> f64 {
         let upper = self.upper.step(&self.values, &self.steps, centre, is_corrector);
         let lower = self.lower.step(&self.values, &self.steps, centre, is_corrector);
         (margin / upper.max(lower)).min(1.0)
     }
 
-    /// The gap after a part of the steps.
+    /// Returns the gap after a step of the given length.
     pub(super) fn gap_at(&self, length: f64) -> f64 {
         self.upper.complementarity_at(length) + self.lower.complementarity_at(length)
     }
 
-    /// Takes a part of the steps.
+    /// Takes a step of the given length.
     pub(super) fn advance(&mut self, length: f64) {
         self.upper.advance(length);
         self.lower.advance(length);

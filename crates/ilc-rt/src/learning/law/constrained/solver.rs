@@ -8,17 +8,17 @@ use crate::learning::sweep::Run;
 pub(super) struct Band {
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// The largest finite limit as the user gave it.
+    /// The largest finite limit as given by the user.
     pub(super) size: f64,
 }
 
 impl Band {
-    /// Makes a band without limits.
+    /// Creates a band without limits.
     pub(super) fn open(count: usize) -> Self {
         Self { lower: vec![f64::NEG_INFINITY; count], upper: vec![f64::INFINITY; count], size: 0.0 }
     }
 
-    /// Narrows the limits at a place; `size` is their magnitude as given.
+    /// Tightens the limits at a place; `size` is their magnitude as given.
     pub(super) fn narrow(&mut self, place: usize, lower: f64, upper: f64, size: f64) {
         self.lower[place] = self.lower[place].max(lower);
         self.upper[place] = self.upper[place].min(upper);
@@ -34,9 +34,9 @@ impl Band {
 
 /// The bounds of one group of axes.
 ///
-/// `input` holds for the next input itself, `step` and `bend` for its first and second difference
-/// (it is 0 before the run), `change` for its change from run to run, and `output`, shifted to the
-/// sample of the input that it answers to, for `-z`, the output less its reference.
+/// `input` applies to the next input itself, `step` and `bend` to its first and second difference
+/// (it is 0 before the run), `change` to its change from run to run, and `output`, shifted to the
+/// sample of the input it responds to, to `-z`, the output minus its reference.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Bands {
     pub(super) n_samples: usize,
@@ -52,7 +52,7 @@ pub(super) struct Bands {
 pub(super) struct Places {
     pub(super) inputs: Vec<usize>,
     pub(super) outputs: Vec<usize>,
-    /// For each output, after how many samples it first answers to an input.
+    /// Delay of each output: samples until it first responds to an input.
     pub(super) shifts: Vec<usize>,
 }
 
@@ -61,16 +61,16 @@ pub(super) struct Places {
 pub(super) struct Outcome {
     pub(super) is_solved: bool,
     pub(super) iterations: usize,
-    /// Gap left, as a part of the cost.
+    /// Remaining gap, relative to the cost.
     pub(super) gap: f64,
 }
 
 /// The bounded problem of one group of axes, with its workspace.
 pub(super) trait Solver: Send + std::fmt::Debug {
-    /// Solves for the next input and keeps it. Allocates nothing.
+    /// Solves for the next input and stores it. Does not allocate.
     fn solve(&mut self, run: &Run) -> Outcome;
 
-    /// Writes the next input that was kept.
+    /// Writes the stored next input.
     fn write(&self, run: &mut Run);
 
     /// Returns the first sample at which bounds contradict each other for this run's input.

@@ -8,7 +8,7 @@ use super::riccati::Plant;
 use super::rows::{BEND, CHANGE, OUTPUT, STEP};
 
 impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N, M, P, NS> {
-    /// Runs the recursion over all samples, with the weights of the rows or without them.
+    /// Runs the recursion over all samples, with or without the weights of the rows.
     #[inline(never)]
     pub(super) fn factorise(&mut self, with_rows: bool) {
         let sigma = &self.rows.sigma[..];
@@ -40,10 +40,10 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         }
     }
 
-    /// Computes the cost where the search is, and how it pulls at each sample.
+    /// Computes cost and gradient at the iterate, sample by sample.
     ///
-    /// The step is solved for, and not the next point: near a bound the rows' weights exceed 1e10,
-    /// and the point itself, multiplied by them, would drown everything else.
+    /// The step is solved for, not the next iterate: near a bound the rows' weights exceed 1e10,
+    /// and the iterate, multiplied by them, would swamp everything else.
     #[inline(never)]
     pub(super) fn look(&mut self) {
         let mut cost = self.cost_before;
@@ -74,7 +74,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         self.cost = cost;
     }
 
-    /// Solves for the step, with the rows or without them.
+    /// Solves for the step, with or without the rows.
     #[inline(never)]
     pub(super) fn sweep(&mut self, with_rows: bool) {
         let gains = if with_rows { &self.gains } else { &self.plain };
@@ -110,7 +110,7 @@ impl<const N: usize, const M: usize, const P: usize, const NS: usize> Interior<N
         }
     }
 
-    /// Goes a part of the step.
+    /// Takes a step of the given length.
     pub(super) fn advance(&mut self, length: f64) {
         for k in 0..self.v.len() {
             for i in 0..M {

@@ -10,16 +10,16 @@ use crate::learning::weights::Weight;
 /// with `z` the predicted error, `u'` the next input and `v` its change.
 ///
 /// # Units
-/// - only the ratios matter; with error and input in metres all four are numbers without unit
+/// - only the ratios matter; with error and input in metres all four are dimensionless
 /// # Source
 /// - \[barton2010\], Eq. (3.13): `q`, `s`, `r`; \[haas2016\], Eq. (7): `rate`, there `d`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weights {
     /// Weight of the predicted error.
     pub q: f64,
-    /// Weight of the next input: keeps it small, at the price of an error that stays.
+    /// Weight of the next input: keeps it small, at the price of a remaining error.
     pub s: f64,
-    /// Weight of the change of the input: slows learning down, and evens noise out.
+    /// Weight of the change of the input: slows learning down, and averages noise.
     pub r: f64,
     /// Weight of the change from one sample to the next: keeps the input smooth. Enters squared.
     pub rate: f64,
@@ -31,13 +31,13 @@ impl Default for Weights {
     }
 }
 
-/// A cost that may differ from sample to sample and couple the channels.
+/// A cost that may vary from sample to sample and couple the channels.
 ///
 /// `J = sum_k |z[k]|^2_{q[k]} + |u'[k]|^2_{s[k]} + |v[k]|^2_{r[k]} + rate^2 |v[k] - v[k-1]|^2`
 ///
 /// with `v[-1] = v[0]`.
 ///
-/// `q[k]` weighs the error at sample `k`, whichever input reaches it.
+/// `q[k]` weights the error at sample `k`, whichever input affects it.
 ///
 /// # Shapes
 /// - `q`: of the outputs; `s`, `r`: of the inputs
@@ -63,11 +63,11 @@ impl From<Weights> for Cost {
 }
 
 impl Cost {
-    /// Refuses weights that do not fit a model or are none.
+    /// Refuses weights that are invalid or do not match a model.
     ///
     /// # Errors
     /// - [`LearningError::Parameter`] for a number that is negative or not finite.
-    /// - [`LearningError::Weight`] for any other weight that is wrong.
+    /// - [`LearningError::Weight`] for any other invalid weight.
     pub fn check(
         &self,
         n_samples: usize,
@@ -92,14 +92,14 @@ impl Cost {
         Ok(())
     }
 
-    /// Returns the part of the cost that some inputs and outputs have, without coupling to others.
+    /// Returns the part of the cost of some inputs and outputs, without coupling to others.
     #[must_use]
     pub fn select(&self, inputs: &[usize], outputs: &[usize]) -> Self {
         let Self { q, s, r, rate } = self;
         Self { q: q.select(outputs), s: s.select(inputs), r: r.select(inputs), rate: *rate }
     }
 
-    /// Returns the weights as numbers, if that is what they are.
+    /// Returns the weights as scalars, if they are.
     pub fn scalars(&self) -> Option<Weights> {
         match (&self.q, &self.s, &self.r) {
             (Weight::Scalar(q), Weight::Scalar(s), Weight::Scalar(r)) => {
@@ -109,12 +109,12 @@ impl Cost {
         }
     }
 
-    /// Returns whether all weights are the same at every sample.
+    /// Returns true if all weights are the same at every sample.
     pub fn is_constant(&self) -> bool {
         [&self.q, &self.s, &self.r].iter().all(|weight| weight.is_constant())
     }
 
-    /// Returns what the errors say of the weights that keep the input determined.
+    /// Returns the text of the weights that determine the input, for errors.
     pub(in crate::learning::law) fn told(&self) -> String {
         format!("s = {}, r = {} and rate = {}", told(&self.s), told(&self.r), self.rate)
     }

@@ -1,4 +1,4 @@
-//! Groups of axes that act on each other; separate groups are solved separately.
+//! Decoupling: groups of coupled axes, which are solved separately.
 
 use nalgebra::DMatrix;
 
@@ -6,8 +6,8 @@ use super::cost::Cost;
 use super::plant::{OwnPlant, Plant};
 use crate::model::{ModelError, StateSpace, TimeVarying};
 
-/// One group of coupled axes: its model, its cost, and where its signals lie among those of the
-/// machine.
+/// One group of coupled axes: its model, its cost, and the indices of its signals among those of
+/// the machine.
 #[derive(Debug)]
 pub(in crate::learning::law) struct Part {
     pub(in crate::learning::law) plant: OwnPlant,
@@ -16,11 +16,11 @@ pub(in crate::learning::law) struct Part {
     pub(in crate::learning::law) outputs: Vec<usize>,
 }
 
-/// Returns the groups that the zeros of `A`, `B`, `C`, `D` and of the weights leave unconnected at
-/// every sample, each with an input.
+/// Returns the groups that are decoupled at every sample by the zeros of `A`, `B`, `C`, `D` and of
+/// the weights, each with an input.
 ///
-/// Every input is in exactly one group. Outputs and states that no input can be connected to have no
-/// part in learning.
+/// Every input is in exactly one group. Outputs and states that no input affects do not take part
+/// in learning.
 pub(in crate::learning::law) fn parts(plant: Plant, cost: &Cost) -> Result<Vec<Part>, ModelError> {
     let first = plant.at(0);
     let (n, m, p) = (first.n_states(), first.n_inputs(), first.n_outputs());
@@ -88,7 +88,7 @@ pub(in crate::learning::law) fn parts(plant: Plant, cost: &Cost) -> Result<Vec<P
     Ok(parts)
 }
 
-/// Calls `found` with the place of each entry that is not zero.
+/// Calls `found` with the position of each non-zero entry.
 fn each_entry(matrix: &DMatrix<f64>, mut found: impl FnMut(usize, usize)) {
     for (index, value) in matrix.iter().enumerate() {
         if *value != 0.0 {

@@ -1,4 +1,4 @@
-//! Norm-optimal learning: the input that a quadratic cost over the whole run asks for.
+//! Norm-optimal ILC: minimises a quadratic cost over the whole run.
 
 mod cost;
 pub(super) mod decouple;
@@ -23,36 +23,37 @@ use crate::model::StateSpace;
 
 use decouple::{Part, parts};
 
-/// Norm-optimal learning, exact and in linear time.
+/// Norm-optimal ILC, exact and in linear time.
 ///
-/// `u_{j+1} = u_j + argmin_v J(v)` with `z = e_j - P v`, `P` the lifted operator of the model,
-/// which may vary along the run as the weights may.
+/// `u_{j+1} = u_j + argmin_v J(v)` with `z = e_j - P v`, `P` the lifted system of the model, which
+/// may vary along the run like the weights.
 ///
-/// With `s = r = 0` and `rate = d` this is convex-optimisation learning. The law pairs `e[k + l]`
-/// with `u[k]`, where `l` is the first Markov parameter of that output that is not zero: 1 for an
-/// axis without delay, 1 more for each sample of delay in the model. So the last `l` samples of the
-/// input reach nothing within the run: there `s`, `r` and `rate` alone decide (with `rate` alone the
-/// change is held at its last useful value), and if all three are zero the input stays as it was.
-/// Axes that neither act on each other nor cost anything together are solved one by one.
+/// With `s = r = 0` and `rate = d` this is convex-optimisation ILC (CO-ILC). The law pairs
+/// `e[k + l]` with `u[k]`, where `l` is the index of the first non-zero Markov parameter of that
+/// output (its relative degree): 1 for an axis without delay, 1 more for each sample of dead time
+/// in the model. So the last `l` samples of the input have no effect within the run: there `s`, `r`
+/// and `rate` alone decide (with `rate` alone the change is held at its last useful value), and if
+/// all three are zero the input is unchanged. Axes that are coupled neither by the model nor by the
+/// weights are solved separately.
 ///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`
 /// # Real Time
-/// Cold path. Allocates when it is made, never in [`Law::update`]; `O(n_samples)` time and memory.
+/// Cold path. Allocates at creation, never in [`Law::update`]; `O(n_samples)` time and memory.
 /// # Source
-/// - \[haas2016\], Eq. (5) to (12); \[barton2010\], Eq. (3.13) to (3.15). They solve the same problem
-///   with dense matrices; here it is solved by a Riccati recursion.
+/// - \[haas2016\], Eq. (5) to (12); \[barton2010\], Eq. (3.13) to (3.15). They solve the same
+///   problem with dense matrices; here it is solved by a Riccati recursion.
 pub struct NormOptimal {
     n_samples: usize,
     n_inputs: usize,
     n_outputs: usize,
     weights: String,
-    /// Model, where one says it all, and the weights, where four numbers do.
+    /// Model, if it is time-invariant, and the weights, if they are scalars.
     invariant: Option<StateSpace>,
     scalars: Option<Weights>,
     conditioning: f64,
     parts: Vec<Box<dyn Sweep>>,
-    /// Samples at the start of the run whose error no part looks at, at least in some output.
+    /// Samples at the start of the run whose error is not used, at least in some output.
     n_unread: usize,
     inverses: Inverses,
 }
@@ -62,7 +63,7 @@ enum Inverses {
     /// Data to factorise: the stages of each part, its channels and its free samples.
     Of(Vec<(Box<dyn Stages + Send>, Channels, usize)>),
     Made(Vec<Inverse>),
-    /// The stages were not given away.
+    /// The stages are not available.
     None,
 }
 
@@ -79,15 +80,16 @@ impl std::fmt::Debug for NormOptimal {
 }
 
 impl NormOptimal {
-    /// Makes the law: factorises the problem for runs of `n_samples` samples.
+    /// Creates the law: factorises the problem for runs of `n_samples` samples.
     ///
     /// `model` is a [`StateSpace`](crate::model::StateSpace) or a
     /// [`TimeVarying`](crate::model::TimeVarying), `weights` are [`Weights`] or a [`Cost`].
     ///
     /// # Errors
     /// - [`LearningError::Parameter`] for a weight that is negative or not finite.
-    /// - [`LearningError::Weight`] for a weight that does not fit or is not positive semidefinite.
-    /// - [`LearningError::Empty`] for no samples, or a model without inputs or outputs.
+    /// - [`LearningError::Weight`] for a weight of the wrong shape, or one that is not positive
+    ///   semidefinite.
+    /// - [`LearningError::Empty`] for 0 samples, or a model without inputs or outputs.
     /// - [`LearningError::Undetermined`] if `s`, `r` and `rate` are zero and the model does not
     ///   determine the input.
     /// - [`LearningError::Unbounded`] if they are zero and the model's inverse is unstable.
@@ -100,8 +102,8 @@ impl NormOptimal {
         Self::with_form(model, n_samples, weights, Form::default())
     }
 
-    /// [`NormOptimal::new`] with the recursion in another form: for problems in which a weight is so
-    /// small that [`NormOptimal::conditioning`] calls for a square-root form.
+    /// [`NormOptimal::new`] with another form of the recursion: for weights so small that
+    /// [`NormOptimal::conditioning`] calls for a square-root form.
     ///
     /// # Errors
     /// - as [`NormOptimal::new`].
@@ -179,22 +181,21 @@ impl NormOptimal {
         Ok(())
     }
 
-    /// Returns how well the weights determine the input: the smallest part of the cost of any
-    /// direction of the input that no other direction explains, over the largest. With less than
-    /// about `1e-12` only noise decides on part of the input.
+    /// Returns the conditioning of the input: the smallest pivot of the cost, over the largest.
+    /// Below about `1e-12` part of the input is determined by noise only.
     pub fn conditioning(&self) -> f64 {
         self.conditioning
     }
 
-    /// Returns the number of groups of axes that are solved by themselves.
+    /// Returns the number of groups of axes that are solved separately.
     pub fn n_parts(&self) -> usize {
         self.parts.len()
     }
 
-    /// Writes `H^-1 x`, `H` being the Hessian of the cost; returns whether it can be had.
+    /// Writes `H^-1 x`, `H` being the Hessian of the cost; returns true if it is available.
     ///
     /// # Errors
-    /// - [`LearningError::Length`] for signals of another length.
+    /// - [`LearningError::Length`] for signals of a different length.
     pub(in crate::learning) fn solve(
         &mut self,
         x: &[f64],
@@ -210,7 +211,7 @@ impl NormOptimal {
         Ok(true)
     }
 
-    /// Returns the inverses of the parts' Hessians; `None` where they cannot be had.
+    /// Returns the inverses of the parts' Hessians; `None` if they are not available.
     fn inverses(&mut self) -> Option<&mut Vec<Inverse>> {
         if let Inverses::Of(problems) = &mut self.inverses {
             let made: Result<Vec<Inverse>, FactorError> = std::mem::take(problems)
@@ -241,9 +242,9 @@ impl Law for NormOptimal {
         for part in &mut self.parts {
             part.solve(&mut run);
         }
-        // Whatever is not finite in the input, or in an error that a part looks at, makes a sample of
-        // `next` infinite or not a number: nothing but sums and products lies in between. So one pass
-        // says all, and only a run with something wrong is searched for where it is.
+        // Any non-finite value in the input, or in an error that a part uses, makes a sample of
+        // `next` non-finite, as there are only sums and products between. So one pass suffices, and
+        // the place is searched for only if something is wrong.
         if is_finite(next) && is_finite(&error[..self.n_unread * n_outputs]) {
             return Ok(());
         }

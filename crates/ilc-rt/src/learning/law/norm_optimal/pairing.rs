@@ -11,21 +11,21 @@ use crate::learning::sweep::{Stage, Stages};
 use crate::learning::weights::Weight;
 use crate::model::{ModelError, StateSpace, TimeVarying};
 
-/// The tracking problem of a model whose outputs answer late.
+/// The tracking problem of a model with delayed outputs.
 ///
-/// Row `i` of the output is paired with the sample `l_i` ahead at which an input first shows in it:
-/// `C_i[k] <- C_i[k+l_i] A[k+l_i-1] .. A[k]`, `D_i[k] <- C_i[k+l_i] A[k+l_i-1] .. A[k+1] B[k]`. So the
-/// effect of an input is seen at its own stage, whatever the delay, and the weight of that row is
-/// `q[k+l_i]`, zero beyond the end of the run. Rows that a weight couples share the smallest `l_i`
-/// among them, since their errors at one sample have to meet at one stage.
+/// Row `i` of the output is paired with the sample `l_i` ahead at which an input first affects it:
+/// `C_i[k] <- C_i[k+l_i] A[k+l_i-1] .. A[k]`, `D_i[k] <- C_i[k+l_i] A[k+l_i-1] .. A[k+1] B[k]`. So
+/// the effect of an input occurs at its own stage, whatever the delay, and the weight of that row
+/// is `q[k+l_i]`, zero beyond the end of the run. Rows coupled by a weight share the smallest `l_i`
+/// among them, since their errors at one sample have to be at one stage.
 #[derive(Debug, Clone)]
 pub struct Paired {
     plant: OwnPlant,
-    /// Paired `C` and `D`: one, or one a sample.
+    /// Paired `C` and `D`: one, or one per sample.
     rows: Vec<(DMatrix<f64>, DMatrix<f64>)>,
     cost: Cost,
     shifts: Vec<usize>,
-    /// Rows that answer to no input and meet no row that does.
+    /// Rows that respond to no input and are coupled to no row that does.
     mute: Vec<bool>,
     free_samples: usize,
     n_samples: usize,
@@ -37,7 +37,7 @@ impl Paired {
     /// # Errors
     /// - [`ModelError`] for a continuous model, or one with another number of samples.
     /// # Panics
-    /// If the weights do not fit the model; [`Cost::check`] has been passed before.
+    /// If the weights do not match the model; [`Cost::check`] rules this out.
     pub fn new<'a>(
         plant: impl Into<Plant<'a>>,
         n_samples: usize,
@@ -49,8 +49,8 @@ impl Paired {
         let (shifts, mute) = shared(&degrees, &cost.q);
         let first = plant.at(0);
         let mut latest = degrees.iter().flatten().copied().max().unwrap_or(0);
-        // With several inputs one of them may show in an output only through the state, up to as many
-        // samples later as there are states; along a run that varies, a single one as well.
+        // With several inputs one of them may affect an output only through the state, up to as
+        // many samples later as there are states; for a time-varying model a single one as well.
         if first.n_inputs() > 1 || matches!(plant, Plant::Varying(_)) {
             latest += first.n_states();
         }
@@ -66,12 +66,12 @@ impl Paired {
         Ok(Self { plant, rows, cost, shifts, mute, free_samples: latest, n_samples })
     }
 
-    /// Returns, for each output, by how many samples it is late; 0 for one that answers to nothing.
+    /// Returns the delay of each output in samples; 0 for one that responds to no input.
     pub fn shifts(&self) -> &[usize] {
         &self.shifts
     }
 
-    /// Returns how many samples at the end may reach nothing within the run.
+    /// Returns the largest number of samples at the end without effect within the run.
     pub fn free_samples(&self) -> usize {
         self.free_samples
     }
@@ -148,10 +148,12 @@ impl Stages for Paired {
     }
 }
 
-/// Returns the shift of each row, the same for rows that `q` couples, and which rows stay mute.
+/// Returns the shift of each row, the same for rows coupled by `q`, and the rows without any
+/// response.
 fn shared(degrees: &[Option<usize>], q: &Weight) -> (Vec<usize>, Vec<bool>) {
     let mut found = degrees.to_vec();
-    // As many passes as there are rows carry the smallest degree through any chain of couplings.
+    // As many passes as there are rows propagate the smallest degree through any chain of
+    // couplings.
     for _ in 0..degrees.len() {
         for row in 0..degrees.len() {
             for col in (0..degrees.len()).filter(|col| *col != row && q.couples(row, *col)) {
@@ -163,7 +165,7 @@ fn shared(degrees: &[Option<usize>], q: &Weight) -> (Vec<usize>, Vec<bool>) {
     (found.into_iter().map(|shift| shift.unwrap_or(0)).collect(), mute)
 }
 
-/// Returns `C` and `D` of sample `k`, each row as many samples ahead as its shift says.
+/// Returns `C` and `D` of sample `k`, each row advanced by its shift.
 fn ahead(
     plant: Plant,
     k: usize,
@@ -176,7 +178,7 @@ fn ahead(
             continue;
         }
         if k + shift >= n_samples {
-            // Beyond the run, where its weight is zero.
+            // Beyond the end of the run, where its weight is zero.
             c.row_mut(row).fill(0.0);
             d.row_mut(row).fill(0.0);
             continue;

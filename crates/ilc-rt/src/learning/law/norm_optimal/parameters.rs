@@ -1,4 +1,4 @@
-//! `[learning.norm_optimal]`: the weights of the quadratic cost, across the path and along the run.
+//! `[learning.norm_optimal]`: the weights of the quadratic cost, by direction and along the run.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,8 +25,8 @@ pub struct NormOptimalParameters {
     /// Weight of the change of input.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub r: f64,
-    /// Weight of the rate of the change of input: keeps learning at frequencies where the model holds.
-    /// Its product with the cycle counts: halve the cycle, double `rate`.
+    /// Weight of the rate of the change of input: restricts learning to frequencies where the model
+    /// is valid. Its product with the cycle counts: halve the cycle, double `rate`.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub rate: f64,
     /// Weights of the error by its direction.
@@ -34,8 +34,8 @@ pub struct NormOptimalParameters {
     /// Other weights for part of the run, in the order of time and without overlap.
     #[serde(rename = "phase")]
     pub phases: Vec<PhaseParameters>,
-    /// Bandwidth with which the weights go over from one phase to the next, 0.001 to 0.95 of half the
-    /// sample rate; a transition takes about 0.34 / `smoothing_hz` seconds.
+    /// Bandwidth of the transition of weights between phases, 0.001 to 0.95 of the Nyquist
+    /// frequency; a transition takes about 0.34 / `smoothing_hz` seconds.
     pub smoothing_hz: f64,
 }
 
@@ -53,19 +53,19 @@ impl Default for NormOptimalParameters {
     }
 }
 
-/// `[learning.norm_optimal.contour]`: `Q = q I + weight (I - t t') + along t t'`, t the direction of
+/// `[learning.norm_optimal.contour]`: `Q = q I + weight (I - t t') + along t t'`, t the tangent of
 /// the program's path at each sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct ContourParameters {
-    /// Weight of the error across the path.
+    /// Weight of the error normal to the path.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub weight: f64,
     /// Weight of the error along the path.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub along: f64,
-    /// Names of the two or three axes that make the path; all axes of the cell if the list is empty.
+    /// Names of the two or three axes that form the path; all axes of the cell by default.
     pub axes: Vec<String>,
 }
 
@@ -75,16 +75,16 @@ impl Default for ContourParameters {
     }
 }
 
-/// `[[learning.norm_optimal.phase]]`: weights that hold for part of the run; those that are not named
-/// here stay as they are outside.
+/// `[[learning.norm_optimal.phase]]`: weights for part of the run; those not given here keep their
+/// outer values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct PhaseParameters {
-    /// Begin, from the start of the run.
+    /// Start time, from the start of the run.
     #[schemars(range(min = 0.0, max = 1e5))]
     pub from_s: f64,
-    /// End, from the start of the run; at least a cycle after the begin.
+    /// End time, from the start of the run; at least a cycle after `from_s`.
     #[schemars(range(min = 0.0, max = 1e5))]
     pub to_s: f64,
     /// Weight of the next error.
@@ -96,7 +96,7 @@ pub struct PhaseParameters {
     /// Weight of the change of input.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub r: Option<f64>,
-    /// Weight of the error across the path; only with `contour` in `[learning.norm_optimal]`.
+    /// Weight of the error normal to the path; only with `contour` in `[learning.norm_optimal]`.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub contour: Option<f64>,
 }
@@ -177,12 +177,12 @@ impl ContourParameters {
 impl NormOptimalParameters {
     /// Returns the cost for the set points of a run.
     ///
-    /// `Q_k = q_k I + c_k (I - t_k t_k') + along t_k t_k'`, `t_k` the direction of the path; `q`, `s`,
-    /// `r` and `c` go over from phase to phase through a Gaussian filter.
+    /// `Q_k = q_k I + c_k (I - t_k t_k') + along t_k t_k'`, `t_k` the tangent of the path; a
+    /// Gaussian filter smooths `q`, `s`, `r` and `c` between phases.
     ///
     /// # Errors
     /// - [`BuildError::Refused`] for a phase that begins after the end of the run;
-    ///   [`BuildError::Learning`] for weights that do not fit the path.
+    ///   [`BuildError::Learning`] for weights that do not match the path.
     pub fn cost(&self, context: &LawContext) -> Result<Cost, BuildError> {
         let cycle_s = context.cell.cycle_s;
         let run = Run { phases: &self.phases, n_samples: context.n_samples(), cycle_s };
@@ -331,7 +331,7 @@ mod tests {
                 && (q(250) - 5.0).abs() < 1e-9
                 && (q(450) - 1.0).abs() < 1e-9
         );
-        // Half-way at the boundary, and nowhere a step.
+        // Half-way at the boundary, without a step anywhere.
         assert!((0.5 * (q(199) + q(200)) - 3.0).abs() < 1e-9, "{}", q(200));
         assert!((1..500).all(|k| (q(k) - q(k - 1)).abs() < 0.3));
         assert!((cost.r.entry(250, 1, 1) - 2.0).abs() < 1e-9);

@@ -1,13 +1,13 @@
-//! The model of the axes, the same at every sample or not.
+//! The model of the axes, time-invariant or time-varying.
 
 use crate::model::{ModelError, StateSpace, TimeVarying};
 
-/// A model that may vary along the run.
+/// A time-invariant or time-varying model.
 #[derive(Debug, Clone, Copy)]
 pub enum Plant<'a> {
-    /// The same at every sample.
+    /// Time-invariant.
     Invariant(&'a StateSpace),
-    /// One model a sample, for exactly the samples of a run.
+    /// One model per sample, for exactly the samples of a run.
     Varying(&'a TimeVarying),
 }
 
@@ -24,7 +24,7 @@ impl<'a> From<&'a TimeVarying> for Plant<'a> {
 }
 
 impl<'a> Plant<'a> {
-    /// Returns the model if it is the same at every sample.
+    /// Returns the model if it is time-invariant.
     pub fn invariant(self) -> Option<&'a StateSpace> {
         match self {
             Self::Invariant(model) => Some(model),
@@ -35,7 +35,7 @@ impl<'a> Plant<'a> {
     /// Returns the model at sample `k`.
     ///
     /// # Panics
-    /// If the model varies and `k` lies beyond the run.
+    /// If the model varies and `k` is beyond the end of the run.
     pub fn at(self, k: usize) -> &'a StateSpace {
         match self {
             Self::Invariant(model) => model,
@@ -43,7 +43,7 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// Returns the models that differ: one, or one a sample.
+    /// Returns the distinct models: one, or one per sample.
     pub fn distinct(self) -> &'a [StateSpace] {
         match self {
             Self::Invariant(model) => std::slice::from_ref(model),
@@ -51,7 +51,7 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// Refuses a model that is continuous or has samples for another run.
+    /// Refuses a continuous model, or one with samples for another run length.
     ///
     /// # Errors
     /// - [`ModelError::Continuous`] or [`ModelError::Length`].

@@ -1,13 +1,12 @@
-//! After how many samples an output first answers to an input.
+//! Relative degree of a time-varying model: delay of each output.
 
 use super::plant::Plant;
 use crate::model::{self, ModelError};
 
-/// A Markov parameter counts as zero below this part of the magnitudes that were added up for it.
+/// A Markov parameter counts as zero below this share of the sum of magnitudes of its terms.
 const ROUNDING: f64 = 1e-13;
 
-/// Returns, for each output, the smallest lag at which some input shows in it, or `None` if none
-/// ever does.
+/// Returns, for each output, the smallest delay of any input, or `None` if it responds to none.
 pub(in crate::learning::law) fn relative_degrees(
     plant: Plant,
     n_samples: usize,
@@ -18,8 +17,8 @@ pub(in crate::learning::law) fn relative_degrees(
     }
 }
 
-/// The smallest lag over all samples; at most as many as there are states, which is small enough to
-/// miss nothing.
+/// Returns the smallest delay over all samples; bounded by the number of states, which is enough to
+/// find every effect.
 fn varying(plant: Plant, n_samples: usize) -> Vec<Option<usize>> {
     let first = plant.at(0);
     let mut found = vec![first.n_states(); first.n_outputs()];
@@ -80,7 +79,7 @@ mod tests {
         let mut c = late.c().clone();
         let same = TimeVarying::new(vec![late.clone(); 9]).unwrap();
         assert_eq!(relative_degrees((&same).into(), 9).unwrap(), [Some(3)]);
-        // At sample 6 alone the delay line shows in the output one sample before the axis does.
+        // At sample 6 alone the delay line affects the output one sample before the axis does.
         c.fill(1.0);
         let (a, b, d) = (late.a().clone(), late.b().clone(), late.d().clone());
         let mut samples = vec![late; 9];

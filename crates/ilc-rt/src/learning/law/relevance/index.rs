@@ -1,4 +1,4 @@
-//! The most relevant runs out of many: a nearest-neighbour query.
+//! The most relevant runs out of many: a nearest-neighbour query (k-d tree).
 
 use std::num::NonZero;
 
@@ -6,24 +6,24 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 use super::weights::RelevanceWeights;
 
-/// Most numbers that describe a disturbance.
+/// Largest number of disturbances.
 pub(super) const DISTURBANCES_MAX: usize = 7;
-/// Most coordinates of a run: its error and its disturbance.
+/// Largest number of coordinates of a run: its error and its disturbance.
 const COORDINATES_MAX: usize = 1 + DISTURBANCES_MAX;
-/// Runs that are searched one by one before a tree pays.
+/// Number of runs up to which a linear search is faster than a tree.
 const FEW: usize = 512;
-/// Width of the border in which the tree's rounding must not decide.
+/// Margin within which the tree's rounding must not decide.
 const ROUNDING: f64 = 1e-9;
 
 /// Places of the runs, and the nearest of them.
 pub(super) trait Index: Send + std::fmt::Debug {
     /// Adds a run.
     fn push(&mut self, weights: &RelevanceWeights, error_sum: f64, disturbance: &[f64]);
-    /// Makes room for `n` runs in all.
+    /// Reserves space for `n` runs in all.
     fn reserve(&mut self, n: usize);
-    /// Writes the sums of all runs, seen from a disturbance.
+    /// Writes the sums of all runs for a disturbance.
     fn sums(&self, weights: &RelevanceWeights, disturbance: &[f64], sums: &mut Vec<f64>);
-    /// Writes numbers and sums of the `top` most relevant runs, the most relevant one first; of
+    /// Writes indices and sums of the `top` most relevant runs, the most relevant one first; of
     /// equally relevant ones the older first.
     fn nearest(
         &self,
@@ -32,11 +32,12 @@ pub(super) trait Index: Send + std::fmt::Debug {
         top: usize,
         found: &mut Vec<(usize, f64)>,
     );
-    /// Drops all runs but these, given in rising order.
+    /// Keeps only these runs, given in ascending order.
     fn retain(&mut self, kept: &[usize]);
 }
 
-/// Returns an empty index for runs of `n_samples` under `n_disturbances`; none for too many of them.
+/// Returns an empty index for runs of `n_samples` under `n_disturbances`; `None` for too many
+/// disturbances.
 pub(super) fn index(n_samples: usize, n_disturbances: usize) -> Option<Box<dyn Index>> {
     Some(match n_disturbances + 1 {
         1 => Box::new(Grown::<1>::new(n_samples)),
@@ -51,9 +52,9 @@ pub(super) fn index(n_samples: usize, n_disturbances: usize) -> Option<Box<dyn I
     })
 }
 
-/// A tree over the older runs, and the newer ones behind it, which are searched one by one.
+/// A tree over the older runs, and the newer ones, which are searched linearly.
 ///
-/// The tree is rebuilt when a few times the square root of all runs have come since.
+/// The tree is rebuilt after an insertion of a few times the square root of the number of runs.
 struct Grown<const K: usize> {
     n_samples: usize,
     places: Vec<[f64; K]>,
@@ -83,7 +84,7 @@ impl<const K: usize> std::fmt::Debug for Grown<K> {
     }
 }
 
-/// Returns the squared distance; the one way it is computed, so that equal runs compare equal.
+/// Returns the squared distance, always computed in this way, so that equal runs compare equal.
 fn distance<const K: usize>(a: &[f64; K], b: &[f64; K]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
@@ -115,8 +116,8 @@ impl<const K: usize> Index for Grown<K> {
         found.clear();
         let of = |number: usize| (number, distance(&self.places[number], &here));
         if let (Some(tree), Some(n)) = (&self.tree, NonZero::new(top.min(self.n_in_tree))) {
-            // Any n runs bound the distance of the n-th nearest one. Whatever lies within that bound
-            // is looked at again here, so that neither the tree's rounding nor its order of ties
+            // Any n runs bound the distance of the n-th nearest one. Everything within that bound
+            // is compared again here, so that neither the tree's rounding nor its order of ties
             // decides.
             let bound = tree
                 .query(&here)
@@ -154,7 +155,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Brute force: all sums, sorted, ties by number.
+    /// Brute force: all sums, sorted, ties by index.
     fn brute(index: &dyn Index, weights: &RelevanceWeights, d: &[f64], top: usize) -> Vec<usize> {
         let mut sums = Vec::new();
         index.sums(weights, d, &mut sums);
@@ -180,7 +181,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ilc_cases::cases(40))]
-        // Coarse values make ties, also at the border of the top.
+        // Coarse values make ties, also at the boundary of the selection.
         #[test]
         fn the_tree_and_brute_force_find_the_same_runs(
             coarse in prop::bool::ANY,

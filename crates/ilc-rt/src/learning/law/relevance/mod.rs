@@ -1,5 +1,5 @@
-//! Disturbance- and performance-weighted learning (DPW-ILC): the coming run's input from all past
-//! runs, each weighted by how like its disturbance was and how small its error.
+//! Disturbance- and performance-weighted ILC (DPW-ILC): the next input from all past runs, each
+//! weighted by the similarity of its disturbance and the size of its error.
 
 mod index;
 mod parameters;
@@ -30,24 +30,24 @@ pub struct RunShape {
     pub n_inputs: usize,
     /// Channels of the error.
     pub n_outputs: usize,
-    /// Numbers that describe the disturbance of a run; 0 to 7.
+    /// Number of disturbances of a run; 0 to 7.
     pub n_disturbances: usize,
-    /// Time between two samples.
+    /// Sample time.
     pub dt_s: f64,
 }
 
-/// Learning from every past run, weighted by its relevance for the coming one.
+/// DPW-ILC: learning from every past run, weighted by its relevance for the coming one.
 ///
 /// `u_i = sum_j w_j (Gamma_2 u_j + Gamma_1 (L(u_j, e_j) - u_j))`, `w_j = N_j / sum_k N_k`
 ///
-/// with `N_j` the relevance ([`RelevanceWeights`]) and `L` the core law: what it proposes after a run
-/// depends on that run alone, so it is computed once and only the proposal is kept. With both gains
-/// 1 the next input is the weighted mean of all proposals. With `top` the sum and the weights run
-/// over the `top` most relevant runs only, exactly those that a search through all would give; of
-/// equally relevant ones the older.
+/// with `N_j` the relevance ([`RelevanceWeights`]) and `L` the core law: its proposal after a run
+/// depends on that run alone, so it is computed once and only the proposal is stored. With both
+/// gains 1 the next input is the weighted mean of all proposals. With `top` the sum and the weights
+/// run over the `top` most relevant runs only, exactly those of a search through all; of equally
+/// relevant ones the older.
 ///
-/// The disturbance of each run is announced before it ([`Law::set_disturbance`]), that of the first one too. A
-/// run whose disturbance was never announced is not kept; a single kept run has weight 1.
+/// The disturbance of each run is set before it ([`Law::set_disturbance`]), including the first
+/// one. A run without a disturbance is not stored; a single stored run has weight 1.
 ///
 /// # Shapes
 /// - `input`, `next`: `n_samples` x `n_inputs`; `error`: `n_samples` x `n_outputs`; disturbance:
@@ -67,7 +67,7 @@ pub struct Relevance {
     weights: RelevanceWeights,
     top: Option<usize>,
     told: Expectation,
-    /// Remembered runs may come again as runs that have just been made.
+    /// Remembered runs may arrive again as new runs.
     is_replayed: bool,
     proposals: Inputs,
     disturbances: Vec<f64>,
@@ -78,10 +78,10 @@ pub struct Relevance {
 }
 
 impl Relevance {
-    /// Makes the law around a core law, with nothing remembered.
+    /// Creates the law around a core law, with an empty memory.
     ///
     /// # Errors
-    /// - [`LearningError::Empty`] for no samples or channels, or `top` = 0.
+    /// - [`LearningError::Empty`] for 0 samples or channels, or `top` = 0.
     /// - [`LearningError::Parameter`] for a weight or a sample time out of its range, or more than 7
     ///   disturbances; [`LearningError::Disturbance`] for the wrong number of disturbance weights.
     pub fn new(
@@ -128,7 +128,7 @@ impl Relevance {
         })
     }
 
-    /// Makes room for `n_runs`, so that nothing is allocated for what is kept of them.
+    /// Reserves space for `n_runs`, so that storing them does not allocate.
     #[must_use]
     pub fn with_capacity(mut self, n_runs: usize) -> Self {
         self.proposals.reserve(n_runs);
@@ -141,12 +141,12 @@ impl Relevance {
         self
     }
 
-    /// Returns how many runs are remembered.
+    /// Returns the number of runs in memory.
     pub fn len(&self) -> usize {
         self.proposals.len()
     }
 
-    /// Returns whether no run is remembered.
+    /// Returns true if the memory is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -156,14 +156,14 @@ impl Relevance {
         self.shape
     }
 
-    /// Remembers a run that was made elsewhere or earlier.
+    /// Adds an earlier run, or one made elsewhere, to the memory.
     ///
-    /// When a campaign is taken up again, its runs pass through the law once more: updates from runs
-    /// that are remembered already, bit by bit, add nothing until the first one that is new.
+    /// When a campaign is resumed, its runs pass through the law again: updates from runs that are
+    /// already in memory, bit by bit, add nothing until the first new one.
     ///
     /// # Errors
-    /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Disturbance`], or
-    ///   what the core law says.
+    /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Disturbance`],
+    ///   or any error of the core law.
     pub fn remember(
         &mut self,
         input: &[f64],
@@ -190,23 +190,23 @@ impl Relevance {
         Ok(found.into_iter().zip(weights).map(|((number, _), weight)| (number, weight)).collect())
     }
 
-    /// Drops all but the `keep` runs that hold most weight under the disturbances to come.
+    /// Keeps only the `keep` runs with the largest weights under coming disturbances.
     ///
     /// A run's share is the sum of its weights (Eq. 4.13, over all runs) under each of
-    /// `disturbances`, one after the other; without any, under the disturbance of every remembered
-    /// run, as if the past came again. The largest shares stay; of equal ones the older. With one
-    /// disturbance these are exactly the runs most relevant for it. Returns the numbers of the runs
-    /// kept, in rising order. `O(n_runs n_disturbances_given)`.
+    /// `disturbances`, one after the other; by default under the disturbance of every stored run,
+    /// as if the past were repeated. The largest shares stay; of equal ones the older. With one
+    /// disturbance these are exactly the runs most relevant for it. Returns the indices of the
+    /// remaining runs, ascending. `O(n_runs n_disturbances_given)`.
     ///
     /// # Errors
-    /// - [`LearningError::Disturbance`] if `disturbances` holds no whole number of them;
+    /// - [`LearningError::Disturbance`] if `disturbances` is not a whole number of them;
     ///   [`LearningError::NotFinite`].
     pub fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>, LearningError> {
         let width = self.shape.n_disturbances;
         let given = if disturbances.is_empty() { &self.disturbances } else { disturbances };
         let mut shares = vec![0.0; self.len()];
         let mut sums = Vec::new();
-        // Without disturbances to tell runs apart, one look says all.
+        // Without disturbances that distinguish runs, one pass suffices.
         let mut looks = given.chunks(width.max(1));
         let no_disturbance: &[f64] = &[];
         let mut first = (width == 0).then_some(no_disturbance);
@@ -231,7 +231,7 @@ impl Relevance {
         Ok(kept)
     }
 
-    /// Computes what a run adds to the memory.
+    /// Computes the proposal of a run.
     fn propose(&mut self, input: &[f64], error: &[f64]) -> Result<(), LearningError> {
         let RunShape { n_samples, n_inputs, n_outputs, .. } = self.shape;
         check("input", input, n_samples, n_inputs)?;
@@ -254,7 +254,7 @@ impl Relevance {
         self.index.push(&self.weights, sum, disturbance);
     }
 
-    /// Returns whether the proposal is remembered already under this disturbance.
+    /// Returns true if the proposal is already stored under this disturbance.
     fn knows(&self, disturbance: &[f64]) -> bool {
         let width = disturbance.len();
         (0..self.len()).any(|run| {
@@ -263,7 +263,7 @@ impl Relevance {
         })
     }
 
-    /// Writes the weighted mean of what counts under a disturbance.
+    /// Writes the weighted mean of the runs that count under a disturbance.
     fn weigh(&mut self, disturbance: &[f64], next: &mut [f64]) {
         let epsilon = self.weights.epsilon;
         next.fill(0.0);
@@ -302,7 +302,7 @@ impl Law for Relevance {
         }
         self.propose(input, error)?;
         let (finished, coming) = self.told.settle()?;
-        // On the stack, so that an update allocates nothing for them.
+        // On the stack, so that an update does not allocate for them.
         let copy = |disturbance: &[f64]| {
             let mut place = [0.0; DISTURBANCES_MAX];
             place[..n_disturbances].copy_from_slice(disturbance);

@@ -1,4 +1,4 @@
-//! `[learning.relevance]`: the law that goes on from all past runs, and what makes a run relevant.
+//! `[learning.relevance]`: core law, disturbances, and weights of the relevance.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,16 +14,16 @@ use crate::schema::{Violation, field_order};
 
 /// `[learning.relevance]`: the core law, the disturbances of a run, and the weights of its relevance.
 ///
-/// Each run counts by `1 / (sum of the weighted squares of its error, of the error's rate and of the
-/// distance of its disturbance from the coming one + epsilon)`. The runs of this cell, program and
-/// measurement that the library holds are remembered at the start.
+/// Each run counts by `1 / (sum of the weighted squares of its error, of the error's rate and of
+/// the distance of its disturbance from the coming one + epsilon)`. The runs of this cell, program
+/// and measurement in the library are added at the start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct RelevanceParameters {
     /// The law that proposes an input after each run, with the parameters of its own table.
     pub core: LawName,
-    /// Numbers that describe the disturbance of a run, as temperatures.
+    /// Number of disturbances of a run, e.g. temperatures.
     #[schemars(range(min = 0, max = 7))]
     pub disturbances: usize,
     /// Weight of the squared error.
@@ -32,22 +32,22 @@ pub struct RelevanceParameters {
     /// Weight of the squared rate of the error.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub error_rate: f64,
-    /// Weight of the squared distance of the disturbances: one for all, or one for each.
+    /// Weight of the squared distance of the disturbances: one for all, or one per disturbance.
     #[schemars(inner(range(min = 0.0, max = 1e12)))]
     pub disturbance: Vec<f64>,
     /// Sum of the squares below which runs count as equally good.
     #[schemars(range(min = 0.0, max = 1e12))]
     pub epsilon: f64,
-    /// Time constant of the filter that gives the error's rate.
+    /// Time constant of the filter that computes the error's rate.
     #[schemars(range(min = 1e-6, max = 1e3))]
     pub rate_filter_s: f64,
-    /// Gain of what the core law adds to an input.
+    /// Gain of the core law's correction.
     #[schemars(range(min = -1e3, max = 1e3))]
     pub error_gain: f64,
-    /// Gain of the input itself.
+    /// Gain of the input.
     #[schemars(range(min = -1e3, max = 1e3))]
     pub input_gain: f64,
-    /// Number of the most relevant runs that count; all if not given.
+    /// Number of most relevant runs to use; all if not given.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub top: Option<usize>,
 }

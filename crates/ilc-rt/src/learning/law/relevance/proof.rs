@@ -1,5 +1,5 @@
-//! Proof of the law: hand-checked runs, the listing's loops on random runs, and a motor whose
-//! resistance follows the temperature.
+//! Tests of the law: hand-checked runs, the listing's loops on random runs, and a motor whose
+//! resistance depends on the temperature.
 
 use proptest::prelude::*;
 
@@ -49,7 +49,7 @@ fn three_runs_by_hand() {
     let relevant = law.relevant(&[1.0]).unwrap();
     assert_eq!(relevant.iter().map(|(run, _)| *run).collect::<Vec<_>>(), [0, 1, 2]);
     assert!((relevant[0].1 - (1.0 / 3.0) / (1.0 / 3.0 + 2.0 / 5.0)).abs() < 1e-14);
-    // What is most relevant at 3: run 2 (0 + 0 + 1), then run 1 (9).
+    // Most relevant at 3: run 2 (0 + 0 + 1), then run 1 (9).
     assert_eq!(law.trim(2, &[3.0]).unwrap(), [1, 2]);
     assert_eq!(law.relevant(&[3.0]).unwrap()[0].0, 1);
 }
@@ -161,7 +161,7 @@ proptest! {
             }
             law
         };
-        // For one disturbance: the most relevant ones, and the law then weighs these alone.
+        // For one disturbance: the most relevant ones, and the law then weights these alone.
         let at = [0.3, -0.4];
         let mut law = make();
         let mut best: Vec<usize> =
@@ -173,7 +173,7 @@ proptest! {
         law.set_disturbance(&at);
         law.weigh(&at, &mut next);
         close(&next, &listing(&left, &at, &law.weights.clone(), 1.0, 0.5));
-        // For all that has been met: the sums of the weights decide.
+        // For all disturbances met: the sums of the weights decide.
         let mut law = make();
         let mut shares = vec![0.0; runs.len()];
         for run in &runs {
@@ -250,7 +250,7 @@ fn wrong_use_is_refused_one_thing_at_a_time() {
     assert!(law.is_empty());
 }
 
-/// The motor of Case I in the thesis, closed loop, sampled: from the reference to the position.
+/// The motor of Case I in the thesis, closed loop, discretised: from the reference to the position.
 fn motor(temperature_c: f64) -> StateSpace {
     let resistance = 1.0 + 3.9e-3 * temperature_c;
     let (inertia, friction, constant, inductance) = (0.01, 1.0, 1.0, 0.005);

@@ -1,4 +1,4 @@
-//! The relevance equation: how much a past run has to say about the coming one.
+//! The relevance equation: weight of a past run for the coming one.
 
 use crate::learning::LearningError;
 
@@ -10,11 +10,12 @@ const FAR: f64 = 1e150;
 /// `N_j = 1 / (sum_k [N_e |e_j[k]|^2 + N_er |de_j[k]|^2 + sum_i N_d,i (d_i - d_j,i)^2] + epsilon)`
 ///
 /// The sum runs over the samples of a run, as in the source's listing; its integral is `dt_s` times
-/// that, a factor that cancels in the weights and scales `epsilon` only. With several channels `|e|`
-/// is the length of the error. The rate `de` is the error through `s / (rate_filter_s s + 1)`, at rest
-/// before the run, discretised exactly for an error that is held over each sample.
+/// that, a factor that cancels in the weights and only scales `epsilon`. With several channels
+/// `|e|` is the Euclidean norm of the error. The rate `de` is the error through
+/// `s / (rate_filter_s s + 1)`, at rest before the run, discretised with a zero-order hold.
 ///
-/// `epsilon` is the sum below which runs count as equally good: choose the weights in proportion to it.
+/// `epsilon` is the sum below which runs count as equally good: choose the weights in proportion to
+/// it.
 ///
 /// # Units
 /// - `error`: 1 / error unit^2; `error_rate`: s^2 / error unit^2; `disturbance`: 1 / disturbance unit^2
@@ -27,15 +28,15 @@ pub struct RelevanceWeights {
     pub error: f64,
     /// Weight `N_er` of the error's rate.
     pub error_rate: f64,
-    /// Weights `N_d`, one for each disturbance, or one for all.
+    /// Weights `N_d`, one per disturbance, or one for all.
     pub disturbance: Vec<f64>,
     /// Added to every sum; with 0 a run without error under the same disturbance takes all weight.
     pub epsilon: f64,
-    /// Time constant of the filter that gives the error's rate.
+    /// Time constant of the filter that computes the error's rate.
     pub rate_filter_s: f64,
-    /// Gain `Gamma_1` of what the core law adds to an input.
+    /// Gain `Gamma_1` of the core law's correction.
     pub error_gain: f64,
-    /// Gain `Gamma_2` of the input itself.
+    /// Gain `Gamma_2` of the input.
     pub input_gain: f64,
 }
 
@@ -57,9 +58,9 @@ impl RelevanceWeights {
     /// Returns the weights, checked, with one weight for each of `n_disturbances`.
     ///
     /// # Errors
-    /// - [`LearningError::Parameter`] for a number that is not finite, a weight below 0, or a filter
-    ///   time that is not above 0.
-    /// - [`LearningError::Disturbance`] for another number of weights than 1 or `n_disturbances`.
+    /// - [`LearningError::Parameter`] for a number that is not finite, a negative weight, or a
+    ///   filter time that is not positive.
+    /// - [`LearningError::Disturbance`] for a number of weights other than 1 or `n_disturbances`.
     pub fn spread(mut self, n_disturbances: usize) -> Result<Self, LearningError> {
         let weights =
             [("error", self.error), ("error_rate", self.error_rate), ("epsilon", self.epsilon)];
@@ -91,7 +92,7 @@ impl RelevanceWeights {
         Ok(self)
     }
 
-    /// Returns the part of a run's sum that is its error's own, in a single pass without memory.
+    /// Returns the share of a run's sum due to its error, in a single pass without memory.
     pub(super) fn error_sum(&self, error: &[f64], n_outputs: usize, dt_s: f64) -> f64 {
         let mut sum = self.error * error.iter().map(|e| e * e).sum::<f64>();
         if self.error_rate > 0.0 {
@@ -110,9 +111,9 @@ impl RelevanceWeights {
         sum
     }
 
-    /// Returns where a run lies in the space in which its sum is a squared distance.
+    /// Returns the position of a run in the space where its sum is a squared distance.
     ///
-    /// `(sqrt(E_j), sqrt(N_d,1 n_samples) d_1, ...)`; the coming run, whose error shall be 0, lies at
+    /// `(sqrt(E_j), sqrt(N_d,1 n_samples) d_1, ...)`; the coming run, with an error of 0, is at
     /// `error_sum = 0`.
     pub(super) fn place<const K: usize>(
         &self,
@@ -136,7 +137,7 @@ impl RelevanceWeights {
 /// # Source
 /// - \[dimarco2016\], Eq. (4.13).
 pub(super) fn normalise(sums: &mut [f64], epsilon: f64) {
-    // Taken relative to the smallest denominator, so that nothing overflows.
+    // Relative to the smallest denominator, so that nothing overflows.
     let least = sums.iter().fold(f64::INFINITY, |least, &sum| least.min(sum + epsilon));
     let mut total = 0.0;
     for sum in sums.iter_mut() {
@@ -149,7 +150,7 @@ pub(super) fn normalise(sums: &mut [f64], epsilon: f64) {
     }
 }
 
-/// Returns how much weight each run holds under the disturbances of all: the sums of Eq. (4.13).
+/// Returns the total weight of each run under the disturbances of all: the sums of Eq. (4.13).
 ///
 /// `disturbances` are the runs' own, already weighted, `width` numbers each.
 pub(crate) fn shares(
@@ -160,7 +161,7 @@ pub(crate) fn shares(
 ) -> Vec<f64> {
     let mut shares = vec![0.0; error_sums.len()];
     let mut sums = vec![0.0; error_sums.len()];
-    // Without disturbances every look is the same one.
+    // Without disturbances every pass is the same.
     let n_looks = if width == 0 { 1 } else { error_sums.len() };
     for look in 0..n_looks {
         let here = &disturbances[look * width..][..width];

@@ -9,11 +9,11 @@ use super::super::least_squares::{Minimum, minimize};
 use super::SecondOrder;
 use crate::model::ModelError;
 
-/// Starts that are followed to their minimum.
+/// Number of initial values that are followed to their minimum.
 const FOLLOWED: usize = 10;
-/// Cost of each frequency's weight below which a start has led to the model itself.
+/// Cost per unit weight below which the fit is exact.
 const EXACT: f64 = 1e-22;
-/// Fits whose cost is within this factor of the least, 5 % in the RMS of what they leave over, are as good.
+/// Fits whose cost is within this factor of the smallest, 5 % in the RMS residual, are as good.
 const AS_GOOD: f64 = 1.1;
 /// Natural frequencies may lie outside the band by this factor.
 pub(super) const BEYOND_BAND: f64 = 30.0;
@@ -48,11 +48,10 @@ pub struct SecondOrderFit {
 
 /// Fits a second-order model with delay to a frequency response.
 ///
-/// `min sum_k w_k |ln (H_k / G(f_k))|^2`, `w = gamma^2 / (1 - gamma^2)`: magnitude counts in relative
-/// terms and phase in radians, both as much as the coherence trusts them. Damping and natural
-/// frequency are positive by construction, so the model is stable. An axis that answers at two
-/// frequencies or fewer gives a model without gain and a residual of 1, which [`super::super::doubt`] speaks
-/// against.
+/// `min sum_k w_k |ln (H_k / G(f_k))|^2`, `w = gamma^2 / (1 - gamma^2)`: relative magnitude and
+/// phase in radians, weighted by the coherence. Damping and natural frequency are positive by
+/// construction, so the model is stable. An axis that responds at two frequencies or fewer gives a
+/// model of gain 0 and a residual of 1, which [`super::super::doubt`] rejects.
 ///
 /// # Shapes
 /// - `measured`: more than two frequencies, without 0 Hz
@@ -102,7 +101,8 @@ pub fn fit_second_order(
     }
     let least = ends.iter().map(|(end, _)| end.cost).fold(f64::INFINITY, f64::min);
     let delay_s = |(end, sign): &(Minimum, Sign)| fit.model(&end.parameters, *sign).delay_s.abs();
-    // Noisy data hardly tell a delay from more damping: of fits that are as good, the plainest.
+    // Noisy data hardly distinguish a delay from more damping: of equally good fits, the simplest
+    // is taken.
     let as_good = ends.iter().filter(|(end, _)| end.cost <= AS_GOOD * least);
     let plainest = as_good.min_by(|a, b| delay_s(a).total_cmp(&delay_s(b)));
     let (minimum, sign) = plainest.ok_or(ModelError::Numerics {
@@ -158,8 +158,8 @@ pub(super) struct Fit<'a> {
     pub(super) known: Known,
     /// Unit of the delay: a radian at the highest frequency.
     pub(super) tau_0: f64,
-    /// Delays that are searched: from half a period of the highest frequency too early to where the
-    /// spacing of the frequencies no longer tells turns apart.
+    /// Range of delays: from half a period of the highest frequency too early to where the spacing
+    /// of the frequencies makes the phase ambiguous.
     delay_range_s: (f64, f64),
 }
 
@@ -179,7 +179,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Returns whether a model lies in the search range.
+    /// Returns true if a model is in the search range.
     fn is_searched(&self, model: &SecondOrder) -> bool {
         let f = &self.measured.frequency_hz;
         let (low_hz, high_hz) = (f[0] / BEYOND_BAND, f[f.len() - 1] * BEYOND_BAND);

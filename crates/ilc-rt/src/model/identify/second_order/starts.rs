@@ -1,4 +1,4 @@
-//! Starts of the fit: from linear fits, and from a grid over the band.
+//! Initial values of the fit: from linear fits, and from a grid over the band.
 
 use std::f64::consts::TAU;
 
@@ -9,11 +9,11 @@ use super::SecondOrder;
 use super::fit::{BEYOND_BAND, DAMPING_RANGE, Fit, Sign};
 use crate::model::unwrap_phase;
 
-/// Natural frequencies tried over the band to begin from.
+/// Natural frequencies of the grid.
 const FREQUENCIES: usize = 16;
-/// Damping ratios tried to begin from.
+/// Damping ratios of the grid.
 const DAMPINGS: [f64; 4] = [0.05, 0.2, 0.7, 1.5];
-/// Delays tried to begin from, in periods of the highest frequency.
+/// Delays of the grid, in periods of the highest frequency.
 const DELAYS: [f64; 5] = [0.0, 0.1, 0.25, 0.5, 1.0];
 
 impl Fit<'_> {
@@ -58,7 +58,7 @@ impl Fit<'_> {
         let f = &self.measured.frequency_hz;
         let mut phase: Vec<f64> = self.measured.response.iter().map(|h| h.arg()).collect();
         unwrap_phase(&mut phase);
-        // Measured phases are known up to whole turns; the first one is near that of the gain.
+        // Measured phases are ambiguous by whole turns; the first one is near that of the gain.
         let mut starts = Vec::new();
         let (low, high) = (f[0].ln(), f[f.len() - 1].ln());
         for i in 0..FREQUENCIES {
@@ -99,7 +99,7 @@ impl Fit<'_> {
                         starts.push((start, sign));
                         continue;
                     }
-                    // The phase's slope says what the delay is, unless noise made it jump.
+                    // The slope of the phase gives the delay, unless noise made it jump.
                     for tau in DELAYS.iter().map(|t| TAU * t).chain([num / den / self.tau_0]) {
                         let mut start = start.clone();
                         start.push(tau);

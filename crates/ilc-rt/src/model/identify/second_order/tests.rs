@@ -129,7 +129,7 @@ fn an_axis_that_does_not_answer_has_no_gain_and_all_left_over() {
             super::super::uncertainty(&silence, &found.model.response(&band()), 3.0).unwrap();
         assert!(bound.bound.iter().all(|bound| (bound - 1.0).abs() < 1e-12), "{bound:?}");
     }
-    // Silence at some frequencies, between others that answer, is left out.
+    // Frequencies without a response, between others with one, are omitted.
     let truth = SecondOrder {
         gain: 1.3,
         natural_frequency_hz: 15.0,

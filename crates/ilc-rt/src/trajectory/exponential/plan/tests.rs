@@ -100,7 +100,7 @@ fn an_oscillation_passes_no_corner_and_stays_within_the_limits() {
         let t = plan.duration_s() * f64::from(k) / 100_000.0;
         let p = plan.at(t).position_m;
         if t < ends[1] {
-            // Along the first line, whichever way.
+            // Along the first line, in either direction.
             let along = 0.6 * p[0] + 0.8 * p[1];
             assert!(along <= 0.05 + 1e-15, "{t}: {along}");
             assert!((0.8 * p[0] - 0.6 * p[1]).abs() < 1e-15, "stays on the line");
@@ -108,7 +108,7 @@ fn an_oscillation_passes_no_corner_and_stays_within_the_limits() {
             assert!(p[0] <= 0.04 + 1e-15 && p[1].abs() < 1e-15);
         }
     }
-    // The oscillation is there in the middle of the legs.
+    // The oscillation is present in the middle of the legs.
     let middle = (0..1000).map(|k| {
         let t = 1.0 + f64::from(k) * 1e-3;
         let p = plan.at(t).position_m;
@@ -204,7 +204,8 @@ fn ends_that_reach_into_each_other_are_planned_together() {
     for acceleration in [4.0, 5.0, 7.0, 10.0, 20.0] {
         let plan = ramped_sinusoid(acceleration).unwrap();
         let start = plan.choices()[0].alpha;
-        // The windows of the oscillation overlap: the start's is not open for good before the end's.
+        // The windows of the oscillation overlap: the start's is not fully open before the end's
+        // begins to close.
         assert!(acceleration > 10.0 || (45.0 / start).sqrt() > 5.0, "{acceleration}: {start}");
         let found = peaks(&plan, 0, 400_000)[1];
         assert!(found <= acceleration * (1.0 + 1e-9), "{acceleration}: {found}");
@@ -221,7 +222,7 @@ fn ends_that_reach_into_each_other_are_planned_together() {
 
 #[test]
 fn a_start_that_cannot_be_over_within_its_leg_is_refused() {
-    // α T³ has to be 45 for the deviation to be gone at the end: v α^(1/3) 3.1 = 3.3 m/s².
+    // α T³ has to be 45 for the deviation to have decayed at the end: v α^(1/3) 3.1 = 3.3 m/s².
     let refusal = ramped_sinusoid(3.0).unwrap_err();
     println!("{refusal}");
     let TrajectoryError::Alpha { quantity, place, alpha, reached, .. } = refusal else {

@@ -275,7 +275,7 @@ fn rotary_axes_are_in_degrees_whatever_the_units_are() {
     assert!((s[0].to_m[3] - half).abs() < 1e-15, "degrees");
     assert!((s[0].feed_m_s - 1.0_f64.to_radians()).abs() < 1e-15, "60 degrees a minute");
     assert!((s[1].to_m[0] - 0.0254).abs() < 1e-15 && (s[1].to_m[3] - 0.5 * half).abs() < 1e-15);
-    // 25.4 mm at 1 mm/s, whatever the rotary axis does meanwhile.
+    // 25.4 mm at 1 mm/s, independent of the rotary axis.
     let lasts_s = 0.0254_f64.hypot(0.5 * half) / s[1].feed_m_s;
     assert!((lasts_s - 25.4).abs() < 1e-9, "{lasts_s}");
     let lasts_s = (0.005 * half).hypot(0.5 * half) / s[2].feed_m_s;
@@ -303,7 +303,7 @@ fn a_semicircle_by_a_rounded_radius_is_one() {
     center("G0 X18.845 Y38.170\nG3 X41.155 Y21.830 R13.826");
     center("G2 X20.03 Y0 R10.01");
     center("G20\nG2 X2.0002 Y0 R1.0000");
-    // Decimals do not explain these.
+    // Rounding of decimals does not explain these.
     assert_refused("G2 X20.003 Y0 R10.000", 1, "R10.000");
     assert_refused("G2 X20 Y0 R9.9", 1, "R9.9");
     assert_refused("G2 X20 Y0 R9", 1, "R9");

@@ -1,8 +1,8 @@
-//! Least squares with unknowns that are not negative.
+//! Non-negative least squares.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Returns the `x >= 0` for which `|A x - b|` is least, by Lawson's and Hanson's active-set method.
+/// Returns the `x >= 0` that minimises `|A x - b|`, by the active-set method of Lawson and Hanson.
 pub(super) fn non_negative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     let n = a.ncols();
     let mut x = DVector::zeros(n);
@@ -20,7 +20,7 @@ pub(super) fn non_negative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
             let qr = DMatrix::from_columns(&columns).qr();
             let right = qr.q().tr_mul(b);
             let Some(found) = qr.r().solve_upper_triangular(&right) else {
-                // Depends on the others: it adds nothing.
+                // Linearly dependent on the others: it adds nothing.
                 passive.pop();
                 return x;
             };

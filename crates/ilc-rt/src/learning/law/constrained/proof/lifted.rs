@@ -1,4 +1,4 @@
-//! The problem written out with dense, lifted matrices.
+//! The problem in dense, lifted form.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use crate::learning::law::norm_optimal::Cost;
 use crate::learning::weights::Weight;
 use crate::model::StateSpace;
 
-/// `min 1/2 v'Hv + f'v` with `low <= T v <= high`, written out.
+/// `min 1/2 v'Hv + f'v` with `low <= T v <= high`, in dense form.
 pub(super) struct Lifted {
     h: DMatrix<f64>,
     f: DVector<f64>,
@@ -27,7 +27,7 @@ fn blocks(weight: &Weight, n_samples: usize, p: usize) -> DMatrix<f64> {
     matrix
 }
 
-/// The matrix of differences of the given order, zero before the run.
+/// Returns the matrix of differences of the given order, with zeros before the run.
 pub(super) fn differences(n_samples: usize, m: usize, order: usize) -> DMatrix<f64> {
     let mut first = DMatrix::identity(n_samples * m, n_samples * m);
     for i in m..n_samples * m {
@@ -74,7 +74,7 @@ pub(super) fn lift(
     let size = n_samples * m;
     let reference = bounds.reference.clone().unwrap_or_else(|| vec![0.0; size]);
     let start: Vec<f64> = (0..size).map(|i| reference[i % m]).collect();
-    // The set-point, counted from where it stands before the run.
+    // The set point, relative to its value before the run.
     let moved = DVector::from_fn(size, |i, _| reference[i] - start[i]);
     let (mut rows, mut low, mut high) = (DMatrix::zeros(0, size), Vec::new(), Vec::new());
     let mut add = |bound: &Option<Bound>, matrix: &DMatrix<f64>, at: &DVector<f64>, width| {
@@ -99,7 +99,7 @@ pub(super) fn lift(
     add(&bounds.velocity, &(&one / dt), &(&one * (&moved + &u) / dt), m);
     add(&bounds.acceleration, &two, &(&two * (&moved + &u)), m);
     if let Some(bound) = &bounds.output {
-        // Rows that no input reaches are as they are.
+        // Rows without any input's effect are constant.
         let target = bounds.output_reference.clone().unwrap_or(reference);
         let y = DVector::from_fn(n_samples * p, |i, _| target[i] - e[i]);
         let free: Vec<bool> = plant.row_iter().map(|row| row.amax() <= 0.0).collect();
@@ -123,11 +123,12 @@ impl Lifted {
         0.5 * v.dot(&(&self.h * v)) + self.f.dot(v) + self.constant
     }
 
-    /// Solves by an active-set method, which shares nothing with an interior point; `None` if no
-    /// change honours all limits.
+    /// Solves by an active-set method, independent of the interior-point method; `None` if no
+    /// change satisfies all limits.
     ///
-    /// With `w = L'v + L^-1 f`, `H = L L'`, the problem is that of the shortest `w` with `G w >= g`,
-    /// which is one of least squares with multipliers that are not negative (Lawson and Hanson).
+    /// With `w = L'v + L^-1 f`, `H = L L'`, the problem is that of the shortest `w` with
+    /// `G w >= g`, which is a non-negative least-squares problem for the multipliers (Lawson and
+    /// Hanson).
     pub(super) fn solve(&self) -> Option<DVector<f64>> {
         let n = self.h.nrows();
         let lower = self.h.clone().cholesky()?.unpack();
@@ -167,7 +168,7 @@ impl Lifted {
         if honours { change(w) } else { None }
     }
 
-    /// The largest excess of a row over its limits, relative to the larger of them.
+    /// Returns the largest violation of a row, relative to the larger of its limits.
     pub(super) fn excess(&self, v: &DVector<f64>) -> f64 {
         let values = &self.rows * v;
         let mut worst = 0.0_f64;
@@ -179,7 +180,8 @@ impl Lifted {
         worst
     }
 
-    /// What of the slope no multiplier of the right sign can balance, relative to its two terms.
+    /// Returns the part of the gradient that no multiplier of the right sign balances
+    /// (stationarity), relative to its two terms.
     pub(super) fn stationarity(&self, v: &DVector<f64>) -> f64 {
         let curved = &self.h * v;
         let size = curved.norm().max(self.f.norm()).max(1e-12);

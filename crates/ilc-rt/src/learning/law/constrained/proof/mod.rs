@@ -1,5 +1,5 @@
-//! The law against an active-set method on the dense, lifted problem, against its optimality
-//! conditions, and against hand calculation.
+//! Tests of the law against an active-set method on the dense, lifted problem, against its
+//! optimality (KKT) conditions, and against hand calculations.
 
 #![allow(
     clippy::unnecessary_wraps,
@@ -105,8 +105,8 @@ fn haas(n_samples: usize, bounds: Bounds) -> Case {
 
 #[test]
 fn one_sample_by_hand() {
-    // y[1] never shows in a run of one sample: min s (u + v)^2 + r v^2 = (4 + v)^2 + 3 v^2 gives
-    // v = -1 and u' = 3, unless a bound says less.
+    // y[1] is outside a run of one sample: min s (u + v)^2 + r v^2 = (4 + v)^2 + 3 v^2 gives v = -1
+    // and u' = 3, unless a bound is tighter.
     let model = from_transfer_function(&[1.0], &[1.0, -0.5], Some(1.0)).unwrap();
     let cost = cost(1.0, 1.0, 3.0, 0.0);
     for (bounds, expected) in [
@@ -184,7 +184,7 @@ fn bounds_that_are_not_reached_change_nothing() {
 
 #[test]
 fn wide_bounds_in_the_search_lead_to_the_plain_solution() {
-    // One sample's bound is reached, so that the search runs; the others are far away.
+    // One sample's bound is active, so that the search runs; the others are far away.
     let mut lower = vec![-1e3; 60];
     lower[59] = 0.0;
     let bound = Bound { lower: Limit::PerSample(lower), upper: Limit::Scalar(1e3) };
@@ -365,7 +365,7 @@ fn an_input_from_which_the_bounds_cannot_be_honoured_is_kept() {
         law.status()
     );
     assert_eq!(next, u);
-    // Outputs that no input can bring about are found out by the search.
+    // Unreachable outputs are detected by the search.
     let case = haas(
         30,
         Bounds { output: Some(Bound::within(5.0, 6.0)), input: within(0.1), ..Bounds::default() },

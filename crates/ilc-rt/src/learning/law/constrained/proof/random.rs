@@ -29,7 +29,7 @@ fn random_model() -> impl Strategy<Value = StateSpace> {
     )
 }
 
-/// A random problem whose bounds some input honours: each is put around that input's own values.
+/// Returns a random feasible problem: each bound is placed around the values of a random input.
 fn random_case() -> impl Strategy<Value = Case> {
     (
         random_model(),
@@ -90,7 +90,7 @@ fn random_case() -> impl Strategy<Value = Case> {
         })
 }
 
-/// Draws the problem that belongs to a number.
+/// Draws the problem of a number.
 fn drawn(number: u64) -> Case {
     let mut seed = [0; 32];
     seed[..8].copy_from_slice(&number.to_le_bytes());
@@ -101,8 +101,8 @@ fn drawn(number: u64) -> Case {
 
 #[test]
 fn problems_that_lead_corrections_round_in_a_circle_are_solved() {
-    // Found among half a million drawn ones: the first eight never end with Mehrotra's steps alone,
-    // the others did not with a guard against short steps only.
+    // Found among half a million random ones: the first eight never converge with Mehrotra's steps
+    // alone, the others did not with a guard against short steps only.
     for number in [
         15_714, 17_897, 35_956, 37_593, 48_515, 60_030, 73_952, 96_413, 103_315, 286_875, 420_362,
         478_582, 498_384,

@@ -1,13 +1,13 @@
-//! The lifted problem as a dense system of equations, in twice the precision.
+//! The lifted problem as a dense system of equations, in double-double precision.
 
 use super::super::{Cost, Plant};
 use super::double_double::Double;
 
-/// Below this part of a diagonal entry nothing is left: this part of the input reaches nothing.
+/// A pivot below this share of a diagonal entry vanishes: this part of the input has no effect.
 const VANISHED: f64 = 1e-26;
 
-/// Returns the next input: solves `(P'QP + S + R + W) v = P'Q e - S u`, with `P` from the responses
-/// to pulses and `v = 0` where nothing determines it.
+/// Returns the next input: solves `(P'QP + S + R + W) v = P'Q e - S u`, with `P` from impulse
+/// responses and `v = 0` where it is undetermined.
 pub(super) fn dense<'a>(
     plant: impl Into<Plant<'a>>,
     n_samples: usize,
@@ -27,7 +27,7 @@ pub(super) fn dense<'a>(
     let mut right = vec![Double::ZERO; size];
     for row in 0..size {
         for col in 0..=row {
-            // Nothing happens before the later of the two pulses.
+            // Nothing happens before the later of the two impulses.
             let begin = row / m * p;
             let mut value = dot(&columns[col][begin..], &weighted[row][begin..]);
             if row / m == col / m {
@@ -56,7 +56,7 @@ pub(super) fn dense<'a>(
     u.iter().zip(change).map(|(u, v)| (Double::from(*u) + v).value()).collect()
 }
 
-/// The response to a pulse of channel `i` at sample `k`.
+/// Returns the response to an impulse of channel `i` at sample `k`.
 fn pulse(plant: Plant, n_samples: usize, k: usize, i: usize) -> Vec<Double> {
     let (n, p) = (plant.at(0).n_states(), plant.at(0).n_outputs());
     let mut response = vec![Double::ZERO; n_samples * p];
@@ -91,7 +91,7 @@ fn dot(left: &[Double], right: &[Double]) -> Double {
     left.iter().zip(right).fold(Double::ZERO, |sum, (left, right)| sum + *left * *right)
 }
 
-/// Solves by a Cholesky factor, lower triangle only.
+/// Solves by Cholesky factorisation of the lower triangle.
 fn solve(mut h: Vec<Vec<Double>>, mut x: Vec<Double>) -> Vec<Double> {
     let size = x.len();
     let mut gone = vec![false; size];

@@ -1,4 +1,4 @@
-//! Numbers of twice the precision, for reference solutions only: 32 digits.
+//! Double-double numbers of 32 digits, for reference solutions only.
 
 #![allow(clippy::float_cmp, reason = "exact where exactness is what is tested")]
 
@@ -30,27 +30,27 @@ impl From<f64> for Double {
     }
 }
 
-/// The exact sum of two numbers of which the first is not the smaller.
+/// Returns the exact sum of two numbers, the first not the smaller one.
 fn quick_sum(a: f64, b: f64) -> Double {
     let high = a + b;
     Double { high, low: b - (high - a) }
 }
 
-/// The exact sum of any two numbers.
+/// Returns the exact sum of any two numbers.
 fn sum(a: f64, b: f64) -> Double {
     let high = a + b;
     let part = high - a;
     Double { high, low: (a - (high - part)) + (b - part) }
 }
 
-/// A number as a sum of two with half the digits.
+/// Splits a number into a sum of two with half the digits.
 fn split(a: f64) -> (f64, f64) {
     let scaled = 134_217_729.0 * a;
     let high = scaled - (scaled - a);
     (high, a - high)
 }
 
-/// The exact product of two numbers.
+/// Returns the exact product of two numbers.
 fn product(a: f64, b: f64) -> Double {
     let high = a * b;
     let ((a1, a2), (b1, b2)) = (split(a), split(b));

@@ -1,4 +1,4 @@
-//! The law against dense linear algebra that shares nothing with it, and against hand calculation.
+//! Tests of the law against independent dense linear algebra, and against hand calculations.
 
 mod dense;
 mod double_double;
@@ -26,7 +26,7 @@ fn update(model: &StateSpace, n_samples: usize, w: Weights, u: &[f64], e: &[f64]
     next
 }
 
-/// Numbers without pattern, the same in every run.
+/// Returns pseudo-random numbers, the same in every run.
 fn noise(count: usize, seed: u32) -> Vec<f64> {
     let mut word = seed.wrapping_mul(2_654_435_761) | 1;
     (0..count)
@@ -49,7 +49,7 @@ fn weights(q: f64, s: f64, r: f64, rate: f64) -> Weights {
 
 #[test]
 fn one_state_two_samples_by_hand() {
-    // y[1] = 2 v[0]: v[0] = 2 q e[1] / (4 q + r); v[1] reaches nothing and r keeps it at 0.
+    // y[1] = 2 v[0]: v[0] = 2 q e[1] / (4 q + r); v[1] has no effect and r keeps it at 0.
     let model = from_transfer_function(&[2.0], &[1.0, -0.5], Some(1.0)).unwrap();
     let next = update(&model, 2, weights(3.0, 0.0, 4.0, 0.0), &[10.0, 20.0], &[99.0, 8.0]);
     assert!((next[0] - (10.0 + 48.0 / 16.0)).abs() < 1e-14 && (next[1] - 20.0).abs() < 1e-14);
@@ -65,7 +65,7 @@ fn without_penalty_the_last_sample_stays_and_the_rest_inverts() {
 
 #[test]
 fn a_rate_penalty_alone_holds_the_last_useful_change() {
-    // y[1] = v[0] and nothing else is penalised: v[0] = e[1], v[1] = v[0] costs nothing.
+    // y[1] = v[0] and nothing else is penalised: v[0] = e[1], v[1] = v[0] is free.
     let model = from_transfer_function(&[1.0], &[1.0, -0.5], Some(1.0)).unwrap();
     let next = update(&model, 2, weights(1.0, 0.0, 0.0, 3.0), &[0.0, 1.0], &[99.0, 4.0]);
     assert!((next[0] - 4.0).abs() < 1e-13 && (next[1] - 5.0).abs() < 1e-13);
@@ -89,8 +89,8 @@ fn the_named_cases_agree_with_dense_algebra() {
     let triple = discretize(&triple, 1.0, Method::ZeroOrderHold).unwrap();
     let feedthrough = from_transfer_function(&[1.0, 0.2], &[1.0, -0.8], Some(1e-3)).unwrap();
     let unstable = from_transfer_function(&[0.1, 0.05], &[1.0, -1.9, 0.8925], Some(1e-3)).unwrap();
-    // Where little but `r` holds a direction of the input, its digits are those that are left: the
-    // tolerance is the rounding of a double times the condition of the problem.
+    // If almost only `r` determines a direction of the input, few digits are left: the tolerance is
+    // the rounding of a double times the condition number of the problem.
     for (name, model, w, tolerance) in [
         ("second order, r 1e-2", &loop_1_ms, weights(1.0, 0.0, 1e-2, 0.0), 1e-13),
         ("second order, r 1e-6", &loop_1_ms, weights(1.0, 0.0, 1e-6, 0.0), 1e-12),
@@ -121,7 +121,7 @@ fn the_named_cases_agree_with_dense_algebra() {
             assert!(worst < tolerance, "{name}, {form:?}: {worst:e}");
         }
     }
-    // The sampled triple integrator has a zero at -3.7: without penalty its inverse explodes.
+    // The discrete triple integrator has a zero at -3.7: without penalty its inverse is unstable.
     let line = NormOptimal::new(&triple, 300, Weights::default()).unwrap_err().to_string();
     assert!(line.contains("zero outside the unit circle"), "{line}");
 }
@@ -171,7 +171,7 @@ fn problems_without_a_solution_are_refused_in_a_sentence() {
     assert!(line.contains("does not determine the input at sample"), "{line}");
     assert!(NormOptimal::new(&wide, 300, weights(1.0, 0.0, 1e-3, 0.0)).is_ok());
 
-    // Settles within one sample, while the last samples are still allowed to be undetermined.
+    // Reaches steady state within one sample, while the last samples may still be undetermined.
     let row = |values: &[f64]| DMatrix::from_row_slice(1, values.len(), values);
     let twins =
         StateSpace::discrete(row(&[0.5]), row(&[1.0, 1.0]), row(&[1.0]), row(&[0.0, 0.0]), 1.0);
@@ -248,7 +248,7 @@ fn whatever_is_not_finite_is_refused_wherever_it_is() {
     let apart = one.append(&late).unwrap();
     let mixed = DMatrix::from_row_slice(2, 2, &[1.0, 0.5, 0.0, 1.0]);
     let coupled = apart.series(&StateSpace::static_gain(mixed, Some(1e-3)).unwrap()).unwrap();
-    // The second output answers to nothing: no part of the law looks at its error.
+    // The second output responds to no input: the law does not use its error.
     let deaf = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
     let deaf = one.series(&StateSpace::static_gain(deaf, Some(1e-3)).unwrap()).unwrap();
     for (model, n_samples) in

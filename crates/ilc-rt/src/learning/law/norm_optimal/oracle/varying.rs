@@ -1,4 +1,4 @@
-//! Weights and models that vary along the run, against the dense reference.
+//! Tests of time-varying weights and models, against the dense reference.
 
 #![allow(
     clippy::decimal_bitwise_operands,
@@ -35,7 +35,7 @@ fn blocks(size: usize, n_samples: usize, seed: u32) -> Weight {
     Weight::Blocks(seeds.map(|seed| block(size, seed)).collect())
 }
 
-/// The largest difference from the reference over all forms.
+/// Returns the largest difference from the reference over all forms.
 fn worst<'a>(plant: impl Into<Plant<'a>>, n_samples: usize, cost: &Cost, seed: u32) -> f64 {
     let plant = plant.into();
     let (m, p) = (plant.at(0).n_inputs(), plant.at(0).n_outputs());
@@ -138,7 +138,7 @@ fn a_varying_problem_without_solution_is_refused() {
     }
 }
 
-/// A weight of any form.
+/// Returns a weight of any form.
 fn weight(size: usize, n_samples: usize, kind: usize, seed: u32) -> Weight {
     match kind {
         0 => Weight::Scalar(0.3),
