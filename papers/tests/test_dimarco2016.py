@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ilc_papers.dimarco2016 import PAPER, campaign, machine
 from ilc_papers.dimarco2016.reference import DT_S, INCH_M, appendix_a
 
-GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "dimarco_appendix_a.csv"
+GOLDEN = Path(__file__).parents[2] / "tests" / "golden" / "dimarco_appendix_a.csv"
 LAWS = ("pd", "pd_ilc", "flexible", "dpw", "dpw_top30")
 
 

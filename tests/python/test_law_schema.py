@@ -60,7 +60,7 @@ def tables() -> dict[str, Any]:
     def resolved(part: dict[str, Any]) -> dict[str, Any]:
         while True:
             if "$ref" in part:
-                part = whole["$defs"][part["$ref"].rsplit("/", 1)[-1]]
+                part = whole["definitions"][part["$ref"].rsplit("/", 1)[-1]]
             elif "anyOf" in part:
                 part = next(one for one in part["anyOf"] if one.get("type") != "null")
             elif len(part.get("allOf", [])) == 1:
