@@ -66,7 +66,7 @@ class Trajectory:
         for name in ("position_m", "velocity_m_s", "acceleration_m_s2", "programmed_m"):
             values = getattr(self, name)
             is_real = isinstance(values, np.ndarray) and values.dtype == np.float64
-            if not is_real or values.ndim != 2 or values.shape != shape:  # noqa: PLR2004
+            if not is_real or values.ndim != 2 or values.shape != shape:
                 message = f"{name}: an array of float64, shape (n_samples, n_axes), is needed"
                 raise TrajectoryError(message)
             if not np.isfinite(values).all():
