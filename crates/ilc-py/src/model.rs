@@ -21,10 +21,10 @@ use crate::whole::whole;
 ///   (n_outputs, n_inputs).
 /// - dt_s: sample time in seconds; None or 0 for a continuous-time model.
 ///
-/// Wherever a model is taken, one of scipy.signal or python-control will do. The methods raise ModelError if
-/// models, sample times or signals do not fit each other, a loop is not well posed, a continuous model is asked
-/// for samples, or numbers overflow; ValueError or TypeError if an array has the wrong shape, dtype or a number
-/// that is not finite.
+/// Every argument that is a model may also be one of scipy.signal or python-control. The methods raise
+/// ModelError if models, sample times or signals are incompatible, a loop is not well posed, a continuous-time
+/// model is to be simulated, or numbers overflow; ValueError or TypeError if an array has the wrong shape,
+/// dtype or a number that is not finite.
 ///
 /// Examples
 /// --------
