@@ -11,11 +11,9 @@ use serde::{Deserialize, Serialize};
 macro_rules! every_law {
     ($macro:ident) => {
         $macro! {
-            /// Norm-optimal ILC: minimises a quadratic cost over the whole run; with `rate` it is
-            /// CO-ILC.
+            /// Norm-optimal ILC: minimises a quadratic cost over the run; with `rate` it is CO-ILC.
             NormOptimal norm_optimal crate::learning::law::norm_optimal::NormOptimalParameters;
-            /// Proportional-derivative learning from the error some samples ahead, each axis
-            /// separately.
+            /// Proportional-derivative ILC: the error some samples ahead, each axis separately.
             Pd pd crate::learning::law::pd::PdParameters;
             /// Constrained norm-optimal ILC: within bounds of input and set point.
             Constrained constrained crate::learning::law::constrained::ConstrainedParameters;
@@ -33,11 +31,9 @@ macro_rules! every_law {
             /// Another law, fed with the tool's errors through the inverse of a Jacobian matrix.
             ThroughJacobian through_jacobian
                 crate::learning::law::through_jacobian::ThroughJacobianParameters;
-            /// Relevance-weighted ILC (DPW-ILC): from all past runs, weighted by the similarity of
-            /// their disturbance and the size of their error.
+            /// Relevance-weighted ILC (DPW-ILC): learns from all past runs with a similar disturbance.
             Relevance relevance crate::learning::law::relevance::RelevanceParameters;
-            /// Flexible ILC: one input for each disturbance met, interpolated between the nearest
-            /// two.
+            /// Flexible ILC: one input for each disturbance met, interpolated between the nearest two.
             Flexible flexible crate::learning::law::flexible::FlexibleParameters;
         }
     };
