@@ -282,7 +282,7 @@ def formation_errors(
     Raises
     ------
     LearningError
-        If an agent or axis is not there.
+        If an agent or axis does not exist.
     ValueError, TypeError
         If `e` has the wrong shape, dtype or a number that is not finite.
 

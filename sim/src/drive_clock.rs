@@ -8,10 +8,10 @@
 //!
 //! Controller and drives share a computer, and if one of them is stalled, the other must not count
 //! it as lost. The silence between two SYNCs is therefore the time for which this process *watched*
-//! the bus in vain: a gap in which it did not run counts as one check. Once the drives have been in
+//! a silent bus: a gap in which it did not run counts as one check. Once the drives have been in
 //! lock for a while, a long silence first pauses the plant's time; then the clock runs freely with
-//! the wall clock, from that moment on, and the drives miss their commands. Paused time is not made
-//! up for.
+//! the wall clock, from that moment on, and the drives miss their commands. Paused time is not
+//! caught up.
 
 use std::time::Duration;
 

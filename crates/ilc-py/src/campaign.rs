@@ -66,9 +66,9 @@ impl EventStream {
         self.frame.take_raised().map(|raised| raised.into_value(py))
     }
 
-    /// Bring the axes to rest; events continue until they are.
+    /// Stop the axes; events continue until they are at rest.
     ///
-    /// - signal : int: Number of the signal that asked for it.
+    /// - signal : int: Number of the signal that requested it.
     #[pyo3(signature = (signal=SIGTERM))]
     fn stop(&self, signal: i32) {
         self.stop.store(signal, Ordering::Relaxed);
@@ -196,7 +196,7 @@ impl Work {
 
 /// Check options, the words of ``ilc-rt run`` or ``ilc-rt identify`` after the verb.
 ///
-/// Raises ValueError with the name of the option, its value and what is allowed.
+/// Raises ValueError with the name of the option, its value and the allowed values.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
 fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {

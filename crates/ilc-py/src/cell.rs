@@ -11,9 +11,9 @@ use crate::error::OrRaise;
 use crate::made::Made;
 use crate::model::PyStateSpace;
 
-/// A cell description, read and validated.
+/// A validated cell description.
 ///
-/// Attributes are those of the file; `reference` gives the set points of a run.
+/// Attributes are those of the file; `reference` returns the set points of a run.
 ///
 /// Examples
 /// --------
@@ -36,11 +36,10 @@ impl PyCell {
     /// Read a cell description from a TOML file.
     ///
     /// - path : str or os.PathLike: The file.
-    /// - allow_divergent : bool: Whether a law that will not converge with the cell's model is
-    ///   accepted, whatever the file says.
+    /// - allow_divergent : bool: Accept a law that does not converge with the cell's model, even if
+    ///   the file does not.
     ///
-    /// Returns Cell.
-    /// Raises ValueError in one line: file, key, value and what is allowed.
+    /// Returns Cell. Raises ValueError in one line: file, key, value and the allowed values.
     #[staticmethod]
     #[pyo3(signature = (path, allow_divergent=false))]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
@@ -92,7 +91,7 @@ impl PyCell {
         self.n_samples
     }
 
-    /// Returns the number of axes.
+    /// Number of axes.
     #[getter]
     fn n_axes(&self) -> usize {
         self.cell.n_axes()
@@ -117,7 +116,7 @@ impl PyCell {
         self.cell.axes.iter().map(|axis| axis.unit.symbol()).collect()
     }
 
-    /// Gain kv of each axis' position loop in 1/s; None where it is in the drive.
+    /// Position gain kv of each axis in 1/s; None if the loop is in the drive.
     #[getter]
     fn position_gains_per_s(&self) -> Vec<Option<f64>> {
         let gain = |axis: &Axis| axis.position_loop.map(|position_loop| position_loop.gain_per_s);
@@ -151,14 +150,14 @@ impl PyCell {
         self.warnings.clone()
     }
 
-    /// Return the set points of a run, as the loop will give them.
+    /// Return the set points of a run, as sent by the loop.
     ///
     /// Returns ndarray of float64, shape (n_samples, n_axes): Positions in metres.
     fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give_signal(py, self.reference_m.clone(), self.cell.n_axes(), false)
     }
 
-    /// Return the model that learning believes in, learned input to position.
+    /// Return the model that learning uses, from learned input to position.
     ///
     /// Returns StateSpace: Inputs in the unit of each axis's interface, positions in metres.
     fn model(&self) -> PyResult<PyStateSpace> {

@@ -49,15 +49,15 @@ impl PyPid {
         Ok(Self { made: Made::of(a)?, dt_s, pid: Guarded::new(Pid::new(gains, dt_s)) })
     }
 
-    /// Return the output for the error of this tick, within its limit.
+    /// Return the output for the error of this tick, saturated (anti-windup).
     ///
-    /// Raises ValueError if the error is not finite; it is then not remembered.
+    /// Raises ValueError if the error is not finite; the state is then unchanged.
     fn step(&self, py: Python<'_>, error: &Bound<'_, PyAny>) -> PyResult<f64> {
         let error = number("error", error)?;
         give("error", error, self.pid.borrow(py)?.step(error))
     }
 
-    /// Return the outputs for a whole error signal of shape (n_samples,), from the present state on.
+    /// Return the outputs for a whole error signal of shape (n_samples,), from the current state.
     fn run<'py>(&self, py: Python<'py>, error: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut signal = Signal::read("error", error)?.with_channels("error", 1)?;
         let mut pid = self.pid.borrow(py)?;
@@ -67,7 +67,7 @@ impl PyPid {
         give_signal(py, signal.values, 1, signal.is_flat)
     }
 
-    /// Return the controller without its limit, as a `StateSpace` from error to output.
+    /// Return the controller without saturation, as a `StateSpace` from error to output.
     ///
     /// It has three states: the integral and two of the derivative.
     fn model(&self, py: Python<'_>) -> PyResult<PyStateSpace> {
@@ -82,7 +82,7 @@ impl PyPid {
         Ok(PyStateSpace::from(model.or_raise()?))
     }
 
-    /// Start again from rest.
+    /// Reset to rest.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.pid.borrow(py)?.reset();
         Ok(())
@@ -121,7 +121,7 @@ impl PyCascade {
         Ok(Self(Guarded::new(Cascade::new(gains, dt_s)), Made::of(a)?))
     }
 
-    /// Return the force of this tick in N, within its limit.
+    /// Return the force of this tick in N, saturated.
     ///
     /// Reference position, measured position and velocity; reference velocity and acceleration for the
     /// feed-forward; learned force, added before the limit. Raises ValueError if the force is not finite;
@@ -148,7 +148,7 @@ impl PyCascade {
         give("position_m, actual_m or another number", f64::NAN, force)
     }
 
-    /// Start again from rest.
+    /// Reset to rest.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.0.borrow(py)?.reset();
         Ok(())
@@ -200,7 +200,7 @@ impl PyCrossCoupled {
         Ok((give_signal(py, added, 1, true)?, contour_m))
     }
 
-    /// Start again from rest.
+    /// Reset to rest.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.0.borrow(py)?.reset();
         Ok(())

@@ -94,13 +94,14 @@ impl PyDelta {
         Ok(jacobians.into_pyarray(py).into_any())
     }
 
-    /// Return whether the tool can be at a place in m, shape (3,), and move on in every direction.
+    /// Return True if the tool can reach a place in m, shape (3,), and leave it in every direction.
     fn in_workspace(&self, p_m: &Bound<'_, PyAny>) -> PyResult<bool> {
         let poses = Poses::read("p_m", p_m)?;
         Ok(poses.values.iter().all(|pose| self.delta.is_in_workspace(*pose)))
     }
 
-    /// Return the condition of the Jacobian for crank angles in rad, shape (3,); 1 is isotropic.
+    /// Return the condition number of the Jacobian for crank angles in rad, shape (3,); 1 is
+    /// isotropic.
     fn condition(&self, theta_rad: &Bound<'_, PyAny>) -> PyResult<f64> {
         let poses = Poses::read("theta_rad", theta_rad)?;
         if !poses.is_single {

@@ -13,18 +13,18 @@ use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
 use crate::whole::whole;
 
-/// Linear time-invariant model, sampled or continuous.
+/// Linear time-invariant model, in discrete or continuous time.
 ///
 /// ``x[k+1] = A x[k] + B u[k]``, ``y[k] = C x[k] + D u[k]``.
 ///
 /// - a, b, c, d: matrices of shape (n_states, n_states), (n_states, n_inputs), (n_outputs, n_states) and
 ///   (n_outputs, n_inputs).
-/// - dt_s: sample time in seconds; None or 0 for a continuous model.
+/// - dt_s: sample time in seconds; None or 0 for a continuous-time model.
 ///
-/// Wherever a model is taken, one of scipy.signal or python-control will do. The methods raise ModelError if
-/// models, sample times or signals do not fit each other, a loop is not well posed, a continuous model is asked
-/// for samples, or numbers overflow; ValueError or TypeError if an array has the wrong shape, dtype or a number
-/// that is not finite.
+/// Every argument that is a model may also be one of scipy.signal or python-control. The methods raise
+/// ModelError if models, sample times or signals are incompatible, a loop is not well posed, a continuous-time
+/// model is to be simulated, or numbers overflow; ValueError or TypeError if an array has the wrong shape,
+/// dtype or a number that is not finite.
 ///
 /// Examples
 /// --------
@@ -95,7 +95,7 @@ impl PyStateSpace {
         give_matrix(py, self.0.d())
     }
 
-    /// Sample time in seconds; None for a continuous model.
+    /// Sample time in seconds; None for a continuous-time model.
     #[getter]
     fn dt_s(&self) -> Option<f64> {
         self.0.dt_s()
@@ -145,7 +145,7 @@ impl PyStateSpace {
         Ok(array.into_pyarray(py).into_any())
     }
 
-    /// Return the lifted matrix of runs of `n` samples, shape (n * n_outputs, n * n_inputs).
+    /// Return the lifted-system matrix of runs of `n` samples, shape (n * n_outputs, n * n_inputs).
     ///
     /// The block lower-triangular Toeplitz matrix of the Markov parameters, sample by sample.
     fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
@@ -166,19 +166,19 @@ impl PyStateSpace {
         self.0.feedback(&controller).or_raise().map(Self)
     }
 
-    /// Return this model followed by another, y = next(self(u)).
+    /// Return the series connection with another model, y = next(self(u)).
     fn series(&self, next: &Bound<'_, PyAny>) -> PyResult<Self> {
         let next = read_model("next", next)?;
         self.0.series(&next).or_raise().map(Self)
     }
 
-    /// Return two sets of axes side by side: a block-diagonal model.
+    /// Return the parallel arrangement with another model: a block-diagonal model.
     fn append(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
         let other = read_model("other", other)?;
         self.0.append(&other).or_raise().map(Self)
     }
 
-    /// Return the model with a dead time of `n_samples` at every input, as of a bus.
+    /// Return the model with a dead time of `n_samples` at every input, e.g. of a bus.
     fn delayed(&self, n_samples: &Bound<'_, PyAny>) -> PyResult<Self> {
         let n_samples = whole("n_samples", n_samples)?;
         self.0.delayed(n_samples).or_raise().map(Self)
@@ -237,9 +237,10 @@ impl PyStateSpace {
         self.0.complementary_sensitivity(&controller).or_raise().map(Self)
     }
 
-    /// Return the process sensitivity P (I + K P)^-1, from an input added to the controller's to the output.
+    /// Return the process sensitivity P (I + K P)^-1, from an input added to the controller's
+    /// output to the output.
     ///
-    /// It is the model of learning in the parallel structure.
+    /// The plant of learning in the parallel structure.
     fn process_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
         let controller = read_model("controller", controller)?;
         self.0.process_sensitivity(&controller).or_raise().map(Self)
@@ -255,7 +256,7 @@ impl PyStateSpace {
         model::delays(&self.0).or_raise()
     }
 
-    /// Return a minimal realisation. Keeps the controllable and observable states.
+    /// Return a minimal realisation: the controllable and observable states.
     fn minimal(&self) -> PyResult<Self> {
         self.0.minimal().or_raise().map(Self)
     }

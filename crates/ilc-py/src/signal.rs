@@ -18,7 +18,7 @@ use crate::exceptions;
 use crate::made::reduce_kind;
 use crate::whole::{each, whole};
 
-/// A filter of any kind, to be applied or given to a law.
+/// A filter of any kind, to be applied or passed to a law (Q-filter).
 #[pyclass(name = "Filter", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
 pub(crate) struct PyFilter {
@@ -65,7 +65,7 @@ impl PyFilter {
         Ok(Self { kind, arguments: kept.unbind(), filter })
     }
 
-    /// Return the signal filtered without lag.
+    /// Return the zero-phase filtered signal.
     ///
     /// Parameters
     /// ----------
@@ -91,7 +91,7 @@ impl PyFilter {
         filtered(py, &without_lag(&self.filter), x)
     }
 
-    /// Return the signal filtered forward only, from rest; recursive filters only.
+    /// Return the causally filtered signal, from rest; recursive filters only.
     fn _forward<'py>(&self, py: Python<'py>, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         filtered(py, &QFilter::Causal(self.sections()?.to_vec()), x)
     }
@@ -104,7 +104,7 @@ impl PyFilter {
         Ok(table.into_pyarray(py).into_any())
     }
 
-    /// Numbers of the filter by name, beside those that it was made of.
+    /// Parameters of the filter by name, in addition to its arguments.
     fn _figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let figures = self.arguments.bind(py).copy()?;
         match &self.filter {

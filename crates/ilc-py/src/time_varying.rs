@@ -17,7 +17,7 @@ use crate::whole::Real;
 /// - a, b, c, d: a matrix for each sample, e.g. `a` of shape (n_samples, n_states, n_states).
 /// - dt_s: sample time in seconds.
 ///
-/// Raises ModelError if there is no sample or the sample time is not positive.
+/// Raises ModelError if there are no samples or the sample time is not positive.
 ///
 /// Examples
 /// --------

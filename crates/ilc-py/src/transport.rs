@@ -4,7 +4,7 @@ use ilc_rt::fieldbus::transport::SCHEMES;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Return what is known of each kind of bus.
+/// Return the description of each kind of bus.
 ///
 /// Returns
 /// -------

@@ -127,7 +127,7 @@ struct Built {
     fits: Fits,
 }
 
-/// The learning law of the controller, whatever its kind.
+/// A learning law of the controller, of any kind.
 ///
 /// `ilc_rt.laws` has a typed class for each kind, which documents its equation and parameters.
 #[pyclass(name = "Law", module = "ilc_rt._native", subclass, frozen)]
@@ -233,7 +233,7 @@ impl PyLaw {
         }
     }
 
-    /// Announce a run before it begins: the first one, or one not learned from.
+    /// Announce a run before it begins: the first one, or one that is not learned from.
     ///
     /// Its measured disturbance is a number or an array of shape (n_disturbances,). `update` announces the
     /// coming run itself if it is given one.
@@ -248,13 +248,13 @@ impl PyLaw {
         Ok(())
     }
 
-    /// Tell the law that the input it made last is not used: the error grew with it.
+    /// Notify the law of a rollback: its last input is not used, since the error grew with it.
     fn taken_back(&self, py: Python<'_>) -> PyResult<()> {
         self.state.borrow(py)?.law.on_rollback();
         Ok(())
     }
 
-    /// Forget what earlier runs taught the law; one with a library reads it again.
+    /// Forget everything learned from earlier runs; a law with a library reads it again.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         let mut state = self.state.borrow(py)?;
         state.law.reset();
@@ -299,7 +299,7 @@ impl PyLaw {
         state.law.remember(u.values()?, e.values()?, &told).or_raise()
     }
 
-    /// Return numbers and weights of the runs that count under a disturbance.
+    /// Return numbers and weights of the runs used under a disturbance.
     fn _relevant(
         &self,
         py: Python<'_>,
@@ -314,7 +314,7 @@ impl PyLaw {
         Ok(found.into_iter().unzip())
     }
 
-    /// Forget all but some of the remembered runs, and return the numbers of those that stayed.
+    /// Forget all but some of the remembered runs, and return the numbers of the remaining ones.
     fn _trim(
         &self,
         py: Python<'_>,
@@ -336,12 +336,12 @@ impl PyLaw {
         let made_by =
             optimal::METHODS.contains(&this.kind).then(|| format!("{class}.{}", this.kind));
         let arguments = this.arguments.bind(slf.py()).copy()?;
-        // The runs that it has are not what the law is: a campaign resumes with another library.
+        // Its runs are not part of its identity: a campaign resumes with another library.
         let _ = arguments.del_item("library");
         Arguments::new(&arguments).call(&made_by.unwrap_or(class))
     }
 
-    /// Pickled and copied as it was made: what it has learned since is not in the copy.
+    /// Pickled and copied as created, without anything learned since.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let this = slf.get();
         reduce_kind(slf.as_any(), "Law", this.kind, &this.arguments)

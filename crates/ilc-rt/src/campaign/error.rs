@@ -110,7 +110,7 @@ impl From<ConfigError> for CampaignError {
 /// Reason that a campaign is not resumed, or not begun beside another one.
 #[derive(Debug, thiserror::Error)]
 pub enum ResumeError {
-    /// The library is not there; opening it would leave an empty file where a name was mistyped.
+    /// The library does not exist; opening it would leave an empty file where a name was mistyped.
     #[error("there is no library {} to go on with", path.display())]
     NoLibrary {
         /// Its file.
