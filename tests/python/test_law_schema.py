@@ -33,20 +33,19 @@ CLASSES = {
 OTHER_IN_A_CELL = {
     "adjoint": {"order", "cutoff_hz"},
     "constrained": {
-        "change_max_m", "change_max_m_s", "step_max_m", "step_max_m_s", "input_max_m",
-        "input_max_m_s", "position_min_m", "position_max_m", "velocity_max_m_s",
-        "acceleration_max_m_s2", "output_min_m", "output_max_m",
+        "change_max_m", "change_max_m_s", "step_max_m", "step_max_m_s", "velocity_max_m_s",
+        "acceleration_max_m_s2",
     },
     "dynamic": {"order", "cutoff_hz"},
     "error_feedforward": {"order", "cutoff_hz"},
-    "flexible": {"core"},
-    "formation": {"agents", "formation"},
+    "flexible": {"core", "disturbances"},
+    "formation": {"agents", "formation", "q"},
     "gate": {"tolerance_m"},
     "model_inverse": {"order", "cutoff_hz"},
     "norm_optimal": {"contour", "phase", "smoothing_hz"},
     "pd": {"order", "cutoff_hz"},
-    "relevance": {"core", "top"},
-    "through_jacobian": {"core"},
+    "relevance": {"core", "disturbances", "top"},
+    "through_jacobian": {"core", "jacobian"},
 }  # fmt: skip
 # A number of Python that a cell leaves out to mean the same.
 NOTHING = {("dynamic", "plain"), ("relevance", "disturbance")}
