@@ -4,24 +4,7 @@ use ilc_rt::fieldbus::transport::SCHEMES;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Return the description of each kind of bus.
-///
-/// Returns
-/// -------
-/// list of dict
-///     ``name`` in front of the colon of an address, ``syntax`` and ``example`` of
-///     one, ``summary``, ``has_bits`` (a real bus, whose load is checked), and
-///     ``in_process`` (the simulated drives run inside this process).
-///
-/// Examples
-/// --------
-/// >>> from ilc_rt._native import transports
-/// >>> for kind in transports():
-/// ...     print(kind.get("name"))
-/// can
-/// udp
-/// zenoh
-/// loopback
+/// Return the description of each kind of bus, with the keys of `ilc_rt.transports.Transport`.
 #[pyfunction]
 fn transports(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     SCHEMES
