@@ -1,7 +1,8 @@
 //! Interior-point method: Mehrotra's predictor-corrector, with a Riccati recursion as linear
 //! solver.
 
-use super::riccati::{Gain, Plant, Pull, Weighing};
+use super::gain::Gain;
+use super::riccati::{Plant, Pull, Weighing};
 use super::rows::Rows;
 use super::solver::{Bands, Outcome, Places, Solver};
 use crate::learning::sweep::Run;

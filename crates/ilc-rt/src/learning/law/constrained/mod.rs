@@ -7,6 +7,7 @@
 //! Family: `bounds` and `solver`: the solver refuses with the error of its bounds.
 
 mod bounds;
+mod gain;
 mod group;
 mod interior;
 mod load;
