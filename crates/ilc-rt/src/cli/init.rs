@@ -67,7 +67,7 @@ mod tests {
         assert_eq!(parse(&found), parse(example));
         for part in [
             "# [learning.relevance]",
-            "# Highest jerk. (0.001 to 10000000)",
+            "# Jerk limit. (0.001 to 10000000)",
             "# [[learning.norm_optimal.phase]]",
         ] {
             assert!(found.contains(part), "{part}: {found}");
