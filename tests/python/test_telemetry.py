@@ -145,12 +145,20 @@ def test_the_same_events_are_heard_as_are_printed(watched: Watched) -> None:
         assert all(parse_event(json.dumps(event)) is not None for event in watched.heard[key])
 
 
-def test_the_error_is_seen_to_fall(watched: Watched) -> None:
-    """One object per run."""
-    first, second = watched.heard["iteration"]
+def test_the_error_is_seen_to_fall(bench: Bench) -> None:
+    """One object per run; in lock-step, as a run that a busy machine disturbs teaches nothing."""
+    ours = endpoint()
+    cell = bench.cell(short=True, more=telemetry(connect=[ours]))
+    bench.drives(cell, "--lockstep")
+    watcher = Watcher(listen=[ours])
+    try:
+        assert start(bench, cell, "--lockstep", runs=RUNS).end() == 0
+        watcher.wait_for_tokens("alive", "gone")
+        first, second = watcher.heard["iteration"]
+    finally:
+        watcher.session.close()
     assert (first["index"], second["index"]) == (0, 1)
-    # By a factor of ten in lock-step; a busy machine spoils some of it.
-    assert second["tracking_rms_m"] < 0.8 * first["tracking_rms_m"]
+    assert second["tracking_rms_m"] < 0.2 * first["tracking_rms_m"]
 
 
 def test_servo_batches_are_the_samples_of_the_runs(watched: Watched) -> None:
