@@ -312,39 +312,46 @@ fn disturbed(name: &str, distort: Distort) -> Vec<IterationRecord> {
 
 #[test]
 fn a_disturbed_run_is_repeated_the_first_one_too() {
-    for name in CELLS {
-        // In the middle of run 0: enabling, return and settling take about a second.
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1300")]
-        let first = (1.3 / short(name).cycle_s()) as u32;
-        for (n, kind) in [(19, 0), (1, 0), (3, 1), (400, 2)] {
-            let mut count = 0;
-            let distort: Distort = Box::new(move |_, frame, out| {
-                let is_status = PDOS[0].1(&frame);
-                count += u32::from(is_status);
-                let on = (first..first + n).contains(&count);
-                match kind {
-                    0 if on && is_status => return,
-                    1 if on && is_status => out.push_back(frame),
-                    // A flood of foreign frames.
-                    2 if count == first && is_status => {
-                        for id in 0..300_u16 {
-                            out.push_back(Frame::new(0x6E0, &id.to_le_bytes()).unwrap());
-                        }
-                    }
-                    _ => {}
-                }
-                out.push_back(frame);
-            });
-            let runs = disturbed(name, distort);
-            assert_eq!(runs.len(), 3);
-            assert!(runs[0].figures.missing_samples > 0, "{name} {kind}: {:?}", runs[0].figures);
-            for pair in runs.windows(2) {
-                let figures = &pair[0].figures;
-                let is_disturbed = figures.missing_samples > 0 || figures.overruns > 0;
-                if is_disturbed {
-                    assert_eq!(pair[0].input, pair[1].input, "{name} {kind}: repeated");
+    // By the clock each takes seconds, in which it waits: all at the same time.
+    std::thread::scope(|scope| {
+        for name in CELLS {
+            for (n, kind) in [(19, 0), (1, 0), (3, 1), (400, 2)] {
+                scope.spawn(move || assert_repeated(name, n, kind));
+            }
+        }
+    });
+}
+
+/// Disturbs `n` statuses of run 0: lost (kind 0), doubled (1), or followed by a flood of foreign frames (2).
+fn assert_repeated(name: &'static str, n: u32, kind: u8) {
+    // In the middle of run 0: enabling, return and settling take about a second.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1300")]
+    let first = (1.3 / short(name).cycle_s()) as u32;
+    let mut count = 0;
+    let distort: Distort = Box::new(move |_, frame, out| {
+        let is_status = PDOS[0].1(&frame);
+        count += u32::from(is_status);
+        let on = (first..first + n).contains(&count);
+        match kind {
+            0 if on && is_status => return,
+            1 if on && is_status => out.push_back(frame),
+            2 if count == first && is_status => {
+                for id in 0..300_u16 {
+                    out.push_back(Frame::new(0x6E0, &id.to_le_bytes()).unwrap());
                 }
             }
+            _ => {}
+        }
+        out.push_back(frame);
+    });
+    let runs = disturbed(name, distort);
+    assert_eq!(runs.len(), 3);
+    assert!(runs[0].figures.missing_samples > 0, "{name} {kind}: {:?}", runs[0].figures);
+    for pair in runs.windows(2) {
+        let figures = &pair[0].figures;
+        let is_disturbed = figures.missing_samples > 0 || figures.overruns > 0;
+        if is_disturbed {
+            assert_eq!(pair[0].input, pair[1].input, "{name} {kind}: repeated");
         }
     }
 }

@@ -55,10 +55,10 @@ fn a_million_profiles() {
 }
 
 #[test]
-fn two_hundred_thousand_moves_of_linear_programs_in_both_settings() {
+fn forty_thousand_moves_of_linear_programs_in_both_settings() {
     let mut random = Random(102);
     let mut n_moves = 0;
-    for round in 0..10_000 {
+    for round in 0..2_000 {
         let n_axes = 1 + round % 3;
         let limits: Vec<AxisLimits> = (0..n_axes).map(|_| random_limits(&mut random)).collect();
         let moves: Vec<PathSegment> = (0..10)
@@ -84,14 +84,14 @@ fn two_hundred_thousand_moves_of_linear_programs_in_both_settings() {
             }
         }
     }
-    assert_eq!(n_moves, 200_000);
+    assert_eq!(n_moves, 40_000);
 }
 
 #[test]
 fn random_exponential_sigmoid_moves() {
     let mut random = Random(103);
     let (mut planned, mut refused) = (0, 0);
-    for round in 0..300 {
+    for round in 0..120 {
         let n_axes = 1 + round % 3;
         let limits: Vec<AxisLimits> = (0..n_axes).map(|_| random_limits(&mut random)).collect();
         let mut to_m = vec![0.0; n_axes];
@@ -139,7 +139,7 @@ fn random_exponential_sigmoid_moves() {
         }
     }
     println!("E/S: {planned} planned, {refused} refused");
-    assert!(planned > 60 && refused > 20, "both must occur: {planned}, {refused}");
+    assert!(planned > 24 && refused > 8, "both must occur: {planned}, {refused}");
 }
 
 /// The set points, their stated derivatives and their finite differences.
