@@ -243,7 +243,8 @@ impl Rig {
         let n_samples = plan.n_samples();
         let stop = Arc::new(AtomicI32::new(0));
         let (mail, loop_side) = mailbox(4096, Arc::clone(&stop));
-        let cycle = Cycle::new(Box::new(tap.clone()), plan.servo, plan.interpolator, loop_side);
+        let network = plan.network(Box::new(tap.clone()));
+        let cycle = Cycle::new(network, plan.servo, plan.interpolator, loop_side);
         Self {
             cycle,
             mail,

@@ -158,7 +158,8 @@ fn execute(
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next.take()) {
         policy.send(&mut mail, input, update_ms);
     }
-    let cycle = Cycle::new(bus, plan.servo.clone(), plan.interpolator.clone(), loop_side);
+    let cycle =
+        Cycle::new(plan.network(bus), plan.servo.clone(), plan.interpolator.clone(), loop_side);
     let (mut pacer, granted) = if session.lockstep {
         (Pacer::in_line(cycle), None)
     } else {

@@ -6,10 +6,10 @@ use super::error::CampaignError;
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::design;
+use crate::fieldbus::Bus;
 use crate::fieldbus::bring_up::{BringUpError, DriveSetup, bring_up, bring_up_encoder, listen};
 use crate::fieldbus::canopen::NmtCommand;
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
-use crate::fieldbus::{Bus, BusError};
 
 /// Heartbeat of the nodes in real time.
 const HEARTBEAT_MS: u16 = 100;
@@ -42,7 +42,7 @@ pub(super) fn start(
         bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
             .map_err(refused(format!("[tcp_encoder] node = {}", tool.node)))?;
     }
-    command_all(bus, NmtCommand::Start).map_err(|source| CampaignError::Start {
+    bus.send(&NmtCommand::Start.frame(None)).map_err(|source| CampaignError::Start {
         file,
         address: cell.bus.address.clone(),
         source,
@@ -99,13 +99,4 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
         rpdo_deadline_ms: if lockstep { 0 } else { deadline_ms },
         answer_timeout: Duration::from_secs_f64(cell.safety.answer_timeout_s),
     })
-}
-
-/// Takes all nodes out of operation again.
-pub(super) fn release(bus: &mut dyn Bus) -> Result<(), BusError> {
-    command_all(bus, NmtCommand::PreOperational)
-}
-
-fn command_all(bus: &mut dyn Bus, command: NmtCommand) -> Result<(), BusError> {
-    bus.send(&command.frame(None))
 }

@@ -4,7 +4,6 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::error::CampaignError;
-use super::nodes;
 use crate::fieldbus::BusError;
 use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
 use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
@@ -81,5 +80,5 @@ impl Pacer {
 }
 
 fn release(cycle: Cycle) -> Result<(), BusError> {
-    nodes::release(cycle.into_bus().as_mut())
+    cycle.into_network().release()
 }

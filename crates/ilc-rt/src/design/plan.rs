@@ -11,6 +11,7 @@ use crate::fieldbus::bring_up::load;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::Scale;
 use crate::fieldbus::transport::scheme_of;
+use crate::fieldbus::{AxisNetwork, Bus, CanopenAxes};
 use crate::model::{ModelError, StateSpace};
 use crate::record::Meta;
 use crate::rt::Nanos;
@@ -94,6 +95,12 @@ impl Plan {
             },
             bus_load,
         })
+    }
+
+    /// Returns the network of the cell's axes on a bus whose nodes have been brought up.
+    pub fn network(&self, bus: Box<dyn Bus>) -> Box<dyn AxisNetwork> {
+        let nodes = self.servo.axes.iter().map(|axis| axis.node).collect();
+        Box::new(CanopenAxes::new(bus, nodes, self.servo.tool.map(|tool| tool.node)))
     }
 
     /// Returns the number of samples in a run.

@@ -9,7 +9,9 @@ pub mod bus;
 pub mod canopen;
 pub mod cia402;
 pub mod frame;
+pub mod network;
 pub mod transport;
 
 pub use bus::{Bus, BusError};
 pub use frame::Frame;
+pub use network::{AxisNetwork, CanopenAxes};

@@ -7,13 +7,11 @@ use super::gate::Bounds;
 use super::mailbox::StopReason;
 use super::mode::{self, Moment};
 use super::phase::Phase;
-use crate::fieldbus::Bus;
-use crate::fieldbus::canopen::sync;
 use crate::fieldbus::cia402::{Controlword, State, next_command};
 
 impl Cycle {
-    /// Sends every drive its command, then SYNC. A frame that the bus cannot take is missed by the
-    /// drive: it extrapolates for a cycle, and a persistent silence is detected.
+    /// Sends every drive its command, then exchanges. A command that the bus cannot take is missed by
+    /// the drive: it extrapolates for a cycle, and a persistent silence is detected.
     pub(super) fn command(&mut self) {
         let mut newest = self.commanded[0];
         let mut fault = None;
@@ -32,11 +30,10 @@ impl Cycle {
             let sent = &mut self.drives[axis].sent;
             sent.controlword = controlword;
             mode.write(target, spec.scale, sent);
-            let frame = sent.encode(spec.node);
-            let _ = self.bus.send(&frame);
+            let _ = self.network.write(axis, sent);
         }
         self.commanded = [newest, self.commanded[0], self.commanded[1]];
-        if let Err(error) = self.bus.send(&sync::frame()) {
+        if let Err(error) = self.network.exchange() {
             fault = fault.or(Some(StopReason::Bus(error)));
         }
         if let Some(reason) = fault {

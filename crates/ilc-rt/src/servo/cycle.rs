@@ -11,7 +11,7 @@ use super::pending::PendingCycles;
 use super::phase::Phase;
 use super::spec::ServoSpec;
 use super::stall::{HOLD_AFTER, Stall};
-use crate::fieldbus::Bus;
+use crate::fieldbus::AxisNetwork;
 use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
 use crate::rt::Nanos;
 
@@ -32,7 +32,7 @@ pub enum TickStatus {
 /// # Real Time
 /// [`Cycle::tick`] does not allocate, take locks, read clocks or panic.
 pub struct Cycle {
-    pub(super) bus: Box<dyn Bus>,
+    pub(super) network: Box<dyn AxisNetwork>,
     pub(super) spec: ServoSpec,
     pub(super) mail: LoopSide,
     pub(super) drives: [Drive; MAX_AXES],
@@ -67,12 +67,12 @@ impl std::fmt::Debug for Cycle {
 }
 
 impl Cycle {
-    /// Creates the cycle on a bus whose nodes have been brought up. Cold.
+    /// Creates the cycle on a network whose nodes have been brought up. Cold.
     ///
     /// # Shapes
     /// - `spec.axes`, `spec.start_m`: one entry for each axis of `interpolator`
     pub fn new(
-        bus: Box<dyn Bus>,
+        network: Box<dyn AxisNetwork>,
         spec: ServoSpec,
         interpolator: Interpolator,
         mail: LoopSide,
@@ -94,7 +94,7 @@ impl Cycle {
         )]
         let fade_ticks = ((FADE_MAX_S / dt_s) as u32).min(spec.settle_ticks / 2).max(1);
         Self {
-            bus,
+            network,
             mail,
             drives: [Drive::default(); MAX_AXES],
             tool_m: [0.0; MAX_AXES],
@@ -167,9 +167,9 @@ impl Cycle {
         TickStatus::Running
     }
 
-    /// Returns the bus when the loop is over.
-    pub fn into_bus(self) -> Box<dyn Bus> {
-        self.bus
+    /// Returns the network when the loop is over.
+    pub fn into_network(self) -> Box<dyn AxisNetwork> {
+        self.network
     }
 
     /// Returns the number of axes.

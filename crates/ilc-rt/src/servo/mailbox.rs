@@ -9,7 +9,8 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::phase::PhaseName;
 use crate::fieldbus::BusError;
-use crate::fieldbus::canopen::{NmtCommand, NmtState, NodeId};
+use crate::fieldbus::canopen::NmtState;
+use crate::fieldbus::network::Stranger;
 use crate::interpolate::MAX_AXES;
 
 /// One servo cycle: commands and measurements of the same SYNC.
@@ -136,19 +137,6 @@ pub enum StopReason {
     },
     /// The bus failed.
     Bus(BusError),
-}
-
-/// Traffic of another master.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stranger {
-    /// SYNC.
-    Sync,
-    /// An NMT command to a node, or to all.
-    Nmt(NmtCommand, Option<NodeId>),
-    /// A command (RPDO) to a node of this cell.
-    Command(NodeId),
-    /// A request for an object (SDO) to a node of this cell.
-    Request(NodeId),
 }
 
 impl StopReason {

@@ -21,8 +21,9 @@ mod stall;
 mod stopping;
 mod strangers;
 
+pub use crate::fieldbus::network::Stranger;
 pub use cycle::{Cycle, TickStatus};
-pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, Stranger, mailbox};
+pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, mailbox};
 pub use phase::PhaseName;
 pub use realtime::{Timing, run_on_clock};
 pub use spec::{AxisSpec, Pace, ServoSpec, ToolSpec};

@@ -2,7 +2,7 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
-use crate::fieldbus::cia402::{CommandRpdo1, Controlword, State, StatusTpdo1, Statusword};
+use crate::fieldbus::cia402::{CommandRpdo1, Controlword, State, Statusword};
 
 /// The last known state of one drive.
 #[derive(Clone, Copy, Debug)]
@@ -52,10 +52,10 @@ impl Default for Drive {
 
 impl Drive {
     /// Stores a status, its position already in metres.
-    pub(super) fn status(&mut self, status: StatusTpdo1, encoder_m: f64) {
+    pub(super) fn status(&mut self, statusword: Statusword, encoder_m: f64) {
         let was_enabled = self.enabled();
         self.heard = true;
-        self.statusword = status.statusword.0;
+        self.statusword = statusword.0;
         self.encoder_m = encoder_m;
         if self.enabled() && !was_enabled {
             // Reports from before it could be enabled are not the cause of a later fault.

@@ -1,4 +1,4 @@
-//! The first half of a tick: received frames, and fault detection.
+//! The first half of a tick: received messages, and fault detection.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -10,12 +10,11 @@ use super::pending::Part;
 use super::phase::Phase;
 use super::silence::saturate;
 use super::spec::Pace;
-use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtState, NodeId, emcy};
-use crate::fieldbus::cia402::pdo_map::{DRIVE_MOTION_PDO, ENCODER_PDO, STATUS_PDO};
-use crate::fieldbus::cia402::{DriveMotionTpdo2, EncoderSample, State, StatusTpdo1};
-use crate::fieldbus::{Bus, Frame};
+use crate::fieldbus::canopen::{NmtState, emcy};
+use crate::fieldbus::cia402::State;
+use crate::fieldbus::network::{AnswerPart, Arrival, Reading};
 
-/// Largest number of frames per tick, so that a babbling bus cannot stall the loop.
+/// Largest number of messages per tick, so that a babbling bus cannot stall the loop.
 const FRAMES_MAX: usize = 256;
 /// Distance, in cycles at full velocity, that an axis may be ahead of its last position.
 const JUMP_WAYS: f64 = 2.0;
@@ -28,7 +27,7 @@ const OUTSIDE_SHARE: f64 = 0.02;
 const STALE_CYCLES: u64 = 5;
 
 impl Cycle {
-    /// Takes every available frame; paced by answers, waits until all have arrived.
+    /// Takes every available message; paced by answers, waits until all have arrived.
     pub(super) fn receive(&mut self) -> Result<(), StopReason> {
         let mut left = Ok(());
         for _ in 0..FRAMES_MAX {
@@ -36,8 +35,8 @@ impl Cycle {
                 Pace::Answers(patience) if !self.pending.all_answered() => patience,
                 _ => Duration::ZERO,
             };
-            match self.bus.recv(timeout) {
-                Ok(Some(frame)) => left = left.and(self.take(&frame)),
+            match self.network.next(timeout) {
+                Ok(Some(arrival)) => left = left.and(self.take(arrival)),
                 Ok(None) => return left,
                 Err(error) => return Err(StopReason::Bus(error)),
             }
@@ -47,86 +46,66 @@ impl Cycle {
         left
     }
 
-    fn take(&mut self, frame: &Frame) -> Result<(), StopReason> {
-        if self.take_answer(frame) {
-            return Ok(());
-        }
-        if let Some(stranger) = self.stranger(frame) {
-            return Err(StopReason::OtherMaster(stranger));
-        }
-        if let Some(emergency) = Emergency::decode(frame) {
-            let sender = self.spec.axes.iter().position(|axis| axis.node == emergency.node);
-            if let Some(axis) = sender {
-                self.drives[axis].emergency =
-                    Some(emergency.code).filter(|code| *code != emcy::CODE_RESET);
+    fn take(&mut self, arrival: Arrival) -> Result<(), StopReason> {
+        match arrival {
+            Arrival::Answer { axis, part, reading } => self.take_answer(axis, part, reading),
+            Arrival::Tool(counts) => {
+                if let Some(tool) = self.spec.tool {
+                    let [x_m, y_m] = counts.map(|count| tool.scale.to_si(count));
+                    self.tool_m[..2].copy_from_slice(&[x_m, y_m]);
+                    self.pending.answer(Part::Tool, [x_m, y_m]);
+                }
             }
-        } else if let Some(heartbeat) = Heartbeat::decode(frame)
-            && self.is_ours(heartbeat.node)
-        {
-            let node = heartbeat.node.get();
-            return match heartbeat.state {
-                NmtState::Operational => Ok(()),
-                NmtState::BootUp => Err(StopReason::NodeLeft { node }),
-                state => Err(StopReason::NodeStopped { node, state }),
-            };
+            Arrival::Unreadable { axis, part, n_bytes } => {
+                self.drives[axis].unreadable[part.index()] = Some(n_bytes);
+            }
+            Arrival::UnreadableTool { n_bytes } => self.tool_unreadable = Some(n_bytes),
+            Arrival::Emergency { axis, code } => {
+                self.drives[axis].emergency = Some(code).filter(|code| *code != emcy::CODE_RESET);
+            }
+            Arrival::Node { node, state } => {
+                let node = node.get();
+                return match state {
+                    NmtState::Operational => Ok(()),
+                    NmtState::BootUp => Err(StopReason::NodeLeft { node }),
+                    state => Err(StopReason::NodeStopped { node, state }),
+                };
+            }
+            Arrival::Stranger(stranger) => return Err(StopReason::OtherMaster(stranger)),
+            Arrival::Other => {}
         }
         Ok(())
     }
 
-    /// Takes a frame if it is an answer to SYNC.
-    fn take_answer(&mut self, frame: &Frame) -> bool {
-        for axis in 0..self.n_axes() {
-            let spec = &self.spec.axes[axis];
-            let drive = &mut self.drives[axis];
-            if let Some(status) = StatusTpdo1::decode(frame, spec.node) {
-                let encoder_m = spec.scale.to_si(status.position_counts);
-                #[expect(clippy::cast_precision_loss, reason = "a count of cycles")]
-                let cycles = self.pending.silence(Part::Status(axis)).max(1) as f64;
-                let way_m = spec.limits.velocity_max_m_s * self.spec.cycle.as_secs_f64() * cycles;
-                let step_m = encoder_m - drive.encoder_m;
-                if drive.heard
-                    && step_m.abs() > JUMP_WAYS * way_m + JUMP_SHARE * spec.following_error_max_m
-                {
-                    drive.jump_m = drive.jump_m.or(Some(step_m));
-                }
-                drive.status(status, encoder_m);
-                self.pending.answer(Part::Status(axis), [encoder_m, 0.0]);
-                return true;
+    /// Takes a part of the answer of an axis.
+    fn take_answer(&mut self, axis: usize, part: AnswerPart, reading: Reading) {
+        let spec = &self.spec.axes[axis];
+        let drive = &mut self.drives[axis];
+        if let (Some(statusword), Some(counts)) = (reading.statusword, reading.position_counts) {
+            let encoder_m = spec.scale.to_si(counts);
+            #[expect(clippy::cast_precision_loss, reason = "a count of cycles")]
+            let cycles = self.pending.silence(Part::Status(axis)).max(1) as f64;
+            let way_m = spec.limits.velocity_max_m_s * self.spec.cycle.as_secs_f64() * cycles;
+            let step_m = encoder_m - drive.encoder_m;
+            if drive.heard
+                && step_m.abs() > JUMP_WAYS * way_m + JUMP_SHARE * spec.following_error_max_m
+            {
+                drive.jump_m = drive.jump_m.or(Some(step_m));
             }
-            if let Some(extra) = DriveMotionTpdo2::decode(frame, spec.node) {
-                // In a fault it has no demand any more; the last following error before counts.
-                if !drive.faulted() {
-                    drive.following_error_m = spec.scale.to_si(extra.following_error_counts);
-                }
-                self.pending.answer(Part::DriveMotion(axis), [0.0; 2]);
-                return true;
+            drive.status(statusword, encoder_m);
+        }
+        // In a fault it has no demand any more; the last following error before counts.
+        if let Some(counts) = reading.following_error_counts
+            && !drive.faulted()
+        {
+            drive.following_error_m = spec.scale.to_si(counts);
+        }
+        match part {
+            AnswerPart::Status => {
+                self.pending.answer(Part::Status(axis), [self.drives[axis].encoder_m, 0.0]);
             }
-            let unreadable = [STATUS_PDO, DRIVE_MOTION_PDO]
-                .iter()
-                .position(|pdo| frame.id() == pdo.default_cob_id(spec.node));
-            if let Some(pdo) = unreadable {
-                drive.unreadable[pdo] = u8::try_from(frame.payload().len()).ok();
-                return true;
-            }
+            AnswerPart::Motion => self.pending.answer(Part::DriveMotion(axis), [0.0; 2]),
         }
-        let Some(tool) = self.spec.tool else { return false };
-        if let Some(measured) = EncoderSample::decode(frame, tool.node) {
-            self.tool_m[0] = tool.scale.to_si(measured.x_counts);
-            self.tool_m[1] = tool.scale.to_si(measured.y_counts);
-            self.pending.answer(Part::Tool, [self.tool_m[0], self.tool_m[1]]);
-            return true;
-        }
-        if frame.id() == ENCODER_PDO.default_cob_id(tool.node) {
-            self.tool_unreadable = u8::try_from(frame.payload().len()).ok();
-            return true;
-        }
-        false
-    }
-
-    /// Returns whether a node belongs to this cell.
-    pub(super) fn is_ours(&self, node: NodeId) -> bool {
-        self.spec.axes.iter().any(|axis| axis.node == node)
-            || self.spec.tool.is_some_and(|tool| tool.node == node)
     }
 
     /// Returns the first reason to stop.

@@ -1,38 +1,14 @@
-//! Another master on the bus: frames that only this controller may send, received from another
-//! node.
-//!
-//! No transport returns a sender's own frames, so each of these was sent by another master.
+//! Cause of a silence that another master brought about, as a later message names it.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::cycle::Cycle;
-use super::mailbox::{StopReason, Stranger};
-use crate::fieldbus::Frame;
-use crate::fieldbus::canopen::{NmtCommand, NodeId, cob_id, sync};
-
-/// Bases of the identifiers of the four receive PDOs.
-const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
+use super::mailbox::StopReason;
+use crate::fieldbus::canopen::NodeId;
+use crate::fieldbus::network::Stranger;
 
 impl Cycle {
-    /// Returns the trace of another master in a frame, if any. Traffic with nodes outside this cell
-    /// is ignored.
-    pub(super) fn stranger(&self, frame: &Frame) -> Option<Stranger> {
-        if sync::is_sync(frame) {
-            return Some(Stranger::Sync);
-        }
-        if let Some((command, node)) = NmtCommand::decode(frame) {
-            return node
-                .is_none_or(|node| self.is_ours(node))
-                .then_some(Stranger::Nmt(command, node));
-        }
-        let to = |base| cob_id::node_of(base, frame.id()).filter(|node| self.is_ours(*node));
-        if let Some(node) = to(cob_id::SDO_REQUEST) {
-            return Some(Stranger::Request(node));
-        }
-        RPDOS.iter().find_map(|base| to(*base)).map(Stranger::Command)
-    }
-
-    /// Returns the cause of a stop if a later frame names it: a silent drive reports that it was
+    /// Returns the cause of a stop if a later message names it: a silent drive reports that it was
     /// stopped or restarted, or a command to it is seen.
     pub(super) fn better_reason(&self, later: StopReason) -> Option<StopReason> {
         let silent: NodeId = match self.stopping? {
