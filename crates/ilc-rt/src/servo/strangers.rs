@@ -26,7 +26,7 @@ impl Cycle {
                 .then_some(Stranger::Nmt(command, node));
         }
         let to = |base| cob_id::node_of(base, frame.id()).filter(|node| self.is_ours(*node));
-        if let Some(node) = to(cob_id::SDO_REQUEST) {
+        if let Some(node) = to(cob_id::SDO_REQUEST).filter(|_| !only_reads(frame)) {
             return Some(Stranger::Request(node));
         }
         RPDOS.iter().find_map(|base| to(*base)).map(Stranger::Command)
@@ -51,4 +51,10 @@ impl Cycle {
         };
         is_why.then_some(later)
     }
+}
+
+/// Returns whether an SDO request changes nothing: an upload, its segment, or an abort. The loop itself exchanges no
+/// objects, so that the answers confuse none of its own requests.
+fn only_reads(frame: &Frame) -> bool {
+    matches!(frame.payload().first().map(|command| command >> 5), Some(2..=5))
 }
