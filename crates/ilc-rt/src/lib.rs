@@ -7,6 +7,7 @@
 
 pub mod campaign;
 pub mod cli;
+pub mod commissioning;
 pub mod config;
 pub mod control;
 pub mod design;

@@ -22,7 +22,7 @@ use ilc_tests::{Scratch, short};
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn request(node: u16) -> Frame {
-    Frame::new(0x600 + node, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]).unwrap()
+    Frame::new(0x600 + node, &[0x2B, 0x40, 0x60, 0, 0, 0, 0, 0]).unwrap()
 }
 
 fn command(to: u8) -> Frame {
@@ -75,6 +75,9 @@ fn what_is_for_other_nodes_is_nobodys_business() {
     rig.tick_into_run(0, 100);
     rig.tap.line().meddle(|_, reply| {
         reply(request(77));
+        // Reading changes nothing, also of a node of this cell.
+        reply(Frame::new(0x601, &[0x40, 0x41, 0x60, 0, 0, 0, 0, 0]).unwrap());
+        reply(Frame::new(0x601, &[0x60, 0, 0, 0, 0, 0, 0, 0]).unwrap());
         reply(command(77));
         reply(NmtCommand::Stop.frame(NodeId::new(77)));
         reply(Frame::new(0x1FF, &[0; 8]).unwrap());

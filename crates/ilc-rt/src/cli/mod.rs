@@ -11,10 +11,15 @@ mod latency;
 mod option;
 mod parent;
 mod quantity;
+mod reset;
 mod run;
 mod runs;
+mod scan;
 mod schema;
+mod sdo;
 mod show;
+mod status;
+mod target;
 
 pub use identify::IdentifyOptions;
 pub use option::{OptionSpec, described, parse};
@@ -57,6 +62,16 @@ enum Verb {
     Init(init::InitArguments),
     /// Print the JSON schema of the cell description, for editors.
     Schema(schema::SchemaArguments),
+    /// List the nodes on a bus: identity, state and supported modes; only reads.
+    Scan(scan::ScanArguments),
+    /// Read or write an object of a node.
+    Sdo(sdo::SdoArguments),
+    /// Print state, position, faults and inputs of the axes; only reads.
+    Status(status::StatusArguments),
+    /// Name the faults of drives, and reset them.
+    Reset(reset::ResetArguments),
+    /// Switch drives off.
+    Disable(reset::DisableArguments),
     /// Measure how late this machine wakes the loop's thread.
     Latency(latency::LatencyArguments),
     /// Print a script that completes this command line in a shell.
@@ -92,6 +107,11 @@ pub fn main() -> ExitCode {
         Verb::Check(arguments) => check::check(&arguments),
         Verb::Init(arguments) => init::init(&arguments),
         Verb::Schema(arguments) => schema::schema(&arguments),
+        Verb::Scan(arguments) => scan::scan(&arguments),
+        Verb::Sdo(arguments) => sdo::sdo(&arguments),
+        Verb::Status(arguments) => status::status(&arguments),
+        Verb::Reset(arguments) => reset::reset(&arguments),
+        Verb::Disable(arguments) => reset::disable(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),
         Verb::Completions(arguments) => completions::completions(&arguments, Arguments::command()),
     };

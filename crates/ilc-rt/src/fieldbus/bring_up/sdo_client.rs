@@ -113,6 +113,11 @@ impl SdoClient {
         Self { node, timeout }
     }
 
+    /// Returns the node.
+    pub fn node(&self) -> NodeId {
+        self.node
+    }
+
     /// Reads an object, expedited or segmented as the node chooses; the bytes are little-endian.
     ///
     /// # Errors

@@ -101,7 +101,7 @@ impl CanopenAxes {
                 .then_some(Stranger::Nmt(command, node));
         }
         let to = |base| cob_id::node_of(base, frame.id()).filter(|node| self.is_ours(*node));
-        if let Some(node) = to(cob_id::SDO_REQUEST) {
+        if let Some(node) = to(cob_id::SDO_REQUEST).filter(|_| !only_reads(frame)) {
             return Some(Stranger::Request(node));
         }
         RPDOS.iter().find_map(|base| to(*base)).map(Stranger::Command)
@@ -130,4 +130,10 @@ impl AxisNetwork for CanopenAxes {
     fn release(&mut self) -> Result<(), BusError> {
         self.bus.send(&NmtCommand::PreOperational.frame(None))
     }
+}
+
+/// Returns whether an SDO request changes nothing: an upload, its segment, or an abort. The loop itself
+/// exchanges no objects, so that the answers confuse none of its own requests.
+fn only_reads(frame: &Frame) -> bool {
+    matches!(frame.payload().first().map(|command| command >> 5), Some(2..=5))
 }
