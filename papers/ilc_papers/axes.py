@@ -16,14 +16,7 @@ if TYPE_CHECKING:
 def errors_over_runs(axes: Axes, label: str, *, runs: bool = True) -> None:
     """Make the vertical axis logarithmic with plain numbers, and name both.
 
-    Parameters
-    ----------
-    axes : Axes
-        With its curves drawn.
-    label : str
-        Quantity of the vertical axis, with its unit.
-    runs : bool
-        Label the horizontal axis as well: on the lowest of several plots.
+    `runs` labels the horizontal axis too: on the lowest of several plots.
     """
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")

@@ -23,22 +23,7 @@ INDEX = "index.md"
 def write_gallery(outcomes: Sequence[Outcome], folder: Path) -> list[Path]:
     """Write a page for each paper, and for several an index.
 
-    Parameters
-    ----------
-    outcomes : sequence of Outcome
-        Figures of the papers.
-    folder : Path
-        Output folder; created if missing.
-
-    Returns
-    -------
-    list of Path
-        The pages, the index first.
-
-    Raises
-    ------
-    BadInputError
-        If something cannot be written.
+    The index comes first; a missing folder is created.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

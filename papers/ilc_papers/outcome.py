@@ -29,16 +29,8 @@ ADDED = ("claims", "seconds", "reduced")
 class Outcome:
     """The figures of one paper, just computed or read from a file.
 
-    Parameters
-    ----------
-    paper : Paper
-        The paper.
-    figures : dict
-        Results of its systems, as stored in JSON.
-    seconds : float
-        Computing time.
-    reduced : bool
-        True for reduced sizes.
+    `figures` are the results of the systems as stored in JSON, `seconds` the computing time;
+    `reduced` is true for reduced sizes.
     """
 
     paper: Paper
@@ -62,30 +54,14 @@ class Outcome:
 
 
 def compute(paper: Paper, *, reduced: bool, tell: Tell) -> Outcome:
-    """Run a paper's systems.
-
-    Parameters
-    ----------
-    paper : Paper
-        The paper.
-    reduced : bool
-        True for reduced sizes.
-    tell : callable
-        Called with the step being computed, before it starts.
-    """
+    """Run a paper's systems."""
     begun_s = time.monotonic()
     figures = paper.compute(reduced, tell)
     return Outcome(paper, figures, time.monotonic() - begun_s, reduced)
 
 
 def write_json(outcomes: Sequence[Outcome], path: Path) -> None:
-    """Write the figures of one or more papers to a file.
-
-    Raises
-    ------
-    BadInputError
-        If the file cannot be written.
-    """
+    """Write the figures of one or more papers to a file."""
     entries = {outcome.paper.name: outcome.to_json() for outcome in outcomes}
     write_text(path, _readable(entries) + "\n")
 
@@ -95,17 +71,7 @@ def read_json(
 ) -> list[Outcome]:
     """Read the figures of papers from a file, and compute nothing.
 
-    Parameters
-    ----------
-    path : Path
-        File written by `write_json`.
-    names : sequence of str
-        The papers that are wanted.
-
-    Raises
-    ------
-    BadInputError
-        If the file is not one of these, or a paper is missing in it.
+    A file that is not one of `write_json`, or lacks one of the papers, is refused.
     """
     try:
         entries = json.loads(path.read_text(encoding="utf-8"))

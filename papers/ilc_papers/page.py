@@ -25,22 +25,7 @@ if TYPE_CHECKING:
 def write_page(outcome: Outcome, folder: Path) -> Path:
     """Write a paper's page and its plots.
 
-    Parameters
-    ----------
-    outcome : Outcome
-        Its figures.
-    folder : Path
-        Output folder; it must exist.
-
-    Returns
-    -------
-    Path
-        The page.
-
-    Raises
-    ------
-    BadInputError
-        If it cannot be written.
+    The folder must exist.
     """
     for picture in outcome.paper.pictures:
         target = folder / picture_name(outcome, picture.stem)

@@ -30,11 +30,6 @@ NAMES = tuple(name for name in _ORDER if find_spec(_package(name)) is not None)
 def load(name: str) -> Paper:
     """Return a paper by its name.
 
-    Raises
-    ------
-    BadInputError
-        If there is none of that name.
-
     Examples
     --------
     >>> load("haas2016").name
@@ -48,13 +43,7 @@ def load(name: str) -> Paper:
 
 
 def chosen(name: str) -> tuple[str, ...]:
-    """Return the names that `name` stands for: all of them, or itself.
-
-    Raises
-    ------
-    BadInputError
-        If there is none of that name.
-    """
+    """Return the names that `name` stands for: all of them, or itself."""
     if name == ALL:
         return NAMES
     load(name)

@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 
 
 class ReproductionView:
-    """Lines that show the step being computed; plain ones if not a terminal.
-
-    Parameters
-    ----------
-    console : Console
-        Output stream.
-    """
+    """Lines that show the step being computed; plain ones if not a terminal."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

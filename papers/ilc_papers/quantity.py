@@ -17,12 +17,7 @@ _PREFIXED_UNITS = {"m", "s", "m/s", "N", "V", "rad"}
 def pair(ours: float | None, printed: float | None, unit: str) -> tuple[str, str]:
     """Return our figure and the printed one, in one unit that suits them both.
 
-    Parameters
-    ----------
-    ours, printed : float or None
-        In `unit`; None shows as a dash.
-    unit : str
-        SI unit; empty for a ratio.
+    None shows as a dash.
 
     Examples
     --------

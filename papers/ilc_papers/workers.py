@@ -39,21 +39,8 @@ def compute_side_by_side(
 ) -> list[Outcome]:
     """Compute several papers, and return them in the order of their names.
 
-    Parameters
-    ----------
-    names : sequence of str
-        The papers.
-    reduced : bool
-        True for reduced sizes.
-    tell : callable
-        Called with the name of a paper and the part being computed; None when it is done.
-    load_paper : callable
-        Returns a paper by its name; each process calls it.
-
-    Raises
-    ------
-    CampaignError
-        If a paper cannot be computed; the others are then stopped.
+    `tell` is called with the name of a paper and the part being computed, None when it is done. If
+    a paper cannot be computed, the others are stopped.
     """
     waiting, running = list(names), list[_Worker]()
     done: dict[str, Outcome] = {}

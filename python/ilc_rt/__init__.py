@@ -1,4 +1,8 @@
-"""The motion controller that learns: iterative learning control on the machine."""
+"""The motion controller that learns: iterative learning control on the machine.
+
+An array of the wrong shape or dtype, or with a number that is NaN or infinite, is refused under its
+name everywhere, with a `ValueError` or a `TypeError`; other errors are documented where they occur.
+"""
 
 from ilc_rt import control, identify, kinematics, laws, signal, trajectory, weights
 from ilc_rt._native import (

@@ -261,10 +261,6 @@ def analyze(
     n_runs : int
         Number of runs for which the expected error is computed.
 
-    Returns
-    -------
-    Analysis
-
     Raises
     ------
     LearningError
@@ -294,17 +290,7 @@ def analyze(
     >>> analyze(PdIlc(kp=5.0, kd=0.0), axis, 200).converges
     False
     """
-    return Analysis(
-        **_native.analyze(
-            law=law,
-            model=model,
-            n_samples=n_samples,
-            uncertainty=uncertainty,
-            reference=reference,
-            noise_std=noise_std,
-            n_runs=n_runs,
-        )
-    )
+    return Analysis(**_native.analyze(**locals()))
 
 
 def refuse_divergent(law: AnyLaw, model: Model, n_samples: int) -> None:
@@ -375,10 +361,6 @@ def tune(
     n_runs : int
         Number of runs within which learning should be finished.
 
-    Returns
-    -------
-    Tuning
-
     Raises
     ------
     LearningError
@@ -398,14 +380,7 @@ def tune(
     >>> tuning.q, tuning.s, tuning.r > 0
     (1.0, 0.0, True)
     """
-    found = _native.tune(
-        model=model,
-        n_samples=n_samples,
-        uncertainty=uncertainty,
-        noise_std=noise_std,
-        reference=reference,
-        n_runs=n_runs,
-    )
+    found = _native.tune(**locals())
     found["analysis"] = Analysis(**found["analysis"])
     return Tuning(**found)
 
@@ -430,8 +405,6 @@ def repeatability(errors: ArrayLike) -> Repeatability:
     ------
     LearningError
         For fewer than two runs.
-    ValueError, TypeError
-        If `errors` has the wrong shape, dtype or a number that is not finite.
 
     References
     ----------

@@ -25,16 +25,7 @@ def bode(
 ) -> Figure:
     """Draw magnitude, phase, coherence and uncertainty.
 
-    Parameters
-    ----------
-    frequency_hz : ndarray of float64, shape (n_frequencies,)
-        Frequencies in Hz.
-    response, model : ndarray of complex128, shape (n_frequencies,)
-        Measured and modelled response.
-    coherence, bound : ndarray of float64, shape (n_frequencies,)
-        Coherence, and the bound of the multiplicative uncertainty.
-    title : str
-        Title of the plot.
+    `bound` is that of the multiplicative uncertainty.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH_IN, 6.4))

@@ -26,22 +26,8 @@ def write_values(path: str | Path, tables: Mapping[str, Mapping[str, float]]) ->
     Comments, order and spelling of everything else are preserved. The file is only replaced by one
     that the controller accepts.
 
-    Parameters
-    ----------
-    path : path
-        The cell description.
-    tables : mapping
-        The numbers by key, by table, e.g. ``learning.norm_optimal``; a missing table is created.
-
-    Returns
-    -------
-    bool
-        True if anything changed.
-
-    Raises
-    ------
-    BadInputError
-        If the file cannot be read or written, or would not be accepted.
+    `tables` has the numbers by key, by table, e.g. ``learning.norm_optimal``; a missing table is
+    created. Returns True if anything changed.
     """
     # A link stays a link: its target is replaced.
     place = Path(path).resolve()
@@ -67,10 +53,7 @@ def write_values(path: str | Path, tables: Mapping[str, Mapping[str, float]]) ->
 def changed_text(text: str, section: str, values: Mapping[str, float], name: str) -> str:
     """Return a TOML text with numbers set in a table.
 
-    Raises
-    ------
-    BadInputError
-        If the text is not TOML, or the table's name is in use for something else.
+    A name in use for something else than a table is refused.
     """
     try:
         document = tomlkit.parse(text)

@@ -83,16 +83,8 @@ if "reproduce" not in FURTHER:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `ilc` and return its exit code; errors are one line.
 
-    Parameters
-    ----------
-    arguments : sequence of str or None
-        Command line without the program's name; None for this process's.
-
-    Returns
-    -------
-    int
-        0 done, 2 bad input, 3 controlled stop after a fault, 130 and 143
-        stopped by a signal, 1 any other failure.
+    0 done, 2 bad input, 3 controlled stop after a fault, 130 and 143 stopped by a signal, 1 any
+    other failure.
     """
     try:
         code = app(args=arguments, standalone_mode=False, prog_name="ilc")

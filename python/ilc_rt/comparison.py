@@ -83,13 +83,7 @@ class Comparison:
         return max((e for e in errors if e is not None and math.isfinite(e)), default=0.0)
 
     def errors(self, *, rms: bool = True) -> list[Column]:
-        """Return the displayed errors of every run.
-
-        Parameters
-        ----------
-        rms : bool
-            Include RMS errors.
-        """
+        """Return the displayed errors of every run."""
         columns = self.tracking(rms=rms)
         if self.first.contour_inf_m is not None:
             sizes = (lambda record: record.contour_inf_m), (lambda record: record.tracking_inf_m)

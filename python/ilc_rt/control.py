@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from ilc_rt import _native
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -66,16 +67,7 @@ class Pid(_native.Pid):
         filter_s: float = 0.01,
         output_max: float | None = None,
     ) -> Self:
-        return super().__new__(
-            cls,
-            kp=kp,
-            ki_per_s=ki_per_s,
-            kd_s=kd_s,
-            dt_s=dt_s,
-            derivative=derivative,
-            filter_s=filter_s,
-            output_max=output_max,
-        )
+        return super().__new__(cls, **given(locals()))
 
 
 class Cascade(_native.Cascade):
@@ -128,17 +120,7 @@ class Cascade(_native.Cascade):
         velocity_max_m_s: float | None = None,
         force_max_n: float | None = None,
     ) -> Self:
-        return super().__new__(
-            cls,
-            position_gain_per_s=position_gain_per_s,
-            velocity_gain_n_s_m=velocity_gain_n_s_m,
-            integral_time_s=integral_time_s,
-            dt_s=dt_s,
-            velocity_feedforward=velocity_feedforward,
-            acceleration_feedforward_kg=acceleration_feedforward_kg,
-            velocity_max_m_s=velocity_max_m_s,
-            force_max_n=force_max_n,
-        )
+        return super().__new__(cls, **given(locals()))
 
 
 class CrossCoupled(_native.CrossCoupled):

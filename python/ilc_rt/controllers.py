@@ -45,16 +45,7 @@ class Controller(Protocol):
 class ProcessController:
     """`ilc-rt run --events`, or another verb, in a process.
 
-    Parameters
-    ----------
-    cell_file : str
-        The cell description.
-    arguments : list of str
-        Options of the verb.
-    drives : Program or None
-        Simulated drives, which end with the controller.
-    verb : str
-        ``"run"`` or ``"identify"``.
+    Simulated drives, if given, end with the controller.
     """
 
     def __init__(
@@ -138,12 +129,8 @@ class ProcessController:
 class InProcessController:
     """The controller inside this process, for ``loopback:`` and Python laws.
 
-    Parameters
-    ----------
-    options : dict
-        Arguments of ``_native.run_events``.
-    drives : Program or None
-        Simulated drives in a process, for a bus other than ``loopback:``.
+    `options` are the arguments of ``_native.run_events``; `drives` simulated ones in a process, for
+    a bus other than ``loopback:``.
     """
 
     def __init__(self, options: dict[str, Any], drives: Program | None = None) -> None:

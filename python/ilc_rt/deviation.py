@@ -22,24 +22,8 @@ def path_deviation(
     Lag along the path is not a deviation: only the normal component counts. The nearest point is
     searched among the reference's segments near the same time, so that a path may cross itself.
 
-    Parameters
-    ----------
-    reference_m : ndarray of float64, shape (n_samples, n_axes)
-        Programmed positions in m.
-    measured_m : ndarray of float64, shape (n_samples, n_axes)
-        Measured positions in m.
-    window_samples : int
-        Samples before and after, within which the nearest point is searched.
-
-    Returns
-    -------
-    ndarray of float64, shape (n_samples, n_axes)
-        Deviations in m.
-
-    Raises
-    ------
-    ValueError
-        If the shapes differ.
+    All arrays have the shape (n_samples, n_axes), in m; the nearest point is searched
+    `window_samples` before and after.
 
     Examples
     --------
@@ -75,12 +59,7 @@ def path_deviation(
 def magnification(largest_m: float, extent_m: float, share: float = 0.12) -> int:
     """Return the round factor that magnifies the largest deviation visibly.
 
-    Parameters
-    ----------
-    largest_m, extent_m : float
-        Largest deviation and size of the picture, in m.
-    share : float
-        Largest share of the picture for the largest deviation.
+    The largest deviation takes at most `share` of the picture.
 
     Examples
     --------

@@ -26,18 +26,8 @@ FORMATS = (".npz", ".csv", ".json")
 def export_run(row: Mapping[str, Any], path: str | Path) -> None:
     """Write a run as ``.npz``, ``.csv`` or ``.json``, by the file's suffix.
 
-    Parameters
-    ----------
-    row : mapping
-        Result of `Library.load`.
-    path : path
-        The file. npz and json hold everything; csv holds the signals, one sample per line, and the
-        rest as comments in its header.
-
-    Raises
-    ------
-    BadInputError
-        If the suffix is unknown or the file cannot be written.
+    `row` is the result of `Library.load`. npz and json hold everything; csv holds the signals, one
+    sample per line, and the rest as comments in its header.
     """
     target = Path(path)
     if target.suffix not in FORMATS:

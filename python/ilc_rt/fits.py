@@ -44,10 +44,6 @@ class _Fit:
         frequency_hz : array_like, shape (n_frequencies,)
             Frequencies in Hz.
 
-        Returns
-        -------
-        ndarray of complex128, shape (n_frequencies,)
-
         Raises
         ------
         ValueError, TypeError
@@ -235,8 +231,6 @@ def fit_second_order(
     ------
     ModelError
         If the response cannot be fitted.
-    ValueError, TypeError
-        If an array has the wrong shape, dtype or a number that is not finite.
 
     References
     ----------
@@ -253,17 +247,7 @@ def fit_second_order(
     >>> round(fit.natural_frequency_hz, 6), round(fit.damping, 6), round(fit.delay_s, 6)
     (12.0, 0.5, 0.004)
     """
-    return SecondOrderFit(
-        **_native.fit_second_order(
-            frequency_hz=frequency_hz,
-            response=response,
-            coherence=coherence,
-            n_averages=n_averages,
-            dt_s=dt_s,
-            gain=gain,
-            delay_s=delay_s,
-        )
-    )
+    return SecondOrderFit(**_native.fit_second_order(**locals()))
 
 
 def fit_velocity_loop(
@@ -297,32 +281,16 @@ def fit_velocity_loop(
         Known delay in seconds, with which the gain is 1; both are fitted if
         None.
 
-    Returns
-    -------
-    VelocityLoopFit
-
     Raises
     ------
     ModelError
         If the response cannot be fitted.
-    ValueError, TypeError
-        If an array has the wrong shape, dtype or a number that is not finite.
 
     References
     ----------
     [pintelon2012], section 9.8.3.
     """
-    return VelocityLoopFit(
-        **_native.fit_velocity_loop(
-            frequency_hz=frequency_hz,
-            response=response,
-            position_gain_per_s=position_gain_per_s,
-            dt_s=dt_s,
-            coherence=coherence,
-            n_averages=n_averages,
-            delay_s=delay_s,
-        )
-    )
+    return VelocityLoopFit(**_native.fit_velocity_loop(**locals()))
 
 
 def fit_rational(
@@ -357,16 +325,10 @@ def fit_rational(
     dt_s : float or None
         Sample time in seconds for a discrete model; None for a continuous one.
 
-    Returns
-    -------
-    RationalFit
-
     Raises
     ------
     ModelError
         If the degrees are out of range or the response cannot be fitted.
-    ValueError, TypeError
-        If an array has the wrong shape, dtype or a number that is not finite.
 
     References
     ----------
@@ -381,15 +343,4 @@ def fit_rational(
     >>> round(float(fit.model.poles()[0].real), 6)
     -4.0
     """
-    return RationalFit(
-        **_native.fit_rational(
-            frequency_hz=frequency_hz,
-            response=response,
-            n_zeros=n_zeros,
-            n_poles=n_poles,
-            coherence=coherence,
-            n_averages=n_averages,
-            delay_s=delay_s,
-            dt_s=dt_s,
-        )
-    )
+    return RationalFit(**_native.fit_rational(**locals()))

@@ -112,10 +112,6 @@ class Identification:
         count : int
             Number of frequencies, at least 2.
 
-        Returns
-        -------
-        ndarray of float64, shape (count,)
-
         Raises
         ------
         ValueError

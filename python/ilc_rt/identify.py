@@ -67,10 +67,6 @@ def swept_sine(
     **options
         All parameters of `multisine`.
 
-    Returns
-    -------
-    Identification
-
     Raises
     ------
     ValueError, CampaignError
@@ -153,10 +149,6 @@ def multisine(
     duration_s : None
         Former name of `period_s`; refused.
 
-    Returns
-    -------
-    Identification
-
     Raises
     ------
     CampaignError
@@ -213,10 +205,6 @@ def identify(
         Waveform of the excitation.
     **session
         Keywords of `Campaign`.
-
-    Returns
-    -------
-    Identification
 
     Raises
     ------

@@ -24,10 +24,7 @@ _UNTOUCHED = (signal.SIG_DFL, signal.default_int_handler)
 class ControlledStop:
     """Call `stop` on the first signal; raise on the second, or at the end.
 
-    Parameters
-    ----------
-    stop : callable
-        Receives the number of the signal.
+    `stop` receives the number of the signal.
 
     Notes
     -----
@@ -68,12 +65,8 @@ class ControlledStop:
     def raise_received(self) -> None:
         """Raise the exception of a received signal.
 
-        Raises
-        ------
-        KeyboardInterrupt
-            After SIGINT.
-        SystemExit
-            After SIGTERM and SIGHUP, with 128 plus the number.
+        KeyboardInterrupt after SIGINT; SystemExit after SIGTERM and SIGHUP, with 128 plus the
+        number.
         """
         if self.received is signal.SIGINT:
             raise KeyboardInterrupt

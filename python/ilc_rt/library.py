@@ -7,6 +7,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from ilc_rt import _native
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     import builtins
@@ -171,16 +172,7 @@ class Library(_native.Library):
         >>> library.recall(20.0)[0]["distance"]
         1.5
         """
-        return super()._append(
-            u=u,
-            e=e,
-            cycle_s=cycle_s,
-            disturbance=disturbance,
-            reference_m=reference_m,
-            cell=cell,
-            campaign=campaign,
-            law=law,
-        )
+        return super()._append(**given(locals()))
 
     def trim(self, keep: int, cell: str | None = None) -> int:
         """Delete all but the most relevant runs, and return how many were deleted.

@@ -133,10 +133,7 @@ class Monitor:
     def messages(self, timeout_s: float | None = None) -> Iterator[Message]:
         """Yield messages as they arrive.
 
-        Parameters
-        ----------
-        timeout_s : float or None
-            End after this total time; None for never.
+        Ends after `timeout_s` in total, if given.
         """
         until = None if timeout_s is None else time.monotonic() + timeout_s
         while until is None or time.monotonic() < until:
@@ -151,10 +148,7 @@ class Monitor:
     def ask_state(self, cell: str | None = None) -> list[Message]:
         """Query the current state, for late joiners.
 
-        Returns
-        -------
-        list of Message
-            One per controller that replied.
+        One message per controller that replied.
         """
         replies = self._session.get(f"ilc/{cell or self._cell}/state", timeout=2.0)
         messages = [_message(reply.ok) for reply in replies if reply.ok is not None]

@@ -74,13 +74,7 @@ STYLE: dict[Any, Any] = {
 
 
 def convergence(result: CampaignResult) -> Figure:
-    """Draw the errors against the number of the run, on a log scale.
-
-    Parameters
-    ----------
-    result : CampaignResult
-        At least one run.
-    """
+    """Draw the errors against the number of the run, on a log scale."""
     comparison = result.comparison
     bases = dict.fromkeys(column.unit.base for column in comparison.errors())
     with mpl.rc_context(STYLE):

@@ -39,16 +39,6 @@ def find_program(name: str) -> Path:
     Searched where the wheel installs it, which depends on the kind of installation: beside the
     running interpreter (a virtual environment's ``bin``), in the scripts folder of this
     installation or user, under ``pip install --target``; then on ``PATH``.
-
-    Parameters
-    ----------
-    name : str
-        ``"ilc-rt"`` or ``"ilc-sim"``.
-
-    Raises
-    ------
-    CampaignError
-        If it is in none of these places.
     """
     folders = [
         str(Path(sys.executable).parent),
@@ -69,11 +59,6 @@ def find_program(name: str) -> Path:
 
 class Program:
     """A running program whose lines are read as they arrive.
-
-    Parameters
-    ----------
-    argv : sequence of str
-        Program and arguments.
 
     Notes
     -----
@@ -142,10 +127,7 @@ class Program:
     def wait_for_line(self, start: str, deadline_s: float) -> str:
         """Read until a line begins with `start` and return it.
 
-        Raises
-        ------
-        CampaignError
-            If the program ends first, or the deadline passes.
+        A program that ends first, or passes the deadline, is an error.
         """
         until = time.monotonic() + deadline_s
         with selectors.DefaultSelector() as selector:
@@ -205,22 +187,7 @@ class Program:
 
 
 def start_simulated_drives(cell_file: str | Path, bus: str | None, *, lockstep: bool) -> Program:
-    """Start `ilc-sim` and wait until its drives listen.
-
-    Parameters
-    ----------
-    cell_file : path
-        The cell description.
-    bus : str or None
-        Bus address in place of the cell's.
-    lockstep : bool
-        Advance the drives on SYNC.
-
-    Raises
-    ------
-    CampaignError
-        If it does not become ready.
-    """
+    """Start `ilc-sim` and wait until its drives listen."""
     argv: list[str | Path] = [find_program("ilc-sim"), "run", cell_file, "--with-parent"]
     if bus is not None:
         argv += ["--bus", bus]

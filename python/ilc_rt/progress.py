@@ -59,13 +59,7 @@ def describe(start: StartEvent) -> str:
 
 
 class CampaignView:
-    """A growing table and a progress bar; plain lines if not a terminal.
-
-    Parameters
-    ----------
-    console : Console or None
-        Output; standard output by default.
-    """
+    """A growing table and a progress bar; plain lines if not a terminal."""
 
     def __init__(self, console: Console | None = None) -> None:
         # Names may contain brackets and colons: nothing printed is markup.

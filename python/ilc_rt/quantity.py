@@ -45,12 +45,8 @@ class Unit:
 def unit_for(base: str, size: float | None) -> Unit:
     """Return a suitable unit for a quantity of this size.
 
-    Parameters
-    ----------
-    base : str
-        Base unit: ``"m"``, ``"rad"``, ``"m/s"`` or ``"rad/s"``.
-    size : float or None
-        Its size, or that of the first of a row of quantities.
+    `size` is that of the quantity, or of the first of a row of quantities; `base` is ``"m"``,
+    ``"rad"``, ``"m/s"`` or ``"rad/s"``.
 
     Examples
     --------

@@ -114,10 +114,6 @@ def compare_runs(
     axis_units : tuple of str
         Their units; all m if empty.
 
-    Returns
-    -------
-    RepeatabilityCheck
-
     Raises
     ------
     ValueError
@@ -183,10 +179,6 @@ def check_repeatability(
         Library that the runs are stored in; None for no library.
     observe : callable or None
         Called with every event of the controller.
-
-    Returns
-    -------
-    RepeatabilityCheck
 
     Raises
     ------

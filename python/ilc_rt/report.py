@@ -108,12 +108,7 @@ def render(result: CampaignResult) -> str:
 def svg(figure: Figure, name: str) -> str:
     """Return a figure as inline SVG, without links and with unique ids.
 
-    Parameters
-    ----------
-    figure : Figure
-        Figure to draw.
-    name : str
-        Prefix of the ids, unique to each figure of a page.
+    `name` begins the ids, and is unique to each figure of a page.
     """
     buffer = io.StringIO()
     with mpl.rc_context({**plots.STYLE, "svg.hashsalt": name}), warnings.catch_warnings():

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ilc_rt import _native
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,12 +54,7 @@ class FrequencyResponse:
         coherence: ArrayLike | None = None,
         n_averages: float = 1.0,
     ) -> None:
-        checked = _native.check_response(
-            frequency_hz=frequency_hz,
-            response=response,
-            coherence=coherence,
-            n_averages=n_averages,
-        )
+        checked = _native.check_response(**given(locals()))
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
@@ -85,10 +81,6 @@ class FrequencyResponse:
         ----------
         from_hz, to_hz : float
             Lowest and highest frequency in Hz.
-
-        Returns
-        -------
-        FrequencyResponse
         """
         inside = (self.frequency_hz >= from_hz) & (self.frequency_hz <= to_hz)
         return FrequencyResponse(
@@ -142,8 +134,6 @@ def frequency_response(
     ------
     ModelError
         If the lengths differ, a segment does not fit, or the input is zero.
-    ValueError, TypeError
-        If `u` or `y` has the wrong shape, dtype or a number that is not finite.
 
     References
     ----------
@@ -158,14 +148,7 @@ def frequency_response(
     >>> np.allclose(h, 3.0)
     True
     """
-    found = _native.frequency_response(
-        u=u,
-        y=y,
-        dt_s=dt_s,
-        period_samples=period_samples,
-        segment_samples=segment_samples,
-        overlap_samples=overlap_samples,
-    )
+    found = _native.frequency_response(**locals())
     return FrequencyResponse(**found)
 
 
@@ -262,15 +245,7 @@ def excitation(
     >>> values.shape, first, period
     ((24000,), 0, 8000)
     """
-    return _native.excitation(
-        waveform=waveform,
-        amplitude=amplitude,
-        from_hz=from_hz,
-        to_hz=to_hz,
-        period_s=period_s,
-        periods=periods,
-        dt_s=dt_s,
-    )
+    return _native.excitation(**locals())
 
 
 def _parts(measured: FrequencyResponse) -> dict[str, object]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ilc_rt import _native
 from ilc_rt._native import Filter
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,9 +80,7 @@ class ButterworthFilter(_Filter):
     causal: bool
 
     def __new__(cls, order: int, cutoff_hz: float, dt_s: float, causal: bool = False) -> Self:  # noqa: FBT001
-        return super().__new__(
-            cls, "butterworth", order=order, cutoff_hz=cutoff_hz, dt_s=dt_s, causal=causal
-        )
+        return super().__new__(cls, "butterworth", **given(locals()))
 
     @property
     def sos(self) -> NDArray[np.float64]:
@@ -100,11 +99,6 @@ class ButterworthFilter(_Filter):
         -------
         ndarray of float64, same shape
             Filtered signal.
-
-        Raises
-        ------
-        ValueError, TypeError
-            If `x` has the wrong shape, dtype or a number that is not finite.
         """
         return self._forward(x)
 
@@ -172,8 +166,6 @@ class FirFilter(_Filter):
     ------
     SignalError
         If the number of taps is even, or they are not symmetric.
-    ValueError, TypeError
-        If `taps` has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
@@ -249,15 +241,7 @@ class SwitchedFilter(_Filter):
         order: int = 2,
         blend: int = 0,
     ) -> Self:
-        return super().__new__(
-            cls,
-            "switched",
-            cutoffs_hz=cutoffs_hz,
-            starts=starts,
-            dt_s=dt_s,
-            order=order,
-            blend=blend,
-        )
+        return super().__new__(cls, "switched", **given(locals()))
 
     @classmethod
     def from_signal(
@@ -304,26 +288,12 @@ class SwitchedFilter(_Filter):
         ------
         SignalError
             If a frequency or time is out of range.
-        ValueError, TypeError
-            If `reference` has the wrong shape, dtype or a number that is not finite.
 
         References
         ----------
         [filter-based], Section 5.
         """
-        return super().__new__(
-            cls,
-            "from_signal",
-            reference=reference,
-            dt_s=dt_s,
-            low_hz=low_hz,
-            high_hz=high_hz,
-            threshold_hz=threshold_hz,
-            order=order,
-            window_s=window_s,
-            margin_s=margin_s,
-            blend_s=blend_s,
-        )
+        return super().__new__(cls, "from_signal", **given(locals()))
 
 
 def butterworth(
@@ -388,8 +358,6 @@ def instantaneous_frequency(x: ArrayLike, dt_s: float) -> NDArray[np.float64]:
     ------
     SignalError
         If there are fewer than two samples or the sample time is not positive.
-    ValueError, TypeError
-        If `x` has the wrong shape, dtype or a number that is not finite.
 
     References
     ----------

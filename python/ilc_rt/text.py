@@ -15,12 +15,7 @@ NAME_MAX = 64
 def printable(text: object, length_max: int = LENGTH_MAX) -> str:
     r"""Return a text as one line of limited length in which every character is visible.
 
-    Parameters
-    ----------
-    text : object
-        Text to display.
-    length_max : int
-        Maximum number of characters; a longer text ends in an ellipsis.
+    A longer text ends in an ellipsis.
 
     Examples
     --------

@@ -39,11 +39,6 @@ SYNTAXES = ", ".join(kind.syntax for kind in TRANSPORTS.values())
 def transport_of(bus: str) -> Transport:
     """Return the kind of bus that an address names.
 
-    Raises
-    ------
-    BadInputError
-        If the kind is unknown.
-
     Examples
     --------
     >>> transport_of("udp:239.74.163.2").name

@@ -73,12 +73,8 @@ class BelievedAxis:
     def model(self, frequency: float = 1.0, damping: float = 1.0, delay: int = 0) -> StateSpace:
         """Return the closed loop from learned input to position.
 
-        Parameters
-        ----------
-        frequency, damping : float
-            Factors of natural frequency (csp) or velocity bandwidth (csv), and of damping (csp).
-        delay : int
-            Cycles in addition to `delay_samples`.
+        `frequency` and `damping` are factors: of natural frequency (csp) or velocity bandwidth
+        (csv), and of damping (csp); `delay` counts cycles in addition to `delay_samples`.
         """
         turn, n_delay = 2.0 * np.pi, max(self.delay_samples + delay, 0)
         if self.interface == "csp":
@@ -124,12 +120,7 @@ def believed_axes(
 ) -> tuple[list[BelievedAxis], dict[str, Any]]:
     """Return the axes of a cell, and its whole description as written.
 
-    Parameters
-    ----------
-    cell : Cell
-        The cell; already validated.
-    samples_max : int or None
-        Limit of the part of the program that the axes get.
+    `samples_max` limits the part of the program that the axes get.
     """
     written = tomlkit.parse(Path(cell.path).read_text(encoding="utf-8-sig")).unwrap()
     way = cell.reference()[:samples_max] - cell.reference()[0]
@@ -159,14 +150,8 @@ def believed_axes(
 class Suspect:
     """A perturbed axis.
 
-    Attributes
-    ----------
-    what : str
-        How it differs from the model, in words.
-    plant : StateSpace
-        Learned input to measured position.
-    friction : float
-        Friction, as the input needed to overcome it.
+    `plant` leads from the learned input to the measured position; `friction` is the input needed to
+    overcome it; `what` is how the axis differs from the model, in words.
     """
 
     what: str
@@ -244,16 +229,8 @@ class Trial:
 class Bench:
     """Trials of one axis.
 
-    Parameters
-    ----------
-    axis : BelievedAxis
-        The axis.
-    uncertainty, known_hz : float
-        As for `suspects`.
-    noise : float
-        Standard deviation of white measurement noise.
-    n_runs : int
-        Runs after the first one.
+    `noise` is the standard deviation of white measurement noise; `n_runs` counts the runs after the
+    first one; the others are as for `suspects`.
     """
 
     def __init__(

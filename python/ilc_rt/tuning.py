@@ -99,13 +99,7 @@ class Proposal:
         return {"q": w.q, "s": w.s, "r": w.r, "rate": w.rate}
 
     def write(self, path: str | Path) -> bool:
-        """Write the weights into a cell description; return True if it changed.
-
-        Raises
-        ------
-        BadInputError
-            If the file cannot be read or written.
-        """
+        """Write the weights into a cell description; return True if it changed."""
         tables: dict[str, dict[str, float]] = {self.section: self.values()}
         if self.along is not None:
             tables[f"{self.section}.contour"] = {"along": self.along}
@@ -172,10 +166,6 @@ def propose_weights(
         Standard deviation of white measurement noise.
     n_runs : int
         Runs by which learning should be complete; values above 100 count as 100.
-
-    Returns
-    -------
-    Proposal
 
     Raises
     ------

@@ -22,18 +22,8 @@ BISECTIONS = 2
 class WeightSearch:
     """Search for the weight `rate` with the smallest error among those with which no trial grows.
 
-    Parameters
-    ----------
-    benches : list of Bench
-        One for each moving axis.
-    q : float
-        Weight of the error.
-    levels : list of float
-        Smallest and largest weight of the error along the run.
-    growth_max : float
-        Allowed growth of an error over the smallest one in a trial.
-    n_runs : int
-        Runs of a trial.
+    One bench for each moving axis; `q` is the weight of the error, `levels` its extremes along the
+    run; `growth_max` the allowed growth of an error over the smallest one in a trial of `n_runs`.
     """
 
     def __init__(

@@ -50,8 +50,6 @@ def contour(
     LearningError
         If a weight is negative or inconsistent, the path never moves, or it has fewer than two
         axes.
-    ValueError, TypeError
-        If an array has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
@@ -70,9 +68,7 @@ def contour(
     >>> weights.contour(line, q=0.0, contour=2.0)[2].round(12).tolist()
     [[1.0, -1.0], [-1.0, 1.0]]
     """
-    return _native.contour_weights(
-        reference=reference, q=q, contour=contour, along=along, axes=axes
-    )
+    return _native.contour_weights(**locals())
 
 
 def coupled(
@@ -101,8 +97,6 @@ def coupled(
     ------
     LearningError
         If sigma is negative, gamma is outside 0 to 1, or a length is inconsistent.
-    ValueError, TypeError
-        If an array has the wrong shape, dtype or a number that is not finite.
 
     References
     ----------
@@ -165,9 +159,7 @@ def schedule(
     >>> weights.schedule([(0, 1.0), (2, 30.0)], 4).tolist()
     [1.0, 1.0, 30.0, 30.0]
     """
-    return _native.schedule(
-        segments=segments, n_samples=n_samples, bandwidth_hz=bandwidth_hz, dt_s=dt_s
-    )
+    return _native.schedule(**locals())
 
 
 def formation(
@@ -219,8 +211,6 @@ def formation(
     ------
     LearningError
         If a share is outside 0 to 1, a weight is negative, or an agent or axis does not exist.
-    ValueError, TypeError
-        If an array has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
@@ -238,19 +228,7 @@ def formation(
     >>> weights.formation(2, 1, 3, tracking=0.75)[0].tolist()
     [[1.0, -0.25], [-0.25, 1.0]]
     """
-    return _native.formation_weights(
-        n_agents=n_agents,
-        n_axes=n_axes,
-        n_samples=n_samples,
-        tracking=tracking,
-        own=own,
-        centre=centre,
-        sigma=sigma,
-        weight=weight,
-        leaders=leaders,
-        pairs=pairs,
-        axes=axes,
-    )
+    return _native.formation_weights(**locals())
 
 
 def formation_errors(
@@ -283,8 +261,6 @@ def formation_errors(
     ------
     LearningError
         If an agent or axis does not exist.
-    ValueError, TypeError
-        If `e` has the wrong shape, dtype or a number that is not finite.
 
     References
     ----------

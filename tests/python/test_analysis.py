@@ -18,7 +18,6 @@ from ilc_rt import (
     analyze,
     discretize,
     second_order,
-    signal,
     tune,
 )
 from ilc_rt.cli import main
@@ -38,89 +37,6 @@ def servo():
     z = control.tf("z")
     plant = control.ss(control.feedback((z - 0.5) / ((z - 1) * (z - 0.925)), 0.425))
     return StateSpace(plant.A, plant.B, plant.C, plant.D, 1.0)
-
-
-def triangle(n=401):
-    """Return the reference of the servo example."""
-    k = np.arange(n)
-    return np.where(k <= 200, k / 200, 2 - k / 200)
-
-
-def lifted(model, n):
-    """Return the dense lifted system, one simulated impulse per column."""
-    first = model.simulate(np.eye(n)[:, 0])
-    return np.array([[first[i - j] if i >= j else 0.0 for j in range(n)] for i in range(n)])
-
-
-def columns(law, n):
-    """Return L_u and L_e of a law, one update per column."""
-    eye, zero = np.eye(n), np.zeros(n)
-    keep = np.column_stack([law.update(eye[:, i], zero) for i in range(n)])
-    learn = np.column_stack([law.update(zero, eye[:, i]) for i in range(n)])
-    return keep, learn
-
-
-def optimal(model, n, q, s, r):
-    """Return L_u, L_e and P in closed form."""
-    p = lifted(model, n)
-    cost = q * p.T @ p + (s + r) * np.eye(n)
-    keep = np.linalg.solve(cost, q * p.T @ p + r * np.eye(n))
-    return keep, np.linalg.solve(cost, q * p.T), p
-
-
-@pytest.mark.parametrize(("q", "s", "r"), [(1, 1, 1), (0.1, 1, 1), (1, 0.01, 5)])
-def test_the_servo_example_agrees_with_its_equations(q, s, r):
-    model, n, reference = servo(), 401, triangle()
-    found = analyze({"q": q, "s": s, "r": r}, model, reference=reference, noise_std=1e-3, n_runs=5)
-    keep, learn, p = optimal(model, n, q, s, r)
-    t = keep - learn @ p
-    np.testing.assert_allclose(found.monotonic_factor, np.linalg.norm(t[:-1, :-1], 2), rtol=1e-9)
-    np.testing.assert_allclose(
-        found.spectral_radius, np.abs(np.linalg.eigvals(t[:-1, :-1])).max(), rtol=1e-9
-    )
-    stays = reference - p @ np.linalg.solve(q * p.T @ p + s * np.eye(n), q * p.T @ reference)
-    np.testing.assert_allclose(found.converged_error[:, 0], stays, atol=1e-9)
-    np.testing.assert_allclose(found.converged_error_rms, np.sqrt(np.mean(stays**2)), rtol=1e-9)
-    sigma, u = np.zeros((n, n)), np.zeros(n)
-    for expected in found.expected_rms:
-        e = reference - p @ u
-        square = e @ e / n + 1e-6 * (np.trace(p @ sigma @ p.T) / n + 1)
-        np.testing.assert_allclose(expected, np.sqrt(square), rtol=1e-9)
-        sigma = t @ sigma @ t.T + learn @ learn.T
-        u = t @ u + learn @ reference
-    assert found.converges
-    assert found.monotonic
-
-
-def test_a_filtered_law_agrees_with_its_columns():
-    model = axis()
-    law = PdIlc(kp=0.4, kd=1.0, q_filter=signal.butterworth(2, 15.0, DT_S), lead_samples=5)
-    found = analyze(law, model, N)
-    keep, learn = columns(law, N)
-    t = keep - learn @ lifted(model, N)
-    np.testing.assert_allclose(found.monotonic_factor, np.linalg.norm(t, 2), rtol=1e-9)
-    # Far from normal: an eigenvalue is much more sensitive than the matrix's rounding.
-    np.testing.assert_allclose(found.spectral_radius, np.abs(np.linalg.eigvals(t)).max(), rtol=1e-6)
-    assert found.method == "dense"
-
-
-def test_long_runs_are_analysed_without_their_matrix():
-    law = PdIlc(kp=0.4, kd=0.0, q_filter=signal.butterworth(2, 15.0, DT_S), lead_samples=6)
-    found = analyze(law, axis(), 5000, noise_std=1e-6)
-    assert found.method == "structured"
-    assert found.converges
-    assert found.expected_rms_limit > 1e-6
-
-
-def test_the_usual_condition_does_not_make_the_error_fall():
-    model = axis()
-    first = model.simulate([1.0, 0.0])[1]
-    found = analyze(PdIlc(kp=0.9 / first, kd=0.0), model, N)
-    assert found.pd_factor == pytest.approx(0.1)
-    assert found.pd_gain_range[1] == pytest.approx(2 / first)
-    assert found.spectral_radius == pytest.approx(0.1)
-    assert found.monotonic_factor > 1
-    assert not found.monotonic
 
 
 class Proportional:

@@ -129,6 +129,48 @@ def test_an_update_leaves_its_arguments_alone_and_returns_an_array_of_its_own(ki
     np.testing.assert_array_equal(first, kept)
 
 
+# A law that remembers its runs keeps the disturbances and the size of the first one.
+FORGETFUL = [kind for kind in LAWS if kind != "relevance"]
+
+
+@pytest.mark.parametrize("kind", FORGETFUL)
+def test_every_law_takes_a_disturbance_and_forgets(kind):
+    law = LAWS[kind]()
+    first = law.update(U, E)
+    assert law.update(U[:, None], E[:, None], [21.5]).shape == (N, 1)
+    law.reset()
+    np.testing.assert_array_equal(law.update(U, E), first)
+    assert type(law).__name__ in repr(law)
+
+
+@pytest.mark.parametrize("name", ["u", "e"])
+@pytest.mark.parametrize(
+    ("spoil", "error"),
+    [
+        (lambda x: x[:-1], ValueError),
+        (lambda x: np.column_stack([x, x]), ValueError),
+        (lambda x: x.reshape(1, -1, 1), ValueError),
+        (lambda x: x[:0], ValueError),
+        (lambda x: np.where(np.arange(x.size) == 7, np.nan, x), ValueError),
+        (lambda x: np.where(np.arange(x.size) == 7, -np.inf, x), ValueError),
+        (lambda x: x.astype(np.longdouble), TypeError),
+        (lambda x: x.astype(np.complex128), TypeError),
+        (lambda x: x.astype(object), TypeError),
+        (lambda x: None, TypeError),
+    ],
+    ids=["short", "wide", "axes", "empty", "nan", "inf", "longdouble", "complex", "object", "none"],
+)
+@pytest.mark.parametrize("kind", FORGETFUL)
+def test_each_bad_array_is_refused_by_name(kind, name, spoil, error):
+    law = LAWS[kind]()
+    arrays = {"u": U, "e": E}
+    arrays[name] = spoil(arrays[name])
+    # For a law without a fixed size, a consistent array makes the other one the wrong one.
+    with pytest.raises(error, match=r"^[ue] (has|holds)"):
+        law.update(**arrays)
+    assert law.update(U, E).shape == (N,)
+
+
 def test_channels_first_is_refused_with_the_shape_given_and_the_shape_wanted():
     law = NormOptimalIlc(AXIS.append(AXIS), N, r=0.1)
     with pytest.raises(ValueError, match=r"u has shape \(2, 60\); \(60, 2\) is needed"):
@@ -208,7 +250,9 @@ def test_threads_take_turns_with_one_law():
     found = []
 
     def work():
-        found.extend(law.update(U, E) for _ in range(50))
+        for _ in range(50):
+            found.append(law.update(U, E))
+            assert law.state == "learning"
 
     threads = [threading.Thread(target=work) for _ in range(4)]
     for thread in threads:

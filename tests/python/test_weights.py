@@ -64,24 +64,6 @@ def test_contour_weights_are_the_printed_ones():
         np.testing.assert_allclose(found[k], expected, atol=1e-10)
 
 
-def test_contour_weights_of_three_axes_leave_others_alone():
-    reference = path(N, 4)
-    found = weights.contour(reference, q=1.0, contour=4.0, axes=[3, 0, 2])
-    tangent = reference[6, [3, 0, 2]] - reference[4, [3, 0, 2]]
-    tangent /= np.linalg.norm(tangent)
-    expected = np.eye(4)
-    places = np.ix_([3, 0, 2], [3, 0, 2])
-    expected[places] += 4.0 * (np.eye(3) - np.outer(tangent, tangent))
-    np.testing.assert_allclose(found[5], expected, atol=1e-12)
-
-
-def test_at_rest_the_nearest_tangent_holds():
-    reference = np.zeros((9, 2))
-    reference[4:, 0] = [1.0, 2.0, 2.0, 2.0, 2.0]
-    found = weights.contour(reference, q=0.0, contour=1.0)
-    np.testing.assert_allclose(found, np.broadcast_to(np.diag([0.0, 1.0]), (9, 2, 2)))
-
-
 def test_shares_are_the_printed_product():
     coupling = RNG.normal(size=(N, 2, 3))
     sigma, gamma = RNG.uniform(0.0, 30.0, N), RNG.uniform(0.0, 1.0, N)

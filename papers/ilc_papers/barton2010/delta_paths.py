@@ -40,16 +40,8 @@ def home_m(delta: Delta) -> NDArray[np.float64]:
 def plane_path_m(name: str) -> NDArray[np.float64]:
     """Return a reference in the plane, around (0, 0).
 
-    Parameters
-    ----------
-    name : str
-        ``raster``: three rows forth and the same way back; ``spiral``: from its
-        centre, anticlockwise.
-
-    Returns
-    -------
-    ndarray of float64, shape (n_samples, 2)
-        Positions in m, one every `DT_S`, from rest to rest.
+    `raster`: three rows forth and the same way back; `spiral`: from its centre, anticlockwise. In
+    m, one position every `DT_S`, from rest to rest, shape (n_samples, 2).
     """
     if name == "raster":
         path = trajectory.raster(

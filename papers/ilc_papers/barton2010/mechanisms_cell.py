@@ -150,20 +150,8 @@ def tools_m(delta: Delta, angles_rad: Array) -> Array:
 def build(folder: Path, path: str, *, is_disturbed: bool, seed: int = 1) -> Machine:
     """Write the cell and its table into a folder, and load it.
 
-    Parameters
-    ----------
-    folder : Path
-        An empty folder; the library is kept there too.
-    path : str
-        Name of the reference, `raster` or `spiral`.
-    is_disturbed : bool
-        True if the first mechanism differs from the model used for learning.
-    seed : int
-        Seed of the encoders' noise.
-
-    Returns
-    -------
-    Machine
+    `path` is a reference, `raster` or `spiral`. If disturbed, the first mechanism differs from the
+    model used for learning; `seed` is that of the encoders' noise.
     """
     delta = Delta()
     angle_rad = delta.inverse(tool_path_m(delta, path))

@@ -103,16 +103,8 @@ class Stage:
     ) -> tuple[Figures, list[Array]]:
         """Return the RMS contour and tracking errors of each run, and all errors in m.
 
-        Parameters
-        ----------
-        law : object or None
-            Law; None for feedback alone.
-        iterations : int
-            Updates.
-        plant : callable or None
-            The true plant; None for the model.
-        disturbance : callable
-            Disturbance of the positions in m, for the number of a run.
+        Without a law there is feedback alone; without a plant the model is the true one.
+        `disturbance` is that of the positions in m, for the number of a run.
         """
         simulate = self.plant.simulate if plant is None else plant
         history = runs(law, simulate, self.first_error_m, iterations, disturbance)

@@ -67,16 +67,7 @@ def _worst_factor(values: Array, s: float, r: float) -> tuple[float, Array]:
     of `H = P'P` with eigenvalues a and b, for which `a (s + r) / r + b / w = 1`: of all z the one
     that is made of the two outermost eigenvectors of H is the worst.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n,)
-        Eigenvalues of H, rising.
-
-    Returns
-    -------
-    norm : float
-    z : ndarray of shape (2,)
-        Its parts along the first and the last eigenvector.
+    The place is given by the parts of z along the two eigenvectors; `values` rise.
     """
     ends = values[[0, -1]] + s + r
     change, error = r / ends, UNCERTAINTY * values[[0, -1]] / ends

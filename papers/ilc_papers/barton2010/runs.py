@@ -33,18 +33,7 @@ def runs(
 
     `e_j = e_0 - P u_j - d_j`
 
-    Parameters
-    ----------
-    law : object or None
-        Its update gives the next input; None leaves the input at zero.
-    plant : callable
-        Plant from learned input to output.
-    first_error : ndarray of shape (n_samples,) or (n_samples, n_outputs)
-        Error without learning and disturbance.
-    iterations : int
-        Updates.
-    disturbance : callable
-        Disturbance of the output, for the number of a run.
+    `e_0` is the error without learning and disturbance; `law` None leaves the input at zero.
 
     References
     ----------

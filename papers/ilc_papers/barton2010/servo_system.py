@@ -56,10 +56,7 @@ def servo(n_samples: int = N_SAMPLES) -> Servo:
     output, P = G / (1 + G C). As in the listings the first sample of the impulse response is
     dropped: u(k) is paired with e(k + 1).
 
-    Parameters
-    ----------
-    n_samples : int
-        Samples of a run; fewer than 400 shorten the triangle.
+    Fewer than 400 samples shorten the triangle.
     """
     axis = from_transfer_function([1.0, -0.5], np.convolve([1.0, -1.0], [1.0, -0.925]), DT_S)
     controller = gain(CONTROLLER_GAIN, DT_S)

@@ -110,18 +110,7 @@ def run(
     The ILC signal is added to the reference of the PD loop; each law is given the temperature of
     the next run before it begins (Eq. 4.11). Errors are relative to the part.
 
-    Parameters
-    ----------
-    system : System
-        One of the two examples.
-    reference : ndarray of float64, shape (n_samples,)
-        Desired position.
-    temperatures_k : ndarray of float64, shape (n_runs,)
-        Temperature above T_0 of every run.
-    names : sequence of str
-        Name of one of the `LAWS`.
-    kept : sequence of int
-        Runs whose error and input are kept.
+    Error and input are kept of the runs in `kept`.
     """
     campaigns = {name: Campaign() for name in names}
     inputs = {name: np.zeros_like(reference) for name in names}

@@ -28,10 +28,7 @@ def appendix_a() -> Trajectory:
     60 at 10 per second with an oscillation of 2 at 10 rad/s, back 40 at 5 per second with 1 at
     20 rad/s; joined by sigmoids, started by an exponential.
 
-    Returns
-    -------
-    Trajectory
-        1,401 samples; what it calls m are inches.
+    1,401 samples; what the trajectory calls m are inches.
     """
     return trajectory.sigmoid_pair(
         velocity_m_s=[10.0, -5.0],

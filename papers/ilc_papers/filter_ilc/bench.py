@@ -138,12 +138,7 @@ class Bench:
 
         ``u = w + C e`` with e the reference minus the noisy encoder.
 
-        Parameters
-        ----------
-        learned : ndarray of float64, shape (n_samples,)
-            Learned signal w.
-        added : ndarray of float64, shape (n_samples,), or float
-            Other input of the plant: a disturbance, a feed-forward.
+        `added` is another input of the plant: a disturbance, a feed-forward.
 
         References
         ----------
@@ -163,16 +158,8 @@ class Bench:
     ) -> Course:
         """Run the motion and learn after each run.
 
-        Parameters
-        ----------
-        law : object
-            Learning law.
-        runs : int
-            Number of runs; the first is without learning.
-        added : callable
-            Other input of the plant in each run.
-        observe : callable
-            Told the number of each run when the law has learned from it.
+        The first run is without learning. `added` gives the other input of the plant in each run;
+        `observe` receives the number of each run when the law has learned from it.
         """
         course = Course()
         learned = np.zeros(self.motion.n_samples)

@@ -37,13 +37,8 @@ class DriveChoice(str, Enum):
 def declared(verb: Verb, *names: str) -> Callable[[F], F]:
     """Declare options of ``ilc-rt`` in place of a function's ``**options``.
 
-    Parameters
-    ----------
-    verb : {"run", "identify"}
-        Verb of ``ilc-rt`` that the options belong to.
-    *names : str
-        The options; by default all but those that the function has parameters for, and the choice
-        of simulated drives.
+    By default all options of the verb but those that the function has parameters for, and the
+    choice of simulated drives.
     """
 
     def declare(function: F) -> F:

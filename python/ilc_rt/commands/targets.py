@@ -18,11 +18,6 @@ def json_target(context: typer.Context, path: Path | None) -> Path | None:
 
     If the figures go to standard output, everything else that the verb prints goes to standard
     error.
-
-    Raises
-    ------
-    BadInputError
-        If it cannot be written.
     """
     if path is None or context.resilient_parsing:
         return path
@@ -34,26 +29,14 @@ def json_target(context: typer.Context, path: Path | None) -> Path | None:
 
 
 def report_target(context: typer.Context, path: Path | None) -> Path | None:
-    """Check the target of ``--report`` before anything moves.
-
-    Raises
-    ------
-    BadInputError
-        If it cannot be written.
-    """
+    """Check the target of ``--report`` before anything moves."""
     if path is not None and not context.resilient_parsing:
         check_report("--report", path)
     return path
 
 
 def check_file(option: str, path: Path) -> None:
-    """Refuse a file that cannot be written; it stays unchanged, or absent.
-
-    Raises
-    ------
-    BadInputError
-        With the option, the file and the reason.
-    """
+    """Refuse a file that cannot be written; it stays unchanged, or absent."""
     is_new = not path.exists()
     if not is_new and not path.is_file() and not path.is_dir():
         return  # a device or a pipe: opening it now would use it
@@ -74,11 +57,6 @@ def check_report(option: str, path: Path) -> None:
     """Refuse a report's file or folder that could not be written at the end.
 
     A folder may be missing, but its parent must exist.
-
-    Raises
-    ------
-    BadInputError
-        With the option, the path and the reason.
     """
     if path.is_dir():
         folder = path
@@ -104,13 +82,7 @@ def check_report(option: str, path: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a missing folder, and report it.
-
-    Raises
-    ------
-    BadInputError
-        If it cannot be created.
-    """
+    """Create a missing folder, and report it."""
     if folder.is_dir():
         return
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from ilc_rt._native import Law
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     import numpy as np
@@ -82,16 +83,7 @@ class Gate(_Around):
         growth: float = 1.5,
         patience: int = 2,
     ) -> Self:
-        return super().__new__(
-            cls,
-            "gate",
-            law=law,
-            tolerance=tolerance,
-            measure=measure,
-            resume=resume,
-            growth=growth,
-            patience=patience,
-        )
+        return super().__new__(cls, "gate", **given(locals()))
 
     @property
     def state(self) -> Literal["learning", "holding", "rolled_back"]:
@@ -167,16 +159,7 @@ class Ladder(_Around):
         lowest: float = 0.0625,
         highest: float = 1.5,
     ) -> Self:
-        return super().__new__(
-            cls,
-            "ladder",
-            law=law,
-            repeats=repeats,
-            slow=slow,
-            increase=increase,
-            lowest=lowest,
-            highest=highest,
-        )
+        return super().__new__(cls, "ladder", **given(locals()))
 
     @property
     def gain(self) -> float:

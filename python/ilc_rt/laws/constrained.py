@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from ilc_rt._native import Law
+from ilc_rt.given import given
 from ilc_rt.laws.arguments import renamed
 
 if TYPE_CHECKING:
@@ -117,25 +118,7 @@ class ConstrainedIlc(Law):
         output_bounds: Bounds = None,
         output_reference: ArrayLike | None = None,
     ) -> Self:
-        return super().__new__(
-            cls,
-            "constrained",
-            model=model,
-            n_samples=n_samples,
-            q=q,
-            s=s,
-            r=r,
-            rate=rate,
-            input_max=input_max,
-            change_max=change_max,
-            step_max=step_max,
-            reference=reference,
-            position_bounds=position_bounds,
-            velocity_bounds=velocity_bounds,
-            acceleration_bounds=acceleration_bounds,
-            output_bounds=output_bounds,
-            output_reference=output_reference,
-        )
+        return super().__new__(cls, "constrained", **given(locals()))
 
     @property
     def n_samples(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ilc_rt._native import Law
+from ilc_rt.given import given
 from ilc_rt.laws.arguments import renamed
 
 if TYPE_CHECKING:
@@ -62,9 +63,7 @@ class PdIlc(Law):
         q_filter: QFilter = None,
         lead_samples: int = 1,
     ) -> Self:
-        return super().__new__(
-            cls, "pd", kp=kp, kd=kd, q_filter=q_filter, lead_samples=lead_samples
-        )
+        return super().__new__(cls, "pd", **given(locals()))
 
 
 class ErrorFeedforwardIlc(Law):
@@ -117,14 +116,7 @@ class ErrorFeedforwardIlc(Law):
         lead_samples: int = 1,
         input_max: float | None = None,
     ) -> Self:
-        return super().__new__(
-            cls,
-            "error_feedforward",
-            gain_per_s=gain_per_s,
-            filter=filter,
-            lead_samples=lead_samples,
-            input_max=input_max,
-        )
+        return super().__new__(cls, "error_feedforward", **given(locals()))
 
     @property
     def n_limited(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ilc_rt._native import Law
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -62,9 +63,7 @@ class AdjointIlc(Law):
     def __new__(
         cls, model: Model, n_samples: int, gain: float | None = None, q_filter: QFilter = None
     ) -> Self:
-        return super().__new__(
-            cls, "adjoint", model=model, n_samples=n_samples, gain=gain, q_filter=q_filter
-        )
+        return super().__new__(cls, "adjoint", **given(locals()))
 
     @property
     def gain(self) -> float:
@@ -126,9 +125,7 @@ class ModelInverseIlc(Law):
     def __new__(
         cls, model: Model, n_samples: int, gain: float = 0.5, q_filter: QFilter = None
     ) -> Self:
-        return super().__new__(
-            cls, "model_inverse", model=model, n_samples=n_samples, gain=gain, q_filter=q_filter
-        )
+        return super().__new__(cls, "model_inverse", **given(locals()))
 
     @property
     def gain(self) -> float:

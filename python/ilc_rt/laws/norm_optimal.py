@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ilc_rt._native import Law
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,8 +47,6 @@ class NormOptimalIlc(Law):
         model does not determine the input or has an unstable inverse.
     ModelError, TypeError
         If the model is continuous, varies over another number of samples, or is not a model.
-    ValueError, TypeError
-        If a weight has the wrong shape, dtype or a number that is not finite.
 
     Notes
     -----
@@ -82,9 +81,7 @@ class NormOptimalIlc(Law):
         r: ArrayLike = 0.0,
         rate: float = 0.0,
     ) -> Self:
-        return super().__new__(
-            cls, "norm_optimal", model=model, n_samples=n_samples, q=q, s=s, r=r, rate=rate
-        )
+        return super().__new__(cls, "norm_optimal", **given(locals()))
 
     @classmethod
     def contour(
@@ -139,19 +136,7 @@ class NormOptimalIlc(Law):
         >>> law.update(np.zeros((100, 2)), np.ones((100, 2))).shape
         (100, 2)
         """
-        return super().__new__(
-            cls,
-            "contour",
-            model=model,
-            reference=reference,
-            q=q,
-            contour=contour,
-            along=along,
-            s=s,
-            r=r,
-            rate=rate,
-            axes=axes,
-        )
+        return super().__new__(cls, "contour", **given(locals()))
 
     @classmethod
     def formation(
@@ -208,23 +193,7 @@ class NormOptimalIlc(Law):
         >>> law.update(np.zeros((100, 2)), np.ones((100, 2))).shape
         (100, 2)
         """
-        return super().__new__(
-            cls,
-            "formation",
-            models=models,
-            n_samples=n_samples,
-            tracking=tracking,
-            own=own,
-            centre=centre,
-            sigma=sigma,
-            weight=weight,
-            s=s,
-            r=r,
-            rate=rate,
-            leaders=leaders,
-            pairs=pairs,
-            axes=axes,
-        )
+        return super().__new__(cls, "formation", **given(locals()))
 
     @classmethod
     def dynamic(
@@ -287,19 +256,7 @@ class NormOptimalIlc(Law):
         >>> law.update(np.zeros(100), np.ones(100)).shape
         (100,)
         """
-        return super().__new__(
-            cls,
-            "dynamic",
-            model=model,
-            n_samples=n_samples,
-            filter=filter,
-            q=q,
-            plain=plain,
-            coupling=coupling,
-            s=s,
-            r=r,
-            rate=rate,
-        )
+        return super().__new__(cls, "dynamic", **given(locals()))
 
     @property
     def n_samples(self) -> int:

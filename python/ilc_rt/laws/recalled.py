@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ilc_rt._native import Law
+from ilc_rt.given import given
 from ilc_rt.laws.relevance_weights import RelevanceWeights
 
 if TYPE_CHECKING:
@@ -240,6 +241,4 @@ class FlexibleIlc(_Recalled):
         *,
         cell: str | None = None,
     ) -> Self:
-        return super().__new__(
-            cls, "flexible", library=library, core=core, tolerance=tolerance, cell=cell
-        )
+        return super().__new__(cls, "flexible", **given(locals()))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ilc_rt import _native
 from ilc_rt._native import ContourError
+from ilc_rt.given import given
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,9 +81,7 @@ class Arc(_native.Arc):
         sweep_rad: float,
         axis: ArrayLike | None = None,
     ) -> Self:
-        return super().__new__(
-            cls, from_m=from_m, centre_m=centre_m, sweep_rad=sweep_rad, axis=axis
-        )
+        return super().__new__(cls, **given(locals()))
 
 
 def contour_error(

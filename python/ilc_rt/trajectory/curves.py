@@ -63,17 +63,7 @@ def spline(
     >>> path.n_axes
     2
     """
-    return Trajectory(
-        **_native.spline(
-            points_m=points_m,
-            feed_m_s=feed_m_s,
-            dt_s=dt_s,
-            velocity_max_m_s=velocity_max_m_s,
-            acceleration_max_m_s2=acceleration_max_m_s2,
-            jerk_max_m_s3=jerk_max_m_s3,
-            curvature_acceleration_max_m_s2=curvature_acceleration_max_m_s2,
-        )
-    )
+    return Trajectory(**_native.spline(**locals()))
 
 
 def butterfly(
@@ -133,19 +123,7 @@ def butterfly(
     >>> path.n_axes
     2
     """
-    return Trajectory(
-        **_native.butterfly(
-            dt_s=dt_s,
-            velocity_max_m_s=velocity_max_m_s,
-            acceleration_max_m_s2=acceleration_max_m_s2,
-            jerk_max_m_s3=jerk_max_m_s3,
-            feed_m_s=feed_m_s,
-            curvature_acceleration_max_m_s2=curvature_acceleration_max_m_s2,
-            scale_m=scale_m,
-            turns=turns,
-            center_m=center_m,
-        )
-    )
+    return Trajectory(**_native.butterfly(**locals()))
 
 
 def spiral(
@@ -209,16 +187,4 @@ def spiral(
     >>> bool(abs((path.position_m[-1] ** 2).sum() ** 0.5 - 0.012) < 1e-12)
     True
     """
-    return Trajectory(
-        **_native.spiral(
-            pitch_m=pitch_m,
-            turns=turns,
-            feed_m_s=feed_m_s,
-            dt_s=dt_s,
-            velocity_max_m_s=velocity_max_m_s,
-            acceleration_max_m_s2=acceleration_max_m_s2,
-            jerk_max_m_s3=jerk_max_m_s3,
-            curvature_acceleration_max_m_s2=curvature_acceleration_max_m_s2,
-            center_m=center_m,
-        )
-    )
+    return Trajectory(**_native.spiral(**locals()))

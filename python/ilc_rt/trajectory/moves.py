@@ -68,17 +68,7 @@ def jerk_limited(
     >>> round(float(move.t_s[-1]), 6)
     2.75
     """
-    return Trajectory(
-        **_native.jerk_limited(
-            points_m=points_m,
-            feed_m_s=feed_m_s,
-            dt_s=dt_s,
-            velocity_max_m_s=velocity_max_m_s,
-            acceleration_max_m_s2=acceleration_max_m_s2,
-            jerk_max_m_s3=jerk_max_m_s3,
-            setting=setting,
-        )
-    )
+    return Trajectory(**_native.jerk_limited(**locals()))
 
 
 def exponential_sigmoid(
@@ -152,19 +142,7 @@ def exponential_sigmoid(
     >>> " ".join(place for _, place, _, _ in move.alphas)
     'start-up transition end'
     """
-    return Trajectory(
-        **_native.exponential_sigmoid(
-            points_m=points_m,
-            feed_m_s=feed_m_s,
-            dt_s=dt_s,
-            velocity_max_m_s=velocity_max_m_s,
-            acceleration_max_m_s2=acceleration_max_m_s2,
-            jerk_max_m_s3=jerk_max_m_s3,
-            amplitude_m=amplitude_m,
-            frequency_hz=frequency_hz,
-            alpha_max=alpha_max,
-        )
-    )
+    return Trajectory(**_native.exponential_sigmoid(**locals()))
 
 
 def modulated(
@@ -230,19 +208,7 @@ def modulated(
     >>> round(float(path.t_s[-1]), 6)
     5.0
     """
-    return Trajectory(
-        **_native.modulated(
-            points_m=points_m,
-            feed_m_s=feed_m_s,
-            amplitude_m=amplitude_m,
-            frequency_hz=frequency_hz,
-            dt_s=dt_s,
-            velocity_max_m_s=velocity_max_m_s,
-            acceleration_max_m_s2=acceleration_max_m_s2,
-            jerk_max_m_s3=jerk_max_m_s3,
-            interpolation=interpolation,
-        )
-    )
+    return Trajectory(**_native.modulated(**locals()))
 
 
 def sigmoid_pair(
@@ -322,18 +288,4 @@ def sigmoid_pair(
     >>> path.n_samples
     1401
     """
-    return Trajectory(
-        **_native.sigmoid_pair(
-            velocity_m_s=velocity_m_s,
-            amplitude_m=amplitude_m,
-            omega_rad_s=omega_rad_s,
-            phase_zero_s=phase_zero_s,
-            corner_s=corner_s,
-            duration_s=duration_s,
-            start_alpha=start_alpha,
-            transition_alpha=transition_alpha,
-            sine_alpha=sine_alpha,
-            sine_offset_s=sine_offset_s,
-            dt_s=dt_s,
-        )
-    )
+    return Trajectory(**_native.sigmoid_pair(**locals()))

@@ -76,21 +76,7 @@ def raster(
     >>> path.position_m[-1].tolist()
     [0.02, 0.01]
     """
-    return Trajectory(
-        **_native.raster(
-            width_m=width_m,
-            pitch_m=pitch_m,
-            rows=rows,
-            feed_m_s=feed_m_s,
-            dt_s=dt_s,
-            velocity_max_m_s=velocity_max_m_s,
-            acceleration_max_m_s2=acceleration_max_m_s2,
-            jerk_max_m_s3=jerk_max_m_s3,
-            start_m=start_m,
-            there_and_back=there_and_back,
-            setting=setting,
-        )
-    )
+    return Trajectory(**_native.raster(**locals()))
 
 
 def gcode(
@@ -155,17 +141,4 @@ def gcode(
     >>> path.position_m[-1].tolist()
     [0.0, 0.01]
     """
-    return Trajectory(
-        **_native.gcode(
-            text=text,
-            start_m=start_m,
-            feed_m_s=feed_m_s,
-            dt_s=dt_s,
-            velocity_max_m_s=velocity_max_m_s,
-            acceleration_max_m_s2=acceleration_max_m_s2,
-            jerk_max_m_s3=jerk_max_m_s3,
-            rapid_m_s=rapid_m_s,
-            blend_s=blend_s,
-            block_delete=block_delete,
-        )
-    )
+    return Trajectory(**_native.gcode(**locals()))

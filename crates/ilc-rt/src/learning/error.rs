@@ -9,6 +9,9 @@ use crate::signal::SignalError;
 /// Largest number of values of a signal, samples times channels: that of a trajectory.
 pub(crate) const MAX_VALUES: usize = 10_000_000;
 
+/// Result of a law or of what it is built from; of `()` if nothing else is said.
+pub type Result<T = (), E = LearningError> = std::result::Result<T, E>;
+
 /// A refused law or signal.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum LearningError {
@@ -193,7 +196,7 @@ pub(crate) fn check(
     signal: &[f64],
     n_samples: usize,
     n_channels: usize,
-) -> Result<(), LearningError> {
+) -> Result {
     check_length(what, signal, n_samples, n_channels)?;
     if is_finite(signal) {
         return Ok(());
@@ -229,7 +232,7 @@ pub(crate) fn check_update(
     next: &[f64],
     n_samples: usize,
     [n_inputs, n_outputs]: [usize; 2],
-) -> Result<(), LearningError> {
+) -> Result {
     check("input", input, n_samples, n_inputs)?;
     check("error", error, n_samples, n_outputs)?;
     check_length("next", next, n_samples, n_inputs)
@@ -242,7 +245,7 @@ pub(crate) fn check_adjoint(
     to_error: &[f64],
     n_samples: usize,
     [n_inputs, n_outputs]: [usize; 2],
-) -> Result<(), LearningError> {
+) -> Result {
     check("dual", dual, n_samples, n_inputs)?;
     check_length("to_input", to_input, n_samples, n_inputs)?;
     check_length("to_error", to_error, n_samples, n_outputs)
@@ -254,7 +257,7 @@ pub(crate) fn check_length(
     signal: &[f64],
     n_samples: usize,
     n_channels: usize,
-) -> Result<(), LearningError> {
+) -> Result {
     if signal.len() == n_samples * n_channels {
         return Ok(());
     }
@@ -263,7 +266,7 @@ pub(crate) fn check_length(
 
 /// Refuses zero counts, and runs too long for memory: the first count is the number of samples, the
 /// others are channels.
-pub(crate) fn check_counts(counts: &[(&'static str, usize)]) -> Result<(), LearningError> {
+pub(crate) fn check_counts(counts: &[(&'static str, usize)]) -> Result {
     if let Some((what, _)) = counts.iter().find(|(_, count)| *count == 0) {
         return Err(LearningError::Empty { what });
     }

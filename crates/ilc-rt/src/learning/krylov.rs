@@ -6,7 +6,7 @@
 use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// A value with an error estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +24,7 @@ impl Estimate {
     }
 }
 
-type Map<'a> = dyn FnMut(&[f64], &mut [f64]) -> Result<(), LearningError> + 'a;
+type Map<'a> = dyn FnMut(&[f64], &mut [f64]) -> Result + 'a;
 
 /// Returns the largest eigenvalue of a symmetric, positive semidefinite map.
 ///
@@ -36,7 +36,7 @@ pub(in crate::learning) fn largest_symmetric(
     n_basis: usize,
     n_products_max: usize,
     tolerance: f64,
-) -> Result<Estimate, LearningError> {
+) -> Result<Estimate> {
     let n_basis = n_basis.min(n).max(1);
     let n_kept = n_basis / 3;
     let mut basis: Vec<Vec<f64>> = vec![unit(noise(n, 5))];
@@ -96,7 +96,7 @@ pub(in crate::learning) fn spectral_radius(
     map: &mut Map,
     n_plain: usize,
     n_basis: usize,
-) -> Result<Estimate, LearningError> {
+) -> Result<Estimate> {
     let n_basis = n_basis.min(n).max(1);
     let mut start = unit(noise(n, 9));
     let mut next = vec![0.0; n];
@@ -145,7 +145,7 @@ pub(in crate::learning) fn fixed_point(
     n_basis: usize,
     n_restarts: usize,
     tolerance: f64,
-) -> Result<(Vec<f64>, f64), LearningError> {
+) -> Result<(Vec<f64>, f64)> {
     let n = right.len();
     let n_basis = n_basis.min(n);
     let scale = norm(right);
@@ -196,7 +196,7 @@ pub(in crate::learning) fn fixed_point(
 }
 
 /// Returns the spectral radius of a small matrix.
-pub(in crate::learning) fn radius(matrix: &DMatrix<f64>) -> Result<f64, LearningError> {
+pub(in crate::learning) fn radius(matrix: &DMatrix<f64>) -> Result<f64> {
     let (rows, cols) = matrix.shape();
     let values = Mat::from_fn(rows, cols, |i, j| matrix[(i, j)]).eigenvalues().map_err(|_| {
         LearningError::Numerics {

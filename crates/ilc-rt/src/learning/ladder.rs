@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Law, LearningError, Standing, Surrogate};
+use super::{Law, LearningError, Result, Standing, Surrogate};
 use crate::schema::field_order;
 
 /// `[learning.ladder]`: several runs with the same input before each step of learning, with a gain
@@ -92,7 +92,7 @@ impl<L: Law> Ladder<L> {
     /// - [`LearningError::Empty`] for 0 repeats.
     /// - [`LearningError::Parameter`] unless `0 < slow <= 1`, `increase >= 1` and
     ///   `0 < lowest <= 1 <= highest`, all finite.
-    pub fn new(law: L, rule: LadderRule) -> Result<Self, LearningError> {
+    pub fn new(law: L, rule: LadderRule) -> Result<Self> {
         let LadderRule { repeats, slow, increase, lowest, highest } = rule;
         if repeats == 0 {
             return Err(LearningError::Empty { what: "repeats" });
@@ -207,12 +207,7 @@ impl<L: Law> Ladder<L> {
 }
 
 impl<L: Law> Law for Ladder<L> {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let is_finite = input.iter().chain(error).all(|value| value.is_finite());
         if next.len() != input.len() || !is_finite {
             // The inner law knows the shapes and returns their errors, without having learned.
@@ -243,12 +238,7 @@ impl<L: Law> Law for Ladder<L> {
         self.law.n_disturbances()
     }
 
-    fn recall(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        disturbance: &[f64],
-    ) -> Result<bool, LearningError> {
+    fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.law.recall(input, error, disturbance)
     }
 

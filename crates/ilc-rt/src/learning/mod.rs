@@ -22,7 +22,7 @@ pub mod sweep;
 pub mod tune;
 pub mod weights;
 
-pub use error::LearningError;
+pub use error::{LearningError, Result};
 pub use repeatability::{Repeatability, repeatability};
 pub use structure::{LowPass, Structure, Surrogate};
 
@@ -42,12 +42,7 @@ pub trait Law: Send {
     /// # Errors
     /// - [`LearningError::Length`] or [`LearningError::NotFinite`]; the content of `next` is then
     ///   undefined.
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError>;
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result;
 
     /// Passes the measured disturbance of the coming run, e.g. a temperature, before
     /// [`Law::update`] computes its input: one number per disturbance. Most laws ignore it.
@@ -64,12 +59,7 @@ pub trait Law: Send {
     ///
     /// # Errors
     /// - as [`Law::update`], or [`LearningError::Disturbance`].
-    fn recall(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        disturbance: &[f64],
-    ) -> Result<bool, LearningError> {
+    fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         let _ = (input, error, disturbance);
         Ok(false)
     }
@@ -87,7 +77,7 @@ pub trait Law: Send {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         let _ = (dual, to_input, to_error);
         Ok(false)
     }
@@ -150,12 +140,7 @@ pub enum Standing {
 }
 
 impl<L: Law + ?Sized> Law for Box<L> {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         (**self).update(input, error, next)
     }
 
@@ -167,12 +152,7 @@ impl<L: Law + ?Sized> Law for Box<L> {
         (**self).n_disturbances()
     }
 
-    fn recall(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        disturbance: &[f64],
-    ) -> Result<bool, LearningError> {
+    fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         (**self).recall(input, error, disturbance)
     }
 
@@ -181,7 +161,7 @@ impl<L: Law + ?Sized> Law for Box<L> {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         (**self).apply_adjoint(dual, to_input, to_error)
     }
 

@@ -1,7 +1,7 @@
 //! Repeatability: the part of the error that repeats, which learning can remove, and the part that does not.
 
-use super::LearningError;
 use super::error::{check, check_counts};
+use super::{LearningError, Result};
 
 /// Common part of several runs with the same input.
 ///
@@ -50,7 +50,7 @@ pub fn repeatability(
     n_runs: usize,
     n_samples: usize,
     n_channels: usize,
-) -> Result<Repeatability, LearningError> {
+) -> Result<Repeatability> {
     check_counts(&[("n_samples", n_samples), ("n_channels", n_channels)])?;
     if n_runs < 2 {
         let allowed = "a spread needs at least 2 runs";

@@ -6,7 +6,7 @@
 use super::analysis::{Analysis, Question, Spectrum, Uncertainty, analyze};
 use super::error::check;
 use super::law::norm_optimal::{NormOptimal, Weights};
-use super::{Law, LearningError};
+use super::{Law, LearningError, Result};
 use crate::model::StateSpace;
 
 /// Fluctuation that the choice of `r` accepts, relative to the measurement noise.
@@ -94,11 +94,7 @@ impl Tuning {
 /// # Source
 /// - \[barton2010\], Sec. 3.3.4. There `S` is compared with `|P|`; here with `|P|^2`, its counterpart in
 ///   the cost, which is the same for an axis of gain 1.
-pub fn tune(
-    model: &StateSpace,
-    n_samples: usize,
-    knowledge: &Knowledge,
-) -> Result<Tuning, LearningError> {
+pub fn tune(model: &StateSpace, n_samples: usize, knowledge: &Knowledge) -> Result<Tuning> {
     if knowledge.n_runs == 0 {
         return Err(LearningError::Empty { what: "n_runs" });
     }
@@ -203,7 +199,7 @@ fn change_weight(
     n_samples: usize,
     s: f64,
     knowledge: &Knowledge,
-) -> Result<(f64, String), LearningError> {
+) -> Result<(f64, String)> {
     let square = largest(&plant.plant_gain()).powi(2);
     let weights = |r: f64| Weights { q: 1.0, s, r, rate: 0.0 };
     let smallest = 1e-6 * square;
@@ -267,7 +263,7 @@ fn repeated_rms(
     reference: &[f64],
     n_samples: usize,
     n_runs: usize,
-) -> Result<f64, LearningError> {
+) -> Result<f64> {
     let n_u = n_samples * model.n_inputs();
     let (mut input, mut next) = (vec![0.0; n_u], vec![0.0; n_u]);
     let mut error = reference.to_vec();
@@ -284,11 +280,7 @@ fn repeated_rms(
 
 /// The frequency above which the law learns less than half of an error, or the model uncertainty
 /// exceeds 100 %.
-fn smoothing(
-    model: &StateSpace,
-    weights: Weights,
-    knowledge: &Knowledge,
-) -> Result<Option<f64>, LearningError> {
+fn smoothing(model: &StateSpace, weights: Weights, knowledge: &Knowledge) -> Result<Option<f64>> {
     let spectrum = Spectrum::optimal(model, weights)?;
     let dt_s = model.dt_s().unwrap_or(1.0);
     let slow = 0.5_f64.powf(1.0 / knowledge.n_runs as f64);

@@ -1,7 +1,7 @@
 //! The iteration matrix of a law without adjoint, column by column.
 
 use super::iteration::Iteration;
-use crate::learning::LearningError;
+use crate::learning::Result;
 
 /// Largest number of inputs for which a law without adjoint is analysed column by column.
 pub const COLUMNS_MAX: usize = 3000;
@@ -14,7 +14,7 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Computes the columns by one update per unit input.
-    pub(super) fn new(iteration: &mut Iteration) -> Result<Self, LearningError> {
+    pub(super) fn new(iteration: &mut Iteration) -> Result<Self> {
         let n = iteration.n_u();
         let mut values = vec![0.0; n * n];
         let mut unit = vec![0.0; n];

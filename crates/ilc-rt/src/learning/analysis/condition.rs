@@ -1,7 +1,7 @@
 //! The common convergence condition for the gains of PD-type ILC.
 
 use super::plant::first_effects;
-use crate::learning::LearningError;
+use crate::learning::Result;
 use crate::learning::law::pd::PdGains;
 use crate::model::StateSpace;
 
@@ -31,7 +31,7 @@ impl PdCondition {
     ///
     /// # Errors
     /// - [`LearningError::Model`] for a continuous model.
-    pub fn new(gains: PdGains, model: &StateSpace) -> Result<Self, LearningError> {
+    pub fn new(gains: PdGains, model: &StateSpace) -> Result<Self> {
         let channels = model.n_inputs().min(model.n_outputs());
         let parameters = model.markov(gains.lead_samples + 1)?;
         let leads = first_effects(model)?;

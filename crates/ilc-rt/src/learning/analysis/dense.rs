@@ -4,8 +4,8 @@ use faer::Mat;
 use faer::linalg::solvers::Solve;
 
 use super::iteration::Iteration;
-use crate::learning::LearningError;
 use crate::learning::krylov::{Estimate, radius};
+use crate::learning::{LearningError, Result};
 
 /// The matrices of one iteration, without the inputs that do not affect convergence.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub(super) struct Dense {
 
 impl Dense {
     /// Computes the matrices by one update per column.
-    pub(super) fn new(iteration: &mut Iteration) -> Result<Self, LearningError> {
+    pub(super) fn new(iteration: &mut Iteration) -> Result<Self> {
         let (n_u, n_e) = (iteration.n_u(), iteration.n_e());
         let kept: Vec<usize> = (0..n_u).filter(|i| !iteration.free().contains(i)).collect();
         let n = kept.len();
@@ -62,7 +62,7 @@ impl Dense {
     /// A law without look-ahead has a block lower-triangular `T`: its eigenvalues are those of the
     /// diagonal blocks, whereas a general eigenvalue solver would return the spectrum of the
     /// rounding errors (`T` is far from normal).
-    pub(super) fn spectral_radius(&self) -> Result<Estimate, LearningError> {
+    pub(super) fn spectral_radius(&self) -> Result<Estimate> {
         let n = self.t.nrows();
         if n == 0 {
             return Ok(Estimate::exact(0.0));
@@ -98,17 +98,17 @@ impl Dense {
     }
 
     /// Returns the largest singular value of `T`.
-    pub(super) fn monotonic_factor(&self) -> Result<Estimate, LearningError> {
+    pub(super) fn monotonic_factor(&self) -> Result<Estimate> {
         largest_singular_value(&self.t).map(Estimate::exact)
     }
 
     /// Returns the largest singular value of `L_e P`, the factor of the model uncertainty.
-    pub(super) fn learned_share(&self) -> Result<f64, LearningError> {
+    pub(super) fn learned_share(&self) -> Result<f64> {
         largest_singular_value(&(&self.learn * &self.plant))
     }
 
     /// Returns the largest norm among `T, T^2, T^4, ...`: the transient growth of the error.
-    pub(super) fn transient_growth(&self) -> Result<f64, LearningError> {
+    pub(super) fn transient_growth(&self) -> Result<f64> {
         const DOUBLINGS: usize = 10;
         let mut power = self.t.clone();
         let mut largest: f64 = 1.0;
@@ -187,7 +187,7 @@ impl Dense {
     }
 }
 
-fn largest_singular_value(matrix: &Mat<f64>) -> Result<f64, LearningError> {
+fn largest_singular_value(matrix: &Mat<f64>) -> Result<f64> {
     if matrix.nrows() == 0 || matrix.ncols() == 0 {
         return Ok(0.0);
     }

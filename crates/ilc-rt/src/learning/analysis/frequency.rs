@@ -8,7 +8,7 @@ use nalgebra::{Complex, DMatrix};
 use rustfft::FftPlanner;
 
 use super::iteration::{FLOOR, Iteration};
-use crate::learning::LearningError;
+use crate::learning::Result;
 use crate::learning::law::norm_optimal::Weights;
 use crate::model::{ModelError, StateSpace};
 
@@ -45,10 +45,7 @@ pub(in crate::learning) struct Spectrum {
 
 impl Spectrum {
     /// Returns `None` for a time-varying law, or one whose impulse response is longer than the run.
-    pub(super) fn new(
-        iteration: &mut Iteration,
-        model: &StateSpace,
-    ) -> Result<Option<Self>, LearningError> {
+    pub(super) fn new(iteration: &mut Iteration, model: &StateSpace) -> Result<Option<Self>> {
         let (n_samples, m, p) = (iteration.n_samples, iteration.n_inputs, iteration.n_outputs);
         let Some(dt_s) = model.dt_s().filter(|_| n_samples >= 16) else { return Ok(None) };
         let (keep, learn) = responses(iteration, n_samples / 2)?;
@@ -214,7 +211,7 @@ impl Spectrum {
 /// impulse.
 type Responses = (Vec<Vec<f64>>, Vec<Vec<f64>>);
 
-fn responses(iteration: &mut Iteration, at: usize) -> Result<Responses, LearningError> {
+fn responses(iteration: &mut Iteration, at: usize) -> Result<Responses> {
     let (m, p) = (iteration.n_inputs, iteration.n_outputs);
     let (n_u, n_e) = (iteration.n_u(), iteration.n_e());
     let (mut u, mut e, mut out) = (vec![FLOOR; n_u], vec![FLOOR; n_e], vec![0.0; n_u]);

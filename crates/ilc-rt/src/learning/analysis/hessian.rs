@@ -1,8 +1,8 @@
 //! The adjoint of a norm-optimal law's iteration, from its normal equations.
 
 use super::plant::Plant;
-use crate::learning::LearningError;
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
+use crate::learning::{LearningError, Result};
 use crate::model::StateSpace;
 
 /// The adjoint of a norm-optimal law's iteration.
@@ -35,7 +35,7 @@ impl Hessian {
         model: &StateSpace,
         n_samples: usize,
         weights: Weights,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         let n_inputs = own.n_inputs();
         let n_u = n_samples * n_inputs;
         Ok(Self {
@@ -51,12 +51,7 @@ impl Hessian {
     }
 
     /// `out = T' x` for the given axes.
-    pub(super) fn transposed(
-        &mut self,
-        x: &[f64],
-        axes: &Plant,
-        out: &mut [f64],
-    ) -> Result<(), LearningError> {
+    pub(super) fn transposed(&mut self, x: &[f64], axes: &Plant, out: &mut [f64]) -> Result {
         if !self.law.solve(x, &mut self.solved)? {
             return Err(LearningError::Numerics {
                 what: "monotonic factor",

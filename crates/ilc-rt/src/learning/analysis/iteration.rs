@@ -4,7 +4,7 @@ use super::hessian::Hessian;
 use super::plant::{Plant, first_effects};
 use crate::learning::error::check_counts;
 use crate::learning::krylov::{noise, norm};
-use crate::learning::{Law, LearningError, Structure};
+use crate::learning::{Law, LearningError, Result, Structure};
 use crate::model::StateSpace;
 
 /// Tolerance of linearity, relative to the update: rounding.
@@ -51,11 +51,7 @@ pub(super) struct Iteration<'a> {
 }
 
 impl<'a> Iteration<'a> {
-    pub(super) fn new(
-        law: &'a mut dyn Law,
-        model: &StateSpace,
-        n_samples: usize,
-    ) -> Result<Self, LearningError> {
+    pub(super) fn new(law: &'a mut dyn Law, model: &StateSpace, n_samples: usize) -> Result<Self> {
         let plant = Plant::new(model)?;
         let (n_inputs, n_outputs) = (model.n_inputs(), model.n_outputs());
         check_counts(&[
@@ -104,7 +100,7 @@ impl<'a> Iteration<'a> {
     }
 
     /// Refuses a nonlinear law, by trial.
-    pub(super) fn check_linear(&mut self) -> Result<(), LearningError> {
+    pub(super) fn check_linear(&mut self) -> Result {
         let (n_u, n_e) = (self.n_u(), self.n_e());
         let signals = [noise(n_u, 1), noise(n_u, 2), noise(n_e, 3), noise(n_e, 4)];
         let sum = |a: &[f64], b: &[f64]| -> Vec<f64> {
@@ -129,7 +125,7 @@ impl<'a> Iteration<'a> {
     ///
     /// Figures from a wrong adjoint would not be those of the law. Without one the law is analysed
     /// by columns.
-    fn check_transpose(&mut self) -> Result<(), LearningError> {
+    fn check_transpose(&mut self) -> Result {
         if !self.has_transpose() {
             return Ok(());
         }
@@ -169,12 +165,7 @@ impl<'a> Iteration<'a> {
     }
 
     /// `out = L_u u + L_e e`
-    pub(super) fn law_linear(
-        &mut self,
-        u: &[f64],
-        e: &[f64],
-        out: &mut [f64],
-    ) -> Result<(), LearningError> {
+    pub(super) fn law_linear(&mut self, u: &[f64], e: &[f64], out: &mut [f64]) -> Result {
         self.law.reset();
         self.law.update(u, e, out)?;
         for (value, offset) in out.iter_mut().zip(&self.offset) {
@@ -184,18 +175,13 @@ impl<'a> Iteration<'a> {
     }
 
     /// `out = law(u, e)`, offset included.
-    pub(super) fn law(
-        &mut self,
-        u: &[f64],
-        e: &[f64],
-        out: &mut [f64],
-    ) -> Result<(), LearningError> {
+    pub(super) fn law(&mut self, u: &[f64], e: &[f64], out: &mut [f64]) -> Result {
         self.law.reset();
         self.law.update(u, e, out)
     }
 
     /// `out = T u`
-    pub(super) fn apply(&mut self, u: &[f64], out: &mut [f64]) -> Result<(), LearningError> {
+    pub(super) fn apply(&mut self, u: &[f64], out: &mut [f64]) -> Result {
         let mut input = std::mem::take(&mut self.input);
         let mut error = std::mem::take(&mut self.error);
         input.copy_from_slice(u);
@@ -214,11 +200,7 @@ impl<'a> Iteration<'a> {
     }
 
     /// `out = T' x`
-    pub(super) fn apply_transposed(
-        &mut self,
-        x: &[f64],
-        out: &mut [f64],
-    ) -> Result<(), LearningError> {
+    pub(super) fn apply_transposed(&mut self, x: &[f64], out: &mut [f64]) -> Result {
         let mut input = x.to_vec();
         self.clear(&mut input);
         lift(&mut input);
@@ -250,7 +232,7 @@ impl<'a> Iteration<'a> {
 
     /// Finds the inputs that affect no output within the run, and omits them if the law does not
     /// couple them to the others.
-    fn leave_out(&mut self, model: &StateSpace) -> Result<(), LearningError> {
+    fn leave_out(&mut self, model: &StateSpace) -> Result {
         let effects = first_effects(model)?;
         let mut free = Vec::new();
         for (channel, effect) in effects.iter().enumerate() {

@@ -20,7 +20,7 @@ use crate::learning::law::pd::{Pd, PdGains};
 use crate::learning::law::q_filter::QFilter;
 use crate::learning::law::through_jacobian::ThroughJacobian;
 use crate::learning::weights::{Dynamic, Weight};
-use crate::learning::{Law, LearningError, Surrogate};
+use crate::learning::{Law, Result, Surrogate};
 use crate::model::{Method as Hold, StateSpace, TimeVarying, discretize, second_order};
 use crate::signal::{FirFilter, GaussianFilter, Segment, SwitchedFilter, butterworth};
 
@@ -44,7 +44,7 @@ fn low_pass(cutoff_hz: f64) -> QFilter {
 struct Silent(Box<dyn Law>);
 
 impl Law for Silent {
-    fn update(&mut self, u: &[f64], e: &[f64], next: &mut [f64]) -> Result<(), LearningError> {
+    fn update(&mut self, u: &[f64], e: &[f64], next: &mut [f64]) -> Result {
         self.0.update(u, e, next)
     }
     fn reset(&mut self) {}

@@ -7,7 +7,7 @@ use std::fmt;
 
 use super::frequency::Spectrum;
 use super::iteration::Iteration;
-use crate::learning::{Law, LearningError, LowPass, Surrogate};
+use crate::learning::{Law, LowPass, Result, Surrogate};
 use crate::model::StateSpace;
 
 /// A low-pass whose cut-off lies above the critical frequency of its law.
@@ -45,7 +45,7 @@ pub fn overreach(
     law: &mut dyn Law,
     model: &StateSpace,
     n_samples: usize,
-) -> Result<Option<Overreach>, LearningError> {
+) -> Result<Option<Overreach>> {
     if let Surrogate::Inside(inside) = law.linear_surrogate() {
         return overreach(inside, model, n_samples);
     }

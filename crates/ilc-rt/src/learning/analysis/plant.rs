@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 use crate::model::{ModelError, StateSpace};
 
 /// The non-zero entries of a matrix, row by row: delays make most entries zero.
@@ -46,7 +46,7 @@ pub(super) struct Plant {
 }
 
 impl Plant {
-    pub(super) fn new(model: &StateSpace) -> Result<Self, LearningError> {
+    pub(super) fn new(model: &StateSpace) -> Result<Self> {
         if model.dt_s().is_none() {
             return Err(ModelError::Continuous { action: "analysis" }.into());
         }

@@ -12,7 +12,7 @@ use super::verdict;
 use crate::learning::error::check;
 use crate::learning::krylov::{Estimate, fixed_point, largest_symmetric, norm, spectral_radius};
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
-use crate::learning::{Law, LearningError, Structure, Surrogate};
+use crate::learning::{Law, LearningError, Result, Structure, Surrogate};
 use crate::model::StateSpace;
 
 /// Largest number of inputs (samples times channels) for which dense matrices are used.
@@ -65,7 +65,7 @@ pub fn analyze(
     model: &StateSpace,
     n_samples: usize,
     question: &Question,
-) -> Result<Analysis, LearningError> {
+) -> Result<Analysis> {
     refuse_question(question, model, n_samples)?;
     match law.linear_surrogate() {
         Surrogate::Itself => {}
@@ -154,11 +154,7 @@ pub fn analyze(
     Ok(analysis)
 }
 
-fn refuse_question(
-    question: &Question,
-    model: &StateSpace,
-    n_samples: usize,
-) -> Result<(), LearningError> {
+fn refuse_question(question: &Question, model: &StateSpace, n_samples: usize) -> Result {
     if let Some(uncertainty) = &question.uncertainty {
         uncertainty.check()?;
     }
@@ -175,9 +171,7 @@ fn refuse_question(
 }
 
 /// Returns the three factors, matrix-free.
-pub(super) fn structured(
-    iteration: &mut Iteration,
-) -> Result<(Estimate, Option<Estimate>, f64), LearningError> {
+pub(super) fn structured(iteration: &mut Iteration) -> Result<(Estimate, Option<Estimate>, f64)> {
     let n = iteration.n_u();
     // A smaller basis in long runs: it dominates the memory.
     let n_basis = if n <= 1000 { 200 } else { (6_000_000 / n).clamp(20, 60) };
@@ -213,7 +207,7 @@ pub(super) fn structured(
 
 /// Raises the norm to the spectral radius, its lower bound; both are estimates from below with an
 /// error.
-fn above_radius(factor: Estimate, radius: Estimate) -> Result<Estimate, LearningError> {
+fn above_radius(factor: Estimate, radius: Estimate) -> Result<Estimate> {
     let (highest, lowest) = (factor.value + factor.error, radius.value - radius.error);
     if lowest > highest * (1.0 + 1e-6) + 1e-9 {
         return Err(LearningError::Numerics {
@@ -232,7 +226,7 @@ fn converged(
     model: &StateSpace,
     weights: Option<Weights>,
     reference: &[f64],
-) -> Result<(), LearningError> {
+) -> Result {
     const TOLERANCE: f64 = 1e-9;
     let (n_samples, n_u) = (iteration.n_samples, iteration.n_u());
     analysis.initial_error_rms = Some(rms(reference, n_samples));
@@ -289,7 +283,7 @@ fn expected(
     dense: Option<&Dense>,
     spectrum: Option<&Spectrum>,
     question: &Question,
-) -> Result<(), LearningError> {
+) -> Result {
     let Some(noise_std) = question.noise_std else { return Ok(()) };
     let n_samples = iteration.n_samples as f64;
     let shares = match (dense, spectrum) {

@@ -3,7 +3,7 @@
 use super::iteration::Iteration;
 use super::verdict::{GROWTH_MAX, converges, with_bounds};
 use crate::learning::krylov::{Estimate, noise, norm, spectral_radius};
-use crate::learning::{Law, LearningError, Structure, Surrogate};
+use crate::learning::{Law, LearningError, Result, Structure, Surrogate};
 use crate::model::StateSpace;
 
 /// A run with more inputs (samples times channels) counts as long.
@@ -37,7 +37,7 @@ pub fn divergence(
     law: &mut dyn Law,
     model: &StateSpace,
     n_samples: usize,
-) -> Result<Option<Verdict>, LearningError> {
+) -> Result<Option<Verdict>> {
     match law.linear_surrogate() {
         Surrogate::Itself => {}
         Surrogate::Inside(inside) => return divergence(inside, model, n_samples),
@@ -98,11 +98,7 @@ pub fn divergence(
 /// # Errors
 /// - [`LearningError::Divergent`] with the figures.
 /// - any error of the law.
-pub fn refuse_divergent(
-    law: &mut dyn Law,
-    model: &StateSpace,
-    n_samples: usize,
-) -> Result<(), LearningError> {
+pub fn refuse_divergent(law: &mut dyn Law, model: &StateSpace, n_samples: usize) -> Result {
     match divergence(law, model, n_samples)? {
         Some(Verdict { converges: false, why, .. }) => Err(LearningError::Divergent { why }),
         _ => Ok(()),
@@ -111,10 +107,7 @@ pub fn refuse_divergent(
 
 /// Returns the largest growth of a random start over some runs, at least 1, and whether any run
 /// amplified it; infinite as soon as the growth exceeds all bounds.
-pub(super) fn transient_growth(
-    iteration: &mut Iteration,
-    n_runs: usize,
-) -> Result<(f64, bool), LearningError> {
+pub(super) fn transient_growth(iteration: &mut Iteration, n_runs: usize) -> Result<(f64, bool)> {
     const HOPELESS: f64 = 1e6;
     let n = iteration.n_u();
     let mut state = noise(n, 21);

@@ -1,6 +1,6 @@
 //! Multiplicative uncertainty of a model.
 
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// Multiplicative model uncertainty, `P_true = P (I + W Delta)` with `|Delta| <= 1`.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +44,7 @@ impl Uncertainty {
     /// # Errors
     /// - [`LearningError::Parameter`] for a gain that is negative or not finite,
     ///   [`LearningError::Empty`] for an empty list.
-    pub fn check(&self) -> Result<(), LearningError> {
+    pub fn check(&self) -> Result {
         let gains = match self {
             Self::Scalar(gain) => std::slice::from_ref(gain),
             Self::Shaped(gains) => gains,

@@ -4,7 +4,7 @@ mod rule;
 
 pub use rule::{GateMeasure, GateParameters, GateRule, Measure};
 
-use super::{Law, LearningError, Standing, Surrogate};
+use super::{Law, LearningError, Result, Standing, Surrogate};
 
 /// State of a [`Gate`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,7 +56,7 @@ impl<L: Law> Gate<L> {
     /// - [`LearningError::Parameter`] for a tolerance that is negative or not finite, or a ratio
     ///   below 1.
     /// - [`LearningError::Empty`] for a patience of 0.
-    pub fn new(law: L, rule: GateRule) -> Result<Self, LearningError> {
+    pub fn new(law: L, rule: GateRule) -> Result<Self> {
         let GateRule { tolerance, resume, growth, patience, .. } = rule;
         if !(tolerance.is_finite() && tolerance >= 0.0) {
             let allowed = "a tolerance must be finite and not negative";
@@ -144,12 +144,7 @@ impl<L: Law> Gate<L> {
 }
 
 impl<L: Law> Law for Gate<L> {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let figure = self.rule.measure.of(error);
         if next.len() != input.len() || !figure.is_finite() {
             // The inner law knows the shapes and returns their errors, without having learned.
@@ -178,12 +173,7 @@ impl<L: Law> Law for Gate<L> {
         self.law.n_disturbances()
     }
 
-    fn recall(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        disturbance: &[f64],
-    ) -> Result<bool, LearningError> {
+    fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.law.recall(input, error, disturbance)
     }
 
@@ -257,7 +247,7 @@ mod tests {
     }
 
     impl Law for Counter {
-        fn update(&mut self, u: &[f64], _: &[f64], next: &mut [f64]) -> Result<(), LearningError> {
+        fn update(&mut self, u: &[f64], _: &[f64], next: &mut [f64]) -> Result {
             crate::learning::error::check("input", u, 2, 1)?;
             for (next, u) in next.iter_mut().zip(u) {
                 *next = u + 1.0;

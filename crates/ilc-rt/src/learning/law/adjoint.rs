@@ -7,7 +7,7 @@ use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, ch
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::operator::Operator;
-use crate::learning::{Law, LearningError, LowPass};
+use crate::learning::{Law, LearningError, LowPass, Result};
 use crate::model::{ModelError, StateSpace};
 use crate::schema::{Violation, field_order};
 
@@ -106,7 +106,7 @@ impl Adjoint {
         n_samples: usize,
         gain: Option<f64>,
         q_filter: QFilter,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         if model.dt_s().is_none() {
             return Err(ModelError::Continuous { action: "gradient learning" }.into());
         }
@@ -155,12 +155,7 @@ impl Adjoint {
 }
 
 impl Law for Adjoint {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let Self { n_samples, n_inputs, n_outputs, gain, .. } = *self;
         check_update(input, error, next, n_samples, [n_inputs, n_outputs])?;
         self.operator.transposed(error, next);
@@ -176,7 +171,7 @@ impl Law for Adjoint {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         let Self { n_samples, n_inputs, n_outputs, gain, .. } = *self;
         check_adjoint(dual, to_input, to_error, n_samples, [n_inputs, n_outputs])?;
         to_input.copy_from_slice(dual);

@@ -8,7 +8,7 @@ use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, ch
 use crate::learning::error::{check, check_length};
 use crate::learning::law::norm_optimal::{Cost, NormOptimal, Plant, Weights};
 use crate::learning::weights::{Dynamic, ErrorFilter, Weight};
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Result};
 use crate::model::{StateSpace, TimeVarying, from_transfer_function};
 use crate::schema::{Violation, field_order};
 use crate::signal::{Section, butterworth};
@@ -73,7 +73,7 @@ impl LawParameters for DynamicParameters {
 
 impl DynamicParameters {
     /// Returns the low-passes of all axes, block-diagonal.
-    fn filter(&self, context: &LawContext) -> Result<StateSpace, LearningError> {
+    fn filter(&self, context: &LawContext) -> Result<StateSpace> {
         let dt_s = context.cell.cycle_s;
         let one = || StateSpace::static_gain(DMatrix::identity(1, 1), Some(dt_s));
         let mut axis = one()?;
@@ -122,15 +122,14 @@ impl DynamicNormOptimal {
         n_samples: usize,
         dynamic: &Dynamic,
         cost: impl Into<Cost>,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         let (plant, cost) = (model.into(), cost.into());
         if n_samples == 0 {
             return Err(LearningError::Empty { what: "n_samples" });
         }
         plant.check(n_samples)?;
         let cost = Cost { q: dynamic.weight(n_samples, &cost.q)?, ..cost };
-        let behind =
-            |k: usize| -> Result<_, LearningError> { Ok(plant.at(k).series(&dynamic.at(k)?)?) };
+        let behind = |k: usize| -> Result<_> { Ok(plant.at(k).series(&dynamic.at(k)?)?) };
         let inner = if dynamic.is_constant() && matches!(plant, Plant::Invariant(_)) {
             NormOptimal::new(&behind(0)?, n_samples, cost)?
         } else {
@@ -149,12 +148,7 @@ impl DynamicNormOptimal {
 }
 
 impl Law for DynamicNormOptimal {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         check("error", error, self.n_samples, self.filter.n_inputs())?;
         self.filter.run(error, &mut self.filtered);
         self.inner.update(input, &self.filtered, next)
@@ -165,7 +159,7 @@ impl Law for DynamicNormOptimal {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         check_length("to_error", to_error, self.n_samples, self.filter.n_inputs())?;
         if !self.inner.apply_adjoint(dual, to_input, &mut self.filtered)? {
             return Ok(false);

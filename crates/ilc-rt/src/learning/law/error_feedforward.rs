@@ -9,7 +9,7 @@ use super::context::{
 };
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
-use crate::learning::{Law, LearningError, LowPass, Surrogate};
+use crate::learning::{Law, LearningError, LowPass, Result, Surrogate};
 use crate::schema::{Violation, field_order};
 
 /// `[learning.error_feedforward]`: gain, lead, and the zero-phase Butterworth low-pass of the error.
@@ -137,7 +137,7 @@ impl ErrorFeedforward {
         n_samples: usize,
         n_channels: usize,
         q_filter: QFilter,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         let Feedforward { gain_per_s: gain, input_max: limit, .. } = rule;
         if !gain.is_finite() {
             let allowed = "a gain must be finite";
@@ -167,12 +167,7 @@ impl ErrorFeedforward {
 }
 
 impl Law for ErrorFeedforward {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
         check_update(input, error, next, n_samples, [n_channels; 2])?;
         self.filtered.copy_from_slice(error);
@@ -196,7 +191,7 @@ impl Law for ErrorFeedforward {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
         check_adjoint(dual, to_input, to_error, n_samples, [n_channels; 2])?;
         to_input.copy_from_slice(dual);

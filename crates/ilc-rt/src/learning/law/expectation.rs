@@ -1,6 +1,6 @@
 //! Disturbances of the finished and of the next run, for the laws that weigh runs by them.
 
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// Stores the disturbance of the finished run and of the coming one.
 ///
@@ -57,7 +57,7 @@ impl Expectation {
 
     /// Returns the disturbances of the finished run, if it is known, and of the coming one; then
     /// the coming run begins.
-    pub(super) fn settle(&mut self) -> Result<(Option<&[f64]>, &[f64]), LearningError> {
+    pub(super) fn settle(&mut self) -> Result<(Option<&[f64]>, &[f64])> {
         if let Some(refused) = self.refused.take() {
             return Err(refused);
         }
@@ -72,7 +72,7 @@ impl Expectation {
 }
 
 /// Checks number and values of a disturbance.
-pub(super) fn check(disturbance: &[f64], expected: usize) -> Result<(), LearningError> {
+pub(super) fn check(disturbance: &[f64], expected: usize) -> Result {
     let found = disturbance.len();
     if found != expected {
         return Err(LearningError::Disturbance { found, expected });

@@ -10,7 +10,7 @@ use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, ch
 use super::expectation::{Expectation, check as check_disturbance};
 use super::inputs::Inputs;
 use crate::learning::error::check;
-use crate::learning::{Law, LearningError, Surrogate};
+use crate::learning::{Law, LearningError, Result, Surrogate};
 use crate::schema::{Violation, field_order};
 
 /// `[learning.flexible]`: the core law and the resolution of the table.
@@ -117,7 +117,7 @@ impl Flexible {
     /// # Errors
     /// - [`LearningError::Empty`] for 0 samples or channels.
     /// - [`LearningError::Parameter`] for a tolerance that is negative or not finite.
-    pub fn new(core: Box<dyn Law>, shape: TableShape) -> Result<Self, LearningError> {
+    pub fn new(core: Box<dyn Law>, shape: TableShape) -> Result<Self> {
         let TableShape { n_samples, n_inputs, n_outputs, n_disturbances, tolerance } = shape;
         for (what, count) in
             [("n_samples", n_samples), ("n_inputs", n_inputs), ("n_outputs", n_outputs)]
@@ -156,19 +156,14 @@ impl Flexible {
     /// # Errors
     /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Disturbance`],
     ///   or any error of the core law.
-    pub fn remember(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        disturbance: &[f64],
-    ) -> Result<(), LearningError> {
+    pub fn remember(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result {
         check_disturbance(disturbance, self.shape.n_disturbances)?;
         self.propose(input, error)?;
         self.enter(disturbance);
         Ok(())
     }
 
-    fn propose(&mut self, input: &[f64], error: &[f64]) -> Result<(), LearningError> {
+    fn propose(&mut self, input: &[f64], error: &[f64]) -> Result {
         let TableShape { n_samples, n_inputs, n_outputs, .. } = self.shape;
         check("input", input, n_samples, n_inputs)?;
         check("error", error, n_samples, n_outputs)?;
@@ -224,12 +219,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Law for Flexible {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let TableShape { n_samples, n_inputs, .. } = self.shape;
         if next.len() != n_samples * n_inputs {
             let (what, found, n_channels) = ("next", next.len(), n_inputs);
@@ -269,12 +259,7 @@ impl Law for Flexible {
         Some(self.shape.n_disturbances)
     }
 
-    fn recall(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        disturbance: &[f64],
-    ) -> Result<bool, LearningError> {
+    fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.remember(input, error, disturbance).map(|()| true)
     }
 

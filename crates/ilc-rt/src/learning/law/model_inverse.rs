@@ -9,7 +9,7 @@ use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, ch
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::operator::Operator;
-use crate::learning::{Law, LearningError, LowPass};
+use crate::learning::{Law, LearningError, LowPass, Result};
 use crate::model::{ModelError, StateSpace, relative_degrees};
 use crate::schema::{Violation, field_order};
 
@@ -106,12 +106,7 @@ impl ModelInverse {
     /// - [`LearningError::Empty`] for 0 samples or channels.
     /// - [`LearningError::Model`] for a continuous model.
     /// - [`LearningError::Signal`] if the run is too short for the filter.
-    pub fn new(
-        model: &StateSpace,
-        n_samples: usize,
-        gain: f64,
-        q_filter: QFilter,
-    ) -> Result<Self, LearningError> {
+    pub fn new(model: &StateSpace, n_samples: usize, gain: f64, q_filter: QFilter) -> Result<Self> {
         let Some(dt_s) = model.dt_s() else {
             return Err(ModelError::Continuous { action: "learning with the inverse" }.into());
         };
@@ -143,7 +138,7 @@ impl ModelInverse {
 }
 
 /// Returns the inverse of the model with its outputs advanced by their delays, and the delays.
-fn inverse(model: &StateSpace, dt_s: f64) -> Result<(StateSpace, Vec<usize>), LearningError> {
+fn inverse(model: &StateSpace, dt_s: f64) -> Result<(StateSpace, Vec<usize>)> {
     let mut shifts = Vec::new();
     let (mut c, mut d) = (model.c().clone(), model.d().clone());
     for (row, shift) in relative_degrees(model)?.into_iter().enumerate() {
@@ -171,12 +166,7 @@ fn inverse(model: &StateSpace, dt_s: f64) -> Result<(StateSpace, Vec<usize>), Le
 }
 
 impl Law for ModelInverse {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let (n_samples, n_channels) = (self.n_samples, self.shifts.len());
         check_update(input, error, next, n_samples, [n_channels; 2])?;
         for (channel, shift) in self.shifts.iter().enumerate() {
@@ -198,7 +188,7 @@ impl Law for ModelInverse {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         let (n_samples, n_channels) = (self.n_samples, self.shifts.len());
         check_adjoint(dual, to_input, to_error, n_samples, [n_channels; 2])?;
         to_input.copy_from_slice(dual);

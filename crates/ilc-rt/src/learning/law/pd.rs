@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, check_cutoff};
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
-use crate::learning::{Law, LearningError, LowPass, Structure};
+use crate::learning::{Law, LearningError, LowPass, Result, Structure};
 use crate::schema::{Violation, field_order};
 
 /// `[learning.pd]`: gains and the zero-phase Butterworth low-pass.
@@ -108,7 +108,7 @@ impl Pd {
         n_samples: usize,
         n_channels: usize,
         q_filter: QFilter,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         for (what, value) in [("kp", gains.kp), ("kd", gains.kd)] {
             if !value.is_finite() {
                 let allowed = "a gain must be finite";
@@ -122,12 +122,7 @@ impl Pd {
 }
 
 impl Law for Pd {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
         check_update(input, error, next, n_samples, [n_channels; 2])?;
         let PdGains { kp, kd, lead_samples: lead } = self.gains;
@@ -149,7 +144,7 @@ impl Law for Pd {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         let (n_samples, n_channels) = (self.n_samples, self.n_channels);
         check_adjoint(dual, to_input, to_error, n_samples, [n_channels; 2])?;
         to_input.copy_from_slice(dual);

@@ -11,7 +11,7 @@ use super::context::{
 use crate::schema::{Violation, field_order};
 
 use crate::learning::error::{check, check_adjoint};
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Result};
 
 /// Largest condition number of a Jacobian that is inverted.
 const CONDITION_MAX: f64 = 1e6;
@@ -115,7 +115,7 @@ impl<L: Law> ThroughJacobian<L> {
     /// - [`LearningError::Empty`] without a matrix.
     /// - [`LearningError::Weight`] for matrices of different or empty shape.
     /// - [`LearningError::Parameter`] for a matrix that is singular or not finite.
-    pub fn new(law: L, jacobians: &[DMatrix<f64>]) -> Result<Self, LearningError> {
+    pub fn new(law: L, jacobians: &[DMatrix<f64>]) -> Result<Self> {
         let found = jacobians.len();
         let Some(first) = jacobians.first() else {
             return Err(LearningError::Empty { what: "jacobian" });
@@ -162,7 +162,7 @@ impl<L: Law> ThroughJacobian<L> {
     }
 }
 
-fn pseudo_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, LearningError> {
+fn pseudo_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>> {
     let refused = |value| LearningError::Parameter {
         what: "condition of the jacobian",
         value,
@@ -181,12 +181,7 @@ fn pseudo_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, LearningError
 }
 
 impl<L: Law> Law for ThroughJacobian<L> {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let (p, m) = (self.n_coordinates, self.n_joints);
         let n_samples = self.n_samples(input);
         check("input", input, n_samples, m)?;
@@ -217,7 +212,7 @@ impl<L: Law> Law for ThroughJacobian<L> {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         let (p, m) = (self.n_coordinates, self.n_joints);
         let n_samples = self.n_samples(dual);
         check_adjoint(dual, to_input, to_error, n_samples, [m, p])?;

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::tangent::tangents;
 use super::{Coupled, Gain, Weight};
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// The geometry of a reference path, for a cost.
 ///
@@ -43,7 +43,7 @@ impl Contour {
     ///
     /// # Errors
     /// - as [`Contour::of_axes`].
-    pub fn new(reference: &[f64], n_outputs: usize) -> Result<Self, LearningError> {
+    pub fn new(reference: &[f64], n_outputs: usize) -> Result<Self> {
         let axes: Vec<usize> = (0..n_outputs).collect();
         Self::of_axes(reference, n_outputs, &axes)
     }
@@ -58,11 +58,7 @@ impl Contour {
     /// - [`LearningError::NotFinite`] for a coordinate that is infinite or NaN.
     /// - [`LearningError::Weight`] for a path that never moves, or an axis that is repeated or does
     ///   not exist.
-    pub fn of_axes(
-        reference: &[f64],
-        n_outputs: usize,
-        axes: &[usize],
-    ) -> Result<Self, LearningError> {
+    pub fn of_axes(reference: &[f64], n_outputs: usize, axes: &[usize]) -> Result<Self> {
         for (place, axis) in axes.iter().enumerate() {
             if *axis >= n_outputs || axes[..place].contains(axis) {
                 let reason = format!(
@@ -122,7 +118,7 @@ impl Contour {
     ///
     /// # Errors
     /// - [`LearningError::Weight`] for a weight that is negative, not finite or of another length.
-    pub fn weight(&self, terms: &ContourTerms) -> Result<Weight, LearningError> {
+    pub fn weight(&self, terms: &ContourTerms) -> Result<Weight> {
         let (n, p) = (self.n_samples(), self.n_outputs);
         terms.q.check("q", n, p)?;
         terms.contour.check("contour", n, f64::INFINITY)?;
@@ -144,7 +140,7 @@ impl Contour {
     /// - [`LearningError::Weight`] for a gain out of range or of another length.
     /// # Source
     /// - \[barton2010\], Eq. (5.2).
-    pub fn coupled(&self, shares: &Coupled) -> Result<Weight, LearningError> {
+    pub fn coupled(&self, shares: &Coupled) -> Result<Weight> {
         shares.weight(self.n_samples(), &self.couplings())
     }
 

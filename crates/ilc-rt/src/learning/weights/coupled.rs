@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Gain, Weight};
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// Overall weight, and its division between the individual channels and the coupled signal.
 ///
@@ -31,11 +31,7 @@ impl Coupled {
     /// # Errors
     /// - [`LearningError::Weight`] for a number out of range, a length other than `n_samples`, or
     ///   matrices of different widths.
-    pub fn weight(
-        &self,
-        n_samples: usize,
-        coupling: &[DMatrix<f64>],
-    ) -> Result<Weight, LearningError> {
+    pub fn weight(&self, n_samples: usize, coupling: &[DMatrix<f64>]) -> Result<Weight> {
         self.sigma.check("sigma", n_samples, f64::INFINITY)?;
         self.gamma.check("gamma", n_samples, 1.0)?;
         let p = check_coupling(coupling, n_samples)?;
@@ -52,7 +48,7 @@ impl Coupled {
 }
 
 /// Refuses a coupling that does not match the run; returns its width.
-fn check_coupling(coupling: &[DMatrix<f64>], n_samples: usize) -> Result<usize, LearningError> {
+fn check_coupling(coupling: &[DMatrix<f64>], n_samples: usize) -> Result<usize> {
     let refused =
         |sample: usize, reason: String| LearningError::Weight { what: "coupling", sample, reason };
     let count = coupling.len();

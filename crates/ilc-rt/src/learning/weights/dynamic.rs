@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::Weight;
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 use crate::model::StateSpace;
 
 /// A pole counts as stable up to this magnitude, so that integrators do in spite of rounding.
@@ -39,7 +39,7 @@ impl Dynamic {
     /// - [`LearningError::Parameter`] for a filter with a pole outside the unit circle, e.g. one
     ///   meant to run backward.
     /// - [`LearningError::Empty`] for a filter without inputs or outputs.
-    pub fn new(filter: StateSpace) -> Result<Self, LearningError> {
+    pub fn new(filter: StateSpace) -> Result<Self> {
         if filter.n_inputs() == 0 {
             return Err(LearningError::Empty { what: "inputs of the filter" });
         }
@@ -70,10 +70,7 @@ impl Dynamic {
     /// - as [`Dynamic::new`]; [`LearningError::Weight`] for gains of the wrong shape.
     /// # Source
     /// - \[barton2010\], Eq. (J.12): with `W_fast = T_fast / T_slow F_lowpass`, `W_slow = 1`.
-    pub fn unlike_axes(
-        filters: &[StateSpace],
-        gains: &[DMatrix<f64>],
-    ) -> Result<Self, LearningError> {
+    pub fn unlike_axes(filters: &[StateSpace], gains: &[DMatrix<f64>]) -> Result<Self> {
         let Some((first, others)) = filters.split_first() else {
             return Err(LearningError::Empty { what: "filters" });
         };
@@ -103,7 +100,7 @@ impl Dynamic {
     /// # Errors
     /// - [`LearningError::Weight`] unless there is at least one matrix, all have the same shape
     ///   with one row per input of the filter, and all entries are finite.
-    pub fn with_coupling(mut self, coupling: Vec<DMatrix<f64>>) -> Result<Self, LearningError> {
+    pub fn with_coupling(mut self, coupling: Vec<DMatrix<f64>>) -> Result<Self> {
         let refused = |sample: usize, reason: String| {
             Err(LearningError::Weight { what: "coupling", sample, reason })
         };
@@ -153,7 +150,7 @@ impl Dynamic {
     /// - [`LearningError::Model`] if a number overflows.
     /// # Panics
     /// If the coupling varies and `k` is beyond the end of the run.
-    pub fn at(&self, k: usize) -> Result<StateSpace, LearningError> {
+    pub fn at(&self, k: usize) -> Result<StateSpace> {
         let (a, c) = (self.filter.a().clone(), self.filter.c());
         let (b, d) = match self.coupling.get(k) {
             Some(coupling) => (self.filter.b() * coupling, self.filter.d() * coupling),
@@ -173,7 +170,7 @@ impl Dynamic {
     ///
     /// # Errors
     /// - [`LearningError::Weight`] for a part, or a coupling, that does not match the run.
-    pub fn weight(&self, n_samples: usize, q: &Weight) -> Result<Weight, LearningError> {
+    pub fn weight(&self, n_samples: usize, q: &Weight) -> Result<Weight> {
         let (p, f) = (self.n_outputs(), self.filter.n_outputs());
         let count = self.coupling.len();
         if count != 0 && count != n_samples {

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Objective, Weight};
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// The agents, and the maps from their errors to formation errors and to the centre's error.
 ///
@@ -33,7 +33,7 @@ impl Formation {
     ///
     /// # Errors
     /// - [`LearningError::Empty`] for 0 agents or axes.
-    pub fn new(n_agents: usize, n_axes: usize) -> Result<Self, LearningError> {
+    pub fn new(n_agents: usize, n_axes: usize) -> Result<Self> {
         let axes: Vec<usize> = (0..n_axes).collect();
         Self::of_pairs(n_agents, n_axes, &Self::all_pairs(n_agents), &axes)
     }
@@ -53,7 +53,7 @@ impl Formation {
         n_axes: usize,
         pairs: &[(usize, usize)],
         axes: &[usize],
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         for (what, count) in [("n_agents", n_agents), ("n_axes", n_axes)] {
             if count == 0 {
                 return Err(LearningError::Empty { what });
@@ -93,7 +93,7 @@ impl Formation {
     ///
     /// # Errors
     /// - [`LearningError::Weight`] unless the map is `n_axes` x (`n_agents` * `n_axes`) and finite.
-    pub fn with_centre(mut self, centre: DMatrix<f64>) -> Result<Self, LearningError> {
+    pub fn with_centre(mut self, centre: DMatrix<f64>) -> Result<Self> {
         check_map("centre", &centre, self.n_channels())?;
         if centre.nrows() != self.n_axes {
             let reason = format!("{} rows; {} are needed", centre.nrows(), self.n_axes);
@@ -132,7 +132,7 @@ impl Formation {
     ///
     /// # Errors
     /// - [`LearningError::Length`] unless `error` holds whole samples of all agents.
-    pub fn errors(&self, error: &[f64]) -> Result<Vec<f64>, LearningError> {
+    pub fn errors(&self, error: &[f64]) -> Result<Vec<f64>> {
         check_signal("error", error, self.n_channels())?;
         let row_of = |sample: &[f64], row: usize| -> f64 {
             sample.iter().enumerate().map(|(i, value)| self.shape[(row, i)] * value).sum()
@@ -151,7 +151,7 @@ impl Formation {
     ///   `n_samples` x (`n_agents` * `n_axes`)
     /// # Errors
     /// - [`LearningError::Length`] for a wrong length.
-    pub fn follow(&self, leader: &[f64], offsets: &[f64]) -> Result<Vec<f64>, LearningError> {
+    pub fn follow(&self, leader: &[f64], offsets: &[f64]) -> Result<Vec<f64>> {
         check_signal("leader", leader, self.n_axes)?;
         if offsets.len() != self.n_channels() {
             return Err(LearningError::Length {
@@ -178,7 +178,7 @@ impl Formation {
     /// - [`LearningError::Weight`] for a term that is out of range or of the wrong shape.
     /// # Source
     /// - \[barton2010\], Eq. (6.3), (6.6), (6.8), (6.9).
-    pub fn weight(&self, n_samples: usize, objective: &Objective) -> Result<Weight, LearningError> {
+    pub fn weight(&self, n_samples: usize, objective: &Objective) -> Result<Weight> {
         objective.check(n_samples, self.n_agents, self.n_axes)?;
         let at = |k: usize| objective.at(k, self);
         if objective.is_constant() {
@@ -189,11 +189,7 @@ impl Formation {
 }
 
 /// Refuses a signal that is not a whole number of samples.
-fn check_signal(
-    what: &'static str,
-    signal: &[f64],
-    n_channels: usize,
-) -> Result<(), LearningError> {
+fn check_signal(what: &'static str, signal: &[f64], n_channels: usize) -> Result {
     let found = signal.len();
     if found > 0 && found.is_multiple_of(n_channels) {
         return Ok(());
@@ -202,11 +198,7 @@ fn check_signal(
     Err(LearningError::Length { what, found, n_samples, n_channels })
 }
 
-fn check_map(
-    what: &'static str,
-    map: &DMatrix<f64>,
-    n_channels: usize,
-) -> Result<(), LearningError> {
+fn check_map(what: &'static str, map: &DMatrix<f64>, n_channels: usize) -> Result {
     let refused = |reason: String| Err(LearningError::Weight { what, sample: 0, reason });
     if map.ncols() != n_channels {
         return refused(format!("{} columns; {n_channels} are needed", map.ncols()));

@@ -1,6 +1,6 @@
 //! A scalar along the run: the share or scale of one term of a weight.
 
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// A scalar that is constant or given for each sample.
 ///
@@ -35,12 +35,7 @@ impl Gain {
     ///
     /// # Errors
     /// - [`LearningError::Weight`] naming `what` and the sample.
-    pub fn check(
-        &self,
-        what: &'static str,
-        n_samples: usize,
-        highest: f64,
-    ) -> Result<(), LearningError> {
+    pub fn check(&self, what: &'static str, n_samples: usize, highest: f64) -> Result {
         let refused =
             |sample: usize, reason: String| Err(LearningError::Weight { what, sample, reason });
         let number = |sample: usize, value: f64| {

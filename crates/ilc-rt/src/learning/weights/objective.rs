@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::{Formation, Gain, Weight};
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// The objective of several agents; each term may vary along the run.
 ///
@@ -62,7 +62,7 @@ impl Objective {
     ///
     /// # Errors
     /// - [`LearningError::Weight`] for a leader that is not one of the agents.
-    pub fn led_by(n_agents: usize, leaders: &[usize]) -> Result<Self, LearningError> {
+    pub fn led_by(n_agents: usize, leaders: &[usize]) -> Result<Self> {
         if let Some(leader) = leaders.iter().find(|leader| **leader >= n_agents) {
             let reason = format!("agent {leader}; there are {n_agents} from 0");
             return Err(LearningError::Weight { what: "leaders", sample: 0, reason });
@@ -92,12 +92,7 @@ impl Objective {
     }
 
     /// Refuses terms out of range or of the wrong number.
-    pub(super) fn check(
-        &self,
-        n_samples: usize,
-        n_agents: usize,
-        n_axes: usize,
-    ) -> Result<(), LearningError> {
+    pub(super) fn check(&self, n_samples: usize, n_agents: usize, n_axes: usize) -> Result {
         let count = |what: &'static str, found: usize| {
             if found == 1 || found == n_agents {
                 return Ok(());

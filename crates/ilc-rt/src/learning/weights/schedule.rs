@@ -1,7 +1,7 @@
 //! Smooth (bumpless) schedules of a scalar along the run.
 
 use super::Gain;
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 use crate::signal::GaussianFilter;
 
 /// A piecewise constant schedule, smoothed by a Gaussian filter.
@@ -24,7 +24,7 @@ impl Schedule {
     /// - `segments`: first sample and value of each, the first at sample 0
     /// # Errors
     /// - [`LearningError::Weight`] unless the starts increase from 0 and the values are finite.
-    pub fn new(segments: &[(usize, f64)]) -> Result<Self, LearningError> {
+    pub fn new(segments: &[(usize, f64)]) -> Result<Self> {
         let refused = |sample: usize, reason: String| {
             Err(LearningError::Weight { what: "schedule", sample, reason })
         };
@@ -51,7 +51,7 @@ impl Schedule {
     ///
     /// # Errors
     /// - [`LearningError::Signal`] unless the bandwidth lies between 0 and the Nyquist frequency.
-    pub fn smoothed(self, bandwidth_hz: f64, dt_s: f64) -> Result<Self, LearningError> {
+    pub fn smoothed(self, bandwidth_hz: f64, dt_s: f64) -> Result<Self> {
         Ok(Self { filter: Some(GaussianFilter::new(bandwidth_hz, dt_s)?), ..self })
     }
 
@@ -64,7 +64,7 @@ impl Schedule {
     /// # Errors
     /// - [`LearningError::Weight`] if a segment starts after the end of the run.
     /// - [`LearningError::Signal`] if half the filter is longer than the run.
-    pub fn samples(&self, n_samples: usize) -> Result<Vec<f64>, LearningError> {
+    pub fn samples(&self, n_samples: usize) -> Result<Vec<f64>> {
         let last = self.segments.len() - 1;
         let (start, _) = self.segments[last];
         if start >= n_samples {
@@ -93,7 +93,7 @@ impl Schedule {
     ///
     /// # Errors
     /// - as [`Schedule::samples`].
-    pub fn gain(&self, n_samples: usize) -> Result<Gain, LearningError> {
+    pub fn gain(&self, n_samples: usize) -> Result<Gain> {
         Ok(Gain::PerSample(self.samples(n_samples)?))
     }
 }

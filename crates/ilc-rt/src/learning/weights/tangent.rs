@@ -1,7 +1,7 @@
 //! Tangents of a contour's reference.
 
-use crate::learning::LearningError;
 use crate::learning::error::check;
+use crate::learning::{LearningError, Result};
 use crate::trajectory::path_tangents;
 
 /// Returns the unit tangent of a path at each sample.
@@ -18,7 +18,7 @@ use crate::trajectory::path_tangents;
 /// - [`LearningError::Weight`] if the path never moves.
 /// # Source
 /// - \[barton2010\], Eq. (4.3): theta is the angle of this tangent.
-pub fn tangents(reference: &[f64], n_axes: usize) -> Result<Vec<f64>, LearningError> {
+pub fn tangents(reference: &[f64], n_axes: usize) -> Result<Vec<f64>> {
     let found = reference.len();
     if n_axes < 2 || found == 0 || !found.is_multiple_of(n_axes) {
         let (n_samples, n_channels) = ((found / n_axes.max(2)).max(1), n_axes.max(2));

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// A symmetric, positive semidefinite weight of the channels of a signal, at each sample.
 ///
@@ -96,12 +96,7 @@ impl Weight {
     ///
     /// # Errors
     /// - [`LearningError::Weight`] naming the weight `what`, the sample and the rule.
-    pub fn check(
-        &self,
-        what: &'static str,
-        n_samples: usize,
-        p: usize,
-    ) -> Result<(), LearningError> {
+    pub fn check(&self, what: &'static str, n_samples: usize, p: usize) -> Result {
         let refused =
             |sample: usize, reason: String| Err(LearningError::Weight { what, sample, reason });
         let count = match self {

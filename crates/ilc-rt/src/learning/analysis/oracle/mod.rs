@@ -12,7 +12,7 @@ use crate::learning::krylov::noise;
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
 use crate::learning::law::pd::{Pd, PdGains};
 use crate::learning::law::q_filter::QFilter;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, Result};
 use crate::model::{Method as Hold, StateSpace, discretize, from_transfer_function, second_order};
 use crate::signal::butterworth;
 

@@ -31,7 +31,7 @@ fn divergent_laws_are_refused_and_sound_ones_are_not() {
 struct Clipped;
 
 impl Law for Clipped {
-    fn update(&mut self, u: &[f64], e: &[f64], next: &mut [f64]) -> Result<(), LearningError> {
+    fn update(&mut self, u: &[f64], e: &[f64], next: &mut [f64]) -> Result {
         for (i, value) in next.iter_mut().enumerate() {
             *value = (u[i] + e[i]).clamp(-0.1, 0.1);
         }
@@ -48,7 +48,7 @@ impl Law for Clipped {
 struct Silent(Pd);
 
 impl Law for Silent {
-    fn update(&mut self, u: &[f64], e: &[f64], next: &mut [f64]) -> Result<(), LearningError> {
+    fn update(&mut self, u: &[f64], e: &[f64], next: &mut [f64]) -> Result {
         self.0.update(u, e, next)
     }
     fn reset(&mut self) {}

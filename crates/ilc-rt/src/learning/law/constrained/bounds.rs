@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::solver::{Band, Bands, Places};
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// One side of a bound: the same for every channel and sample, or for each; infinite where there is
 /// none.
@@ -165,12 +165,7 @@ impl Limit {
         }
     }
 
-    fn fits(
-        &self,
-        what: &'static str,
-        n_samples: usize,
-        n_channels: usize,
-    ) -> Result<(), LearningError> {
+    fn fits(&self, what: &'static str, n_samples: usize, n_channels: usize) -> Result {
         let (found, needed) = match self {
             Self::Scalar(_) => return Ok(()),
             Self::PerSample(values) => (values.len(), (n_samples, 1)),
@@ -210,12 +205,7 @@ impl Bound {
         (self.lower.at(sample, channel, n_channels), self.upper.at(sample, channel, n_channels))
     }
 
-    fn check(
-        &self,
-        what: &'static str,
-        n_samples: usize,
-        n_channels: usize,
-    ) -> Result<(), LearningError> {
+    fn check(&self, what: &'static str, n_samples: usize, n_channels: usize) -> Result {
         self.lower.fits(what, n_samples, n_channels)?;
         self.upper.fits(what, n_samples, n_channels)?;
         for sample in 0..n_samples {
@@ -247,7 +237,7 @@ fn magnitude(lower: f64, upper: f64) -> f64 {
 
 impl Bounds {
     /// Refuses bounds of the wrong shape, or with crossed sides.
-    pub(super) fn check(&self, extent: Extent) -> Result<(), LearningError> {
+    pub(super) fn check(&self, extent: Extent) -> Result {
         let Extent { n_samples, n_inputs, n_outputs, .. } = extent;
         for (what, bound, n_channels) in self.named(extent) {
             if let Some(bound) = bound {

@@ -8,10 +8,10 @@ use super::interior::{Interior, Parts};
 use super::reach;
 use super::riccati::{Plant, Weighing};
 use super::solver::{Places, Solver};
-use crate::learning::LearningError;
 use crate::learning::law::norm_optimal::Cost;
 use crate::learning::law::norm_optimal::decouple::Part;
 use crate::learning::law::norm_optimal::relative_degree::relative_degrees;
+use crate::learning::{LearningError, Result};
 
 /// Relative weight of inputs that have no effect within the run and are otherwise undetermined.
 const FREE: f64 = 1e-8;
@@ -31,11 +31,7 @@ struct Problem<'a> {
 }
 
 /// Creates the solver of a group.
-pub(super) fn solver(
-    part: Part,
-    bounds: &Bounds,
-    extent: Extent,
-) -> Result<Box<dyn Solver>, LearningError> {
+pub(super) fn solver(part: Part, bounds: &Bounds, extent: Extent) -> Result<Box<dyn Solver>> {
     let Part { plant, cost, inputs, outputs } = part;
     let model = plant.borrow().at(0);
     let is_mixed = cost.q.is_mixed(outputs.len());
@@ -70,7 +66,7 @@ pub(super) fn solver(
 fn sized(
     (n, m, p, delays): (usize, usize, usize, usize),
     problem: &Problem<'_>,
-) -> Result<Box<dyn Solver>, LearningError> {
+) -> Result<Box<dyn Solver>> {
     macro_rules! offer {
         ($($n:literal, $m:literal, $p:literal;)*) => {
             $(
@@ -108,7 +104,7 @@ fn sized(
 impl Problem<'_> {
     fn fill<const N: usize, const M: usize, const P: usize, const NS: usize>(
         &self,
-    ) -> Result<Box<dyn Solver>, LearningError> {
+    ) -> Result<Box<dyn Solver>> {
         let plant = Plant::<N, M, P> {
             a: array(&self.a),
             b: array(&self.b),

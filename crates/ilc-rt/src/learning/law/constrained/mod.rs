@@ -24,7 +24,7 @@ use super::norm_optimal::decouple::parts;
 use super::norm_optimal::{Cost, NormOptimal, Plant};
 use crate::learning::error::check;
 use crate::learning::sweep::Run;
-use crate::learning::{Law, LearningError, Surrogate};
+use crate::learning::{Law, LearningError, Result, Surrogate};
 use crate::model::{ModelError, StateSpace};
 
 use bounds::Extent;
@@ -98,7 +98,7 @@ impl Constrained {
         n_samples: usize,
         cost: impl Into<Cost>,
         bounds: Bounds,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         let Some(dt_s) = model.dt_s() else {
             return Err(ModelError::Continuous { action: "constrained learning" }.into());
         };
@@ -131,7 +131,7 @@ impl Constrained {
     ///
     /// # Errors
     /// - as [`NormOptimal::new`].
-    pub fn unbounded(&self) -> Result<NormOptimal, LearningError> {
+    pub fn unbounded(&self) -> Result<NormOptimal> {
         NormOptimal::new(&self.model, self.extent.n_samples, self.cost.clone())
     }
 
@@ -148,12 +148,7 @@ impl Constrained {
 }
 
 impl Law for Constrained {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let Extent { n_samples, n_inputs, n_outputs, .. } = self.extent;
         check("input", input, n_samples, n_inputs)?;
         check("error", error, n_samples, n_outputs)?;

@@ -1,7 +1,7 @@
 //! Quadratic cost of the next input.
 
-use crate::learning::LearningError;
 use crate::learning::weights::Weight;
+use crate::learning::{LearningError, Result};
 
 /// The same cost for every channel and every sample.
 ///
@@ -68,12 +68,7 @@ impl Cost {
     /// # Errors
     /// - [`LearningError::Parameter`] for a number that is negative or not finite.
     /// - [`LearningError::Weight`] for any other invalid weight.
-    pub fn check(
-        &self,
-        n_samples: usize,
-        n_inputs: usize,
-        n_outputs: usize,
-    ) -> Result<(), LearningError> {
+    pub fn check(&self, n_samples: usize, n_inputs: usize, n_outputs: usize) -> Result {
         let allowed = "a weight must be finite and not negative";
         let rate = Weight::Scalar(self.rate);
         for (what, weight, channels) in [

@@ -18,7 +18,7 @@ use crate::learning::error::{check, check_adjoint, check_counts, check_length, i
 use crate::learning::sweep::{
     self, Channels, FactorError, Form, Gains, Inverse, Rate, Run, Stages, Sweep,
 };
-use crate::learning::{Law, LearningError, Structure};
+use crate::learning::{Law, LearningError, Result, Structure};
 use crate::model::StateSpace;
 
 use decouple::{Part, parts};
@@ -98,7 +98,7 @@ impl NormOptimal {
         model: impl Into<Plant<'a>>,
         n_samples: usize,
         weights: impl Into<Cost>,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         Self::with_form(model, n_samples, weights, Form::default())
     }
 
@@ -112,7 +112,7 @@ impl NormOptimal {
         n_samples: usize,
         weights: impl Into<Cost>,
         form: Form,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         let (plant, cost) = (model.into(), weights.into());
         let (n_inputs, n_outputs) = (plant.at(0).n_inputs(), plant.at(0).n_outputs());
         check_counts(&[
@@ -166,7 +166,7 @@ impl NormOptimal {
         free_samples: usize,
         form: Form,
         told: &str,
-    ) -> Result<(), LearningError> {
+    ) -> Result {
         let weights = || told.to_owned();
         let gains = Gains::with_form(stages, free_samples, form).map_err(|error| match error {
             FactorError::Undetermined { sample } => {
@@ -196,11 +196,7 @@ impl NormOptimal {
     ///
     /// # Errors
     /// - [`LearningError::Length`] for signals of a different length.
-    pub(in crate::learning) fn solve(
-        &mut self,
-        x: &[f64],
-        z: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    pub(in crate::learning) fn solve(&mut self, x: &[f64], z: &mut [f64]) -> Result<bool> {
         check_length("x", x, self.n_samples, self.n_inputs)?;
         check_length("z", z, self.n_samples, self.n_inputs)?;
         let n_inputs = self.n_inputs;
@@ -228,12 +224,7 @@ impl NormOptimal {
 }
 
 impl Law for NormOptimal {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let Self { n_samples, n_inputs, n_outputs, .. } = *self;
         check_length("input", input, n_samples, n_inputs)?;
         check_length("error", error, n_samples, n_outputs)?;
@@ -258,7 +249,7 @@ impl Law for NormOptimal {
         dual: &[f64],
         to_input: &mut [f64],
         to_error: &mut [f64],
-    ) -> Result<bool, LearningError> {
+    ) -> Result<bool> {
         let Self { n_samples, n_inputs, n_outputs, .. } = *self;
         check_adjoint(dual, to_input, to_error, n_samples, [n_inputs, n_outputs])?;
         let Some(inverses) = self.inverses() else { return Ok(false) };

@@ -8,7 +8,7 @@ use crate::learning::law::context::{
     BuildError, Example, LawCell, LawContext, LawParameters, check_cutoff, violation,
 };
 use crate::learning::weights::{Contour, ContourTerms, Gain, Schedule, Weight};
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, Result};
 use crate::schema::{Violation, field_order};
 
 /// `[learning.norm_optimal]`: weights of the quadratic cost.
@@ -247,7 +247,7 @@ impl Run<'_> {
         base: f64,
         pick: fn(&PhaseParameters) -> Option<f64>,
         smoothing_hz: f64,
-    ) -> Result<Option<Vec<f64>>, LearningError> {
+    ) -> Result<Option<Vec<f64>>> {
         let mut segments = vec![(0, base)];
         for phase in self.phases {
             let Some(value) = pick(phase) else { continue };

@@ -12,7 +12,7 @@ use std::fmt;
 use super::expectation::{Expectation, check as check_disturbance};
 use super::inputs::Inputs;
 use crate::learning::error::check;
-use crate::learning::{Law, LearningError, Surrogate};
+use crate::learning::{Law, LearningError, Result, Surrogate};
 
 use index::{DISTURBANCES_MAX, Index, index};
 use weights::normalise;
@@ -89,7 +89,7 @@ impl Relevance {
         shape: RunShape,
         weights: RelevanceWeights,
         top: Option<usize>,
-    ) -> Result<Self, LearningError> {
+    ) -> Result<Self> {
         let RunShape { n_samples, n_inputs, n_outputs, n_disturbances, dt_s } = shape;
         for (what, count) in [
             ("n_samples", n_samples),
@@ -164,12 +164,7 @@ impl Relevance {
     /// # Errors
     /// - [`LearningError::Length`], [`LearningError::NotFinite`], [`LearningError::Disturbance`],
     ///   or any error of the core law.
-    pub fn remember(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        disturbance: &[f64],
-    ) -> Result<(), LearningError> {
+    pub fn remember(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result {
         check_disturbance(disturbance, self.shape.n_disturbances)?;
         self.propose(input, error)?;
         self.keep(error, disturbance);
@@ -181,7 +176,7 @@ impl Relevance {
     ///
     /// # Errors
     /// - [`LearningError::Disturbance`], [`LearningError::NotFinite`].
-    pub fn relevant(&self, disturbance: &[f64]) -> Result<Vec<(usize, f64)>, LearningError> {
+    pub fn relevant(&self, disturbance: &[f64]) -> Result<Vec<(usize, f64)>> {
         check_disturbance(disturbance, self.shape.n_disturbances)?;
         let mut found = Vec::new();
         self.index.nearest(&self.weights, disturbance, self.top.unwrap_or(self.len()), &mut found);
@@ -201,7 +196,7 @@ impl Relevance {
     /// # Errors
     /// - [`LearningError::Disturbance`] if `disturbances` is not a whole number of them;
     ///   [`LearningError::NotFinite`].
-    pub fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>, LearningError> {
+    pub fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>> {
         let width = self.shape.n_disturbances;
         let given = if disturbances.is_empty() { &self.disturbances } else { disturbances };
         let mut shares = vec![0.0; self.len()];
@@ -232,7 +227,7 @@ impl Relevance {
     }
 
     /// Computes the proposal of a run.
-    fn propose(&mut self, input: &[f64], error: &[f64]) -> Result<(), LearningError> {
+    fn propose(&mut self, input: &[f64], error: &[f64]) -> Result {
         let RunShape { n_samples, n_inputs, n_outputs, .. } = self.shape;
         check("input", input, n_samples, n_inputs)?;
         check("error", error, n_samples, n_outputs)?;
@@ -289,12 +284,7 @@ impl Relevance {
 }
 
 impl Law for Relevance {
-    fn update(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        next: &mut [f64],
-    ) -> Result<(), LearningError> {
+    fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let RunShape { n_samples, n_inputs, n_disturbances, .. } = self.shape;
         if next.len() != n_samples * n_inputs {
             let (what, found, n_channels) = ("next", next.len(), n_inputs);
@@ -339,12 +329,7 @@ impl Law for Relevance {
         Some(self.shape.n_disturbances)
     }
 
-    fn recall(
-        &mut self,
-        input: &[f64],
-        error: &[f64],
-        disturbance: &[f64],
-    ) -> Result<bool, LearningError> {
+    fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.remember(input, error, disturbance).map(|()| true)
     }
 

@@ -1,6 +1,6 @@
 //! The relevance equation: weight of a past run for the coming one.
 
-use crate::learning::LearningError;
+use crate::learning::{LearningError, Result};
 
 /// Bound of a coordinate: its square, and the sum of eight squares, are still finite.
 const FAR: f64 = 1e150;
@@ -61,7 +61,7 @@ impl RelevanceWeights {
     /// - [`LearningError::Parameter`] for a number that is not finite, a negative weight, or a
     ///   filter time that is not positive.
     /// - [`LearningError::Disturbance`] for a number of weights other than 1 or `n_disturbances`.
-    pub fn spread(mut self, n_disturbances: usize) -> Result<Self, LearningError> {
+    pub fn spread(mut self, n_disturbances: usize) -> Result<Self> {
         let weights =
             [("error", self.error), ("error_rate", self.error_rate), ("epsilon", self.epsilon)];
         let each = self.disturbance.iter().map(|&weight| ("disturbance", weight));
