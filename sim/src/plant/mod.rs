@@ -3,7 +3,10 @@
 //! A plant knows physics, not buses or counts; the simulator's drives own one and step it, and
 //! tests connect one directly to a controller.
 
+mod backlash;
+mod bristles;
 pub mod drive_loop;
+mod environment;
 pub mod exact_step;
 pub mod friction;
 mod gantry;

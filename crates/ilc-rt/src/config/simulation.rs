@@ -4,8 +4,11 @@ use crate::schema::field_order;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Temperature at which motors and scales of the simulation are nominal: 20 °C.
+pub const NOMINAL_TEMPERATURE_K: f64 = 293.15;
+
 /// `[simulation]`: the plant as a whole.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct Simulation {
@@ -19,16 +22,55 @@ pub struct Simulation {
     pub encoder_noise_m: f64,
     /// Seed of the noise.
     pub seed: u64,
+    /// Temperature of the machine at power-on; motors and scales are nominal at 293.15 K.
+    #[schemars(range(min = 200.0, max = 500.0))]
+    pub temperature_k: f64,
+    /// `[[simulation.change]]`: changes while the machine runs, each from its time on.
+    #[serde(rename = "change")]
+    pub changes: Vec<SimulationChange>,
+}
+
+/// `[[simulation.change]]`: a change of temperature, payload or load of the simulated machine, linear over
+/// a time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct SimulationChange {
+    /// Start of the change, after power-on of the drives.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub after_s: f64,
+    /// Duration of the change; 0: at once.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub over_s: f64,
+    /// Axis of payload and force; all axes without it.
+    pub axis: Option<String>,
+    /// New temperature of the machine.
+    #[schemars(range(min = 200.0, max = 500.0))]
+    pub temperature_k: Option<f64>,
+    /// New additional mass on the carriage.
+    #[schemars(range(min = 0.0, max = 1e5))]
+    pub payload_kg: Option<f64>,
+    /// New constant force on the carriage, e.g. of a cable or of gravity.
+    #[schemars(range(min = -1e7, max = 1e7))]
+    pub force_n: Option<f64>,
 }
 
 impl Default for Simulation {
     fn default() -> Self {
-        Self { orthogonality_rad: 0.0, step_us: 125, encoder_noise_m: 0.0, seed: 1 }
+        Self {
+            orthogonality_rad: 0.0,
+            step_us: 125,
+            encoder_noise_m: 0.0,
+            seed: 1,
+            temperature_k: NOMINAL_TEMPERATURE_K,
+            changes: Vec::new(),
+        }
     }
 }
 
-/// `[axis.simulation]`: a mass in a cascade (P position, PI velocity), friction, and one flexible
-/// mode that only the tool centre point sees.
+/// `[axis.simulation]`: a mass in a cascade (P position, PI velocity), friction, cogging, and one flexible
+/// mode, with backlash if wanted, that only the tool centre point sees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
@@ -66,6 +108,32 @@ pub struct AxisSimulation {
     /// Damping ratio of the mode.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub mode_damping: f64,
+    /// Play between the carriage, which the encoder measures, and the mode's mass, which the tool is on.
+    #[schemars(range(min = 0.0, max = 0.01))]
+    pub backlash_m: f64,
+    /// Viscous friction.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub viscous_n_s_m: f64,
+    /// Stiffness of the bristles of a LuGre friction with the same Coulomb and static friction, instead
+    /// of true stiction; 0 for none.
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub bristle_stiffness_n_m: f64,
+    /// Damping of the bristles.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub bristle_damping_n_s_m: f64,
+    /// Amplitude of the cogging force, a sine over position.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub cogging_n: f64,
+    /// Period of the cogging force.
+    #[schemars(range(min = 1e-5, max = 10.0))]
+    pub cogging_pitch_m: f64,
+    /// Relative rise of the motor's resistance per kelvin; its force falls by `R0/R`, as with a voltage
+    /// amplifier.
+    #[schemars(range(min = 0.0, max = 0.1))]
+    pub resistance_per_k: f64,
+    /// Thermal expansion between encoder and tool, relative per kelvin.
+    #[schemars(range(min = 0.0, max = 0.001))]
+    pub expansion_per_k: f64,
     /// Position at power-on.
     pub position_start_m: f64,
 }
@@ -84,6 +152,14 @@ impl Default for AxisSimulation {
             mode_mass_kg: 0.0,
             mode_frequency_hz: 20.0,
             mode_damping: 0.1,
+            backlash_m: 0.0,
+            viscous_n_s_m: 0.0,
+            bristle_stiffness_n_m: 0.0,
+            bristle_damping_n_s_m: 0.0,
+            cogging_n: 0.0,
+            cogging_pitch_m: 0.03,
+            resistance_per_k: 0.0,
+            expansion_per_k: 0.0,
             position_start_m: 0.0,
         }
     }

@@ -57,7 +57,7 @@ pub(super) fn nodes(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
 }
 
 /// Checks the ranges of an axis, and the requirements of its interface.
-pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
+pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), ConfigError> {
     let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
     let l = &axis.limits;
     v.that(
@@ -109,15 +109,31 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
         };
         return Err(v.refuse(&at("position_loop"), &found, &allowed));
     }
-    check_simulation(axis, v)
+    check_simulation(axis, step_us, v)
 }
 
-fn check_simulation(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
+fn check_simulation(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), ConfigError> {
     let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
     let s = &axis.simulation;
     v.range(&at("simulation.coulomb_n"), s.coulomb_n, 0.0, s.force_max_n)?;
     v.range(&at("simulation.static_n"), s.static_n, s.coulomb_n, s.force_max_n)?;
     v.range(&at("simulation.mode_mass_kg"), s.mode_mass_kg, 0.0, 0.9 * s.mass_kg)?;
+    v.that(
+        s.backlash_m == 0.0 || s.mode_mass_kg > 0.0,
+        &at("simulation.backlash_m"),
+        &s.backlash_m,
+        "0 without simulation.mode_mass_kg: the play is between the carriage and that mass",
+    )?;
+    let step_s = f64::from(step_us) * 1e-6;
+    let carriage_kg = s.mass_kg - s.mode_mass_kg;
+    v.that(
+        s.bristle_stiffness_n_m * step_s * step_s <= 0.5 * carriage_kg
+            && s.bristle_damping_n_s_m * step_s <= 0.5 * carriage_kg,
+        &at("simulation.bristle_stiffness_n_m"),
+        &s.bristle_stiffness_n_m,
+        "bristles that [simulation] step_us resolves: stiffness * step^2 and damping * step at most half of \
+         the carriage's mass",
+    )?;
     // Any position that can be expressed in counts: an axis that starts outside its limits is worth
     // simulating.
     let farthest_m = f64::from(i32::MAX) / axis.counts_per_m;

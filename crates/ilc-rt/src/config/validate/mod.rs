@@ -72,7 +72,7 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     axis::nodes(cell, &v)?;
     v.ranges(cell)?;
     for axis in &cell.axes {
-        axis::check(axis, &v)?;
+        axis::check(axis, cell.simulation.step_us, &v)?;
     }
     if let Some(tcp) = &cell.tcp_encoder {
         v.that(
@@ -90,5 +90,16 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
         "[simulation] step_us",
         &simulation.step_us,
         "a divisor of [cell] cycle_us",
-    )
+    )?;
+    for change in &simulation.changes {
+        let Some(name) = &change.axis else { continue };
+        let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
+        v.that(
+            names.contains(&name.as_str()),
+            "[[simulation.change]] axis",
+            name,
+            &format!("the name of an axis: {}", names.join(", ")),
+        )?;
+    }
+    Ok(())
 }
