@@ -2,6 +2,7 @@
 
 use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
 
+use super::drive_mode::DriveMode;
 use super::value::Value;
 
 /// Access to an object by SDO.
@@ -37,6 +38,8 @@ pub enum Allowed {
     Range(i64, i64),
     /// A list.
     OneOf(&'static [i64]),
+    /// A mode of operation, or 0 for none.
+    Modes,
 }
 
 /// An object.
@@ -233,6 +236,9 @@ impl Entry {
             Allowed::Range(_, high) if number > high => Err(AbortCode::ValueTooHigh),
             Allowed::Range(low, _) if number < low => Err(AbortCode::ValueTooLow),
             Allowed::OneOf(values) if !values.contains(&number) => Err(AbortCode::ValueRange),
+            Allowed::Modes if number != 0 && DriveMode::from_code(number).is_none() => {
+                Err(AbortCode::ValueRange)
+            }
             _ => Ok(()),
         }
     }

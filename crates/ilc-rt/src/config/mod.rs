@@ -22,7 +22,7 @@ pub use cell::{
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, read_beside, read_file};
 pub use learning::{Learning, Measure};
-pub use simulation::{AxisSimulation, Simulation};
+pub use simulation::{AxisSimulation, Quirks, Simulation};
 pub use validate::check;
 
 pub use crate::learning::law::catalogue::LawName;
