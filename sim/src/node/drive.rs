@@ -95,9 +95,11 @@ impl DriveNode {
     /// # Errors
     /// The abort code of an object missing from the drive's own table.
     pub fn new(node: NodeId, parameters: DriveParameters) -> Result<Self, AbortCode> {
-        let communication = Communication::new(node, drive_objects::all(node, &parameters))?;
+        let mut communication = Communication::new(node, drive_objects::all(node, &parameters))?;
         let slots = DriveSlots::find(communication.dictionary())?;
-        let units = Units::read(communication.dictionary(), &slots, parameters.counts_per_m, 0.0);
+        communication.take_habits(&parameters.quirks);
+        let units = Units::read(communication.dictionary(), &slots, parameters.counts_per_m, 0.0)
+            .within(&parameters.switches);
         Ok(Self {
             communication,
             slots,
@@ -176,6 +178,7 @@ impl DriveNode {
                 self.read_units();
                 self.show_mode();
                 self.heed_controlword(out);
+                self.heed_simulated_fault(out);
             }
             Incoming::Sync => {
                 // In this order: sample, take over, send. The values sent were measured at SYNC.
@@ -252,7 +255,8 @@ impl DriveNode {
     pub(super) fn read_units(&mut self) {
         let dictionary = self.communication.dictionary();
         let counts_per_m = self.parameters.counts_per_m;
-        self.units = Units::read(dictionary, &self.slots, counts_per_m, self.home_m);
+        self.units = Units::read(dictionary, &self.slots, counts_per_m, self.home_m)
+            .within(&self.parameters.switches);
     }
 
     pub(super) fn number(&self, slot: Slot) -> i64 {

@@ -1,5 +1,6 @@
 //! The objects of a simulated drive, 0x6000 and above.
 
+use ilc_rt::config::Quirks;
 use ilc_rt::fieldbus::canopen::pdo::{MappedObject, PdoNumber, TYPE_EVERY_SYNC};
 use ilc_rt::fieldbus::canopen::{NodeId, ObjectAddress};
 use ilc_rt::fieldbus::cia402::{Mode, objects, pdo_map};
@@ -20,6 +21,10 @@ const DISPLAY_EVENT_MS: u16 = 100;
 
 /// Rated torque, and rated current, in thousandths.
 const RATED: u16 = 1000;
+/// Rated current, in milliamperes.
+const RATED_MA: u32 = 5_000;
+/// Voltage of the DC link, in millivolts.
+const DC_LINK_MV: u32 = 325_000;
 /// Positions in counts of the encoder.
 pub(super) const UNIT_COUNTS: u32 = 0x00B5_0000;
 /// Velocities in counts of the encoder per second.
@@ -36,12 +41,17 @@ pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
     let mode_map = [mapped(objects::MODE_OF_OPERATION, 8)];
     let display_map = [mapped(objects::MODE_DISPLAY, 8), mapped(objects::ERROR_CODE, 16)];
     let command_map = pdo_map::command_map(Mode::Csp);
+    let [command_map, status_map, motion_map] =
+        [&command_map[..], &pdo_map::STATUS_MAP, &pdo_map::DRIVE_MOTION_MAP]
+            .map(|map| present(map, &parameters.quirks));
     let default = |number, transmission, map| PdoDefault { number, transmission, event_ms: 0, map };
+    let status_type =
+        if parameters.quirks.statusword_on_event { TYPE_EVENT } else { TYPE_EVERY_SYNC };
     let pdos = [
         default(pdo_map::COMMAND_PDO, TYPE_EVERY_SYNC, &command_map[..]),
         default(PdoNumber::receive(1), TYPE_EVENT, &mode_map[..]),
-        default(pdo_map::STATUS_PDO, TYPE_EVERY_SYNC, &pdo_map::STATUS_MAP[..]),
-        default(pdo_map::DRIVE_MOTION_PDO, TYPE_EVERY_SYNC, &pdo_map::DRIVE_MOTION_MAP[..]),
+        default(pdo_map::STATUS_PDO, status_type, &status_map[..]),
+        default(pdo_map::DRIVE_MOTION_PDO, TYPE_EVERY_SYNC, &motion_map[..]),
         PdoDefault {
             event_ms: DISPLAY_EVENT_MS,
             ..default(PdoNumber::transmit(2), TYPE_EVENT, &display_map[..])
@@ -54,6 +64,28 @@ pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
     entries.extend(motion(parameters));
     entries.extend(profile_objects::all(parameters));
     entries
+}
+
+/// Returns the objects that a drive with these quirks lacks.
+pub fn lacking(quirks: &Quirks) -> impl Iterator<Item = u16> {
+    [
+        (quirks.lacks_torque_offset, objects::TORQUE_OFFSET),
+        (quirks.lacks_torque, objects::TORQUE_ACTUAL),
+        (quirks.lacks_following_error, objects::FOLLOWING_ERROR_ACTUAL),
+        (quirks.lacks_interpolation_period, objects::INTERPOLATION_PERIOD),
+        (quirks.lacks_following_error_time, objects::FOLLOWING_ERROR_TIME),
+        (quirks.lacks_emergencies, objects::COB_ID_EMCY),
+        (quirks.lacks_emergencies, objects::INHIBIT_TIME_EMCY),
+    ]
+    .into_iter()
+    .filter_map(|(lacks, index)| lacks.then_some(index))
+}
+
+/// Returns the part of a map whose objects exist.
+fn present(map: &[MappedObject], quirks: &Quirks) -> Vec<MappedObject> {
+    let exists =
+        |object: &&MappedObject| lacking(quirks).all(|index| index != object.address.index);
+    map.iter().filter(exists).copied().collect()
 }
 
 const fn mapped(index: u16, bits: u8) -> MappedObject {
@@ -118,6 +150,7 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
     let limit = objects::POSITION_LIMIT;
     let period = objects::INTERPOLATION_PERIOD;
     let range = objects::POSITION_RANGE_LIMIT;
+    let (cycle, exponent) = power_on_period(parameters);
     let deceleration = unsigned(counts(parameters.deceleration_m_s2));
     let mut entries = vec![
         output(objects::POSITION_DEMAND, Value::I32(0)),
@@ -141,6 +174,8 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
             "Motor rated torque",
             unsigned(parameters.force_max_n * 1000.0),
         ),
+        Entry::constant(objects::RATED_CURRENT, 0, "Motor rated current", Value::U32(RATED_MA)),
+        object(objects::DC_LINK_VOLTAGE, Value::U32(DC_LINK_MV)),
         output(objects::TORQUE_ACTUAL, Value::I16(0)),
         input(objects::TARGET_POSITION, Value::I32(0)),
         Entry::constant(limit, 0, "Highest sub-index", Value::U8(2)),
@@ -171,8 +206,8 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         input(objects::VELOCITY_OFFSET, Value::I32(0)),
         input(objects::TORQUE_OFFSET, Value::I16(0)),
         Entry::constant(period, 0, "Highest sub-index", Value::U8(2)),
-        setting(period, 1, Value::U8(1)).allowing(Allowed::Range(1, 255)),
-        setting(period, 2, Value::I8(-3)).allowing(Allowed::Range(-6, 0)),
+        setting(period, 1, Value::U8(cycle)).allowing(Allowed::Range(1, 255)),
+        setting(period, 2, Value::I8(exponent)).allowing(Allowed::Range(-6, 0)),
         output(objects::FOLLOWING_ERROR_ACTUAL, Value::I32(0)),
         input(objects::TARGET_VELOCITY, Value::I32(0)),
     ];
@@ -192,6 +227,20 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         }
     }
     entries
+}
+
+/// Returns 0x60C2 at power-on: one millisecond, or the cell's cycle where it cannot be written.
+fn power_on_period(parameters: &DriveParameters) -> (u8, i8) {
+    if !parameters.quirks.lacks_interpolation_period {
+        return (1, -3);
+    }
+    let mut exact = [(1, -6), (10, -5), (100, -4), (1000, -3), (10_000, -2)]
+        .into_iter()
+        .filter_map(|(unit_us, exponent)| {
+            let n_units = u8::try_from(parameters.cycle_us / unit_us).ok()?;
+            (u32::from(n_units) * unit_us == parameters.cycle_us).then_some((n_units, exponent))
+        });
+    exact.next().unwrap_or((1, -3))
 }
 
 /// Returns the integer nearest to a count, as wide as any object needs.

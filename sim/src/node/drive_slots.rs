@@ -4,7 +4,7 @@ use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
 use ilc_rt::fieldbus::cia402::objects;
 
 use super::dictionary::{Dictionary, Slot};
-use super::profile_objects::SIMULATED_INPUTS;
+use super::profile_objects::{SIMULATED_FAULT, SIMULATED_INPUTS};
 
 macro_rules! slots {
     ($($name:ident = $index:expr, $sub:literal;)*) => {
@@ -95,4 +95,5 @@ slots! {
     digital_outputs = objects::DIGITAL_OUTPUTS, 1;
     output_mask = objects::DIGITAL_OUTPUTS, 2;
     simulated_inputs = SIMULATED_INPUTS, 0;
+    simulated_fault = SIMULATED_FAULT, 0;
 }

@@ -67,16 +67,11 @@ pub(super) enum Order {
     /// Nothing.
     None,
     /// Move in a direction until told otherwise, quickly or at the speed for edges.
-    Move {
-        sign: f64,
-        is_quick: bool,
-    },
+    Move { sign: f64, is_quick: bool },
     /// Come to rest.
     Rest,
     /// It is over; the place becomes home, unless the position stays as it is.
-    Done {
-        home_m: Option<f64>,
-    },
+    Done { home_m: Option<f64> },
 }
 
 /// The homing of a drive.
@@ -175,8 +170,7 @@ impl Homing {
 mod tests {
     use super::*;
 
-    const FREE: Seen =
-        Seen { position_m: 0.0, is_at_min: false, is_at_max: false, index_m: None };
+    const FREE: Seen = Seen { position_m: 0.0, is_at_min: false, is_at_max: false, index_m: None };
 
     #[test]
     fn an_index_that_lies_beyond_the_switch_is_a_failure() {

@@ -91,7 +91,8 @@ impl DriveNode {
     }
 
     fn begin(&mut self) {
-        if let (Some(SetPoint { position_m, law }), false) = (self.positioning.active, self.is_halted)
+        if let (Some(SetPoint { position_m, law }), false) =
+            (self.positioning.active, self.is_halted)
         {
             self.motion.pursue(Goal::Place { position_m }, law);
         }

@@ -40,9 +40,7 @@ impl Profile {
     /// profile was already too fast for it.
     pub fn step(&mut self, goal: Goal, law: &ProfileLaw, dt_s: f64) {
         let wanted_m_s = match goal {
-            Goal::Speed { velocity_m_s } => {
-                velocity_m_s.clamp(-law.velocity_m_s, law.velocity_m_s)
-            }
+            Goal::Speed { velocity_m_s } => velocity_m_s.clamp(-law.velocity_m_s, law.velocity_m_s),
             Goal::Place { position_m } => {
                 let way_m = position_m - self.position_m;
                 let speed_m_s = brakeable_m_s(way_m.abs(), law.deceleration_m_s2, dt_s);
@@ -66,7 +64,9 @@ impl Profile {
     pub fn has_reached(&self, goal: Goal) -> bool {
         let is_there = match goal {
             Goal::Place { position_m } => self.position_m.to_bits() == position_m.to_bits(),
-            Goal::Speed { velocity_m_s } => return self.velocity_m_s.to_bits() == velocity_m_s.to_bits(),
+            Goal::Speed { velocity_m_s } => {
+                return self.velocity_m_s.to_bits() == velocity_m_s.to_bits();
+            }
         };
         is_there && self.velocity_m_s.abs() <= 0.0
     }
@@ -139,8 +139,7 @@ mod tests {
 
     #[test]
     fn a_reversal_passes_zero_at_the_deceleration() {
-        let law =
-            ProfileLaw { velocity_m_s: 1.0, acceleration_m_s2: 1.0, deceleration_m_s2: 10.0 };
+        let law = ProfileLaw { velocity_m_s: 1.0, acceleration_m_s2: 1.0, deceleration_m_s2: 10.0 };
         let mut profile = Profile { position_m: 0.0, velocity_m_s: 0.1 };
         let mut speeds = Vec::new();
         for _ in 0..4 {

@@ -112,8 +112,9 @@ impl DriveNode {
         let here_m = self.measured.position_m;
         let up_m_s = self.brakeable_m_s(limits.position_max_m - here_m, law, step_us);
         let down_m_s = self.brakeable_m_s(here_m - limits.position_min_m, law, step_us);
-        let wanted_m_s =
-            asked_m_s.clamp(-limits.velocity_max_m_s, limits.velocity_max_m_s).clamp(-down_m_s, up_m_s);
+        let wanted_m_s = asked_m_s
+            .clamp(-limits.velocity_max_m_s, limits.velocity_max_m_s)
+            .clamp(-down_m_s, up_m_s);
         self.is_clipped = wanted_m_s.to_bits() != asked_m_s.to_bits();
         let shown = units.velocity(self.measured.velocity_m_s);
         let is_near = (shown - target).abs() <= self.number(self.slots.velocity_window);

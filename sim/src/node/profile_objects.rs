@@ -11,6 +11,9 @@ use super::value::Value;
 /// Further digital inputs that are on, as bits of 0x60FD: what a cable would do to a real drive.
 pub const SIMULATED_INPUTS: u16 = 0x2001;
 
+/// Writing an error code makes the drive fail with it.
+pub const SIMULATED_FAULT: u16 = 0x2002;
+
 /// Share of the velocity limit with which a profile moves at power-on.
 const PROFILE_SHARE: f64 = 0.5;
 /// Share of the velocity limit with which homing searches a switch at power-on.
@@ -48,8 +51,7 @@ pub(super) fn all(parameters: &DriveParameters) -> Vec<Entry> {
         input(objects::PROFILE_VELOCITY, speed(PROFILE_SHARE)),
         // 0: a trapezoidal velocity profile.
         setting(objects::PROFILE_TYPE, 0, Value::I16(0)).allowing(Allowed::OneOf(&[0])),
-        setting(objects::HOMING_METHOD, 0, Value::I8(0))
-            .allowing(Allowed::OneOf(&homing::METHODS)),
+        setting(objects::HOMING_METHOD, 0, Value::I8(0)).allowing(Allowed::OneOf(&homing::METHODS)),
         Entry::constant(speeds, 0, "Highest sub-index", Value::U8(2)),
         setting(speeds, 1, speed(HOMING_SHARE)).allowing(positive),
         setting(speeds, 2, speed(CREEP_SHARE)).allowing(positive),
@@ -61,7 +63,13 @@ pub(super) fn all(parameters: &DriveParameters) -> Vec<Entry> {
         // Bit 0: the brake is applied.
         input_of(outputs, 1, Value::U32(1)),
         setting(outputs, 2, Value::U32(0xFFFF_0000)),
-        setting(SIMULATED_INPUTS, 0, Value::U32(parameters.inputs)),
+        Entry::read_write(
+            SIMULATED_INPUTS,
+            0,
+            "Simulated digital inputs",
+            Value::U32(parameters.inputs),
+        ),
+        Entry::write_only(SIMULATED_FAULT, 0, "Simulated fault", Value::U16(0)),
     ];
     let methods = objects::HOMING_METHODS;
     let implemented = homing::METHODS.iter().filter(|method| **method != 0);

@@ -123,6 +123,24 @@ impl DriveNode {
         }
     }
 
+    /// Fails with the code that was written for it; without power as well.
+    pub(super) fn heed_simulated_fault(&mut self, out: &mut dyn FnMut(Frame)) {
+        if !self.communication.dictionary_mut().take_written(self.slots.simulated_fault) {
+            return;
+        }
+        let code = u16::try_from(self.number(self.slots.simulated_fault)).unwrap_or(0);
+        if code == emcy::CODE_RESET || self.state() == State::Fault {
+            return;
+        }
+        self.communication.emergency(code, out);
+        self.fault(code);
+        if self.state() != State::FaultReactionActive {
+            self.set(self.slots.error_code, code.into());
+            self.machine.fault();
+            self.motion.off();
+        }
+    }
+
     /// Enters the fault reaction. A drive that is not energised only reports a lost command.
     pub(super) fn fault(&mut self, code: u16) {
         if !matches!(self.state(), State::OperationEnabled | State::QuickStopActive) {

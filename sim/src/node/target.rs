@@ -66,6 +66,11 @@ impl DriveNode {
         if wanted == shown {
             return;
         }
+        if !self.communication.may_change_mode() {
+            self.set(self.slots.mode, shown);
+            return;
+        }
+        let dictionary = self.communication.dictionary_mut();
         dictionary.set(self.slots.mode_display, wanted);
         self.forget_targets();
         self.drop_own_motion();

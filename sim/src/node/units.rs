@@ -5,6 +5,7 @@ use super::drive_objects::{UNIT_COUNTS, rounded};
 use super::drive_slots::DriveSlots;
 use super::motion::MotionLimits;
 use super::profile::ProfileLaw;
+use super::switches::Switches;
 
 /// Bit 7 of the polarity: positions are inverted.
 const REVERSED_POSITION: i64 = 0x80;
@@ -12,6 +13,8 @@ const REVERSED_POSITION: i64 = 0x80;
 const REVERSED_VELOCITY: i64 = 0x40;
 /// A 32-bit limit at its maximum is no limit.
 const NO_LIMIT: i64 = 0xFFFF_FFFF;
+/// Way from the edge of a limit switch to where it stops an axis.
+const OVERRUN_M: f64 = 1e-5;
 
 /// The conversion between SI units and a drive's objects, cached from its dictionary.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,8 +73,8 @@ impl Units {
         let motor_m_s = number(slots.motor_speed_max) as f64 / 60.0 * resolution / counts_per_m;
         let deceleration_max_m_s2 =
             unless_unlimited(slots.deceleration_max, acceleration(slots.deceleration_max));
-        let velocity_max_m_s = speed(slots.velocity_max)
-            .min(unless_unlimited(slots.motor_speed_max, motor_m_s));
+        let velocity_max_m_s =
+            speed(slots.velocity_max).min(unless_unlimited(slots.motor_speed_max, motor_m_s));
         let acceleration_max_m_s2 =
             unless_unlimited(slots.acceleration_max, acceleration(slots.acceleration_max));
         let slow_deceleration_m_s2 =
@@ -110,6 +113,15 @@ impl Units {
             },
             homing_creep_m_s: speed(slots.homing_creep).min(velocity_max_m_s),
         }
+    }
+
+    /// Bounds every motion by the limit switches: a little beyond them, so that they are closed there.
+    #[must_use]
+    pub(super) fn within(mut self, switches: &Switches) -> Self {
+        let limits = &mut self.limits;
+        limits.position_min_m = limits.position_min_m.max(switches.min_m - OVERRUN_M);
+        limits.position_max_m = limits.position_max_m.min(switches.max_m + OVERRUN_M);
+        self
     }
 
     /// Returns the limits of every motion.
