@@ -30,8 +30,11 @@ fn sections(text: &mut String, dictionary: &Dictionary, product: &str) -> fmt::R
     writeln!(text, "DynamicChannelsSupported=0\nGroupMessaging=0")?;
     writeln!(text, "NrOfRXPDO=4\nNrOfTXPDO=4\nLSS_Supported=0\n")?;
 
-    let groups: Vec<&[Entry]> =
-        dictionary.entries().chunk_by(|a, b| a.address.index == b.address.index).collect();
+    let groups: Vec<&[Entry]> = dictionary
+        .entries()
+        .chunk_by(|a, b| a.address.index == b.address.index)
+        .filter(|group| !group[0].is_hidden())
+        .collect();
     let is_mandatory =
         |index| matches!(index, objects::DEVICE_TYPE | objects::ERROR_REGISTER | objects::IDENTITY);
     let is_manufacturers = |index| (0x2000..0x6000).contains(&index);
@@ -87,6 +90,7 @@ fn variable(text: &mut String, entry: &Entry) -> fmt::Result {
         Access::Constant => "const",
         Access::ReadOnly => "ro",
         Access::ReadWrite => "rw",
+        Access::WriteOnly => "wo",
     };
     writeln!(text, "ParameterName={}\nObjectType=0x7\nDataType=0x{data_type:04X}", entry.name)?;
     writeln!(text, "AccessType={access}")?;

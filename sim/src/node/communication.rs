@@ -1,35 +1,24 @@
 //! Communication of every CANopen node: NMT, boot-up, heartbeat, SDO, PDO and EMCY around one dictionary.
 
+use ilc_rt::config::Quirks;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{
-    AbortCode, Emergency, Heartbeat, NmtCommand, NmtState, NodeId, ObjectAddress, cob_id, emcy,
-    sync,
+    AbortCode, Heartbeat, NmtCommand, NmtState, NodeId, ObjectAddress, cob_id, emcy, sync,
 };
 use ilc_rt::fieldbus::cia402::objects;
 
-use super::dictionary::{Dictionary, Entry, Slot};
+use super::dictionary::{Dictionary, Entry, Mappable, Slot};
+use super::drive_objects;
+use super::emergencies::Emergencies;
+use super::object_access::{ObjectAccess, refuse_under_halt};
 use super::pdo_engine::{PdoEngine, Received};
 use super::pdo_rules;
-use super::sdo_server::{Objects, SdoServer};
-use super::standard_objects::HISTORY_MAX;
-use super::value::Value;
-
-/// Bit 0 of the error register: any error.
-const REGISTER_GENERIC: i64 = 0x01;
-/// Bit 4 of the error register: communication.
-const REGISTER_COMMUNICATION: i64 = 0x10;
-/// Bit 5 of the error register: device profile.
-const REGISTER_PROFILE: i64 = 0x20;
+use super::sdo_server::SdoServer;
 
 /// In 0x1005: this node produces SYNC.
 const SYNC_PRODUCER: i64 = 1 << 30;
 /// In 0x1005: the identifier.
 const SYNC_IDENTIFIER: i64 = 0x7FF;
-/// "save", as it is written to 0x1010.
-const SAVE: i64 = 0x6576_6173;
-/// "load", as it is written to 0x1011.
-const LOAD: i64 = 0x6461_6F6C;
-
 /// Meaning of a frame to the device behind the communication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Incoming {
@@ -57,15 +46,13 @@ pub enum Silence {
 /// Objects used by the communication itself.
 #[derive(Clone, Copy, Debug)]
 struct Slots {
-    register: Slot,
-    n_errors: Slot,
-    history: [Slot; HISTORY_MAX as usize],
     consumer: Slot,
     producer_ms: Slot,
     behaviour: Slot,
     sync: Slot,
     sync_period_us: Slot,
     sync_counter: Slot,
+    verified: [Slot; 2],
 }
 
 /// The CANopen side of a node.
@@ -82,7 +69,24 @@ pub struct Communication {
     sync_us: u64,
     /// Time since the controller's last heartbeat; `None` before the first.
     controller_us: Option<u64>,
-    last_emergency: Option<u16>,
+    emergencies: Emergencies,
+    /// Counter of the last SYNC, if it had one.
+    counter: Option<u8>,
+    /// Counter of this node's own last SYNC.
+    own_counter: u8,
+    /// SYNCs on the bus, for the quirk that loses some.
+    n_syncs: u32,
+    habits: Habits,
+    /// An SDO answer that is due after some time.
+    late_answer: Option<(Frame, u64)>,
+}
+
+/// Habits of real drives that concern their communication.
+#[derive(Clone, Copy, Debug, Default)]
+struct Habits {
+    keeps_mode_under_halt: bool,
+    answer_delay_us: u64,
+    sync_lost_every: u32,
 }
 
 impl Communication {
@@ -93,22 +97,20 @@ impl Communication {
     pub fn new(node: NodeId, entries: Vec<Entry>) -> Result<Self, AbortCode> {
         let dictionary = Dictionary::new(entries);
         let slot = |index, sub| dictionary.find(ObjectAddress::new(index, sub));
-        let mut history = [Slot::FIRST; HISTORY_MAX as usize];
-        for (place, sub) in history.iter_mut().zip(1..) {
-            *place = slot(objects::ERROR_HISTORY, sub)?;
-        }
         let slots = Slots {
-            register: slot(objects::ERROR_REGISTER, 0)?,
-            n_errors: slot(objects::ERROR_HISTORY, 0)?,
-            history,
             consumer: slot(objects::CONSUMER_HEARTBEAT, 1)?,
             producer_ms: slot(objects::PRODUCER_HEARTBEAT, 0)?,
             behaviour: slot(objects::ERROR_BEHAVIOUR, 1)?,
             sync: slot(objects::COB_ID_SYNC, 0)?,
             sync_period_us: slot(objects::CYCLE_PERIOD, 0)?,
             sync_counter: slot(objects::SYNC_COUNTER_OVERFLOW, 0)?,
+            verified: [
+                slot(objects::VERIFY_CONFIGURATION, 1)?,
+                slot(objects::VERIFY_CONFIGURATION, 2)?,
+            ],
         };
         let pdos = PdoEngine::new(&dictionary);
+        let emergencies = Emergencies::find(node, &dictionary)?;
         Ok(Self {
             node,
             nmt: NmtState::BootUp,
@@ -119,8 +121,34 @@ impl Communication {
             heartbeat_us: 0,
             sync_us: 0,
             controller_us: None,
-            last_emergency: None,
+            emergencies,
+            counter: None,
+            own_counter: 0,
+            n_syncs: 0,
+            habits: Habits::default(),
+            late_answer: None,
         })
+    }
+
+    /// Takes over the habits of a real drive: objects that it lacks, slow answers, deaf moments.
+    pub fn take_habits(&mut self, quirks: &Quirks) {
+        for index in drive_objects::lacking(quirks) {
+            self.dictionary.hide(index);
+        }
+        if quirks.lacks_emergencies {
+            self.emergencies.silence();
+        }
+        self.habits = Habits {
+            keeps_mode_under_halt: quirks.keeps_mode_under_halt,
+            answer_delay_us: u64::from(quirks.sdo_delay_ms) * 1000,
+            sync_lost_every: quirks.sync_lost_every,
+        };
+        self.pdos = PdoEngine::new(&self.dictionary);
+    }
+
+    /// Returns whether the mode may be changed now.
+    pub fn may_change_mode(&self) -> bool {
+        !self.habits.keeps_mode_under_halt || refuse_under_halt(&self.dictionary).is_ok()
     }
 
     /// Returns the node number.
@@ -150,7 +178,7 @@ impl Communication {
 
     /// Takes the last emergency sent since the last call.
     pub fn take_emergency(&mut self) -> Option<u16> {
-        self.last_emergency.take()
+        self.emergencies.take_last()
     }
 
     /// Returns whether `frame` asks this node for an object, so that its values must be fresh.
@@ -189,7 +217,8 @@ impl Communication {
                 self.emergency(emcy::CODE_SYNC_LENGTH, out);
                 return Incoming::Nothing;
             }
-            return Incoming::Sync;
+            self.counter = frame.payload().first().copied();
+            return if self.misses_sync() { Incoming::Nothing } else { Incoming::Sync };
         }
         match self.pdos.receive(frame, &mut self.dictionary) {
             Received::Applied => Incoming::Written,
@@ -208,7 +237,7 @@ impl Communication {
 
     /// Sends the TPDOs due at this SYNC.
     pub fn transmit_at_sync(&mut self, out: &mut dyn FnMut(Frame)) {
-        self.pdos.transmit_at_sync(&self.dictionary, out);
+        self.pdos.transmit_at_sync(self.counter, &self.dictionary, out);
     }
 
     /// Advances time: heartbeat, event-driven TPDOs, and timeouts.
@@ -223,8 +252,11 @@ impl Communication {
             out(Heartbeat { node: self.node, state: self.nmt }.encode());
         }
         if self.nmt != NmtState::Stopped && self.is_sync_due(elapsed_us) {
-            out(sync::frame());
+            out(self.own_sync());
         }
+        let may_send = self.may_send_emergencies();
+        self.emergencies.advance(elapsed_us, may_send, &self.dictionary, out);
+        self.answer_late(elapsed_us, out);
         if self.nmt == NmtState::Operational {
             self.pdos.transmit_events(elapsed_us, &self.dictionary, out);
             if self.pdos.deadline_passed(elapsed_us) {
@@ -246,34 +278,12 @@ impl Communication {
 
     /// Sends an emergency message, unless stopped, and adds it to the history.
     pub fn emergency(&mut self, code: u16, out: &mut dyn FnMut(Frame)) {
-        let group = if code >> 8 == 0x81 || code >> 8 == 0x82 {
-            REGISTER_COMMUNICATION
-        } else {
-            REGISTER_PROFILE
-        };
-        let register = if code == emcy::CODE_RESET {
-            0
-        } else {
-            self.remember(code);
-            self.dictionary.number(self.slots.register) | REGISTER_GENERIC | group
-        };
-        self.dictionary.set(self.slots.register, register);
-        self.last_emergency = Some(code);
-        if matches!(self.nmt, NmtState::PreOperational | NmtState::Operational) {
-            let register = u8::try_from(register).unwrap_or(u8::MAX);
-            out(Emergency { node: self.node, code, register, vendor: [0; 5] }.encode());
-        }
+        let may_send = self.may_send_emergencies();
+        self.emergencies.report(code, may_send, &mut self.dictionary, out);
     }
 
-    /// Adds a code at the head of the history, 0x1003.
-    fn remember(&mut self, code: u16) {
-        for at in (1..self.slots.history.len()).rev() {
-            let older = self.dictionary.number(self.slots.history[at - 1]);
-            self.dictionary.set(self.slots.history[at], older);
-        }
-        self.dictionary.set(self.slots.history[0], code.into());
-        let n_errors = self.dictionary.number(self.slots.n_errors) + 1;
-        self.dictionary.set(self.slots.n_errors, n_errors.min(HISTORY_MAX.into()));
+    fn may_send_emergencies(&self) -> bool {
+        matches!(self.nmt, NmtState::PreOperational | NmtState::Operational)
     }
 
     fn command(&mut self, command: NmtCommand, out: &mut dyn FnMut(Frame)) {
@@ -292,6 +302,8 @@ impl Communication {
                 self.pdos = PdoEngine::new(&self.dictionary);
                 self.sdo = SdoServer::default();
                 self.controller_us = None;
+                self.late_answer = None;
+                self.own_counter = 0;
                 self.boot(out);
             }
         }
@@ -299,31 +311,83 @@ impl Communication {
 
     fn answer(&mut self, frame: &Frame, out: &mut dyn FnMut(Frame)) -> Incoming {
         let mut server = self.sdo;
-        let mut access = DictionaryAccess { dictionary: &mut self.dictionary, written: None };
+        let keeps_mode_under_halt = self.habits.keeps_mode_under_halt;
+        let mut access =
+            ObjectAccess { dictionary: &mut self.dictionary, keeps_mode_under_halt, written: None };
         let answer = server.answer(frame.payload(), &mut access);
         let written = access.written;
         self.sdo = server;
         if let Some(answer) = answer {
             let id = cob_id::of(cob_id::SDO_RESPONSE, self.node);
             if let Some(frame) = Frame::new(id, &answer.encode()) {
-                out(frame);
+                self.answer_in_time(frame, out);
             }
         }
         let Some(address) = written else { return Incoming::Nothing };
+        self.forget_verification(address);
         if pdo_rules::pdo_at(address.index).is_some() {
             self.pdos = PdoEngine::new(&self.dictionary);
         }
         match address.index {
             objects::PRODUCER_HEARTBEAT => self.heartbeat_us = 0,
             objects::CONSUMER_HEARTBEAT => self.controller_us = None,
-            objects::ERROR_HISTORY => {
-                for slot in self.slots.history {
-                    self.dictionary.set(slot, 0);
-                }
-            }
+            objects::ERROR_HISTORY => self.emergencies.clear(&mut self.dictionary),
             _ => {}
         }
         Incoming::Written
+    }
+
+    /// Sends an SDO answer, at once or after the time that this drive takes.
+    fn answer_in_time(&mut self, answer: Frame, out: &mut dyn FnMut(Frame)) {
+        if let Some((earlier, _)) = self.late_answer.take() {
+            out(earlier);
+        }
+        if self.habits.answer_delay_us == 0 {
+            out(answer);
+        } else {
+            self.late_answer = Some((answer, self.habits.answer_delay_us));
+        }
+    }
+
+    fn answer_late(&mut self, elapsed_us: u64, out: &mut dyn FnMut(Frame)) {
+        let Some((answer, left_us)) = self.late_answer else { return };
+        let left_us = left_us.saturating_sub(elapsed_us);
+        self.late_answer = (left_us > 0).then_some((answer, left_us));
+        if left_us == 0 {
+            out(answer);
+        }
+    }
+
+    /// Clears 0x1020 when the configuration that it stands for is changed.
+    fn forget_verification(&mut self, written: ObjectAddress) {
+        let is_configuration = !matches!(
+            written.index,
+            objects::VERIFY_CONFIGURATION | objects::STORE_PARAMETERS | objects::ERROR_HISTORY
+        ) && self
+            .dictionary
+            .find(written)
+            .is_ok_and(|slot| self.dictionary.entry(slot).mappable == Mappable::No);
+        if is_configuration {
+            for slot in self.slots.verified {
+                self.dictionary.set(slot, 0);
+            }
+        }
+    }
+
+    /// Counts SYNCs and returns true for one that this drive does not hear.
+    fn misses_sync(&mut self) -> bool {
+        self.n_syncs = self.n_syncs.wrapping_add(1);
+        self.habits.sync_lost_every > 0 && self.n_syncs.is_multiple_of(self.habits.sync_lost_every)
+    }
+
+    /// Returns this node's own SYNC, with a counter if one is set.
+    fn own_sync(&mut self) -> Frame {
+        let overflow = u8::try_from(self.dictionary.number(self.slots.sync_counter)).unwrap_or(0);
+        if overflow == 0 {
+            return sync::frame();
+        }
+        self.own_counter = if self.own_counter >= overflow { 1 } else { self.own_counter + 1 };
+        Frame::new(cob_id::SYNC, &[self.own_counter]).unwrap_or_default()
     }
 
     /// Returns whether `frame` is a SYNC on the identifier that this node listens to.
@@ -377,33 +441,5 @@ impl Communication {
 
     fn microseconds(&self, milliseconds: Slot) -> u64 {
         u64::try_from(self.dictionary.number(milliseconds)).unwrap_or(0) * 1000
-    }
-}
-
-/// The dictionary for the SDO server, with the rules of process-data parameters.
-struct DictionaryAccess<'a> {
-    dictionary: &'a mut Dictionary,
-    written: Option<ObjectAddress>,
-}
-
-impl Objects for DictionaryAccess<'_> {
-    fn read(&self, address: ObjectAddress) -> Result<Value, AbortCode> {
-        self.dictionary.find(address).map(|slot| self.dictionary.entry(slot).value())
-    }
-
-    fn write(&mut self, address: ObjectAddress, bytes: &[u8]) -> Result<(), AbortCode> {
-        let slot = self.dictionary.find(address)?;
-        let value = self.dictionary.check(slot, bytes)?;
-        pdo_rules::check(self.dictionary, address, value.number())?;
-        match (address.index, value.number()) {
-            (objects::STORE_PARAMETERS, SAVE) => self.dictionary.save(),
-            (objects::RESTORE_DEFAULTS, LOAD) => self.dictionary.restore_factory(),
-            (objects::STORE_PARAMETERS | objects::RESTORE_DEFAULTS, _) => {
-                return Err(AbortCode::CannotStore);
-            }
-            _ => self.dictionary.store(slot, value),
-        }
-        self.written = Some(address);
-        Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
 
+use super::drive_mode::DriveMode;
 use super::value::Value;
 
 /// Access to an object by SDO.
@@ -13,6 +14,8 @@ pub enum Access {
     ReadOnly,
     /// Read and write.
     ReadWrite,
+    /// Written only.
+    WriteOnly,
 }
 
 /// PDOs that may carry an object.
@@ -37,6 +40,8 @@ pub enum Allowed {
     Range(i64, i64),
     /// A list.
     OneOf(&'static [i64]),
+    /// A mode of operation, or 0 for none.
+    Modes,
 }
 
 /// An object.
@@ -57,6 +62,8 @@ pub struct Entry {
     factory: Value,
     value: Value,
     written: bool,
+    /// Absent for everyone but the node itself.
+    is_hidden: bool,
 }
 
 impl Entry {
@@ -72,12 +79,18 @@ impl Entry {
             factory: value,
             value,
             written: false,
+            is_hidden: false,
         }
     }
 
     /// Creates a constant object.
     pub fn constant(index: u16, sub: u8, name: &'static str, value: Value) -> Self {
         Self { access: Access::Constant, ..Self::read_only(index, sub, name, value) }
+    }
+
+    /// Creates an object that can only be written.
+    pub fn write_only(index: u16, sub: u8, name: &'static str, value: Value) -> Self {
+        Self { access: Access::WriteOnly, ..Self::read_only(index, sub, name, value) }
     }
 
     /// Creates a readable and writable object.
@@ -95,6 +108,11 @@ impl Entry {
     #[must_use]
     pub fn allowing(self, allowed: Allowed) -> Self {
         Self { allowed, ..self }
+    }
+
+    /// Returns whether the object is absent for everyone but the node itself.
+    pub fn is_hidden(&self) -> bool {
+        self.is_hidden
     }
 
     /// Returns the current value.
@@ -130,12 +148,20 @@ impl Dictionary {
         &self.entries
     }
 
+    /// Hides an object from the bus, as if the node lacked it; its slots keep working.
+    pub fn hide(&mut self, index: u16) {
+        for entry in self.entries.iter_mut().filter(|entry| entry.address.index == index) {
+            entry.is_hidden = true;
+        }
+    }
+
     /// Finds an object.
     ///
     /// # Errors
     /// [`AbortCode::NoObject`], or [`AbortCode::NoSubIndex`] if only the sub-index is missing.
     pub fn find(&self, address: ObjectAddress) -> Result<Slot, AbortCode> {
         match self.entries.binary_search_by_key(&address, |entry| entry.address) {
+            Ok(place) if self.entries[place].is_hidden => Err(AbortCode::NoObject),
             Ok(place) => Ok(Slot(place)),
             Err(place) => {
                 let near = [place.checked_sub(1), Some(place)];
@@ -169,7 +195,7 @@ impl Dictionary {
     /// The abort code of the refusal.
     pub fn check(&self, slot: Slot, bytes: &[u8]) -> Result<Value, AbortCode> {
         let entry = self.entry(slot);
-        if entry.access != Access::ReadWrite {
+        if !matches!(entry.access, Access::ReadWrite | Access::WriteOnly) {
             return Err(AbortCode::ReadOnly);
         }
         let value = entry.value.decode_like(bytes)?;
@@ -233,6 +259,9 @@ impl Entry {
             Allowed::Range(_, high) if number > high => Err(AbortCode::ValueTooHigh),
             Allowed::Range(low, _) if number < low => Err(AbortCode::ValueTooLow),
             Allowed::OneOf(values) if !values.contains(&number) => Err(AbortCode::ValueRange),
+            Allowed::Modes if number != 0 && DriveMode::from_code(number).is_none() => {
+                Err(AbortCode::ValueRange)
+            }
             _ => Ok(()),
         }
     }

@@ -1,19 +1,22 @@
 //! A simulated CiA 402 drive: communication, state machine, motion, and the faults between them.
 
+use ilc_rt::config::Quirks;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{AbortCode, NmtCommand, NmtState, NodeId, emcy};
-use ilc_rt::fieldbus::cia402::{State, Statusword};
+use ilc_rt::fieldbus::cia402::State;
 
 use super::communication::{Communication, Incoming, Silence};
 use super::dictionary::{Dictionary, Slot};
-use super::drive_objects::{self, DriveSlots, rounded};
+use super::drive_objects;
+use super::drive_slots::DriveSlots;
+use super::homing::Homing;
 use super::motion::Motion;
+use super::positioning::Positioning;
+use super::profile_modes::Dwell;
 use super::state_machine::StateMachine;
+use super::switches::Switches;
 use super::units::Units;
 use crate::plant::Demand;
-
-/// Bit 8 of the controlword.
-const HALT: u16 = 1 << 8;
 
 /// Parameters set by the maker of the drive and the integrator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +35,14 @@ pub struct DriveParameters {
     pub following_error_max_m: f64,
     /// Force at 1000 thousandths of torque.
     pub force_max_n: f64,
+    /// Cycle of the controller, for a drive that cannot be told.
+    pub cycle_us: u32,
+    /// Limit and home switches, and index pulses.
+    pub switches: Switches,
+    /// Further digital inputs that are on, as bits of 0x60FD.
+    pub inputs: u32,
+    /// Deviations from the profile.
+    pub quirks: Quirks,
 }
 
 /// Measurements of the drive.
@@ -62,6 +73,20 @@ pub struct DriveNode {
     /// Time since the following error left its window.
     pub(super) astray_us: u64,
     pub(super) has_following_error: bool,
+    /// Controlword of the last evaluation.
+    pub(super) controlword: u16,
+    pub(super) positioning: Positioning,
+    pub(super) homing: Homing,
+    /// Place of the home that was found; 0 before.
+    pub(super) home_m: f64,
+    /// Position in the last step, for index pulses.
+    pub(super) seen_m: f64,
+    /// Time at the target.
+    pub(super) reached: Dwell,
+    /// Time at standstill, in profile velocity.
+    pub(super) standing: Dwell,
+    /// A limit changed the target of profile velocity.
+    pub(super) is_clipped: bool,
 }
 
 impl DriveNode {
@@ -70,9 +95,11 @@ impl DriveNode {
     /// # Errors
     /// The abort code of an object missing from the drive's own table.
     pub fn new(node: NodeId, parameters: DriveParameters) -> Result<Self, AbortCode> {
-        let communication = Communication::new(node, drive_objects::all(node, &parameters))?;
+        let mut communication = Communication::new(node, drive_objects::all(node, &parameters))?;
         let slots = DriveSlots::find(communication.dictionary())?;
-        let units = Units::read(communication.dictionary(), &slots, parameters.counts_per_m);
+        communication.take_habits(&parameters.quirks);
+        let units = Units::read(communication.dictionary(), &slots, parameters.counts_per_m, 0.0)
+            .within(&parameters.switches);
         Ok(Self {
             communication,
             slots,
@@ -84,6 +111,14 @@ impl DriveNode {
             is_halted: false,
             astray_us: 0,
             has_following_error: false,
+            controlword: 0,
+            positioning: Positioning::default(),
+            homing: Homing::default(),
+            home_m: 0.0,
+            seen_m: 0.0,
+            reached: Dwell::default(),
+            standing: Dwell::default(),
+            is_clipped: false,
         })
     }
 
@@ -143,6 +178,7 @@ impl DriveNode {
                 self.read_units();
                 self.show_mode();
                 self.heed_controlword(out);
+                self.heed_simulated_fault(out);
             }
             Incoming::Sync => {
                 // In this order: sample, take over, send. The values sent were measured at SYNC.
@@ -165,8 +201,9 @@ impl DriveNode {
             Silence::Heartbeat => self.on_connection_loss(emcy::CODE_HEARTBEAT, None),
         }
         let dt_s = f64::from(step_us) * 1e-6;
+        self.pursue(step_us);
         let demand = self.motion.step(
-            self.units.limits(),
+            &self.motion_limits(),
             self.measured.position_m,
             self.measured.velocity_m_s,
             self.units.velocity_m_s(self.number(self.slots.velocity_offset)),
@@ -174,7 +211,7 @@ impl DriveNode {
         );
         self.end_ramp();
         self.watch_following_error(step_us, out);
-        if self.machine.state() == State::Fault { Demand::Off } else { demand }
+        if self.machine.state() == State::Fault || self.is_braked() { Demand::Off } else { demand }
     }
 
     fn on_nmt(&mut self, command: NmtCommand, out: &mut dyn FnMut(Frame)) {
@@ -189,6 +226,10 @@ impl DriveNode {
                 self.motion.off();
                 self.is_halted = false;
                 self.has_following_error = false;
+                self.controlword = 0;
+                self.homing = Homing::default();
+                self.drop_own_motion();
+                self.home_m = 0.0;
             }
         }
     }
@@ -211,131 +252,11 @@ impl DriveNode {
         }
     }
 
-    fn heed_controlword(&mut self, out: &mut dyn FnMut(Frame)) {
-        if !self.communication.dictionary_mut().take_written(self.slots.controlword) {
-            return;
-        }
-        let controlword = u16::try_from(self.number(self.slots.controlword)).unwrap_or(0);
-        let was_fault = self.state() == State::Fault;
-        self.command(controlword);
-        if was_fault && self.state() != State::Fault {
-            self.has_following_error = false;
-            self.set(self.slots.error_code, 0);
-            self.communication.emergency(emcy::CODE_RESET, out);
-        }
-        self.heed_halt(controlword & HALT != 0);
-    }
-
-    /// Runs the state machine and starts the motion of the new state.
-    fn command(&mut self, controlword: u16) {
-        let before = self.state();
-        let after = self.machine.command(controlword);
-        if before == after {
-            return;
-        }
-        match after {
-            State::OperationEnabled => {
-                // An earlier target must not move the axis: it counts from the next SYNC on.
-                self.forget_targets();
-                self.motion.hold(self.measured.position_m);
-                self.is_halted = false;
-                self.astray_us = 0;
-            }
-            State::QuickStopActive => match self.number(self.slots.quick_stop_option) {
-                0 => {
-                    self.machine.quick_stop_done();
-                    self.motion.off();
-                }
-                1 | 5 => self.slow_down(),
-                _ => self.stop_quickly(),
-            },
-            State::ReadyToSwitchOn
-                if before == State::OperationEnabled
-                    && self.number(self.slots.shutdown_option) == 1 =>
-            {
-                self.slow_down();
-            }
-            State::SwitchedOn
-                if before == State::OperationEnabled
-                    && self.number(self.slots.disable_option) == 1 =>
-            {
-                self.slow_down();
-            }
-            State::NotReadyToSwitchOn
-            | State::SwitchOnDisabled
-            | State::ReadyToSwitchOn
-            | State::SwitchedOn
-            | State::FaultReactionActive
-            | State::Fault => self.motion.off(),
-        }
-    }
-
-    fn heed_halt(&mut self, asked: bool) {
-        if self.state() != State::OperationEnabled || asked == self.is_halted {
-            return;
-        }
-        self.is_halted = asked;
-        if asked && self.number(self.slots.halt_option) == 1 {
-            self.slow_down();
-        } else if asked {
-            self.stop_quickly();
-        } else {
-            self.forget_targets();
-            self.motion.hold(self.measured.position_m);
-        }
-    }
-
-    fn slow_down(&mut self) {
-        self.motion.ramp_down(self.measured.velocity_m_s, self.units.slow_deceleration_m_s2());
-    }
-
-    fn stop_quickly(&mut self) {
-        self.motion.ramp_down(self.measured.velocity_m_s, self.units.quick_deceleration_m_s2());
-    }
-
-    /// Executes the transition after a ramp.
-    fn end_ramp(&mut self) {
-        if self.motion.is_ramping() {
-            return;
-        }
-        match self.state() {
-            State::FaultReactionActive => {
-                self.machine.fault_reaction_done();
-                self.motion.off();
-            }
-            State::QuickStopActive
-                if !matches!(self.number(self.slots.quick_stop_option), 5 | 6) =>
-            {
-                self.machine.quick_stop_done();
-                self.motion.off();
-            }
-            // The ramp of a shutdown, or of a disabled operation, is over.
-            State::ReadyToSwitchOn | State::SwitchedOn => self.motion.off(),
-            _ => {}
-        }
-    }
-
-    /// Enters the fault reaction. A drive that is not energised only reports a lost command.
-    pub(super) fn fault(&mut self, code: u16) {
-        if !matches!(self.state(), State::OperationEnabled | State::QuickStopActive) {
-            return;
-        }
-        self.set(self.slots.error_code, code.into());
-        self.machine.fault();
-        self.astray_us = 0;
-        match self.number(self.slots.fault_reaction_option) {
-            0 => {
-                self.machine.fault_reaction_done();
-                self.motion.off();
-            }
-            1 => self.slow_down(),
-            _ => self.stop_quickly(),
-        }
-    }
-
-    fn read_units(&mut self) {
+    pub(super) fn read_units(&mut self) {
         let dictionary = self.communication.dictionary();
-        self.units = Units::read(dictionary, &self.slots, self.parameters.counts_per_m);
+        let counts_per_m = self.parameters.counts_per_m;
+        self.units = Units::read(dictionary, &self.slots, counts_per_m, self.home_m)
+            .within(&self.parameters.switches);
     }
 
     pub(super) fn number(&self, slot: Slot) -> i64 {
@@ -344,44 +265,5 @@ impl DriveNode {
 
     pub(super) fn set(&mut self, slot: Slot, number: i64) {
         self.communication.dictionary_mut().set(slot, number);
-    }
-
-    /// Stores measurements and demands in the dictionary.
-    fn show(&mut self) {
-        let units = &self.units;
-        let Measured { position_m, velocity_m_s, force_n } = self.measured;
-        let demand_m = self.motion.demand_m().unwrap_or(position_m);
-        let values = [
-            (self.slots.position_demand, units.position(demand_m)),
-            (self.slots.position_internal, rounded(position_m * self.parameters.counts_per_m)),
-            (self.slots.position_actual, units.position(position_m)),
-            (self.slots.velocity_demand, units.velocity(self.motion.demand_m_s())),
-            (self.slots.velocity_actual, units.velocity(velocity_m_s)),
-            (self.slots.torque_actual, rounded(force_n / self.parameters.force_max_n * 1000.0)),
-            (self.slots.following_error, rounded(self.following_error_counts())),
-        ];
-        for (slot, number) in values {
-            self.set(slot, number);
-        }
-        self.show_statusword();
-    }
-
-    fn show_statusword(&mut self) {
-        let (_, coding) = self.state().coding();
-        let mut word = coding | Statusword::REMOTE;
-        if self.state() != State::NotReadyToSwitchOn {
-            word |= Statusword::VOLTAGE_ENABLED;
-        }
-        if self.motion.is_limited() {
-            word |= Statusword::INTERNAL_LIMIT;
-        }
-        let is_cyclic = self.mode().is_some();
-        if self.state() == State::OperationEnabled && is_cyclic && !self.is_halted {
-            word |= Statusword::FOLLOWS_TARGET;
-        }
-        if self.has_following_error {
-            word |= Statusword::FOLLOWING_ERROR;
-        }
-        self.set(self.slots.statusword, word.into());
     }
 }

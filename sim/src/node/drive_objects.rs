@@ -1,11 +1,14 @@
-//! The objects of a simulated drive, 0x6000 and above, and their slots.
+//! The objects of a simulated drive, 0x6000 and above.
 
+use ilc_rt::config::Quirks;
 use ilc_rt::fieldbus::canopen::pdo::{MappedObject, PdoNumber, TYPE_EVERY_SYNC};
-use ilc_rt::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
+use ilc_rt::fieldbus::canopen::{NodeId, ObjectAddress};
 use ilc_rt::fieldbus::cia402::{Mode, objects, pdo_map};
 
-use super::dictionary::{Allowed, Dictionary, Entry, Mappable, Slot};
+use super::dictionary::{Allowed, Entry, Mappable};
 use super::drive::DriveParameters;
+use super::drive_mode::DriveMode;
+use super::profile_objects;
 use super::standard_objects::{self, PdoDefault};
 use super::value::Value;
 
@@ -18,6 +21,10 @@ const DISPLAY_EVENT_MS: u16 = 100;
 
 /// Rated torque, and rated current, in thousandths.
 const RATED: u16 = 1000;
+/// Rated current, in milliamperes.
+const RATED_MA: u32 = 5_000;
+/// Voltage of the DC link, in millivolts.
+const DC_LINK_MV: u32 = 325_000;
 /// Positions in counts of the encoder.
 pub(super) const UNIT_COUNTS: u32 = 0x00B5_0000;
 /// Velocities in counts of the encoder per second.
@@ -34,12 +41,17 @@ pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
     let mode_map = [mapped(objects::MODE_OF_OPERATION, 8)];
     let display_map = [mapped(objects::MODE_DISPLAY, 8), mapped(objects::ERROR_CODE, 16)];
     let command_map = pdo_map::command_map(Mode::Csp);
+    let [command_map, status_map, motion_map] =
+        [&command_map[..], &pdo_map::STATUS_MAP, &pdo_map::DRIVE_MOTION_MAP]
+            .map(|map| present(map, &parameters.quirks));
     let default = |number, transmission, map| PdoDefault { number, transmission, event_ms: 0, map };
+    let status_type =
+        if parameters.quirks.statusword_on_event { TYPE_EVENT } else { TYPE_EVERY_SYNC };
     let pdos = [
         default(pdo_map::COMMAND_PDO, TYPE_EVERY_SYNC, &command_map[..]),
         default(PdoNumber::receive(1), TYPE_EVENT, &mode_map[..]),
-        default(pdo_map::STATUS_PDO, TYPE_EVERY_SYNC, &pdo_map::STATUS_MAP[..]),
-        default(pdo_map::DRIVE_MOTION_PDO, TYPE_EVERY_SYNC, &pdo_map::DRIVE_MOTION_MAP[..]),
+        default(pdo_map::STATUS_PDO, status_type, &status_map[..]),
+        default(pdo_map::DRIVE_MOTION_PDO, TYPE_EVERY_SYNC, &motion_map[..]),
         PdoDefault {
             event_ms: DISPLAY_EVENT_MS,
             ..default(PdoNumber::transmit(2), TYPE_EVENT, &display_map[..])
@@ -48,9 +60,32 @@ pub fn all(node: NodeId, parameters: &DriveParameters) -> Vec<Entry> {
     let mut entries =
         standard_objects::communication(node, DEVICE_TYPE, "ilc-sim CiA 402 drive", 402);
     entries.extend(standard_objects::process_data(node, &pdos));
-    entries.extend(words_and_options());
+    entries.extend(words_and_options(parameters));
     entries.extend(motion(parameters));
+    entries.extend(profile_objects::all(parameters));
     entries
+}
+
+/// Returns the objects that a drive with these quirks lacks.
+pub fn lacking(quirks: &Quirks) -> impl Iterator<Item = u16> {
+    [
+        (quirks.lacks_torque_offset, objects::TORQUE_OFFSET),
+        (quirks.lacks_torque, objects::TORQUE_ACTUAL),
+        (quirks.lacks_following_error, objects::FOLLOWING_ERROR_ACTUAL),
+        (quirks.lacks_interpolation_period, objects::INTERPOLATION_PERIOD),
+        (quirks.lacks_following_error_time, objects::FOLLOWING_ERROR_TIME),
+        (quirks.lacks_emergencies, objects::COB_ID_EMCY),
+        (quirks.lacks_emergencies, objects::INHIBIT_TIME_EMCY),
+    ]
+    .into_iter()
+    .filter_map(|(lacks, index)| lacks.then_some(index))
+}
+
+/// Returns the part of a map whose objects exist.
+fn present(map: &[MappedObject], quirks: &Quirks) -> Vec<MappedObject> {
+    let exists =
+        |object: &&MappedObject| lacking(quirks).all(|index| index != object.address.index);
+    map.iter().filter(exists).copied().collect()
 }
 
 const fn mapped(index: u16, bits: u8) -> MappedObject {
@@ -58,28 +93,28 @@ const fn mapped(index: u16, bits: u8) -> MappedObject {
 }
 
 /// Creates an object of this profile, with the profile's name.
-fn object(index: u16, value: Value) -> Entry {
+pub(super) fn object(index: u16, value: Value) -> Entry {
     Entry::read_only(index, 0, objects::name(index).unwrap_or("Object"), value)
 }
 
 /// Creates an object that the controller writes, also by RPDO.
-fn input(index: u16, value: Value) -> Entry {
+pub(super) fn input(index: u16, value: Value) -> Entry {
     let name = objects::name(index).unwrap_or("Object");
     Entry::read_write(index, 0, name, value).mappable(Mappable::Both)
 }
 
 /// Creates an object that the drive provides, also by TPDO.
-fn output(index: u16, value: Value) -> Entry {
+pub(super) fn output(index: u16, value: Value) -> Entry {
     object(index, value).mappable(Mappable::Transmit)
 }
 
 /// Creates an object that is configured once.
-fn setting(index: u16, sub: u8, value: Value) -> Entry {
+pub(super) fn setting(index: u16, sub: u8, value: Value) -> Entry {
     Entry::read_write(index, sub, objects::name(index).unwrap_or("Object"), value)
 }
 
-fn words_and_options() -> Vec<Entry> {
-    let modes = Mode::ALL.into_iter().fold(0, |modes, mode| modes | mode.supported_bit());
+fn words_and_options(parameters: &DriveParameters) -> Vec<Entry> {
+    let quick_stop = parameters.quirks.quick_stop_option;
     vec![
         // 0: no action, 1: fault, 2: disable voltage, 3: quick stop.
         setting(objects::CONNECTION_LOSS_OPTION, 0, Value::I16(1)).allowing(Allowed::Range(0, 3)),
@@ -87,7 +122,7 @@ fn words_and_options() -> Vec<Entry> {
         input(objects::CONTROLWORD, Value::U16(0)),
         output(objects::STATUSWORD, Value::U16(0)),
         // 0: power off; 1, 2: slow and quick ramp, then power off; 5, 6: the same, and hold.
-        setting(objects::QUICK_STOP_OPTION, 0, Value::I16(6))
+        setting(objects::QUICK_STOP_OPTION, 0, Value::I16(quick_stop))
             .allowing(Allowed::OneOf(&[0, 1, 2, 5, 6])),
         // 0: power off, 1: slow ramp, then power off.
         setting(objects::SHUTDOWN_OPTION, 0, Value::I16(0)).allowing(Allowed::OneOf(&[0, 1])),
@@ -97,9 +132,14 @@ fn words_and_options() -> Vec<Entry> {
         // 0: power off; 1, 2: slow and quick ramp, then power off.
         setting(objects::FAULT_REACTION_OPTION, 0, Value::I16(2))
             .allowing(Allowed::OneOf(&[0, 1, 2])),
-        input(objects::MODE_OF_OPERATION, Value::I8(0)).allowing(Allowed::OneOf(&[0, 8, 9])),
+        input(objects::MODE_OF_OPERATION, Value::I8(0)).allowing(Allowed::Modes),
         output(objects::MODE_DISPLAY, Value::I8(0)),
-        Entry::constant(objects::SUPPORTED_MODES, 0, "Supported drive modes", Value::U32(modes)),
+        Entry::constant(
+            objects::SUPPORTED_MODES,
+            0,
+            "Supported drive modes",
+            Value::U32(DriveMode::supported()),
+        ),
     ]
 }
 
@@ -110,6 +150,7 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
     let limit = objects::POSITION_LIMIT;
     let period = objects::INTERPOLATION_PERIOD;
     let range = objects::POSITION_RANGE_LIMIT;
+    let (cycle, exponent) = power_on_period(parameters);
     let deceleration = unsigned(counts(parameters.deceleration_m_s2));
     let mut entries = vec![
         output(objects::POSITION_DEMAND, Value::I32(0)),
@@ -133,6 +174,8 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
             "Motor rated torque",
             unsigned(parameters.force_max_n * 1000.0),
         ),
+        Entry::constant(objects::RATED_CURRENT, 0, "Motor rated current", Value::U32(RATED_MA)),
+        object(objects::DC_LINK_VOLTAGE, Value::U32(DC_LINK_MV)),
         output(objects::TORQUE_ACTUAL, Value::I16(0)),
         input(objects::TARGET_POSITION, Value::I32(0)),
         Entry::constant(limit, 0, "Highest sub-index", Value::U8(2)),
@@ -147,7 +190,8 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         setting(objects::POLARITY, 0, Value::U8(0))
             .allowing(Allowed::OneOf(&[0, 0x40, 0x80, 0xC0])),
         setting(objects::MAX_MOTOR_SPEED, 0, Value::U32(u32::MAX)),
-        setting(objects::PROFILE_ACCELERATION, 0, deceleration),
+        setting(objects::PROFILE_ACCELERATION, 0, deceleration)
+            .allowing(Allowed::Range(1, i64::from(u32::MAX))),
         setting(objects::PROFILE_DECELERATION, 0, deceleration)
             .allowing(Allowed::Range(1, i64::from(u32::MAX))),
         setting(objects::QUICK_STOP_DECELERATION, 0, deceleration)
@@ -162,8 +206,8 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         input(objects::VELOCITY_OFFSET, Value::I32(0)),
         input(objects::TORQUE_OFFSET, Value::I16(0)),
         Entry::constant(period, 0, "Highest sub-index", Value::U8(2)),
-        setting(period, 1, Value::U8(1)).allowing(Allowed::Range(1, 255)),
-        setting(period, 2, Value::I8(-3)).allowing(Allowed::Range(-6, 0)),
+        setting(period, 1, Value::U8(cycle)).allowing(Allowed::Range(1, 255)),
+        setting(period, 2, Value::I8(exponent)).allowing(Allowed::Range(-6, 0)),
         output(objects::FOLLOWING_ERROR_ACTUAL, Value::I32(0)),
         input(objects::TARGET_VELOCITY, Value::I32(0)),
     ];
@@ -185,83 +229,22 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
     entries
 }
 
+/// Returns 0x60C2 at power-on: one millisecond, or the cell's cycle where it cannot be written.
+fn power_on_period(parameters: &DriveParameters) -> (u8, i8) {
+    if !parameters.quirks.lacks_interpolation_period {
+        return (1, -3);
+    }
+    let mut exact = [(1, -6), (10, -5), (100, -4), (1000, -3), (10_000, -2)]
+        .into_iter()
+        .filter_map(|(unit_us, exponent)| {
+            let n_units = u8::try_from(parameters.cycle_us / unit_us).ok()?;
+            (u32::from(n_units) * unit_us == parameters.cycle_us).then_some((n_units, exponent))
+        });
+    exact.next().unwrap_or((1, -3))
+}
+
 /// Returns the integer nearest to a count, as wide as any object needs.
 #[expect(clippy::cast_possible_truncation, reason = "saturates; no count is NaN")]
 pub(super) fn rounded(counts: f64) -> i64 {
     counts.round() as i64
-}
-
-macro_rules! slots {
-    ($($name:ident = $index:expr, $sub:literal;)*) => {
-        /// The slots of the objects that the drive uses, looked up once.
-        #[derive(Clone, Copy, Debug)]
-        pub(super) struct DriveSlots {
-            $(pub(super) $name: Slot,)*
-        }
-
-        impl DriveSlots {
-            pub(super) fn find(dictionary: &Dictionary) -> Result<Self, AbortCode> {
-                Ok(Self { $($name: dictionary.find(ObjectAddress::new($index, $sub))?,)* })
-            }
-        }
-    };
-}
-
-slots! {
-    connection_loss_option = objects::CONNECTION_LOSS_OPTION, 0;
-    error_code = objects::ERROR_CODE, 0;
-    controlword = objects::CONTROLWORD, 0;
-    statusword = objects::STATUSWORD, 0;
-    quick_stop_option = objects::QUICK_STOP_OPTION, 0;
-    shutdown_option = objects::SHUTDOWN_OPTION, 0;
-    disable_option = objects::DISABLE_OPTION, 0;
-    halt_option = objects::HALT_OPTION, 0;
-    fault_reaction_option = objects::FAULT_REACTION_OPTION, 0;
-    mode = objects::MODE_OF_OPERATION, 0;
-    mode_display = objects::MODE_DISPLAY, 0;
-    position_demand = objects::POSITION_DEMAND, 0;
-    position_internal = objects::POSITION_INTERNAL, 0;
-    position_actual = objects::POSITION_ACTUAL, 0;
-    error_window = objects::FOLLOWING_ERROR_WINDOW, 0;
-    error_time_ms = objects::FOLLOWING_ERROR_TIME, 0;
-    velocity_demand = objects::VELOCITY_DEMAND, 0;
-    velocity_actual = objects::VELOCITY_ACTUAL, 0;
-    torque_actual = objects::TORQUE_ACTUAL, 0;
-    target_position = objects::TARGET_POSITION, 0;
-    position_min = objects::POSITION_LIMIT, 1;
-    position_max = objects::POSITION_LIMIT, 2;
-    velocity_max = objects::MAX_VELOCITY, 0;
-    range_min = objects::POSITION_RANGE_LIMIT, 1;
-    range_max = objects::POSITION_RANGE_LIMIT, 2;
-    home_offset = objects::HOME_OFFSET, 0;
-    polarity = objects::POLARITY, 0;
-    motor_speed_max = objects::MAX_MOTOR_SPEED, 0;
-    profile_deceleration = objects::PROFILE_DECELERATION, 0;
-    deceleration = objects::QUICK_STOP_DECELERATION, 0;
-    acceleration_max = objects::MAX_ACCELERATION, 0;
-    deceleration_max = objects::MAX_DECELERATION, 0;
-    torque_max = objects::MAX_TORQUE, 0;
-    current_max = objects::MAX_CURRENT, 0;
-    positive_torque = objects::POSITIVE_TORQUE_LIMIT, 0;
-    negative_torque = objects::NEGATIVE_TORQUE_LIMIT, 0;
-    encoder_increments = objects::ENCODER_RESOLUTION, 1;
-    encoder_revolutions = objects::ENCODER_RESOLUTION, 2;
-    velocity_increments = objects::VELOCITY_RESOLUTION, 1;
-    velocity_revolutions = objects::VELOCITY_RESOLUTION, 2;
-    gear_motor = objects::GEAR_RATIO, 1;
-    gear_shaft = objects::GEAR_RATIO, 2;
-    feed = objects::FEED_CONSTANT, 1;
-    feed_revolutions = objects::FEED_CONSTANT, 2;
-    velocity_numerator = objects::VELOCITY_FACTOR, 1;
-    velocity_denominator = objects::VELOCITY_FACTOR, 2;
-    acceleration_numerator = objects::ACCELERATION_FACTOR, 1;
-    acceleration_denominator = objects::ACCELERATION_FACTOR, 2;
-    position_unit = objects::POSITION_UNIT, 0;
-    velocity_unit = objects::VELOCITY_UNIT, 0;
-    position_offset = objects::POSITION_OFFSET, 0;
-    velocity_offset = objects::VELOCITY_OFFSET, 0;
-    period = objects::INTERPOLATION_PERIOD, 1;
-    period_exponent = objects::INTERPOLATION_PERIOD, 2;
-    following_error = objects::FOLLOWING_ERROR_ACTUAL, 0;
-    target_velocity = objects::TARGET_VELOCITY, 0;
 }

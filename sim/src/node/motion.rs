@@ -1,5 +1,6 @@
 //! From targets to demands: interpolation between SYNCs, limits, and ramps to standstill.
 
+use super::profile::{Goal, Profile, ProfileLaw};
 use crate::plant::Demand;
 
 /// Time after which a ramp counts as over once its demand is zero, even if the axis still creeps.
@@ -44,6 +45,12 @@ enum Phase {
     },
     Hold {
         position_m: f64,
+    },
+    /// Follows the drive's own profile.
+    Profile {
+        profile: Profile,
+        goal: Goal,
+        law: ProfileLaw,
     },
 }
 
@@ -98,7 +105,9 @@ impl Motion {
             Phase::Position { .. } | Phase::Hold { .. } => {
                 self.demand_m().unwrap_or(self.limited_m)
             }
-            Phase::Off | Phase::Velocity { .. } | Phase::Ramp { .. } => return,
+            Phase::Off | Phase::Velocity { .. } | Phase::Ramp { .. } | Phase::Profile { .. } => {
+                return;
+            }
         };
         self.last_delta_m = target_m - start_m;
         self.phase = Phase::Position { start_m, end_m: target_m, elapsed_s: 0.0, period_s };
@@ -123,6 +132,39 @@ impl Motion {
         }
     }
 
+    /// Starts, or changes, the drive's own profile; a ramp or an idle drive is left alone.
+    pub fn pursue(&mut self, goal: Goal, law: ProfileLaw) {
+        let profile = match self.phase {
+            Phase::Profile { profile, .. } => profile,
+            Phase::Hold { position_m } => Profile { position_m, velocity_m_s: 0.0 },
+            Phase::Off | Phase::Position { .. } | Phase::Velocity { .. } | Phase::Ramp { .. } => {
+                return;
+            }
+        };
+        self.phase = Phase::Profile { profile, goal, law };
+    }
+
+    /// Returns whether the drive follows its own profile.
+    pub fn is_profile(&self) -> bool {
+        matches!(self.phase, Phase::Profile { .. })
+    }
+
+    /// Returns whether the axis is held, or its profile is where it wants to be.
+    pub fn has_arrived(&self) -> bool {
+        match self.phase {
+            Phase::Profile { profile, goal, .. } => profile.has_reached(goal),
+            Phase::Hold { .. } => true,
+            Phase::Off | Phase::Position { .. } | Phase::Velocity { .. } | Phase::Ramp { .. } => {
+                false
+            }
+        }
+    }
+
+    /// Returns whether the axis is held, so that a profile may begin.
+    pub fn is_holding(&self) -> bool {
+        matches!(self.phase, Phase::Hold { .. })
+    }
+
     /// Returns the interpolated position before limits; `None` if the drive does not control
     /// position.
     pub fn demand_m(&self) -> Option<f64> {
@@ -133,6 +175,7 @@ impl Motion {
                 Some(if share < 1.0 { start_m + (end_m - start_m) * share } else { end_m })
             }
             Phase::Hold { position_m } => Some(position_m),
+            Phase::Profile { profile, .. } => Some(profile.position_m),
             Phase::Off | Phase::Velocity { .. } | Phase::Ramp { .. } => None,
         }
     }
@@ -144,6 +187,7 @@ impl Motion {
             Phase::Position { elapsed_s, period_s, .. } if elapsed_s < period_s => {
                 self.last_delta_m / period_s
             }
+            Phase::Profile { profile, .. } => profile.velocity_m_s,
             Phase::Off | Phase::Position { .. } | Phase::Hold { .. } => 0.0,
         }
     }
@@ -151,11 +195,6 @@ impl Motion {
     /// Returns true if a limit of the drive changed the demand.
     pub fn is_limited(&self) -> bool {
         self.is_limited
-    }
-
-    /// Returns whether a target is being followed, not a ramp or a hold.
-    pub fn follows_target(&self) -> bool {
-        matches!(self.phase, Phase::Position { .. } | Phase::Velocity { .. })
     }
 
     /// Returns whether there is a ramp under way.
@@ -177,6 +216,13 @@ impl Motion {
             Phase::Off => return Demand::Off,
             Phase::Position { elapsed_s, .. } => *elapsed_s += dt_s,
             Phase::Hold { .. } => {}
+            Phase::Profile { profile, goal, law } => {
+                profile.step(*goal, law, dt_s);
+                let Profile { position_m, velocity_m_s } = *profile;
+                (self.limited_m, self.rate_m_s) = (position_m, velocity_m_s);
+                // Its own velocity is fed forward, so that the axis does not lag behind.
+                return Demand::Position { position_m, velocity_m_s };
+            }
             Phase::Velocity { velocity_m_s: wanted_m_s } => {
                 let wanted_m_s = *wanted_m_s;
                 return self.velocity_demand(wanted_m_s, limits, position_m, dt_s);

@@ -25,6 +25,8 @@ struct Pdo {
     latched: Option<Frame>,
     last_sent: Option<Frame>,
     n_syncs: u8,
+    /// Counter of the SYNC at which it begins; `None` once it has begun, or for any.
+    begins_at: Option<u8>,
     /// Time since the last reception or transmission; `None` while the timer is not armed.
     since_us: Option<u64>,
 }
@@ -41,6 +43,7 @@ impl Pdo {
         latched: None,
         last_sent: None,
         n_syncs: 0,
+        begins_at: None,
         since_us: None,
     };
 
@@ -56,6 +59,7 @@ impl Pdo {
             transmission: u8::try_from(communication(2)).unwrap_or(1),
             event_ms: communication(5),
             inhibit_us: u64::from(communication(3)) * 100,
+            begins_at: u8::try_from(communication(6)).ok().filter(|counter| *counter > 0),
             ..Self::EMPTY
         };
         let mapping =
@@ -166,17 +170,31 @@ impl PdoEngine {
     }
 
     /// Sends the TPDOs due at this SYNC.
-    pub fn transmit_at_sync(&mut self, dictionary: &Dictionary, out: &mut dyn FnMut(Frame)) {
+    pub fn transmit_at_sync(
+        &mut self,
+        counter: Option<u8>,
+        dictionary: &Dictionary,
+        out: &mut dyn FnMut(Frame),
+    ) {
         for pdo in &mut self.transmit {
             let Some(cob_id) = pdo.cob_id else { continue };
             if !pdo.is_synchronous() {
                 continue;
             }
+            let mut begins = false;
+            // A SYNC without counter cannot be waited for.
+            if let (Some(first), Some(counter)) = (pdo.begins_at, counter) {
+                begins = first == counter;
+                if !begins {
+                    continue;
+                }
+            }
+            pdo.begins_at = None;
             pdo.n_syncs += 1;
             let frame = pdo.pack(cob_id, dictionary);
             let due = match pdo.transmission {
                 0 => pdo.last_sent != Some(frame),
-                every => pdo.n_syncs >= every,
+                every => begins || pdo.n_syncs >= every,
             };
             if due || pdo.transmission == 0 {
                 pdo.n_syncs = 0;

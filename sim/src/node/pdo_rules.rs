@@ -37,7 +37,7 @@ pub fn check(
         return match address.sub {
             1 => check_cob_id(parameter(dictionary, address), value),
             2 if (241..=253).contains(&value) => Err(AbortCode::ValueRange),
-            3 if is_valid(dictionary, pdo) => Err(AbortCode::DeviceState),
+            3 | 6 if is_valid(dictionary, pdo) => Err(AbortCode::DeviceState),
             _ => Ok(()),
         };
     }

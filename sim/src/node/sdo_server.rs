@@ -15,6 +15,12 @@ pub trait Objects {
     /// The abort code of the answer.
     fn read(&self, address: ObjectAddress) -> Result<Value, AbortCode>;
 
+    /// Returns a value of the type of an object, even if it cannot be read.
+    ///
+    /// # Errors
+    /// The abort code of the answer.
+    fn shape(&self, address: ObjectAddress) -> Result<Value, AbortCode>;
+
     /// Writes an object.
     ///
     /// # Errors
@@ -136,7 +142,7 @@ impl SdoServer {
         objects: &dyn Objects,
     ) -> Result<SdoResponse, AbortCode> {
         self.transfer = Transfer::None;
-        objects.read(address)?;
+        objects.shape(address)?;
         if size.is_some_and(|size| usize::try_from(size).map_or(true, |size| size > TEXT_MAX)) {
             return Err(AbortCode::TooLong);
         }
@@ -178,7 +184,7 @@ fn write_expedited(
     data: Expedited,
     objects: &mut dyn Objects,
 ) -> Result<SdoResponse, AbortCode> {
-    let present = objects.read(address)?;
+    let present = objects.shape(address)?;
     let bytes =
         if data.size_indicated() { data.data() } else { &data.data()[..present.len().min(4)] };
     objects.write(address, bytes)?;
@@ -205,6 +211,10 @@ mod tests {
     impl Objects for One {
         fn read(&self, address: ObjectAddress) -> Result<Value, AbortCode> {
             if address.index == 0x2000 { Ok(self.0) } else { Err(AbortCode::NoObject) }
+        }
+
+        fn shape(&self, address: ObjectAddress) -> Result<Value, AbortCode> {
+            self.read(address)
         }
 
         fn write(&mut self, _: ObjectAddress, bytes: &[u8]) -> Result<(), AbortCode> {

@@ -60,6 +60,13 @@ pub fn communication(
         Entry::read_write(objects::STORE_PARAMETERS, 1, "Save all parameters", Value::U32(1)),
         Entry::constant(objects::RESTORE_DEFAULTS, 0, "Highest sub-index", Value::U8(1)),
         Entry::read_write(objects::RESTORE_DEFAULTS, 1, "Restore all defaults", Value::U32(1)),
+        // No node guarding: the objects are there, and refuse to be written.
+        Entry::constant(objects::GUARD_TIME, 0, "Guard time", Value::U16(0)),
+        Entry::constant(objects::LIFE_TIME_FACTOR, 0, "Life time factor", Value::U8(0)),
+        Entry::read_write(objects::INHIBIT_TIME_EMCY, 0, "Inhibit time EMCY", Value::U16(0)),
+        Entry::constant(objects::VERIFY_CONFIGURATION, 0, "Highest sub-index", Value::U8(2)),
+        Entry::read_write(objects::VERIFY_CONFIGURATION, 1, "Configuration date", Value::U32(0)),
+        Entry::read_write(objects::VERIFY_CONFIGURATION, 2, "Configuration time", Value::U32(0)),
         Entry::constant(objects::COB_ID_EMCY, 0, "COB-ID EMCY", Value::U32(0x80 + id)),
         Entry::constant(objects::CONSUMER_HEARTBEAT, 0, "Highest sub-index", Value::U8(1)),
         Entry::read_write(objects::CONSUMER_HEARTBEAT, 1, "Consumer heartbeat time", Value::U32(0)),
@@ -123,7 +130,7 @@ fn one_pdo(node: NodeId, number: PdoNumber, default: Option<&PdoDefault<'_>>) ->
         entries.push(Entry::read_write(communication, 3, "Inhibit time", Value::U16(0)));
         entries.push(
             Entry::read_write(communication, 6, "SYNC start value", Value::U8(0))
-                .allowing(Allowed::OneOf(&[0])),
+                .allowing(Allowed::Range(0, 240)),
         );
     }
     let mapping = number.mapping_index();

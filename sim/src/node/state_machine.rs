@@ -139,6 +139,8 @@ fn next(state: State, request: Request, reset_rises: bool) -> State {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     /// For each state, the state that follows each of: disable voltage, quick stop, shutdown,
@@ -165,6 +167,98 @@ mod tests {
             for (word, follower) in words.into_iter().zip(followers) {
                 let mut machine = StateMachine { state, previous: 0 };
                 assert_eq!(machine.command(word), follower, "{state} under 0x{word:02X}");
+            }
+        }
+    }
+
+    /// The commands of the profile: mask and value of a controlword, then the transitions.
+    const COMMANDS: [(u16, u16, &[(State, State)]); 6] = {
+        use State::{
+            OperationEnabled as Enabled, QuickStopActive as QuickStop, ReadyToSwitchOn as Ready,
+            SwitchOnDisabled as Disabled, SwitchedOn as On,
+        };
+        [
+            (0x87, 0x06, &[(Disabled, Ready), (On, Ready), (Enabled, Ready)]),
+            (0x8F, 0x07, &[(Ready, On), (Enabled, On)]),
+            (0x8F, 0x0F, &[(Ready, Enabled), (On, Enabled), (QuickStop, Enabled)]),
+            (
+                0x82,
+                0x00,
+                &[(Ready, Disabled), (On, Disabled), (Enabled, Disabled), (QuickStop, Disabled)],
+            ),
+            (0x86, 0x02, &[(Ready, Disabled), (On, Disabled), (Enabled, QuickStop)]),
+            (0x80, 0x80, &[]),
+        ]
+    };
+
+    #[derive(Clone, Copy, Debug)]
+    enum Happening {
+        Word(u16),
+        Fault,
+        ReactionDone,
+        StopDone,
+    }
+
+    /// Returns what the tables of the profile say.
+    fn expected(state: State, previous: u16, happening: Happening) -> State {
+        use State::{
+            Fault, FaultReactionActive, OperationEnabled, QuickStopActive, SwitchOnDisabled,
+        };
+        match (happening, state) {
+            (Happening::Word(word), Fault) => {
+                if word & !previous & 0x80 == 0 {
+                    Fault
+                } else {
+                    SwitchOnDisabled
+                }
+            }
+            (Happening::Word(word), _) => COMMANDS
+                .iter()
+                .find(|(mask, value, _)| word & mask == *value)
+                .and_then(|(_, _, moves)| moves.iter().find(|(from, _)| *from == state))
+                .map_or(state, |(_, to)| *to),
+            (Happening::Fault, OperationEnabled | QuickStopActive | FaultReactionActive) => {
+                FaultReactionActive
+            }
+            (Happening::Fault, _) | (Happening::ReactionDone, FaultReactionActive) => Fault,
+            (Happening::StopDone, QuickStopActive) => SwitchOnDisabled,
+            (Happening::ReactionDone | Happening::StopDone, _) => state,
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
+        #[test]
+        fn any_sequence_of_events_follows_the_tables(
+            happenings in prop::collection::vec(
+                prop_oneof![
+                    4 => prop_oneof![
+                        Just(0x06_u16), Just(0x07), Just(0x0F), Just(0x02), Just(0x00), Just(0x80),
+                        any::<u16>(),
+                    ].prop_map(Happening::Word),
+                    1 => Just(Happening::Fault),
+                    1 => Just(Happening::ReactionDone),
+                    1 => Just(Happening::StopDone),
+                ],
+                1..60,
+            )
+        ) {
+            let mut machine = StateMachine::default();
+            machine.initialised();
+            let (mut state, mut previous) = (State::SwitchOnDisabled, 0);
+            for happening in happenings {
+                state = expected(state, previous, happening);
+                match happening {
+                    Happening::Word(word) => {
+                        machine.command(word);
+                        previous = word;
+                    }
+                    Happening::Fault => machine.fault(),
+                    Happening::ReactionDone => machine.fault_reaction_done(),
+                    Happening::StopDone => machine.quick_stop_done(),
+                }
+                prop_assert_eq!(machine.state(), state, "after {:?}", happening);
             }
         }
     }

@@ -5,7 +5,9 @@ use ilc_rt::fieldbus::canopen::emcy;
 use ilc_rt::fieldbus::cia402::{Mode, State};
 
 use super::drive::DriveNode;
+use super::drive_mode::DriveMode;
 use super::drive_objects::rounded;
+use super::homing::Homing;
 
 /// Value of the window that disables the following-error monitor.
 const WINDOW_OFF: i64 = 0xFFFF_FFFF;
@@ -27,9 +29,10 @@ impl DriveNode {
         let has_position = dictionary.take_written(self.slots.target_position);
         let has_velocity = dictionary.take_written(self.slots.target_velocity);
         match self.mode() {
-            Some(Mode::Csp) => self.take_position(has_position),
-            Some(Mode::Csv) => self.take_velocity(has_velocity),
-            None => {}
+            Some(DriveMode::Cyclic(Mode::Csp)) => self.take_position(has_position),
+            Some(DriveMode::Cyclic(Mode::Csv)) => self.take_velocity(has_velocity),
+            // The drive's own modes take their targets when they need them.
+            _ => {}
         }
     }
 
@@ -60,16 +63,32 @@ impl DriveNode {
         }
         let (wanted, shown) =
             (dictionary.number(self.slots.mode), dictionary.number(self.slots.mode_display));
+        if wanted == shown {
+            return;
+        }
+        if !self.communication.may_change_mode() {
+            self.set(self.slots.mode, shown);
+            return;
+        }
+        let dictionary = self.communication.dictionary_mut();
         dictionary.set(self.slots.mode_display, wanted);
-        if wanted != shown && self.state() == State::OperationEnabled {
-            self.motion.hold(self.measured.position_m);
+        self.forget_targets();
+        self.drop_own_motion();
+        self.homing = Homing::default();
+        if self.state() == State::OperationEnabled && !self.motion.is_ramping() {
+            // From a profile under way the axis slows down first.
+            if self.motion.has_arrived() || !self.motion.is_profile() {
+                self.motion.hold(self.measured.position_m);
+            } else {
+                self.slow_down();
+            }
         }
     }
 
     pub(super) fn watch_following_error(&mut self, step_us: u32, out: &mut dyn FnMut(Frame)) {
         let window = self.number(self.slots.error_window);
         let watched = self.state() == State::OperationEnabled
-            && self.mode() == Some(Mode::Csp)
+            && self.controls_position()
             && window != WINDOW_OFF;
         if !watched || rounded(self.following_error_counts()).abs() <= window {
             self.astray_us = 0;
@@ -90,8 +109,15 @@ impl DriveNode {
         self.units.distance(demand_m - self.measured.position_m)
     }
 
-    pub(super) fn mode(&self) -> Option<Mode> {
-        i8::try_from(self.number(self.slots.mode_display)).ok().and_then(Mode::from_code)
+    fn controls_position(&self) -> bool {
+        matches!(
+            self.mode(),
+            Some(DriveMode::ProfilePosition | DriveMode::Homing | DriveMode::Cyclic(Mode::Csp))
+        )
+    }
+
+    pub(super) fn mode(&self) -> Option<DriveMode> {
+        DriveMode::from_code(self.number(self.slots.mode_display))
     }
 
     pub(super) fn period_s(&self) -> f64 {

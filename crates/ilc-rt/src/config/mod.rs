@@ -22,7 +22,7 @@ pub use cell::{
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, read_beside, read_file};
 pub use learning::{Learning, Measure};
-pub use simulation::{AxisSimulation, NOMINAL_TEMPERATURE_K, Simulation, SimulationChange};
+pub use simulation::{AxisSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange};
 pub use validate::check;
 
 pub use crate::learning::law::catalogue::LawName;

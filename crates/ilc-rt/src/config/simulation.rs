@@ -136,6 +136,69 @@ pub struct AxisSimulation {
     pub expansion_per_k: f64,
     /// Position at power-on.
     pub position_start_m: f64,
+    /// Place of the negative limit switch; a twentieth of the travel below `position_min_m` if absent.
+    pub switch_min_m: Option<f64>,
+    /// Place of the positive limit switch; a twentieth of the travel above `position_max_m` if absent.
+    pub switch_max_m: Option<f64>,
+    /// Place of the home switch, which is closed from there upwards; none if absent.
+    pub switch_home_m: Option<f64>,
+    /// Distance of the encoder's index pulses.
+    #[schemars(range(min = 1e-6, max = 1000.0))]
+    pub index_pitch_m: f64,
+    /// Further digital inputs that are on, as bits of object 0x60FD: 3 interlock, 16 to 31 free.
+    pub digital_inputs: u32,
+    /// Deviations from the drive that the profile describes.
+    pub quirks: Quirks,
+}
+
+/// `[axis.simulation.quirks]`: habits of real drives, to try a master against.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of its own")]
+pub struct Quirks {
+    /// Quick-stop option 0x605A at power-on: 0, 1, 2, 5 or 6.
+    #[schemars(range(min = 0, max = 6))]
+    pub quick_stop_option: i16,
+    /// A change of mode is refused while the halt bit is set.
+    pub keeps_mode_under_halt: bool,
+    /// TPDO1, with the statusword, is sent on change instead of at SYNC.
+    pub statusword_on_event: bool,
+    /// Time until an SDO request is answered.
+    #[schemars(range(min = 0, max = 10_000))]
+    pub sdo_delay_ms: u32,
+    /// One SYNC in so many is not heard; 0 for none.
+    pub sync_lost_every: u32,
+    /// No torque offset, 0x60B2: RPDO1 has 6 bytes at power-on.
+    pub lacks_torque_offset: bool,
+    /// No torque, 0x6077: TPDO1 has 6 bytes at power-on.
+    pub lacks_torque: bool,
+    /// No following error, 0x60F4: TPDO2 has 4 bytes at power-on.
+    pub lacks_following_error: bool,
+    /// No interpolation period, 0x60C2: the drive takes the cycle of the cell.
+    pub lacks_interpolation_period: bool,
+    /// No timeout of the following error, 0x6066.
+    pub lacks_following_error_time: bool,
+    /// No emergency messages, and no 0x1014.
+    pub lacks_emergencies: bool,
+}
+
+impl Default for Quirks {
+    fn default() -> Self {
+        Self {
+            quick_stop_option: 6,
+            keeps_mode_under_halt: false,
+            statusword_on_event: false,
+            sdo_delay_ms: 0,
+            sync_lost_every: 0,
+            lacks_torque_offset: false,
+            lacks_torque: false,
+            lacks_following_error: false,
+            lacks_interpolation_period: false,
+            lacks_following_error_time: false,
+            lacks_emergencies: false,
+        }
+    }
 }
 
 impl Default for AxisSimulation {
@@ -161,6 +224,12 @@ impl Default for AxisSimulation {
             resistance_per_k: 0.0,
             expansion_per_k: 0.0,
             position_start_m: 0.0,
+            switch_min_m: None,
+            switch_max_m: None,
+            switch_home_m: None,
+            index_pitch_m: 0.01,
+            digital_inputs: 0,
+            quirks: Quirks::default(),
         }
     }
 }

@@ -27,6 +27,10 @@ fn frame() -> impl Strategy<Value = Frame> {
         Just(0x6040_u16),
         Just(0x6060),
         Just(0x607A),
+        Just(0x6098),
+        Just(0x6099),
+        Just(0x6081),
+        Just(0x2002),
         Just(0x60C2),
         Just(0x6065),
         Just(0x1017),
@@ -49,6 +53,41 @@ fn frame() -> impl Strategy<Value = Frame> {
     let payload =
         prop_oneof![prop::collection::vec(any::<u8>(), 0..=8), request, command, nmt, Just(vec![])];
     (id, payload).prop_map(|(id, payload)| Frame::new(id, &payload).unwrap())
+}
+
+/// Frames of a stranger: one number after the other, from a seed.
+struct Strangers(u64);
+
+impl Strangers {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    fn frame(&mut self) -> Frame {
+        let [a, b, len, ..] = self.next().to_le_bytes();
+        let payload = self.next().to_le_bytes();
+        let id = u16::from_le_bytes([a, b]) & 0x7FF;
+        Frame::new(id, &payload[..usize::from(len % 9)]).unwrap()
+    }
+}
+
+#[test]
+fn a_million_random_frames_leave_the_drive_alive_and_its_axis_still() {
+    let mut bench = Bench::started(Mode::Csp);
+    let mut strangers = Strangers(ilc_cases::seed() | 1);
+    let start_m = bench.bus.responder().plant().encoder_m(0);
+    for _ in 0..1_000_000 {
+        bench.bus.send(&strangers.frame()).unwrap();
+        while bench.bus.recv(Duration::ZERO).unwrap().is_some() {}
+    }
+    assert_eq!(bench.bus.responder().plant().encoder_m(0).to_bits(), start_m.to_bits());
+    // Whatever state the strangers left: it boots, answers and can be enabled.
+    ilc_rt::fieldbus::bring_up::bring_up(&mut bench.bus, &crate::bench::setup(Mode::Csp)).unwrap();
+    bench.bus.send(&ilc_rt::fieldbus::canopen::NmtCommand::Start.frame(None)).unwrap();
+    bench.enable(crate::bench::counts(crate::bench::START_M));
 }
 
 proptest! {

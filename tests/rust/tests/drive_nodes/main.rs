@@ -8,8 +8,10 @@
 
 mod bench;
 mod bring_up;
+mod communication;
 mod determinism;
 mod faults;
 mod garbage;
 mod motion;
 mod objects;
+mod profiles;

@@ -28,7 +28,7 @@ fn wrong_writes_are_refused_for_the_right_reason() {
         (0x1018, 9, &[0], AbortCode::NoSubIndex),
         (0x6040, 0, &[0], AbortCode::TooShort),
         (0x6040, 0, &[0; 4], AbortCode::TooLong),
-        (0x6060, 0, &[1], AbortCode::ValueRange),
+        (0x6060, 0, &[7], AbortCode::ValueRange),
         (0x60C2, 1, &[0], AbortCode::ValueTooLow),
         (0x60C2, 2, &[1], AbortCode::ValueTooHigh),
         (0x1800, 2, &[245], AbortCode::ValueRange),
@@ -126,6 +126,15 @@ fn every_object_of_the_data_sheet_can_be_read_and_has_its_default() {
     let text = eds::write(bench.bus.responder().dictionary(node(1)).unwrap(), "drive");
     assert!(entries.len() > 150, "{} objects", entries.len());
     for entry in entries {
+        if entry.access == Access::WriteOnly {
+            let refusal = client.upload(&mut bench.bus, entry.address.index, entry.address.sub);
+            assert!(
+                matches!(refusal, Err(SdoError::Aborted { code: AbortCode::WriteOnly, .. })),
+                "{}",
+                entry.address
+            );
+            continue;
+        }
         let found = client.upload(&mut bench.bus, entry.address.index, entry.address.sub).unwrap();
         if entry.access == Access::Constant {
             assert_eq!(found, entry.power_on.encode().as_bytes(), "{}", entry.address);

@@ -137,5 +137,18 @@ fn check_simulation(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), Config
     // Any position that can be expressed in counts: an axis that starts outside its limits is worth
     // simulating.
     let farthest_m = f64::from(i32::MAX) / axis.counts_per_m;
-    v.range(&at("simulation.position_start_m"), s.position_start_m, -farthest_m, farthest_m)
+    v.range(&at("simulation.position_start_m"), s.position_start_m, -farthest_m, farthest_m)?;
+    for (key, place_m) in [
+        ("simulation.switch_min_m", s.switch_min_m),
+        ("simulation.switch_max_m", s.switch_max_m),
+        ("simulation.switch_home_m", s.switch_home_m),
+    ] {
+        v.range(&at(key), place_m.unwrap_or(0.0), -farthest_m, farthest_m)?;
+    }
+    if let (Some(low_m), Some(high_m)) = (s.switch_min_m, s.switch_max_m) {
+        v.that(low_m < high_m, &at("simulation.switch_min_m"), &low_m, "below switch_max_m")?;
+    }
+    let option = s.quirks.quick_stop_option;
+    let key = at("simulation.quirks.quick_stop_option");
+    v.that([0, 1, 2, 5, 6].contains(&option), &key, &option, "0, 1, 2, 5 or 6")
 }

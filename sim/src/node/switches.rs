@@ -1,0 +1,78 @@
+//! The switches and the index pulses of an axis, simulated from its position.
+
+/// Where the switches of an axis are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Switches {
+    /// The negative limit switch is closed from here downwards.
+    pub min_m: f64,
+    /// The positive limit switch is closed from here upwards.
+    pub max_m: f64,
+    /// The home switch is closed from here upwards.
+    pub home_m: Option<f64>,
+    /// Distance of the encoder's index pulses.
+    pub index_pitch_m: f64,
+}
+
+/// Bit of 0x60FD: the negative limit switch.
+const AT_MIN: i64 = 1 << 0;
+/// Bit of 0x60FD: the positive limit switch.
+const AT_MAX: i64 = 1 << 1;
+/// Bit of 0x60FD: the home switch.
+const AT_HOME: i64 = 1 << 2;
+
+/// What the switches and the encoder say in one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Seen {
+    /// Position of the encoder.
+    pub(super) position_m: f64,
+    /// The negative limit switch is closed.
+    pub(super) is_at_min: bool,
+    /// The positive limit switch is closed.
+    pub(super) is_at_max: bool,
+    /// Place of the index pulse that was passed since the last step.
+    pub(super) index_m: Option<f64>,
+}
+
+impl Switches {
+    /// Returns what is seen at a position, after another one.
+    pub(super) fn see(&self, before_m: f64, position_m: f64) -> Seen {
+        let turn = |place_m: f64| (place_m / self.index_pitch_m).floor();
+        let (from, to) = (turn(before_m), turn(position_m));
+        Seen {
+            position_m,
+            is_at_min: position_m <= self.min_m,
+            is_at_max: position_m >= self.max_m,
+            index_m: (from < to || to < from).then(|| from.max(to) * self.index_pitch_m),
+        }
+    }
+
+    /// Returns the bits of 0x60FD that the position sets.
+    pub(super) fn bits(&self, position_m: f64) -> i64 {
+        let bit = |is_closed, bit| if is_closed { bit } else { 0 };
+        bit(position_m <= self.min_m, AT_MIN)
+            | bit(position_m >= self.max_m, AT_MAX)
+            | bit(self.home_m.is_some_and(|home_m| position_m >= home_m), AT_HOME)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SWITCHES: Switches =
+        Switches { min_m: -0.02, max_m: 0.1, home_m: Some(0.05), index_pitch_m: 0.01 };
+
+    #[test]
+    fn pulses_are_seen_from_both_sides_at_the_same_place() {
+        assert_eq!(SWITCHES.see(0.019, 0.021).index_m, Some(0.02));
+        assert_eq!(SWITCHES.see(0.021, 0.019).index_m, Some(0.02));
+        assert_eq!(SWITCHES.see(0.021, 0.022).index_m, None);
+        assert_eq!(SWITCHES.see(-0.001, 0.001).index_m, Some(0.0));
+    }
+
+    #[test]
+    fn switches_have_their_bits() {
+        let bits = [-0.02, 0.0, 0.05, 0.1].map(|position_m| SWITCHES.bits(position_m));
+        assert_eq!(bits, [0b001, 0b000, 0b100, 0b110]);
+    }
+}
