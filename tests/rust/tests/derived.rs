@@ -5,12 +5,14 @@
 
 use std::fmt::Write as _;
 
-use ilc_rt::config::Cell;
+use ilc_rt::config::{Cell, LawName};
 use ilc_rt::fieldbus::transport::SCHEMES;
 use ilc_rt::record::{Event, Field, FieldKind, figure_fields};
 use ilc_rt::schema::{fill, for_editors, inlined};
 use ilc_tests::{hold_derived, hold_derived_file, root};
 
+/// Place in the cell reference before which sections of further laws are put.
+const FURTHER_LAWS: &str = "<!-- further laws -->";
 /// Columns of a line of the Python source.
 const WIDTH: usize = 88;
 
@@ -117,8 +119,14 @@ fn the_table_of_the_buses() {
     hold_derived("README.md", "buses", &table);
 }
 
+/// Returns the cell reference, with a section for every law that has none yet.
 fn reference() -> String {
-    std::fs::read_to_string(root().join("docs/cell.md")).unwrap()
+    let text = std::fs::read_to_string(root().join("docs/cell.md")).unwrap();
+    let mark = |law: &LawName| format!("<!-- keys of learning.{} -->\n", law.as_str());
+    let missing = LawName::ALL.iter().filter(|law| !text.contains(&mark(law)));
+    let sections = missing
+        .map(|law| format!("### `[learning.{}]`\n\n{}<!-- end -->\n\n", law.as_str(), mark(law)));
+    text.replacen(FURTHER_LAWS, &format!("{}{FURTHER_LAWS}", sections.collect::<String>()), 1)
 }
 
 #[test]

@@ -25,4 +25,4 @@ pub use learning::{Learning, Measure};
 pub use simulation::{AxisSimulation, Simulation};
 pub use validate::check;
 
-pub use crate::learning::law::catalogue::LawName;
+pub use crate::learning::law::LawName;
