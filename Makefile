@@ -16,12 +16,10 @@ SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o
            Cargo.toml Cargo.lock pyproject.toml README.md
 # Half of the Python tests wait for a process or for time to pass.
 JOBS    := $(shell expr 2 \* $$(nproc))
-# Tests that hold derived files against the source.
-DERIVED := --test derived --test derived_cell
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build derived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
+.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -48,14 +46,22 @@ $(VENV)/.test: $(VENV)/.built
 	wheel=$$(ls build/wheels/ilc_rt-*.whl) && $(BIN)/pip install --quiet "$$wheel[test]"
 	@touch $@
 
+$(VENV)/.docs: $(VENV)/.built
+	wheel=$$(ls build/wheels/ilc_rt-*.whl) && $(BIN)/pip install --quiet "$$wheel[docs]"
+	@touch $@
+
 $(VENV)/.bench: $(VENV)/.built
 	wheel=$$(ls build/wheels/ilc_rt-*.whl) && $(BIN)/pip install --quiet "$$wheel[bench]"
 	@touch $@
 
 build: $(VENV)/.built ## Build the binaries and the Python package into .venv
 
-derived: ## Write the files and tables that derive from the source
-	ILC_DERIVE=1 cargo test --release --workspace --quiet $(DERIVED)
+derived: export ILC_DERIVE = 1
+derived: underived ## Write the files and tables that derive from the source
+
+underived: $(VENV)/.test
+	cargo test --release --workspace --quiet --test derived
+	$(BIN)/python -m pytest -q tests/python/test_derived.py
 
 demo: build ## Ten runs on simulated drives, the error falling, and a report
 	$(BIN)/ilc demo
@@ -74,7 +80,7 @@ else
 endif
 	cargo test --release --workspace --doc
 
-test-python: $(VENV)/.test ## Python tests
+test-python: $(VENV)/.test $(VENV)/.docs ## Python tests
 	cargo build --release --workspace --example bus_echo
 	$(BIN)/python -m pytest -q --numprocesses $(JOBS) --dist loadfile
 
@@ -94,21 +100,23 @@ check: fmt lint test ## All that a change needs before review
 
 fmt: $(VENV)/.test ## Format
 	cargo fmt --all
-	$(BIN)/ruff format python papers tests examples
+	$(BIN)/ruff format python papers tests examples docs/conf.py
 
-lint: $(VENV)/.test ## Formatting, lints, types, layers, language
+lint: $(VENV)/.test docs underived ## Formatting, lints, types, layers, language, derived files, documentation
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
-	$(BIN)/ruff format --check python papers tests examples
-	$(BIN)/ruff check python papers tests examples
+	$(BIN)/ruff format --check python papers tests examples docs/conf.py
+	$(BIN)/ruff check python papers tests examples docs/conf.py
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest ilc_rt._native
 	$(BIN)/lint-imports
-	cargo test --release --workspace --quiet $(DERIVED)
 	$(BIN)/python tests/lint/language.py
 
-docs: ## Rust documentation, with warnings denied
+docs: $(VENV)/.docs ## The documentation site in build/docs, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d build/doctrees -c docs . build/docs
+	rm -rf build/docs/rust
+	cp -r $(TARGET)/doc build/docs/rust
 
 bench: $(VENV)/.bench ## Speed, as ratios; writes docs/benchmarks.md
 	rm -rf $(abspath $(TARGET))/criterion

@@ -17,7 +17,7 @@ controller in lock-step with simulated drives.
 The paper prints no sample time: 1, 2 and 4 ms are shown. Nor does it print acceleration and jerk
 of the moves (2 m/s² and 50 m/s³ here), or of the bench more than masses, 15 Hz and 20 Hz: friction,
 the crossbeam's mode and an orthogonality error of 2.5 mrad are chosen so that it behaves like the
-bench ([bench.toml](../../python/ilc_rt/reproduce/haas2016/bench.toml)). The bench runs at 4 ms with
+bench ([bench.toml](../../papers/ilc_papers/haas2016/bench.toml)). The bench runs at 4 ms with
 d = 3; what counts is the product of the two. The model knows neither friction nor mode.
 
 Its outlook is delivered: the optimisation runs on the controller, between the runs, and set points,

@@ -54,10 +54,11 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Check what a caller gave, as the planners do."""
-        for name in ("dt_s", "computing_s"):
+        for name, allowed in (("dt_s", "above 0"), ("computing_s", "of at least 0")):
             value = getattr(self, name)
-            if not isinstance(value, float) or not 0.0 <= value < np.inf:
-                message = f"{name} = {value!r}; a finite number of at least 0 is needed"
+            is_right = isinstance(value, float) and 0.0 <= value < np.inf
+            if not is_right or (name == "dt_s" and value == 0.0):
+                message = f"{name} = {value!r}; a finite number {allowed} is needed"
                 raise TrajectoryError(message)
         if not isinstance(self.alphas, list):
             message = f"alphas = {self.alphas!r}; a list is needed"

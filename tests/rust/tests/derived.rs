@@ -1,15 +1,18 @@
-//! Files that derive from the Rust source: the Python class of the figures, the schema of the events, and
-//! tables of the documents. `make derived` writes them.
+//! Files that derive from the Rust source: the Python class of the figures, the schemas of the cell
+//! description and of the events, and tables of the documents. `make derived` writes them.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
 use std::fmt::Write as _;
 
+use ilc_rt::config::{Cell, LawName};
 use ilc_rt::fieldbus::transport::SCHEMES;
 use ilc_rt::record::{Event, Field, FieldKind, figure_fields};
-use ilc_rt::schema::inlined;
-use ilc_tests::{hold_derived, hold_derived_file};
+use ilc_rt::schema::{fill, for_editors, inlined};
+use ilc_tests::{hold_derived, hold_derived_file, root};
 
+/// Place in the cell reference before which sections of further laws are put.
+const FURTHER_LAWS: &str = "<!-- further laws -->";
 /// Columns of a line of the Python source.
 const WIDTH: usize = 88;
 
@@ -114,4 +117,44 @@ fn the_table_of_the_buses() {
         let _ = writeln!(table, "| `{}` | {} |", scheme.syntax, scheme.summary);
     }
     hold_derived("README.md", "buses", &table);
+}
+
+/// Returns the cell reference, with a section for every law that has none yet.
+fn reference() -> String {
+    let text = std::fs::read_to_string(root().join("docs/cell.md")).unwrap();
+    let mark = |law: &LawName| format!("<!-- keys of learning.{} -->\n", law.as_str());
+    let missing = LawName::ALL.iter().filter(|law| !text.contains(&mark(law)));
+    let sections = missing
+        .map(|law| format!("### `[learning.{}]`\n\n{}<!-- end -->\n\n", law.as_str(), mark(law)));
+    text.replacen(FURTHER_LAWS, &format!("{}{FURTHER_LAWS}", sections.collect::<String>()), 1)
+}
+
+#[test]
+fn the_schema_for_editors() {
+    hold_derived_file("docs/cell.schema.json", &format!("{:#}\n", for_editors::<Cell>()));
+}
+
+#[test]
+fn the_tables_of_the_cell_reference() {
+    let text = fill(&reference(), inlined::<Cell>().as_value()).unwrap();
+    hold_derived_file("docs/cell.md", &text);
+}
+
+#[test]
+fn every_table_of_a_cell_is_in_its_reference() {
+    let (text, schema) = (reference(), inlined::<Cell>().to_value());
+    let mut open = vec![(String::new(), &schema)];
+    while let Some((path, table)) = open.pop() {
+        let table = table.get("items").unwrap_or(table);
+        for (name, key) in table["properties"].as_object().into_iter().flatten() {
+            let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+            let of = key.get("items").unwrap_or(key);
+            if of.get("properties").is_some() {
+                let is_program = path.starts_with("program.") && path != "program.segment";
+                let mark = format!("<!-- keys of {path} -->");
+                assert!(is_program || text.contains(&mark), "docs/cell.md lacks {mark}");
+                open.push((path, key));
+            }
+        }
+    }
 }

@@ -7,10 +7,14 @@ use ilc_rt::learning::law::through_jacobian::ThroughJacobian;
 use pyo3::prelude::*;
 
 use super::figure::Figure;
-use super::{Built, Call, Fits, Readable};
+use super::{Builder, Built, Call, Fits, Readable};
 use crate::error::OrRaise;
 use crate::python_law::Channels;
 use crate::weights::read_matrices;
+
+/// The laws of this file.
+pub(super) const BUILDERS: &[Builder] =
+    &[("gate", gate), ("ladder", ladder), ("through_jacobian", through_jacobian)];
 
 /// The inner law of a wrapper, of any kind.
 type Inner = Box<dyn Law>;

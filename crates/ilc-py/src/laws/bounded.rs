@@ -8,10 +8,13 @@ use pyo3::types::{PyList, PyTuple};
 
 use super::figure::Figure;
 use super::kinds::modelled;
-use super::{Built, Call, Readable};
+use super::{Builder, Built, Call, Readable};
 use crate::argument::{Signal, misfit, read_numbers};
 use crate::detached::detached;
 use crate::error::OrRaise;
+
+/// The laws of this file.
+pub(super) const BUILDERS: &[Builder] = &[("constrained", constrained)];
 
 pub(super) fn constrained(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;

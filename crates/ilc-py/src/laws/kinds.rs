@@ -8,11 +8,19 @@ use ilc_rt::model::StateSpace;
 use pyo3::prelude::*;
 
 use super::figure::Figure;
-use super::{Built, Call, Fits, Readable, Size};
+use super::{Builder, Built, Call, Fits, Readable, Size};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::python_law::Channels;
 use crate::signal::read_filter;
+
+/// The laws of this file.
+pub(super) const BUILDERS: &[Builder] = &[
+    ("pd", pd),
+    ("error_feedforward", error_feedforward),
+    ("adjoint", adjoint),
+    ("model_inverse", model_inverse),
+];
 
 pub(super) fn pd(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;

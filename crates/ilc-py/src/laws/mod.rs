@@ -1,7 +1,7 @@
 //! `Law`: the native Python class behind every learning law.
 //!
-//! The typed classes of `ilc_rt.laws` derive from it. A kind of law is one line in [`BUILDERS`] and
-//! one small function that builds it from its arguments; this file has the exchange of signals with
+//! The typed classes of `ilc_rt.laws` derive from it. A kind of law is a small function that
+//! builds it from its arguments, and a line of `BUILDERS` in the same file; this file has the exchange of signals with
 //! NumPy, the size of the runs, pickling, and the access to the law for analysis and campaign.
 
 mod apart;
@@ -36,23 +36,12 @@ pub(crate) use figure::Readable;
 /// A function that builds a law from its arguments.
 type Build = fn(&Call<'_, '_>) -> PyResult<Built>;
 
-/// The kinds of law with their builders.
-const BUILDERS: [(&str, Build); 14] = [
-    ("pd", kinds::pd),
-    ("error_feedforward", kinds::error_feedforward),
-    ("adjoint", kinds::adjoint),
-    ("model_inverse", kinds::model_inverse),
-    ("norm_optimal", optimal::plain),
-    ("contour", optimal::contour),
-    ("formation", optimal::formation),
-    ("dynamic", optimal::dynamic),
-    ("constrained", bounded::constrained),
-    ("gate", around::gate),
-    ("ladder", around::ladder),
-    ("through_jacobian", around::through_jacobian),
-    ("relevance", recalled::relevance),
-    ("flexible", recalled::flexible),
-];
+/// A name of a law and its builder.
+type Builder = (&'static str, Build);
+
+/// The kinds of law with their builders, a list in each file.
+const BUILDERS: [&[Builder]; 5] =
+    [kinds::BUILDERS, optimal::BUILDERS, bounded::BUILDERS, around::BUILDERS, recalled::BUILDERS];
 
 /// The size of a run, from its signals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -153,8 +142,9 @@ impl PyLaw {
     #[new]
     #[pyo3(signature = (kind, /, **arguments))]
     fn new(py: Python<'_>, kind: &str, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let Some((kind, build)) = BUILDERS.into_iter().find(|(name, _)| *name == kind) else {
-            let kinds: Vec<&str> = BUILDERS.iter().map(|(name, _)| *name).collect();
+        let mut builders = BUILDERS.into_iter().flatten().copied();
+        let Some((kind, build)) = builders.find(|(name, _)| *name == kind) else {
+            let kinds: Vec<&str> = BUILDERS.into_iter().flatten().map(|(name, _)| *name).collect();
             let line = format!("kind = '{kind}'; one of {} is needed", kinds.join(", "));
             return Err(PyValueError::new_err(line));
         };

@@ -9,7 +9,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::figure::Figure;
-use super::{Built, Call, Fits, Readable};
+use super::{Builder, Built, Call, Fits, Readable};
 use crate::argument::misfit;
 use crate::arguments::Arguments;
 use crate::detached::detached;
@@ -17,6 +17,14 @@ use crate::error::OrRaise;
 use crate::model_argument::{AnyModel, read_any_model, read_model};
 use crate::python_law::Channels;
 use crate::weights::{read_contour, read_formation_weight, read_matrices};
+
+/// The laws of this file.
+pub(super) const BUILDERS: &[Builder] = &[
+    ("norm_optimal", plain),
+    ("contour", contour),
+    ("formation", formation),
+    ("dynamic", dynamic),
+];
 
 /// The kinds that are class methods of `NormOptimalIlc`.
 pub(super) const METHODS: [&str; 3] = ["contour", "formation", "dynamic"];

@@ -9,13 +9,16 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use super::figure::{Figure, Readable};
-use super::{Built, Call, Fits, Size};
+use super::{Builder, Built, Call, Fits, Size};
 use crate::argument::read_disturbance;
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::library::PyLibrary;
 use crate::python_law::Channels;
 use crate::whole::number;
+
+/// The laws of this file.
+pub(super) const BUILDERS: &[Builder] = &[("relevance", relevance), ("flexible", flexible)];
 
 pub(super) fn relevance(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;

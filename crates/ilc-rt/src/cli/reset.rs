@@ -9,14 +9,16 @@ use crate::commissioning::{self, CommissioningError};
 use crate::fieldbus::bring_up::SdoClient;
 
 #[derive(Args)]
-#[command(after_help = "Names every fault first, then resets it; the drive stays switched off. Refused while another master
+#[command(
+    after_help = "Names every fault first, then resets it; the drive stays switched off. Refused while another master
 is at work.
 Exit status: 0 no fault is left, 2 refused, 3 a fault stays or a drive does not answer.
 
 Examples:
   ilc-rt reset gantry.toml
   ilc-rt reset gantry.toml --axis x --json -
-  ilc-rt reset can:can0 --node 1")]
+  ilc-rt reset can:can0 --node 1"
+)]
 pub(super) struct ResetArguments {
     /// Cell description, or address of a bus.
     #[arg(value_name = "CELL|BUS")]
@@ -28,13 +30,15 @@ pub(super) struct ResetArguments {
 }
 
 #[derive(Args)]
-#[command(after_help = "A drive that may be moving stops by its own quick-stop ramp first. Refused while another master is at
+#[command(
+    after_help = "A drive that may be moving stops by its own quick-stop ramp first. Refused while another master is at
 work: stop that one, and it switches its drives off itself.
 Exit status: 0 all are off, 2 refused, 3 a drive stays on or does not answer.
 
 Examples:
   ilc-rt disable gantry.toml
-  ilc-rt disable can:can0 --node 1")]
+  ilc-rt disable can:can0 --node 1"
+)]
 pub(super) struct DisableArguments {
     /// Cell description, or address of a bus.
     #[arg(value_name = "CELL|BUS")]

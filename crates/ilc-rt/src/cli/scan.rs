@@ -9,12 +9,14 @@ use crate::commissioning::{self, FoundNode};
 use crate::record::{TEXT_MAX, printable};
 
 #[derive(Args)]
-#[command(after_help = "Only reads objects: it changes nothing, and may run beside a running controller.
+#[command(
+    after_help = "Only reads objects: it changes nothing, and may run beside a running controller.
 Exit status: 0 done, 1 no node answered or one of the cell is missing, 2 refused.
 
 Examples:
   ilc-rt scan can:can0
-  ilc-rt scan gantry.toml --json -")]
+  ilc-rt scan gantry.toml --json -"
+)]
 pub(super) struct ScanArguments {
     /// Cell description, or address of a bus.
     #[arg(value_name = "CELL|BUS")]
@@ -76,7 +78,8 @@ fn found(arguments: &ScanArguments) -> Result<(serde_json::Value, u8), String> {
         .collect();
     let missing: Vec<u8> = missing.iter().map(|(node, _)| *node).collect();
     let master = company.master.map(|command| command.to_string());
-    let text = json!({ "bus": target.address, "master": master, "nodes": listed, "missing": missing });
+    let text =
+        json!({ "bus": target.address, "master": master, "nodes": listed, "missing": missing });
     Ok((text, status))
 }
 
@@ -86,10 +89,9 @@ fn described(node: &FoundNode, axis: Option<&str>) -> String {
         node.node,
         axis.map_or_else(String::new, |axis| format!(" (axis {axis})")),
         node.nmt.as_deref().unwrap_or("NMT state unknown (no heartbeat)"),
-        node.name.as_ref().map_or_else(String::new, |name| format!(
-            ", \"{}\"",
-            printable(name, TEXT_MAX)
-        )),
+        node.name
+            .as_ref()
+            .map_or_else(String::new, |name| format!(", \"{}\"", printable(name, TEXT_MAX))),
     )];
     let names = ["vendor", "product", "revision", "serial number"];
     let parts: Vec<String> = names

@@ -11,12 +11,14 @@ use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::Scale;
 
 #[derive(Args)]
-#[command(after_help = "Only reads objects: it changes nothing, and may run beside a running controller.
+#[command(
+    after_help = "Only reads objects: it changes nothing, and may run beside a running controller.
 Exit status: 0 done, 1 a drive does not answer, 2 refused.
 
 Examples:
   ilc-rt status gantry.toml
-  ilc-rt status gantry.toml --axis x --json -")]
+  ilc-rt status gantry.toml --axis x --json -"
+)]
 pub(super) struct StatusArguments {
     /// Cell description.
     cell: String,
@@ -39,7 +41,10 @@ fn read(arguments: &StatusArguments) -> Result<(serde_json::Value, u8), String> 
     let choice = Choice { axis: arguments.axis.clone(), node: Vec::new() };
     let chosen = target.chosen(&choice)?;
     let Some(cell) = target.cell.clone() else {
-        return Err(format!("{}: allowed: a cell description; `ilc-rt scan` reads a bus", arguments.cell));
+        return Err(format!(
+            "{}: allowed: a cell description; `ilc-rt scan` reads a bus",
+            arguments.cell
+        ));
     };
     let company = target.listen()?;
     company.lets_read().map_err(|error| target.said(&error))?;

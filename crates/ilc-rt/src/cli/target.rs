@@ -120,7 +120,8 @@ impl Target {
     /// One line with what is allowed.
     pub(super) fn chosen(&self, choice: &Choice) -> Result<Vec<(NodeId, String)>, String> {
         let named = |node: NodeId| {
-            let axis = self.axis_of(node.get()).map(|axis| format!("axis {} (node {node})", axis.name));
+            let axis =
+                self.axis_of(node.get()).map(|axis| format!("axis {} (node {node})", axis.name));
             (node, axis.unwrap_or_else(|| format!("node {node}")))
         };
         if !choice.axis.is_empty() || !choice.node.is_empty() {
@@ -150,9 +151,8 @@ pub(super) struct Choice {
 
 /// Refuses a name that no axis has.
 fn choice_of(cell: Option<&Cell>, name: &str) -> Result<(), String> {
-    let names: Vec<&str> = cell.map_or_else(Vec::new, |cell| {
-        cell.axes.iter().map(|axis| axis.name.as_str()).collect()
-    });
+    let names: Vec<&str> = cell
+        .map_or_else(Vec::new, |cell| cell.axes.iter().map(|axis| axis.name.as_str()).collect());
     if names.contains(&name) {
         return Ok(());
     }

@@ -13,7 +13,9 @@ pub enum CommissioningError {
     #[error("another master is at work on this bus ({0} heard); nothing was sent; stop it first")]
     Occupied(Command),
     /// Another master exchanges objects with this node; two at once get each other's answers.
-    #[error("another master reads or writes objects of node {0}; nothing was sent; try again when it is done")]
+    #[error(
+        "another master reads or writes objects of node {0}; nothing was sent; try again when it is done"
+    )]
     SdoTraffic(NodeId),
     /// The bus failed.
     #[error("{0}")]

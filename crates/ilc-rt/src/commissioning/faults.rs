@@ -34,12 +34,8 @@ impl Faults {
         let code = if self.code == 0 { self.history.first().copied() } else { Some(self.code) };
         let Some(code) = code else { return "no error code says why".to_owned() };
         let mut text = reported(code);
-        let earlier: Vec<String> = self
-            .history
-            .iter()
-            .filter(|each| **each != code)
-            .map(|each| reported(*each))
-            .collect();
+        let earlier: Vec<String> =
+            self.history.iter().filter(|each| **each != code).map(|each| reported(*each)).collect();
         if !earlier.is_empty() {
             text = format!("{text}; before: {}", earlier.join(", "));
         }

@@ -64,7 +64,8 @@ impl DataType {
 
     /// Returns the likely type of an object of this size; text and longer data by their characters.
     pub fn likely(address: ObjectAddress, bytes: &[u8]) -> Self {
-        let is_signed = SIGNED.contains(&address.index) && !(has_count(address) && address.sub == 0);
+        let is_signed =
+            SIGNED.contains(&address.index) && !(has_count(address) && address.sub == 0);
         match bytes.len() {
             1 | 2 | 4 if is_signed => Self::Signed(bytes.len()),
             1 | 2 | 4 if !is_text(address) => Self::Unsigned(bytes.len()),
@@ -133,9 +134,9 @@ impl DataType {
             }
             Self::Real(4) => ObjectValue::Real(f32::from_le_bytes(bytes.try_into().ok()?).into()),
             Self::Real(_) => ObjectValue::Real(f64::from_le_bytes(bytes.try_into().ok()?)),
-            Self::Text => ObjectValue::Text(
-                String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned(),
-            ),
+            Self::Text => {
+                ObjectValue::Text(String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned())
+            }
             Self::Bytes => ObjectValue::Bytes(bytes.to_vec()),
             Self::Unsigned(_) | Self::Signed(_) => return None,
         })
@@ -219,7 +220,11 @@ pub fn read_object(
     let kind = kind.unwrap_or_else(|| DataType::likely(address, &bytes));
     let value = kind.decode(&bytes).ok_or_else(|| CommissioningError::Value {
         value: ObjectValue::Bytes(bytes.clone()).to_string(),
-        allowed: format!("object {address} has {} bytes, not those of {}", bytes.len(), kind.name()),
+        allowed: format!(
+            "object {address} has {} bytes, not those of {}",
+            bytes.len(),
+            kind.name()
+        ),
     })?;
     Ok((kind, value))
 }
@@ -299,9 +304,12 @@ mod tests {
 
     #[test]
     fn an_address_is_hexadecimal_and_its_sub_index_either() {
-        for (text, index, sub) in
-            [("6041", 0x6041, 0), ("0x1018:4", 0x1018, 4), ("607D:0x02", 0x607D, 2), ("1A00:16", 0x1A00, 16)]
-        {
+        for (text, index, sub) in [
+            ("6041", 0x6041, 0),
+            ("0x1018:4", 0x1018, 4),
+            ("607D:0x02", 0x607D, 2),
+            ("1A00:16", 0x1A00, 16),
+        ] {
             assert_eq!(parse_address(text).unwrap(), ObjectAddress::new(index, sub));
         }
         for bad in ["", "x", "60411", "6041:", "6041:256", "+6041", "6041:-1", "0x", "6041:1:2"] {
@@ -345,7 +353,9 @@ mod tests {
 
     #[test]
     fn the_likely_type_follows_the_profile_and_the_size() {
-        let of = |index, sub, bytes: &[u8]| DataType::likely(ObjectAddress::new(index, sub), bytes).name();
+        let of = |index, sub, bytes: &[u8]| {
+            DataType::likely(ObjectAddress::new(index, sub), bytes).name()
+        };
         assert_eq!(of(0x6041, 0, &[0x50, 2]), "u16");
         assert_eq!(of(0x6064, 0, &[0; 4]), "i32");
         assert_eq!(of(0x607D, 0, &[2]), "u8");

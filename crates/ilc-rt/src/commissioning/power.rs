@@ -36,7 +36,11 @@ pub fn disable(bus: &mut dyn Bus, client: &SdoClient) -> Result<bool, Commission
     if is_off(Statusword(statusword).state()) {
         return Ok(true);
     }
-    Err(CommissioningError::State { node: client.node(), what: "it does not switch off", statusword })
+    Err(CommissioningError::State {
+        node: client.node(),
+        what: "it does not switch off",
+        statusword,
+    })
 }
 
 /// Resets the fault of a drive by a rising edge of bit 7; leaves it switched off.

@@ -77,7 +77,8 @@ pub fn scan(
     collect(bus, PATIENCE, &mut take)?;
     // Of another master, as no transport returns own frames.
     heard.lets_read()?;
-    let numbers: BTreeSet<u8> = answered.iter().copied().chain(heard.states.keys().copied()).collect();
+    let numbers: BTreeSet<u8> =
+        answered.iter().copied().chain(heard.states.keys().copied()).collect();
     let states = heard.states;
     Ok(numbers
         .into_iter()

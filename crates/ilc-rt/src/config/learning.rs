@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::learning::gate::GateParameters;
 use crate::learning::ladder::LadderRule;
-use crate::learning::law::catalogue::{LawName, every_law};
 use crate::learning::law::{Json, LawParameters, LawTables};
+use crate::learning::law::{LawName, every_law};
 use crate::schema::field_order;
 
 /// Default growth of the RMS error over the best run at which the best input is restored.

@@ -25,4 +25,4 @@ pub use learning::{Learning, Measure};
 pub use simulation::{AxisSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange};
 pub use validate::check;
 
-pub use crate::learning::law::catalogue::LawName;
+pub use crate::learning::law::LawName;

@@ -67,7 +67,7 @@ impl Linear {
     /// # Errors
     /// [`TrajectoryError`] for values out of range.
     /// # Source
-    /// - [dimarco2016], Chapter 2: both settings and their costs
+    /// - \[dimarco2016\], Chapter 2: both settings and their costs
     pub fn plan(
         start_m: &[f64],
         segments: &[PathSegment],

@@ -96,7 +96,7 @@ impl GateParameters {
     }
 }
 
-/// Thresholds of a [`Gate`].
+/// Thresholds of a [`Gate`](super::Gate).
 ///
 /// # Units
 /// - `tolerance` in units of the error; the others are ratios and numbers of runs

@@ -7,7 +7,7 @@ use std::fmt::Debug;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::catalogue::LawName;
+use super::LawName;
 use crate::learning::{Law, LearningError};
 use crate::model::StateSpace;
 use crate::schema::Violation;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::catalogue::LawName;
+use super::LawName;
 use super::context::{
     BuildError, Example, LawCell, LawContext, LawParameters, check_cutoff, needs_inputs,
 };

@@ -5,7 +5,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::catalogue::LawName;
+use super::LawName;
 use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, check_core};
 use super::expectation::{Expectation, check as check_disturbance};
 use super::inputs::Inputs;

@@ -1,11 +1,14 @@
-//! The laws, one per file: a [`Law`](super::Law) and its parameters in a cell description, listed
-//! in [`catalogue`]. `config`, `design` and the Python bindings import them.
+//! The laws, one per file: a [`Law`](super::Law) and its parameters in a cell description, and the
+//! catalogue of those that a cell can name. A new law needs its file and two lines here.
+//!
+//! `config` makes the tables of `[learning]` from the catalogue, and with them the schema of the
+//! cell description, its documents and its checks; the tests over all laws read it. `config`,
+//! `design` and the Python bindings import this folder.
 //!
 //! Family: every file here, since the catalogue lists the laws, and a law is built from types of
 //! the catalogue.
 
 pub mod adjoint;
-pub mod catalogue;
 pub mod constrained;
 mod context;
 pub mod dynamic;
@@ -24,3 +27,66 @@ pub mod through_jacobian;
 pub use context::{
     BuildError, Example, Json, LawAxis, LawCell, LawContext, LawParameters, LawTables,
 };
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Calls a macro with every law: its summary, its names in Rust and in a cell, its parameters.
+macro_rules! every_law {
+    ($macro:ident) => {
+        $macro! {
+            /// Norm-optimal ILC: minimises a quadratic cost over the run; with `rate` it is CO-ILC.
+            NormOptimal norm_optimal crate::learning::law::norm_optimal::NormOptimalParameters;
+            /// Proportional-derivative ILC: the error some samples ahead, each axis separately.
+            Pd pd crate::learning::law::pd::PdParameters;
+            /// Constrained norm-optimal ILC: within bounds of input and set point.
+            Constrained constrained crate::learning::law::constrained::ConstrainedParameters;
+            /// Adjoint (gradient) ILC: the error run backward through the model.
+            Adjoint adjoint crate::learning::law::adjoint::AdjointParameters;
+            /// Model-inverse ILC.
+            ModelInverse model_inverse crate::learning::law::model_inverse::ModelInverseParameters;
+            /// Adds up the filtered error (feed-forward, parallel); for cells of csv axes only.
+            ErrorFeedforward error_feedforward
+                crate::learning::law::error_feedforward::ErrorFeedforwardParameters;
+            /// Norm-optimal ILC with a dynamic weight on the low frequencies of the error.
+            Dynamic dynamic crate::learning::law::dynamic::DynamicParameters;
+            /// Norm-optimal ILC of several machines in formation.
+            Formation formation crate::learning::law::formation::FormationParameters;
+            /// Another law, fed with the tool's errors through the inverse of a Jacobian matrix.
+            ThroughJacobian through_jacobian
+                crate::learning::law::through_jacobian::ThroughJacobianParameters;
+            /// Relevance-weighted ILC (DPW-ILC): learns from all past runs with a similar disturbance.
+            Relevance relevance crate::learning::law::relevance::RelevanceParameters;
+            /// Flexible ILC: one input for each disturbance met, interpolated between the nearest two.
+            Flexible flexible crate::learning::law::flexible::FlexibleParameters;
+        }
+    };
+}
+pub(crate) use every_law;
+
+macro_rules! names {
+    ($($(#[$doc:meta])* $law:ident $name:ident $parameters:ty;)*) => {
+        /// Name of a law.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+        #[serde(rename_all = "snake_case")]
+        pub enum LawName {
+            $($(#[$doc])* $law,)*
+            /// No learning: every run is like the first.
+            None,
+        }
+
+        impl LawName {
+            /// Every law that a cell can name.
+            pub const ALL: &[Self] = &[$(Self::$law),*];
+
+            /// Returns the name in a cell description.
+            pub fn as_str(self) -> &'static str {
+                match self {
+                    $(Self::$law => stringify!($name),)*
+                    Self::None => "none",
+                }
+            }
+        }
+    };
+}
+every_law!(names);

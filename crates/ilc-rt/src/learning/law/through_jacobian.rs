@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::catalogue::LawName;
+use super::LawName;
 use super::context::{
     BuildError, Example, LawCell, LawContext, LawParameters, check_core, violation,
 };

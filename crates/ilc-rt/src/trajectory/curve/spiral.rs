@@ -22,7 +22,7 @@ impl Spiral {
     /// # Errors
     /// [`TrajectoryError::Shape`] for a pitch or number of turns out of range.
     /// # Source
-    /// - [barton2010], Section 8.1.2: from the centre, counter-clockwise
+    /// - \[barton2010\], Section 8.1.2: from the centre, counter-clockwise
     pub fn new(pitch_m: f64, turns: f64, center_m: [f64; 2]) -> Result<Self, TrajectoryError> {
         if !is_positive(pitch_m) || pitch_m > 10.0 {
             return Err(TrajectoryError::Shape {

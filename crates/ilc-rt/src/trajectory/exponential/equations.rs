@@ -11,7 +11,7 @@ use crate::trajectory::jet::Jet;
 /// # Units
 /// - `slope_m_s` in m/s, `offset_m` in m, `alpha` in s⁻³
 /// # Source
-/// - [dimarco2016], Eq. 2.2 to 2.5
+/// - \[dimarco2016\], Eq. 2.2 to 2.5
 #[cfg(test)]
 pub(super) fn startup_linear(t_s: f64, slope_m_s: f64, offset_m: f64, alpha: f64) -> Jet {
     let t = Jet::line(t_s, 1.0);
@@ -23,7 +23,7 @@ pub(super) fn startup_linear(t_s: f64, slope_m_s: f64, offset_m: f64, alpha: f64
 /// # Units
 /// - `amplitude_m` in m, `omega_rad_s` in rad/s, `alpha` in s⁻²
 /// # Source
-/// - [dimarco2016], Eq. 2.7 to 2.10
+/// - \[dimarco2016\], Eq. 2.7 to 2.10
 #[cfg(test)]
 pub(super) fn startup_sine(t_s: f64, amplitude_m: f64, omega_rad_s: f64, alpha: f64) -> Jet {
     let t = Jet::line(t_s, 1.0);
@@ -36,7 +36,7 @@ pub(super) fn startup_sine(t_s: f64, amplitude_m: f64, omega_rad_s: f64, alpha: 
 /// both are the sigmoid shifted by `ln R / α`.
 ///
 /// # Source
-/// - [dimarco2016], Eq. 2.12 and 2.17
+/// - \[dimarco2016\], Eq. 2.12 and 2.17
 pub(super) fn weight_before(t_s: f64, ratio: f64, alpha: f64) -> Jet {
     (-(Jet::line(alpha * t_s - ratio.ln(), alpha))).logistic()
 }
@@ -44,7 +44,7 @@ pub(super) fn weight_before(t_s: f64, ratio: f64, alpha: f64) -> Jet {
 /// Weight of the segment after a transition at `t = 0`: `b / (b + e^{-α t})`, `b = 1/R`.
 ///
 /// # Source
-/// - [dimarco2016], Eq. 2.13 and 2.18
+/// - \[dimarco2016\], Eq. 2.13 and 2.18
 pub(super) fn weight_after(t_s: f64, ratio: f64, alpha: f64) -> Jet {
     Jet::line(alpha * t_s - ratio.ln(), alpha).logistic()
 }
@@ -53,7 +53,7 @@ pub(super) fn weight_after(t_s: f64, ratio: f64, alpha: f64) -> Jet {
 /// otherwise. A move that ends (`v₂ = 0`) has no ratio and is not a transition.
 ///
 /// # Source
-/// - [dimarco2016], Eq. 2.15 and the listing of Appendix A
+/// - \[dimarco2016\], Eq. 2.15 and the listing of Appendix A
 pub(super) fn blending_ratio(before_m_s: f64, after_m_s: f64) -> f64 {
     if before_m_s * after_m_s < 0.0 { (after_m_s / before_m_s).abs() } else { 1.0 }
 }

@@ -70,7 +70,7 @@ impl Listing {
     /// # Real Time
     /// Hot: does not allocate.
     /// # Source
-    /// - [dimarco2016], Appendix A
+    /// - \[dimarco2016\], Appendix A
     pub fn at(&self, t_s: f64) -> Jet {
         let from_corner_s = t_s - self.corner_s;
         let t = Jet::line(t_s, 1.0);

@@ -57,7 +57,7 @@ impl ExponentialSigmoid {
     /// overshoots its feed by 79 %, and has to decay within its leg); [`TrajectoryError::Hurried`]
     /// for a leg that is too short for its ends.
     /// # Source
-    /// - [dimarco2016], Section 2.1
+    /// - \[dimarco2016\], Section 2.1
     pub fn plan(
         start_m: &[f64],
         segments: &[ModulatedSegment],
@@ -77,7 +77,7 @@ impl ExponentialSigmoid {
     /// As [`plan`](Self::plan); [`TrajectoryError::AlphaMax`] for a bound so small that an end does
     /// not fit its leg.
     /// # Source
-    /// - [dimarco2016], Section 2.3.3
+    /// - \[dimarco2016\], Section 2.3.3
     pub fn plan_below(
         start_m: &[f64],
         segments: &[ModulatedSegment],

@@ -19,7 +19,7 @@ const MOVES_MAX: f64 = 1e6;
 /// # Errors
 /// [`TrajectoryError`] for values out of range, or more than a million moves.
 /// # Source
-/// - [dimarco2016], Chapter 1, Fig. 1.3: the six-point sine
+/// - \[dimarco2016\], Chapter 1, Fig. 1.3: the six-point sine
 pub fn points_program(
     start_m: &[f64],
     segment: &ModulatedSegment,

@@ -54,7 +54,7 @@ impl RasterSection {
     /// # Errors
     /// [`TrajectoryError::Shape`] for sizes or rows out of range.
     /// # Source
-    /// - [barton2010], Section 8.1.2: two rasters forward, two in reverse
+    /// - \[barton2010\], Section 8.1.2: two rasters forward, two in reverse
     pub fn segments(
         &self,
         start_m: [f64; 2],

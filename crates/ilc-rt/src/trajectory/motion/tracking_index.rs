@@ -21,7 +21,7 @@ impl TrackingIndex {
     /// [`TrajectoryError::Shape`] for a weight or sample time out of range, or slices of different
     /// lengths.
     /// # Source
-    /// - [dimarco2016], Eq. 2.19
+    /// - \[dimarco2016\], Eq. 2.19
     pub fn of(
         programmed_m: &[f64],
         position_m: &[f64],

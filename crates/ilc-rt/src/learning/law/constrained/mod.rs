@@ -53,7 +53,7 @@ pub enum Status {
 /// A primal-dual interior-point method finds the minimum; its linear systems are solved by a
 /// Riccati recursion, with bounds as weighted virtual outputs, so that time and memory grow
 /// linearly with the run. Inactive bounds cost nothing: the law then is
-/// [`NormOptimal`](super::norm_optimal::NormOptimal). Each search is warm-started from the last
+/// [`NormOptimal`]. Each search is warm-started from the last
 /// solution.
 ///
 /// The next input exceeds no bound by more than 1e-9 of its size. If no such input is found, the

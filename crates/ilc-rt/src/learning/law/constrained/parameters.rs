@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Bound, Bounds, Constrained, Limit};
 use crate::learning::Law;
-use crate::learning::law::catalogue::LawName;
+use crate::learning::law::LawName;
 use crate::learning::law::context::{
     BuildError, Example, LawAxis, LawCell, LawContext, LawParameters, needs_inputs, violation,
 };

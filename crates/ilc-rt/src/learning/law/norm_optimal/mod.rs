@@ -82,7 +82,7 @@ impl std::fmt::Debug for NormOptimal {
 impl NormOptimal {
     /// Creates the law: factorises the problem for runs of `n_samples` samples.
     ///
-    /// `model` is a [`StateSpace`](crate::model::StateSpace) or a
+    /// `model` is a [`StateSpace`] or a
     /// [`TimeVarying`](crate::model::TimeVarying), `weights` are [`Weights`] or a [`Cost`].
     ///
     /// # Errors

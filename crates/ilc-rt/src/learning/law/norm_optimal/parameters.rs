@@ -274,7 +274,7 @@ impl Run<'_> {
 mod tests {
     use super::*;
     use crate::learning::law::LawAxis;
-    use crate::learning::law::catalogue::LawName;
+    use crate::learning::law::LawName;
     use crate::learning::law::context::LawTables;
     use crate::model::StateSpace;
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::index::DISTURBANCES_MAX;
 use super::{Relevance, RelevanceWeights, RunShape};
 use crate::learning::Law;
-use crate::learning::law::catalogue::LawName;
+use crate::learning::law::LawName;
 use crate::learning::law::context::{
     BuildError, Example, LawCell, LawContext, LawParameters, check_core, violation,
 };

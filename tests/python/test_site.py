@@ -1,0 +1,92 @@
+"""The documentation site, as `make docs` builds it, has no dead internal link."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from derived_fixture import ROOT
+
+import ilc_rt
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytest.importorskip("furo")
+pytest.importorskip("myst_parser")
+
+#: `make docs` puts the pages of rustdoc there, whose links rustdoc itself checks.
+RUST = "rust/"
+
+
+class Page(HTMLParser):
+    """The links and anchors of a page."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, _tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Collect what a tag links to and what it names."""
+        for name, value in attrs:
+            if name in {"href", "src"} and value:
+                self.links.append(value)
+            if name in {"id", "name"} and value:
+                self.anchors.add(value)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a freshly built site; a warning fails its build."""
+    out = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going"]
+    folders = ["-d", str(out / "doctrees"), "-c", str(ROOT / "docs"), str(ROOT), str(out / "site")]
+    done = subprocess.run([*command, *folders], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return out / "site"
+
+
+@pytest.mark.timeout(300)
+def test_every_internal_link_has_a_target(site: Path) -> None:
+    pages = {path.resolve(): Page(path) for path in site.rglob("*.html")}
+    dead, crates = [], set()
+    for path, page in pages.items():
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            inside = target.relative_to(site.resolve()).as_posix()
+            if inside.startswith(RUST):
+                crates.add(inside.split("/")[1])
+            elif not target.exists() or (
+                parts.fragment
+                and target in pages
+                and unquote(parts.fragment) not in pages[target].anchors
+            ):
+                dead.append(f"{path.relative_to(site.resolve())}: {link}")
+    assert not dead, "\n".join(dead)
+    members = (ROOT / "Cargo.toml").read_text(encoding="utf-8")
+    known = {
+        name.replace("-", "_") for name in re.findall(r"^(ilc-[a-z]+) = ", members, re.MULTILINE)
+    }
+    assert crates
+    assert crates <= known, "a link to a crate that this workspace lacks"
+
+
+def test_everything_public_is_on_a_page(site: Path) -> None:
+    shown = {
+        anchor.rsplit(".", 1)[-1]
+        for path in (site / "docs" / "python").glob("*.html")
+        for anchor in Page(path).anchors
+        if anchor.startswith(("ilc_rt.", "module-ilc_rt."))
+    }
+    missing = [name for name in ilc_rt.__all__ if not name.startswith("_") and name not in shown]
+    assert not missing
