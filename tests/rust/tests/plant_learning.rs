@@ -158,7 +158,7 @@ fn campaign(cell: &Cell, from_tool: bool, delay: usize, iterations: usize) -> Ve
     let n = reference.len() / n_axes;
     let mut input = vec![vec![0.0; n]; n_axes];
     let response = |axis: &ilc_rt::config::Axis| {
-        let hz = axis.model.natural_frequency_hz.expect("csp");
+        let hz = axis.model.unwrap().natural_frequency_hz.expect("csp");
         impulse_response(hz, axis.model.damping.expect("csp"), delay, cell.cycle_s())
     };
     let responses: Vec<Vec<f64>> = cell.axes.iter().map(response).collect();

@@ -1,7 +1,8 @@
 //! Contradictions within `[[axis]]`.
 
 use super::checker::Checker;
-use crate::config::{Axis, Cell, ConfigError, Mode, mode};
+use super::{drive, homing};
+use crate::config::{Axis, AxisModel, Cell, ConfigError, Mode, mode};
 use crate::record::{NAME_MAX, is_hidden};
 
 /// Highest CANopen node number.
@@ -66,7 +67,8 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
         &l.position_max_m,
         "above limits.position_min_m",
     )?;
-    let counts = axis.counts_per_m * l.position_min_m.abs().max(l.position_max_m.abs());
+    let farthest = |position_m: f64| (position_m - axis.homing.offset_m).abs();
+    let counts = axis.counts_per_m * farthest(l.position_min_m).max(farthest(l.position_max_m));
     v.that(
         counts <= f64::from(i32::MAX),
         &at("counts_per_m"),
@@ -79,8 +81,28 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
         &l.velocity_max_m_s,
         "counts_per_m times velocity_max_m_s must fit 32 bits",
     )?;
+    if let Some(model) = &axis.model {
+        check_model(axis, model, v)?;
+    }
     let design = mode::of(axis.interface);
-    let wanted = design.model_keys(&axis.model);
+    let name = axis.interface.name();
+    if design.closes_position_loop() != axis.position_loop.is_some() {
+        let (found, allowed) = if design.closes_position_loop() {
+            ("missing", format!("interface \"{name}\" needs [axis.position_loop] gain_per_s"))
+        } else {
+            ("given", format!("interface \"{name}\" has its position loop in the drive; remove it"))
+        };
+        return Err(v.refuse(&at("position_loop"), &found, &allowed));
+    }
+    homing::check(axis, v)?;
+    drive::check(axis, v)?;
+    check_simulation(axis, v)
+}
+
+/// Checks that a model has what the interface needs, and nothing else.
+fn check_model(axis: &Axis, model: &AxisModel, v: &Checker) -> Result<(), ConfigError> {
+    let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
+    let wanted = mode::of(axis.interface).model_keys(model);
     for (key, value) in &wanted {
         v.that(
             value.is_some(),
@@ -89,7 +111,7 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
             "needed by this interface",
         )?;
     }
-    let all = Mode::ALL.into_iter().flat_map(|other| mode::of(other).model_keys(&axis.model));
+    let all = Mode::ALL.into_iter().flat_map(|other| mode::of(other).model_keys(model));
     let unwanted = all.filter(|(key, _)| wanted.iter().all(|(needed, _)| needed != key));
     for (key, value) in unwanted {
         if let Some(value) = value {
@@ -100,16 +122,7 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
             ));
         }
     }
-    let name = axis.interface.name();
-    if design.closes_position_loop() != axis.position_loop.is_some() {
-        let (found, allowed) = if design.closes_position_loop() {
-            ("missing", format!("interface \"{name}\" needs [axis.position_loop] gain_per_s"))
-        } else {
-            ("given", format!("interface \"{name}\" has its position loop in the drive; remove it"))
-        };
-        return Err(v.refuse(&at("position_loop"), &found, &allowed));
-    }
-    check_simulation(axis, v)
+    Ok(())
 }
 
 fn check_simulation(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
@@ -120,6 +133,7 @@ fn check_simulation(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
     v.range(&at("simulation.mode_mass_kg"), s.mode_mass_kg, 0.0, 0.9 * s.mass_kg)?;
     // Any position that can be expressed in counts: an axis that starts outside its limits is worth
     // simulating.
-    let farthest_m = f64::from(i32::MAX) / axis.counts_per_m;
-    v.range(&at("simulation.position_start_m"), s.position_start_m, -farthest_m, farthest_m)
+    let (farthest_m, zero_m) = (f64::from(i32::MAX) / axis.counts_per_m, axis.homing.offset_m);
+    let (low, high) = (zero_m - farthest_m, zero_m + farthest_m);
+    v.range(&at("simulation.position_start_m"), s.position_start_m, low, high)
 }

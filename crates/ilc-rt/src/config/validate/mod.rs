@@ -2,6 +2,8 @@
 
 mod axis;
 mod checker;
+mod drive;
+mod homing;
 mod learning;
 mod program;
 

@@ -82,6 +82,9 @@ objects! {
     FEED_CONSTANT = 0x6092, "Feed constant";
     VELOCITY_FACTOR = 0x6096, "Velocity factor";
     ACCELERATION_FACTOR = 0x6097, "Acceleration factor";
+    HOMING_METHOD = 0x6098, "Homing method";
+    HOMING_SPEEDS = 0x6099, "Homing speeds";
+    HOMING_ACCELERATION = 0x609A, "Homing acceleration";
     POSITION_UNIT = 0x60A8, "SI unit position";
     VELOCITY_UNIT = 0x60A9, "SI unit velocity";
     POSITION_OFFSET = 0x60B0, "Position offset";
