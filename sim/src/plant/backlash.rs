@@ -45,8 +45,7 @@ mod tests {
 
     /// Steps freely and returns the states.
     fn freely(backlash_m: f64, mut z: State, n: usize) -> Vec<State> {
-        let (whole, play) =
-            (ExactStep::new(&PAIR, DT_S), Backlash::new(backlash_m, &PAIR, DT_S));
+        let (whole, play) = (ExactStep::new(&PAIR, DT_S), Backlash::new(backlash_m, &PAIR, DT_S));
         let steps = (0..n).map(|_| {
             z = play.step(&whole, &z, |step, z| step.free(z, 0.0));
             z

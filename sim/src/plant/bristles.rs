@@ -60,7 +60,8 @@ mod tests {
     const FRICTION: Friction = Friction { coulomb_n: 15.0, static_n: 25.0, stribeck_m_s: 0.002 };
 
     fn mass() -> ExactStep {
-        let alone = Mechanics { carriage_kg: 20.0, mode_kg: 0.0, mode_rad_s: 1.0, mode_damping: 0.0 };
+        let alone =
+            Mechanics { carriage_kg: 20.0, mode_kg: 0.0, mode_rad_s: 1.0, mode_damping: 0.0 };
         ExactStep::new(&alone, DT_S)
     }
 

@@ -94,11 +94,9 @@ impl Environment {
         let warming_k = self.temperature_k.at(self.time_s) - NOMINAL_TEMPERATURE_K;
         let time_s = self.time_s;
         match self.axes.get_mut(axis) {
-            Some([payload, force]) => Conditions {
-                payload_kg: payload.at(time_s),
-                force_n: force.at(time_s),
-                warming_k,
-            },
+            Some([payload, force]) => {
+                Conditions { payload_kg: payload.at(time_s), force_n: force.at(time_s), warming_k }
+            }
             None => Conditions { payload_kg: 0.0, force_n: 0.0, warming_k },
         }
     }

@@ -158,8 +158,9 @@ fn campaign(cell: &Cell, from_tool: bool, delay: usize, iterations: usize) -> Ve
     let n = reference.len() / n_axes;
     let mut input = vec![vec![0.0; n]; n_axes];
     let response = |axis: &ilc_rt::config::Axis| {
-        let hz = axis.model.natural_frequency_hz.expect("csp");
-        impulse_response(hz, axis.model.damping.expect("csp"), delay, cell.cycle_s())
+        let model = axis.model.unwrap();
+        let (hz, damping) = (model.natural_frequency_hz.unwrap(), model.damping.unwrap());
+        impulse_response(hz, damping, delay, cell.cycle_s())
     };
     let responses: Vec<Vec<f64>> = cell.axes.iter().map(response).collect();
     let mut gantry = Gantry::from_cell(cell);

@@ -16,6 +16,7 @@ mod keeper;
 mod learner;
 mod nodes;
 mod options;
+mod own;
 mod pace;
 mod reason;
 mod resume;

@@ -68,7 +68,7 @@ fn refuse_company(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
 /// # Errors
 /// [`ConfigError`] for a node number or a scale that validation would have refused.
 pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetup, ConfigError> {
-    let scale = design::scale(cell, axis.counts_per_m)?;
+    let scale = design::axis_scale(cell, axis)?;
     let unit = match axis.unit {
         AxisUnit::M => UNIT_METRE,
         AxisUnit::Rad => UNIT_RADIAN,
@@ -78,7 +78,8 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
     // Positions and velocities of a valid cell fit; what an acceleration cannot hold is its highest.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let unsigned = |value_si: f64| (value_si * axis.counts_per_m).round() as u32;
-    let signed = |value_si: f64| scale.to_counts(value_si).unwrap_or(0);
+    let place = |position_m: f64| scale.position_to_counts(position_m).unwrap_or(0);
+    let ends = [place(limits.position_min_m), place(limits.position_max_m)];
     // A drive brakes on its own when commands stop arriving for as long as the loop waits for
     // answers.
     let deadline_ms = f64::from(cell.safety.silent_cycles_max) * cell.cycle_s() * 1e3;
@@ -88,15 +89,19 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
         node: design::node(cell, axis.node)?,
         mode: axis.interface,
         cycle_us: cell.cell.cycle_us,
-        following_error_max_counts: unsigned(limits.following_error_max_m),
-        position_min_counts: signed(limits.position_min_m),
-        position_max_counts: signed(limits.position_max_m),
+        following_error_max_counts: axis
+            .drive
+            .following_error_window
+            .unwrap_or_else(|| unsigned(limits.following_error_max_m)),
+        position_min_counts: ends[0].min(ends[1]),
+        position_max_counts: ends[0].max(ends[1]),
         velocity_max_counts_s: unsigned(limits.velocity_max_m_s),
         acceleration_max_counts_s2: unsigned(limits.acceleration_max_m_s2),
-        position_unit: units.map(|(position, _)| position),
-        velocity_unit: units.map(|(_, velocity)| velocity),
+        position_unit: axis.drive.position_unit.or(units.map(|(position, _)| position)),
+        velocity_unit: axis.drive.velocity_unit.or(units.map(|(_, velocity)| velocity)),
         heartbeat_ms: if lockstep { 0 } else { HEARTBEAT_MS },
         rpdo_deadline_ms: if lockstep { 0 } else { deadline_ms },
         answer_timeout: Duration::from_secs_f64(cell.safety.answer_timeout_s),
+        own: super::own::of(axis),
     })
 }

@@ -1,16 +1,15 @@
-//! Sections of a cell description for the machine: cell, bus, axes, safety.
+//! Sections of a cell description for the machine as a whole: cell, bus, tool, safety.
 
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::axis::{Axis, AxisUnit};
 use super::error::ConfigError;
 use super::file::{CELL_BYTES_MAX, read_file};
 use super::learning::Learning;
-use super::simulation::{AxisSimulation, Simulation};
-pub use crate::fieldbus::cia402::Mode;
-pub use crate::interpolate::AxisUnit;
+use super::simulation::Simulation;
 use crate::schema::field_order;
 use crate::trajectory::kind::Program;
 
@@ -82,101 +81,6 @@ fn default_bitrate_bit_s() -> u32 {
 
 fn default_load_max() -> f64 {
     0.8
-}
-
-/// `[[axis]]`: one drive.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(extend("x-order" = field_order::<Self>()))]
-pub struct Axis {
-    /// Name, such as `"x"`: 1 to 64 characters without control characters, no leading or trailing
-    /// spaces; unique, ignoring case and spaces.
-    pub name: String,
-    /// CANopen node of the drive, unique.
-    #[schemars(range(min = 1, max = 127))]
-    pub node: u8,
-    /// Command interface. `csp`: the drive closes the position loop, the learned input (m) is added to
-    /// the set point. `csv`: the position loop is in the controller, the learned input (m/s) is added to
-    /// the velocity command.
-    pub interface: Mode,
-    /// Unit of its coordinate; every quantity of a rotary axis whose name ends in `_m`,
-    /// `_m_s`, … is in rad, rad/s, …
-    #[serde(default)]
-    pub unit: AxisUnit,
-    /// Encoder counts of the drive per metre (or radian); the farthest position and the highest
-    /// speed must fit 32 bits.
-    #[schemars(range(min = 1.0, max = 1e10))]
-    pub counts_per_m: f64,
-    /// `[axis.limits]`
-    pub limits: Limits,
-    /// `[axis.model]`: the model that learning uses.
-    pub model: AxisModel,
-    /// `[axis.position_loop]`: for `interface = "csv"` only.
-    pub position_loop: Option<PositionLoop>,
-    /// `[axis.simulation]`: physics, read by the simulated drives only.
-    #[serde(default)]
-    pub simulation: AxisSimulation,
-}
-
-/// `[axis.limits]`: limits that are never exceeded.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(extend("x-order" = field_order::<Self>()))]
-pub struct Limits {
-    /// Lowest position.
-    #[schemars(range(min = -1000.0, max = 1000.0))]
-    pub position_min_m: f64,
-    /// Highest position.
-    #[schemars(range(min = -1000.0, max = 1000.0))]
-    pub position_max_m: f64,
-    /// Velocity limit.
-    #[schemars(range(min = 1e-6, max = 100.0))]
-    pub velocity_max_m_s: f64,
-    /// Acceleration limit, also of a controlled stop.
-    #[schemars(range(min = 0.0001, max = 1e4))]
-    pub acceleration_max_m_s2: f64,
-    /// Jerk limit.
-    #[schemars(range(min = 0.001, max = 1e7))]
-    pub jerk_max_m_s3: f64,
-    /// Following error at which drive and controller fault.
-    #[schemars(range(min = 1e-7, max = 1.0))]
-    pub following_error_max_m: f64,
-}
-
-/// `[axis.model]`: second-order position loop (csp) or first-order velocity loop (csv), and delay.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(extend("x-order" = field_order::<Self>()))]
-pub struct AxisModel {
-    /// Natural frequency of the drive's position loop, `w0^2 / (s^2 + 2 d w0 s + w0^2)`; csp only.
-    #[schemars(range(min = 0.1, max = 1000.0))]
-    pub natural_frequency_hz: Option<f64>,
-    /// Damping ratio of the drive's position loop; csp only.
-    #[schemars(range(min = 0.05, max = 5.0))]
-    pub damping: Option<f64>,
-    /// Bandwidth of the drive's velocity loop, first order; csv only.
-    #[schemars(range(min = 0.1, max = 1e4))]
-    pub velocity_bandwidth_hz: Option<f64>,
-    /// Dead time: servo cycles from a command to its first effect, in addition to that of the
-    /// sampler. A drive that interpolates its set points adds one; a little more compensates
-    /// unmodelled lags.
-    #[serde(default)]
-    #[schemars(range(min = 0, max = 20))]
-    pub delay_samples: u32,
-}
-
-/// `[axis.position_loop]`: proportional position control in the controller.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(extend("x-order" = field_order::<Self>()))]
-pub struct PositionLoop {
-    /// Position gain kv: velocity per position error.
-    #[schemars(range(min = 0.01, max = 1000.0))]
-    pub gain_per_s: f64,
-    /// Velocity feed-forward, 0 to 1: share of the reference velocity.
-    #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub velocity_feedforward: f64,
 }
 
 /// `[tcp_encoder]`: a node that measures the tool centre point, one coordinate per axis.

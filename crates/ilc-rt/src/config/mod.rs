@@ -3,24 +3,27 @@
 //! All programs read a cell through [`Cell::load`]: design, the binary, the simulator and Python.
 //! It knows the numbers and their ranges, not their use.
 //!
-//! Family: `cell`, `mode` and `validate`: a cell is checked where it is loaded, by what the mode of each axis
+//! Family: `axis`, `cell`, `homing`, `mode` and `validate`: a cell is checked where it is loaded, by what the mode of each axis
 //! demands.
 
+mod axis;
 mod cell;
+mod drive;
 mod error;
 mod file;
+mod homing;
 mod learning;
 pub mod mode;
 mod simulation;
 mod validate;
 
 pub use crate::trajectory::kind::{Corner, PathKind, Program, Segment};
-pub use cell::{
-    Axis, AxisModel, AxisUnit, BusSection, Cell, CellSection, Limits, Mode, PositionLoop, Safety,
-    TcpEncoder, Telemetry,
-};
+pub use axis::{Axis, AxisModel, AxisUnit, Limits, Mode, PositionLoop};
+pub use cell::{BusSection, Cell, CellSection, Safety, TcpEncoder, Telemetry};
+pub use drive::{Drive, DrivePdo, ObjectName, StartUp};
 pub use error::ConfigError;
 pub use file::{CELL_BYTES_MAX, read_beside, read_file};
+pub use homing::{DriveHoming, HOMING_METHODS, Homing, HomingKind};
 pub use learning::{Learning, Measure};
 pub use simulation::{AxisSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange};
 pub use validate::check;

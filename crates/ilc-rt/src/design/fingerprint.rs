@@ -50,7 +50,10 @@ pub(super) fn legacy(cell: &Cell, meta: &Meta, law: &str, parameters: &str) -> S
     let axes: Vec<_> = cell
         .axes
         .iter()
-        .map(|a| format!("{:?}", (&a.name, a.interface, a.limits, a.model, a.position_loop)))
+        .map(|a| {
+            let model = a.model.unwrap_or_default();
+            format!("{:?}", (&a.name, a.interface, a.limits, model, a.position_loop))
+        })
         .collect();
     let learning = &cell.learning;
     let law_text = || {

@@ -11,9 +11,9 @@ use crate::model::StateSpace;
 /// Returns the model from the learned input of all axes to their positions.
 ///
 /// # Errors
-/// [`DesignError::Model`] if the cell's parameters give no model.
+/// [`DesignError`] if the cell's parameters give no model.
 pub fn learning_model(cell: &Cell) -> Result<StateSpace, DesignError> {
-    model(cell).map_err(|source| DesignError::Model { file: file(cell), source })
+    model(cell)
 }
 
 /// Returns the predicted error of a run without learning: set point minus response.

@@ -45,8 +45,7 @@ fn build_law(cell: &Cell, reference_m: &[f64]) -> Result<Option<Box<dyn Law>>, D
     let Some(parameters) = cell.learning.parameters(cell.learning.law) else {
         return Ok(None);
     };
-    let model = model(cell)
-        .map_err(|source| DesignError::Model { file: cell.file.display().to_string(), source })?;
+    let model = model(cell)?;
     let context = LawContext { cell: &cell.for_laws(), model: &model, reference_m };
     parameters.build(&context).map(Some).map_err(|source| refused(cell, source))
 }

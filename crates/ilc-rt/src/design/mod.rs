@@ -16,4 +16,4 @@ pub use error::DesignError;
 pub use forecast::{first_error, learning_model};
 pub use law::Prepared;
 pub use plan::Plan;
-pub(crate) use plan::{input_unit, node, scale};
+pub(crate) use plan::{axis_scale, input_unit, node};

@@ -130,7 +130,23 @@ impl Plan {
 }
 
 /// Returns the model that learning uses: the axes' closed loops, block-diagonal.
-pub(super) fn model(cell: &Cell) -> Result<StateSpace, ModelError> {
+///
+/// # Errors
+/// [`DesignError::Config`] for an axis without a model, [`DesignError::Model`] for an unusable one.
+pub(super) fn model(cell: &Cell) -> Result<StateSpace, DesignError> {
+    if let Some(axis) = cell.axes.iter().find(|axis| axis.model.is_none()) {
+        let key = format!("[[axis]] {}: model", axis.name);
+        let (law, file, name) = (cell.learning.law.as_str(), cell.file.display(), &axis.name);
+        let allowed = format!(
+            "law = \"{law}\" needs [axis.model]: `ilc-rt identify {file} --axis {name}` measures it"
+        );
+        return Err(refused(cell, &key, &"missing", &allowed).into());
+    }
+    closed_loops(cell)
+        .map_err(|source| DesignError::Model { file: cell.file.display().to_string(), source })
+}
+
+fn closed_loops(cell: &Cell) -> Result<StateSpace, ModelError> {
     let mut models =
         cell.axes.iter().map(|axis| mode::of(axis.interface).nominal_model(axis, cell.cycle_s()));
     let first =
@@ -184,7 +200,7 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
                 Ok(AxisSpec {
                     node: node(cell, axis.node)?,
                     mode: axis.interface,
-                    scale: scale(cell, axis.counts_per_m)?,
+                    scale: axis_scale(cell, axis)?,
                     limits: axis_limits(axis),
                     position_min_m: axis.limits.position_min_m,
                     position_max_m: axis.limits.position_max_m,
@@ -230,7 +246,13 @@ pub(crate) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
     NodeId::new(number).ok_or_else(|| refused(cell, "node", &number, "1 to 127"))
 }
 
-pub(crate) fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
+/// Returns the scale of an axis, with its sign and its zero.
+pub(crate) fn axis_scale(cell: &Cell, axis: &Axis) -> Result<Scale, ConfigError> {
+    let scale = scale(cell, axis.counts_per_m)?;
+    Ok(scale.reversed(axis.reversed).with_zero_m(axis.homing.offset_m))
+}
+
+fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
     Scale::new(counts_per_m).ok_or_else(|| refused(cell, "counts_per_m", &counts_per_m, "above 0"))
 }
 

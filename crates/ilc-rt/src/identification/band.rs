@@ -46,17 +46,30 @@ pub struct BandSearch {
 }
 
 impl BandSearch {
-    /// Starts with a band up to 1.5 times the natural frequency in the cell.
+    /// Starts with a band up to 1.5 times the natural frequency in the cell; without a model, up to
+    /// 1.5 times the lowest one with which the axis keeps its allowed following error.
     pub fn new(cell: &Cell, axis: &Axis) -> Self {
+        let model = axis.model.as_ref();
         let expected_hz = match axis.position_loop {
-            None => axis.model.natural_frequency_hz.unwrap_or(1.0),
+            None => model.and_then(|model| model.natural_frequency_hz).unwrap_or_else(|| {
+                // A loop of second order follows a velocity 2 d / w0 behind, which must be less than
+                // the allowed following error at full speed.
+                let limits = &axis.limits;
+                2.0 * limits.velocity_max_m_s / (TAU * limits.following_error_max_m)
+            }),
             // kv and the velocity loop make a second-order loop with w0^2 = kv 2 pi f.
             Some(position_loop) => {
-                let bandwidth_hz = axis.model.velocity_bandwidth_hz.unwrap_or(1.0);
-                (position_loop.gain_per_s * bandwidth_hz / TAU).sqrt()
+                let gain_per_s = position_loop.gain_per_s;
+                // A loop that is damped critically has 2 pi f = 4 kv.
+                let bandwidth_hz = model
+                    .and_then(|model| model.velocity_bandwidth_hz)
+                    .unwrap_or(4.0 * gain_per_s / TAU);
+                (gain_per_s * bandwidth_hz / TAU).sqrt()
             }
         };
         let highest_hz = HIGHEST / cell.cycle_s();
+        let expected_hz =
+            if model.is_some() { expected_hz } else { expected_hz.clamp(FROM_HZ, highest_hz) };
         let period_s = PERIOD_S.max(5.0 * CYCLES / expected_hz);
         let from_hz = FROM_HZ.min(0.1 * expected_hz).max(CYCLES / period_s);
         let mut to_try_hz: Vec<f64> = SHARES

@@ -82,7 +82,7 @@ impl Cycle {
         let spec = &self.spec.axes[axis];
         let drive = &mut self.drives[axis];
         if let (Some(statusword), Some(counts)) = (reading.statusword, reading.position_counts) {
-            let encoder_m = spec.scale.to_si(counts);
+            let encoder_m = spec.scale.position_m(counts);
             #[expect(clippy::cast_precision_loss, reason = "a count of cycles")]
             let cycles = self.pending.silence(Part::Status(axis)).max(1) as f64;
             let way_m = spec.limits.velocity_max_m_s * self.spec.cycle.as_secs_f64() * cycles;

@@ -113,13 +113,9 @@ fn a_tool_behind_backlash_lags_by_its_half() {
 
 #[test]
 fn bristles_let_a_held_axis_creep_where_stiction_does_not() {
-    let sticky =
-        AxisSimulation { coulomb_n: 15.0, static_n: 25.0, ..AxisSimulation::default() };
-    let bristly = AxisSimulation {
-        bristle_stiffness_n_m: 1e6,
-        bristle_damping_n_s_m: 4e3,
-        ..sticky
-    };
+    let sticky = AxisSimulation { coulomb_n: 15.0, static_n: 25.0, ..AxisSimulation::default() };
+    let bristly =
+        AxisSimulation { bristle_stiffness_n_m: 1e6, bristle_damping_n_s_m: 4e3, ..sticky };
     let moved = |axis: AxisSimulation| {
         let mut gantry = with(axis, &Simulation::default());
         // About 9 N: below the static friction.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use ilc_rt::config::Cell;
-use ilc_rt::fieldbus::bring_up::{DriveSetup, SdoClient, bring_up};
+use ilc_rt::fieldbus::bring_up::{DriveOwn, DriveSetup, SdoClient, bring_up};
 use ilc_rt::fieldbus::canopen::{Emergency, NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{
     self, CommandRpdo1, Controlword, DriveMotionTpdo2, Mode, State, StatusTpdo1, next_command,
@@ -244,5 +244,6 @@ pub(crate) fn setup(mode: Mode) -> DriveSetup {
         heartbeat_ms: 0,
         rpdo_deadline_ms: 0,
         answer_timeout: ANSWER,
+        own: DriveOwn::default(),
     }
 }

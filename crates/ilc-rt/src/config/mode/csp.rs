@@ -27,11 +27,11 @@ impl ModeDesign for Csp {
 
     /// `w^2 / (s^2 + 2 d w s + w^2)` with a zero-order hold.
     fn nominal_model(&self, axis: &Axis, cycle_s: f64) -> Result<StateSpace, ModelError> {
-        let frequency_hz = axis.model.natural_frequency_hz.unwrap_or(1.0);
-        let damping = axis.model.damping.unwrap_or(1.0);
+        let model = axis.model.unwrap_or_default();
+        let frequency_hz = model.natural_frequency_hz.unwrap_or(1.0);
+        let damping = model.damping.unwrap_or(1.0);
         let position = second_order(TAU * frequency_hz, damping)?;
-        discretize(&position, cycle_s, Method::ZeroOrderHold)?
-            .delayed(axis.model.delay_samples as usize)
+        discretize(&position, cycle_s, Method::ZeroOrderHold)?.delayed(model.delay_samples as usize)
     }
 
     fn feed(&self, _axis: &Axis, set_point_m: f64, _velocity_m_s: f64) -> f64 {

@@ -32,13 +32,14 @@ impl ModeDesign for Csv {
     /// `G / (1 + kv z^-1 G)` with `G = a / (s (s + a))`, as the position in the controller's loop
     /// is one cycle old; with a zero-order hold.
     fn nominal_model(&self, axis: &Axis, cycle_s: f64) -> Result<StateSpace, ModelError> {
-        let bandwidth = TAU * axis.model.velocity_bandwidth_hz.unwrap_or(1.0);
+        let model = axis.model.unwrap_or_default();
+        let bandwidth = TAU * model.velocity_bandwidth_hz.unwrap_or(1.0);
         let velocity = from_transfer_function(&[bandwidth], &[1.0, bandwidth, 0.0], None)?;
         let controller =
             StateSpace::static_gain(nalgebra::dmatrix![gain_per_s(axis)], Some(cycle_s))?
                 .delayed(1)?;
         discretize(&velocity, cycle_s, Method::ZeroOrderHold)?
-            .delayed(axis.model.delay_samples as usize)?
+            .delayed(model.delay_samples as usize)?
             .feedback(&controller)
     }
 

@@ -1,7 +1,8 @@
 //! Contradictions within `[[axis]]`.
 
 use super::checker::Checker;
-use crate::config::{Axis, Cell, ConfigError, Mode, mode};
+use super::{drive, homing, simulation};
+use crate::config::{Axis, AxisModel, Cell, ConfigError, Mode, mode};
 use crate::record::{NAME_MAX, is_hidden};
 
 /// Highest CANopen node number.
@@ -66,7 +67,8 @@ pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), Config
         &l.position_max_m,
         "above limits.position_min_m",
     )?;
-    let counts = axis.counts_per_m * l.position_min_m.abs().max(l.position_max_m.abs());
+    let farthest = |position_m: f64| (position_m - axis.homing.offset_m).abs();
+    let counts = axis.counts_per_m * farthest(l.position_min_m).max(farthest(l.position_max_m));
     v.that(
         counts <= f64::from(i32::MAX),
         &at("counts_per_m"),
@@ -79,8 +81,28 @@ pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), Config
         &l.velocity_max_m_s,
         "counts_per_m times velocity_max_m_s must fit 32 bits",
     )?;
+    if let Some(model) = &axis.model {
+        check_model(axis, model, v)?;
+    }
     let design = mode::of(axis.interface);
-    let wanted = design.model_keys(&axis.model);
+    let name = axis.interface.name();
+    if design.closes_position_loop() != axis.position_loop.is_some() {
+        let (found, allowed) = if design.closes_position_loop() {
+            ("missing", format!("interface \"{name}\" needs [axis.position_loop] gain_per_s"))
+        } else {
+            ("given", format!("interface \"{name}\" has its position loop in the drive; remove it"))
+        };
+        return Err(v.refuse(&at("position_loop"), &found, &allowed));
+    }
+    homing::check(axis, v)?;
+    drive::check(axis, v)?;
+    simulation::check(axis, step_us, v)
+}
+
+/// Checks that a model has what the interface needs, and nothing else.
+fn check_model(axis: &Axis, model: &AxisModel, v: &Checker) -> Result<(), ConfigError> {
+    let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
+    let wanted = mode::of(axis.interface).model_keys(model);
     for (key, value) in &wanted {
         v.that(
             value.is_some(),
@@ -89,7 +111,7 @@ pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), Config
             "needed by this interface",
         )?;
     }
-    let all = Mode::ALL.into_iter().flat_map(|other| mode::of(other).model_keys(&axis.model));
+    let all = Mode::ALL.into_iter().flat_map(|other| mode::of(other).model_keys(model));
     let unwanted = all.filter(|(key, _)| wanted.iter().all(|(needed, _)| needed != key));
     for (key, value) in unwanted {
         if let Some(value) = value {
@@ -100,55 +122,5 @@ pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), Config
             ));
         }
     }
-    let name = axis.interface.name();
-    if design.closes_position_loop() != axis.position_loop.is_some() {
-        let (found, allowed) = if design.closes_position_loop() {
-            ("missing", format!("interface \"{name}\" needs [axis.position_loop] gain_per_s"))
-        } else {
-            ("given", format!("interface \"{name}\" has its position loop in the drive; remove it"))
-        };
-        return Err(v.refuse(&at("position_loop"), &found, &allowed));
-    }
-    check_simulation(axis, step_us, v)
-}
-
-fn check_simulation(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), ConfigError> {
-    let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
-    let s = &axis.simulation;
-    v.range(&at("simulation.coulomb_n"), s.coulomb_n, 0.0, s.force_max_n)?;
-    v.range(&at("simulation.static_n"), s.static_n, s.coulomb_n, s.force_max_n)?;
-    v.range(&at("simulation.mode_mass_kg"), s.mode_mass_kg, 0.0, 0.9 * s.mass_kg)?;
-    v.that(
-        s.backlash_m == 0.0 || s.mode_mass_kg > 0.0,
-        &at("simulation.backlash_m"),
-        &s.backlash_m,
-        "0 without simulation.mode_mass_kg: the play is between the carriage and that mass",
-    )?;
-    let step_s = f64::from(step_us) * 1e-6;
-    let carriage_kg = s.mass_kg - s.mode_mass_kg;
-    v.that(
-        s.bristle_stiffness_n_m * step_s * step_s <= 0.5 * carriage_kg
-            && s.bristle_damping_n_s_m * step_s <= 0.5 * carriage_kg,
-        &at("simulation.bristle_stiffness_n_m"),
-        &s.bristle_stiffness_n_m,
-        "bristles that [simulation] step_us resolves: stiffness * step^2 and damping * step at most half of \
-         the carriage's mass",
-    )?;
-    // Any position that can be expressed in counts: an axis that starts outside its limits is worth
-    // simulating.
-    let farthest_m = f64::from(i32::MAX) / axis.counts_per_m;
-    v.range(&at("simulation.position_start_m"), s.position_start_m, -farthest_m, farthest_m)?;
-    for (key, place_m) in [
-        ("simulation.switch_min_m", s.switch_min_m),
-        ("simulation.switch_max_m", s.switch_max_m),
-        ("simulation.switch_home_m", s.switch_home_m),
-    ] {
-        v.range(&at(key), place_m.unwrap_or(0.0), -farthest_m, farthest_m)?;
-    }
-    if let (Some(low_m), Some(high_m)) = (s.switch_min_m, s.switch_max_m) {
-        v.that(low_m < high_m, &at("simulation.switch_min_m"), &low_m, "below switch_max_m")?;
-    }
-    let option = s.quirks.quick_stop_option;
-    let key = at("simulation.quirks.quick_stop_option");
-    v.that([0, 1, 2, 5, 6].contains(&option), &key, &option, "0, 1, 2, 5 or 6")
+    Ok(())
 }

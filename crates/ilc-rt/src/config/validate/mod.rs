@@ -2,8 +2,11 @@
 
 mod axis;
 mod checker;
+mod drive;
+mod homing;
 mod learning;
 mod program;
+mod simulation;
 
 use super::cell::Cell;
 use super::error::ConfigError;

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::error::BringUpError;
+use super::own::DriveOwn;
 use super::remote::Remote;
 use super::sdo_client::SdoClient;
 use super::{process_data, scaling, settings};
@@ -18,13 +19,15 @@ const REST: Duration = Duration::from_millis(500);
 /// Polling period of a request whose completion takes time.
 const ASK_EVERY: Duration = Duration::from_millis(1);
 
+/// Bit of the homing mode in the supported modes.
+const HOMING_MODE: u32 = 1 << 5;
 /// Number of doubly answered requests that proves two nodes.
 const TWIN_QUESTIONS: u32 = 4;
 /// Time after an answer during which a second one is awaited.
 const TWIN_WAIT: Duration = Duration::from_millis(20);
 
 /// Configuration of a drive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DriveSetup {
     /// The drive.
     pub node: NodeId,
@@ -53,6 +56,8 @@ pub struct DriveSetup {
     pub rpdo_deadline_ms: u16,
     /// Time-out for the drive to boot, and to answer each request.
     pub answer_timeout: Duration,
+    /// What the cell description states of this drive.
+    pub own: DriveOwn,
 }
 
 /// Identity of a drive.
@@ -64,6 +69,8 @@ pub struct DriveIdentity {
     pub supported_modes: u32,
     /// Vendor, product, revision and serial number, object 0x1018; 0 where not supported.
     pub identity: [u32; 4],
+    /// Error code (object 0x603F) of a drive that was found in fault; 0 if it states none.
+    pub fault: Option<u16>,
 }
 
 /// Identity of an encoder node.
@@ -89,15 +96,21 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     let period = interpolation_period(setup.cycle_us)
         .ok_or(BringUpError::Cycle { node, cycle_us: setup.cycle_us })?;
     reset(bus, node, setup.answer_timeout)?;
-    let mut remote = Remote { bus, client: SdoClient::new(node, setup.answer_timeout), node };
+    let client = SdoClient::new(node, setup.answer_timeout);
+    let mut remote = Remote { bus, client, node, own: setup.own.clone() };
     let device_type = remote.check_profile(objects::PROFILE_DRIVE)?;
     remote.refuse_twins(setup.answer_timeout)?;
     let identity = remote.identity()?;
+    remote.check_identity(identity)?;
     let supported_modes = remote.read("supported modes", objects::SUPPORTED_MODES, 0)?;
     if supported_modes & setup.mode.supported_bit() == 0 {
         let (mode, supported) = (setup.mode, supported_modes);
         return Err(BringUpError::ModeNotSupported { node, mode, supported });
     }
+    if setup.own.homing.is_some() && supported_modes & HOMING_MODE == 0 {
+        return Err(BringUpError::HomingNotSupported { node, supported: supported_modes });
+    }
+    let fault = remote.fault()?;
     remote.take_power(setup)?;
 
     process_data::close_all(&mut remote)?;
@@ -112,13 +125,18 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     process_data::open(&mut remote, pdo_map::STATUS_PDO, &pdo_map::STATUS_MAP, 0)?;
     process_data::open(&mut remote, pdo_map::DRIVE_MOTION_PDO, &pdo_map::DRIVE_MOTION_MAP, 0)?;
 
+    remote.start_up()?;
     scaling::check(&mut remote, setup)?;
     remote.ensure_all(&settings::interpolation(period))?;
     remote.ensure_all(&settings::reactions(setup))?;
     remote.ensure_all(&settings::motion(setup))?;
+    if let Some(homing) = &setup.own.homing {
+        remote.ensure_all(&settings::homing(homing))?;
+    }
     remote.set_mode(setup.mode, setup.answer_timeout)?;
     remote.ensure_all(&settings::offsets())?;
-    Ok(DriveIdentity { device_type, supported_modes, identity })
+    remote.check_start_up()?;
+    Ok(DriveIdentity { device_type, supported_modes, identity, fault })
 }
 
 /// Resets an encoder node, checks its identity and maps its two positions; leaves it
@@ -132,7 +150,8 @@ pub fn bring_up_encoder(
     timeout: Duration,
 ) -> Result<EncoderIdentity, BringUpError> {
     reset(bus, node, timeout)?;
-    let mut remote = Remote { bus, client: SdoClient::new(node, timeout), node };
+    let client = SdoClient::new(node, timeout);
+    let mut remote = Remote { bus, client, node, own: DriveOwn::default() };
     let device_type = remote.check_profile(objects::PROFILE_ENCODER)?;
     remote.refuse_twins(timeout)?;
     let identity = remote.identity()?;
@@ -201,6 +220,29 @@ impl Remote<'_> {
             *value = self.find("identity", objects::IDENTITY, sub)?.unwrap_or(0);
         }
         Ok(identity)
+    }
+
+    /// Refuses a drive that is not the one of the cell description.
+    fn check_identity(&self, identity: [u32; 4]) -> Result<(), BringUpError> {
+        let names = ["vendor", "product", "revision", "serial"];
+        for (((name, sub), found), required) in
+            names.into_iter().zip(1..).zip(identity).zip(self.own.identity)
+        {
+            if let Some(required) = required.filter(|required| *required != found) {
+                return Err(BringUpError::Identity { node: self.node, name, sub, found, required });
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the error code of a drive in fault, 0 if it has none.
+    fn fault(&mut self) -> Result<Option<u16>, BringUpError> {
+        if !matches!(self.state()?.1, Some(State::Fault | State::FaultReactionActive)) {
+            return Ok(None);
+        }
+        let code = self.find("error code", objects::ERROR_CODE, 0)?.unwrap_or(0);
+        let [low, high, ..] = code.to_le_bytes();
+        Ok(Some(u16::from_le_bytes([low, high])))
     }
 
     /// Clears every consumed heartbeat: that of a missing master would stop the node.

@@ -55,6 +55,32 @@ pub enum BringUpError {
         /// Object 0x6502.
         supported: u32,
     },
+    /// A drive without the homing mode.
+    #[error(
+        "node {node}: supported modes: [axis.homing] kind = \"drive\" needs homing, found 0x6502 = 0x{supported:08X}, which lacks it"
+    )]
+    HomingNotSupported {
+        /// The node.
+        node: NodeId,
+        /// Object 0x6502.
+        supported: u32,
+    },
+    /// Another drive than that of the cell description.
+    #[error(
+        "node {node}: object 0x1018:{sub:02} ({name}): found 0x{found:08X}, [axis.drive] {name} requires 0x{required:08X}"
+    )]
+    Identity {
+        /// The node.
+        node: NodeId,
+        /// Key of the cell description.
+        name: &'static str,
+        /// Sub-index.
+        sub: u8,
+        /// Number found.
+        found: u32,
+        /// Number required.
+        required: u32,
+    },
     /// A drive that does not report the requested mode.
     #[error(
         "node {node}: mode of operation: expected {mode}, found 0x6061 = {found} after {timeout:?}"

@@ -3,12 +3,13 @@
 //! For `campaign`, the simulator and tests; never called in a tick. Imports the codecs of `canopen`
 //! and `cia402`, and the bus.
 //!
-//! Family: `drive`, `scaling` and `settings`: a drive is brought up from its own set-up.
+//! Family: `drive`, `own`, `scaling`, `setting` and `settings`: a drive is brought up from its own set-up.
 
 mod drive;
 mod error;
 pub mod listen;
 pub mod load;
+mod own;
 mod process_data;
 mod remote;
 mod scaling;
@@ -20,4 +21,6 @@ pub use drive::{
     DriveIdentity, DriveSetup, EncoderIdentity, FOLLOWING_ERROR_TIME_MS, bring_up, bring_up_encoder,
 };
 pub use error::BringUpError;
+pub use own::{DriveOwn, HomingObjects, StartUpObject, is_keepable, is_set};
 pub use sdo_client::{SdoClient, SdoError, Stray, TRIES};
+pub use setting::Kind;

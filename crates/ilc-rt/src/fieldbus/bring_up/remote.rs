@@ -1,6 +1,7 @@
 //! A node during bring-up: reads, writes, and objects with required values.
 
 use super::error::BringUpError;
+use super::own::{DriveOwn, StartUpObject};
 use super::sdo_client::{SdoClient, SdoError};
 use super::setting::{self, Absence, Kind, Need, Setting};
 use crate::fieldbus::Bus;
@@ -11,6 +12,8 @@ pub(super) struct Remote<'a> {
     pub(super) bus: &'a mut dyn Bus,
     pub(super) client: SdoClient,
     pub(super) node: NodeId,
+    /// What the cell description states of this node.
+    pub(super) own: DriveOwn,
 }
 
 impl Remote<'_> {
@@ -62,6 +65,15 @@ impl Remote<'_> {
         }
     }
 
+    /// Ensures that an object holds a required value, unless the cell description keeps it; returns
+    /// its value, and `None` if it is kept, or missing and optional.
+    ///
+    /// # Errors
+    /// As [`Remote::enforce`].
+    pub(super) fn ensure(&mut self, setting: &Setting) -> Result<Option<i64>, BringUpError> {
+        if self.own.keeps(setting.address) { Ok(None) } else { self.enforce(setting) }
+    }
+
     /// Ensures that an object holds a required value, and returns its value; `None` if the object
     /// is missing and optional.
     ///
@@ -70,7 +82,7 @@ impl Remote<'_> {
     /// # Errors
     /// [`BringUpError::Value`] if it keeps another value, [`BringUpError::Missing`] if it is
     /// missing and required.
-    pub(super) fn ensure(&mut self, setting: &Setting) -> Result<Option<i64>, BringUpError> {
+    fn enforce(&mut self, setting: &Setting) -> Result<Option<i64>, BringUpError> {
         let mut refusal = None;
         for is_written in [false, true] {
             if is_written {
@@ -101,6 +113,39 @@ impl Remote<'_> {
             }
         }
         Ok(None)
+    }
+
+    /// Writes the start-up objects of the cell description, in order.
+    pub(super) fn start_up(&mut self) -> Result<(), BringUpError> {
+        for object in self.own.start_up.clone() {
+            let setting = start_up_setting(&object);
+            if object.read_back {
+                self.enforce(&setting)?;
+            } else if let Some(refusal) = self.try_write(&setting)? {
+                return Err(self.unfit(&setting, "no value", Some(refusal)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that the start-up objects still hold their values, after everything else was set.
+    pub(super) fn check_start_up(&mut self) -> Result<(), BringUpError> {
+        for object in self.own.start_up.clone().iter().filter(|object| object.read_back) {
+            let ObjectAddress { index, sub } = object.address;
+            let setting = start_up_setting(object);
+            match self.client.upload(self.bus, index, sub) {
+                Ok(bytes) => {
+                    let found = setting.kind.decode(&bytes);
+                    if !setting.need.admits(found) {
+                        let found = format!("{} at the end", setting.shown(found));
+                        return Err(self.unfit(&setting, &found, None));
+                    }
+                }
+                Err(SdoError::Aborted { code: AbortCode::WriteOnly, .. }) => {}
+                Err(source) => return Err(BringUpError::Sdo { step: setting.name(), source }),
+            }
+        }
+        Ok(())
     }
 
     /// Ensures a whole list, in order.
@@ -154,6 +199,12 @@ impl Remote<'_> {
             refusal,
         }
     }
+}
+
+fn start_up_setting(object: &StartUpObject) -> Setting {
+    let ObjectAddress { index, sub } = object.address;
+    Setting::new(index, sub, object.kind, Need::Exactly(object.value))
+        .needed("as [[axis.drive.start_up]] sets it")
 }
 
 /// Returns whether the node said that it has no such object.

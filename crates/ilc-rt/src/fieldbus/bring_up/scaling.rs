@@ -14,9 +14,12 @@ const UNITY: [u32; 2] = [1, 1];
 ///
 /// `position = increments * feed constant / (encoder resolution * gear ratio)`
 ///
-/// Position factors are compared and never written: they belong to the mechanics, and a drive may
-/// lose its reference when they change.
+/// Position factors are compared and never written, unless the cell description states them: they
+/// belong to the mechanics, and a drive may lose its reference when they change.
 pub(super) fn check(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), BringUpError> {
+    if setup.own.states_ratios() {
+        state_ratios(remote, setup)?;
+    }
     let resolution = remote.ratio(objects::ENCODER_RESOLUTION)?;
     let gear = remote.ratio(objects::GEAR_RATIO)?.unwrap_or(UNITY);
     let feed = remote.ratio(objects::FEED_CONSTANT)?.unwrap_or(UNITY);
@@ -24,13 +27,15 @@ pub(super) fn check(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), B
     let product = |factors: [u32; 3]| factors.into_iter().map(u128::from).product::<u128>();
     let counts = product([feed[0], increments[1], gear[1]]);
     let of_increments = product([feed[1], increments[0], gear[0]]);
-    if counts != of_increments {
+    if counts != of_increments && !setup.own.states_ratios() {
         let setting = Setting::new(objects::ENCODER_RESOLUTION, 0, Kind::U32, Need::Exactly(1));
         let found = format!(
             "{}/{} with 0x6091 = {}/{} and 0x6092 = {}/{}",
             increments[0], increments[1], gear[0], gear[1], feed[0], feed[1]
         );
-        let needed = "one count per encoder increment (0x6092 / (0x608F * 0x6091) = 1)".to_owned();
+        let needed = "one count per encoder increment (0x6092 / (0x608F * 0x6091) = 1), or the \
+                      ratios in [axis.drive]"
+            .to_owned();
         return Err(remote.unfit_words(&setting, found, needed, None));
     }
     let same = |index, ratio: [u32; 2]| {
@@ -42,19 +47,58 @@ pub(super) fn check(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), B
     remote.ensure_all(&same(objects::VELOCITY_RESOLUTION, increments))?;
     remote.ensure_all(&same(objects::VELOCITY_FACTOR, UNITY))?;
     remote.ensure_all(&same(objects::ACCELERATION_FACTOR, UNITY))?;
-    if let Some([increments, revolutions]) = resolution {
-        let top = u64::from(setup.velocity_max_counts_s) * 60 * u64::from(revolutions);
-        let top = top.div_ceil(increments.into()).min(u32::MAX.into());
-        let need = Need::AtLeast(top.cast_signed());
+    if resolution.is_some() {
+        // revolutions per minute = 60 * velocity * gear ratio / feed constant
+        let velocity = u128::from(setup.velocity_max_counts_s);
+        let top = (velocity * 60 * u128::from(gear[0]) * u128::from(feed[1]))
+            .div_ceil(u128::from(gear[1]) * u128::from(feed[0]))
+            .min(u32::MAX.into());
+        let need = Need::AtLeast(i64::try_from(top).unwrap_or(i64::MAX));
         remote.ensure(&Setting::new(objects::MAX_MOTOR_SPEED, 0, Kind::U32, need))?;
     }
-    let home = Setting::new(objects::HOME_OFFSET, 0, Kind::I32, Need::Exactly(0));
+    home_offset(remote, setup)
+}
+
+/// Writes the ratios that the cell description states, and refuses a drive with others beside them:
+/// `counts_per_m` holds for all three together.
+fn state_ratios(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), BringUpError> {
+    let ratios = [objects::ENCODER_RESOLUTION, objects::GEAR_RATIO, objects::FEED_CONSTANT];
+    for (index, stated) in ratios.into_iter().zip(setup.own.ratios) {
+        let Some(ratio) = stated else {
+            if let Some([over, under]) = remote.ratio(index)? {
+                let setting = Setting::new(index, 0, Kind::U32, Need::Exactly(1));
+                let needed = "to be stated in [axis.drive] as the other ratios are".to_owned();
+                return Err(remote.unfit_words(&setting, format!("{over}/{under}"), needed, None));
+            }
+            continue;
+        };
+        for (sub, value) in (1..).zip(ratio) {
+            let setting = Setting::new(index, sub, Kind::U32, Need::Exactly(value.into()));
+            remote.ensure(&setting.needed("as [axis.drive] states it"))?;
+        }
+    }
+    Ok(())
+}
+
+/// Sets the home offset that the cell description states, or that a homing starts from. Otherwise it
+/// is compared: writing it would shift the coordinates of an axis that was set up with it, at once or
+/// at the next homing; which of the two is unknown.
+fn home_offset(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), BringUpError> {
+    let own = &setup.own;
+    let value = own.home_offset.unwrap_or(0);
+    let home = Setting::new(objects::HOME_OFFSET, 0, Kind::I32, Need::Exactly(value.into()));
+    if own.home_offset.is_some_and(|offset| offset != 0) {
+        return remote.ensure(&home.needed("as [axis.drive] home_offset states it")).map(|_| ());
+    }
+    if own.home_offset.is_some() || own.homing.is_some() || own.keeps(home.address) {
+        return remote.ensure(&home).map(|_| ());
+    }
     match remote.find(home.name(), objects::HOME_OFFSET, 0)? {
-        // Writing it would shift the coordinates of an axis that was set up with it, at once or at
-        // the next homing; which of the two is unknown.
         Some(found) if found != 0 => {
             let found = home.shown(found.cast_signed().into());
-            let needed = "0; positions would be shifted against the cell description".to_owned();
+            let needed = "0; positions would be shifted against the cell description, unless \
+                          [axis.drive] home_offset states it"
+                .to_owned();
             Err(remote.unfit_words(&home, found, needed, None))
         }
         _ => Ok(()),

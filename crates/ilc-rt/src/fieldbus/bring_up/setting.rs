@@ -1,23 +1,46 @@
 //! An object of a node with a required value.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::fieldbus::canopen::ObjectAddress;
 use crate::fieldbus::cia402::objects;
 
 /// Relative tolerance of a rate after writing: drives store rates in their own units.
 const RATE_TOLERANCE: f64 = 0.01;
 
-/// The type of an object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+/// Type of an object: sign and size in bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[schemars(rename = "ObjectType")]
+pub enum Kind {
+    /// Unsigned, 8 bits.
     U8,
+    /// Signed, 8 bits.
     I8,
+    /// Unsigned, 16 bits.
     U16,
+    /// Signed, 16 bits.
     I16,
+    /// Unsigned, 32 bits.
     U32,
+    /// Signed, 32 bits.
     I32,
 }
 
 impl Kind {
+    /// Returns the lowest and the highest number.
+    pub const fn range(self) -> (i64, i64) {
+        match self {
+            Self::U8 => (0, u8::MAX as i64),
+            Self::I8 => (i8::MIN as i64, i8::MAX as i64),
+            Self::U16 => (0, u16::MAX as i64),
+            Self::I16 => (i16::MIN as i64, i16::MAX as i64),
+            Self::U32 => (0, u32::MAX as i64),
+            Self::I32 => (i32::MIN as i64, i32::MAX as i64),
+        }
+    }
+
     /// Returns the number of bytes.
     pub(super) const fn len(self) -> usize {
         match self {

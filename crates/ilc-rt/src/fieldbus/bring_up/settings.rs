@@ -5,6 +5,7 @@
 //! bring-up and corrected if it is wrong; if it cannot be corrected the drive is rejected.
 
 use super::drive::{DriveSetup, FOLLOWING_ERROR_TIME_MS};
+use super::own::HomingObjects;
 use super::setting::{Kind, Need, Setting};
 use crate::fieldbus::canopen::{NodeId, cob_id};
 use crate::fieldbus::cia402::objects;
@@ -54,6 +55,12 @@ pub(super) fn watched_heartbeat(sub: u8) -> Setting {
 pub(super) fn reactions(setup: &DriveSetup) -> Vec<Setting> {
     use Kind::{I16, U32};
     let option = |index, values: &[i64]| Setting::new(index, 0, I16, Need::OneOf(values.to_vec()));
+    let [connection_loss, quick_stop, fault] = setup.own.reactions;
+    let or = |own: Option<i16>, index, values: &[i64]| match own {
+        Some(value) => Setting::new(index, 0, I16, Need::Exactly(value.into()))
+            .needed("as [axis.drive] states its reaction"),
+        None => option(index, values),
+    };
     let rate = |index| {
         Setting::new(index, 0, U32, Need::Near(setup.acceleration_max_counts_s2.max(1).into()))
     };
@@ -62,20 +69,20 @@ pub(super) fn reactions(setup: &DriveSetup) -> Vec<Setting> {
         rate(objects::PROFILE_DECELERATION),
         rate(objects::PROFILE_ACCELERATION),
         // Fault or quick stop; neither continue nor coast.
-        option(objects::CONNECTION_LOSS_OPTION, &[1, 3]),
+        or(connection_loss, objects::CONNECTION_LOSS_OPTION, &[1, 3]),
         // The quick-stop ramp, then off or held.
-        option(objects::QUICK_STOP_OPTION, &[2, 6]),
+        or(quick_stop, objects::QUICK_STOP_OPTION, &[2, 6]),
         // Applied to an axis at rest: disabled at once, or by a ramp.
         option(objects::SHUTDOWN_OPTION, &[0, 1]),
         option(objects::DISABLE_OPTION, &[1, 0]),
         option(objects::HALT_OPTION, &[1, 2]),
-        option(objects::FAULT_REACTION_OPTION, &[2, 1]),
+        or(fault, objects::FAULT_REACTION_OPTION, &[2, 1]),
     ]
 }
 
 /// Returns the other settings that affect the following of targets.
 pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
-    use Kind::{I32, U8, U16, U32};
+    use Kind::{I32, U16, U32};
     let at_least = |index, kind, value| Setting::new(index, 0, kind, Need::AtLeast(value));
     let times = |multiple: i64| {
         (i64::from(setup.acceleration_max_counts_s2) * multiple).min(i64::from(u32::MAX))
@@ -85,7 +92,7 @@ pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
     let (min, max) = (i64::from(setup.position_min_counts), i64::from(setup.position_max_counts));
     let limit = |sub, value| Setting::new(objects::POSITION_LIMIT, sub, I32, Need::Exactly(value));
     vec![
-        Setting::new(objects::POLARITY, 0, U8, Need::Exactly(0)),
+        polarity(setup.own.polarity),
         limit(1, min),
         limit(2, max),
         // Wrap-around of positions; never inside the axis' range.
@@ -108,11 +115,37 @@ pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
             objects::FOLLOWING_ERROR_TIME,
             0,
             U16,
-            Need::Exactly(FOLLOWING_ERROR_TIME_MS.into()),
+            Need::Exactly(
+                setup.own.following_error_time_ms.unwrap_or(FOLLOWING_ERROR_TIME_MS).into(),
+            ),
         ),
         unit(objects::POSITION_UNIT, UNIT_COUNTS, setup.position_unit),
         unit(objects::VELOCITY_UNIT, UNIT_COUNTS_PER_S, setup.velocity_unit),
     ]
+}
+
+/// A polarity other than 0 is stated by the cell description, so the drive needs the object.
+fn polarity(value: u8) -> Setting {
+    let setting = Setting::new(objects::POLARITY, 0, Kind::U8, Need::Exactly(value.into()));
+    if value == 0 { setting } else { setting.needed("as [axis.drive] polarity states it") }
+}
+
+/// Returns the settings of a homing that the drive carries out.
+pub(super) fn homing(homing: &HomingObjects) -> Vec<Setting> {
+    let needed = |index, sub, kind, need| {
+        Setting::new(index, sub, kind, need).needed("to be homed by [axis.homing]")
+    };
+    let near = |value: u32| Need::Near(value.max(1).into());
+    let speed = |sub, speed: u32| needed(objects::HOMING_SPEEDS, sub, Kind::U32, near(speed));
+    let method = Need::Exactly(homing.method.into());
+    let mut all = vec![needed(objects::HOMING_METHOD, 0, Kind::I8, method)];
+    all.extend(homing.speed_switch_counts_s.map(|value| speed(1, value)));
+    if let Some(value) = homing.speed_zero_counts_s {
+        all.push(speed(2, value));
+        let acceleration = near(homing.acceleration_counts_s2);
+        all.push(needed(objects::HOMING_ACCELERATION, 0, Kind::U32, acceleration));
+    }
+    all
 }
 
 /// Returns the required offsets of targets: 0. Checked last, as setting a mode may change them.

@@ -3,6 +3,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::{AxisMode, Moment};
+use crate::fieldbus::cia402::Scale;
 use crate::interpolate::AxisLimits;
 use crate::servo::gate::Gate;
 use crate::servo::phase::Phase;
@@ -28,6 +29,10 @@ impl AxisMode for Csp {
 
     fn extrapolate(&self, [last, before, _]: [f64; 3]) -> f64 {
         2.0 * last - before
+    }
+
+    fn counts(&self, command: f64, scale: Scale) -> Option<i32> {
+        scale.position_to_counts(command)
     }
 
     fn position_m(&self, command: f64, _reference_m: f64) -> f64 {

@@ -4,6 +4,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::{AxisMode, Moment};
+use crate::fieldbus::cia402::Scale;
 use crate::interpolate::AxisLimits;
 use crate::servo::gate::Gate;
 use crate::servo::phase::Phase;
@@ -37,6 +38,10 @@ impl AxisMode for Csv {
 
     fn extrapolate(&self, [last, _, _]: [f64; 3]) -> f64 {
         last
+    }
+
+    fn counts(&self, command: f64, scale: Scale) -> Option<i32> {
+        scale.to_counts(command)
     }
 
     fn position_m(&self, _command: f64, reference_m: f64) -> f64 {

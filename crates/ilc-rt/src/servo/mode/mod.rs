@@ -45,9 +45,12 @@ pub(super) trait AxisMode: Sync {
     /// Extrapolates the last three commands, newest first, for a tick without a finite one.
     fn extrapolate(&self, last: [f64; 3]) -> f64;
 
+    /// Returns a command in counts; `None` for NaN.
+    fn counts(&self, command: f64, scale: Scale) -> Option<i32>;
+
     /// Writes a command into the frame of the drive; NaN keeps the last one.
     fn write(&self, command: f64, scale: Scale, frame: &mut CommandRpdo1) {
-        if let Some(counts) = scale.to_counts(command) {
+        if let Some(counts) = self.counts(command, scale) {
             frame.target_counts = counts;
         }
     }
