@@ -126,7 +126,7 @@ pub fn travel(
     }
     nodes::go(cell, bus.as_mut())?;
     let (mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
-    let cycle = Cycle::new(bus, plan.servo, plan.interpolator, loop_side);
+    let cycle = Cycle::new(plan.network(bus), plan.servo.clone(), plan.interpolator, loop_side);
     let pacer = if session.lockstep { Pacer::in_line(cycle) } else { Pacer::on_clock(cycle)?.0 };
     let every = u64::from(ticks(REPORT_S)).max(1);
     Ok(Journey::new(cell, mail, every).pursue(cell, session, pacer, report))
