@@ -81,6 +81,9 @@ class Campaign:
     allow_divergent : bool
         Start the law even if the analysis predicts divergence. A law written in Python is not
         analysed: it always starts. For a `Gate` or a `Ladder` the inner law is analysed.
+    reset_faults : bool
+        Reset faults that the drives have when the program starts; otherwise they are named, and
+        nothing moves.
     telemetry : bool
         Publish on Zenoh; never with ``loopback:``.
 
@@ -127,6 +130,7 @@ class Campaign:
         learning: bool = True,
         disturbance: Callable[[int], ArrayLike] | ArrayLike | None = None,
         allow_divergent: bool = False,
+        reset_faults: bool = False,
         telemetry: bool = True,
     ) -> None:
         if isinstance(cell, Cell):
@@ -152,6 +156,7 @@ class Campaign:
         self.simulated = _simulated(self.transport, drives)
         self.resume = resume
         self.learning = learning
+        self.reset_faults = reset_faults
         self.telemetry = telemetry
         # Excitation in place of the program, for an identification.
         self.experiment: Experiment | None = None
@@ -226,6 +231,7 @@ class Campaign:
         values: dict[str, object] = {
             "bus": self.bus, "measure": self.measure, "lockstep": self.lockstep,
             "simulated": self.simulated, "library": self.library, "telemetry": self.telemetry,
+            "reset_faults": self.reset_faults,
         }  # fmt: skip
         if self.experiment is not None:
             return "identify", arguments("identify", values) + self.experiment.arguments()

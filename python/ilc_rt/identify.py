@@ -107,6 +107,7 @@ def multisine(
     lockstep: bool | None = None,
     drives: Drives = "auto",
     library: str | Path | None = None,
+    reset_faults: bool = False,
     telemetry: bool = True,
     observe: Observer | None = None,
     tell: Callable[[str], None] | None = None,
@@ -138,7 +139,7 @@ def multisine(
         Sample time in seconds, for a function; a cell has its own.
     at_m : float or None
         Position that the axis is excited around; the program's start if None.
-    measure, bus, lockstep, drives, telemetry
+    measure, bus, lockstep, drives, reset_faults, telemetry
         As for `Campaign`.
     library : path or None
         Library that the experiment is stored in; None for no library.
@@ -172,8 +173,8 @@ def multisine(
     return identify(
         system, waveform="multisine", axis=axis, amplitude=amplitude, from_hz=from_hz, to_hz=to_hz,
         period_s=period_s, periods=periods, dt_s=dt_s, at_m=at_m, measure=measure, bus=bus,
-        lockstep=lockstep, drives=drives, library=library, telemetry=telemetry, observe=observe,
-        tell=tell, duration_s=duration_s,
+        lockstep=lockstep, drives=drives, library=library, reset_faults=reset_faults,
+        telemetry=telemetry, observe=observe, tell=tell, duration_s=duration_s,
     )  # fmt: skip
 
 
@@ -221,7 +222,7 @@ def identify(
     words = arguments("identify", asked)
     if callable(system):
         session |= {"axis": axis, "at_m": at_m, "library": library, "observe": observe}
-        unset = (None, "auto", True)
+        unset = (None, "auto", True, False)
         given = [name for name, value in session.items() if not any(value is one for one in unset)]
         if given:
             message = f"{', '.join(given)}: for a cell only"

@@ -124,6 +124,22 @@ def with_drives(text: str, folder: Path) -> None:
         drives.close()
 
 
+def with_drives_by_hand(text: str, folder: Path) -> None:
+    """Run a line of commissioning with simulated drives of this host on its bus."""
+    address = f"udp:239.74.163.2:{free_port()}"
+    text, is_bus = re.subn(r"can:\S+", address, text)
+    if not is_bus:
+        text = f"{text} --bus {address}"
+    if re.search(r"ilc-rt (enable|jog|goto) ", text):
+        text = f"{text} --simulated-drives"
+    drives = Process([program("ilc-sim"), "run", ROOT / NETWORK_CELL, "--bus", address], folder)
+    try:
+        drives.line_with("ready")
+        run(text, folder)
+    finally:
+        drives.close()
+
+
 def drives_alone(text: str, folder: Path) -> None:
     """Run the simulated drives, and end them with Ctrl-C."""
     text = re.sub(r"--bus \S+", "", text) + f" --bus udp:239.74.163.2:{free_port()}"
@@ -193,6 +209,8 @@ def test_a_line_that_one_is_told_to_type_works(command: Command, folder: Path) -
         drives_alone(text, folder)
     elif re.match(r"ilc-rt (run|identify)", text):
         with_drives(text, folder)
+    elif re.match(r"(yes \| )?ilc-rt (scan|sdo|status|reset|enable|jog|goto|disable) ", text):
+        with_drives_by_hand(text, folder)
     else:
         run(text, folder)
 

@@ -55,6 +55,41 @@ pub enum CampaignError {
         /// Its command.
         heard: crate::fieldbus::bring_up::listen::Command,
     },
+    /// A drive is in fault, and a person has to see that first.
+    #[error(
+        "{file}: axis {axis} (node {node}) is in fault: {fault}; nothing has moved; `ilc-rt reset` names and resets \
+         it, or allow it by --reset-faults or [safety] reset_faults = true"
+    )]
+    Faulted {
+        /// Cell description.
+        file: String,
+        /// Name of the axis.
+        axis: String,
+        /// Its node.
+        node: u8,
+        /// Codes in words.
+        fault: String,
+    },
+    /// A drive does not tell its faults or its position.
+    #[error("{file}: axis {axis}: {source}")]
+    Commissioning {
+        /// Cell description.
+        file: String,
+        /// Name of the axis.
+        axis: String,
+        /// Reason.
+        source: Box<crate::commissioning::CommissioningError>,
+    },
+    /// A move that the limits do not allow.
+    #[error("axis {axis}: {what}: allowed {allowed}; nothing has moved")]
+    Travel {
+        /// Name of the axis.
+        axis: String,
+        /// The quantity and its value.
+        what: String,
+        /// Values allowed.
+        allowed: String,
+    },
     /// The bus failed while the nodes were started.
     #[error("{file}: [bus] address = {address}: {source}")]
     Start {

@@ -25,7 +25,7 @@ use crate::rt::RtReport;
 use crate::servo::{Cycle, mailbox};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
-const MAILBOX: usize = 8192;
+pub(super) const MAILBOX: usize = 8192;
 
 /// Runs a campaign on a bus (`cell.bus.address`, open), with the cell's law or another one; `observe` is
 /// called with every event.
@@ -142,6 +142,7 @@ fn execute(
     // the next input brings them there; it is not stored, as it says nothing about the law.
     let warm_up = u32::from(!resumed.runs.is_empty());
     plan.servo.runs = first - warm_up..options.iterations;
+    plan.servo.resets_faults |= session.reset_faults;
     if session.forgives_stalls() {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
         let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;

@@ -23,9 +23,11 @@ mod resume;
 mod rollback;
 mod running;
 mod telemetry;
+mod travel;
 
 pub use disturbance::Disturbance;
 pub use error::{CampaignError, ResumeError};
 pub use execute::{identify, run};
 pub use nodes::drive_setup;
 pub use options::{Options, Outcome, Session};
+pub use travel::{Arrival, Goal, Travel, Traveling, travel};

@@ -4,11 +4,15 @@ use std::time::Duration;
 
 use super::error::CampaignError;
 use super::options::{SIMULATED_PATIENCE_S, Session};
+use crate::commissioning::{self, CommissioningError};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::design;
 use crate::fieldbus::Bus;
-use crate::fieldbus::bring_up::{BringUpError, DriveSetup, bring_up, bring_up_encoder, listen};
+use crate::fieldbus::bring_up::{
+    BringUpError, DriveSetup, SdoClient, bring_up, bring_up_encoder, listen,
+};
 use crate::fieldbus::canopen::NmtCommand;
+use crate::fieldbus::cia402::objects;
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
 
 /// Heartbeat of the nodes in real time.
@@ -16,6 +20,16 @@ const HEARTBEAT_MS: u16 = 100;
 
 /// Resets, checks and configures all nodes, then starts them together. No axis moves.
 pub(super) fn start(
+    cell: &Cell,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<(), CampaignError> {
+    prepare(cell, bus, session)?;
+    go(cell, bus)
+}
+
+/// Resets, checks and configures all nodes; they wait for [`go`].
+pub(super) fn prepare(
     cell: &Cell,
     bus: &mut dyn Bus,
     session: &Session,
@@ -42,10 +56,63 @@ pub(super) fn start(
         bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
             .map_err(refused(format!("[tcp_encoder] node = {}", tool.node)))?;
     }
+    if session.reset_faults || cell.safety.reset_faults {
+        return Ok(());
+    }
+    for axis in &cell.axes {
+        let found = ask(cell, axis, session, |client| commissioning::faults(bus, client))?;
+        if found.in_fault() {
+            return Err(CampaignError::Faulted {
+                file,
+                axis: axis.name.clone(),
+                node: axis.node,
+                fault: found.sentence(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Starts all nodes together.
+pub(super) fn go(cell: &Cell, bus: &mut dyn Bus) -> Result<(), CampaignError> {
     bus.send(&NmtCommand::Start.frame(None)).map_err(|source| CampaignError::Start {
-        file,
+        file: cell.file.display().to_string(),
         address: cell.bus.address.clone(),
         source,
+    })
+}
+
+/// Reads the position of every axis.
+pub(super) fn positions(
+    cell: &Cell,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<Vec<f64>, CampaignError> {
+    let mut all_m = Vec::with_capacity(cell.n_axes());
+    for axis in &cell.axes {
+        let scale = design::scale(cell, axis.counts_per_m)?;
+        let counts = ask(cell, axis, session, |client| {
+            Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
+        })?;
+        all_m.push(scale.to_si(counts.cast_signed()));
+    }
+    Ok(all_m)
+}
+
+/// Asks the drive of an axis.
+fn ask<T>(
+    cell: &Cell,
+    axis: &Axis,
+    session: &Session,
+    question: impl FnOnce(&SdoClient) -> Result<T, CommissioningError>,
+) -> Result<T, CampaignError> {
+    let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
+    let timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
+    let client = SdoClient::new(design::node(cell, axis.node)?, timeout);
+    question(&client).map_err(|source| CampaignError::Commissioning {
+        file: cell.file.display().to_string(),
+        axis: axis.name.clone(),
+        source: Box::new(source),
     })
 }
 

@@ -34,6 +34,9 @@ pub struct Session {
     /// The drives are simulated on this computer: forgive a stall of up to 1 s, which stalls them as well.
     #[arg(long = "simulated-drives")]
     pub simulated: bool,
+    /// Reset faults that the drives have when the program starts, in place of a refusal that names them.
+    #[arg(long)]
+    pub reset_faults: bool,
     /// Library file that every run is stored in.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     pub library: PathBuf,

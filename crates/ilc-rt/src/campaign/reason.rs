@@ -1,6 +1,7 @@
 //! Reason of a stop, as a sentence that names axis, node and numbers.
 
 use super::options::{SIMULATED_PATIENCE_S, Session};
+use crate::commissioning::power_lost;
 use crate::config::{AxisUnit, Cell};
 use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
@@ -43,8 +44,14 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
                 .state()
                 .map_or_else(|| "no known state".to_owned(), |state| state.to_string());
             format!(
-                "drive of {} is not enabled: statusword 0x{statusword:04X}, {state}",
-                axis(index)
+                "drive of {} is not enabled: statusword 0x{statusword:04X}, {state}{}",
+                axis(index),
+                if power_lost(statusword) {
+                    "; its power stage is off, as after an emergency stop (STO): it stays off until a \
+                     person starts anew"
+                } else {
+                    ""
+                }
             )
         }
         StopReason::SilentAxis { axis: index, cycles } => {

@@ -4,10 +4,15 @@
 
 mod check;
 mod completions;
+mod dead_man;
+mod enable;
 mod figures;
+mod goto;
 mod identify;
 mod init;
+mod jog;
 mod latency;
+mod moving;
 mod option;
 mod parent;
 mod quantity;
@@ -70,6 +75,12 @@ enum Verb {
     Status(status::StatusArguments),
     /// Name the faults of drives, and reset them.
     Reset(reset::ResetArguments),
+    /// Switch the drives of a cell on, and hold their positions until released.
+    Enable(enable::EnableArguments),
+    /// Move one axis by a distance, or for as long as input arrives.
+    Jog(jog::JogArguments),
+    /// Move axes to positions.
+    Goto(goto::GotoArguments),
     /// Switch drives off.
     Disable(reset::DisableArguments),
     /// Measure how late this machine wakes the loop's thread.
@@ -111,6 +122,9 @@ pub fn main() -> ExitCode {
         Verb::Sdo(arguments) => sdo::sdo(&arguments),
         Verb::Status(arguments) => status::status(&arguments),
         Verb::Reset(arguments) => reset::reset(&arguments),
+        Verb::Enable(arguments) => enable::enable(&arguments),
+        Verb::Jog(arguments) => jog::jog(&arguments),
+        Verb::Goto(arguments) => goto::goto(&arguments),
         Verb::Disable(arguments) => reset::disable(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),
         Verb::Completions(arguments) => completions::completions(&arguments, Arguments::command()),

@@ -13,6 +13,9 @@ use super::simulation::Simulation;
 use crate::schema::field_order;
 use crate::trajectory::kind::Program;
 
+/// Default velocity of `jog` and `goto`, as a share of the limit of the axis.
+const JOG_SHARE: f64 = 0.1;
+
 /// A complete, validated cell description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -111,11 +114,23 @@ pub struct Safety {
     /// Time-out for a node to boot and to answer.
     #[schemars(range(min = 0.01, max = 60.0))]
     pub answer_timeout_s: f64,
+    /// Velocity of the first move of a run, to its start, and the highest one of `jog` and `goto`. If not given, the
+    /// first move has the feed of the program, and `jog` and `goto` a tenth of the velocity limit of their axis.
+    #[schemars(range(min = 1e-6, max = 100.0))]
+    pub approach_velocity_m_s: Option<f64>,
+    /// Reset faults that the drives have when a run starts. Otherwise they are named, and nothing moves.
+    pub reset_faults: bool,
 }
 
 impl Default for Safety {
     fn default() -> Self {
-        Self { silent_cycles_max: 20, overrun_cycles_max: 50, answer_timeout_s: 2.0 }
+        Self {
+            silent_cycles_max: 20,
+            overrun_cycles_max: 50,
+            answer_timeout_s: 2.0,
+            approach_velocity_m_s: None,
+            reset_faults: false,
+        }
     }
 }
 
@@ -172,6 +187,15 @@ impl Cell {
     /// Returns the servo cycle in seconds.
     pub fn cycle_s(&self) -> f64 {
         f64::from(self.cell.cycle_us) * 1e-6
+    }
+
+    /// Returns the highest velocity of an axis in `jog` and `goto`.
+    ///
+    /// # Panics
+    /// If there is no such axis.
+    pub fn jog_velocity_m_s(&self, axis: usize) -> f64 {
+        let most_m_s = self.axes[axis].limits.velocity_max_m_s;
+        self.safety.approach_velocity_m_s.map_or(JOG_SHARE * most_m_s, |set| set.min(most_m_s))
     }
 
     /// Returns the unit of each axis, in order.

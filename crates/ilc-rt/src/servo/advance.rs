@@ -89,7 +89,7 @@ impl Cycle {
             }
         }
         if (0..self.n_axes()).all(|axis| self.drives[axis].enabled()) {
-            self.return_to_start();
+            self.move_to_start(self.spec.approach_feed_m_s);
         } else {
             self.phase = Phase::Enabling { ticks: ticks + 1 };
         }
@@ -105,12 +105,16 @@ impl Cycle {
     }
 
     fn return_to_start(&mut self) {
+        self.move_to_start(self.spec.return_feed_m_s);
+    }
+
+    fn move_to_start(&mut self, feed_m_s: f64) {
         let plan = PointToPoint::new(
             &self.reference.position_m,
             &self.start_m,
             self.n_axes(),
             &self.limits,
-            self.spec.return_feed_m_s,
+            feed_m_s,
         );
         match plan {
             Ok(plan) => self.phase = Phase::Returning(plan),

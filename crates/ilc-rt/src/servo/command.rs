@@ -75,7 +75,7 @@ impl Cycle {
         match self.phase {
             // No drive is enabled before all are known to be within their limits.
             Phase::Enabling { .. } if !self.all_heard() => Controlword::DISABLE_VOLTAGE,
-            Phase::Enabling { .. } if state == State::Fault => {
+            Phase::Enabling { .. } if state == State::Fault && self.spec.resets_faults => {
                 Controlword::fault_reset_after(drive.sent.controlword)
             }
             Phase::Enabling { .. }

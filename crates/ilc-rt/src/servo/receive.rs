@@ -141,8 +141,14 @@ impl Cycle {
             {
                 return Some(StopReason::OutsideLimits { axis, position_m });
             }
-            // An earlier fault is reset during enabling; a drive that is not enabled in time is
-            // refused.
+            if drive.heard && drive.faulted() && !self.spec.resets_faults {
+                return Some(StopReason::DriveFault {
+                    axis,
+                    code: drive.emergency.unwrap_or(emcy::CODE_RESET),
+                    following_error_m: drive.following_error_m,
+                });
+            }
+            // A drive that is not enabled in time, or whose fault returns, is refused.
             if ticks <= self.spec.enable_ticks || drive.enabled() {
                 return None;
             }

@@ -69,6 +69,10 @@ pub struct ServoSpec {
     pub start_m: Vec<f64>,
     /// Velocity of the move to the start.
     pub return_feed_m_s: f64,
+    /// Velocity of the first move to the start, from wherever the axes are when their drives are enabled.
+    pub approach_feed_m_s: f64,
+    /// True if faults that drives have when the loop begins are reset; otherwise they end it.
+    pub resets_faults: bool,
     /// Settling time between the arrival at the start and the run.
     pub settle_ticks: u32,
     /// Time-out for a drive to switch on.
