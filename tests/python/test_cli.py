@@ -154,15 +154,6 @@ def test_a_terminal_gets_a_table_and_a_bar(gantry: Path, tmp_path: Path) -> None
     assert text.rstrip().splitlines()[-1].startswith("library: ")
 
 
-def bad_cell(gantry: Path, tmp_path: Path, old: str, new: str) -> Path:
-    """Return a copy of the cell with one error."""
-    text = gantry.read_text()
-    assert old in text
-    path = tmp_path / "bad.toml"
-    path.write_text(text.replace(old, new, 1))
-    return path
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -194,26 +185,6 @@ def test_bad_input_is_one_line_and_exit_2(
     assert done.stderr.count("\n") == 1, done.stderr
     assert said in done.stderr
     assert done.stdout == ""
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("cycle_us = 2000", "cycle_us = 2000\nspeed = 3", "speed"),
-        ("cycle_us = 2000", "cycle_us = 3", "cycle_us"),
-        ("cycle_us = 2000", 'cycle_us = "fast"', "cycle_us"),
-        ("[cell]", "[cell", "bad.toml:4"),
-    ],
-)
-def test_a_bad_cell_names_file_and_key(
-    ilc: Ilc, gantry: Path, tmp_path: Path, old: str, new: str, said: str
-) -> None:
-    """The line of the controller's own check."""
-    done = ilc("run", bad_cell(gantry, tmp_path, old, new))
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1, done.stderr
-    assert "bad.toml" in done.stderr
-    assert said in done.stderr
 
 
 def test_without_the_papers_reproduce_says_how_to_get_them() -> None:

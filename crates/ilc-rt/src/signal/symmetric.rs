@@ -12,6 +12,16 @@ pub(super) enum Ends {
     Mirrored,
 }
 
+impl Ends {
+    /// Returns the samples that the `i`-th ones before the first and after the last are made of.
+    fn of(self, i: usize, last: usize) -> (usize, usize) {
+        match self {
+            Self::Held => (0, last),
+            Self::Mirrored => (i, last - i),
+        }
+    }
+}
+
 /// A symmetric (zero-phase) FIR filter with its workspace.
 ///
 /// `y[k] = w[0] x[k] + sum_{i=1}^{r} w[i] (x[k+i] + x[k-i])`
@@ -67,10 +77,7 @@ impl Symmetric {
             self.extended[reach + k] = signal[at(k)];
         }
         for i in 0..reach {
-            let (before, after) = match self.ends {
-                Ends::Held => (0, last),
-                Ends::Mirrored => (i, last - i),
-            };
+            let (before, after) = self.ends.of(i, last);
             self.extended[reach - 1 - i] = signal[at(before)];
             self.extended[reach + n_samples + i] = signal[at(after)];
         }
@@ -114,10 +121,7 @@ impl Symmetric {
             signal[at(k)] = self.extended[reach + k];
         }
         for i in 0..reach {
-            let (before, after) = match self.ends {
-                Ends::Held => (0, last),
-                Ends::Mirrored => (i, last - i),
-            };
+            let (before, after) = self.ends.of(i, last);
             signal[at(before)] += self.extended[reach - 1 - i];
             signal[at(after)] += self.extended[reach + n_samples + i];
         }

@@ -118,10 +118,7 @@ impl ZeroPhase {
         n_channels: usize,
     ) -> Result<(), SignalError> {
         let expected = self.n_samples();
-        if n_channels == 0 || channel >= n_channels || signal.len() != expected * n_channels {
-            let found = signal.len().checked_div(n_channels).unwrap_or(0);
-            return Err(SignalError::Length { found, expected });
-        }
+        check_channel(signal, channel, n_channels, expected)?;
         let at = |sample: usize| sample * n_channels + channel;
         let (padding, last) = (self.padding, expected - 1);
         self.extended.fill(0.0);

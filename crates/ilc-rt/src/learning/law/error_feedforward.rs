@@ -203,7 +203,8 @@ impl Law for ErrorFeedforward {
                 to_error[ahead * n_channels + channel] += gain * dual[k * n_channels + channel];
             }
         }
-        Ok(self.runner.apply_transposed(to_error, n_channels)?)
+        self.runner.apply_transposed(to_error, n_channels)?;
+        Ok(true)
     }
 
     fn linear_surrogate(&mut self) -> Surrogate<'_> {

@@ -149,9 +149,7 @@ impl Law for Pd {
         check_adjoint(dual, to_input, to_error, n_samples, [n_channels; 2])?;
         to_input.copy_from_slice(dual);
         to_error.fill(0.0);
-        if !self.runner.apply_transposed(to_input, n_channels)? {
-            return Ok(false);
-        }
+        self.runner.apply_transposed(to_input, n_channels)?;
         let PdGains { kp, kd, lead_samples: lead } = self.gains;
         let last = n_samples - 1;
         for channel in 0..n_channels {

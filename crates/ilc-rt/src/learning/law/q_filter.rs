@@ -172,45 +172,28 @@ impl QRunner {
     }
 
     /// Applies the transpose (adjoint) of the filter to every channel in place, for the analysis of
-    /// laws; returns true if this kind has one.
+    /// laws; shapes are those of [`QRunner::apply`].
     ///
-    /// # Shapes
-    /// - as [`QRunner::apply`]
     /// # Errors
-    /// - [`SignalError::Length`] if the signal has a different length than the filter was set up
-    ///   for.
+    /// - as [`QRunner::apply`].
     pub fn apply_transposed(
         &mut self,
         signal: &mut [f64],
         n_channels: usize,
-    ) -> Result<bool, SignalError> {
-        match &mut self.0 {
-            Kind::None => {}
-            Kind::ZeroPhase(filter) => {
-                for channel in 0..n_channels {
-                    filter.apply_transposed(signal, channel, n_channels)?;
-                }
-            }
+    ) -> Result<(), SignalError> {
+        (0..n_channels).try_for_each(|channel| match &mut self.0 {
+            Kind::None => Ok(()),
+            Kind::ZeroPhase(filter) => filter.apply_transposed(signal, channel, n_channels),
             Kind::Causal(filter) => {
-                for channel in 0..n_channels {
-                    filter.reset();
-                    for value in signal.iter_mut().skip(channel).step_by(n_channels).rev() {
-                        *value = filter.step(*value);
-                    }
+                filter.reset();
+                for value in signal.iter_mut().skip(channel).step_by(n_channels).rev() {
+                    *value = filter.step(*value);
                 }
+                Ok(())
             }
-            Kind::Symmetric(filter) => {
-                for channel in 0..n_channels {
-                    filter.apply_transposed(signal, channel, n_channels)?;
-                }
-            }
-            Kind::Switched(filter) => {
-                for channel in 0..n_channels {
-                    filter.apply_transposed(signal, channel, n_channels)?;
-                }
-            }
-        }
-        Ok(true)
+            Kind::Symmetric(filter) => filter.apply_transposed(signal, channel, n_channels),
+            Kind::Switched(filter) => filter.apply_transposed(signal, channel, n_channels),
+        })
     }
 }
 
