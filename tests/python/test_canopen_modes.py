@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING
 
@@ -37,7 +38,7 @@ def eds(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def changed_cell(folder: Path, *quirks: str) -> Path:
-    """Return a copy of the cell whose first drive has some habits."""
+    """Return a copy of the cell whose first drive has these habits."""
     table = "\n".join(["", "[axis.simulation.quirks]", *quirks, ""])
     head, mark, tail = CELL.read_text().partition("position_start_m = 0.04")
     assert mark
@@ -68,8 +69,6 @@ def test_homing(eds: Path, method: int, home_m: float) -> None:
         # Off the pulse at the start, which friction may leave on either side.
         node.sdo[0x6099][2].raw = 20 * MM
         enable(network, node, "HOMING")
-        if method != 35:
-            node.sdo[0x607A].raw = START_COUNTS + (-2 if method == 34 else 2) * MM
         place_m = actual(node) / COUNTS_PER_M
         assert node.homing(timeout=20)
         assert node.is_homed()
@@ -145,8 +144,6 @@ def test_block_transfer_is_refused(eds: Path) -> None:
 
 
 def test_a_sine_in_cyclic_position(eds: Path) -> None:
-    import math
-
     with running() as (_, network):
         node = attach(network, 1, eds)
         enable(network, node, "CYCLIC SYNCHRONOUS POSITION")
@@ -206,8 +203,10 @@ def test_objects_that_are_not_there(tmp_path: Path) -> None:
                 node.sdo.upload(index, 0)
             assert refusal.value.code == 0x0602_0000
         node.pdo.read()
-        lengths = [sum(variable.length for variable in pdo) for pdo in
-                   (node.rpdo[1], node.tpdo[1], node.tpdo[2])]
+        lengths = [
+            sum(variable.length for variable in pdo)
+            for pdo in (node.rpdo[1], node.tpdo[1], node.tpdo[2])
+        ]
         assert lengths == [48, 48, 32]
         node.sdo[0x6098].raw = 35
         node.sdo[0x6060].raw = 8
@@ -243,7 +242,6 @@ def test_statusword_on_change(eds: Path, tmp_path: Path) -> None:
         assert node.sdo[0x1800][2].raw == 255
         node.tpdo.read()
         node.nmt.state = "OPERATIONAL"
-        wait_until(lambda: 0x6041 in node.tpdo_values or True, "subscribed")
         words: list[int] = []
         node.tpdo[1].add_callback(lambda pdo: words.append(pdo[0].raw))
         node.sdo[0x6040].raw = 6

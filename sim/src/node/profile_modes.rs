@@ -26,7 +26,7 @@ impl Dwell {
         self.held_us = holds.then(|| self.held_us.map_or(0, |us| us + u64::from(step_us)));
     }
 
-    /// Begins anew.
+    /// Begins again.
     pub(super) fn restart(&mut self) {
         self.held_us = None;
     }

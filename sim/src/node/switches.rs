@@ -1,6 +1,6 @@
 //! The switches and the index pulses of an axis, simulated from its position.
 
-/// Where the switches of an axis are.
+/// Places of the switches of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Switches {
     /// The negative limit switch is closed from here downwards.
@@ -20,7 +20,7 @@ const AT_MAX: i64 = 1 << 1;
 /// Bit of 0x60FD: the home switch.
 const AT_HOME: i64 = 1 << 2;
 
-/// What the switches and the encoder say in one step.
+/// State of the switches and of the encoder in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Seen {
     /// Position of the encoder.
