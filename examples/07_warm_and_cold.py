@@ -1,8 +1,8 @@
 """Learn with the temperature: what was learned cold and warm is recalled, not learned again.
 
-The motor loses force and the tool's scale grows as the machine heats up. Norm-optimal learning alone
-corrects the last run, and starts every change of temperature from the wrong one; relevance-weighted
-learning (DPW-ILC) weights past runs by their temperature. Run it with
+The motor loses force and the tool's scale grows as the machine heats up. Norm-optimal learning
+alone corrects the last run, and starts every change of temperature from the wrong one;
+relevance-weighted learning (DPW-ILC) weights past runs by their temperature. Run it with
 
     python examples/07_warm_and_cold.py
 """
@@ -18,12 +18,14 @@ SHIFTS = [(293.15, 4), (353.15, 4), (293.15, 2), (353.15, 2)]
 
 
 def campaign(law: str, folder: Path) -> list[tuple[float, float]]:
-    """Return the temperature and the RMS error of each run, one campaign resumed from shift to shift."""
+    """Return the temperature and the RMS error of each run of a campaign resumed per shift."""
     runs = []
     for shift, (temperature_k, n_runs) in enumerate(SHIFTS):
         text = CELL.read_text(encoding="utf-8").replace('law = "relevance"', f'law = "{law}"')
         cell = folder / f"{law}.toml"
-        cell.write_text(text + f"\n[simulation]\ntemperature_k = {temperature_k}\n", encoding="utf-8")
+        cell.write_text(
+            text + f"\n[simulation]\ntemperature_k = {temperature_k}\n", encoding="utf-8"
+        )
 
         def thermometer(run: int, now_k: float = temperature_k) -> float:
             """Return the temperature before a run, as a sensor on the machine would."""

@@ -49,7 +49,7 @@ class LocalDrive:
 
     @property
     def is_enabled(self) -> bool:
-        """Whether it has power."""
+        """True if it has power."""
         return self._state == ENABLED
 
     def _number(self, index: int, sub: int = 0) -> int:

@@ -200,9 +200,7 @@ def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
     assert refused.end() == 2
     (line,) = refused.errors
     assert "axis x (node 1) is in fault: 0x8250" in line and "--reset-faults" in line, line
-    resumed = bench.controller(
-        cell, "--resume", "--reset-faults", "--json", "figures.json", runs=4
-    )
+    resumed = bench.controller(cell, "--resume", "--reset-faults", "--json", "figures.json", runs=4)
     start = resumed.event(event="start")
     assert (start["first_index"], start["campaign"]) == (2, kept[0][0])
     assert resumed.end() == 0, resumed.errors

@@ -47,7 +47,7 @@ Timeout = Annotated[
     float | None, typer.Option("--timeout", metavar="SECONDS", help="End after this time.")
 ]
 Raw = Annotated[
-    bool, typer.Option("--events", help="Print the JSON objects as they come, one a line.")
+    bool, typer.Option("--events", help="Print the JSON objects as they come, one per line.")
 ]
 
 

@@ -90,7 +90,7 @@ pub(super) fn positions(
 ) -> Result<Vec<f64>, CampaignError> {
     let mut all_m = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
-        let scale = design::scale(cell, axis.counts_per_m)?;
+        let scale = design::axis_scale(cell, axis)?;
         let counts = ask(cell, axis, session, |client| {
             Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
         })?;

@@ -1,4 +1,4 @@
-//! What the cell description states of a drive, in the drive's own units.
+//! The values of a drive that the cell description states, in the drive's own units.
 
 use crate::config::Axis;
 use crate::fieldbus::bring_up::{DriveOwn, HomingObjects, StartUpObject};

@@ -7,8 +7,8 @@ use super::target::{Asking, Choice, Target, answered};
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
 use crate::commissioning::{AxisStatus, axis_status, power_lost};
 use crate::config::Cell;
+use crate::design::axis_scale;
 use crate::fieldbus::canopen::NodeId;
-use crate::fieldbus::cia402::Scale;
 
 #[derive(Args)]
 #[command(
@@ -78,9 +78,8 @@ fn one(
     nmt: Option<String>,
 ) -> Result<AxisStatus, String> {
     let axis = cell.axes.iter().find(|axis| axis.node == node.get());
-    let (axis, scale) = axis
-        .and_then(|axis| Some((axis, Scale::new(axis.counts_per_m)?)))
-        .ok_or("it has no axis in this cell")?;
+    let axis = axis.ok_or("it has no axis in this cell")?;
+    let scale = axis_scale(cell, axis).map_err(|error| error.to_string())?;
     let client = target.client(node);
     let unit = axis.unit.symbol();
     axis_status(target.bus.as_mut(), &client, &axis.name, unit, scale, nmt)

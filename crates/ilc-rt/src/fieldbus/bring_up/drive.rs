@@ -56,7 +56,7 @@ pub struct DriveSetup {
     pub rpdo_deadline_ms: u16,
     /// Time-out for the drive to boot, and to answer each request.
     pub answer_timeout: Duration,
-    /// What the cell description states of this drive.
+    /// Values of this drive that the cell description states.
     pub own: DriveOwn,
 }
 

@@ -1,4 +1,4 @@
-//! What a drive has of its own: identity, values and start-up objects that its cell description states.
+//! The values of one drive that its cell description states: identity, objects, start-up list.
 //!
 //! For `campaign`, which fills it in, and `config`, which checks it by [`is_set`] and [`is_keepable`].
 
@@ -7,7 +7,7 @@ use crate::fieldbus::cia402::objects;
 
 use super::setting::Kind;
 
-/// What a cell description states of one drive; empty by default.
+/// Values of one drive that its cell description states; empty by default.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DriveOwn {
     /// Vendor, product, revision and serial number that the drive must have.

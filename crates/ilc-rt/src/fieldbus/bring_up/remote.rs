@@ -12,7 +12,7 @@ pub(super) struct Remote<'a> {
     pub(super) bus: &'a mut dyn Bus,
     pub(super) client: SdoClient,
     pub(super) node: NodeId,
-    /// What the cell description states of this node.
+    /// Values of this node that the cell description states.
     pub(super) own: DriveOwn,
 }
 

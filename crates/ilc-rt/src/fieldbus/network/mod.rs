@@ -98,7 +98,7 @@ pub enum Arrival {
 pub enum AnswerPart {
     /// State and position (TPDO1).
     Status,
-    /// What does not fit there (TPDO2).
+    /// The values that do not fit there (TPDO2).
     Motion,
 }
 
