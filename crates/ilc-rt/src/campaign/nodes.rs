@@ -11,7 +11,7 @@ use crate::fieldbus::Bus;
 use crate::fieldbus::bring_up::{
     BringUpError, DriveSetup, SdoClient, bring_up, bring_up_encoder, listen,
 };
-use crate::fieldbus::canopen::NmtCommand;
+use crate::fieldbus::canopen::{NmtCommand, emcy};
 use crate::fieldbus::cia402::objects;
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
 
@@ -48,15 +48,22 @@ pub(super) fn prepare(
             source: Box::new(source),
         }
     };
+    let resets = session.reset_faults || cell.safety.reset_faults;
     for axis in &cell.axes {
-        bring_up(bus, &drive_setup(cell, axis, lockstep)?)
+        let found = bring_up(bus, &drive_setup(cell, axis, lockstep)?)
             .map_err(refused(format!("[[axis]] {} node = {}", axis.name, axis.node)))?;
+        if let Some(code) = found.fault.filter(|_| resets) {
+            let (name, node, meaning) = (&axis.name, axis.node, emcy::meaning(code));
+            tracing::warn!(
+                "drive of axis {name} (node {node}) was in fault, which is reset: 0x{code:04X} {meaning}"
+            );
+        }
     }
     if let Some(tool) = &cell.tcp_encoder {
         bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
             .map_err(refused(format!("[tcp_encoder] node = {}", tool.node)))?;
     }
-    if session.reset_faults || cell.safety.reset_faults {
+    if resets {
         return Ok(());
     }
     for axis in &cell.axes {
@@ -90,11 +97,11 @@ pub(super) fn positions(
 ) -> Result<Vec<f64>, CampaignError> {
     let mut all_m = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
-        let scale = design::scale(cell, axis.counts_per_m)?;
+        let scale = design::axis_scale(cell, axis)?;
         let counts = ask(cell, axis, session, |client| {
             Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
         })?;
-        all_m.push(scale.to_si(counts.cast_signed()));
+        all_m.push(scale.position_m(counts.cast_signed()));
     }
     Ok(all_m)
 }

@@ -79,7 +79,10 @@ fn one(
 ) -> Result<AxisStatus, String> {
     let axis = cell.axes.iter().find(|axis| axis.node == node.get());
     let (axis, scale) = axis
-        .and_then(|axis| Some((axis, Scale::new(axis.counts_per_m)?)))
+        .and_then(|axis| {
+            let scale = Scale::new(axis.counts_per_m)?.reversed(axis.reversed);
+            Some((axis, scale.with_zero_m(axis.homing.offset_m)))
+        })
         .ok_or("it has no axis in this cell")?;
     let client = target.client(node);
     let unit = axis.unit.symbol();
