@@ -113,7 +113,8 @@ impl Machine {
         for axis in &cell.axes {
             let node = node_of(axis.node)?;
             let parameters = DriveParameters {
-                counts_per_m: axis.counts_per_m,
+                counts_per_m: if axis.reversed { -axis.counts_per_m } else { axis.counts_per_m },
+                zero_m: axis.homing.offset_m,
                 position_min_m: axis.limits.position_min_m,
                 position_max_m: axis.limits.position_max_m,
                 velocity_max_m_s: axis.limits.velocity_max_m_s,

@@ -81,6 +81,9 @@ def folder(tmp_path: Path, finished: CampaignResult) -> Path:
     )
     for name in ("ilc-library.db", "gantry.db"):
         (tmp_path / name).write_bytes(Path(finished.library).read_bytes())
+    sheet = run(f"ilc-sim eds {NETWORK_CELL} --node 1", tmp_path)
+    for name in ("servo.eds", "servo.dcf"):
+        (tmp_path / name).write_text(sheet, encoding="utf-8")
     figures = ROOT / "docs" / "gallery" / "figures.json"
     (tmp_path / "figures.json").write_bytes(figures.read_bytes())
     return tmp_path

@@ -21,8 +21,10 @@ use crate::plant::Demand;
 /// Parameters set by the maker of the drive and the integrator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveParameters {
-    /// Counts per metre.
+    /// Counts per metre; negative for a drive that counts in the other direction than its axis.
     pub counts_per_m: f64,
+    /// Position at which it shows 0 after power-on.
+    pub zero_m: f64,
     /// Lowest position.
     pub position_min_m: f64,
     /// Highest position.
@@ -98,8 +100,13 @@ impl DriveNode {
         let mut communication = Communication::new(node, drive_objects::all(node, &parameters))?;
         let slots = DriveSlots::find(communication.dictionary())?;
         communication.take_habits(&parameters.quirks);
-        let units = Units::read(communication.dictionary(), &slots, parameters.counts_per_m, 0.0)
-            .within(&parameters.switches);
+        let units = Units::read(
+            communication.dictionary(),
+            &slots,
+            parameters.counts_per_m,
+            parameters.zero_m,
+        )
+        .within(&parameters.switches);
         Ok(Self {
             communication,
             slots,
@@ -114,7 +121,7 @@ impl DriveNode {
             controlword: 0,
             positioning: Positioning::default(),
             homing: Homing::default(),
-            home_m: 0.0,
+            home_m: parameters.zero_m,
             seen_m: 0.0,
             reached: Dwell::default(),
             standing: Dwell::default(),
@@ -229,7 +236,7 @@ impl DriveNode {
                 self.controlword = 0;
                 self.homing = Homing::default();
                 self.drop_own_motion();
-                self.home_m = 0.0;
+                self.home_m = self.parameters.zero_m;
             }
         }
     }

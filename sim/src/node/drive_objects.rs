@@ -146,7 +146,9 @@ fn words_and_options(parameters: &DriveParameters) -> Vec<Entry> {
 fn motion(parameters: &DriveParameters) -> Vec<Entry> {
     let unsigned = |counts: f64| Value::U32(0).with_number(rounded(counts));
     let signed = |counts: f64| Value::I32(0).with_number(rounded(counts));
-    let counts = |value_si: f64| value_si * parameters.counts_per_m;
+    let counts = |value_si: f64| value_si * parameters.counts_per_m.abs();
+    let ends = [parameters.position_min_m, parameters.position_max_m]
+        .map(|position_m| (position_m - parameters.zero_m) * parameters.counts_per_m);
     let limit = objects::POSITION_LIMIT;
     let period = objects::INTERPOLATION_PERIOD;
     let range = objects::POSITION_RANGE_LIMIT;
@@ -179,8 +181,8 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         output(objects::TORQUE_ACTUAL, Value::I16(0)),
         input(objects::TARGET_POSITION, Value::I32(0)),
         Entry::constant(limit, 0, "Highest sub-index", Value::U8(2)),
-        setting(limit, 1, signed(counts(parameters.position_min_m))),
-        setting(limit, 2, signed(counts(parameters.position_max_m))),
+        setting(limit, 1, signed(ends[0].min(ends[1]))),
+        setting(limit, 2, signed(ends[0].max(ends[1]))),
         setting(objects::MAX_VELOCITY, 0, unsigned(counts(parameters.velocity_max_m_s))),
         Entry::constant(range, 0, "Highest sub-index", Value::U8(2)),
         setting(range, 1, Value::I32(i32::MIN)),

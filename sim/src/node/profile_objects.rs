@@ -32,10 +32,10 @@ const U32_MAX: i64 = 0xFFFF_FFFF;
 /// Returns the objects.
 pub(super) fn all(parameters: &DriveParameters) -> Vec<Entry> {
     let unsigned = |value_si: f64| {
-        Value::U32(0).with_number(rounded(value_si * parameters.counts_per_m).max(1))
+        Value::U32(0).with_number(rounded(value_si * parameters.counts_per_m.abs()).max(1))
     };
     let short = |value_si: f64| {
-        Value::U16(0).with_number(rounded(value_si * parameters.counts_per_m).max(1))
+        Value::U16(0).with_number(rounded(value_si * parameters.counts_per_m.abs()).max(1))
     };
     let speed = |share: f64| unsigned(share * parameters.velocity_max_m_s);
     let positive = Allowed::Range(1, U32_MAX);

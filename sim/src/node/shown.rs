@@ -21,13 +21,15 @@ impl DriveNode {
         let units = &self.units;
         let Measured { position_m, velocity_m_s, force_n } = self.measured;
         let demand_m = self.motion.demand_m().unwrap_or(position_m);
+        // A reversed motor turns the other way for the same force.
+        let force_max_n = self.parameters.force_max_n.copysign(self.parameters.counts_per_m);
         let values = [
             (self.slots.position_demand, units.position(demand_m)),
             (self.slots.position_internal, rounded(position_m * self.parameters.counts_per_m)),
             (self.slots.position_actual, units.position(position_m)),
             (self.slots.velocity_demand, units.velocity(self.motion.demand_m_s())),
             (self.slots.velocity_actual, units.velocity(velocity_m_s)),
-            (self.slots.torque_actual, rounded(force_n / self.parameters.force_max_n * 1000.0)),
+            (self.slots.torque_actual, rounded(force_n / force_max_n * 1000.0)),
             (self.slots.following_error, rounded(self.following_error_counts())),
         ];
         for (slot, number) in values {

@@ -70,7 +70,8 @@ impl Units {
         let unless_unlimited = |slot: Slot, value: f64| {
             if number(slot) == NO_LIMIT { f64::INFINITY } else { value }
         };
-        let motor_m_s = number(slots.motor_speed_max) as f64 / 60.0 * resolution / counts_per_m;
+        let motor_m_s =
+            number(slots.motor_speed_max) as f64 / 60.0 * resolution / counts_per_m.abs();
         let deceleration_max_m_s2 =
             unless_unlimited(slots.deceleration_max, acceleration(slots.deceleration_max));
         let velocity_max_m_s =
@@ -197,5 +198,9 @@ impl Units {
 /// One metre in a unit of 0x60A8 or 0x60A9: counts, or metres with a prefix.
 fn per_m(unit: i64, counts_per_m: f64) -> f64 {
     let [.., numerator, prefix] = u32::try_from(unit).unwrap_or(UNIT_COUNTS).to_le_bytes();
-    if numerator == 0x01 { 10.0_f64.powi(-i32::from(prefix.cast_signed())) } else { counts_per_m }
+    if numerator == 0x01 {
+        10.0_f64.powi(-i32::from(prefix.cast_signed())).copysign(counts_per_m)
+    } else {
+        counts_per_m
+    }
 }

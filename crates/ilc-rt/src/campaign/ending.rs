@@ -10,6 +10,8 @@ use super::pace::Pacer;
 use super::reason::sentence;
 use super::running::Running;
 use crate::config::Cell;
+use crate::fieldbus::canopen::emcy;
+use crate::interpolate::MAX_AXES;
 use crate::record::{EndStatus, Event, Fault, FaultKind, IterationRecord, StateName};
 use crate::servo::StopReason;
 
@@ -98,6 +100,9 @@ impl Running<'_> {
     pub(super) fn end(mut self, pacer: Pacer, cell: &Cell, options: &Options) -> Outcome {
         let result = pacer.end();
         self.read_mail();
+        if let Some(result) = &result {
+            self.stopping = self.stopping.map(|reason| explained(reason, &result.error_codes));
+        }
         while self.awaited > 0
             && let Some(update) = self.learner.as_mut().and_then(Learner::take_last)
         {
@@ -148,5 +153,23 @@ impl Running<'_> {
         };
         let axis_units = cell.axes.iter().map(|axis| axis.unit.symbol()).collect();
         Outcome { status, reason, signal, campaign: self.campaign, axis_units, runs: self.runs }
+    }
+}
+
+/// Returns the reason with the error code that the drive gave when asked, if it is the fault of a drive
+/// without an emergency message.
+fn explained(reason: StopReason, error_codes: &[u16; MAX_AXES]) -> StopReason {
+    let (axis, following_error_m) = match reason {
+        StopReason::DriveFault { axis, code: emcy::CODE_RESET, following_error_m } => {
+            (axis, following_error_m)
+        }
+        StopReason::NotEnabled { axis, .. } => (axis, 0.0),
+        other => return other,
+    };
+    match error_codes.get(axis) {
+        Some(&code) if code != emcy::CODE_RESET => {
+            StopReason::DriveFault { axis, code, following_error_m }
+        }
+        _ => reason,
     }
 }

@@ -11,7 +11,7 @@ use crate::fieldbus::Bus;
 use crate::fieldbus::bring_up::{
     BringUpError, DriveSetup, SdoClient, bring_up, bring_up_encoder, listen,
 };
-use crate::fieldbus::canopen::NmtCommand;
+use crate::fieldbus::canopen::{NmtCommand, emcy};
 use crate::fieldbus::cia402::{PdoMap, objects};
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
 
@@ -52,18 +52,25 @@ pub(super) fn prepare(
             source: Box::new(source),
         }
     };
+    let resets = session.reset_faults || cell.safety.reset_faults;
     let mut maps = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
         let key = format!("[[axis]] {} node = {}", axis.name, axis.node);
-        let identity =
+        let found =
             bring_up(bus, &drive_setup(cell, axis, lockstep)?).map_err(refused(key, axis.bus))?;
-        maps.push(identity.map);
+        if let Some(code) = found.fault.filter(|_| resets) {
+            let (name, node, meaning) = (&axis.name, axis.node, emcy::meaning(code));
+            tracing::warn!(
+                "drive of axis {name} (node {node}) was in fault, which is reset: 0x{code:04X} {meaning}"
+            );
+        }
+        maps.push(found.map);
     }
     if let Some(tool) = &cell.tcp_encoder {
         bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
             .map_err(refused(format!("[tcp_encoder] node = {}", tool.node), 0))?;
     }
-    if session.reset_faults || cell.safety.reset_faults {
+    if resets {
         return Ok(maps);
     }
     for axis in &cell.axes {
@@ -101,7 +108,7 @@ pub(super) fn positions(
         let counts = ask(cell, axis, session, |client| {
             Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
         })?;
-        all_m.push(scale.to_si(counts.cast_signed()));
+        all_m.push(scale.position_m(counts.cast_signed()));
     }
     Ok(all_m)
 }

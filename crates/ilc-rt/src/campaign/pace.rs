@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use super::error::CampaignError;
 use crate::fieldbus::BusError;
+use crate::fieldbus::canopen::emcy;
+use crate::interpolate::MAX_AXES;
 use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
 use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
 
@@ -25,6 +27,8 @@ pub(super) enum Pacer {
 pub(super) struct LoopResult {
     /// Outcome of taking the nodes out of operation.
     pub(super) released: Result<(), BusError>,
+    /// Error code of each axis whose drive is in fault, by its emergency message or asked for; 0 for none.
+    pub(super) error_codes: [u16; MAX_AXES],
     pub(super) timing: Option<Timing>,
 }
 
@@ -45,7 +49,7 @@ impl Pacer {
                 run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
                 // At once, not when the campaign has finished its clean-up: by then the nodes may
                 // have missed their commands, or be in another campaign.
-                LoopResult { released: release(cycle), timing: Some(timing) }
+                release(cycle, Some(timing))
             })
             .map_err(|source| CampaignError::Thread { what: "servo", source })?;
         let report = granted.recv().unwrap_or_default();
@@ -72,13 +76,19 @@ impl Pacer {
     pub(super) fn end(self) -> Option<LoopResult> {
         match self {
             Self::Clock { thread } => thread?.join().ok(),
-            Self::Answers { cycle } => {
-                Some(LoopResult { released: release(*cycle?), timing: None })
-            }
+            Self::Answers { cycle } => Some(release(*cycle?, None)),
         }
     }
 }
 
-fn release(cycle: Cycle) -> Result<(), BusError> {
-    cycle.into_network().release()
+/// Takes the nodes out of operation, once those in fault have said why.
+fn release(cycle: Cycle, timing: Option<Timing>) -> LoopResult {
+    let faults: [Option<u16>; MAX_AXES] = std::array::from_fn(|axis| cycle.fault(axis));
+    let mut network = cycle.into_network();
+    let error_codes = std::array::from_fn(|axis| match faults[axis] {
+        Some(emcy::CODE_RESET) => network.error_code(axis).unwrap_or(emcy::CODE_RESET),
+        Some(code) => code,
+        None => emcy::CODE_RESET,
+    });
+    LoopResult { released: network.release(), error_codes, timing }
 }

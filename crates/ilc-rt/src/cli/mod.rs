@@ -5,6 +5,7 @@
 mod check;
 mod completions;
 mod dead_man;
+mod drive;
 mod enable;
 mod figures;
 mod goto;
@@ -71,6 +72,8 @@ enum Verb {
     Scan(scan::ScanArguments),
     /// Read or write an object of a node.
     Sdo(sdo::SdoArguments),
+    /// Describe a drive from the data sheet of its maker.
+    Drive(drive::DriveArguments),
     /// Print state, position, faults and inputs of the axes; only reads.
     Status(status::StatusArguments),
     /// Name the faults of drives, and reset them.
@@ -120,6 +123,7 @@ pub fn main() -> ExitCode {
         Verb::Schema(arguments) => schema::schema(&arguments),
         Verb::Scan(arguments) => scan::scan(&arguments),
         Verb::Sdo(arguments) => sdo::sdo(&arguments),
+        Verb::Drive(arguments) => drive::drive(&arguments),
         Verb::Status(arguments) => status::status(&arguments),
         Verb::Reset(arguments) => reset::reset(&arguments),
         Verb::Enable(arguments) => enable::enable(&arguments),

@@ -50,11 +50,12 @@ pub fn axis_status(
     nmt: Option<String>,
 ) -> Result<AxisStatus, CommissioningError> {
     let faults = faults(bus, client)?;
-    let mut counts = |index: u16| -> Result<Option<f64>, CommissioningError> {
-        Ok(find(bus, client, index, 0)?.map(|counts| scale.to_si(counts.cast_signed())))
+    let mut counts = |index: u16| -> Result<Option<i32>, CommissioningError> {
+        Ok(find(bus, client, index, 0)?.map(u32::cast_signed))
     };
-    let position_m = counts(objects::POSITION_ACTUAL)?;
-    let following_error_m = counts(objects::FOLLOWING_ERROR_ACTUAL)?;
+    let position_m = counts(objects::POSITION_ACTUAL)?.map(|counts| scale.position_m(counts));
+    let following_error_m =
+        counts(objects::FOLLOWING_ERROR_ACTUAL)?.map(|counts| scale.to_si(counts));
     let mode = find(bus, client, objects::MODE_DISPLAY, 0)?;
     let inputs = find(bus, client, objects::DIGITAL_INPUTS, 0)?;
     Ok(AxisStatus {

@@ -8,6 +8,7 @@
 
 mod axis;
 mod cell;
+pub mod data_sheet;
 mod drive;
 mod error;
 mod file;

@@ -149,6 +149,23 @@ mod tests {
     }
 
     #[test]
+    fn without_a_model_the_limits_say_where_to_begin() {
+        let text =
+            include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/01_gantry.toml"));
+        let mut cell = Cell::parse(text, "cell.toml").unwrap();
+        let axis = &mut cell.axes[1];
+        axis.model = None;
+        axis.limits.velocity_max_m_s = 0.5;
+        axis.limits.following_error_max_m = 0.02;
+        let band = BandSearch::new(&cell, &cell.axes[1]).next_band().unwrap();
+        // 2 v / (2 pi e) = 7.958 Hz, and half as much more.
+        assert!((band.to_hz - 1.5 * 50.0 / TAU).abs() < 1e-9, "{band:?}");
+        cell.axes[1].limits.following_error_max_m = 1e-7;
+        let band = BandSearch::new(&cell, &cell.axes[1]).next_band().unwrap();
+        assert!((band.to_hz - 200.0).abs() < 1e-9, "not beyond what the cycle allows: {band:?}");
+    }
+
+    #[test]
     fn a_slow_axis_gets_a_longer_period_and_a_fast_one_what_the_cycle_allows() {
         let slow = search(("natural_frequency_hz = 15.0", "natural_frequency_hz = 1.0"))
             .next_band()

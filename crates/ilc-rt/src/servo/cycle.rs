@@ -12,6 +12,7 @@ use super::phase::Phase;
 use super::spec::ServoSpec;
 use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::AxisNetwork;
+use crate::fieldbus::canopen::emcy;
 use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
 use crate::rt::Nanos;
 
@@ -165,6 +166,13 @@ impl Cycle {
         let last_of_run = at.is_some_and(|(_, k)| k as usize + 1 == self.interpolator.n_samples());
         self.pending.send(sample, self.commanded_position_m(), last_of_run);
         TickStatus::Running
+    }
+
+    /// Returns the last emergency code of a drive in fault, 0 if it sent none; `None` for a drive that is
+    /// not in fault.
+    pub fn fault(&self, axis: usize) -> Option<u16> {
+        let drive = self.drives.get(axis).filter(|drive| drive.faulted())?;
+        Some(drive.emergency.unwrap_or(emcy::CODE_RESET))
     }
 
     /// Returns the network when the loop is over.

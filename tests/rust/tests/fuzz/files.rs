@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use ilc_rt::config::Cell;
+use ilc_rt::config::data_sheet::{DataSheet, import, section};
+use ilc_rt::config::{Cell, Mode};
 use ilc_rt::design::Plan;
 use ilc_rt::library::Library;
 use ilc_tests::campaign::{in_process, options};
@@ -126,6 +127,23 @@ fn a_library_is_read_or_refused_in_one_line() {
         });
         if let Err(error) = read {
             is_one_line(&error.to_string());
+        }
+    });
+}
+
+#[test]
+fn a_data_sheet_is_read_or_refused_in_one_line() {
+    let cell = short("01_gantry.toml");
+    let machine = ilc_tests::campaign::machine(&cell);
+    let dictionary = machine.dictionary(ilc_tests::rig::node(1)).unwrap();
+    let seed = ilc_sim::eds::write(dictionary, "drive").into_bytes();
+    fuzz("data_sheet", &[seed], 300, |input| {
+        for node in [None, Some(127)] {
+            let read = DataSheet::parse(input, "servo.eds", node);
+            match read.and_then(|sheet| import(&sheet, Mode::Csp)) {
+                Ok(found) => assert!(section(&found).contains("[axis.drive]")),
+                Err(error) => is_one_line(&error.to_string()),
+            }
         }
     });
 }

@@ -6,14 +6,18 @@ use std::fmt;
 use std::time::Duration;
 
 use super::{AnswerPart, Arrival, AxisNetwork, Stranger};
-use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtCommand, NodeId, cob_id, sync};
+use crate::fieldbus::bring_up::SdoClient;
+use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtCommand, NodeId, cob_id, emcy, sync};
 use crate::fieldbus::cia402::pdo_map::{COMMAND_PDO, DRIVE_MOTION_PDO, ENCODER_PDO, STATUS_PDO};
-use crate::fieldbus::cia402::{CommandRpdo1, EncoderSample, Mode, PdoMap};
+use crate::fieldbus::cia402::{CommandRpdo1, EncoderSample, Mode, PdoMap, objects};
 use crate::fieldbus::frame::PAYLOAD_MAX;
 use crate::fieldbus::{Bus, BusError, Frame};
 
 /// Bases of the identifiers of the four receive PDOs.
 const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
+
+/// Time for the answer of a drive in fault; the axes are at rest by then.
+const ERROR_CODE_WAIT: Duration = Duration::from_millis(100);
 
 /// A drive that was brought up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,6 +150,12 @@ impl AxisNetwork for CanopenAxes {
 
     fn release(&mut self) -> Result<(), BusError> {
         self.bus.send(&NmtCommand::PreOperational.frame(None))
+    }
+
+    fn error_code(&mut self, axis: usize) -> Option<u16> {
+        let client = SdoClient::new(self.stations.get(axis)?.node, ERROR_CODE_WAIT);
+        let code = client.upload_u32(self.bus.as_mut(), objects::ERROR_CODE, 0).ok()?;
+        u16::try_from(code & 0xFFFF).ok().filter(|code| *code != emcy::CODE_RESET)
     }
 }
 

@@ -49,6 +49,12 @@ pub trait AxisNetwork: Send {
     /// # Errors
     /// [`BusError`] if the nodes were not reached.
     fn release(&mut self) -> Result<(), BusError>;
+
+    /// Asks the drive of an axis for the reason of its fault, when the loop is over; `None` if it gives
+    /// none. Waits for the answer.
+    fn error_code(&mut self, _axis: usize) -> Option<u16> {
+        None
+    }
 }
 
 /// A message from the network, as the loop sees it.
