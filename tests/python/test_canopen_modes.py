@@ -70,7 +70,9 @@ def test_homing(eds: Path, method: int, home_m: float) -> None:
         node.sdo[0x6099][2].raw = 20 * MM
         enable(network, node, "HOMING")
         place_m = actual(node) / COUNTS_PER_M
-        assert node.homing(timeout=20)
+        # One statusword after the start it takes a set bit 10 for a failure; on a slow machine that
+        # word is older than the start. Asked again, it waits for the homing that is under way.
+        assert any(node.homing(timeout=20) for _ in range(5))
         assert node.is_homed()
         shift_m = place_m - actual(node) / COUNTS_PER_M
         if method == 35:
