@@ -93,7 +93,7 @@ soak: $(VENV)/.test ## Kills, full disks, strangers and a stalling computer, SOA
 	$(BIN)/python tests/soak/demo.py load --times 40
 	$(BIN)/python tests/soak/demo.py kills --times 20
 
-vcan: build ## The bus contract and the main job on a real vcan0
+vcan: $(VENV)/.test ## The bus contract, python-canopen and the main job on a real vcan0
 	tests/vcan/job
 
 check: fmt lint test ## All that a change needs before review

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use ilc_rt::config::{self, Cell};
+use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{AbortCode, NmtState, NodeId, sync};
 use ilc_rt::fieldbus::cia402::State;
@@ -15,8 +15,6 @@ use crate::plant::{Demand, Gantry, Plant};
 
 /// Number of events kept until they are taken; older ones are dropped.
 const EVENTS_MAX: usize = 64;
-/// Distance of a limit switch from the limit, as a share of the travel.
-const BEYOND_LIMITS: f64 = 0.05;
 
 /// Source of the machine's time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,7 +120,7 @@ impl Machine {
                 following_error_max_m: axis.limits.following_error_max_m,
                 force_max_n: axis.simulation.force_max_n,
                 cycle_us: cell.cell.cycle_us,
-                switches: switches(axis),
+                switches: Switches::of(axis),
                 inputs: axis.simulation.digital_inputs,
                 quirks: axis.simulation.quirks,
             };
@@ -304,19 +302,6 @@ impl Machine {
 
     fn note(&mut self, node: NodeId, change: Change) {
         push(&mut self.events, Event { time_us: self.time_us, node, change });
-    }
-}
-
-/// Returns the switches of an axis, by default beyond its limits.
-fn switches(axis: &config::Axis) -> Switches {
-    let limits = &axis.limits;
-    let simulation = &axis.simulation;
-    let beyond_m = BEYOND_LIMITS * (limits.position_max_m - limits.position_min_m);
-    Switches {
-        min_m: simulation.switch_min_m.unwrap_or(limits.position_min_m - beyond_m),
-        max_m: simulation.switch_max_m.unwrap_or(limits.position_max_m + beyond_m),
-        home_m: simulation.switch_home_m,
-        index_pitch_m: simulation.index_pitch_m,
     }
 }
 

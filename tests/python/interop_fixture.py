@@ -1,6 +1,6 @@
 """python-canopen, an independent master, and the program ``ilc-sim`` on a bus of their own.
 
-The bus is UDP multicast on this host (hop limit 0).
+The bus is UDP multicast on this host (hop limit 0), or the CAN interface named by ILC_INTEROP_CAN.
 """
 
 from __future__ import annotations
@@ -66,9 +66,10 @@ class Sim:
 
     def __init__(self, *arguments: str, cell: Path = CELL) -> None:
         self.port = free_port()
+        interface = os.environ.get("ILC_INTEROP_CAN")
         self.lines: list[str] = []
         self._incoming: queue.Queue[str | None] = queue.Queue()
-        address = f"udp:{GROUP}:{self.port}"
+        address = f"can:{interface}" if interface else f"udp:{GROUP}:{self.port}"
         self._process = subprocess.Popen(
             [find_sim(), "run", cell, "--bus", address, *arguments],
             stdout=subprocess.PIPE,
@@ -114,7 +115,11 @@ class Sim:
 def running(*arguments: str, cell: Path = CELL) -> Iterator[tuple[Sim, canopen.Network]]:
     """Run the drives and a CANopen network to them."""
     sim = Sim(*arguments, cell=cell)
-    bus = can.Bus(interface="udp_multicast", channel=GROUP, port=sim.port, hop_limit=0)
+    interface = os.environ.get("ILC_INTEROP_CAN")
+    if interface:
+        bus = can.Bus(interface="socketcan", channel=interface)
+    else:
+        bus = can.Bus(interface="udp_multicast", channel=GROUP, port=sim.port, hop_limit=0)
     network = canopen.Network(bus=bus)
     network.connect()
     try:

@@ -3,22 +3,20 @@
 use ilc_rt::config::Quirks;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{
-    AbortCode, Heartbeat, NmtCommand, NmtState, NodeId, ObjectAddress, cob_id, emcy, sync,
+    AbortCode, Heartbeat, NmtCommand, NmtState, NodeId, ObjectAddress, cob_id, emcy,
 };
 use ilc_rt::fieldbus::cia402::objects;
 
 use super::dictionary::{Dictionary, Entry, Mappable, Slot};
 use super::drive_objects;
 use super::emergencies::Emergencies;
+use super::heartbeats::Heartbeats;
 use super::object_access::{ObjectAccess, refuse_under_halt};
 use super::pdo_engine::{PdoEngine, Received};
 use super::pdo_rules;
 use super::sdo_server::SdoServer;
+use super::sync_service::{Heard, SyncService};
 
-/// In 0x1005: this node produces SYNC.
-const SYNC_PRODUCER: i64 = 1 << 30;
-/// In 0x1005: the identifier.
-const SYNC_IDENTIFIER: i64 = 0x7FF;
 /// Meaning of a frame to the device behind the communication.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Incoming {
@@ -46,12 +44,7 @@ pub enum Silence {
 /// Objects used by the communication itself.
 #[derive(Clone, Copy, Debug)]
 struct Slots {
-    consumer: Slot,
-    producer_ms: Slot,
     behaviour: Slot,
-    sync: Slot,
-    sync_period_us: Slot,
-    sync_counter: Slot,
     verified: [Slot; 2],
 }
 
@@ -64,18 +57,9 @@ pub struct Communication {
     pdos: PdoEngine,
     sdo: SdoServer,
     slots: Slots,
-    heartbeat_us: u64,
-    /// Time since this node's last SYNC, if it produces SYNC.
-    sync_us: u64,
-    /// Time since the controller's last heartbeat; `None` before the first.
-    controller_us: Option<u64>,
+    heartbeats: Heartbeats,
+    sync: SyncService,
     emergencies: Emergencies,
-    /// Counter of the last SYNC, if it had one.
-    counter: Option<u8>,
-    /// Counter of this node's own last SYNC.
-    own_counter: u8,
-    /// SYNCs on the bus, for the quirk that loses some.
-    n_syncs: u32,
     habits: Habits,
     /// An SDO answer that is due after some time.
     late_answer: Option<(Frame, u64)>,
@@ -86,7 +70,6 @@ pub struct Communication {
 struct Habits {
     keeps_mode_under_halt: bool,
     answer_delay_us: u64,
-    sync_lost_every: u32,
 }
 
 impl Communication {
@@ -98,12 +81,7 @@ impl Communication {
         let dictionary = Dictionary::new(entries);
         let slot = |index, sub| dictionary.find(ObjectAddress::new(index, sub));
         let slots = Slots {
-            consumer: slot(objects::CONSUMER_HEARTBEAT, 1)?,
-            producer_ms: slot(objects::PRODUCER_HEARTBEAT, 0)?,
             behaviour: slot(objects::ERROR_BEHAVIOUR, 1)?,
-            sync: slot(objects::COB_ID_SYNC, 0)?,
-            sync_period_us: slot(objects::CYCLE_PERIOD, 0)?,
-            sync_counter: slot(objects::SYNC_COUNTER_OVERFLOW, 0)?,
             verified: [
                 slot(objects::VERIFY_CONFIGURATION, 1)?,
                 slot(objects::VERIFY_CONFIGURATION, 2)?,
@@ -111,6 +89,8 @@ impl Communication {
         };
         let pdos = PdoEngine::new(&dictionary);
         let emergencies = Emergencies::find(node, &dictionary)?;
+        let heartbeats = Heartbeats::find(&dictionary)?;
+        let sync = SyncService::find(&dictionary)?;
         Ok(Self {
             node,
             nmt: NmtState::BootUp,
@@ -118,13 +98,9 @@ impl Communication {
             pdos,
             sdo: SdoServer::default(),
             slots,
-            heartbeat_us: 0,
-            sync_us: 0,
-            controller_us: None,
+            heartbeats,
+            sync,
             emergencies,
-            counter: None,
-            own_counter: 0,
-            n_syncs: 0,
             habits: Habits::default(),
             late_answer: None,
         })
@@ -141,8 +117,8 @@ impl Communication {
         self.habits = Habits {
             keeps_mode_under_halt: quirks.keeps_mode_under_halt,
             answer_delay_us: u64::from(quirks.sdo_delay_ms) * 1000,
-            sync_lost_every: quirks.sync_lost_every,
         };
+        self.sync.lose_every(quirks.sync_lost_every);
         self.pdos = PdoEngine::new(&self.dictionary);
     }
 
@@ -190,7 +166,7 @@ impl Communication {
     pub fn boot(&mut self, out: &mut dyn FnMut(Frame)) {
         out(Heartbeat { node: self.node, state: NmtState::BootUp }.encode());
         self.nmt = NmtState::PreOperational;
-        self.heartbeat_us = 0;
+        self.heartbeats.restart_own();
     }
 
     /// Handles a frame from the bus.
@@ -202,7 +178,7 @@ impl Communication {
             }
             return Incoming::Nothing;
         }
-        self.hear_heartbeat(frame);
+        self.heartbeats.hear(frame, &self.dictionary);
         if self.nmt == NmtState::Stopped || self.nmt == NmtState::BootUp {
             return Incoming::Nothing;
         }
@@ -212,13 +188,14 @@ impl Communication {
         if self.nmt != NmtState::Operational {
             return Incoming::Nothing;
         }
-        if self.is_sync(frame) {
-            if self.dictionary.number(self.slots.sync_counter) != 0 && frame.payload().is_empty() {
+        match self.sync.hear(frame, &self.dictionary) {
+            Heard::Foreign => {}
+            Heard::Sync => return Incoming::Sync,
+            Heard::Missed => return Incoming::Nothing,
+            Heard::WithoutCounter => {
                 self.emergency(emcy::CODE_SYNC_LENGTH, out);
                 return Incoming::Nothing;
             }
-            self.counter = frame.payload().first().copied();
-            return if self.misses_sync() { Incoming::Nothing } else { Incoming::Sync };
         }
         match self.pdos.receive(frame, &mut self.dictionary) {
             Received::Applied => Incoming::Written,
@@ -237,7 +214,7 @@ impl Communication {
 
     /// Sends the TPDOs due at this SYNC.
     pub fn transmit_at_sync(&mut self, out: &mut dyn FnMut(Frame)) {
-        self.pdos.transmit_at_sync(self.counter, &self.dictionary, out);
+        self.pdos.transmit_at_sync(self.sync.counter(), &self.dictionary, out);
     }
 
     /// Advances time: heartbeat, event-driven TPDOs, and timeouts.
@@ -245,14 +222,13 @@ impl Communication {
         if self.nmt == NmtState::BootUp {
             return Silence::None;
         }
-        let period_us = self.microseconds(self.slots.producer_ms);
-        self.heartbeat_us += elapsed_us;
-        if period_us > 0 && self.heartbeat_us >= period_us {
-            self.heartbeat_us = 0;
+        if self.heartbeats.is_due(elapsed_us, &self.dictionary) {
             out(Heartbeat { node: self.node, state: self.nmt }.encode());
         }
-        if self.nmt != NmtState::Stopped && self.is_sync_due(elapsed_us) {
-            out(self.own_sync());
+        if self.nmt != NmtState::Stopped
+            && let Some(sync) = self.sync.advance(elapsed_us, &self.dictionary)
+        {
+            out(sync);
         }
         let may_send = self.may_send_emergencies();
         self.emergencies.advance(elapsed_us, may_send, &self.dictionary, out);
@@ -264,7 +240,7 @@ impl Communication {
                 return Silence::Command;
             }
         }
-        if self.controller_is_silent(elapsed_us) {
+        if self.heartbeats.controller_is_silent(elapsed_us, &self.dictionary) {
             self.emergency(emcy::CODE_HEARTBEAT, out);
             match self.dictionary.number(self.slots.behaviour) {
                 0 => self.nmt = NmtState::PreOperational,
@@ -301,9 +277,9 @@ impl Communication {
                 self.dictionary.reset(0x1000, last);
                 self.pdos = PdoEngine::new(&self.dictionary);
                 self.sdo = SdoServer::default();
-                self.controller_us = None;
+                self.heartbeats.disarm();
                 self.late_answer = None;
-                self.own_counter = 0;
+                self.sync.restart();
                 self.boot(out);
             }
         }
@@ -329,8 +305,8 @@ impl Communication {
             self.pdos = PdoEngine::new(&self.dictionary);
         }
         match address.index {
-            objects::PRODUCER_HEARTBEAT => self.heartbeat_us = 0,
-            objects::CONSUMER_HEARTBEAT => self.controller_us = None,
+            objects::PRODUCER_HEARTBEAT => self.heartbeats.restart_own(),
+            objects::CONSUMER_HEARTBEAT => self.heartbeats.disarm(),
             objects::ERROR_HISTORY => self.emergencies.clear(&mut self.dictionary),
             _ => {}
         }
@@ -372,74 +348,5 @@ impl Communication {
                 self.dictionary.set(slot, 0);
             }
         }
-    }
-
-    /// Counts SYNCs and returns true for one that this drive does not hear.
-    fn misses_sync(&mut self) -> bool {
-        self.n_syncs = self.n_syncs.wrapping_add(1);
-        self.habits.sync_lost_every > 0 && self.n_syncs.is_multiple_of(self.habits.sync_lost_every)
-    }
-
-    /// Returns this node's own SYNC, with a counter if one is set.
-    fn own_sync(&mut self) -> Frame {
-        let overflow = u8::try_from(self.dictionary.number(self.slots.sync_counter)).unwrap_or(0);
-        if overflow == 0 {
-            return sync::frame();
-        }
-        self.own_counter = if self.own_counter >= overflow { 1 } else { self.own_counter + 1 };
-        Frame::new(cob_id::SYNC, &[self.own_counter]).unwrap_or_default()
-    }
-
-    /// Returns whether `frame` is a SYNC on the identifier that this node listens to.
-    fn is_sync(&self, frame: &Frame) -> bool {
-        let identifier = self.dictionary.number(self.slots.sync) & SYNC_IDENTIFIER;
-        i64::from(frame.id()) == identifier && frame.payload().len() <= 1
-    }
-
-    /// Advances time and returns true if this node must produce a SYNC now.
-    fn is_sync_due(&mut self, elapsed_us: u64) -> bool {
-        let produces = self.dictionary.number(self.slots.sync) & SYNC_PRODUCER != 0;
-        let period_us =
-            u64::try_from(self.dictionary.number(self.slots.sync_period_us)).unwrap_or(0);
-        if !produces || period_us == 0 {
-            self.sync_us = 0;
-            return false;
-        }
-        self.sync_us += elapsed_us;
-        let is_due = self.sync_us >= period_us;
-        if is_due {
-            self.sync_us = 0;
-        }
-        is_due
-    }
-
-    /// Returns node and period of the consumed heartbeat, 0x1016:01.
-    fn watched(&self) -> Option<(NodeId, u64)> {
-        let [low, high, node, _] =
-            u32::try_from(self.dictionary.number(self.slots.consumer)).unwrap_or(0).to_le_bytes();
-        let period_us = u64::from(u16::from_le_bytes([low, high])) * 1000;
-        NodeId::new(node).filter(|_| period_us > 0).map(|node| (node, period_us))
-    }
-
-    fn hear_heartbeat(&mut self, frame: &Frame) {
-        let Some(heartbeat) = Heartbeat::decode(frame) else { return };
-        if self.watched().is_some_and(|(node, _)| node == heartbeat.node) {
-            self.controller_us = Some(0);
-        }
-    }
-
-    /// Counts the silence of the watched heartbeat; each one is reported once.
-    fn controller_is_silent(&mut self, elapsed_us: u64) -> bool {
-        let (Some(since_us), Some((_, period_us))) = (self.controller_us, self.watched()) else {
-            return false;
-        };
-        let since_us = since_us + elapsed_us;
-        let is_silent = since_us > period_us;
-        self.controller_us = (!is_silent).then_some(since_us);
-        is_silent
-    }
-
-    fn microseconds(&self, milliseconds: Slot) -> u64 {
-        u64::try_from(self.dictionary.number(milliseconds)).unwrap_or(0) * 1000
     }
 }

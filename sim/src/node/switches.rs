@@ -1,5 +1,10 @@
 //! The switches and the index pulses of an axis, simulated from its position.
 
+use ilc_rt::config::Axis;
+
+/// Distance of a limit switch from the limit, as a share of the travel.
+const BEYOND_LIMITS: f64 = 0.05;
+
 /// Places of the switches of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Switches {
@@ -34,6 +39,19 @@ pub(super) struct Seen {
 }
 
 impl Switches {
+    /// Returns the switches of an axis, by default beyond its limits.
+    pub fn of(axis: &Axis) -> Self {
+        let limits = &axis.limits;
+        let simulation = &axis.simulation;
+        let beyond_m = BEYOND_LIMITS * (limits.position_max_m - limits.position_min_m);
+        Self {
+            min_m: simulation.switch_min_m.unwrap_or(limits.position_min_m - beyond_m),
+            max_m: simulation.switch_max_m.unwrap_or(limits.position_max_m + beyond_m),
+            home_m: simulation.switch_home_m,
+            index_pitch_m: simulation.index_pitch_m,
+        }
+    }
+
     /// Returns what is seen at a position, after another one.
     pub(super) fn see(&self, before_m: f64, position_m: f64) -> Seen {
         let turn = |place_m: f64| (place_m / self.index_pitch_m).floor();
