@@ -97,13 +97,6 @@ fn a_homing_is_written_to_the_drive() {
 }
 
 #[test]
-fn another_direction_than_the_drive_has_is_no_run() {
-    // Without the sign of the simulated drive the first position is outside the limits.
-    let found = run(&cell("reversed = true", ""), machine(&cell("", "")));
-    assert!(found.is_err() || found != run(&cell("", ""), machine(&cell("", ""))));
-}
-
-#[test]
 fn the_drive_of_another_maker_is_refused() {
     let good = cell("", "[axis.drive]\nproduct = 402\nrevision = 1");
     assert!(run(&good, machine(&good)).is_ok());
