@@ -97,13 +97,6 @@ fn a_homing_is_written_to_the_drive() {
 }
 
 #[test]
-fn another_direction_than_the_drive_has_is_no_run() {
-    // Without the sign of the simulated drive the first position is outside the limits.
-    let found = run(&cell("reversed = true", ""), machine(&cell("", "")));
-    assert!(found.is_err() || found != run(&cell("", ""), machine(&cell("", ""))));
-}
-
-#[test]
 fn the_drive_of_another_maker_is_refused() {
     let good = cell("", "[axis.drive]\nproduct = 402\nrevision = 1");
     assert!(run(&good, machine(&good)).is_ok());
@@ -159,6 +152,27 @@ fn ratios_are_written_where_they_are_stated() {
 }
 
 #[test]
+fn process_data_are_those_that_the_cell_states() {
+    let stated = cell(
+        "",
+        "[axis.drive.pdo]\ncommand = [\"0x6040\", \"0x607A\"]\nstatus = [\"0x6041\", \"0x6064\", \"0x603F\"]",
+    );
+    let clean = run(&cell("", ""), machine(&cell("", ""))).unwrap();
+    assert_eq!(
+        run(&stated, machine(&stated)).as_ref(),
+        Ok(&clean),
+        "the measurements are the same"
+    );
+    let setup = campaign::drive_setup(&stated, &stated.axes[0], true).unwrap();
+    let mut bus = InProcess::new(machine(&stated), 256);
+    bring_up(&mut bus, &setup).unwrap();
+    let client = SdoClient::new(rig::node(1), std::time::Duration::from_secs(2));
+    let mut number = |index, sub| client.upload_u32(&mut bus, index, sub).unwrap();
+    assert_eq!([number(0x1600, 0), number(0x1600, 2)], [2, 0x607A_0020]);
+    assert_eq!([number(0x1A00, 0), number(0x1A00, 3)], [3, 0x603F_0010]);
+}
+
+#[test]
 fn contradictions_are_refused_with_what_is_allowed() {
     for (keys, tables, expected) in [
         (
@@ -186,7 +200,7 @@ fn contradictions_are_refused_with_what_is_allowed() {
         (
             "",
             "[axis.drive.pdo]\ncommand = [\"0x6040\"]",
-            "drive.pdo.command = a list: it needs 0x607A",
+            "drive.pdo.command = a list: the map has no object 0x607A:00, which every RPDO1 needs",
         ),
         (
             "",

@@ -12,8 +12,8 @@ use crate::fieldbus::bring_up::{
     BringUpError, DriveSetup, SdoClient, bring_up, bring_up_encoder, listen,
 };
 use crate::fieldbus::canopen::{NmtCommand, emcy};
-use crate::fieldbus::cia402::{PdoMap, objects};
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
+use crate::fieldbus::cia402::{PdoMap, objects};
 
 /// Heartbeat of the nodes in real time.
 const HEARTBEAT_MS: u16 = 100;

@@ -29,10 +29,15 @@ pub struct BusTraffic {
 ///
 /// A drive without one of the optional objects gets a smaller map at bring-up.
 pub fn pdo_map(cell: &Cell, axis: &Axis) -> PdoMap {
-    if is_small(cell, axis.bus) {
-        PdoMap::small(axis.interface)
-    } else {
-        PdoMap::full(axis.interface)
+    one_map(axis, is_small(cell, axis.bus))
+}
+
+/// Returns the process data that the cell description states, or those that the bus has time for.
+fn one_map(axis: &Axis, small: bool) -> PdoMap {
+    match axis.drive.pdo.map(axis.interface) {
+        Ok(Some(map)) => map,
+        _ if small => PdoMap::small(axis.interface),
+        _ => PdoMap::full(axis.interface),
     }
 }
 
@@ -90,12 +95,9 @@ fn is_small(cell: &Cell, number: u8) -> bool {
 /// Returns the lengths of the frames of a cycle on a bus: SYNC, a reserve, command and answers of each
 /// drive, and the answer of the tool, which is on `[bus]`.
 fn payloads(cell: &Cell, number: u8, small: bool) -> Vec<usize> {
-    let map = |axis: &Axis| {
-        if small { PdoMap::small(axis.interface) } else { PdoMap::full(axis.interface) }
-    };
     let own = cell.axes.iter().filter(|axis| axis.bus == number);
     let tool = cell.tcp_encoder.iter().filter(|_| number == 0).map(|_| TOOL_BYTES);
-    let drives = own.flat_map(|axis| map(axis).frame_bytes().collect::<Vec<_>>());
+    let drives = own.flat_map(|axis| one_map(axis, small).frame_bytes().collect::<Vec<_>>());
     EVERY_CYCLE.into_iter().chain(drives).chain(tool).collect()
 }
 

@@ -3,6 +3,7 @@
 //! Everything here is optional: without it a drive is brought up as `docs/drives.md` says.
 
 mod object_name;
+mod pdo;
 mod start_up;
 
 use schemars::JsonSchema;
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::schema::field_order;
 pub use object_name::ObjectName;
+pub use pdo::DrivePdo;
 pub use start_up::StartUp;
 
 /// `[axis.drive]`: identity, settings and process data of the drive.
@@ -65,21 +67,6 @@ pub struct Drive {
     pub pdo: DrivePdo,
     /// `[[axis.drive.start_up]]`: objects written at bring-up, in this order.
     pub start_up: Vec<StartUp>,
-}
-
-/// `[axis.drive.pdo]`: the objects that the drive exchanges in every cycle, in order.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-#[schemars(extend("x-order" = field_order::<Self>()))]
-pub struct DrivePdo {
-    /// Objects of RPDO1: the controlword (0x6040), the target of the interface, and what the drive
-    /// takes beside them.
-    pub command: Option<Vec<ObjectName>>,
-    /// Objects of TPDO1: the statusword (0x6041), the position (0x6064), and what the drive sends
-    /// beside them.
-    pub status: Option<Vec<ObjectName>>,
-    /// Objects of TPDO2; an empty list for none.
-    pub motion: Option<Vec<ObjectName>>,
 }
 
 impl Drive {

@@ -1,7 +1,7 @@
 //! Contradictions within `[axis.drive]`.
 
 use super::checker::Checker;
-use crate::config::{Axis, ConfigError, Drive, HomingKind, Mode, ObjectName, StartUp};
+use crate::config::{Axis, ConfigError, Drive, HomingKind, ObjectName, StartUp};
 use crate::fieldbus::bring_up::{is_keepable, is_set};
 use crate::fieldbus::cia402::objects;
 
@@ -113,28 +113,10 @@ fn start_up(axis: &Axis, object: &StartUp, v: &Checker) -> Result<(), ConfigErro
 
 /// Checks that the process data hold what the loop cannot do without.
 fn pdo(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
-    let target = match axis.interface {
-        Mode::Csp => objects::TARGET_POSITION,
-        Mode::Csv => objects::TARGET_VELOCITY,
-    };
-    let pdo = &axis.drive.pdo;
-    let needed = [
-        ("command", &pdo.command, vec![objects::CONTROLWORD, target]),
-        ("status", &pdo.status, vec![objects::STATUSWORD, objects::POSITION_ACTUAL]),
-        ("motion", &pdo.motion, vec![]),
-    ];
-    for (key, list, needed) in needed {
-        let at = format!("[[axis]] {}: drive.pdo.{key}", axis.name);
-        let Some(list) = list else { continue };
-        for index in needed {
-            let name = objects::name(index).unwrap_or("");
-            v.that(
-                list.iter().any(|object| object.covers(index, 0)),
-                &at,
-                &"a list",
-                &format!("it needs 0x{index:04X} ({name})"),
-            )?;
+    match axis.drive.pdo.map(axis.interface) {
+        Ok(_) => Ok(()),
+        Err((key, reason)) => {
+            Err(v.refuse(&format!("[[axis]] {}: drive.pdo.{key}", axis.name), &"a list", &reason))
         }
     }
-    Ok(())
 }
