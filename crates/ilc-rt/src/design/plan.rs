@@ -217,10 +217,7 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
         runs: 0..0,
         start_m: cell.program.start_m.clone(),
         return_feed_m_s: cell.program.feed_m_s,
-        approach_feed_m_s: cell
-            .safety
-            .approach_velocity_m_s
-            .unwrap_or(cell.program.feed_m_s),
+        approach_feed_m_s: cell.safety.approach_velocity_m_s.unwrap_or(cell.program.feed_m_s),
         resets_faults: cell.safety.reset_faults,
         settle_ticks: ticks(cell.program.settle_s),
         enable_ticks: ticks(ENABLE_S),
