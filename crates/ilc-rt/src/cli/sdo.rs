@@ -95,7 +95,7 @@ fn exchange(
         write_object(target.bus.as_mut(), &client, address, transfer.kind, value)
             .map_err(|error| failed(&target, &error))?;
     }
-    // A drive may round or clip: the value it holds now is reported.
+    // A drive may round or clip: the value that it holds now is reported.
     let (kind, held) = match read_object(target.bus.as_mut(), &client, address, transfer.kind) {
         Ok((kind, held)) => (Some(kind), Some(held)),
         Err(CommissioningError::Sdo(_)) if value.is_some() => (transfer.kind, None),

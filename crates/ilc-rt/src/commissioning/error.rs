@@ -31,7 +31,7 @@ pub enum CommissioningError {
         /// Values that fit.
         allowed: String,
     },
-    /// An invalid object address.
+    /// Text that is not an address.
     #[error("object {0}: allowed INDEX or INDEX:SUB in hexadecimal, as 6041, 0x6041 or 1018:1")]
     Address(String),
     /// A type is needed, as the size of the object does not tell it.

@@ -40,7 +40,7 @@ pub struct AxisStatus {
 /// Reads the status of an axis; its name, unit and NMT state are the caller's.
 ///
 /// # Errors
-/// [`CommissioningError`] if the drive does not answer, or is not a drive of CiA 402.
+/// [`CommissioningError`] if the drive does not answer, or is not a drive.
 pub fn axis_status(
     bus: &mut dyn Bus,
     client: &SdoClient,
