@@ -35,10 +35,11 @@ impl DrivePdo {
             return Ok(None);
         }
         let mut map = PdoMap::small(mode);
+        let [status, motion] = &mut map.answers;
         for (key, list, part) in [
             ("command", &self.command, &mut map.command),
-            ("status", &self.status, &mut map.answers[0]),
-            ("motion", &self.motion, &mut map.answers[1]),
+            ("status", &self.status, status),
+            ("motion", &self.motion, motion),
         ] {
             let Some(list) = list else { continue };
             let mapped: Result<Vec<MappedObject>, String> = list.iter().map(mapped).collect();
