@@ -110,8 +110,11 @@ impl DriveNode {
         let law = units.profile();
         let asked_m_s = units.velocity_m_s(target);
         let here_m = self.measured.position_m;
-        let up_m_s = self.brakeable_m_s(limits.position_max_m - here_m, law, step_us);
-        let down_m_s = self.brakeable_m_s(here_m - limits.position_min_m, law, step_us);
+        // The speed from which the way to a limit suffices to stop.
+        let dt_s = f64::from(step_us) * 1e-6;
+        let brakeable = |way_m: f64| brakeable_m_s(way_m.max(0.0), law.deceleration_m_s2, dt_s);
+        let up_m_s = brakeable(limits.position_max_m - here_m);
+        let down_m_s = brakeable(here_m - limits.position_min_m);
         let wanted_m_s = asked_m_s
             .clamp(-limits.velocity_max_m_s, limits.velocity_max_m_s)
             .clamp(-down_m_s, up_m_s);
@@ -124,11 +127,6 @@ impl DriveNode {
         }
         self.reached.note(is_near, step_us);
         self.standing.note(is_slow, step_us);
-    }
-
-    /// Returns the speed from which the way to a limit suffices to stop.
-    fn brakeable_m_s(&self, way_m: f64, law: &ProfileLaw, step_us: u32) -> f64 {
-        brakeable_m_s(way_m.max(0.0), law.deceleration_m_s2, f64::from(step_us) * 1e-6)
     }
 
     fn pursue_home(&mut self, seen: &Seen) {
