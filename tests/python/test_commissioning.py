@@ -84,7 +84,7 @@ def test_objects_are_read_and_written_in_their_type(bench: Bench, cell: Path) ->
     assert said(bench, "sdo", "read", cell, "x", "1008", "--bus", bench.bus)["value"] == (
         "ilc-sim CiA 402 drive"
     )
-    written = said(bench, "sdo", "write", bench.bus, "1", "607D:1", "--", "-0x10")
+    written = said(bench, "sdo", "write", bench.bus, "1", "607D:1", "-0x10")
     assert (written["value"], written["type"]) == (-16, "i32")
     line = refused(bench, "sdo", "read", bench.bus, "1", "9999", status=1)
     assert "0x06020000 (object does not exist)" in line

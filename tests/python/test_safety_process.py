@@ -195,11 +195,12 @@ def test_drives_stop_by_themselves_and_nothing_is_lost(bench: Bench) -> None:
     kept = bench.kept()
     assert [digest for _, _, digest in kept] == told
 
-    # The drives are still in fault: that is told and left, unless a person asks for the reset.
+    # The drives are still in fault: it is named and left, unless a person requests the reset.
     refused = bench.controller(cell, "--resume", runs=4)
     assert refused.end() == 2
     (line,) = refused.errors
-    assert "axis x (node 1) is in fault: 0x8250" in line and "--reset-faults" in line, line
+    assert "axis x (node 1) is in fault: 0x8250" in line
+    assert "--reset-faults" in line
     resumed = bench.controller(cell, "--resume", "--reset-faults", "--json", "figures.json", runs=4)
     start = resumed.event(event="start")
     assert (start["first_index"], start["campaign"]) == (2, kept[0][0])

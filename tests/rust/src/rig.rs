@@ -227,8 +227,20 @@ impl Rig {
         Self::paced(cell, runs, false)
     }
 
+    /// Brings the same nodes up again, as a second controller does, for one run.
+    ///
+    /// # Panics
+    /// If a node cannot be brought up.
+    #[must_use]
+    pub fn again(&self, cell: &Cell) -> Self {
+        Self::on(self.tap.clone(), cell, 1, true)
+    }
+
     fn paced(cell: &Cell, runs: u32, lockstep: bool) -> Self {
-        let mut tap = Tap::new(cell);
+        Self::on(Tap::new(cell), cell, runs, lockstep)
+    }
+
+    fn on(mut tap: Tap, cell: &Cell, runs: u32, lockstep: bool) -> Self {
         let mut maps = Vec::new();
         for axis in &cell.axes {
             let setup = drive_setup(cell, axis, true).expect("a validated cell");

@@ -48,7 +48,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
                 axis(index),
                 if power_lost(statusword) {
                     "; its power stage is off, as after an emergency stop (STO): it stays off until a \
-                     person starts anew"
+                     person starts again"
                 } else {
                     ""
                 }
