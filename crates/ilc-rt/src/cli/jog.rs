@@ -26,13 +26,13 @@ pub(super) struct JogArguments {
     /// Axis to move.
     axis: String,
     /// Distance in the unit of the axis.
-    #[arg(allow_hyphen_values = true, required_unless_present = "speed", conflicts_with = "speed")]
+    #[arg(allow_negative_numbers = true, required_unless_present = "speed", conflicts_with = "speed")]
     distance: Option<f64>,
     /// Velocity of the move by a distance.
     #[arg(long, value_name = "SPEED", conflicts_with = "speed")]
     at_speed: Option<f64>,
     /// Move at this velocity, with its sign, while input arrives.
-    #[arg(long, value_name = "SPEED", allow_hyphen_values = true)]
+    #[arg(long, value_name = "SPEED", allow_negative_numbers = true)]
     speed: Option<f64>,
     /// Time without input after which the axis comes to rest.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.8, value_parser = hold)]
