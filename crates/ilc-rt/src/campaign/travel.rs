@@ -118,6 +118,7 @@ pub fn travel(
     let speed_m_s = if speed_m_s.is_finite() { speed_m_s } else { cell.program.feed_m_s };
     plan.servo.return_feed_m_s = speed_m_s;
     plan.servo.approach_feed_m_s = speed_m_s;
+    plan.servo.resets_faults |= session.reset_faults;
     plan.servo.settle_ticks = travel.hold_s.map_or(u32::MAX, |hold_s| ticks(hold_s + REST_S));
     if session.forgives_stalls() {
         let patience = ticks(SIMULATED_PATIENCE_S);
