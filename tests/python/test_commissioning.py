@@ -286,7 +286,9 @@ def test_a_key_moves_an_axis_for_as_long_as_it_is_held(bench: Bench, cell: Path)
     rest = process.stdout.read()
     assert process.wait(DEADLINE_S) == 0
     assert "released: no input for 2 s" in rest
-    process.stdin.close()
+    for stream in (process.stdin, process.stdout, process.stderr):
+        assert stream is not None
+        stream.close()
     at_rest(bench, cell)
 
 
