@@ -6,10 +6,11 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Parser, Subcommand};
+use ilc_rt::campaign::open_buses;
 use ilc_rt::cli::refusal_line;
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::canopen::NodeId;
-use ilc_rt::fieldbus::transport;
+use ilc_rt::fieldbus::transport::{self, GroupSide};
 use ilc_rt::record::printable_lines;
 use ilc_sim::{ClockMode, Machine, eds};
 
@@ -107,7 +108,7 @@ fn bus_help() -> String {
 }
 
 fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Result<(), Failure> {
-    let cell = load(path)?;
+    let mut cell = load(path)?;
     let address = bus.unwrap_or_else(|| cell.bus.address.clone());
     if transport::scheme_of(&address).is_some_and(|scheme| scheme.in_process) {
         return Err(Failure::Input(format!(
@@ -120,7 +121,9 @@ fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Res
     for mute in &habits.mutes {
         require_node(&machine, mute.node, "--mute")?;
     }
-    let bus = transport::open(&address).map_err(|error| Failure::Input(error.to_string()))?;
+    address.clone_into(&mut cell.bus.address);
+    let bus = open_buses(&cell, GroupSide::Drives)
+        .map_err(|(_, error)| Failure::Input(error.to_string()))?;
     run::run(&cell, machine, bus, &address, clock, habits).map_err(|error| match error {
         run::RunError::Taken { .. } => Failure::Input(error.to_string()),
         error => Failure::Broken(error.to_string()),

@@ -101,7 +101,8 @@ def test_nine_axes_fit_a_can_bus_at_200_hz_and_not_at_500(tmp_path):
     assert load(tmp_path, cell_text("can:can0"), table).n_axes == N_AXES
     line = refusal(tmp_path, cell_text("can:can0", 2000, 1e6), table)
     assert "[bus] load_max" in line
-    assert "3835 bits" in line
+    assert "2260 us at worst" in line
+    assert "cycle_us = 2900" in line
 
 
 def test_thirteen_axes_are_refused(tmp_path):

@@ -10,7 +10,7 @@ use ilc_rt::campaign::{self, CampaignError, Disturbance, Options};
 use ilc_rt::cli::{IdentifyOptions, described, parse};
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Bus;
-use ilc_rt::fieldbus::transport::{self, loopback::InProcess};
+use ilc_rt::fieldbus::transport::{self, GroupSide, loopback::InProcess};
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
 use ilc_sim::machine::{ClockMode, Machine};
@@ -233,9 +233,8 @@ fn measured(ask: Py<PyAny>) -> Disturbance {
 fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
     let file = cell.file.display().to_string();
     if transport::scheme_of(&cell.bus.address).is_none_or(|scheme| !scheme.in_process) {
-        let place = format!("{file}: [bus] address");
-        return transport::open(&cell.bus.address)
-            .map_err(|source| CampaignError::Bus { place, source });
+        return campaign::open_buses(cell, GroupSide::Controller)
+            .map_err(|(place, source)| CampaignError::Bus { place, source });
     }
     match Machine::from_cell(cell, ClockMode::LockStep) {
         Ok(machine) => Ok(Box::new(InProcess::new(machine, LOOPBACK_FRAMES))),

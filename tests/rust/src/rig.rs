@@ -229,9 +229,10 @@ impl Rig {
 
     fn paced(cell: &Cell, runs: u32, lockstep: bool) -> Self {
         let mut tap = Tap::new(cell);
+        let mut maps = Vec::new();
         for axis in &cell.axes {
             let setup = drive_setup(cell, axis, true).expect("a validated cell");
-            bring_up(&mut tap, &setup).expect("the drive comes up");
+            maps.push(bring_up(&mut tap, &setup).expect("the drive comes up").map);
         }
         if let Some(tool) = &cell.tcp_encoder {
             bring_up_encoder(&mut tap, node(tool.node), Duration::from_secs(1))
@@ -243,7 +244,7 @@ impl Rig {
         let n_samples = plan.n_samples();
         let stop = Arc::new(AtomicI32::new(0));
         let (mail, loop_side) = mailbox(4096, Arc::clone(&stop));
-        let network = plan.network(Box::new(tap.clone()));
+        let network = plan.network(Box::new(tap.clone()), &maps);
         let cycle = Cycle::new(network, plan.servo, plan.interpolator, loop_side);
         Self {
             cycle,

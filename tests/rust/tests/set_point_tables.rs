@@ -100,10 +100,10 @@ fn a_table_is_refused_with_its_line_or_row() {
 fn nine_axes_fit_a_can_bus_at_200_hz_and_not_at_500() {
     let folder = Scratch::new();
     let cell = load(&folder, &cell_text("can:can0", 5000, 4000.0), &points());
-    let load_200_hz = Plan::new(&cell, None, false).unwrap().bus_load;
-    assert!((load_200_hz - 3835.0 / 5000.0).abs() < 1e-12, "{load_200_hz}");
+    let bus = Plan::new(&cell, None, false).unwrap().traffic.remove(0);
+    assert!((bus.load.ratio() - 3835.0 / 5000.0).abs() < 1e-12 && !bus.small, "{bus:?}");
     let line = refusal(&cell_text("can:can0", 2000, 1e6), &points());
-    assert!(line.contains("[bus] load_max") && line.contains("3835 bits"), "{line}");
+    assert!(line.contains("[bus] load_max") && line.contains("2260 us at worst"), "{line}");
 }
 
 #[test]

@@ -136,7 +136,7 @@ fn execute(
     };
     let mut announcer = Announcer::new(observe, telemetry, cell.cycle_s(), cell.n_axes());
     announcer.publish(&Event::State { state: StateName::BringingUp, iteration: first });
-    nodes::start(cell, bus.as_mut(), session)?;
+    let maps = nodes::start(cell, bus.as_mut(), session)?;
 
     // After being switched off, drives start elsewhere than the last run left them. One run with
     // the next input brings them there; it is not stored, as it says nothing about the law.
@@ -159,8 +159,8 @@ fn execute(
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next.take()) {
         policy.send(&mut mail, input, update_ms);
     }
-    let cycle =
-        Cycle::new(plan.network(bus), plan.servo.clone(), plan.interpolator.clone(), loop_side);
+    let network = plan.network(bus, &maps);
+    let cycle = Cycle::new(network, plan.servo.clone(), plan.interpolator.clone(), loop_side);
     let (mut pacer, granted) = if session.lockstep {
         (Pacer::in_line(cycle), None)
     } else {

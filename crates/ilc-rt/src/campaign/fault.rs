@@ -48,10 +48,10 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
             let silent = counted(of_axis(FaultKind::SilentPdo, axis), cycles, silent_max);
             Fault { code: Some(pdo.into()), ..silent }
         }
-        StopReason::WrongLength { node, pdo, n_bytes } => Fault {
+        StopReason::WrongLength { node, pdo, n_bytes, needed } => Fault {
             code: Some(pdo.into()),
             value: Some(n_bytes.into()),
-            limit: Some(8.0),
+            limit: Some(needed.into()),
             unit: Some("bytes".to_owned()),
             ..of_node(FaultKind::WrongLength, node)
         },

@@ -1,10 +1,11 @@
 //! The campaign: brings the nodes up, paces the loop, learns between runs, stores every run, and
 //! publishes events.
 //!
-//! The owner of loop, library and telemetry; only `cli` and the Python bindings import it. Cold: it
+//! The owner of loop, library and telemetry; only `cli`, the simulator (its buses) and the Python bindings import it. Cold: it
 //! reads the loop's mailbox and never shares anything else with it.
 
 mod announce;
+mod buses;
 mod claim;
 mod collect;
 mod disturbance;
@@ -25,6 +26,7 @@ mod running;
 mod telemetry;
 mod travel;
 
+pub use buses::open_buses;
 pub use disturbance::Disturbance;
 pub use error::{CampaignError, ResumeError};
 pub use execute::{identify, run};

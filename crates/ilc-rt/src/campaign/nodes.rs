@@ -12,52 +12,59 @@ use crate::fieldbus::bring_up::{
     BringUpError, DriveSetup, SdoClient, bring_up, bring_up_encoder, listen,
 };
 use crate::fieldbus::canopen::NmtCommand;
-use crate::fieldbus::cia402::objects;
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
+use crate::fieldbus::cia402::{PdoMap, objects};
 
 /// Heartbeat of the nodes in real time.
 const HEARTBEAT_MS: u16 = 100;
 
-/// Resets, checks and configures all nodes, then starts them together. No axis moves.
+/// Resets, checks and configures all nodes, then starts them together; returns the process data of each
+/// axis as mapped. No axis moves.
 pub(super) fn start(
     cell: &Cell,
     bus: &mut dyn Bus,
     session: &Session,
-) -> Result<(), CampaignError> {
-    prepare(cell, bus, session)?;
-    go(cell, bus)
+) -> Result<Vec<PdoMap>, CampaignError> {
+    let maps = prepare(cell, bus, session)?;
+    go(cell, bus)?;
+    Ok(maps)
 }
 
-/// Resets, checks and configures all nodes; they wait for [`go`].
+/// Resets, checks and configures all nodes; they wait for [`go`]. Returns the process data of each axis as mapped.
 pub(super) fn prepare(
     cell: &Cell,
     bus: &mut dyn Bus,
     session: &Session,
-) -> Result<(), CampaignError> {
+) -> Result<Vec<PdoMap>, CampaignError> {
     let lockstep = session.lockstep;
     let file = cell.file.display().to_string();
     let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
     let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
     refuse_company(cell, bus)?;
-    let refused = |key: String| {
+    let addresses: Vec<String> = cell.addresses().map(str::to_owned).collect();
+    let refused = |key: String, bus: u8| {
         let file = file.clone();
+        let address = addresses.get(usize::from(bus)).cloned().unwrap_or_default();
         move |source: BringUpError| CampaignError::BringUp {
             file,
             key,
-            address: cell.bus.address.clone(),
+            address,
             source: Box::new(source),
         }
     };
+    let mut maps = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
-        bring_up(bus, &drive_setup(cell, axis, lockstep)?)
-            .map_err(refused(format!("[[axis]] {} node = {}", axis.name, axis.node)))?;
+        let key = format!("[[axis]] {} node = {}", axis.name, axis.node);
+        let identity =
+            bring_up(bus, &drive_setup(cell, axis, lockstep)?).map_err(refused(key, axis.bus))?;
+        maps.push(identity.map);
     }
     if let Some(tool) = &cell.tcp_encoder {
         bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
-            .map_err(refused(format!("[tcp_encoder] node = {}", tool.node)))?;
+            .map_err(refused(format!("[tcp_encoder] node = {}", tool.node), 0))?;
     }
     if session.reset_faults || cell.safety.reset_faults {
-        return Ok(());
+        return Ok(maps);
     }
     for axis in &cell.axes {
         let found = ask(cell, axis, session, |client| commissioning::faults(bus, client))?;
@@ -70,7 +77,7 @@ pub(super) fn prepare(
             });
         }
     }
-    Ok(())
+    Ok(maps)
 }
 
 /// Starts all nodes together.
@@ -90,11 +97,11 @@ pub(super) fn positions(
 ) -> Result<Vec<f64>, CampaignError> {
     let mut all_m = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
-        let scale = design::scale(cell, axis.counts_per_m)?;
+        let scale = design::axis_scale(cell, axis)?;
         let counts = ask(cell, axis, session, |client| {
             Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
         })?;
-        all_m.push(scale.to_si(counts.cast_signed()));
+        all_m.push(scale.position_m(counts.cast_signed()));
     }
     Ok(all_m)
 }
@@ -155,6 +162,7 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
     Ok(DriveSetup {
         node: design::node(cell, axis.node)?,
         mode: axis.interface,
+        map: design::pdo_map(cell, axis),
         cycle_us: cell.cell.cycle_us,
         following_error_max_counts: axis
             .drive

@@ -63,10 +63,10 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             unanswered(cycles),
             3 - pdo
         ),
-        StopReason::WrongLength { node, pdo, n_bytes } => {
-            let what = carried(cell, node, pdo);
-            format!("no {what} of node {node}: its TPDO{pdo} has {n_bytes} bytes, 8 are needed")
-        }
+        StopReason::WrongLength { node, pdo, n_bytes, needed } => format!(
+            "no {} of node {node}: its TPDO{pdo} has {n_bytes} bytes, {needed} are needed",
+            carried(cell, node, pdo)
+        ),
         StopReason::SilentTool { cycles } => format!(
             "tool measurement (node {}) is silent: {}",
             cell.tcp_encoder.map_or(0, |tool| tool.node),

@@ -91,7 +91,7 @@ pub fn travel(
             check_inside(cell, &cell.axes[*axis], *position_m)?;
         }
     }
-    nodes::prepare(cell, bus.as_mut(), session)?;
+    let maps = nodes::prepare(cell, bus.as_mut(), session)?;
     let mut to_m = nodes::positions(cell, bus.as_mut(), session)?;
     for (axis, goal) in &travel.goals {
         let (described, at_m) = (&cell.axes[*axis], to_m[*axis]);
@@ -126,7 +126,8 @@ pub fn travel(
     }
     nodes::go(cell, bus.as_mut())?;
     let (mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
-    let cycle = Cycle::new(plan.network(bus), plan.servo.clone(), plan.interpolator, loop_side);
+    let network = plan.network(bus, &maps);
+    let cycle = Cycle::new(network, plan.servo.clone(), plan.interpolator, loop_side);
     let pacer = if session.lockstep { Pacer::in_line(cycle) } else { Pacer::on_clock(cycle)?.0 };
     let every = u64::from(ticks(REPORT_S)).max(1);
     Ok(Journey::new(cell, mail, every).pursue(cell, session, pacer, report))

@@ -6,7 +6,8 @@ use clap::Args;
 
 use super::{EXIT_BAD_INPUT, show};
 use crate::config::{AxisUnit, Cell, LawName};
-use crate::design::{DesignError, Plan, Prepared};
+use crate::design::{BusTraffic, DesignError, Plan, Prepared};
+use crate::fieldbus::transport::scheme_of;
 use crate::learning::gate::GateMeasure;
 use crate::record::AxisKinds;
 
@@ -34,14 +35,15 @@ fn describe(arguments: &CheckArguments) -> Result<(), DesignError> {
     let plan = Plan::new(&cell, None, false)?;
     let Prepared { law, verdict, warnings } = plan.law(&cell)?;
     show::say(&format!(
-        "cell {}: {} on {}, {} us cycle; a classical CAN bus at {} bit/s would be {:.0} % loaded",
+        "cell {}: {} on {}, {} us cycle",
         cell.cell.name,
         if cell.n_axes() == 1 { "1 axis".to_owned() } else { format!("{} axes", cell.n_axes()) },
-        cell.bus.address,
+        cell.addresses().collect::<Vec<_>>().join(", "),
         cell.cell.cycle_us,
-        cell.bus.bitrate_bit_s,
-        plan.bus_load * 100.0
     ));
+    for bus in &plan.traffic {
+        show::say(&format!("  {}", traffic(bus)));
+    }
     for (i, axis) in cell.axes.iter().enumerate() {
         let column = || plan.reference_m.iter().skip(i).step_by(cell.n_axes());
         let low = column().copied().fold(f64::INFINITY, f64::min);
@@ -78,6 +80,20 @@ fn describe(arguments: &CheckArguments) -> Result<(), DesignError> {
         show::say(&format!("  warning: {warning}"));
     }
     Ok(())
+}
+
+/// Describes the traffic of a bus.
+fn traffic(bus: &BusTraffic) -> String {
+    let is_real = scheme_of(&bus.address).is_some_and(|scheme| scheme.has_bits);
+    format!(
+        "bus {}: {:.0} us per cycle at worst{} {} bit/s, {:.0} % of the period{}",
+        bus.address,
+        bus.load.us_per_cycle,
+        if is_real { " at" } else { "; that is on a classical CAN bus of" },
+        bus.bitrate_bit_s,
+        bus.load.ratio() * 100.0,
+        if bus.small { "; the smallest process data, as there is no time for more" } else { "" }
+    )
 }
 
 /// Describes rollback, gate and ladder, which decide on the next input besides the law.

@@ -48,9 +48,11 @@ impl DeadMan {
     pub(super) fn new(hold: Option<Duration>) -> Result<Self, String> {
         let kind = kind_of_input();
         if hold.is_some() && kind == Input::Other {
-            return Err("--speed moves only while input arrives: allowed with a terminal or a pipe at \
+            return Err(
+                "--speed moves only while input arrives: allowed with a terminal or a pipe at \
                         standard input"
-                .to_owned());
+                    .to_owned(),
+            );
         }
         let man = Self {
             began: Instant::now(),
@@ -76,7 +78,8 @@ impl DeadMan {
             return true;
         }
         while self.watch.last_ms.load(Ordering::Relaxed) == 0 {
-            if is_over() || self.watch.closed.load(Ordering::Relaxed) || parent_id() != self.parent {
+            if is_over() || self.watch.closed.load(Ordering::Relaxed) || parent_id() != self.parent
+            {
                 return false;
             }
             std::thread::sleep(POLL);

@@ -8,13 +8,15 @@ use super::moving::{Moving, Request, carry_out};
 use crate::campaign::Travel;
 
 #[derive(Args)]
-#[command(after_help = "The drives hold their positions under the watch of the servo loop, until Ctrl-C, or until the pipe at
+#[command(
+    after_help = "The drives hold their positions under the watch of the servo loop, until Ctrl-C, or until the pipe at
 standard input or the parent is gone; then they are switched off. No drive stays on without a controller.
 Exit status: 0 after --seconds or the end of input, 2 refused (nothing moved), 3 controlled stop, 130 after Ctrl-C.
 
 Examples:
   ilc-rt enable gantry.toml --seconds 2
-  ilc-rt enable gantry.toml --reset-faults --seconds 2")]
+  ilc-rt enable gantry.toml --reset-faults --seconds 2"
+)]
 pub(super) struct EnableArguments {
     /// Cell description.
     cell: PathBuf,

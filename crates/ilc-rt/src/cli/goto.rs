@@ -9,13 +9,15 @@ use crate::campaign::{Goal, Travel};
 use crate::record::{TEXT_MAX, printable};
 
 #[derive(Args)]
-#[command(after_help = "All axes named arrive together; the others hold. Positions are within the limits, speeds up to
+#[command(
+    after_help = "All axes named arrive together; the others hold. Positions are within the limits, speeds up to
 [safety] approach_velocity_m_s. The axes come to rest when the pipe at standard input or the parent is gone.
 Exit status: 0 arrived, 2 refused (nothing moved), 3 controlled stop, 130 after Ctrl-C.
 
 Examples:
   ilc-rt goto gantry.toml x=0.05
-  ilc-rt goto gantry.toml x=0.05 y=0.03 --speed 0.02 --json -")]
+  ilc-rt goto gantry.toml x=0.05 y=0.03 --speed 0.02 --json -"
+)]
 pub(super) struct GotoArguments {
     /// Cell description.
     cell: PathBuf,

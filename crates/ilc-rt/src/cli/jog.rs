@@ -9,7 +9,8 @@ use super::moving::{Moving, Request, axis, carry_out};
 use crate::campaign::{Goal, Travel};
 
 #[derive(Args)]
-#[command(after_help = "With --speed the axis moves while input arrives: hold the Enter key, or write to the pipe at standard
+#[command(
+    after_help = "With --speed the axis moves while input arrives: hold the Enter key, or write to the pipe at standard
 input. It comes to rest when that ends for --hold, at its limit, and when terminal, pipe or parent is gone.
 All other axes of the cell hold. Speeds go up to [safety] approach_velocity_m_s.
 Exit status: 0 arrived or released, 2 refused (nothing moved), 3 controlled stop, 130 after Ctrl-C.
@@ -17,7 +18,8 @@ Exit status: 0 arrived or released, 2 refused (nothing moved), 3 controlled stop
 Examples:
   ilc-rt jog gantry.toml x 0.005
   ilc-rt jog gantry.toml x -0.005 --at-speed 0.01
-  yes | ilc-rt jog gantry.toml x --speed=-0.02")]
+  yes | ilc-rt jog gantry.toml x --speed=-0.02"
+)]
 pub(super) struct JogArguments {
     /// Cell description.
     cell: PathBuf,
@@ -49,7 +51,9 @@ pub(super) fn jog(arguments: &JogArguments) -> u8 {
             (value.is_finite() && value != 0.0).then_some(value).ok_or_else(refused)
         };
         let (goal, speed_m_s) = match (arguments.distance, arguments.speed) {
-            (Some(distance_m), _) => (Goal::By(finite("distance", distance_m)?), arguments.at_speed),
+            (Some(distance_m), _) => {
+                (Goal::By(finite("distance", distance_m)?), arguments.at_speed)
+            }
             (None, speed) => {
                 let speed = finite("--speed", speed.unwrap_or(0.0))?;
                 (Goal::Limit(speed), Some(speed.abs()))

@@ -134,7 +134,10 @@ pub(super) fn axis(cell: &Cell, name: &str) -> Result<usize, String> {
 
 fn positions(cell: &Cell, position_m: &[f64]) -> serde_json::Value {
     let named = cell.axes.iter().zip(position_m);
-    named.map(|(axis, at_m)| (axis.name.clone(), json!(at_m))).collect::<serde_json::Map<_, _>>().into()
+    named
+        .map(|(axis, at_m)| (axis.name.clone(), json!(at_m)))
+        .collect::<serde_json::Map<_, _>>()
+        .into()
 }
 
 fn described(cell: &Cell, now: &Traveling) -> String {

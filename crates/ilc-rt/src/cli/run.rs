@@ -12,7 +12,8 @@ use super::runs::Runs;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show, when_parent_ends};
 use crate::campaign::{self, CampaignError, Options, Outcome};
 use crate::config::Cell;
-use crate::fieldbus::{Bus, transport};
+use crate::fieldbus::Bus;
+use crate::fieldbus::transport::{self, GroupSide};
 use crate::record::{EndStatus, Event};
 
 #[derive(Args)]
@@ -104,7 +105,11 @@ pub(super) fn open(file: &Path, bus: Option<&str>) -> Result<(Cell, Box<dyn Bus>
     if transport::scheme_of(address).is_some_and(|scheme| scheme.in_process) {
         return Err(CampaignError::NoDrivesInside { place, address: address.clone() });
     }
-    let bus = transport::open(address).map_err(|source| CampaignError::Bus { place, source })?;
+    let opened = campaign::open_buses(&cell, GroupSide::Controller).map_err(|(key, source)| {
+        let place = if bus.is_some() && cell.extra_buses.is_empty() { place } else { key };
+        CampaignError::Bus { place, source }
+    });
+    let bus = opened?;
     Ok((cell, bus))
 }
 

@@ -21,6 +21,10 @@ pub struct Axis {
     /// CANopen node of the drive, unique.
     #[schemars(range(min = 1, max = 127))]
     pub node: u8,
+    /// Bus of the drive: 0 is `[bus]`, n the n-th `[[extra_bus]]`.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 7))]
+    pub bus: u8,
     /// Command interface. `csp`: the drive closes the position loop, the learned input (m) is added to
     /// the set point. `csv`: the position loop is in the controller, the learned input (m/s) is added to
     /// the velocity command.

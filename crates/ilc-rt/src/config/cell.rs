@@ -28,6 +28,9 @@ pub struct Cell {
     pub cell: CellSection,
     /// `[bus]`
     pub bus: BusSection,
+    /// `[[extra_bus]]`, further buses of the cell, in one SYNC with `[bus]`; `bus` of an axis names one.
+    #[serde(rename = "extra_bus", default)]
+    pub extra_buses: Vec<BusSection>,
     /// `[[axis]]`, in the order of the coordinates of the program.
     #[serde(rename = "axis")]
     pub axes: Vec<Axis>,
@@ -196,6 +199,11 @@ impl Cell {
     pub fn jog_velocity_m_s(&self, axis: usize) -> f64 {
         let most_m_s = self.axes[axis].limits.velocity_max_m_s;
         self.safety.approach_velocity_m_s.map_or(JOG_SHARE * most_m_s, |set| set.min(most_m_s))
+    }
+
+    /// Returns the address of each bus: `[bus]`, then every `[[extra_bus]]`.
+    pub fn addresses(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(&self.bus).chain(&self.extra_buses).map(|bus| bus.address.as_str())
     }
 
     /// Returns the unit of each axis, in order.

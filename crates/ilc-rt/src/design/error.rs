@@ -1,7 +1,7 @@
 //! Refusals of a cell description in design.
 
 use crate::config::ConfigError;
-use crate::fieldbus::bring_up::load::LoadError;
+use crate::fieldbus::load::LoadError;
 use crate::learning::LearningError;
 use crate::model::ModelError;
 use crate::trajectory::program::{GcodeError, TableError};
@@ -14,10 +14,12 @@ pub enum DesignError {
     #[error("{0}")]
     Config(#[from] ConfigError),
     /// The bus cannot carry the traffic.
-    #[error("{file}: [bus] load_max: {source}")]
+    #[error("{file}: {key} load_max: {source}")]
     Load {
         /// Cell description.
         file: String,
+        /// Table of the bus.
+        key: String,
         /// Reason.
         source: LoadError,
     },

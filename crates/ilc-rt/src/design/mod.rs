@@ -11,9 +11,11 @@ mod forecast;
 mod law;
 mod plan;
 mod program;
+mod traffic;
 
 pub use error::DesignError;
 pub use forecast::{first_error, learning_model};
 pub use law::Prepared;
 pub use plan::Plan;
 pub(crate) use plan::{axis_scale, input_unit, node};
+pub use traffic::{BusTraffic, pdo_map};

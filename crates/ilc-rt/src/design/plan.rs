@@ -5,13 +5,12 @@ use std::time::Duration;
 use super::error::DesignError;
 use super::fingerprint;
 use super::law::{self, Prepared};
+use super::traffic::{self, BusTraffic};
 use crate::config::{Axis, Cell, ConfigError, Measure, mode};
 use crate::control::PositionLoop;
-use crate::fieldbus::bring_up::load;
 use crate::fieldbus::canopen::NodeId;
-use crate::fieldbus::cia402::Scale;
-use crate::fieldbus::transport::scheme_of;
-use crate::fieldbus::{AxisNetwork, Bus, CanopenAxes};
+use crate::fieldbus::cia402::{PdoMap, Scale};
+use crate::fieldbus::{AxisNetwork, Bus, CanopenAxes, Station};
 use crate::model::{ModelError, StateSpace};
 use crate::record::Meta;
 use crate::rt::Nanos;
@@ -36,8 +35,8 @@ pub struct Plan {
     pub meta: Meta,
     /// Fingerprint under which versions up to 0.1 kept the same campaign.
     pub(crate) legacy_fingerprint: String,
-    /// Worst-case share of the bus taken by cyclic traffic.
-    pub bus_load: f64,
+    /// Cyclic traffic of each bus, in the worst case.
+    pub traffic: Vec<BusTraffic>,
 }
 
 impl Plan {
@@ -69,7 +68,8 @@ impl Plan {
         let mut cell = cell.clone();
         cell.learning.measure = measure.unwrap_or(cell.learning.measure);
         crate::config::check(&cell)?;
-        let bus_load = bus_load(&cell).map_err(|source| DesignError::Load { file, source })?;
+        let traffic =
+            traffic::of(&cell).map_err(|(key, source)| DesignError::Load { file, key, source })?;
         let reference_m = interpolator.reference();
         Ok(Self {
             servo: servo_spec(&cell, lockstep)?,
@@ -93,14 +93,19 @@ impl Plan {
                 axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
                 input_units: cell.axes.iter().map(|axis| input_unit(axis).to_owned()).collect(),
             },
-            bus_load,
+            traffic,
         })
     }
 
     /// Returns the network of the cell's axes on a bus whose nodes have been brought up.
-    pub fn network(&self, bus: Box<dyn Bus>) -> Box<dyn AxisNetwork> {
-        let nodes = self.servo.axes.iter().map(|axis| axis.node).collect();
-        Box::new(CanopenAxes::new(bus, nodes, self.servo.tool.map(|tool| tool.node)))
+    ///
+    /// # Shapes
+    /// - `maps`: the process data of each axis as mapped at bring-up
+    pub fn network(&self, bus: Box<dyn Bus>, maps: &[PdoMap]) -> Box<dyn AxisNetwork> {
+        let axes = self.servo.axes.iter().zip(maps);
+        let stations =
+            axes.map(|(axis, &map)| Station { node: axis.node, mode: axis.mode, map }).collect();
+        Box::new(CanopenAxes::new(bus, stations, self.servo.tool.map(|tool| tool.node)))
     }
 
     /// Returns the number of samples in a run.
@@ -166,22 +171,6 @@ pub(crate) fn input_unit(axis: &Axis) -> &'static str {
     mode::of(axis.interface).input_unit(axis.unit)
 }
 
-/// Cyclic frames: a command and two answers per drive, one answer of the tool, SYNC, and a reserve
-/// of one frame.
-fn bus_load(cell: &Cell) -> Result<f64, load::LoadError> {
-    let mut payloads = vec![0, 8];
-    payloads.extend(cell.axes.iter().flat_map(|_| [8, 8, 8]));
-    payloads.extend(cell.tcp_encoder.iter().map(|_| 8));
-    // Only a real bus has a bit rate; the others are as fast as the machine, and their load is
-    // stated for comparison.
-    if scheme_of(&cell.bus.address).is_some_and(|scheme| scheme.has_bits) {
-        return load::check(&payloads, cell.cycle_s(), cell.bus.bitrate_bit_s, cell.bus.load_max)
-            .map(|found| found.ratio());
-    }
-    let bits: u64 = payloads.iter().map(|&n_bytes| load::frame_bits(n_bytes)).sum();
-    Ok(bits as f64 / (f64::from(cell.bus.bitrate_bit_s) * cell.cycle_s()))
-}
-
 fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
     let ticks = |span_s: f64| -> u32 {
         #[expect(
@@ -233,10 +222,7 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
         runs: 0..0,
         start_m: cell.program.start_m.clone(),
         return_feed_m_s: cell.program.feed_m_s,
-        approach_feed_m_s: cell
-            .safety
-            .approach_velocity_m_s
-            .unwrap_or(cell.program.feed_m_s),
+        approach_feed_m_s: cell.safety.approach_velocity_m_s.unwrap_or(cell.program.feed_m_s),
         resets_faults: cell.safety.reset_faults,
         settle_ticks: ticks(cell.program.settle_s),
         enable_ticks: ticks(ENABLE_S),

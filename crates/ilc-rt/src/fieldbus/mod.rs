@@ -9,9 +9,10 @@ pub mod bus;
 pub mod canopen;
 pub mod cia402;
 pub mod frame;
+pub mod load;
 pub mod network;
 pub mod transport;
 
 pub use bus::{Bus, BusError};
 pub use frame::Frame;
-pub use network::{AxisNetwork, CanopenAxes};
+pub use network::{AxisNetwork, CanopenAxes, Station};

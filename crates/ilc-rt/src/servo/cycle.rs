@@ -78,7 +78,7 @@ impl Cycle {
         mail: LoopSide,
     ) -> Self {
         let dt_s = spec.cycle.as_secs_f64();
-        let n_axes = spec.axes.len();
+        let parts: Vec<[bool; 2]> = (0..spec.axes.len()).map(|axis| network.parts(axis)).collect();
         let (mut input_max, mut step_max) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
         let limits: Vec<AxisLimits> = spec.axes.iter().map(|axis| axis.limits).collect();
         let mut start_m = [0.0; MAX_AXES];
@@ -99,7 +99,7 @@ impl Cycle {
             drives: [Drive::default(); MAX_AXES],
             tool_m: [0.0; MAX_AXES],
             tool_unreadable: None,
-            pending: PendingCycles::new(n_axes, spec.tool.is_some()),
+            pending: PendingCycles::new(&parts, spec.tool.is_some()),
             interpolator,
             input: LearnedInput::new(input_max, step_max, fade_ticks),
             phase: Phase::Enabling { ticks: 0 },

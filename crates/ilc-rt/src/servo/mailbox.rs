@@ -77,6 +77,8 @@ pub enum StopReason {
         pdo: u8,
         /// Its length.
         n_bytes: u8,
+        /// The length of its mapping.
+        needed: u8,
     },
     /// The tool measurement did not answer.
     SilentTool {

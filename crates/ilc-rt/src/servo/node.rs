@@ -6,6 +6,7 @@ use crate::fieldbus::cia402::{CommandRpdo1, Controlword, State, Statusword};
 
 /// The last known state of one drive.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "independent facts")]
 pub(super) struct Drive {
     /// True if it has ever answered.
     pub(super) heard: bool,
@@ -13,8 +14,10 @@ pub(super) struct Drive {
     pub(super) statusword: u16,
     /// Last position.
     pub(super) encoder_m: f64,
-    /// Last following error reported by the drive.
+    /// Last following error: reported by the drive, or computed.
     pub(super) following_error_m: f64,
+    /// True if it reports its following error.
+    pub(super) reports_following_error: bool,
     /// Last emergency code since it was enabled.
     pub(super) emergency: Option<u16>,
     /// True if it is lost and only gets commands to stop.
@@ -36,6 +39,7 @@ impl Default for Drive {
             statusword: 0,
             encoder_m: 0.0,
             following_error_m: 0.0,
+            reports_following_error: false,
             emergency: None,
             lost: false,
             distrusted: false,

@@ -65,7 +65,8 @@ pub(super) struct PendingCycles {
     ring: [PendingCycle; DEPTH],
     lags: [Lag; PARTS_MAX],
     n_axes: usize,
-    n_parts: usize,
+    /// True for the parts that are sent.
+    is_sent: [bool; PARTS_MAX],
     sent: u64,
     given: u64,
     spoil_next: bool,
@@ -73,13 +74,18 @@ pub(super) struct PendingCycles {
 
 impl PendingCycles {
     #[expect(clippy::large_stack_arrays, reason = "made once, before the loop starts")]
-    pub(super) fn new(n_axes: usize, has_tool: bool) -> Self {
-        let n_axes = n_axes.min(MAX_AXES);
+    pub(super) fn new(parts: &[[bool; 2]], has_tool: bool) -> Self {
+        let n_axes = parts.len().min(MAX_AXES);
+        let mut is_sent = [false; PARTS_MAX];
+        for (room, parts) in is_sent.chunks_exact_mut(2).zip(parts) {
+            room.copy_from_slice(parts);
+        }
+        is_sent[2 * n_axes] = has_tool;
         Self {
             ring: [PendingCycle::default(); DEPTH],
             lags: [Lag::default(); PARTS_MAX],
             n_axes,
-            n_parts: 2 * n_axes + usize::from(has_tool),
+            is_sent,
             sent: 0,
             given: 0,
             spoil_next: false,
@@ -100,8 +106,8 @@ impl PendingCycles {
         self.ring[index(self.sent)] =
             PendingCycle { sample, commanded_m, last_of_run, came: [0; PARTS_MAX], spoiled };
         self.sent += 1;
-        for lag in &mut self.lags[..self.n_parts] {
-            lag.silent += 1;
+        for (lag, is_sent) in self.lags.iter_mut().zip(self.is_sent) {
+            lag.silent += u64::from(is_sent);
         }
     }
 
@@ -137,7 +143,8 @@ impl PendingCycles {
         let first = self.sent.saturating_sub(n_cycles.min(DEPTH as u64));
         (first..self.sent).map(|sync| {
             let cycle = &self.ring[index(sync)];
-            let missing = cycle.spoiled || cycle.came[..self.n_parts].contains(&0);
+            let missing =
+                cycle.spoiled || self.expected().any(|(_, number)| cycle.came[number] == 0);
             Sample { missing, ..cycle.sample }
         })
     }
@@ -154,6 +161,11 @@ impl PendingCycles {
         self.number(part).map_or(0, |number| self.sent - self.lags[number].answers)
     }
 
+    /// Returns whether a part is sent at all.
+    pub(super) fn is_sent(&self, part: Part) -> bool {
+        self.number(part).is_some()
+    }
+
     /// Returns the SYNCs sent since a part last arrived.
     pub(super) fn silence(&self, part: Part) -> u64 {
         self.number(part).map_or(0, |number| self.lags[number].silent)
@@ -161,7 +173,7 @@ impl PendingCycles {
 
     /// Returns true if a part that is not given up has been missing for the last `n_cycles` SYNCs.
     pub(super) fn waits(&self, n_cycles: u64) -> bool {
-        self.lags[..self.n_parts].iter().any(|lag| !lag.given_up && lag.silent >= n_cycles)
+        self.expected().any(|(lag, _)| !lag.given_up && lag.silent >= n_cycles)
     }
 
     /// Returns whether a part is no longer waited for.
@@ -178,12 +190,21 @@ impl PendingCycles {
 
     /// Returns whether every part that is not given up has answered every SYNC.
     pub(super) fn all_answered(&self) -> bool {
-        self.lags[..self.n_parts].iter().all(|lag| lag.given_up || lag.answers == self.sent)
+        self.expected().all(|(lag, _)| lag.given_up || lag.answers == self.sent)
+    }
+
+    /// Returns the parts that are sent, with their numbers.
+    fn expected(&self) -> impl Iterator<Item = (&Lag, usize)> {
+        let numbered = self.lags.iter().zip(0..).zip(self.is_sent);
+        numbered.filter_map(|(part, is_sent)| is_sent.then_some(part))
     }
 
     /// Decides, once per tick after receiving, which answers are late and which are lost.
     pub(super) fn watch_lag(&mut self) {
-        for number in 0..self.n_parts {
+        for number in 0..PARTS_MAX {
+            if !self.is_sent[number] {
+                continue;
+            }
             let lag = &mut self.lags[number];
             let came = std::mem::take(&mut lag.came);
             let behind = self.sent - lag.answers;
@@ -244,16 +265,14 @@ impl PendingCycles {
         if self.given == self.sent {
             return None;
         }
-        let cycle = &mut self.ring[index(self.given)];
-        let complete = self.lags[..self.n_parts]
-            .iter()
-            .zip(&cycle.came)
-            .all(|(lag, came)| *came > 0 && self.given < lag.settled);
+        let came = &self.ring[index(self.given)].came;
         // A settled cycle whose answer has not arrived never gets one.
-        let hopeless = self.lags[..self.n_parts].iter().all(|lag| self.given < lag.settled);
+        let hopeless = self.expected().all(|(lag, _)| self.given < lag.settled);
+        let complete = hopeless && self.expected().all(|(_, number)| came[number] > 0);
         if !complete && !hopeless && self.sent - self.given <= PATIENCE {
             return None;
         }
+        let cycle = &mut self.ring[index(self.given)];
         cycle.sample.missing = !complete || cycle.spoiled;
         self.given += 1;
         Some((cycle.sample, cycle.last_of_run))
@@ -265,7 +284,7 @@ impl PendingCycles {
             Part::DriveMotion(axis) => 2 * axis + 1,
             Part::Tool => 2 * self.n_axes,
         };
-        (number < self.n_parts).then_some(number)
+        self.is_sent.get(number).is_some_and(|is_sent| *is_sent).then_some(number)
     }
 
     fn part(&self, number: usize) -> Part {

@@ -11,8 +11,8 @@ use super::phase::Phase;
 use super::silence::saturate;
 use super::spec::Pace;
 use crate::fieldbus::canopen::{NmtState, emcy};
-use crate::fieldbus::cia402::State;
-use crate::fieldbus::network::{AnswerPart, Arrival, Reading};
+use crate::fieldbus::cia402::{Reading, State};
+use crate::fieldbus::network::{AnswerPart, Arrival};
 
 /// Largest number of messages per tick, so that a babbling bus cannot stall the loop.
 const FRAMES_MAX: usize = 256;
@@ -95,16 +95,22 @@ impl Cycle {
             drive.status(statusword, encoder_m);
         }
         // In a fault it has no demand any more; the last following error before counts.
-        if let Some(counts) = reading.following_error_counts
-            && !drive.faulted()
-        {
-            drive.following_error_m = spec.scale.to_si(counts);
+        if let Some(counts) = reading.following_error_counts {
+            drive.reports_following_error = true;
+            if !drive.faulted() {
+                drive.following_error_m = spec.scale.to_si(counts);
+            }
         }
         match part {
-            AnswerPart::Status => {
-                self.pending.answer(Part::Status(axis), [self.drives[axis].encoder_m, 0.0]);
-            }
+            AnswerPart::Status => self.pending.answer(Part::Status(axis), [drive.encoder_m, 0.0]),
             AnswerPart::Motion => self.pending.answer(Part::DriveMotion(axis), [0.0; 2]),
+        }
+        // Without a report it is computed from the command that this position answers.
+        if !drive.reports_following_error
+            && !drive.faulted()
+            && let Some(commanded_m) = self.pending.answered_command_m(axis)
+        {
+            drive.following_error_m = commanded_m - drive.encoder_m;
         }
     }
 
@@ -113,7 +119,7 @@ impl Cycle {
         // Checked in every phase: a lost node must not be waited for again.
         let silence = self.find_silence();
         if matches!(self.phase, Phase::Disabling { .. } | Phase::Stopped) {
-            return None;
+            return silence.filter(|silence| self.better_reason(*silence).is_some());
         }
         let asked = self.mail.asked_to_stop();
         if asked != 0 {

@@ -8,9 +8,12 @@ use super::mode;
 use super::pending::Part;
 use super::phase::Phase;
 use super::spec::Pace;
+use crate::fieldbus::network::AnswerPart;
 
 /// Largest age in cycles of a position from which a velocity is computed in a valid run.
 const OLD_CYCLES: u64 = 2;
+/// Length of the PDO of the tool.
+const TOOL_BYTES: u8 = 8;
 
 impl Cycle {
     /// Returns the first part that has been silent for too long, each one once.
@@ -42,7 +45,12 @@ impl Cycle {
         {
             self.pending.give_up(Part::Tool);
             let reason = match self.tool_unreadable {
-                Some(n_bytes) => StopReason::WrongLength { node: tool.node.get(), pdo: 1, n_bytes },
+                Some(n_bytes) => StopReason::WrongLength {
+                    node: tool.node.get(),
+                    pdo: 1,
+                    n_bytes,
+                    needed: TOOL_BYTES,
+                },
                 None => StopReason::SilentTool { cycles: saturate(silence) },
             };
             found = found.or(Some(reason));
@@ -53,27 +61,36 @@ impl Cycle {
     /// Returns the reason for the silence of a part of an axis, as far as it is known.
     fn silent_part(&self, axis: usize, part: Part, silence: u64) -> StopReason {
         let (pdo, other) = match part {
-            Part::DriveMotion(_) => (2, Part::Status(axis)),
-            Part::Status(_) | Part::Tool => (1, Part::DriveMotion(axis)),
+            Part::DriveMotion(_) => (AnswerPart::Motion, Part::Status(axis)),
+            Part::Status(_) | Part::Tool => (AnswerPart::Status, Part::DriveMotion(axis)),
         };
-        if let Some(n_bytes) = self.drives[axis].unreadable[usize::from(pdo - 1)] {
-            let node = self.spec.axes[axis].node.get();
-            return StopReason::WrongLength { node, pdo, n_bytes };
+        if let Some(reason) = self.wrong_length(axis, pdo) {
+            return reason;
         }
         // Both fall silent together if the node does; a cycle of difference is chance.
-        if 2 * self.pending.silence(other) > silence {
+        if !self.pending.is_sent(other) || 2 * self.pending.silence(other) > silence {
             return self.silent_axis(axis, silence);
         }
+        let pdo = if pdo == AnswerPart::Status { 1 } else { 2 };
         StopReason::SilentPdo { axis, pdo, cycles: saturate(silence) }
     }
 
     pub(super) fn silent_axis(&self, axis: usize, silence: u64) -> StopReason {
-        match self.drives[axis].unreadable[0] {
-            Some(n_bytes) => {
-                StopReason::WrongLength { node: self.spec.axes[axis].node.get(), pdo: 1, n_bytes }
-            }
-            None => StopReason::SilentAxis { axis, cycles: saturate(silence) },
-        }
+        let unreadable = self.wrong_length(axis, AnswerPart::Status);
+        unreadable.unwrap_or(StopReason::SilentAxis { axis, cycles: saturate(silence) })
+    }
+
+    /// Returns the reason for a part of an answer that came, but could not be read.
+    fn wrong_length(&self, axis: usize, part: AnswerPart) -> Option<StopReason> {
+        let n_bytes = self.drives[axis].unreadable[part.index()]?;
+        let node = self.spec.axes[axis].node.get();
+        let pdo = if part == AnswerPart::Status { 1 } else { 2 };
+        Some(StopReason::WrongLength {
+            node,
+            pdo,
+            n_bytes,
+            needed: self.network.part_bytes(axis, part),
+        })
     }
 
     /// Records if this cycle of a run is commanded on a stale position.

@@ -1,4 +1,4 @@
-//! Cause of a silence that another master brought about, as a later message names it.
+//! Cause of a silence, as a later message names it, or a further silence of the same node.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -12,6 +12,12 @@ impl Cycle {
     /// stopped or restarted, or a command to it is seen.
     pub(super) fn better_reason(&self, later: StopReason) -> Option<StopReason> {
         let silent: NodeId = match self.stopping? {
+            // In lock-step the first PDO may be missed alone, in the cycle in which the node falls silent.
+            StopReason::SilentPdo { axis, .. } => {
+                let is_node =
+                    matches!(later, StopReason::SilentAxis { axis: other, .. } if other == axis);
+                return is_node.then_some(later);
+            }
             StopReason::SilentAxis { axis, .. } => self.spec.axes.get(axis)?.node,
             StopReason::SilentTool { .. } => self.spec.tool?.node,
             _ => return None,

@@ -8,7 +8,8 @@ use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::bring_up::{DriveOwn, DriveSetup, SdoClient, bring_up};
 use ilc_rt::fieldbus::canopen::{Emergency, NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{
-    self, CommandRpdo1, Controlword, DriveMotionTpdo2, Mode, State, StatusTpdo1, next_command,
+    self, CommandRpdo1, Controlword, DriveMotionTpdo2, Mode, PdoMap, State, StatusTpdo1,
+    next_command,
 };
 use ilc_rt::fieldbus::transport::InProcess;
 use ilc_rt::fieldbus::{Bus, Frame};
@@ -233,6 +234,7 @@ pub(crate) fn setup(mode: Mode) -> DriveSetup {
     DriveSetup {
         node: node(1),
         mode,
+        map: PdoMap::full(mode),
         cycle_us: CYCLE_US,
         following_error_max_counts: 5000,
         position_min_counts: counts(-0.02),

@@ -57,6 +57,23 @@ pub(super) fn nodes(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     Ok(())
 }
 
+/// Checks buses: each axis on one that exists.
+pub(super) fn buses(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
+    let n_extra = cell.extra_buses.len();
+    for axis in &cell.axes {
+        v.that(
+            usize::from(axis.bus) <= n_extra,
+            &format!("[[axis]] {}: bus", axis.name),
+            &axis.bus,
+            &match n_extra {
+                0 => "0, which is [bus]; there is no [[extra_bus]]".to_owned(),
+                n => format!("0, which is [bus], to {n}, the last [[extra_bus]]"),
+            },
+        )?;
+    }
+    Ok(())
+}
+
 /// Checks the ranges of an axis, and the requirements of its interface.
 pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), ConfigError> {
     let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);

@@ -74,6 +74,7 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     axis::names(cell, &v)?;
     axis::nodes(cell, &v)?;
     v.ranges(cell)?;
+    axis::buses(cell, &v)?;
     for axis in &cell.axes {
         axis::check(axis, cell.simulation.step_us, &v)?;
     }

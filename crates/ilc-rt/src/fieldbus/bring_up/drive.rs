@@ -9,7 +9,7 @@ use super::sdo_client::SdoClient;
 use super::{process_data, scaling, settings};
 use crate::fieldbus::Bus;
 use crate::fieldbus::canopen::{Heartbeat, NmtCommand, NmtState, NodeId};
-use crate::fieldbus::cia402::{Controlword, Mode, State, Statusword, objects, pdo_map};
+use crate::fieldbus::cia402::{Controlword, Mode, PdoMap, State, Statusword, objects, pdo_map};
 
 /// Time that the following error may exceed its window before the drive faults (object 0x6066), in ms.
 pub const FOLLOWING_ERROR_TIME_MS: u16 = 10;
@@ -33,6 +33,8 @@ pub struct DriveSetup {
     pub node: NodeId,
     /// Mode of operation.
     pub mode: Mode,
+    /// Process data; what the drive does not have of the optional objects is left out.
+    pub map: PdoMap,
     /// Servo cycle, in microseconds: the period between two SYNCs.
     pub cycle_us: u32,
     /// Following error at which the drive faults, in counts.
@@ -71,6 +73,8 @@ pub struct DriveIdentity {
     pub identity: [u32; 4],
     /// Error code (object 0x603F) of a drive that was found in fault; 0 if it states none.
     pub fault: Option<u16>,
+    /// Process data as mapped.
+    pub map: PdoMap,
 }
 
 /// Identity of an encoder node.
@@ -116,14 +120,17 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     process_data::close_all(&mut remote)?;
     remote.ensure_all(&settings::communication(node, setup.heartbeat_ms, setup.cycle_us))?;
     remote.forget_heartbeats()?;
-    process_data::open(
-        &mut remote,
-        pdo_map::COMMAND_PDO,
-        &pdo_map::command_map(setup.mode),
-        setup.rpdo_deadline_ms,
-    )?;
-    process_data::open(&mut remote, pdo_map::STATUS_PDO, &pdo_map::STATUS_MAP, 0)?;
-    process_data::open(&mut remote, pdo_map::DRIVE_MOTION_PDO, &pdo_map::DRIVE_MOTION_MAP, 0)?;
+    let map = remote.supported(setup.map)?;
+    let deadline_ms = setup.rpdo_deadline_ms;
+    for (number, layout, deadline_ms) in [
+        (pdo_map::COMMAND_PDO, map.command, deadline_ms),
+        (pdo_map::STATUS_PDO, map.answers[0], 0),
+        (pdo_map::DRIVE_MOTION_PDO, map.answers[1], 0),
+    ] {
+        if !layout.is_empty() {
+            process_data::open(&mut remote, number, layout.objects(), deadline_ms)?;
+        }
+    }
 
     remote.start_up()?;
     scaling::check(&mut remote, setup)?;
@@ -136,7 +143,7 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     remote.set_mode(setup.mode, setup.answer_timeout)?;
     remote.ensure_all(&settings::offsets())?;
     remote.check_start_up()?;
-    Ok(DriveIdentity { device_type, supported_modes, identity, fault })
+    Ok(DriveIdentity { device_type, supported_modes, identity, fault, map })
 }
 
 /// Resets an encoder node, checks its identity and maps its two positions; leaves it
@@ -243,6 +250,16 @@ impl Remote<'_> {
         let code = self.find("error code", objects::ERROR_CODE, 0)?.unwrap_or(0);
         let [low, high, ..] = code.to_le_bytes();
         Ok(Some(u16::from_le_bytes([low, high])))
+    }
+
+    /// Returns a map without the optional objects that the node does not have.
+    fn supported(&mut self, mut map: PdoMap) -> Result<PdoMap, BringUpError> {
+        for index in process_data::OPTIONAL {
+            if map.carries(index) && !self.has("process data", index)? {
+                map = map.without(index);
+            }
+        }
+        Ok(map)
     }
 
     /// Clears every consumed heartbeat: that of a missing master would stop the node.

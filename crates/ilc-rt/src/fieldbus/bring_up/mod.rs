@@ -8,7 +8,6 @@
 mod drive;
 mod error;
 pub mod listen;
-pub mod load;
 mod own;
 mod process_data;
 mod remote;

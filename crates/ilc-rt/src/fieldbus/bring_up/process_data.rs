@@ -6,7 +6,15 @@ use super::setting::{Kind, Need, Setting};
 use crate::fieldbus::canopen::pdo::{
     COB_INVALID, COB_NO_RTR, Direction, MappedObject, PdoNumber, TYPE_EVERY_SYNC,
 };
+use crate::fieldbus::cia402::objects;
 
+/// Objects without which the loop runs: torque offset and torque, velocity and following error of the drive.
+pub(super) const OPTIONAL: [u16; 4] = [
+    objects::TORQUE_OFFSET,
+    objects::TORQUE_ACTUAL,
+    objects::VELOCITY_ACTUAL,
+    objects::FOLLOWING_ERROR_ACTUAL,
+];
 /// Largest number of PDOs per direction.
 const PDOS_MAX: u16 = 512;
 /// PDOs that are probed even if an earlier one is missing.

@@ -42,6 +42,15 @@ impl Remote<'_> {
         }
     }
 
+    /// Returns whether the node has an object, whatever its value.
+    pub(super) fn has(&mut self, step: &'static str, index: u16) -> Result<bool, BringUpError> {
+        match self.client.upload(self.bus, index, 0) {
+            Ok(_) | Err(SdoError::Aborted { code: AbortCode::WriteOnly, .. }) => Ok(true),
+            Err(SdoError::Aborted { code, .. }) if is_absent(code) => Ok(false),
+            Err(source) => Err(BringUpError::Sdo { step, source }),
+        }
+    }
+
     pub(super) fn write(
         &mut self,
         step: &'static str,

@@ -5,10 +5,12 @@
 pub mod mode;
 pub mod objects;
 pub mod pdo_map;
+pub mod process_data;
 pub mod state;
 pub mod units;
 
 pub use mode::Mode;
 pub use pdo_map::{CommandRpdo1, DriveMotionTpdo2, EncoderSample, StatusTpdo1};
+pub use process_data::{MapError, OptionalObjects, PdoLayout, PdoMap, Reading};
 pub use state::{Controlword, State, Statusword, next_command};
 pub use units::Scale;

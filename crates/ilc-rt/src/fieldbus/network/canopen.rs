@@ -5,32 +5,44 @@
 use std::fmt;
 use std::time::Duration;
 
-use super::{AnswerPart, Arrival, AxisNetwork, Reading, Stranger};
+use super::{AnswerPart, Arrival, AxisNetwork, Stranger};
 use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtCommand, NodeId, cob_id, sync};
-use crate::fieldbus::cia402::pdo_map::{DRIVE_MOTION_PDO, ENCODER_PDO, STATUS_PDO};
-use crate::fieldbus::cia402::{CommandRpdo1, DriveMotionTpdo2, EncoderSample, StatusTpdo1};
+use crate::fieldbus::cia402::pdo_map::{COMMAND_PDO, DRIVE_MOTION_PDO, ENCODER_PDO, STATUS_PDO};
+use crate::fieldbus::cia402::{CommandRpdo1, EncoderSample, Mode, PdoMap};
+use crate::fieldbus::frame::PAYLOAD_MAX;
 use crate::fieldbus::{Bus, BusError, Frame};
 
 /// Bases of the identifiers of the four receive PDOs.
 const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
 
+/// A drive that was brought up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Station {
+    /// Its node.
+    pub node: NodeId,
+    /// Its mode of operation.
+    pub mode: Mode,
+    /// Its process data.
+    pub map: PdoMap,
+}
+
 /// Drives that were brought up on a bus, and a node that measures the tool.
 pub struct CanopenAxes {
     bus: Box<dyn Bus>,
-    nodes: Vec<NodeId>,
+    stations: Vec<Station>,
     tool: Option<NodeId>,
 }
 
 impl fmt::Debug for CanopenAxes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("CanopenAxes").field("nodes", &self.nodes).finish_non_exhaustive()
+        f.debug_struct("CanopenAxes").field("stations", &self.stations).finish_non_exhaustive()
     }
 }
 
 impl CanopenAxes {
-    /// Creates the network of the drives in `nodes`, in the order of the axes. Cold.
-    pub fn new(bus: Box<dyn Bus>, nodes: Vec<NodeId>, tool: Option<NodeId>) -> Self {
-        Self { bus, nodes, tool }
+    /// Creates the network of some drives, in the order of the axes. Cold.
+    pub fn new(bus: Box<dyn Bus>, stations: Vec<Station>, tool: Option<NodeId>) -> Self {
+        Self { bus, stations, tool }
     }
 
     /// Returns the message in a frame.
@@ -43,7 +55,7 @@ impl CanopenAxes {
             return Arrival::Stranger(stranger);
         }
         if let Some(Emergency { node, code, .. }) = Emergency::decode(frame) {
-            let sender = self.nodes.iter().position(|own| *own == node);
+            let sender = self.stations.iter().position(|own| own.node == node);
             return sender.map_or(Arrival::Other, |axis| Arrival::Emergency { axis, code });
         }
         match Heartbeat::decode(frame) {
@@ -55,30 +67,18 @@ impl CanopenAxes {
     /// Returns the answer to SYNC in a frame, if it is one.
     fn answer(&self, frame: &Frame) -> Option<Arrival> {
         let n_bytes = u8::try_from(frame.payload().len()).unwrap_or(u8::MAX);
-        for (axis, &node) in self.nodes.iter().enumerate() {
-            if let Some(status) = StatusTpdo1::decode(frame, node) {
-                let reading = Reading {
-                    statusword: Some(status.statusword),
-                    position_counts: Some(status.position_counts),
-                    torque: Some(status.torque),
-                    ..Reading::default()
-                };
-                return Some(Arrival::Answer { axis, part: AnswerPart::Status, reading });
-            }
-            if let Some(motion) = DriveMotionTpdo2::decode(frame, node) {
-                let reading = Reading {
-                    velocity_counts_s: Some(motion.velocity_counts_s),
-                    following_error_counts: Some(motion.following_error_counts),
-                    ..Reading::default()
-                };
-                return Some(Arrival::Answer { axis, part: AnswerPart::Motion, reading });
-            }
-            for (part, pdo) in
-                [(AnswerPart::Status, STATUS_PDO), (AnswerPart::Motion, DRIVE_MOTION_PDO)]
-            {
-                if frame.id() == pdo.default_cob_id(node) {
-                    return Some(Arrival::Unreadable { axis, part, n_bytes });
+        for (axis, station) in self.stations.iter().enumerate() {
+            let parts = [(AnswerPart::Status, STATUS_PDO), (AnswerPart::Motion, DRIVE_MOTION_PDO)];
+            for ((part, pdo), layout) in parts.into_iter().zip(&station.map.answers) {
+                if layout.is_empty() || frame.id() != pdo.default_cob_id(station.node) {
+                    continue;
                 }
+                let reading = layout.read(frame.payload());
+                return Some(
+                    reading.map_or(Arrival::Unreadable { axis, part, n_bytes }, |reading| {
+                        Arrival::Answer { axis, part, reading }
+                    }),
+                );
             }
         }
         let tool = self.tool?;
@@ -109,13 +109,19 @@ impl CanopenAxes {
 
     /// Returns whether a node belongs to this cell.
     fn is_ours(&self, node: NodeId) -> bool {
-        self.nodes.contains(&node) || self.tool == Some(node)
+        self.stations.iter().any(|own| own.node == node) || self.tool == Some(node)
     }
 }
 
 impl AxisNetwork for CanopenAxes {
     fn write(&mut self, axis: usize, command: &CommandRpdo1) -> Result<(), BusError> {
-        self.nodes.get(axis).map_or(Ok(()), |node| self.bus.send(&command.encode(*node)))
+        let Some(station) = self.stations.get(axis) else { return Ok(()) };
+        let mut payload = [0; PAYLOAD_MAX];
+        let n_bytes = station.map.command.write(station.mode, command, &mut payload);
+        let payload = payload.get(..n_bytes).unwrap_or(&[]);
+        // Checked at set-up: a map fits a frame.
+        let frame = Frame::new(COMMAND_PDO.default_cob_id(station.node), payload);
+        frame.map_or(Ok(()), |frame| self.bus.send(&frame))
     }
 
     fn exchange(&mut self) -> Result<(), BusError> {
@@ -125,6 +131,17 @@ impl AxisNetwork for CanopenAxes {
     fn next(&mut self, timeout: Duration) -> Result<Option<Arrival>, BusError> {
         let frame = self.bus.recv(timeout)?;
         Ok(frame.map(|frame| self.read(&frame)))
+    }
+
+    fn parts(&self, axis: usize) -> [bool; 2] {
+        self.stations
+            .get(axis)
+            .map_or([false; 2], |own| own.map.answers.map(|part| !part.is_empty()))
+    }
+
+    fn part_bytes(&self, axis: usize, part: AnswerPart) -> u8 {
+        let layout = self.stations.get(axis).and_then(|own| own.map.answers.get(part.index()));
+        layout.map_or(0, |layout| u8::try_from(layout.n_bytes()).unwrap_or(u8::MAX))
     }
 
     fn release(&mut self) -> Result<(), BusError> {

@@ -11,9 +11,9 @@ use std::time::Duration;
 
 use super::bus::BusError;
 use super::canopen::{NmtCommand, NmtState, NodeId};
-use super::cia402::{CommandRpdo1, Statusword};
+use super::cia402::{CommandRpdo1, Reading};
 
-pub use canopen::CanopenAxes;
+pub use canopen::{CanopenAxes, Station};
 
 /// A network of axes that exchanges commands and answers once per cycle.
 ///
@@ -37,6 +37,12 @@ pub trait AxisNetwork: Send {
     /// # Errors
     /// [`BusError`] if nothing can arrive any more.
     fn next(&mut self, timeout: Duration) -> Result<Option<Arrival>, BusError>;
+
+    /// Returns which parts of an answer an axis sends: status, motion.
+    fn parts(&self, axis: usize) -> [bool; 2];
+
+    /// Returns the agreed length of a part of the answer of an axis, in bytes.
+    fn part_bytes(&self, axis: usize, part: AnswerPart) -> u8;
 
     /// Takes all nodes out of operation, when the loop is over.
     ///
@@ -110,21 +116,6 @@ impl AnswerPart {
             Self::Motion => 1,
         }
     }
-}
-
-/// Values in a part of an answer; `None` for those that the part does not carry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Reading {
-    /// Statusword.
-    pub statusword: Option<Statusword>,
-    /// Position, in counts.
-    pub position_counts: Option<i32>,
-    /// Velocity, in counts/s.
-    pub velocity_counts_s: Option<i32>,
-    /// Torque, in thousandths of the rated torque.
-    pub torque: Option<i16>,
-    /// Demand minus actual position, in counts.
-    pub following_error_counts: Option<i32>,
 }
 
 /// A message of another master.

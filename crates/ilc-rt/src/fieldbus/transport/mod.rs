@@ -8,6 +8,7 @@
 //! its parts.
 
 mod doorbell;
+mod group;
 pub mod loopback;
 pub(crate) mod opening;
 mod queue;
@@ -17,6 +18,7 @@ pub mod udp_multicast;
 mod wait;
 pub mod zenoh;
 
+pub use group::{Group, GroupSide};
 pub use loopback::{InProcess, Loopback, Responder};
 pub use opening::{Address, OpenError, SCHEMES, Scheme, ZenohSettings, open, scheme_of, syntaxes};
 pub use socketcan::SocketCan;

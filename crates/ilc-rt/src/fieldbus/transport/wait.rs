@@ -31,7 +31,7 @@ impl Deadline {
         clippy::disallowed_methods,
         reason = "a time-out is system time; no value depends on it"
     )]
-    fn left(self) -> Option<Duration> {
+    pub(super) fn left(self) -> Option<Duration> {
         match self.end {
             None => Some(Duration::MAX),
             Some(end) => end.checked_duration_since(Instant::now()).filter(|left| !left.is_zero()),

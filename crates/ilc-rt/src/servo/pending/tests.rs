@@ -12,7 +12,7 @@ fn answer(pending: &mut PendingCycles, axis: usize, value: f64) {
 
 #[test]
 fn a_late_answer_lands_in_its_own_cycle() {
-    let mut pending = PendingCycles::new(2, false);
+    let mut pending = PendingCycles::new(&[[true; 2]; 2], false);
     pending.send(Sample::default(), [0.0; MAX_AXES], false);
     answer(&mut pending, 0, 10.0);
     pending.watch_lag();
@@ -31,7 +31,7 @@ fn a_late_answer_lands_in_its_own_cycle() {
 
 /// Lets `n` cycles pass; `deliver` selects the answers of PDO 1 in the tick after each SYNC.
 fn pass(n: u64, mut deliver: impl FnMut(u64, &mut Vec<u64>)) -> Vec<Sample> {
-    let mut pending = PendingCycles::new(1, false);
+    let mut pending = PendingCycles::new(&[[true; 2]], false);
     let mut out = Vec::new();
     let mut coming = Vec::new();
     for sync in 0..n {
@@ -121,7 +121,7 @@ fn whatever_comes_and_does_not_nothing_is_put_in_the_wrong_cycle_for_long() {
 
 #[test]
 fn a_late_position_belongs_to_the_command_that_it_answers() {
-    let mut pending = PendingCycles::new(1, false);
+    let mut pending = PendingCycles::new(&[[true; 2]], false);
     assert_eq!(pending.answered_command_m(0), None);
     for n in 0..4 {
         pending.send(Sample::default(), [f64::from(n); MAX_AXES], false);
@@ -136,7 +136,7 @@ fn a_late_position_belongs_to_the_command_that_it_answers() {
 
 #[test]
 fn one_pdo_of_two_is_not_enough() {
-    let mut pending = PendingCycles::new(1, true);
+    let mut pending = PendingCycles::new(&[[true; 2]], true);
     for _ in 0..60 {
         pending.send(
             Sample { encoder_m: [7.0; MAX_AXES], ..Default::default() },

@@ -1,0 +1,107 @@
+//! Tests of the maps.
+
+use proptest::prelude::*;
+
+use super::super::pdo_map::{
+    DRIVE_MOTION_MAP, DriveMotionTpdo2, STATUS_MAP, StatusTpdo1, command_map,
+};
+use super::super::state::Controlword;
+use super::*;
+use crate::fieldbus::canopen::NodeId;
+
+fn bytes(map: &PdoMap) -> Vec<usize> {
+    map.frame_bytes().collect()
+}
+
+#[test]
+fn the_full_map_is_the_fixed_one_and_the_small_one_has_six_bytes() {
+    for mode in Mode::ALL {
+        let full = PdoMap::full(mode);
+        assert_eq!(full.command.objects(), command_map(mode));
+        assert_eq!(full.answers[0].objects(), STATUS_MAP);
+        assert_eq!(full.answers[1].objects(), DRIVE_MOTION_MAP);
+        assert_eq!(bytes(&PdoMap::small(mode)), [6, 6]);
+        assert_eq!(PdoMap::small(mode).check(mode, 8), Ok(()));
+        assert_eq!(full.check(mode, 8), Ok(()));
+    }
+}
+
+#[test]
+fn what_fits_shares_a_frame() {
+    let of = |wanted, bytes_max| {
+        bytes(&PdoMap::choose(Mode::Csp, wanted, OptionalObjects::ALL, bytes_max))
+    };
+    assert_eq!(of(OptionalObjects::ALL, 64), [8, 16]);
+    let error = OptionalObjects { following_error: true, ..OptionalObjects::NONE };
+    assert_eq!(of(error, 8), [6, 6, 4]);
+    let torque = OptionalObjects { torque: true, torque_offset: true, ..OptionalObjects::NONE };
+    assert_eq!(of(torque, 8), [8, 8]);
+}
+
+#[test]
+fn what_a_drive_lacks_is_not_mapped() {
+    let lacks = OptionalObjects { torque_offset: false, ..OptionalObjects::ALL };
+    let map = PdoMap::choose(Mode::Csv, OptionalObjects::ALL, lacks, 8);
+    assert_eq!(bytes(&map), [6, 8, 8]);
+    assert!(!map.carries(objects::TORQUE_OFFSET) && map.carries(objects::FOLLOWING_ERROR_ACTUAL));
+    assert_eq!(PdoMap::full(Mode::Csv).without(objects::TORQUE_OFFSET), map);
+}
+
+#[test]
+fn a_map_that_cannot_be_used_is_refused_by_name() {
+    let object = |index, bits| MappedObject { address: ObjectAddress::new(index, 0), bits };
+    let small = PdoMap::small(Mode::Csp);
+    let with_command = |objects: &[MappedObject]| {
+        PdoMap { command: PdoLayout::new(objects).unwrap(), ..small }
+            .check(Mode::Csp, 8)
+            .unwrap_err()
+            .to_string()
+    };
+    let (word, target) = (object(0x6040, 16), object(0x607A, 32));
+    assert!(with_command(&[word]).contains("no object 0x607A:00, which every RPDO1 needs"));
+    assert!(with_command(&[word, object(0x607A, 16)]).contains("with 16 bits"));
+    assert!(with_command(&[word, target, object(0x60FE, 16)]).contains("object 0x60FE:00 in a"));
+    let long = with_command(&[word, target, object(0x60B1, 32)]);
+    assert!(long.contains("10 bytes is not allowed: at most 8"), "{long}");
+    assert_eq!(PdoLayout::new(&[word; 9]), Err(MapError::Objects { found: 9 }));
+    let blind = PdoMap { answers: [small.answers[1], small.answers[0]], ..small };
+    assert!(blind.check(Mode::Csp, 8).unwrap_err().to_string().contains("0x6041:00"));
+}
+
+proptest! {
+    #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
+    #[test]
+    fn the_full_map_has_the_bytes_of_the_fixed_codecs(
+        word: u16, a: i32, b: i32, last: i16
+    ) {
+        let node = NodeId::new(5).unwrap();
+        let map = PdoMap::full(Mode::Csp);
+        let command =
+            CommandRpdo1 { controlword: Controlword(word), target_counts: a, torque_offset: last };
+        let mut payload = [0; 8];
+        prop_assert_eq!(map.command.write(Mode::Csp, &command, &mut payload), 8);
+        let encoded = command.encode(node);
+        prop_assert_eq!(&payload[..], encoded.payload());
+        let status =
+            StatusTpdo1 { statusword: Statusword(word), position_counts: a, torque: last };
+        let read = map.answers[0].read(status.encode(node).payload()).unwrap();
+        prop_assert_eq!(
+            (read.statusword, read.position_counts, read.torque, read.velocity_counts_s),
+            (Some(Statusword(word)), Some(a), Some(last), None)
+        );
+        let motion = DriveMotionTpdo2 { velocity_counts_s: a, following_error_counts: b };
+        let read = map.answers[1].read(motion.encode(node).payload()).unwrap();
+        prop_assert_eq!(read.velocity_counts_s, Some(a));
+        prop_assert_eq!(read.following_error_counts, Some(b));
+    }
+
+    #[test]
+    fn any_length_but_its_own_is_unreadable(
+        payload in prop::collection::vec(any::<u8>(), 0..=8)
+    ) {
+        for layout in PdoMap::small(Mode::Csp).answers {
+            prop_assert_eq!(layout.read(&payload).is_some(), payload.len() == layout.n_bytes());
+        }
+    }
+}
