@@ -1,4 +1,4 @@
-"""Production from Python: frozen inputs, drift, runs that are kept, and the end of a campaign in fields."""
+"""Production from Python: frozen inputs, drift, and the runs that are kept."""
 
 from __future__ import annotations
 
@@ -47,9 +47,7 @@ def test_options_of_production_are_refused_where_they_contradict(gantry: Path) -
 
 
 def test_runs_that_are_not_kept_are_not_in_the_result(gantry: Path, tmp_path: Path) -> None:
-    campaign = Campaign(
-        gantry, library=tmp_path / "l.db", bus="loopback:", learning=False, keep=2
-    )
+    campaign = Campaign(gantry, library=tmp_path / "l.db", bus="loopback:", learning=False, keep=2)
     assert len(list(campaign.run(4))) == 4
     assert [record.index for record in campaign.result.records] == [0, 2, 3]
 

@@ -71,7 +71,7 @@ fn the_best_input_runs_frozen_and_nothing_is_learned() {
         assert!(row.record.figures.frozen_ratio.unwrap() < 1.5);
         assert!(!row.record.figures.learning_off);
     }
-    // A frozen campaign is none to resume, and none to choose from.
+    // A frozen campaign is neither resumed nor chosen from.
     let again = Options { resume: true, ..ilc_tests::campaign::options(library.clone(), 7) };
     assert_eq!(run(&cell, &again).unwrap().campaign, learned[0].meta.campaign);
     let last = Options { input_from: Some(Source::Last), ..frozen(library.clone(), 1) };

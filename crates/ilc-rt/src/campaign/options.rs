@@ -144,7 +144,7 @@ impl Options {
         }
         if self.frozen && self.relearn_above.is_none() {
             cell.learning.law = LawName::None;
-            // They go round a law.
+            // They wrap a law.
             (cell.learning.ladder, cell.learning.gate) = (None, None);
         }
         if let Some(address) = &self.session.bus {

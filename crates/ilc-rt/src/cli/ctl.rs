@@ -10,7 +10,9 @@ use crate::campaign::control::{Command, Reply, Status, send};
 use crate::config::Cell;
 
 #[derive(Args)]
-#[command(after_help = "Exit status: 0 done, 1 refused by the controller, 2 no controller can be commanded.")]
+#[command(
+    after_help = "Exit status: 0 done, 1 refused by the controller, 2 no controller can be commanded."
+)]
 pub(super) struct CtlArguments {
     /// Cell description.
     cell: PathBuf,

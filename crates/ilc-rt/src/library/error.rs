@@ -98,7 +98,7 @@ pub enum LibraryError {
         /// Requested key.
         id: i64,
     },
-    /// A disturbance to look for that is none.
+    /// An invalid disturbance to look for.
     #[error("library {path}: disturbance = {found:?}: at least one number, all finite")]
     Disturbance {
         /// File.

@@ -191,7 +191,7 @@ impl Cycle {
         self.network
     }
 
-    /// Returns the name of the phase, as it is told.
+    /// Returns the name of the phase for messages.
     fn phase_name(&self) -> PhaseName {
         match self.phase.name() {
             PhaseName::Settling if self.waits => PhaseName::Waiting,

@@ -16,8 +16,8 @@ const REPLY_BYTES_MAX: u64 = 65_536;
 /// Sends a command to the controller of a cell, and returns its reply.
 ///
 /// # Errors
-/// [`ControlError::Nobody`] if no controller listens; [`ControlError::Unsafe`] if the socket may be
-/// that of somebody else; [`ControlError::Reply`].
+/// [`ControlError::Nobody`] if no controller listens; [`ControlError::Unsafe`] if the socket may belong
+/// to another user; [`ControlError::Reply`].
 pub fn send(cell: &str, command: Command) -> Result<Reply, ControlError> {
     let path = folder::socket(cell);
     let nobody = |source| {

@@ -14,7 +14,7 @@ pub enum ControlError {
     },
     /// The folder of the socket is open to others.
     #[error(
-        "{}: {found}; allowed: a folder of this user that nobody else can write, as XDG_RUNTIME_DIR",
+        "{}: {found}; allowed: a folder of this user that no other user can write, as XDG_RUNTIME_DIR",
         path.display()
     )]
     Unsafe {
@@ -41,7 +41,7 @@ pub enum ControlError {
         /// Reason given by the system.
         source: io::Error,
     },
-    /// The reply is none.
+    /// The reply is unreadable.
     #[error("{}: no readable reply: {reason}", path.display())]
     Reply {
         /// Socket.

@@ -1,4 +1,4 @@
-//! Place of the socket: a folder that nobody but this user can change.
+//! Place of the socket: a folder that no other user can change.
 
 use std::fs::{self, DirBuilder, File, Metadata, OpenOptions, TryLockError};
 use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _, OpenOptionsExt as _};
@@ -60,7 +60,7 @@ pub(super) fn prepare(socket: &Path) -> Result<File, ControlError> {
     }
 }
 
-/// Ensures that a folder is one of this user that nobody else can open.
+/// Ensures that a folder is one of this user that no other user can open.
 pub(super) fn check(folder: &Path) -> Result<(), ControlError> {
     // Not of a link's target: a link could be changed by its owner.
     let found = fs::symlink_metadata(folder)

@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn silent_clients_keep_nobody_out_for_long() {
+    fn silent_clients_keep_no_other_out_for_long() {
         let cell = format!("ctl-{}-slow", std::process::id());
         let server = Server::open(&cell, shared()).unwrap();
         let path = server.path().to_owned();
@@ -204,7 +204,7 @@ mod tests {
         assert!(matches!(refused, ControlError::Taken { .. }), "{refused}");
         assert!(ask(&path, b"{\"command\":\"status\"}\n").is_some(), "the first one goes on");
         drop(first);
-        // As a killed controller leaves it: a socket that nobody listens on.
+        // As a killed controller leaves it: a socket without a listener.
         drop(UnixListener::bind(&path).unwrap());
         assert!(path.exists());
         let again = Server::open(&cell, shared()).unwrap();
@@ -217,7 +217,7 @@ mod tests {
         fs::create_dir(&folder).unwrap();
         fs::set_permissions(&folder, Permissions::from_mode(0o755)).unwrap();
         let refused = folder::check(&folder).unwrap_err().to_string();
-        assert!(refused.contains("mode 755") && refused.contains("nobody else"), "{refused}");
+        assert!(refused.contains("mode 755") && refused.contains("no other user"), "{refused}");
         fs::set_permissions(&folder, Permissions::from_mode(0o700)).unwrap();
         assert!(folder::check(&folder).is_ok());
         fs::remove_dir(&folder).unwrap();

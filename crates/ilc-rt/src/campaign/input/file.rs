@@ -26,7 +26,7 @@ struct Content {
     origin: Origin,
     /// Digest of everything else.
     digest: String,
-    /// Learned input, one row a sample.
+    /// Learned input, one row per sample.
     input: Vec<Vec<f64>>,
 }
 
@@ -76,7 +76,7 @@ pub fn save(chosen: &Chosen, n_axes: usize, path: &Path) -> Result<(), InputErro
 /// Loads the input of a file for a planned cell.
 ///
 /// # Errors
-/// [`InputError`] for a file that is none of these, is damaged, or belongs to another task; for an
+/// [`InputError`] for another kind of file, one that is damaged, or belongs to another task; for an
 /// input beyond the bounds of the cell.
 pub fn load(path: &Path, cell: &Cell, plan: &Plan) -> Result<Chosen, InputError> {
     let bytes = read_file(path, FILE_BYTES_MAX).map_err(|reason| unusable(path, &reason))?;
