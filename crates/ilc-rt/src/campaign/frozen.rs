@@ -5,7 +5,7 @@
 
 use super::claim::{Claim, claim};
 use super::error::CampaignError;
-use super::input::{self, Chosen, FROZEN, Origin, Source};
+use super::input::{self, Chosen, FROZEN, Origin};
 use super::options::Options;
 use super::rollback::{RollbackPolicy, disturbance_remark};
 use crate::config::{Cell, LawName};
@@ -40,7 +40,7 @@ pub(super) fn choose(
         return Ok(input::load(path, cell, plan)?);
     }
     let path = options.session.library.display().to_string();
-    let source = options.input_from.unwrap_or_else(Source::default);
+    let source = options.input_from.unwrap_or_default();
     let is_disturbed = |figures: &Figures| policy.is_disturbed(figures);
     Ok(input::choose(library, &path, source, (cell, plan), is_disturbed)??)
 }

@@ -47,7 +47,7 @@ pub(super) enum StoreRequest {
 /// The library, with the thread that writes to it.
 pub(super) enum Keeper {
     /// In the caller's thread: the result is available at once.
-    InLine { store: Store, done: VecDeque<StoreEvent> },
+    InLine { store: Box<Store>, done: VecDeque<StoreEvent> },
     /// On its own thread.
     Thread {
         requests: Option<Sender<StoreRequest>>,
@@ -58,7 +58,7 @@ pub(super) enum Keeper {
 
 impl Keeper {
     pub(super) fn in_line(library: Library, meta: Arc<Meta>, keep: Keep) -> Self {
-        Self::InLine { store: Store::new(library, meta, keep), done: VecDeque::new() }
+        Self::InLine { store: Box::new(Store::new(library, meta, keep)), done: VecDeque::new() }
     }
 
     pub(super) fn on_thread(
@@ -125,7 +125,7 @@ impl Keeper {
         drop(requests.take());
         let rest: Vec<StoreEvent> = events.iter().collect();
         if let Some(store) = thread.take().and_then(|thread| thread.join().ok()) {
-            *self = Self::InLine { store, done: VecDeque::new() };
+            *self = Self::InLine { store: Box::new(store), done: VecDeque::new() };
         }
         rest
     }
@@ -173,17 +173,14 @@ impl Store {
             return Stored { record, asked, result: None };
         }
         let result = self.library.append(&self.meta, &record);
-        match &result {
-            Ok(id) => {
-                let gone = self.thinning.add(*id, &self.meta, &record);
-                if let Err(error) = self.library.remove(&gone) {
-                    tracing::warn!("runs that need not be kept stay: {error}");
-                }
+        if let Ok(id) = &result {
+            let gone = self.thinning.add(*id, &self.meta, &record);
+            if let Err(error) = self.library.remove(&gone) {
+                tracing::warn!("runs that need not be kept stay: {error}");
             }
-            Err(_) => {
-                self.is_stuck = true;
-                self.library.hurry();
-            }
+        } else {
+            self.is_stuck = true;
+            self.library.hurry();
         }
         Stored { record, asked, result: Some(result) }
     }

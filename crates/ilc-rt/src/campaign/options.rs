@@ -62,6 +62,7 @@ impl Session {
 
 /// Options of a campaign.
 #[derive(Clone, Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "switches of a command line")]
 pub struct Options {
     /// Bus, measurement, pace and library.
     #[command(flatten)]

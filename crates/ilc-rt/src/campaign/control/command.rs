@@ -65,7 +65,7 @@ fn order(shared: &Shared, command: Command) -> Result<(), String> {
         Command::Stop => shared.stop(STOPPED_BY_COMMAND),
         Command::Status => {}
         Command::Feed { percent } if (1..=FEED_WHOLE).contains(&percent) => {
-            orders.set_feed(percent)
+            orders.set_feed(percent);
         }
         Command::Feed { percent } => {
             return Err(format!("feed {percent}: allowed 1 to {FEED_WHOLE} percent"));

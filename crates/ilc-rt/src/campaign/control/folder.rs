@@ -65,7 +65,7 @@ pub(super) fn check(folder: &Path) -> Result<(), ControlError> {
     // Not of a link's target: a link could be changed by its owner.
     let found = fs::symlink_metadata(folder)
         .map_err(|source| ControlError::System { path: folder.to_owned(), source })?;
-    let is_own = found.is_dir() && found.uid() == user() && found.mode() & 0o077 == 0;
+    let is_own = found.is_dir() && found.uid() == user() && found.mode() & 0o777 == OWNER_ONLY;
     require(folder, &found, is_own)
 }
 

@@ -86,8 +86,8 @@ pub struct Chosen {
 impl Chosen {
     /// Returns the provenance as JSON: the parameters of a law in the records of frozen runs.
     pub(in crate::campaign) fn parameters(&self) -> String {
-        let bits: String = self.input.iter().map(|v| format!("{:x} ", v.to_bits())).collect();
-        serde_json::json!({ "origin": self.origin, "input": fingerprint(&bits) }).to_string()
+        let input = serde_json::json!(self.input).to_string();
+        serde_json::json!({ "origin": self.origin, "input": fingerprint(&input) }).to_string()
     }
 }
 
@@ -127,16 +127,14 @@ pub fn choose(
             Source::Best => rows.iter().rev().min_by(|a, b| error(a).total_cmp(&error(b))),
             _ => rows.iter().rev().find(|row| !row.record.figures.rolled_back),
         };
-        match chosen {
-            Some(row) => row.id,
-            None => {
-                let nearest = match newest {
-                    Some(Err(difference)) => format!("; {difference}"),
-                    _ => String::new(),
-                };
-                return Ok(Err(InputError::NoRun { path: path.to_owned(), nearest }));
-            }
-        }
+        let Some(row) = chosen else {
+            let nearest = match newest {
+                Some(Err(difference)) => format!("; {difference}"),
+                _ => String::new(),
+            };
+            return Ok(Err(InputError::NoRun { path: path.to_owned(), nearest }));
+        };
+        row.id
     };
     let row = library.load(id)?;
     let place = place(&row);
