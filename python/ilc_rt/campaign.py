@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from ilc_rt.experiment import Experiment
 
 DEFAULT_LIBRARY = str(options("run")["library"].default)
+DEFAULT_ITERATIONS = int(str(options("run")["iterations"].default))
 Drives = Literal["auto", "simulated", "external"]
 
 
@@ -72,6 +73,24 @@ class Campaign:
         Resume the newest campaign of this cell, program, measurement and law.
     learning : bool
         Learn; otherwise every run is like the first.
+    frozen : bool
+        Run with a learned input and learn nothing: the one of `input_file`, or of the library.
+    input_from : int, {"best", "last"} or None
+        Run of the library that a frozen input is taken from, by its id; None for the best one.
+    input_file : path or None
+        File of ``ilc-rt input export`` that a frozen input is loaded from.
+    relearn_above : float or None
+        Learn again, in a new campaign, when the error of a frozen input is above this many times
+        that of the run it comes from. None never does; a `DriftEvent` tells the drift all the same.
+    forever : bool
+        Run until stopped, in place of a number of runs.
+    keep : int, {"all", "best"}
+        Runs that stay in the library when nothing is learned from them: all, every n-th, or the
+        best; the newest always does.
+    ctl : bool
+        Accept commands of ``ilc-rt ctl`` on a socket of this user; `StartEvent` has its path.
+    start : {"at-once", "command"}
+        Start each run at once, or when ``ilc-rt ctl CELL start`` asks for it; this needs `ctl`.
     disturbance : callable, array_like of float64 or None
         Measured disturbance before each run, e.g. a temperature: stored with
         the run, and given to the law for the next run. Either one row per run,
@@ -128,6 +147,14 @@ class Campaign:
         drives: Drives = "auto",
         resume: bool = False,
         learning: bool = True,
+        frozen: bool = False,
+        input_from: int | str | None = None,
+        input_file: str | Path | None = None,
+        relearn_above: float | None = None,
+        forever: bool = False,
+        keep: int | str = "all",
+        ctl: bool = False,
+        start: Literal["at-once", "command"] = "at-once",
         disturbance: Callable[[int], ArrayLike] | ArrayLike | None = None,
         allow_divergent: bool = False,
         reset_faults: bool = False,
@@ -147,7 +174,8 @@ class Campaign:
             raise BadInputError(message)
         if law is not None and not allow_divergent:
             _refuse_divergent(law, self.cell)
-        if law is None and learning and not allow_divergent:
+        learns = learning and (not frozen or relearn_above is not None)
+        if law is None and learns and not allow_divergent:
             for line in self.cell.warnings:
                 warnings.warn(f"{self.cell.path}: {line}", stacklevel=2)
         self.measure = measure
@@ -157,6 +185,14 @@ class Campaign:
         self.resume = resume
         self.learning = learning
         self.reset_faults = reset_faults
+        self.frozen = frozen
+        self.input_from = input_from
+        self.input_file = input_file
+        self.relearn_above = relearn_above
+        self.forever = forever
+        self.keep = keep
+        self.ctl = ctl
+        self.start = start
         self.telemetry = telemetry
         # Excitation in place of the program, for an identification.
         self.experiment: Experiment | None = None
@@ -168,14 +204,14 @@ class Campaign:
             message = f"{self.library}: no such folder: {folder}"
             raise BadInputError(message)
 
-    def run(self, iterations: int) -> Iterator[IterationRecord]:
+    def run(self, iterations: int | None = None) -> Iterator[IterationRecord]:
         """Run the program and yield one record per run, as it is completed.
 
         Parameters
         ----------
-        iterations : int
+        iterations : int or None
             Runs in the whole campaign, at least 1, including those before a `resume`; the first is
-            without learning.
+            without learning. None means 10, or until stopped with `forever`.
 
         Raises
         ------
@@ -189,7 +225,7 @@ class Campaign:
                 if isinstance(event, IterationEvent):
                     yield self.result.records[-1]
 
-    def events(self, iterations: int) -> Generator[Event, None, None]:
+    def events(self, iterations: int | None = None) -> Generator[Event, None, None]:
         """Run the program and yield every event of the controller.
 
         Leaving the loop early is a controlled stop of the axes before this iterator is closed.
@@ -212,6 +248,8 @@ class Campaign:
                     if event is not None:
                         self.result.follow(event)
                         yield event
+                if self.keep != "all":
+                    self.result.forget_unkept()
                 self._check_end(controller)
             finally:
                 self._controller = None
@@ -226,7 +264,7 @@ class Campaign:
         if self._controller is not None:
             self._controller.interrupt(number)
 
-    def _command(self, iterations: int) -> tuple[Verb, list[str]]:
+    def _command(self, iterations: int | None) -> tuple[Verb, list[str]]:
         """Return verb and options of ``ilc-rt``."""
         values: dict[str, object] = {
             "bus": self.bus, "measure": self.measure, "lockstep": self.lockstep,
@@ -237,7 +275,10 @@ class Campaign:
             return "identify", arguments("identify", values) + self.experiment.arguments()
         values |= {
             "iterations": iterations, "learning": self.learning, "resume": self.resume,
-            "allow_divergent": self.allow_divergent,
+            "allow_divergent": self.allow_divergent, "frozen": self.frozen,
+            "input_from": self.input_from, "input_file": self.input_file,
+            "relearn_above": self.relearn_above, "forever": self.forever, "keep": self.keep,
+            "ctl": self.ctl, "start": self.start,
         }  # fmt: skip
         return "run", arguments("run", values)
 
@@ -267,8 +308,9 @@ class Campaign:
         if status == "fault" or (failure is not None and status == "running"):
             reason = self.result.reason or (failure.reason if failure else "fault")
             code = failure.exit_code if failure else EXIT_FAULT
-            if failure is not None and failure.reason not in reason:
-                reason = failure.reason if reason in failure.reason else reason
+            if self.result.reason and failure is not None and failure.drives_ended is not None:
+                # The controller tells the silence of the drives, and this why they are silent.
+                reason = f"{reason} (the simulated drives ended: {failure.drives_ended})"
             cause = failure.__cause__ if failure else None
             fault = self.result.fault
             if fault is not None:
@@ -302,12 +344,13 @@ def load_cell(path: str | Path, *, allow_divergent: bool = False) -> Cell:
 
 
 def _measure(
-    disturbance: Callable[[int], ArrayLike] | ArrayLike | None, iterations: int
+    disturbance: Callable[[int], ArrayLike] | ArrayLike | None, iterations: int | None
 ) -> Callable[[int], ArrayLike] | None:
     """Return a function that returns the disturbance of each run."""
     if disturbance is None or callable(disturbance):
         return disturbance
     rows = np.asarray(disturbance)
+    iterations = DEFAULT_ITERATIONS if iterations is None else iterations
     if rows.ndim not in {1, 2} or rows.shape[0] < iterations:
         message = (
             f"disturbance has shape {rows.shape}; (n_runs,) or (n_runs, n_disturbances) "

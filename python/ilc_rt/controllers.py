@@ -119,7 +119,7 @@ class ProcessController:
             return error
         cause = self._drives.failure().reason
         message = f"{error.reason} (the simulated drives ended: {cause})"
-        return CampaignError(message, error.exit_code)
+        return CampaignError(message, error.exit_code, drives_ended=cause)
 
     def _close_drives(self) -> None:
         if self._drives is not None:

@@ -18,6 +18,8 @@ class CampaignError(RuntimeError):
         One readable line.
     exit_code : int
         2 for bad input, 3 for a controlled stop after a fault, 1 otherwise.
+    drives_ended : str or None
+        Reason that simulated drives ended before the controller, if they did.
 
     Examples
     --------
@@ -25,10 +27,13 @@ class CampaignError(RuntimeError):
     'node 2 is silent'
     """
 
-    def __init__(self, reason: str, exit_code: int = EXIT_FAILURE) -> None:
+    def __init__(
+        self, reason: str, exit_code: int = EXIT_FAILURE, *, drives_ended: str | None = None
+    ) -> None:
         super().__init__(reason)
         self.reason = reason
         self.exit_code = exit_code
+        self.drives_ended = drives_ended
 
 
 class FaultError(CampaignError):

@@ -64,6 +64,7 @@ class StartEvent:
     bus: str
     mode: str
     input_units: tuple[str, ...] = ()
+    ctl: str | None = None
     rt: RealTimeReport | None = None
 
 
@@ -110,6 +111,22 @@ class JudgedEvent:
     rolled_back: bool
     learning_off: bool
     remark: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DriftEvent:
+    """A frozen input does not fit the machine any more: its error has grown too far.
+
+    `ratio` is the error of run `index` over that of the run the input was taken from, `origin`;
+    None if that one had no error. `relearned_in` is the campaign in which learning starts again.
+    """
+
+    name: ClassVar[str] = "drift"
+    index: int
+    ratio: float | None
+    allowed: float
+    origin: str
+    relearned_in: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +193,7 @@ Event = (
     | ProgressEvent
     | IterationEvent
     | JudgedEvent
+    | DriftEvent
     | LatencyEvent
     | FaultEvent
     | EndEvent
@@ -189,6 +207,7 @@ _CLASSES: dict[str, type[Any]] = {
         ProgressEvent,
         IterationEvent,
         JudgedEvent,
+        DriftEvent,
         LatencyEvent,
         FaultEvent,
         EndEvent,

@@ -34,12 +34,17 @@ class Figures:
         measurement.
     overruns : int
         Servo cycles that began at least a whole cycle late.
+    scaled_cycles : int
+        Servo cycles at another feed than 100 %, e.g. in a pause: nothing is learned from
+        such a run.
     missing_samples : int
         Samples whose measurement never arrived; the last known one stands in for them.
     late_updates : int
         Runs so far that repeated the old input because the learning update was late.
     update_ms : float
         Computing time of the learning update for this run's input; 0 without one.
+    frozen_ratio : float | None
+        Error over that of the run a frozen input was taken from; absent when learning.
     rolled_back : bool
         True if the best input was restored after this run (rollback), as the error had
         grown.
@@ -60,9 +65,11 @@ class Figures:
     encoder_tracking_inf_m: float = 0.0
     tool_tracking_inf_m: float | None = None
     overruns: int = 0
+    scaled_cycles: int = 0
     missing_samples: int = 0
     late_updates: int = 0
     update_ms: float = 0.0
+    frozen_ratio: float | None = None
     rolled_back: bool = False
     learning_off: bool = False
     remark: str | None = None

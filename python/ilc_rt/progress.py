@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.text import Text
 
 from ilc_rt.events import (
+    DriftEvent,
     EndEvent,
     FaultEvent,
     IterationEvent,
@@ -33,12 +34,16 @@ if TYPE_CHECKING:
 
 # Number of remarks below the table in a terminal: the newest ones.
 REMARKS_SHOWN = 8
+# Number of runs of a campaign that runs until it is stopped.
+UNTIL_STOPPED = 2**32 - 1
 WORDS = {
     "bringing_up": "bringing the drives up",
     "enabling": "switching the drives on",
     "returning": "returning to the start",
     "settling": "settling at the start",
+    "waiting": "waiting for its start",
     "running": "running",
+    "paused": "held on the path",
     "stopping": "stopping the axes",
     "stopped": "at rest",
 }
@@ -49,13 +54,32 @@ def describe(start: StartEvent) -> str:
     clock = "real time" if start.mode == "realtime" else "lock-step"
     seconds = start.n_samples * start.cycle_s
     axes = f"{start.n_axes} {'axis' if start.n_axes == 1 else 'axes'}"
-    learns = (
-        "nothing is learned" if start.law == "none" else f"{start.law} learns from {start.measure}"
-    )
+    learns = {
+        "none": "nothing is learned",
+        "frozen": f"frozen input, watched at the {start.measure}",
+    }.get(start.law, f"{start.law} learns from {start.measure}")
     return printable(
         f"{start.cell}: {axes}, {seconds:.2f} s a run at {start.cycle_s * 1e3:g} ms, "
         f"{learns}, {start.bus}, {clock}"
     )
+
+
+def drift(event: DriftEvent) -> str:
+    """Return one line on a frozen input that does not fit any more.
+
+    Examples
+    --------
+    >>> drift(DriftEvent(7, 2.0, 1.5, "run 3 of campaign c"))
+    'drift: the error of run 7 is 2.00 times that of run 3 of campaign c, 1.5 is allowed'
+    """
+    times = "beyond" if event.ratio is None else f"{event.ratio:.2f} times"
+    line = f"drift: the error of run {event.index} is {times} that of {event.origin}"
+    again = (
+        f"; learning starts again from its input, in campaign {event.relearned_in}"
+        if event.relearned_in
+        else ""
+    )
+    return f"{line}, {event.allowed:g} is allowed{again}"
 
 
 class CampaignView:
@@ -96,8 +120,10 @@ class CampaignView:
     def show(self, event: Event, result: CampaignResult) -> None:
         """Show one event; `result` has handled it already."""
         if isinstance(event, StartEvent):
-            self._runs = event.iterations
+            self._runs = 0 if event.iterations == UNTIL_STOPPED else event.iterations
             self._console.print(describe(event), soft_wrap=True)
+            if event.ctl:
+                self._console.print(f"control: {printable(event.ctl)}", soft_wrap=True)
             for note in event.rt.notes if event.rt else ():
                 said = f"note: {printable(note)}"
                 self._console.print(said, style="yellow", soft_wrap=True)
@@ -111,6 +137,8 @@ class CampaignView:
             self._bar.reset(self._task, description=run + words)
         elif isinstance(event, ProgressEvent):
             self._bar.update(self._task, completed=event.sample / max(1, event.n_samples))
+        elif isinstance(event, DriftEvent):
+            self._console.print(printable(drift(event)), style="yellow", soft_wrap=True)
         elif isinstance(event, FaultEvent):
             self._bar.update(self._task, description="fault: stopping the axes")
         elif isinstance(event, EndEvent):

@@ -255,7 +255,7 @@ def _facts(result: CampaignResult) -> str:
         ("Cell", f"{result.cell}: {'axes' if result.n_axes > 1 else 'axis'} "
                  f"{', '.join(map(printable, result.axis_names))}"),
         ("Campaign", f"{result.campaign}, in {result.library}"),
-        ("Law", result.law),
+        ("Law", "none: frozen input" if result.law == "frozen" else result.law),
         ("Its parameters", _parameters(result)),
         ("Learned from", {"tcp": "tool centre point", "encoder": "encoders of the drives"}.get(
             result.measure, result.measure)),

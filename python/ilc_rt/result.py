@@ -214,6 +214,11 @@ class CampaignResult:
         """
         write_text(path, json_text(self.to_json()))
 
+    def forget_unkept(self) -> None:
+        """Forget the runs that are not in the library any more."""
+        kept = {int(row["id"]) for row in library_rows(self.library)}
+        self.records = [record for record in self.records if record.id in kept]
+
     def _judge(self, event: JudgedEvent) -> None:
         for place, record in enumerate(self.records):
             if record.id == event.id:

@@ -303,7 +303,7 @@ impl Rig {
                     }
                 }
                 Message::RunStarted { run, table } => self.started.push((run, table)),
-                Message::RunEnded { run, overruns } => self.ended.push((run, overruns)),
+                Message::RunEnded { run, overruns, .. } => self.ended.push((run, overruns)),
                 Message::Before(sample) => self.before.push(sample),
                 Message::Stopping(reason) => {
                     (self.reason, self.stopping_at) = (Some(reason), Some(n_syncs));

@@ -1,7 +1,10 @@
 //! Publishing of events: to the caller at once, and to the network through the telemetry thread.
 
+use std::sync::Arc;
+
 use serde_json::json;
 
+use super::control::{Shared, Status};
 use super::telemetry::Telemetry;
 use crate::record::Event;
 use crate::servo::Sample;
@@ -13,6 +16,8 @@ const BATCH_S: f64 = 0.05;
 pub(super) struct Announcer<'a> {
     observe: &'a mut dyn FnMut(&Event),
     telemetry: Option<Telemetry>,
+    /// State for clients of the control.
+    shared: Arc<Shared>,
     batch: Vec<Sample>,
     batch_size: usize,
     n_axes: usize,
@@ -22,6 +27,7 @@ impl<'a> Announcer<'a> {
     pub(super) fn new(
         observe: &'a mut dyn FnMut(&Event),
         telemetry: Option<Telemetry>,
+        shared: Arc<Shared>,
         cycle_s: f64,
         n_axes: usize,
     ) -> Self {
@@ -31,15 +37,28 @@ impl<'a> Announcer<'a> {
             reason = "small, positive"
         )]
         let batch_size = ((BATCH_S / cycle_s) as usize).max(1);
-        Self { observe, telemetry, batch: Vec::with_capacity(batch_size), batch_size, n_axes }
+        Self {
+            observe,
+            telemetry,
+            shared,
+            batch: Vec::with_capacity(batch_size),
+            batch_size,
+            n_axes,
+        }
+    }
+
+    /// Records the run that the loop is about to make.
+    pub(super) fn set_waiting_run(&self, run: u32) {
+        self.shared.set_waiting_run(run);
     }
 
     /// Publishes an event.
     pub(super) fn publish(&mut self, event: &Event) {
+        self.shared.update(|status: &mut Status| status.follow(event));
         (self.observe)(event);
         let Some(telemetry) = &mut self.telemetry else { return };
         let key = match event {
-            Event::Iteration { .. } | Event::Judged { .. } => "iteration",
+            Event::Iteration { .. } | Event::Judged { .. } | Event::Drift { .. } => "iteration",
             Event::Fault { .. } => "fault",
             Event::Latency { .. } => "latency",
             Event::Start { .. }

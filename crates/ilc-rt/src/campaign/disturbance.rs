@@ -12,6 +12,33 @@ const FILE_BYTES_MAX: u64 = 4096;
 /// Function from the number of the next run to its disturbance, or to the reason why it has none.
 type Ask = dyn FnMut(u32) -> Result<Vec<f64>, String> + Send;
 
+/// Reason that the disturbance of a run is unavailable.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DisturbanceError {
+    /// Its source failed.
+    #[error("the disturbance of run {run}: {reason}")]
+    NotMeasured {
+        /// Number of the run.
+        run: u32,
+        /// Reason given by the source.
+        reason: String,
+    },
+    /// Nothing was measured.
+    #[error("the disturbance of run {run} holds no number")]
+    Empty {
+        /// Number of the run.
+        run: u32,
+    },
+    /// A value is not a finite number.
+    #[error("the disturbance of run {run} holds {value}")]
+    NotFinite {
+        /// Number of the run.
+        run: u32,
+        /// The value.
+        value: f64,
+    },
+}
+
 /// Measured disturbance of each run, one number per quantity, e.g. a temperature; or none.
 ///
 /// Measured once before each run, in order, while the axes return: never in the loop.
@@ -39,19 +66,17 @@ impl Disturbance {
     }
 
     /// Returns the disturbance of a run that is about to begin; empty if none is measured.
-    pub(super) fn of(&self, run: u32) -> Result<Vec<f64>, String> {
+    pub(super) fn of(&self, run: u32) -> Result<Vec<f64>, DisturbanceError> {
         let Some(ask) = &self.0 else {
             return Ok(Vec::new());
         };
         let mut ask = ask.lock().unwrap_or_else(PoisonError::into_inner);
         let disturbance =
-            (*ask)(run).map_err(|reason| format!("the disturbance of run {run}: {reason}"))?;
+            (*ask)(run).map_err(|reason| DisturbanceError::NotMeasured { run, reason })?;
         match disturbance.iter().find(|value| !value.is_finite()) {
-            None if disturbance.is_empty() => {
-                Err(format!("the disturbance of run {run} holds no number"))
-            }
+            None if disturbance.is_empty() => Err(DisturbanceError::Empty { run }),
             None => Ok(disturbance),
-            Some(value) => Err(format!("the disturbance of run {run} holds {value}")),
+            Some(&value) => Err(DisturbanceError::NotFinite { run, value }),
         }
     }
 }
@@ -84,8 +109,8 @@ mod tests {
         let mut told = vec![vec![1.0, f64::NAN], Vec::new(), vec![21.5]];
         let source = Disturbance::measured(move |_| told.pop().ok_or_else(|| "gone".to_owned()));
         assert_eq!(source.of(0), Ok(vec![21.5]));
-        assert!(source.of(1).unwrap_err().contains("run 1 holds no number"));
-        assert!(source.of(2).unwrap_err().contains("run 2 holds NaN"));
-        assert_eq!(source.of(3).unwrap_err(), "the disturbance of run 3: gone");
+        assert!(source.of(1).unwrap_err().to_string().contains("run 1 holds no number"));
+        assert!(source.of(2).unwrap_err().to_string().contains("run 2 holds NaN"));
+        assert_eq!(source.of(3).unwrap_err().to_string(), "the disturbance of run 3: gone");
     }
 }

@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+use super::control::ControlError;
+use super::disturbance::DisturbanceError;
+use super::input::InputError;
 use crate::config::ConfigError;
 use crate::design::DesignError;
 use crate::fieldbus::bring_up::BringUpError;
@@ -20,8 +23,8 @@ pub enum CampaignError {
     #[error(transparent)]
     Identification(#[from] IdentificationError),
     /// The disturbance of the first run is unavailable.
-    #[error("{0}")]
-    Disturbance(String),
+    #[error(transparent)]
+    Disturbance(#[from] DisturbanceError),
     /// The bus does not open.
     #[error("{place}: {source}")]
     Bus {
@@ -103,6 +106,18 @@ pub enum CampaignError {
     /// The library.
     #[error("{0}")]
     Library(#[from] LibraryError),
+    /// The frozen input.
+    #[error("{0}")]
+    Input(#[from] InputError),
+    /// The cell cannot be commanded.
+    #[error("--ctl: {0}")]
+    Control(#[from] ControlError),
+    /// There is no law to learn with again.
+    #[error("--relearn-above {ratio}: law \"none\" learns nothing; allowed: a law in [learning]")]
+    NothingToRelearn {
+        /// Ratio of errors.
+        ratio: f64,
+    },
     /// There is no campaign to resume.
     #[error("--resume: {0}")]
     Resume(#[from] ResumeError),

@@ -4,11 +4,15 @@ use std::sync::Arc;
 
 use super::announce::Announcer;
 use super::claim::{Claim, claim};
+use super::control::{Server, Shared};
 use super::error::{CampaignError, ResumeError};
+use super::frozen::{self, Frozen};
+use super::input::InputError;
+use super::keep::Keep;
 use super::keeper::Keeper;
 use super::learner::{Learner, set_disturbance};
 use super::nodes;
-use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session};
+use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session, StartOn};
 use super::pace::Pacer;
 use super::resume::{Resumed, to_resume};
 use super::rollback::RollbackPolicy;
@@ -22,7 +26,7 @@ use crate::learning::{Law, LearningError};
 use crate::library::Library;
 use crate::record::{Event, StateName};
 use crate::rt::RtReport;
-use crate::servo::{Cycle, mailbox};
+use crate::servo::{Cycle, Orders, mailbox};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
 pub(super) const MAILBOX: usize = 8192;
@@ -40,10 +44,12 @@ pub fn run(
     law: Option<Box<dyn Law>>,
     observe: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, CampaignError> {
+    let options = &options.counted();
     let cell = &options.apply(cell.clone());
     let session = &options.session;
     let mut plan = Plan::new(cell, session.measure, session.lockstep)?;
-    let (name, law) = if let Some(law) = law {
+    let relearns = !options.frozen || options.relearn_above.is_some();
+    let (name, law) = if let Some(law) = law.filter(|_| relearns) {
         ("user", Some(law))
     } else {
         let prepared = plan.law(cell)?;
@@ -60,7 +66,8 @@ pub fn run(
     };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
     plan.name_law(cell, name, &parameters);
-    execute(cell, options, bus, Campaign { plan, law, input: None, growth_allowed }, observe)
+    let campaign = Campaign { plan, law, input: None, growth_allowed, frozen: None };
+    execute(cell, options, bus, campaign, observe)
 }
 
 /// Excites one axis in one run while all others hold still, and stores the run; its record names the law
@@ -83,6 +90,7 @@ pub fn identify(
         input: Some(planned.input),
         // Nothing is learned, so there is nothing to roll back.
         growth_allowed: f64::INFINITY,
+        frozen: None,
     };
     let options = Options {
         session: session.clone(),
@@ -90,6 +98,14 @@ pub fn identify(
         learning: false,
         resume: false,
         allow_divergent: false,
+        frozen: false,
+        input_from: None,
+        input_file: None,
+        relearn_above: None,
+        forever: false,
+        keep: Keep::All,
+        ctl: false,
+        start: StartOn::AtOnce,
         disturbance: super::Disturbance::default(),
     };
     execute(cell, &options, bus, campaign, observe)
@@ -103,6 +119,8 @@ struct Campaign {
     input: Option<Vec<f64>>,
     /// Growth of the error at which the best input is restored.
     growth_allowed: f64,
+    /// Drift of a frozen input.
+    frozen: Option<Frozen>,
 }
 
 fn execute(
@@ -116,9 +134,15 @@ fn execute(
     let library = open_library(options)?;
     let mut policy =
         RollbackPolicy::new(campaign.growth_allowed).forgiving(session.forgives_stalls());
+    if options.frozen {
+        let chosen = frozen::choose(&library, options, (cell, &campaign.plan), &policy)?;
+        let learns = campaign.law.is_some();
+        let frozen = Frozen::new(&library, options, cell, &chosen, learns, &mut campaign.plan)?;
+        (campaign.frozen, campaign.input) = (Some(frozen), Some(chosen.input));
+    }
     let (claim, mut resumed) =
         begin_or_resume(&library, cell, options, &mut campaign, &mut policy)?;
-    let Campaign { mut plan, law, input, .. } = campaign;
+    let Campaign { mut plan, law, input, frozen, .. } = campaign;
     let learner = match law {
         Some(law) if session.lockstep => Some(Learner::in_line(law)),
         Some(law) => Some(Learner::on_thread(law)?),
@@ -134,7 +158,12 @@ fn execute(
     } else {
         None
     };
-    let mut announcer = Announcer::new(observe, telemetry, cell.cycle_s(), cell.n_axes());
+    let orders = Arc::new(Orders::new(options.start == StartOn::AtOnce));
+    let shared = Arc::new(Shared::new(Arc::clone(&orders), Arc::clone(&session.stop)));
+    // Before anything moves: a cell that cannot be commanded as asked is not started.
+    let server =
+        if options.ctl { Some(Server::open(&cell.cell.name, Arc::clone(&shared))?) } else { None };
+    let mut announcer = Announcer::new(observe, telemetry, shared, cell.cycle_s(), cell.n_axes());
     announcer.publish(&Event::State { state: StateName::BringingUp, iteration: first });
     let maps = nodes::start(cell, bus.as_mut(), session)?;
 
@@ -151,14 +180,15 @@ fn execute(
     }
     let meta = Arc::new(plan.meta.clone());
     let keeper = if session.lockstep {
-        Keeper::in_line(library, meta)
+        Keeper::in_line(library, meta, options.keep)
     } else {
-        Keeper::on_thread(library, meta)?
+        Keeper::on_thread(library, meta, options.keep)?
     };
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next.take()) {
         policy.send(&mut mail, input, update_ms);
     }
+    let loop_side = loop_side.following(orders);
     let network = plan.network(bus, &maps);
     let cycle = Cycle::new(network, plan.servo.clone(), plan.interpolator.clone(), loop_side);
     let (mut pacer, granted) = if session.lockstep {
@@ -167,11 +197,13 @@ fn execute(
         let (pacer, report) = Pacer::on_clock(cycle)?;
         (pacer, Some(report))
     };
-    announcer.publish(&start_event(cell, options, &plan, first, granted));
+    let ctl = server.as_ref().map(|server| server.path().display().to_string());
+    let start = start_event(cell, options, &plan, first, (ctl, granted));
+    announcer.publish(&start);
     // The loop reports changes only, and this is its initial state.
     announcer.publish(&Event::State { state: StateName::Enabling, iteration: first });
 
-    let parts = Parts { announcer, keeper, claim, policy, learner, mail };
+    let parts = Parts { announcer, keeper, claim, policy, learner, mail, frozen, start };
     let mut running = Running::new(cell, options, plan, parts, resumed);
     loop {
         let has_ended = pacer.poll();
@@ -187,6 +219,9 @@ fn open_library(options: &Options) -> Result<Library, CampaignError> {
     let path = &options.session.library;
     if options.resume && !path.exists() {
         return Err(ResumeError::NoLibrary { path: path.clone() }.into());
+    }
+    if options.frozen && options.input_file.is_none() && !path.exists() {
+        return Err(InputError::NoLibrary { path: path.display().to_string() }.into());
     }
     Ok(Library::open(path)?)
 }
@@ -213,7 +248,7 @@ fn begin_or_resume(
     let resumed = if options.resume {
         policy.resume(library, &plan.meta, law.as_deref_mut(), &disturbance)?
     } else {
-        let next_disturbance = disturbance.of(0).map_err(CampaignError::Disturbance)?;
+        let next_disturbance = disturbance.of(0)?;
         if let Some(law) = law.as_deref_mut() {
             set_disturbance(law, &next_disturbance);
         }
@@ -235,7 +270,7 @@ fn start_event(
     options: &Options,
     plan: &Plan,
     first: u32,
-    granted: Option<RtReport>,
+    (ctl, granted): (Option<String>, Option<RtReport>),
 ) -> Event {
     Event::Start {
         cell: cell.cell.name.clone(),
@@ -251,6 +286,7 @@ fn start_event(
         law: plan.meta.law.clone(),
         bus: cell.bus.address.clone(),
         mode: if options.session.lockstep { "lockstep" } else { "realtime" },
+        ctl,
         rt: granted,
     }
 }

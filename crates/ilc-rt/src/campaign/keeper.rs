@@ -10,6 +10,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use super::error::CampaignError;
+use super::keep::{Keep, Thinning};
 use crate::library::{Library, LibraryError};
 use crate::record::{Figures, IterationRecord, Meta};
 
@@ -39,12 +40,14 @@ pub(super) enum StoreRequest {
     Append(Box<IterationRecord>, bool),
     /// Add the law's decision to a stored run.
     Amend(i64, Figures),
+    /// Store all further runs with another provenance.
+    Begin(Arc<Meta>),
 }
 
 /// The library, with the thread that writes to it.
 pub(super) enum Keeper {
     /// In the caller's thread: the result is available at once.
-    InLine { store: Store, done: VecDeque<StoreEvent> },
+    InLine { store: Box<Store>, done: VecDeque<StoreEvent> },
     /// On its own thread.
     Thread {
         requests: Option<Sender<StoreRequest>>,
@@ -54,14 +57,18 @@ pub(super) enum Keeper {
 }
 
 impl Keeper {
-    pub(super) fn in_line(library: Library, meta: Arc<Meta>) -> Self {
-        Self::InLine { store: Store { library, meta, is_stuck: false }, done: VecDeque::new() }
+    pub(super) fn in_line(library: Library, meta: Arc<Meta>, keep: Keep) -> Self {
+        Self::InLine { store: Box::new(Store::new(library, meta, keep)), done: VecDeque::new() }
     }
 
-    pub(super) fn on_thread(library: Library, meta: Arc<Meta>) -> Result<Self, CampaignError> {
+    pub(super) fn on_thread(
+        library: Library,
+        meta: Arc<Meta>,
+        keep: Keep,
+    ) -> Result<Self, CampaignError> {
         let (requests, received) = channel();
         let (done, events) = channel();
-        let mut store = Store { library, meta, is_stuck: false };
+        let mut store = Store::new(library, meta, keep);
         let thread = std::thread::Builder::new()
             .name("ilc-library".to_owned())
             .spawn(move || {
@@ -86,6 +93,11 @@ impl Keeper {
     /// Begins to add the law's decision to a stored run.
     pub(super) fn amend(&mut self, id: i64, figures: Figures) {
         self.send(StoreRequest::Amend(id, figures));
+    }
+
+    /// Stores all further runs in another campaign.
+    pub(super) fn begin(&mut self, meta: Meta) {
+        self.send(StoreRequest::Begin(Arc::new(meta)));
     }
 
     fn send(&mut self, request: StoreRequest) {
@@ -113,7 +125,7 @@ impl Keeper {
         drop(requests.take());
         let rest: Vec<StoreEvent> = events.iter().collect();
         if let Some(store) = thread.take().and_then(|thread| thread.join().ok()) {
-            *self = Self::InLine { store, done: VecDeque::new() };
+            *self = Self::InLine { store: Box::new(store), done: VecDeque::new() };
         }
         rest
     }
@@ -132,13 +144,22 @@ pub(super) struct Store {
     library: Library,
     meta: Arc<Meta>,
     is_stuck: bool,
+    thinning: Thinning,
 }
 
 impl Store {
+    fn new(library: Library, meta: Arc<Meta>, keep: Keep) -> Self {
+        Self { library, meta, is_stuck: false, thinning: Thinning::new(keep) }
+    }
+
     fn execute(&mut self, request: StoreRequest) -> Option<StoreEvent> {
         match request {
             StoreRequest::Append(record, asked) => {
                 Some(StoreEvent::Stored(Box::new(self.keep(*record, asked))))
+            }
+            StoreRequest::Begin(meta) => {
+                self.meta = meta;
+                None
             }
             StoreRequest::Amend(..) if self.is_stuck => None,
             StoreRequest::Amend(id, figures) => {
@@ -152,7 +173,12 @@ impl Store {
             return Stored { record, asked, result: None };
         }
         let result = self.library.append(&self.meta, &record);
-        if result.is_err() {
+        if let Ok(id) = &result {
+            let gone = self.thinning.add(*id, &self.meta, &record);
+            if let Err(error) = self.library.remove(&gone) {
+                tracing::warn!("runs that need not be kept stay: {error}");
+            }
+        } else {
             self.is_stuck = true;
             self.library.hurry();
         }

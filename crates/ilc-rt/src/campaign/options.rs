@@ -12,12 +12,17 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args};
 
 use super::disturbance::Disturbance;
+use super::input::Source;
+use super::keep::Keep;
 use crate::config::{Cell, LawName, Measure};
 use crate::fieldbus::transport::syntaxes;
 use crate::record::{EndStatus, Figures};
 
 /// Time for which a stall of controller and simulated drives is forgiven, as it stalls both.
 pub(super) const SIMULATED_PATIENCE_S: f64 = 1.0;
+
+/// Largest ratio of errors at which learning starts again.
+const RELEARN_RATIO_MAX: f64 = 1e6;
 
 /// Options of everything that moves axes: a campaign or an experiment.
 #[derive(Clone, Debug, Args)]
@@ -57,6 +62,7 @@ impl Session {
 
 /// Options of a campaign.
 #[derive(Clone, Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "switches of a command line")]
 pub struct Options {
     /// Bus, measurement, pace and library.
     #[command(flatten)]
@@ -73,17 +79,74 @@ pub struct Options {
     /// Start the law even if the analysis predicts divergence.
     #[arg(long)]
     pub allow_divergent: bool,
+    /// Run with a learned input and learn nothing; the best input of the library, unless --from or --input
+    /// names another.
+    #[arg(long, conflicts_with = "resume")]
+    pub frozen: bool,
+    /// Run of the library that a frozen input is taken from.
+    #[arg(
+        long = "from",
+        value_name = "ID|best|last",
+        requires = "frozen",
+        conflicts_with = "input_file"
+    )]
+    pub input_from: Option<Source>,
+    /// File that a frozen input is loaded from.
+    #[arg(long = "input", value_name = "FILE", requires = "frozen")]
+    pub input_file: Option<PathBuf>,
+    /// Learn again, in a new campaign, when the error of a frozen input is above this many times its
+    /// reference.
+    #[arg(long, value_name = "RATIO", requires = "frozen", value_parser = relearn_ratio)]
+    pub relearn_above: Option<f64>,
+    /// Run until stopped, in place of a number of runs.
+    #[arg(long, conflicts_with = "iterations")]
+    pub forever: bool,
+    /// Runs that stay in the library when nothing is learned from them; the newest always does.
+    #[arg(long, value_name = "all|N|best", default_value = "all")]
+    pub keep: Keep,
+    /// Accept commands of `ilc-rt ctl` on a socket of this user.
+    #[arg(long)]
+    pub ctl: bool,
+    /// Start each run at once, or when `ilc-rt ctl CELL start` asks for it.
+    #[arg(
+        long,
+        value_parser = PossibleValuesParser::new(["at-once", "command"]).map(start_on),
+        default_value = "at-once",
+        requires_if("command", "ctl")
+    )]
+    pub start: StartOn,
     /// Measured disturbance before each run: stored with the run, and given to the law.
     #[arg(skip)]
     pub disturbance: Disturbance,
 }
 
+/// Cause of the start of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartOn {
+    /// The axes have settled.
+    #[default]
+    AtOnce,
+    /// A command, after the axes have settled.
+    Command,
+}
+
 impl Options {
+    /// Returns the options of a campaign that counts its runs in any case.
+    pub(super) fn counted(&self) -> Self {
+        let iterations = if self.forever { u32::MAX } else { self.iterations };
+        Self { iterations, ..self.clone() }
+    }
+
     /// Returns the cell with what the options put in the place of its own keys.
     pub fn apply(&self, mut cell: Cell) -> Cell {
         cell.learning.allow_divergent |= self.allow_divergent;
         if !self.learning {
             cell.learning.law = LawName::None;
+        }
+        if self.frozen && self.relearn_above.is_none() {
+            cell.learning.law = LawName::None;
+            // They wrap a law.
+            (cell.learning.ladder, cell.learning.gate) = (None, None);
         }
         if let Some(address) = &self.session.bus {
             address.clone_into(&mut cell.bus.address);
@@ -100,6 +163,17 @@ fn bus_help() -> String {
 #[expect(clippy::needless_pass_by_value, reason = "as the parser of arguments hands it on")]
 fn measure(name: String) -> Measure {
     if name == "tcp" { Measure::Tcp } else { Measure::Encoder }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "as the parser of arguments hands it on")]
+fn start_on(name: String) -> StartOn {
+    if name == "command" { StartOn::Command } else { StartOn::AtOnce }
+}
+
+/// Parses a ratio of two errors.
+fn relearn_ratio(text: &str) -> Result<f64, String> {
+    let allowed = |ratio: &f64| (1.0..=RELEARN_RATIO_MAX).contains(ratio);
+    text.parse().ok().filter(allowed).ok_or_else(|| format!("allowed 1 to {RELEARN_RATIO_MAX}"))
 }
 
 /// Parses the number of runs, which are counted in 32 bits.

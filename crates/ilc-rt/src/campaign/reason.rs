@@ -1,5 +1,6 @@
 //! Reason of a stop, as a sentence that names axis, node and numbers.
 
+use super::control::STOPPED_BY_COMMAND;
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::commissioning::power_lost;
 use crate::config::{AxisUnit, Cell};
@@ -28,6 +29,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
     };
     let ms = |cycles: u32| f64::from(cycles) * cell.cycle_s() * 1e3;
     match reason {
+        StopReason::Asked(STOPPED_BY_COMMAND) => "stopped by command".to_owned(),
         StopReason::Asked(signal) => asked(signal),
         StopReason::DriveFault { axis: index, code, following_error_m } => format!(
             "drive of {} faulted: {}; its following error was {}",

@@ -93,7 +93,7 @@ impl RollbackPolicy {
             last = Some((decision, record));
         }
         let index = last.as_ref().map_or(0, |(_, record)| record.index + 1);
-        let next_disturbance = disturbance.of(index).map_err(CampaignError::Disturbance)?;
+        let next_disturbance = disturbance.of(index)?;
         if let Some(law) = law.as_deref_mut() {
             set_disturbance(law, &next_disturbance);
         }

@@ -65,7 +65,7 @@ impl RollbackPolicy {
 
     /// Returns true if computer or bus disturbed a run, so that it is not evidence.
     pub(super) fn is_disturbed(&self, figures: &Figures) -> bool {
-        figures.missing_samples > 0 || figures.overruns > 0 && !self.forgives_overruns
+        figures.is_incomplete() || figures.overruns > 0 && !self.forgives_overruns
     }
 
     /// Records that a run began with a table.
@@ -154,9 +154,14 @@ impl RollbackPolicy {
     }
 }
 
-fn disturbance_remark(figures: &Figures) -> String {
+/// Remark on a run that is no evidence.
+pub(super) fn disturbance_remark(figures: &Figures) -> String {
+    let scaled = match figures.scaled_cycles {
+        0 => String::new(),
+        cycles => format!(", {cycles} cycles at another feed than 100 %"),
+    };
     format!(
-        "nothing is learned from it, its input is repeated: {} overruns, {} samples missing",
+        "nothing is learned from it, its input is repeated: {} overruns, {} samples missing{scaled}",
         figures.overruns, figures.missing_samples
     )
 }

@@ -6,6 +6,7 @@ use super::announce::Announcer;
 use super::claim::Claim;
 use super::collect::Collector;
 use super::disturbance::Disturbance;
+use super::frozen::Frozen;
 use super::keeper::Keeper;
 use super::learner::{Learner, UpdateResult};
 use super::options::Options;
@@ -28,16 +29,20 @@ pub(super) struct Running<'a> {
     pub(super) campaign: String,
     /// Runs that could not be stored, oldest first.
     pub(super) unkept: Vec<IterationRecord>,
-    _claim: Claim,
+    pub(super) claim: Claim,
     pub(super) policy: RollbackPolicy,
     pub(super) learner: Option<Learner>,
+    /// Drift of a frozen input; `None` while the law learns.
+    pub(super) frozen: Option<Frozen>,
+    /// Event at the start of the campaign.
+    pub(super) start: Event,
     pub(super) runs: Vec<(u32, Figures)>,
     disturbance: Disturbance,
     /// Disturbance of the current run, or of the next one between two runs.
     pub(super) current_disturbance: Vec<f64>,
     /// First run that counts.
     first: u32,
-    iterations: u32,
+    pub(super) iterations: u32,
     pub(super) mail: Mailbox,
     pub(super) stopping: Option<StopReason>,
     /// Last cycles before the stop.
@@ -65,6 +70,8 @@ pub(super) struct Parts<'a> {
     pub(super) policy: RollbackPolicy,
     pub(super) learner: Option<Learner>,
     pub(super) mail: Mailbox,
+    pub(super) frozen: Option<Frozen>,
+    pub(super) start: Event,
 }
 
 impl<'a> Running<'a> {
@@ -95,9 +102,11 @@ impl<'a> Running<'a> {
             n_samples: plan.n_samples(),
             campaign: plan.meta.campaign,
             unkept: Vec::new(),
-            _claim: parts.claim,
+            claim: parts.claim,
             policy: parts.policy,
             learner: parts.learner,
+            frozen: parts.frozen,
+            start: parts.start,
             runs: resumed.runs,
             disturbance: options.disturbance.clone().or_file(cell),
             current_disturbance: resumed.next_disturbance,
@@ -139,6 +148,7 @@ impl Running<'_> {
                     }
                 }
                 Message::Phase(phase, iteration) => {
+                    self.announcer.set_waiting_run(iteration);
                     let iteration = iteration.max(self.first);
                     self.phase_iteration = iteration;
                     if let Some(state) = state_name(phase) {
@@ -150,7 +160,7 @@ impl Running<'_> {
                     self.policy.started(table);
                 }
                 Message::RunEnded { run, .. } if run < self.first => {}
-                Message::RunEnded { overruns, .. } => self.run_ended(overruns),
+                Message::RunEnded { overruns, scaled, .. } => self.run_ended(overruns, scaled),
                 Message::Before(sample) => self.before.push(sample),
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
@@ -209,25 +219,29 @@ impl Running<'_> {
         self.announcer.publish(&event);
     }
 
-    fn run_ended(&mut self, overruns: u32) {
+    fn run_ended(&mut self, overruns: u32, scaled: u32) {
         let Some(mut record) = self.collector.end() else {
             let why = "samples of a run were lost on their way to the record";
             self.fail(FaultKind::SamplesLost, why.to_owned());
             return;
         };
         record.figures.overruns = overruns;
+        record.figures.scaled_cycles = scaled;
         record.disturbance = std::mem::take(&mut self.current_disturbance);
         if record.index + 1 < self.iterations {
             match self.disturbance.of(record.index + 1) {
                 Ok(next_disturbance) => self.current_disturbance = next_disturbance,
                 Err(why) => {
                     self.keep(record, false);
-                    self.fail(FaultKind::Disturbance, why);
+                    self.fail(FaultKind::Disturbance, why.to_string());
                     return;
                 }
             }
         }
         self.policy.annotate(&mut record);
+        if self.frozen.is_some() {
+            return self.frozen_run_ended(record);
+        }
         let decision = self.policy.decide(&mut record);
         let mut asked = false;
         let mut update = None;
@@ -267,7 +281,9 @@ fn state_name(phase: PhaseName) -> Option<StateName> {
         PhaseName::Enabling => StateName::Enabling,
         PhaseName::Returning => StateName::Returning,
         PhaseName::Settling => StateName::Settling,
+        PhaseName::Waiting => StateName::Waiting,
         PhaseName::Running => StateName::Running,
+        PhaseName::Paused => StateName::Paused,
         PhaseName::Stopping => StateName::Stopping,
         PhaseName::Disabling | PhaseName::Stopped => return None,
     })

@@ -4,6 +4,7 @@
 
 mod check;
 mod completions;
+mod ctl;
 mod dead_man;
 mod drive;
 mod enable;
@@ -11,6 +12,7 @@ mod figures;
 mod goto;
 mod identify;
 mod init;
+mod input;
 mod jog;
 mod latency;
 mod moving;
@@ -62,6 +64,10 @@ enum Verb {
     Run(run::RunArguments),
     /// Excite one axis while all others hold still, and fit a model to its response.
     Identify(identify::IdentifyArguments),
+    /// Command a cell that runs with --ctl: start, pause, resume, feed, stop, status.
+    Ctl(ctl::CtlArguments),
+    /// Export the learned input of a run to a file, for `run --frozen --input`.
+    Input(input::InputArguments),
     /// Check a cell description and print what it would do; touches no bus.
     Check(check::CheckArguments),
     /// Write a cell description to begin with: every key, its meaning and its range.
@@ -118,6 +124,8 @@ pub fn main() -> ExitCode {
     let status = match arguments.verb {
         Verb::Run(arguments) => run::run(&arguments),
         Verb::Identify(arguments) => identify::identify(&arguments),
+        Verb::Ctl(arguments) => ctl::ctl(&arguments),
+        Verb::Input(arguments) => input::input(&arguments),
         Verb::Check(arguments) => check::check(&arguments),
         Verb::Init(arguments) => init::init(&arguments),
         Verb::Schema(arguments) => schema::schema(&arguments),

@@ -144,7 +144,9 @@ fn described(cell: &Cell, now: &Traveling) -> String {
     let what = match now.phase {
         PhaseName::Enabling => "switching on",
         PhaseName::Returning => "moving",
-        PhaseName::Settling | PhaseName::Running => "holding",
+        PhaseName::Settling | PhaseName::Waiting | PhaseName::Running | PhaseName::Paused => {
+            "holding"
+        }
         PhaseName::Stopping => "coming to rest",
         PhaseName::Disabling => "switching off",
         PhaseName::Stopped => "off",

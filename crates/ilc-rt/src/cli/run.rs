@@ -10,6 +10,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGPIPE, SIGTERM};
 use super::figures::FiguresFile;
 use super::runs::Runs;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_FAULT, show, when_parent_ends};
+use crate::campaign::control::STOPPED_BY_COMMAND;
 use crate::campaign::{self, CampaignError, Options, Outcome};
 use crate::config::Cell;
 use crate::fieldbus::Bus;
@@ -20,7 +21,8 @@ use crate::record::{EndStatus, Event};
 #[command(after_help = "Examples:
   ilc-rt run gantry.toml --iterations 10
   ilc-rt run gantry.toml --bus can:can0 --library /var/lib/ilc/gantry.db --resume
-  ilc-rt run gantry.toml --bus udp:239.74.163.2 --measure encoder --json figures.json")]
+  ilc-rt run gantry.toml --bus udp:239.74.163.2 --measure encoder --json figures.json
+  ilc-rt run gantry.toml --frozen --from best --relearn-above 2")]
 pub(super) struct RunArguments {
     /// Cell description.
     cell: PathBuf,
@@ -188,6 +190,8 @@ pub(super) fn exit_status(outcome: &Outcome, written: bool) -> u8 {
     match outcome.status {
         EndStatus::Completed if written => 0,
         EndStatus::Completed => EXIT_FAILURE,
+        // The regular end of runs without a number.
+        EndStatus::Interrupted if outcome.signal == STOPPED_BY_COMMAND => 0,
         EndStatus::Interrupted => u8::try_from(128 + outcome.signal).unwrap_or(EXIT_FAULT),
         EndStatus::Fault => {
             show::complain(&format!("controlled stop: {}", outcome.reason));

@@ -55,6 +55,7 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
             input_units,
             cycle_s,
             campaign,
+            ctl,
             rt,
             ..
         } => {
@@ -69,8 +70,9 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
             });
             Some(format!(
                 "cell {cell} on {bus}, {mode}, {:.0} us cycle, {n_samples} samples a run; law {law} from \
-                 the {measure}; campaign {campaign}{thread}",
-                cycle_s * 1e6
+                 the {measure}; campaign {campaign}{thread}{}",
+                cycle_s * 1e6,
+                ctl.as_ref().map_or_else(String::new, |path| format!("\ncontrol: {path}"))
             ))
         }
         Event::Iteration { index, figures, .. } => Some(runs.row(*index, figures)),
@@ -91,6 +93,16 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
             Some(sentence) => format!("{sentence}\n{reason}"),
             None => reason.clone(),
         }),
+        Event::Drift { index, ratio, allowed, origin, relearned_in } => Some(format!(
+            "drift: the error of run {index} is {} that of {origin}, {allowed} is allowed{}",
+            ratio.map_or_else(|| "beyond".to_owned(), |ratio| format!("{ratio:.2} times")),
+            relearned_in.as_ref().map_or_else(
+                || "; the input stays frozen".to_owned(),
+                |campaign| format!(
+                    "; learning starts again from its input, in campaign {campaign}"
+                )
+            )
+        )),
         Event::Judged { index, remark, .. } => runs.judged(*index, remark.as_deref()),
         Event::State { .. } | Event::Progress { .. } | Event::Fault { .. } => None,
     }

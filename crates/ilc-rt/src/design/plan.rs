@@ -125,6 +125,16 @@ impl Plan {
         law::prepare(cell, &self.reference_m)
     }
 
+    /// Returns the fingerprint of a campaign of this cell with another law.
+    pub(crate) fn fingerprint_with(&self, cell: &Cell, law: &str, parameters: &str) -> String {
+        fingerprint::of(cell, &self.meta, law, parameters)
+    }
+
+    /// Returns the bound of the learned input of each axis, in its unit.
+    pub(crate) fn input_bounds(&self) -> Vec<f64> {
+        self.servo.axes.iter().map(|axis| axis.input_max).collect()
+    }
+
     /// Completes the provenance with the law that will be used.
     pub fn name_law(&mut self, cell: &Cell, name: &str, parameters: &str) {
         name.clone_into(&mut self.meta.law);

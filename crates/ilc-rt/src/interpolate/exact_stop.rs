@@ -60,7 +60,22 @@ impl ExactStop {
         while self.current + 1 < self.moves.len() && t_s >= self.moves[self.current].end_s {
             self.current += 1;
         }
-        let Some(now) = self.moves.get(self.current) else {
+        self.on_move(self.current, t_s)
+    }
+
+    /// Returns the set point at a time at most one tick before that of the last call of [`at`](Self::at).
+    pub(crate) fn between(&self, t_s: f64) -> Setpoint {
+        // The look-ahead may have entered the next moves.
+        let mut place = self.current;
+        while place > 0 && t_s < self.moves[place - 1].end_s {
+            place -= 1;
+        }
+        self.on_move(place, t_s)
+    }
+
+    /// Returns the set point of a move; at rest after its end.
+    fn on_move(&self, place: usize, t_s: f64) -> Setpoint {
+        let Some(now) = self.moves.get(place) else {
             return Setpoint::at_rest([0.0; MAX_AXES]);
         };
         if t_s >= now.end_s {

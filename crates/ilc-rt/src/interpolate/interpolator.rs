@@ -66,6 +66,18 @@ impl Interpolator {
         Setpoint { done, ..setpoint }
     }
 
+    /// Returns the set point between two ticks of a path that is known at any time, not earlier than that of
+    /// the previous call; `None` for a path that is known at its ticks only.
+    pub(crate) fn between(&mut self, tick: usize, fraction: f64) -> Option<Setpoint> {
+        match &mut self.motion {
+            Motion::ExactStop(moves) => {
+                Some(moves.between((tick as f64 + fraction) * self.cycle_s))
+            }
+            Motion::Hold(setpoint) => Some(*setpoint),
+            Motion::Blend(_) | Motion::Table(_) => None,
+        }
+    }
+
     /// Returns the number of samples of the run, first and last included.
     pub fn n_samples(&self) -> usize {
         self.n_samples

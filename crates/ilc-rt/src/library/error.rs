@@ -98,13 +98,26 @@ pub enum LibraryError {
         /// Requested key.
         id: i64,
     },
-    /// An invalid disturbance.
-    #[error("library {path}: {what}")]
+    /// An invalid disturbance to look for.
+    #[error("library {path}: disturbance = {found:?}: at least one number, all finite")]
     Disturbance {
         /// File.
         path: String,
-        /// Problem, and allowed values.
-        what: String,
+        /// Disturbance.
+        found: Vec<f64>,
+    },
+    /// Runs with different numbers of disturbances, which cannot be compared.
+    #[error(
+        "library {path}: runs {} and {} have {} and {} disturbances; runs that are trimmed together \
+         must have the same number", ids[0], ids[1], found[0], found[1]
+    )]
+    Disturbances {
+        /// File.
+        path: String,
+        /// Keys of two runs.
+        ids: [i64; 2],
+        /// Numbers of their disturbances.
+        found: [usize; 2],
     },
     /// The stored arrays do not match their stored digest.
     #[error("library {path}: iteration {id} is damaged: its arrays do not match its digest")]

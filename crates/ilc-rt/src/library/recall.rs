@@ -37,8 +37,8 @@ impl Library {
         task: &Task,
     ) -> Result<Vec<Near>, LibraryError> {
         if disturbance.is_empty() || disturbance.iter().any(|value| !value.is_finite()) {
-            let what = format!("disturbance = {disturbance:?}: at least one number, all finite");
-            return Err(LibraryError::Disturbance { path: self.path.clone(), what });
+            let found = disturbance.to_vec();
+            return Err(LibraryError::Disturbance { path: self.path.clone(), found });
         }
         let mut found: Vec<(f64, i64)> = self
             .disturbances(task)?

@@ -33,7 +33,7 @@ impl Library {
     /// error are kept. `O(n_runs^2)` with a disturbance.
     ///
     /// # Errors
-    /// [`LibraryError::Disturbance`] if runs have different numbers of disturbances;
+    /// [`LibraryError::Disturbances`] if runs have different numbers of disturbances;
     /// [`LibraryError::Sqlite`] if the file cannot be written: nothing is deleted then;
     /// [`LibraryError::NotShrunk`] if the runs are deleted, but their space cannot be returned.
     /// # Source
@@ -45,14 +45,8 @@ impl Library {
         }
         let width = runs[0].disturbance.len();
         if let Some(other) = runs.iter().find(|run| run.disturbance.len() != width) {
-            let what = format!(
-                "runs {} and {} have {width} and {} disturbances; runs that are trimmed together \
-                 must have the same number",
-                runs[0].id,
-                other.id,
-                other.disturbance.len()
-            );
-            return Err(LibraryError::Disturbance { path: self.path.clone(), what });
+            let (ids, found) = ([runs[0].id, other.id], [width, other.disturbance.len()]);
+            return Err(LibraryError::Disturbances { path: self.path.clone(), ids, found });
         }
         let n = runs.len() as f64;
         let mean_error = runs.iter().map(|run| run.error_square).sum::<f64>() / n;
@@ -123,6 +117,14 @@ impl Library {
             })
         });
         rows.and_then(Iterator::collect).map_err(|source| self.fail(source))
+    }
+
+    /// Deletes these runs, all or none; the file keeps its size, as later runs use their space.
+    ///
+    /// # Errors
+    /// [`LibraryError::Sqlite`] if the file cannot be written.
+    pub fn remove(&self, ids: &[i64]) -> Result<(), LibraryError> {
+        if ids.is_empty() { Ok(()) } else { self.delete(ids).map(drop) }
     }
 
     /// Deletes all of these runs or none.

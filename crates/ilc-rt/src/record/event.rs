@@ -41,6 +41,8 @@ pub enum Event {
         bus: String,
         /// `realtime` or `lockstep`.
         mode: &'static str,
+        /// Socket that `ilc-rt ctl` commands it with, if there is one.
+        ctl: Option<String>,
         /// Real-time settings granted to the thread of the loop; absent in lock-step.
         #[schemars(with = "Option<serde_json::Value>")]
         rt: Option<RtReport>,
@@ -86,6 +88,19 @@ pub enum Event {
         /// Reason; one sentence.
         remark: Option<String>,
     },
+    /// A frozen input does not fit the machine any more: the error has grown too far.
+    Drift {
+        /// Number of the run.
+        index: u32,
+        /// Its error over that of the run the input was taken from; absent if that one had none.
+        ratio: Option<f64>,
+        /// Largest ratio allowed.
+        allowed: f64,
+        /// Run that the input was taken from.
+        origin: String,
+        /// Campaign in which learning starts again, if it does.
+        relearned_in: Option<String>,
+    },
     /// Timing of the loop over the whole campaign; in real time only.
     Latency {
         /// Lateness of the loop on its grid.
@@ -126,8 +141,12 @@ pub enum StateName {
     Returning,
     /// Axes rest at the start.
     Settling,
+    /// Axes rest at the start until the run is released.
+    Waiting,
     /// A run is in progress.
     Running,
+    /// A run is held on its path.
+    Paused,
     /// Axes are being stopped early.
     Stopping,
     /// Drives are disabled.

@@ -46,6 +46,9 @@ pub struct Figures {
     /// Servo cycles that began at least a whole cycle late.
     #[serde(default)]
     pub overruns: u32,
+    /// Servo cycles at another feed than 100 %, e.g. in a pause: nothing is learned from such a run.
+    #[serde(default)]
+    pub scaled_cycles: u32,
     /// Samples whose measurement never arrived; the last known one stands in for them.
     #[serde(default)]
     pub missing_samples: u32,
@@ -55,6 +58,8 @@ pub struct Figures {
     /// Computing time of the learning update for this run's input; 0 without one.
     #[serde(default)]
     pub update_ms: f64,
+    /// Error over that of the run a frozen input was taken from; absent when learning.
+    pub frozen_ratio: Option<f64>,
     /// True if the best input was restored after this run (rollback), as the error had grown.
     #[serde(default)]
     pub rolled_back: bool,
@@ -102,6 +107,11 @@ impl Figures {
         let there = !contour_m.is_empty();
         self.contour_inf_m = there.then(|| measured(infinity_norm(contour_m)));
         self.contour_rms_m = there.then(|| measured(rms(contour_m, 1)));
+    }
+
+    /// Returns true if measurements of the run are missing, or it was not made at the whole feed.
+    pub fn is_incomplete(&self) -> bool {
+        self.missing_samples > 0 || self.scaled_cycles > 0
     }
 
     /// Returns the figure by which a run is judged, over all axes: a number to compare runs with,

@@ -7,7 +7,7 @@ use super::mailbox::StopReason;
 use super::mode;
 use super::phase::Phase;
 use crate::fieldbus::cia402::State;
-use crate::interpolate::PointToPoint;
+use crate::interpolate::{MAX_AXES, PointToPoint};
 
 /// Time at rest after a stop before the drives are switched off.
 const REST_S: f64 = 0.1;
@@ -35,16 +35,16 @@ impl Cycle {
                 if ticks_left > 0 || !self.input.faded() {
                     self.phase = Phase::Settling { ticks_left: ticks_left.saturating_sub(1) };
                 } else if self.run < self.spec.runs.end {
-                    self.take_table();
-                    self.interpolator.restart();
-                    self.run_overruns = 0;
-                    return self.running(0);
+                    self.waits = !self.mail.orders.may_start(self.run);
+                    if !self.waits {
+                        return self.start_run();
+                    }
                 } else {
                     self.phase = Phase::Disabling { ticks: 0 };
                 }
             }
             Phase::Running { sample } => {
-                if (sample as usize) < self.interpolator.n_samples() {
+                if (sample as usize) < self.path.n_samples() {
                     return self.running(sample);
                 }
                 self.run += 1;
@@ -122,16 +122,50 @@ impl Cycle {
         }
     }
 
-    fn running(&mut self, sample: u32) -> Option<(u32, u32)> {
-        let row = self.table_row(sample as usize);
+    fn start_run(&mut self) -> Option<(u32, u32)> {
+        self.take_table();
+        self.path.restart();
+        self.feed.reset(self.mail.orders.scale());
+        (self.run_overruns, self.run_scaled) = (0, 0);
+        self.running(0)
+    }
+
+    /// Goes on along the path; `next` is the sample of the run that was not reached yet. Returns the
+    /// sample in the tick that reaches it: a run slowed down has ticks between its samples.
+    fn running(&mut self, next: u32) -> Option<(u32, u32)> {
+        let mut scale = self.feed.scale();
+        if next > 0 {
+            scale = self.feed.next(self.mail.orders.scale());
+            self.path.advance(scale);
+        }
+        self.run_scaled = self.run_scaled.saturating_add(u32::from(scale < 1.0));
+        let (place, fraction) = self.path.place();
+        let row = self.scaled_row(place, fraction, scale);
         let n_axes = self.n_axes();
         if let Err(axis) = self.input.follow(&row[..n_axes]) {
             self.begin_stop(StopReason::NotFinite { axis });
             // The stop has absorbed the learned input, so the set point of this tick is the stop's.
             return self.advance();
         }
-        self.reference = self.interpolator.next();
-        self.phase = Phase::Running { sample: sample + 1 };
-        Some((self.run, sample))
+        self.reference = self.path.setpoint(scale);
+        if place < next as usize {
+            return None;
+        }
+        self.phase = Phase::Running { sample: next + 1 };
+        Some((self.run, next))
+    }
+
+    /// Returns the learned input at a place of the path: it was learned at the whole feed, and fades out
+    /// with the scale, so that held axes rest on the path and not beside it.
+    fn scaled_row(&self, place: usize, fraction: f64, scale: f64) -> [f64; MAX_AXES] {
+        let row = self.table_row(place);
+        if scale >= 1.0 && fraction <= 0.0 {
+            return row;
+        }
+        let mut mixed = self.table_row((place + 1).min(self.path.n_samples() - 1));
+        for (mixed, from) in mixed.iter_mut().zip(row) {
+            *mixed = scale * (from + fraction * (*mixed - from));
+        }
+        mixed
     }
 }

@@ -2,18 +2,19 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use super::feed::Feed;
 use super::gate::Gate;
 use super::input::LearnedInput;
 use super::mailbox::{LoopSide, Message, Sample, StopReason, Table};
 use super::mode;
 use super::node::Drive;
 use super::pending::PendingCycles;
-use super::phase::Phase;
+use super::phase::{Phase, PhaseName};
 use super::spec::ServoSpec;
 use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::AxisNetwork;
 use crate::fieldbus::canopen::emcy;
-use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Setpoint};
+use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Playback, Setpoint};
 use crate::rt::Nanos;
 
 /// Longest fade-out of the learned input after a run.
@@ -41,7 +42,12 @@ pub struct Cycle {
     /// Length of the tool's last unreadable PDO, if there was one.
     pub(super) tool_unreadable: Option<u8>,
     pub(super) pending: PendingCycles,
-    pub(super) interpolator: Interpolator,
+    pub(super) path: Playback,
+    pub(super) feed: Feed,
+    /// Cycles of the run at another feed than 100 %.
+    pub(super) run_scaled: u32,
+    /// True if the axes rest at the start because the run is not released.
+    pub(super) waits: bool,
     pub(super) input: LearnedInput,
     pub(super) phase: Phase,
     pub(super) reference: Setpoint,
@@ -94,6 +100,8 @@ impl Cycle {
             reason = "small, positive"
         )]
         let fade_ticks = ((FADE_MAX_S / dt_s) as u32).min(spec.settle_ticks / 2).max(1);
+        let path = Playback::new(interpolator);
+        let feed = Feed::new(&limits, &path.peak_velocity_m_s(), dt_s);
         Self {
             network,
             mail,
@@ -101,7 +109,10 @@ impl Cycle {
             tool_m: [0.0; MAX_AXES],
             tool_unreadable: None,
             pending: PendingCycles::new(&parts, spec.tool.is_some()),
-            interpolator,
+            path,
+            feed,
+            run_scaled: 0,
+            waits: false,
             input: LearnedInput::new(input_max, step_max, fade_ticks),
             phase: Phase::Enabling { ticks: 0 },
             reference: Setpoint {
@@ -139,13 +150,13 @@ impl Cycle {
         }
         self.give_out();
         let fault = received.err().or_else(|| self.find_fault());
-        let before = self.phase.name();
+        let before = self.phase_name();
         if let Some(reason) = fault {
             self.begin_stop(reason);
         }
         let at = self.advance();
         self.watch_age();
-        let after = self.phase.name();
+        let after = self.phase_name();
         if before != after {
             self.mail.tell(Message::Phase(after, self.run));
         }
@@ -163,7 +174,7 @@ impl Cycle {
         for (axis, drive) in self.drives.iter().enumerate() {
             sample.encoder_m[axis] = drive.encoder_m;
         }
-        let last_of_run = at.is_some_and(|(_, k)| k as usize + 1 == self.interpolator.n_samples());
+        let last_of_run = at.is_some_and(|(_, k)| k as usize + 1 == self.path.n_samples());
         self.pending.send(sample, self.commanded_position_m(), last_of_run);
         TickStatus::Running
     }
@@ -178,6 +189,15 @@ impl Cycle {
     /// Returns the network when the loop is over.
     pub fn into_network(self) -> Box<dyn AxisNetwork> {
         self.network
+    }
+
+    /// Returns the name of the phase for messages.
+    fn phase_name(&self) -> PhaseName {
+        match self.phase.name() {
+            PhaseName::Settling if self.waits => PhaseName::Waiting,
+            PhaseName::Running if self.feed.is_paused() => PhaseName::Paused,
+            name => name,
+        }
     }
 
     /// Returns the number of axes.
@@ -218,7 +238,8 @@ impl Cycle {
         while let Some((sample, last_of_run)) = self.pending.take() {
             self.mail.tell(Message::Sample(sample));
             if let (true, Some((run, _))) = (last_of_run, sample.at) {
-                self.mail.tell(Message::RunEnded { run, overruns: self.run_overruns });
+                let (overruns, scaled) = (self.run_overruns, self.run_scaled);
+                self.mail.tell(Message::RunEnded { run, overruns, scaled });
             }
         }
     }

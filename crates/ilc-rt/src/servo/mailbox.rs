@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicI32, Ordering};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::orders::Orders;
 use super::phase::PhaseName;
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::NmtState;
@@ -187,6 +188,8 @@ pub enum Message {
         run: u32,
         /// Cycles in it that began a whole cycle late.
         overruns: u32,
+        /// Cycles in it at another feed than 100 %.
+        scaled: u32,
     },
     /// A cycle before a stop, complete or not; oldest first, followed by the stop.
     Before(Sample),
@@ -217,6 +220,7 @@ pub struct LoopSide {
     pub(super) tables: Consumer<Table>,
     spent: Producer<Table>,
     stop: Arc<AtomicI32>,
+    pub(super) orders: Arc<Orders>,
     dropped: u64,
 }
 
@@ -234,7 +238,14 @@ pub fn mailbox(capacity: usize, stop: Arc<AtomicI32>) -> (Mailbox, LoopSide) {
             spent: spent_out,
             stop: Arc::clone(&stop),
         },
-        LoopSide { messages: messages_in, tables: tables_out, spent: spent_in, stop, dropped: 0 },
+        LoopSide {
+            messages: messages_in,
+            tables: tables_out,
+            spent: spent_in,
+            stop,
+            orders: Arc::default(),
+            dropped: 0,
+        },
     )
 }
 
@@ -262,6 +273,12 @@ impl Mailbox {
 }
 
 impl LoopSide {
+    /// Follows the orders of an operator from now on.
+    #[must_use]
+    pub fn following(self, orders: Arc<Orders>) -> Self {
+        Self { orders, ..self }
+    }
+
     /// Sends a message; messages without room are counted.
     #[expect(clippy::large_types_passed_by_value, reason = "it moves into the ring")]
     pub(super) fn tell(&mut self, message: Message) {

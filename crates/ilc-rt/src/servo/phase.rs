@@ -33,8 +33,12 @@ pub enum PhaseName {
     Returning,
     /// Axes rest at the start.
     Settling,
+    /// Axes rest at the start until the run is released.
+    Waiting,
     /// A run is in progress.
     Running,
+    /// A run is held on its path.
+    Paused,
     /// Axes are being stopped early.
     Stopping,
     /// Drives are being disabled.

@@ -1,0 +1,106 @@
+//! `ilc-rt ctl`: commands to a cell that runs.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::figures::FiguresFile;
+use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
+use crate::campaign::control::{Command, Reply, Status, send};
+use crate::config::Cell;
+
+#[derive(Args)]
+#[command(
+    after_help = "Exit status: 0 done, 1 refused by the controller, 2 no controller can be commanded."
+)]
+pub(super) struct CtlArguments {
+    /// Cell description.
+    cell: PathBuf,
+    #[command(subcommand)]
+    verb: Verb,
+    /// Write the state after the command to a file; - for standard output.
+    #[arg(long, value_name = "FILE", global = true)]
+    json: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Subcommand)]
+enum Verb {
+    /// Let the waiting run start.
+    Start,
+    /// Hold the path where it is, and every start.
+    Pause,
+    /// Go on after a pause.
+    Resume,
+    /// Bring the axes to rest and end.
+    Stop,
+    /// Print the state.
+    Status,
+    /// Set the feed override.
+    Feed {
+        /// 1 to 100 percent.
+        percent: u32,
+    },
+}
+
+impl From<Verb> for Command {
+    fn from(verb: Verb) -> Self {
+        match verb {
+            Verb::Start => Self::Start,
+            Verb::Pause => Self::Pause,
+            Verb::Resume => Self::Resume,
+            Verb::Stop => Self::Stop,
+            Verb::Status => Self::Status,
+            Verb::Feed { percent } => Self::Feed { percent },
+        }
+    }
+}
+
+/// Sends a command; returns the exit status.
+pub(super) fn ctl(arguments: &CtlArguments) -> u8 {
+    let file = match &arguments.json {
+        None => None,
+        Some(path) => match FiguresFile::reserve(path, false) {
+            None => return EXIT_BAD_INPUT,
+            reserved => reserved,
+        },
+    };
+    let replied = Cell::load(&arguments.cell).map_err(|error| error.to_string()).and_then(|cell| {
+        send(&cell.cell.name, arguments.verb.into()).map_err(|error| error.to_string())
+    });
+    let Reply { refused, status } = match replied {
+        Ok(reply) => reply,
+        Err(line) => {
+            if let Some(file) = file {
+                file.give_up();
+            }
+            show::complain(&line);
+            return EXIT_BAD_INPUT;
+        }
+    };
+    let written = match &file {
+        Some(file) => file.write(&serde_json::to_value(&status).unwrap_or_default()),
+        None => true,
+    };
+    if let Some(reason) = refused {
+        show::complain(&reason);
+        return EXIT_FAILURE;
+    }
+    if file.is_none() {
+        show::say(&sentence(&status));
+    }
+    if written { 0 } else { EXIT_FAILURE }
+}
+
+fn sentence(status: &Status) -> String {
+    let of = status.iterations.map_or_else(String::new, |n| format!(" of {n}"));
+    let paused = if status.paused { ", paused" } else { "" };
+    format!(
+        "cell {}: {}, run {}{of}, feed {} %{paused}; law {}, campaign {}",
+        status.cell,
+        status.state,
+        status.iteration,
+        status.feed_percent,
+        status.law,
+        status.campaign
+    )
+}
