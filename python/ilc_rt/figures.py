@@ -35,8 +35,8 @@ class Figures:
     overruns : int
         Servo cycles that began at least a whole cycle late.
     scaled_cycles : int
-        Servo cycles at another feed than 100 %, e.g. in a pause: nothing is learned from
-        such a run.
+        Servo cycles at another feed than 100 %, e.g. in a pause: nothing is learned
+        from such a run.
     missing_samples : int
         Samples whose measurement never arrived; the last known one stands in for them.
     late_updates : int

@@ -4,7 +4,8 @@
 //! independent of plant and clock, and do not allocate after creation. Imported by `machine` and
 //! `eds`.
 //!
-//! Family: `drive`, `drive_objects` and `units`: the dictionary of a drive holds its parameters.
+//! Family: `communication`, `drive`, `drive_objects`, `drive_slots`, `positioning`, `profile_modes`,
+//! `profile_objects` and `units`: the dictionary of a drive holds the parameters of its modes.
 
 pub mod communication;
 pub mod dictionary;

@@ -10,7 +10,9 @@ use ilc_tests::short;
 /// Returns the highest speed of the set points of the first axis while it moves to the start before run 0.
 fn approach_m_s(rig: &mut Rig, dt_s: f64) -> f64 {
     rig.tick_until(|rig| rig.phase.0 == PhaseName::Running);
-    let reference: Vec<f64> = rig.samples.iter().map(|sample| sample.reference_m[0]).collect();
+    // Before the axis is enabled there is no set point.
+    let references = rig.samples.iter().map(|sample| sample.reference_m[0]);
+    let reference: Vec<f64> = references.skip_while(|at_m| at_m.abs() < 1e-9).collect();
     reference.windows(2).map(|pair| (pair[1] - pair[0]).abs() / dt_s).fold(0.0, f64::max)
 }
 

@@ -79,7 +79,7 @@ fn drives_without_the_optional_objects_run_alike() {
         let cell = short(name);
         let expected = run(&cell, RUNS, None).digests;
         for lacks in [
-            &[0x60B2, 0x6077, 0x606C, 0x60F4, 0x60C2, 0x6066][..],
+            &[0x60B2, 0x6077, 0x606C, 0x60F4, 0x6066][..],
             &[0x60B2],
             &[0x6077],
             &[0x606C, 0x60F4],
@@ -93,6 +93,10 @@ fn drives_without_the_optional_objects_run_alike() {
             assert_eq!(kept.outcome.status, EndStatus::Completed, "{}", kept.outcome.reason);
             assert_eq!(kept.digests, expected, "{name} without {lacks:X?}");
         }
+        // Without 0x60C2 too the drive interpolates over a period of its own, and so moves otherwise.
+        let bus = lacking(&cell, &[0x60B2, 0x6077, 0x606C, 0x60F4, 0x60C2, 0x6066]);
+        let kept = run_on(&cell, Box::new(bus), RUNS, None);
+        assert_eq!(kept.outcome.status, EndStatus::Completed, "{}", kept.outcome.reason);
     }
 }
 

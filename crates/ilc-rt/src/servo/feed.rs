@@ -119,6 +119,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ilc_cases::cases(ilc_cases::CASES))]
+
         /// The worst case: velocity, acceleration and jerk of the path all at their limits.
         #[test]
         fn the_limits_hold_at_any_change(

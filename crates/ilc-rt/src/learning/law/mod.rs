@@ -4,9 +4,6 @@
 //! `config` makes the tables of `[learning]` from the catalogue, and with them the schema of the
 //! cell description, its documents and its checks; the tests over all laws read it. `config`,
 //! `design` and the Python bindings import this folder.
-//!
-//! Family: every file here, since the catalogue lists the laws, and a law is built from types of
-//! the catalogue.
 
 pub mod adjoint;
 pub mod constrained;
