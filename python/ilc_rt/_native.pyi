@@ -26,6 +26,7 @@ __all__ = [
     "Pid",
     "SignalError",
     "StateSpace",
+    "TUNING_RUNS_MAX",
     "TimeVarying",
     "TrajectoryError",
     "__version__",
@@ -80,6 +81,7 @@ __all__ = [
 ]
 
 __version__: str
+TUNING_RUNS_MAX: int
 
 # Docstrings are those of the compiled classes: help(ilc_rt.StateSpace).
 
