@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self, disjoint_base
 
 __all__ = [
+    "TUNING_RUNS_MAX",
     "Arc",
     "Cascade",
     "Cell",
@@ -26,7 +27,6 @@ __all__ = [
     "Pid",
     "SignalError",
     "StateSpace",
-    "TUNING_RUNS_MAX",
     "TimeVarying",
     "TrajectoryError",
     "__version__",

@@ -398,5 +398,5 @@ def test_a_sampled_motion_that_cannot_be_is_refused(change, match):
 @pytest.mark.parametrize("dt_s", [0.0, -0.001, np.nan, np.inf])
 @pytest.mark.parametrize("name", PLANS)
 def test_no_planner_takes_a_sample_time_that_cannot_be(name, dt_s):
-    with pytest.raises(ValueError, match="dt_s|sample time|cycle"):
+    with pytest.raises(ValueError, match=r"dt_s|sample time|cycle"):
         PLANS[name](dt_s)
