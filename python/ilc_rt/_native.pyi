@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self, disjoint_base
 
 __all__ = [
+    "TUNING_RUNS_MAX",
     "Arc",
     "Cascade",
     "Cell",
@@ -80,6 +81,7 @@ __all__ = [
 ]
 
 __version__: str
+TUNING_RUNS_MAX: int
 
 # Docstrings are those of the compiled classes: help(ilc_rt.StateSpace).
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ilc_rt._native import Cell
+from ilc_rt._native import TUNING_RUNS_MAX, Cell
 from ilc_rt.cell_file import write_values
 from ilc_rt.errors import BadInputError
 from ilc_rt.trials import KNOWN_SHARE, BelievedAxis, Bench, Trial, Weights, believed_axes
@@ -165,7 +165,7 @@ def propose_weights(
     noise_m : float
         Standard deviation of white measurement noise.
     n_runs : int
-        Runs by which learning should be complete; values above 100 count as 100.
+        Runs by which learning should be complete, at most 10 000; a trial has 100 at most.
 
     Raises
     ------
@@ -186,8 +186,8 @@ def propose_weights(
     if not (np.isfinite(noise_m) and noise_m >= 0.0):
         message = f"noise_m = {noise_m}; 0 or a positive number is needed"
         raise BadInputError(message)
-    if n_runs < 1:
-        message = f"n_runs = {n_runs}; at least 1 is needed"
+    if not 1 <= n_runs <= TUNING_RUNS_MAX:
+        message = f"n_runs = {n_runs}; 1 to {TUNING_RUNS_MAX} is needed"
         raise BadInputError(message)
     n_runs = min(n_runs, TRIAL_RUNS_MAX)
     known_of = {axis.name: known or KNOWN_SHARE * axis.natural_frequency_hz for axis in axes}

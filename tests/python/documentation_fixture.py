@@ -148,10 +148,17 @@ def verbs_of(name: str) -> list[list[str]]:
             inner = getattr(command, "commands", {})
             open_ones += [([*verb, word], one) for word, one in inner.items()]
         return found
-    listed = re.search(r"^Commands:\n(.*?)\n\n", help_of(name), re.DOTALL | re.MULTILINE)
-    assert listed is not None
-    words = re.findall(r"^  ([a-z][a-z-]*) ", listed.group(1), re.MULTILINE)
-    return [[], *([word] for word in words if word != "help")]
+    open_verbs: list[list[str]] = [[]]
+    listed_verbs = []
+    while open_verbs:
+        verb = open_verbs.pop(0)
+        listed_verbs.append(verb)
+        listed = re.search(r"^Commands:\n(.*?)\n\n", help_of(name, *verb), re.DOTALL | re.MULTILINE)
+        words = re.findall(r"^  ([a-z][a-z-]*) ", listed.group(1), re.MULTILINE) if listed else []
+        # Those of a verb follow it.
+        open_verbs = [[*verb, word] for word in words if word != "help"] + open_verbs
+    assert len(listed_verbs) > 1 or name == "ilc-sim", f"{name} --help lists no verb"
+    return listed_verbs
 
 
 def commands_of_help() -> list[Command]:

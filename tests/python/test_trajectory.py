@@ -359,3 +359,44 @@ def test_a_part_program_may_be_bytes_in_any_encoding_and_leave_blocks_out():
         end("G1 X5 (oops\nX7")
     with pytest.raises(TypeError):
         end(5)
+
+
+GOOD = {
+    "dt_s": 0.001,
+    "position_m": np.zeros((5, 2)),
+    "velocity_m_s": np.zeros((5, 2)),
+    "acceleration_m_s2": np.zeros((5, 2)),
+    "programmed_m": np.zeros((5, 2)),
+    "alphas": [],
+    "computing_s": 0.0,
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"dt_s": 0.0}, r"dt_s = 0\.0; a finite number above 0"),
+        ({"dt_s": -0.001}, r"dt_s = -0\.001; a finite number above 0"),
+        ({"dt_s": np.nan}, "dt_s = nan"),
+        ({"dt_s": np.inf}, "dt_s = inf"),
+        ({"dt_s": None}, "dt_s = None"),
+        ({"computing_s": -1.0}, r"computing_s = -1\.0; a finite number of at least 0"),
+        ({"computing_s": np.nan}, "computing_s = nan"),
+        ({"alphas": None}, "alphas = None; a list"),
+        ({"position_m": np.zeros((4, 2))}, r"shape \(n_samples, n_axes\)"),
+        ({"velocity_m_s": np.zeros(5)}, "velocity_m_s: an array of float64"),
+        ({"programmed_m": np.zeros((5, 2), dtype=int)}, "programmed_m: an array of float64"),
+        ({"acceleration_m_s2": np.full((5, 2), np.nan)}, "acceleration_m_s2 has a value that is"),
+    ],
+)
+def test_a_sampled_motion_that_cannot_be_is_refused(change, match):
+    assert trajectory.Trajectory(**GOOD).t_s[-1] == pytest.approx(0.004)
+    with pytest.raises(TrajectoryError, match=match):
+        trajectory.Trajectory(**(GOOD | change))
+
+
+@pytest.mark.parametrize("dt_s", [0.0, -0.001, np.nan, np.inf])
+@pytest.mark.parametrize("name", PLANS)
+def test_no_planner_takes_a_sample_time_that_cannot_be(name, dt_s):
+    with pytest.raises(ValueError, match=r"dt_s|sample time|cycle"):
+        PLANS[name](dt_s)

@@ -106,7 +106,8 @@ def test_noise_asks_for_slower_learning():
         ({"known_hz": 250.0}, "known_hz = 250.0"),
         ({"noise_m": -1.0}, "noise_m = -1.0"),
         ({"noise_m": float("inf")}, "noise_m = inf"),
-        ({"n_runs": 0}, "n_runs = 0"),
+        ({"n_runs": 0}, "n_runs = 0; 1 to 10000 is needed"),
+        ({"n_runs": 10_001}, "n_runs = 10001"),
     ],
 )
 def test_what_is_out_of_range_is_refused(options, told):

@@ -7,7 +7,7 @@ use std::ffi::CString;
 
 use ilc_rt::learning::analysis::{self, Analysis, Method, Question, Uncertainty};
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
-use ilc_rt::learning::tune::{Knowledge, TuningStep, tune as propose};
+use ilc_rt::learning::tune::{Knowledge, RUNS_MAX, TuningStep, tune as propose};
 use ilc_rt::learning::{self, Law};
 use ilc_rt::model::StateSpace;
 use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
@@ -16,7 +16,7 @@ use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_signal, misfit, read_array, read_vector};
 use crate::arguments::Arguments;
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::laws;
 use crate::python_law::Channels;
@@ -50,7 +50,8 @@ fn analyze<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, Py
         n_runs: a.whole("n_runs")?,
     };
     let mut law = read_law(&law, &model, n_samples)?;
-    let found = detached(a.py(), || analysis::analyze(law.as_mut(), &model, n_samples, &question));
+    let found =
+        interruptible(a.py(), || analysis::analyze(law.as_mut(), &model, n_samples, &question))?;
     figures(a.py(), &found.or_raise()?, &model)
 }
 
@@ -114,10 +115,10 @@ fn refuse_divergent(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
         return Ok(());
     }
     let mut law = laws::apart("law", &law, n_samples, channels(&model))?;
-    let found = detached(a.py(), || {
+    let found = interruptible(a.py(), || {
         analysis::refuse_divergent(law.as_mut(), &model, n_samples)?;
         analysis::overreach(law.as_mut(), &model, n_samples)
-    });
+    })?;
     let Some(found) = found.or_raise()? else { return Ok(()) };
     let message = CString::new(found.to_string())?;
     PyErr::warn(a.py(), &a.py().get_type::<PyUserWarning>(), &message, 2)
@@ -197,7 +198,7 @@ fn tune<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDic
         reference: read_reference(a, &model, Some(n_samples))?.map(|found| found.values),
         n_runs: a.whole("n_runs")?,
     };
-    let found = detached(a.py(), || propose(&model, n_samples, &knowledge)).or_raise()?;
+    let found = interruptible(a.py(), || propose(&model, n_samples, &knowledge))?.or_raise()?;
     let figures_of_law = figures(a.py(), &found.analysis, &model)?;
     let step = |step: &TuningStep| {
         let entry = PyDict::new(a.py());
@@ -231,8 +232,9 @@ fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>
         }
     };
     let is_flat = shape.len() == 2;
-    let found = detached(py, || learning::repeatability(&values, count, n_samples, n_channels))
-        .or_raise()?;
+    let found =
+        interruptible(py, || learning::repeatability(&values, count, n_samples, n_channels))?
+            .or_raise()?;
     let figures = PyDict::new(py);
     figures.set_item("mean", give_signal(py, found.mean, n_channels, is_flat)?)?;
     figures.set_item("spread", give_signal(py, found.spread, n_channels, is_flat)?)?;
@@ -253,5 +255,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(analyze, module)?)?;
     module.add_function(wrap_pyfunction!(refuse_divergent, module)?)?;
     module.add_function(wrap_pyfunction!(tune, module)?)?;
+    module.add("TUNING_RUNS_MAX", RUNS_MAX)?;
     module.add_function(wrap_pyfunction!(repeatability, module)?)
 }

@@ -1,9 +1,39 @@
 //! Release of the interpreter (GIL) during long work.
 
-use pyo3::marker::Ungil;
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use ilc_rt::interrupt;
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-/// Runs `work` while other Python threads run: for everything that may take more than 100 us.
-pub(crate) fn detached<T: Ungil, F: Ungil + FnOnce() -> T>(py: Python<'_>, work: F) -> T {
-    py.detach(work)
+/// Runs `work` while other Python threads run: for everything that may take more than 100 us. It is not
+/// interrupted, as it may change what others keep.
+pub(crate) fn detached<T: Send, F: Send + FnOnce() -> T>(py: Python<'_>, work: F) -> T {
+    py.detach(|| interrupt::shielded(work))
+}
+
+/// Runs `work` as [`detached`] does, until a signal handler raises: for work that may take seconds, and that owns
+/// what it changes.
+///
+/// # Errors
+/// - The exception that a signal handler raised, `KeyboardInterrupt` for Ctrl-C.
+pub(crate) fn interruptible<T: Send, F: Send + FnOnce() -> T>(
+    py: Python<'_>,
+    work: F,
+) -> PyResult<T> {
+    py.detach(|| {
+        let raised = Rc::new(RefCell::new(None));
+        let slot = Rc::clone(&raised);
+        let is_cancelled = move || match Python::attach(|py| py.check_signals()) {
+            Ok(()) => false,
+            Err(error) => {
+                *slot.borrow_mut() = Some(error);
+                true
+            }
+        };
+        interrupt::scope(is_cancelled, work).ok_or_else(|| {
+            raised.take().unwrap_or_else(|| PyKeyboardInterrupt::new_err("interrupted"))
+        })
+    })
 }

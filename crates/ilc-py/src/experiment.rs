@@ -14,7 +14,7 @@ use pyo3::types::PyDict;
 
 use crate::argument::read_vector;
 use crate::cell::PyCell;
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::identify::{give_measured, give_second_order, give_velocity_loop};
 use crate::whole::{Real, whole};
@@ -122,7 +122,7 @@ fn evaluate_experiment<'py>(
     let period_samples = whole("period_samples", period_samples)?;
     let (band_hz, dt_s) = ((from_hz.0, to_hz.0), dt_s.0);
     let evaluate = || Identified::evaluate(u, y, period_samples, band_hz, dt_s, Form::Free);
-    describe(py, detached(py, evaluate).or_raise()?)
+    describe(py, interruptible(py, evaluate)?.or_raise()?)
 }
 
 /// Returns the figures of an experiment, as the arguments of `ilc_rt.experiment.Experiment`.

@@ -15,7 +15,7 @@ use pyo3::types::PyDict;
 
 use crate::argument::read_vector;
 use crate::arguments::Arguments;
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::experiment::read_waveform;
 use crate::model::PyStateSpace;
@@ -89,7 +89,7 @@ fn frequency_response<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bo
             Averaging::Welch { segment_samples, overlap_samples }
         }
     };
-    let found = detached(a.py(), || identify::frequency_response(&u, &y, dt_s, averaging));
+    let found = interruptible(a.py(), || identify::frequency_response(&u, &y, dt_s, averaging))?;
     give_measured(a.py(), found.or_raise()?)
 }
 
@@ -99,7 +99,7 @@ fn fit_second_order<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Boun
     let a = Arguments::of(keywords)?;
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
     let known = Known { gain: a.maybe_number("gain")?, delay_s: a.maybe_number("delay_s")? };
-    let fit = detached(a.py(), || identify::fit_second_order(&measured, dt_s, known));
+    let fit = interruptible(a.py(), || identify::fit_second_order(&measured, dt_s, known))?;
     give_second_order(a.py(), &fit.or_raise()?)
 }
 
@@ -162,7 +162,7 @@ fn fit_velocity_loop<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bou
     let (measured, gain_per_s) = (read_measured(a)?, a.number("position_gain_per_s")?);
     let (dt_s, delay_s) = (a.number("dt_s")?, a.maybe_number("delay_s")?);
     let fit = || identify::fit_velocity_loop(&measured, gain_per_s, dt_s, delay_s);
-    give_velocity_loop(a.py(), &detached(a.py(), fit).or_raise()?)
+    give_velocity_loop(a.py(), &interruptible(a.py(), fit)?.or_raise()?)
 }
 
 /// Returns a fit by the names of `ilc_rt.fits.VelocityLoopFit`.
@@ -215,7 +215,7 @@ fn fit_rational<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'p
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
     let delay_s = a.number("delay_s")?;
     let fit = || identify::fit_rational(&measured, n_zeros, n_poles, delay_s, dt_s);
-    let fit = detached(a.py(), fit).or_raise()?;
+    let fit = interruptible(a.py(), fit)?.or_raise()?;
     let figures = PyDict::new(a.py());
     figures.set_item("model", PyStateSpace(fit.model))?;
     figures.set_item("delay_s", fit.delay_s)?;
@@ -251,7 +251,7 @@ fn excitation<'py>(
         period_s: a.number("period_s")?,
         periods: a.whole("periods")?,
     };
-    let signal = detached(a.py(), || excitation.signal(dt_s)).or_raise()?;
+    let signal = interruptible(a.py(), || excitation.signal(dt_s))?.or_raise()?;
     Ok((give(a.py(), signal.values), signal.first_sample, signal.period_samples))
 }
 

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
 use crate::arguments::Arguments;
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
 use crate::whole::whole;
@@ -132,14 +132,14 @@ impl PyStateSpace {
     ) -> PyResult<Bound<'py, PyAny>> {
         let u = Signal::read("u", u)?.with_channels("u", self.0.n_inputs())?;
         let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
-        let y = detached(py, || self.0.simulate(&u.values, x0.as_deref())).or_raise()?;
+        let y = interruptible(py, || self.0.simulate(&u.values, x0.as_deref()))?.or_raise()?;
         give_signal(py, y, self.0.n_outputs(), is_flat_output(&u, &self.0))
     }
 
     /// Return the first `n` Markov parameters D, CB, CAB, ..., shape (n, n_outputs, n_inputs).
     fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let n = whole("n", n)?;
-        let parameters = detached(py, || self.0.markov(n)).or_raise()?;
+        let parameters = interruptible(py, || self.0.markov(n))?.or_raise()?;
         let shape = (n, self.0.n_outputs(), self.0.n_inputs());
         let array = Array3::from_shape_fn(shape, |(k, row, col)| parameters[k][(row, col)]);
         Ok(array.into_pyarray(py).into_any())
@@ -150,7 +150,7 @@ impl PyStateSpace {
     /// The block lower-triangular Toeplitz matrix of the Markov parameters, sample by sample.
     fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let n = whole("n", n)?;
-        let lifted = detached(py, || self.0.lifted(n)).or_raise()?;
+        let lifted = interruptible(py, || self.0.lifted(n))?.or_raise()?;
         Ok(give_matrix(py, &lifted))
     }
 
@@ -186,7 +186,7 @@ impl PyStateSpace {
 
     /// Return the finite invariant zeros, in no particular order [emami1982].
     fn zeros<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let zeros = detached(py, || self.0.zeros()).or_raise()?;
+        let zeros = interruptible(py, || self.0.zeros())?.or_raise()?;
         Ok(Array1::from(zeros).into_pyarray(py).into_any())
     }
 
@@ -202,7 +202,7 @@ impl PyStateSpace {
         w_rad_s: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let w = read_vector("w_rad_s", w_rad_s)?;
-        let response = detached(py, || self.0.frequency_response(&w)).or_raise()?;
+        let response = interruptible(py, || self.0.frequency_response(&w))?.or_raise()?;
         let shape = (w.len(), self.0.n_outputs(), self.0.n_inputs());
         let array = Array3::from_shape_fn(shape, |(k, row, col)| response[k][(row, col)]);
         Ok(array.into_pyarray(py).into_any())
@@ -220,7 +220,7 @@ impl PyStateSpace {
         let w = read_vector("w_rad_s", w_rad_s)?;
         let output = output.map_or(Ok(0), |output| whole("output", output))?;
         let input = input.map_or(Ok(0), |input| whole("input", input))?;
-        let bode = detached(py, || self.0.bode(&w, output, input)).or_raise()?;
+        let bode = interruptible(py, || self.0.bode(&w, output, input))?.or_raise()?;
         let give = |values| Array1::from(values).into_pyarray(py).into_any();
         Ok((give(bode.magnitude), give(bode.phase_rad)))
     }

@@ -9,7 +9,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::argument::{Signal, give_signal};
-use crate::laws::PyLaw;
+use crate::laws::{PyLaw, legacy};
 use crate::whole::shown;
 
 /// Channels of the signals passed to a Python object.
@@ -185,5 +185,13 @@ impl Law for PythonLaw {
         // The address in a default repr differs between processes and would prevent resuming.
         let shown = shown.ok().filter(|text| !text.contains(" at 0x"));
         serde_json::json!({ "law": self.name, "repr": shown }).to_string()
+    }
+
+    fn earlier_description(&self) -> Option<String> {
+        let shown = Python::attach(|py| {
+            let native = self.law.bind(py).cast::<PyLaw>().ok()?;
+            legacy::repr(py, native.get())
+        })?;
+        Some(serde_json::json!({ "law": self.name, "repr": shown }).to_string())
     }
 }

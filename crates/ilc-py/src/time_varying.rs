@@ -6,7 +6,7 @@ use numpy::ndarray::Array3;
 use pyo3::prelude::*;
 
 use crate::argument::{Matrix, Signal, give_signal, misfit, read_array, read_vector};
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::whole::Real;
 
@@ -175,7 +175,7 @@ impl PyTimeVarying {
             .with_samples("u", self.0.n_samples())?
             .with_channels("u", self.0.n_inputs())?;
         let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
-        let y = detached(py, || self.0.simulate(&u.values, x0.as_deref())).or_raise()?;
+        let y = interruptible(py, || self.0.simulate(&u.values, x0.as_deref()))?.or_raise()?;
         let n_outputs = self.0.n_outputs();
         give_signal(py, y, n_outputs, u.is_flat && n_outputs == 1)
     }

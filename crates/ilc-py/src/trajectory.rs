@@ -21,7 +21,7 @@ use pyo3::types::PyDict;
 
 use crate::argument::{give_signal, read_vector};
 use crate::arguments::Arguments;
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::exceptions;
 
@@ -38,7 +38,7 @@ const SETTINGS: [(&str, LinearSetting); 2] =
 /// Plans a motion while other Python threads run, and returns its samples by name.
 fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> PyResult<Bound<'_, PyDict>> {
     let begun = Instant::now();
-    let (motion, alphas) = detached(py, plan).or_raise()?;
+    let (motion, alphas) = interruptible(py, plan)?.or_raise()?;
     let computing_s = begun.elapsed().as_secs_f64();
     let n_axes = motion.n_axes;
     let samples = PyDict::new(py);

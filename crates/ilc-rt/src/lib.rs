@@ -14,6 +14,7 @@ pub mod design;
 pub mod fieldbus;
 pub mod identification;
 pub mod interpolate;
+pub mod interrupt;
 pub mod kinematics;
 pub mod learning;
 pub mod library;

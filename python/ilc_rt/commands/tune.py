@@ -37,11 +37,7 @@ NoiseStd = Annotated[
     float | None,
     typer.Option("--noise-m", help="Standard deviation of the measurement's noise in metres."),
 ]
-# More runs give no further information.
-RUNS_MAX = 1_000_000
-Runs = Annotated[
-    int, typer.Option("--runs", min=1, max=RUNS_MAX, help="Runs in which learning should be done.")
-]
+Runs = Annotated[int, typer.Option("--runs", min=1, help="Runs in which learning should be done.")]
 Write = Annotated[bool, typer.Option("--write", help="Put the weights into the cell description.")]
 
 

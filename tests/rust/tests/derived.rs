@@ -9,7 +9,9 @@ use ilc_rt::config::{Cell, LawName};
 use ilc_rt::fieldbus::transport::SCHEMES;
 use ilc_rt::record::{Event, Field, FieldKind, figure_fields};
 use ilc_rt::schema::{fill, for_editors, inlined};
+use ilc_rt::trajectory::kind::{Key, PathKind};
 use ilc_tests::{hold_derived, hold_derived_file, root};
+use serde_json::Value;
 
 /// Place in the cell reference before which sections of further laws are put.
 const FURTHER_LAWS: &str = "<!-- further laws -->";
@@ -119,6 +121,38 @@ fn the_table_of_the_buses() {
     hold_derived("README.md", "buses", &table);
 }
 
+/// Returns the table of the kinds of path.
+fn kinds_of_path() -> String {
+    let schema = inlined::<Cell>().to_value();
+    let program = &schema["properties"]["program"]["properties"];
+    let mut table = "| `kind` | reads | path |\n|---|---|---|\n".to_owned();
+    for kind in PathKind::ALL {
+        let entry = kind.entry();
+        let reads: Vec<_> =
+            entry.reads.iter().filter_map(|key| key_in_words(*key, program)).collect();
+        let _ = writeln!(table, "| `{}` | {} | {} |", kind.name(), reads.join(", "), entry.summary);
+    }
+    table
+}
+
+/// Returns a key as the table of the kinds has it, with the numbers of its table; `None` for a part of
+/// another key.
+fn key_in_words(key: Key, program: &Value) -> Option<String> {
+    let name = key.name();
+    if name.contains(' ') && !name.starts_with("[program]") {
+        return None;
+    }
+    let plain = name.trim_start_matches("[program] ");
+    let table = name.strip_prefix("[program.").and_then(|rest| rest.strip_suffix(']'));
+    let Some(table) = table else { return Some(format!("`{plain}`")) };
+    let default =
+        |key: &Value| key.get("default").map_or(String::new(), |value| format!(" ({value})"));
+    let numbers = program[table]["properties"].as_object().unwrap();
+    let numbers: Vec<_> =
+        numbers.iter().map(|(name, key)| format!("`{name}`{}", default(key))).collect();
+    Some(format!("`{name}` {}", numbers.join(", ")))
+}
+
 /// Returns the cell reference, with a section for every law that has none yet.
 fn reference() -> String {
     let text = std::fs::read_to_string(root().join("docs/cell.md")).unwrap();
@@ -136,6 +170,8 @@ fn the_schema_for_editors() {
 
 #[test]
 fn the_tables_of_the_cell_reference() {
+    // In one test, as both write the document.
+    hold_derived("docs/cell.md", "kinds of path", &kinds_of_path());
     let text = fill(&reference(), inlined::<Cell>().as_value()).unwrap();
     hold_derived_file("docs/cell.md", &text);
 }

@@ -10,7 +10,7 @@ use super::figure::Figure;
 use super::kinds::modelled;
 use super::{Builder, Built, Call, Readable};
 use crate::argument::{Signal, misfit, read_numbers};
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 
 /// The laws of this file.
@@ -57,7 +57,7 @@ pub(super) fn constrained(call: &Call<'_, '_>) -> PyResult<Built> {
         },
         reference: reference.filter(|_| is_setpoint),
     };
-    let law = detached(call.py(), || Constrained::new(&model, n_samples, cost, bounds));
+    let law = interruptible(call.py(), || Constrained::new(&model, n_samples, cost, bounds))?;
     Ok(Built { law: Box::new(law.or_raise()?), fits })
 }
 

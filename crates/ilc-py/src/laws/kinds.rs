@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use super::figure::Figure;
 use super::{Builder, Built, Call, Fits, Readable, Size};
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::python_law::Channels;
 use crate::signal::read_filter;
@@ -67,7 +67,8 @@ pub(super) fn adjoint(call: &Call<'_, '_>) -> PyResult<Built> {
     let (model, n_samples, fits) = modelled(call)?;
     let gain = call.arguments.maybe_number("gain")?;
     let q_filter = read_filter("q_filter", call.arguments.given("q_filter")?.as_ref())?;
-    let law = detached(call.py(), || Adjoint::new(&model, n_samples, gain, q_filter)).or_raise()?;
+    let law =
+        interruptible(call.py(), || Adjoint::new(&model, n_samples, gain, q_filter))?.or_raise()?;
     Ok(Built { law: Box::new(law), fits })
 }
 
@@ -85,7 +86,7 @@ pub(super) fn model_inverse(call: &Call<'_, '_>) -> PyResult<Built> {
     let (model, n_samples, fits) = modelled(call)?;
     let gain = call.arguments.number("gain")?;
     let q_filter = read_filter("q_filter", call.arguments.given("q_filter")?.as_ref())?;
-    let law = detached(call.py(), || ModelInverse::new(&model, n_samples, gain, q_filter));
+    let law = interruptible(call.py(), || ModelInverse::new(&model, n_samples, gain, q_filter))?;
     Ok(Built { law: Box::new(law.or_raise()?), fits })
 }
 

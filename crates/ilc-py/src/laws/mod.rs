@@ -10,6 +10,7 @@ mod bounded;
 mod exchange;
 mod figure;
 mod kinds;
+pub(crate) mod legacy;
 mod optimal;
 mod recalled;
 

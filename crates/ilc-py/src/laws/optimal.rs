@@ -12,7 +12,7 @@ use super::figure::Figure;
 use super::{Builder, Built, Call, Fits, Readable};
 use crate::argument::misfit;
 use crate::arguments::Arguments;
-use crate::detached::detached;
+use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::{AnyModel, read_any_model, read_model};
 use crate::python_law::Channels;
@@ -75,13 +75,13 @@ fn build(
         a.weight("r", n_samples, channels.n_inputs)?,
     );
     let cost = Cost { q, s, r, rate: a.number("rate")? };
-    let law = detached(call.py(), || -> Result<Box<dyn Readable>, LearningError> {
+    let law = interruptible(call.py(), || -> Result<Box<dyn Readable>, LearningError> {
         let plant = model.plant();
         Ok(match filter {
             None => Box::new(NormOptimal::new(plant, n_samples, cost)?),
             Some(filter) => Box::new(DynamicNormOptimal::new(plant, n_samples, filter, cost)?),
         })
-    });
+    })?;
     Ok(Built { law: law.or_raise()?, fits: Fits::Fixed(n_samples, channels) })
 }
 

@@ -65,7 +65,8 @@ pub fn run(
         _ => f64::INFINITY,
     };
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
-    plan.name_law(cell, name, &parameters);
+    let earlier = law.as_ref().and_then(Law::earlier_description);
+    plan.name_law(cell, name, &parameters, earlier.as_ref().unwrap_or(&parameters));
     let campaign = Campaign { plan, law, input: None, growth_allowed, frozen: None };
     execute(cell, options, bus, campaign, observe)
 }

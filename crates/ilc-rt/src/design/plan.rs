@@ -135,11 +135,12 @@ impl Plan {
         self.servo.axes.iter().map(|axis| axis.input_max).collect()
     }
 
-    /// Completes the provenance with the law that will be used.
-    pub fn name_law(&mut self, cell: &Cell, name: &str, parameters: &str) {
+    /// Completes the provenance with the law that will be used; `earlier` are the parameters that
+    /// versions up to 0.1 stored for it.
+    pub fn name_law(&mut self, cell: &Cell, name: &str, parameters: &str, earlier: &str) {
         name.clone_into(&mut self.meta.law);
         parameters.clone_into(&mut self.meta.law_parameters);
-        self.legacy_fingerprint = fingerprint::legacy(cell, &self.meta, name, parameters);
+        self.legacy_fingerprint = fingerprint::legacy(cell, &self.meta, name, earlier);
         self.meta.fingerprint = fingerprint::of(cell, &self.meta, name, parameters);
     }
 }

@@ -119,7 +119,8 @@ impl Experiment {
         )?;
         let program = json!({ "hold_m": cell.program.start_m, "n_samples": n_samples });
         let mut plan = Plan::with(&cell, measure, lockstep, hold, program.to_string())?;
-        plan.name_law(&cell, LAW_NAME, &self.parameters(&signal));
+        let parameters = self.parameters(&signal);
+        plan.name_law(&cell, LAW_NAME, &parameters, &parameters);
         let n_axes = cell.n_axes();
         let mut input = vec![0.0; n_samples * n_axes];
         for (row, value) in input.chunks_exact_mut(n_axes).zip(&signal.values) {

@@ -209,6 +209,7 @@ pub(in crate::learning) fn radius(matrix: &DMatrix<f64>) -> Result<f64> {
 
 /// Orthogonalises `next` against the basis, twice because of rounding; returns the coefficients.
 fn orthogonalise(basis: &[Vec<f64>], next: &mut [f64]) -> Vec<f64> {
+    crate::interrupt::point();
     let mut parts = vec![0.0; basis.len()];
     for _ in 0..2 {
         for (vector, part) in basis.iter().zip(&mut parts) {

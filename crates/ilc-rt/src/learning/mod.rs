@@ -123,6 +123,11 @@ pub trait Law: Send {
 
     /// Returns the law and its parameters as one line of JSON, for the record of the run.
     fn describe(&self) -> String;
+
+    /// Returns the description that versions up to 0.1 stored for this law, if it was another.
+    fn earlier_description(&self) -> Option<String> {
+        None
+    }
 }
 
 /// Outcome of the last update of a law that may also rest.
@@ -199,5 +204,9 @@ impl<L: Law + ?Sized> Law for Box<L> {
 
     fn describe(&self) -> String {
         (**self).describe()
+    }
+
+    fn earlier_description(&self) -> Option<String> {
+        (**self).earlier_description()
     }
 }

@@ -15,8 +15,8 @@ const FLUCTUATION: f64 = 1.05;
 const INPUT_START: f64 = 0.01;
 /// Safety factor of `s`.
 const SAFETY: f64 = 2.0;
-/// Largest number of runs computed for a proposal.
-const RUNS_MAX: usize = 10_000;
+/// Largest number of runs that a proposal of weights may be for.
+pub const RUNS_MAX: usize = 10_000;
 
 /// Known properties of the machine.
 #[derive(Debug, Clone, PartialEq)]
@@ -219,6 +219,7 @@ fn change_weight(
     let mut best: Option<(f64, f64)> = None;
     let mut tried = 0;
     for exponent in -12..=12 {
+        crate::interrupt::point();
         let r = square * 10.0_f64.powf(f64::from(exponent) / 2.0);
         let Ok(mut law) = NormOptimal::new(model, n_samples, weights(r)) else { continue };
         tried += 1;
@@ -268,6 +269,7 @@ fn repeated_rms(
     let (mut input, mut next) = (vec![0.0; n_u], vec![0.0; n_u]);
     let mut error = reference.to_vec();
     for _ in 0..n_runs {
+        crate::interrupt::point();
         law.update(&input, &error, &mut next)?;
         std::mem::swap(&mut input, &mut next);
         let y = model.simulate(&input, None)?;

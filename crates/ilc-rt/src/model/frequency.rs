@@ -33,6 +33,7 @@ impl StateSpace {
         let (a, b, c, d) = (complex(&self.a), complex(&self.b), complex(&self.c), complex(&self.d));
         let mut response = Vec::with_capacity(w_rad_s.len());
         for (col, &w) in w_rad_s.iter().enumerate() {
+            crate::interrupt::point();
             if !w.is_finite() {
                 return Err(ModelError::NotFinite { what: "w_rad_s", row: 0, col, value: w });
             }

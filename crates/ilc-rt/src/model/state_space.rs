@@ -184,6 +184,7 @@ impl StateSpace {
         let (mut next, mut u) = (DVector::zeros(n), DVector::zeros(m));
         let mut y = DVector::zeros(self.n_outputs());
         for sample in input.chunks_exact(m) {
+            crate::interrupt::point();
             u.copy_from_slice(sample);
             y.gemv(1.0, &self.c, &x, 0.0);
             y.gemv(1.0, &self.d, &u, 1.0);
@@ -212,6 +213,7 @@ impl StateSpace {
         let mut parameters = Vec::with_capacity(count);
         let mut reached = self.b.clone();
         for k in 0..count {
+            crate::interrupt::point();
             if k == 0 {
                 parameters.push(self.d.clone());
             } else {
@@ -248,6 +250,7 @@ impl StateSpace {
         let parameters = self.markov(n_samples)?;
         let mut lifted = DMatrix::zeros(n_samples * p, n_samples * m);
         for row in 0..n_samples {
+            crate::interrupt::point();
             for col in 0..=row {
                 lifted.view_mut((row * p, col * m), (p, m)).copy_from(&parameters[row - col]);
             }

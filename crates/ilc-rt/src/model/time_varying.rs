@@ -122,6 +122,7 @@ impl TimeVarying {
         }
         let mut output = Vec::with_capacity(n_samples * self.n_outputs());
         for (k, model) in self.samples.iter().enumerate() {
+            crate::interrupt::point();
             let u = DVector::from_column_slice(&input[k * m..(k + 1) * m]);
             output.extend_from_slice((model.c() * &x + model.d() * &u).as_slice());
             x = model.a() * &x + model.b() * &u;

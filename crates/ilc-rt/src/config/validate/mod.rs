@@ -41,8 +41,9 @@ pub(super) fn syntax(text: &str, file: &str, error: &toml::de::Error) -> ConfigE
         _ => table.to_owned(),
     };
     let message = error.message().replace('\n', " ");
-    let renamed =
-        RENAMED.iter().find(|(old, _)| message.contains(&format!("unknown field `{old}`")));
+    // The error of an unknown key has the key alone as its place.
+    let place = error.span().and_then(|span| text.get(span));
+    let renamed = RENAMED.iter().find(|(old, _)| place == Some(*old));
     let reason = match renamed {
         Some((_, new)) => format!("it is now called {new}"),
         None => printable(&message, TEXT_MAX),

@@ -20,7 +20,8 @@ pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
 fn check_kind(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let program = &cell.program;
     let kind = program.kind.entry();
-    for (key, name, is_given) in program.given() {
+    for (key, is_given) in program.given() {
+        let name = key.name();
         let (is_read, is_needed) = (kind.reads.contains(&key), kind.needs.contains(&key));
         v.that(is_read || !is_given, name, &"given", "not used by this kind of path; remove it")?;
         let needed = match key {

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
+use super::misfit::{Found, Required, Shown};
 use super::sdo_client::SdoError;
+use super::setting::{Kind, name};
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::{AbortCode, NodeId, ObjectAddress};
 use crate::fieldbus::cia402::{Mode, Statusword};
@@ -106,18 +108,22 @@ pub enum BringUpError {
         cycle_us: u32,
     },
     /// An object with a value that must not be used, and that cannot be changed.
-    #[error("node {node}: object {object} ({name}): found {found}, needed {needed}{}", because(*refusal))]
+    #[error(
+        "node {node}: object {object} ({}): found {}, needed {}{}",
+        name(*object), Shown(*object, *kind, found), Shown(*object, *kind, required),
+        because(*refusal)
+    )]
     Value {
         /// The node.
         node: NodeId,
         /// The object.
         object: ObjectAddress,
-        /// Its name.
-        name: &'static str,
+        /// Its type.
+        kind: Kind,
         /// Value found.
-        found: String,
-        /// Value needed.
-        needed: String,
+        found: Found,
+        /// Value required.
+        required: Required,
         /// Reason why the node rejects another value, if it was asked to take one and gave a
         /// reason.
         refusal: Option<AbortCode>,
@@ -173,6 +179,7 @@ fn because(refusal: Option<AbortCode>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::setting::Need;
     use super::*;
 
     #[test]
@@ -186,9 +193,9 @@ mod tests {
         let error = BringUpError::Value {
             node,
             object: ObjectAddress::new(0x60B0, 0),
-            name: "Position offset",
-            found: "5000".to_owned(),
-            needed: "0".to_owned(),
+            kind: Kind::I32,
+            found: Found::Number(5000),
+            required: Required::Number(Need::Exactly(0)),
             refusal: Some(AbortCode::ReadOnly),
         };
         assert_eq!(

@@ -8,6 +8,7 @@
 mod drive;
 mod error;
 pub mod listen;
+mod misfit;
 mod own;
 mod process_data;
 mod remote;
@@ -20,6 +21,7 @@ pub use drive::{
     DriveIdentity, DriveSetup, EncoderIdentity, FOLLOWING_ERROR_TIME_MS, bring_up, bring_up_encoder,
 };
 pub use error::BringUpError;
+pub use misfit::{Found, Required};
 pub use own::{DriveOwn, HomingObjects, StartUpObject, is_keepable, is_set};
 pub use sdo_client::{SdoClient, SdoError, Stray, TRIES};
-pub use setting::Kind;
+pub use setting::{Kind, Need};

@@ -1,6 +1,7 @@
 //! PDO configuration of a node: PDOs left by others are disabled, those of the loop mapped.
 
 use super::error::BringUpError;
+use super::misfit::Found;
 use super::remote::Remote;
 use super::setting::{Kind, Need, Setting};
 use crate::fieldbus::canopen::pdo::{
@@ -94,8 +95,7 @@ pub(super) fn open(
         return Ok(());
     }
     let setting = Setting::new(communication, 1, Kind::U32, Need::Exactly(cob_id.into()));
-    let (found, needed) = (setting.shown(found.into()), setting.needed_words());
-    Err(remote.unfit_words(&setting, found, needed, None))
+    Err(remote.unfit(&setting, Found::Number(found.into()), None))
 }
 
 /// Returns whether the node has this very mapping already.

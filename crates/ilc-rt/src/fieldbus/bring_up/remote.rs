@@ -1,6 +1,7 @@
 //! A node during bring-up: reads, writes, and objects with required values.
 
 use super::error::BringUpError;
+use super::misfit::{Found, Required};
 use super::own::{DriveOwn, StartUpObject};
 use super::sdo_client::{SdoClient, SdoError};
 use super::setting::{self, Absence, Kind, Need, Setting};
@@ -107,7 +108,7 @@ impl Remote<'_> {
                 Err(SdoError::Aborted { code: AbortCode::WriteOnly, .. }) => {
                     return match self.try_write(setting)? {
                         None => Ok(Some(setting.need.value())),
-                        refusal => Err(self.unfit(setting, "no value to be read", refusal)),
+                        refusal => Err(self.unfit(setting, Found::Unreadable, refusal)),
                     };
                 }
                 Err(source) => return Err(BringUpError::Sdo { step: setting.name(), source }),
@@ -118,7 +119,7 @@ impl Remote<'_> {
                 return Ok(Some(found));
             }
             if is_written {
-                return Err(self.unfit(setting, &setting.shown(found), refusal));
+                return Err(self.unfit(setting, Found::Number(found), refusal));
             }
         }
         Ok(None)
@@ -131,7 +132,7 @@ impl Remote<'_> {
             if object.read_back {
                 self.enforce(&setting)?;
             } else if let Some(refusal) = self.try_write(&setting)? {
-                return Err(self.unfit(&setting, "no value", Some(refusal)));
+                return Err(self.unfit(&setting, Found::Unread, Some(refusal)));
             }
         }
         Ok(())
@@ -146,8 +147,7 @@ impl Remote<'_> {
                 Ok(bytes) => {
                     let found = setting.kind.decode(&bytes);
                     if !setting.need.admits(found) {
-                        let found = format!("{} at the end", setting.shown(found));
-                        return Err(self.unfit(&setting, &found, None));
+                        return Err(self.unfit(&setting, Found::NumberAtEnd(found), None));
                     }
                 }
                 Err(SdoError::Aborted { code: AbortCode::WriteOnly, .. }) => {}
@@ -169,9 +169,7 @@ impl Remote<'_> {
         let denominator = self.find(step, index, 2)?.unwrap_or(1);
         let ratio = [numerator, denominator];
         if ratio.contains(&0) {
-            let found = format!("{numerator}/{denominator}");
-            let setting = Setting::new(index, 0, Kind::U32, Need::Exactly(1));
-            return Err(self.unfit_words(&setting, found, "a ratio without 0".to_owned(), None));
+            return Err(self.unfit_ratio(index, Found::Ratio(ratio), Required::NonZeroRatio));
         }
         Ok(Some(ratio))
     }
@@ -188,25 +186,22 @@ impl Remote<'_> {
         }
     }
 
-    fn unfit(&self, setting: &Setting, found: &str, refusal: Option<AbortCode>) -> BringUpError {
-        self.unfit_words(setting, found.to_owned(), setting.needed_words(), refusal)
-    }
-
-    pub(super) fn unfit_words(
+    /// Returns the error of an object with a number that it must not have.
+    pub(super) fn unfit(
         &self,
         setting: &Setting,
-        found: String,
-        needed: String,
+        found: Found,
         refusal: Option<AbortCode>,
     ) -> BringUpError {
-        BringUpError::Value {
-            node: self.node,
-            object: setting.address,
-            name: setting.name(),
-            found,
-            needed,
-            refusal,
-        }
+        let required = Required::Number(setting.need.clone());
+        let (node, object, kind) = (self.node, setting.address, setting.kind);
+        BringUpError::Value { node, object, kind, found, required, refusal }
+    }
+
+    /// Returns the error of a ratio, which is the object `index` as a whole.
+    pub(super) fn unfit_ratio(&self, index: u16, found: Found, required: Required) -> BringUpError {
+        let (node, object) = (self.node, ObjectAddress::new(index, 0));
+        BringUpError::Value { node, object, kind: Kind::U32, found, required, refusal: None }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::drive::DriveSetup;
 use super::error::BringUpError;
+use super::misfit::{Found, Required};
 use super::remote::Remote;
 use super::setting::{Kind, Need, Setting};
 use crate::fieldbus::cia402::objects;
@@ -28,15 +29,13 @@ pub(super) fn check(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), B
     let counts = product([feed[0], increments[1], gear[1]]);
     let of_increments = product([feed[1], increments[0], gear[0]]);
     if counts != of_increments && !setup.own.states_ratios() {
-        let setting = Setting::new(objects::ENCODER_RESOLUTION, 0, Kind::U32, Need::Exactly(1));
-        let found = format!(
-            "{}/{} with 0x6091 = {}/{} and 0x6092 = {}/{}",
-            increments[0], increments[1], gear[0], gear[1], feed[0], feed[1]
-        );
-        let needed = "one count per encoder increment (0x6092 / (0x608F * 0x6091) = 1), or the \
-                      ratios in [axis.drive]"
-            .to_owned();
-        return Err(remote.unfit_words(&setting, found, needed, None));
+        let found = Found::Scaling {
+            encoder_resolution: increments,
+            gear_ratio: gear,
+            feed_constant: feed,
+        };
+        let required = Required::CountPerIncrement;
+        return Err(remote.unfit_ratio(objects::ENCODER_RESOLUTION, found, required));
     }
     let same = |index, ratio: [u32; 2]| {
         [1, 2].map(|sub| {
@@ -65,10 +64,9 @@ fn state_ratios(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), Bring
     let ratios = [objects::ENCODER_RESOLUTION, objects::GEAR_RATIO, objects::FEED_CONSTANT];
     for (index, stated) in ratios.into_iter().zip(setup.own.ratios) {
         let Some(ratio) = stated else {
-            if let Some([over, under]) = remote.ratio(index)? {
-                let setting = Setting::new(index, 0, Kind::U32, Need::Exactly(1));
-                let needed = "to be stated in [axis.drive] as the other ratios are".to_owned();
-                return Err(remote.unfit_words(&setting, format!("{over}/{under}"), needed, None));
+            if let Some(ratio) = remote.ratio(index)? {
+                let found = Found::Ratio(ratio);
+                return Err(remote.unfit_ratio(index, found, Required::StatedRatio));
             }
             continue;
         };
@@ -95,11 +93,15 @@ fn home_offset(remote: &mut Remote<'_>, setup: &DriveSetup) -> Result<(), BringU
     }
     match remote.find(home.name(), objects::HOME_OFFSET, 0)? {
         Some(found) if found != 0 => {
-            let found = home.shown(found.cast_signed().into());
-            let needed = "0; positions would be shifted against the cell description, unless \
-                          [axis.drive] home_offset states it"
-                .to_owned();
-            Err(remote.unfit_words(&home, found, needed, None))
+            let found = Found::Number(found.cast_signed().into());
+            Err(BringUpError::Value {
+                node: remote.node,
+                object: home.address,
+                kind: home.kind,
+                found,
+                required: Required::NoHomeOffset,
+                refusal: None,
+            })
         }
         _ => Ok(()),
     }

@@ -1,5 +1,7 @@
 //! An object of a node with a required value.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +72,7 @@ impl Kind {
 
 /// Allowed values of an object, and the one written if it holds another.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Need {
+pub enum Need {
     /// Exactly this value.
     Exactly(i64),
     /// This rate, as accurately as the drive can store it.
@@ -121,6 +123,23 @@ impl Need {
             _ => self.admits(found),
         }
     }
+
+    /// Writes the need in words.
+    pub(super) fn write(
+        &self,
+        f: &mut fmt::Formatter<'_>,
+        shown: impl Fn(i64) -> String,
+    ) -> fmt::Result {
+        match self {
+            Self::Exactly(value) | Self::Near(value) => f.write_str(&shown(*value)),
+            Self::AtLeast(value) | Self::Ample(_, value) => write!(f, "at least {}", shown(*value)),
+            Self::AtMost(value) => write!(f, "at most {}", shown(*value)),
+            Self::OneOf(values) => {
+                let words: Vec<String> = values.iter().map(|value| shown(*value)).collect();
+                f.write_str(&words.join(" or "))
+            }
+        }
+    }
 }
 
 /// Reaction to a node without the object.
@@ -157,26 +176,6 @@ impl Setting {
     /// Returns the object's name.
     pub(super) fn name(&self) -> &'static str {
         name(self.address)
-    }
-
-    /// Formats a value of this object.
-    pub(super) fn shown(&self, value: i64) -> String {
-        shown(self.address, self.kind, value)
-    }
-
-    /// Returns the need in words.
-    pub(super) fn needed_words(&self) -> String {
-        match &self.need {
-            Need::Exactly(value) | Need::Near(value) => self.shown(*value),
-            Need::AtLeast(value) | Need::Ample(_, value) => {
-                format!("at least {}", self.shown(*value))
-            }
-            Need::AtMost(value) => format!("at most {}", self.shown(*value)),
-            Need::OneOf(values) => {
-                let words: Vec<String> = values.iter().map(|value| self.shown(*value)).collect();
-                words.join(" or ")
-            }
-        }
     }
 }
 
@@ -249,14 +248,5 @@ mod tests {
         assert!(Need::AtMost(5).admits(5) && !Need::AtMost(5).admits(6));
         assert!(Need::OneOf(vec![2, 6]).admits(6) && !Need::OneOf(vec![2, 6]).admits(1));
         assert_eq!(Need::OneOf(vec![2, 6]).value(), 2);
-    }
-
-    #[test]
-    fn codes_are_shown_in_hexadecimal() {
-        let setting = |index, sub, kind, need| Setting::new(index, sub, kind, need).needed_words();
-        assert_eq!(setting(0x1005, 0, Kind::U32, Need::Exactly(0x80)), "0x00000080");
-        assert_eq!(setting(0x607E, 0, Kind::U8, Need::Exactly(0)), "0x00");
-        assert_eq!(setting(0x605A, 0, Kind::I16, Need::OneOf(vec![2, 6])), "2 or 6");
-        assert_eq!(setting(0x6072, 0, Kind::U16, Need::AtLeast(1000)), "at least 1000");
     }
 }

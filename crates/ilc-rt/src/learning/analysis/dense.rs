@@ -113,6 +113,7 @@ impl Dense {
         let mut power = self.t.clone();
         let mut largest: f64 = 1.0;
         for _ in 0..DOUBLINGS {
+            crate::interrupt::point();
             let size = power.norm_max() * power.nrows() as f64;
             if !(size.is_finite() && size < 1e100) {
                 return Ok(f64::INFINITY);
@@ -172,6 +173,7 @@ impl Dense {
         let (mut sigma, mut power) = (fresh, self.t.clone());
         let mut before = share(&sigma);
         for _ in 0..DOUBLINGS {
+            crate::interrupt::point();
             sigma = &sigma + &power * &sigma * power.transpose();
             let now = share(&sigma);
             if !now.is_finite() {

@@ -81,6 +81,7 @@ impl Spectrum {
         let stride = (n_fft / 2) / n_bins(model).min(n_fft / 2);
         let mut bins = Vec::new();
         for at in (0..=n_fft / 2).step_by(stride) {
+            crate::interrupt::point();
             let frequency_hz = at as f64 / (n_fft as f64 * dt_s);
             let Some(plant) = response(model, std::f64::consts::TAU * at as f64 / n_fft as f64)
             else {
@@ -113,6 +114,7 @@ impl Spectrum {
         let n_bins = n_bins(model);
         let mut bins = Vec::new();
         for at in 0..=n_bins {
+            crate::interrupt::point();
             let omega_rad = std::f64::consts::PI * at as f64 / n_bins as f64;
             let Some(plant) = response(model, omega_rad) else { continue };
             let square = plant.adjoint() * &plant * real(weights.q);
@@ -181,6 +183,7 @@ impl Spectrum {
         let (mut limit, mut weights) = (0.0, 0.0);
         let mut settles = true;
         for (i, bin) in self.bins.iter().enumerate() {
+            crate::interrupt::point();
             // Trapezoidal rule: the two ends count half.
             let weight = if i == 0 || i + 1 == self.bins.len() { 0.5 } else { 1.0 };
             weights += weight;

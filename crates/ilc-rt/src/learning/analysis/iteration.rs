@@ -166,6 +166,7 @@ impl<'a> Iteration<'a> {
 
     /// `out = L_u u + L_e e`
     pub(super) fn law_linear(&mut self, u: &[f64], e: &[f64], out: &mut [f64]) -> Result {
+        crate::interrupt::point();
         self.law.reset();
         self.law.update(u, e, out)?;
         for (value, offset) in out.iter_mut().zip(&self.offset) {
@@ -176,6 +177,7 @@ impl<'a> Iteration<'a> {
 
     /// `out = law(u, e)`, offset included.
     pub(super) fn law(&mut self, u: &[f64], e: &[f64], out: &mut [f64]) -> Result {
+        crate::interrupt::point();
         self.law.reset();
         self.law.update(u, e, out)
     }
@@ -201,6 +203,7 @@ impl<'a> Iteration<'a> {
 
     /// `out = T' x`
     pub(super) fn apply_transposed(&mut self, x: &[f64], out: &mut [f64]) -> Result {
+        crate::interrupt::point();
         let mut input = x.to_vec();
         self.clear(&mut input);
         lift(&mut input);

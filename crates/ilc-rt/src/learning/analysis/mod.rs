@@ -21,11 +21,11 @@ mod uncertainty;
 mod verdict;
 
 #[cfg(test)]
-mod every_law;
-#[cfg(test)]
 mod mismatch;
 #[cfg(test)]
 mod oracle;
+#[cfg(test)]
+mod wrapped;
 
 pub use crate::learning::krylov::Estimate;
 pub use columns::COLUMNS_MAX;

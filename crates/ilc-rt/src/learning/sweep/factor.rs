@@ -154,6 +154,7 @@ impl Gains {
         let has_constant_plant = stages.has_constant_plant();
         let mut k = n_samples;
         while k > 0 {
+            crate::interrupt::point();
             k -= 1;
             // The stages of the constant range are read once, and so is a constant plant.
             if !constant.contains(&k) || k + 1 == constant.end {

@@ -87,6 +87,7 @@ fn begin(
     let mut before: Vec<f64> = points.iter().map(|s| s.norm().max(1.0).powi(2)).collect();
     let mut found = None;
     for _ in 0..ROUNDS {
+        crate::interrupt::point();
         let n = f.len();
         let (mut a, mut b) = (DMatrix::zeros(2 * n, 3), DVector::zeros(2 * n));
         for k in 0..n {

@@ -33,6 +33,7 @@ pub(super) fn minimize(start: &[f64], residuals: &dyn Fn(&[f64]) -> DVector<f64>
     let (mut cost, mut damping) = (size(&r), 1e-3);
     let mut jacobian = slopes(&x, &r, residuals);
     for _ in 0..STEPS_MAX {
+        crate::interrupt::point();
         let (gradient, normal) = (jacobian.tr_mul(&r), jacobian.tr_mul(&jacobian));
         let mut damped = normal.clone();
         for i in 0..x.len() {
@@ -82,6 +83,7 @@ fn slopes(
 ) -> DMatrix<f64> {
     let mut jacobian = DMatrix::zeros(r.len(), x.len());
     for i in 0..x.len() {
+        crate::interrupt::point();
         let h = 1e-6 * x[i].abs().max(1.0);
         let (mut up, mut down) = (x.clone(), x.clone());
         up[i] += h;

@@ -186,6 +186,7 @@ impl Problem {
             self.points.iter().map(|p| p.norm().max(1.0).powi(exponent(self.n_poles))).collect();
         let mut best: Option<(f64, Fraction)> = None;
         for _ in 0..ROUNDS {
+            crate::interrupt::point();
             let count = self.n_zeros + 1 + self.n_poles;
             let rows = |k: usize| {
                 let (p, h) = (self.points[k], self.response[k]);

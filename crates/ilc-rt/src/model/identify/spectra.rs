@@ -92,6 +92,7 @@ impl Spectra {
         };
         let mut count = 0_usize;
         for start in (0..=u.len() - n).step_by(step) {
+            crate::interrupt::point();
             let (u, y) = (transform(&u[start..start + n]), transform(&y[start..start + n]));
             for bin in 0..bins {
                 sums.input[bin] += u[bin].norm_sqr();

@@ -30,6 +30,7 @@ impl Default for ButterflySection {
 pub(super) const KIND: Kind = Kind {
     reads: &[Key::Butterfly, Key::CurvatureAcceleration],
     needs: &[],
+    summary: "the butterfly contour, from `start_m`",
     file: None,
     is_plane: true,
     plan,

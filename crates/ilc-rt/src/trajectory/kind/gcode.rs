@@ -7,6 +7,8 @@ use crate::trajectory::program::{GcodeSetting, read_gcode};
 pub(super) const KIND: Kind = Kind {
     reads: &[Key::File, Key::Rapid, Key::BlockDelete],
     needs: &[Key::File],
+    summary: "a part program, see [below](#part-programs). `rapid_m_s` is the speed of G0, by \
+              default `feed_m_s`",
     file: Some(FileKind { content: "G-code", bytes_max: 16 << 20 }),
     is_plane: false,
     plan,

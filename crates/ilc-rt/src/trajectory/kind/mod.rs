@@ -41,6 +41,8 @@ pub struct Kind {
     pub file: Option<FileKind>,
     /// True for a plane shape, which requires a cell of two axes.
     pub is_plane: bool,
+    /// Its path in the words of the documents, Markdown.
+    pub summary: &'static str,
     /// Plans a run.
     pub plan: fn(&Job) -> Result<Interpolator, ProgramError>,
     /// A program in a few words.

@@ -26,6 +26,7 @@ pub struct ModulatedSection {
 pub(super) const KIND: Kind = Kind {
     reads: &[Key::Segments, Key::Modulated],
     needs: &[Key::Segments, Key::Modulated],
+    summary: "legs with an oscillation superimposed along them, exponential/sigmoid",
     file: None,
     is_plane: false,
     plan,

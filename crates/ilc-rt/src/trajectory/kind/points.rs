@@ -7,6 +7,7 @@ use crate::trajectory::path::{ArcSpec, PathSegment};
 pub(super) const KIND: Kind = Kind {
     reads: &[Key::Segments, Key::Arcs],
     needs: &[Key::Segments],
+    summary: "lines and arcs",
     file: None,
     is_plane: false,
     plan,

@@ -92,24 +92,39 @@ pub enum Key {
     CurvatureAcceleration,
 }
 
+impl Key {
+    /// Returns the name in a cell description.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Segments => "[[program.segment]]",
+            Self::Arcs => "[[program.segment]] center_m, clockwise, dwell_s",
+            Self::File => "[program] file",
+            Self::Rapid => "[program] rapid_m_s",
+            Self::BlockDelete => "[program] block_delete",
+            Self::Butterfly => "[program.butterfly]",
+            Self::Spiral => "[program.spiral]",
+            Self::Raster => "[program.raster]",
+            Self::Modulated => "[program.modulated]",
+            Self::CurvatureAcceleration => "[program] curvature_acceleration_max_m_s2",
+        }
+    }
+}
+
 impl Program {
-    /// Every key that only some kinds read: its name in a cell description, and true if it is
-    /// given.
-    pub fn given(&self) -> [(Key, &'static str, bool); 10] {
+    /// Every key that only some kinds read, and true if it is given.
+    pub fn given(&self) -> [(Key, bool); 10] {
         let is_extra = |s: &Segment| s.center_m.is_some() || s.clockwise || s.dwell_s > 0.0;
-        let extra = self.segments.iter().any(is_extra);
-        let across = self.curvature_acceleration_max_m_s2.is_some();
         [
-            (Key::Segments, "[[program.segment]]", !self.segments.is_empty()),
-            (Key::File, "[program] file", self.file.is_some()),
-            (Key::Rapid, "[program] rapid_m_s", self.rapid_m_s.is_some()),
-            (Key::BlockDelete, "[program] block_delete", self.block_delete),
-            (Key::Butterfly, "[program.butterfly]", self.butterfly.is_some()),
-            (Key::Spiral, "[program.spiral]", self.spiral.is_some()),
-            (Key::Raster, "[program.raster]", self.raster.is_some()),
-            (Key::Modulated, "[program.modulated]", self.modulated.is_some()),
-            (Key::CurvatureAcceleration, "[program] curvature_acceleration_max_m_s2", across),
-            (Key::Arcs, "[[program.segment]] center_m, clockwise, dwell_s", extra),
+            (Key::Segments, !self.segments.is_empty()),
+            (Key::File, self.file.is_some()),
+            (Key::Rapid, self.rapid_m_s.is_some()),
+            (Key::BlockDelete, self.block_delete),
+            (Key::Butterfly, self.butterfly.is_some()),
+            (Key::Spiral, self.spiral.is_some()),
+            (Key::Raster, self.raster.is_some()),
+            (Key::Modulated, self.modulated.is_some()),
+            (Key::CurvatureAcceleration, self.curvature_acceleration_max_m_s2.is_some()),
+            (Key::Arcs, self.segments.iter().any(is_extra)),
         ]
     }
 

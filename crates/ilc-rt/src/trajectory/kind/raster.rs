@@ -32,6 +32,7 @@ pub struct RasterSection {
 pub(super) const KIND: Kind = Kind {
     reads: &[Key::Raster],
     needs: &[Key::Raster],
+    summary: "rows along the first axis",
     file: None,
     is_plane: true,
     plan,

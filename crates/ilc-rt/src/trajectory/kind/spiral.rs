@@ -25,6 +25,7 @@ pub struct SpiralSection {
 pub(super) const KIND: Kind = Kind {
     reads: &[Key::Spiral, Key::CurvatureAcceleration],
     needs: &[Key::Spiral],
+    summary: "a spiral with its centre at `start_m`",
     file: None,
     is_plane: true,
     plan,

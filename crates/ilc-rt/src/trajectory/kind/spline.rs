@@ -7,6 +7,7 @@ use crate::trajectory::curve::Spline;
 pub(super) const KIND: Kind = Kind {
     reads: &[Key::Segments, Key::CurvatureAcceleration],
     needs: &[Key::Segments],
+    summary: "a natural cubic spline through start and points",
     file: None,
     is_plane: false,
     plan,

@@ -11,6 +11,11 @@ const START_M: f64 = 1e-9;
 pub(super) const KIND: Kind = Kind {
     reads: &[Key::File],
     needs: &[Key::File],
+    summary: "set points, one row per servo cycle: one comma-separated column per axis, decimal \
+              point. An optional header names the axes in order; `#` starts a comment, also after \
+              data. The first row is `start_m`; the axes are at rest there and at the last row. \
+              Set points are sent unchanged: if velocity, acceleration or jerk over the cycle \
+              would exceed a limit, the table is rejected with the row",
     file: Some(FileKind { content: "set points", bytes_max: 64 << 20 }),
     is_plane: false,
     plan,

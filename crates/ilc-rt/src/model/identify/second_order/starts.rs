@@ -65,6 +65,7 @@ impl Fit<'_> {
             let share = (i as f64 + 0.5) / FREQUENCIES as f64;
             let w0 = TAU * (low + share * (high - low)).exp();
             for damping in DAMPINGS {
+                crate::interrupt::point();
                 let bare = SecondOrder {
                     gain: 1.0,
                     natural_frequency_hz: w0 / TAU,
@@ -77,6 +78,7 @@ impl Fit<'_> {
                 let mut model_phase: Vec<f64> = model.iter().map(|g| g.arg()).collect();
                 unwrap_phase(&mut model_phase);
                 for sign in [1.0, -1.0] {
+                    crate::interrupt::point();
                     if self.known.gain.is_some_and(|gain| gain * sign < 0.0) {
                         continue;
                     }
