@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use ilc_rt::config::Cell;
+use ilc_rt::config::{Cell, HomingKind};
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{AbortCode, NmtState, NodeId, sync};
 use ilc_rt::fieldbus::cia402::State;
@@ -85,6 +85,14 @@ pub struct Machine {
     events: VecDeque<Event>,
 }
 
+/// Returns the place at which a drive shows 0 after power-on: with an encoder that is not absolute, wherever the axis is.
+fn zero_m(axis: &ilc_rt::config::Axis) -> f64 {
+    match axis.homing.kind {
+        HomingKind::Drive => axis.simulation.position_start_m,
+        HomingKind::None | HomingKind::Absolute => axis.homing.offset_m,
+    }
+}
+
 impl Machine {
     /// Creates the machine of a cell description, at rest and not yet booted.
     ///
@@ -112,7 +120,7 @@ impl Machine {
             let node = node_of(axis.node)?;
             let parameters = DriveParameters {
                 counts_per_m: if axis.reversed { -axis.counts_per_m } else { axis.counts_per_m },
-                zero_m: axis.homing.offset_m,
+                zero_m: zero_m(axis),
                 position_min_m: axis.limits.position_min_m,
                 position_max_m: axis.limits.position_max_m,
                 velocity_max_m_s: axis.limits.velocity_max_m_s,

@@ -81,6 +81,8 @@ pub struct DriveNode {
     pub(super) homing: Homing,
     /// Place of the home that was found; 0 before.
     pub(super) home_m: f64,
+    /// Home was found since power-on, and no other homing was begun.
+    pub(super) is_homed: bool,
     /// Position in the last step, for index pulses.
     pub(super) seen_m: f64,
     /// Time at the target.
@@ -122,6 +124,7 @@ impl DriveNode {
             positioning: Positioning::default(),
             homing: Homing::default(),
             home_m: parameters.zero_m,
+            is_homed: false,
             seen_m: 0.0,
             reached: Dwell::default(),
             standing: Dwell::default(),
@@ -237,6 +240,7 @@ impl DriveNode {
                 self.homing = Homing::default();
                 self.drop_own_motion();
                 self.home_m = self.parameters.zero_m;
+                self.is_homed = false;
             }
         }
     }

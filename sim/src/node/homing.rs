@@ -5,7 +5,7 @@ use super::switches::Seen;
 /// The methods of 0x6098 that are simulated; 0 takes the position as it is.
 pub(super) const METHODS: [i64; 9] = [0, 1, 2, 17, 18, 33, 34, 35, 37];
 
-/// A direction along the axis, and the limit switch at its end.
+/// A direction of the drive, and the limit switch at its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
     Down,
@@ -66,7 +66,7 @@ enum Phase {
 pub(super) enum Order {
     /// Nothing.
     None,
-    /// Move in a direction until told otherwise, quickly or at the speed for edges.
+    /// Move in a direction of the drive until told otherwise, quickly or at the speed for edges.
     Move { sign: f64, is_quick: bool },
     /// Come to rest.
     Rest,

@@ -58,6 +58,7 @@ impl DriveNode {
                 let method = self.number(self.slots.homing_method);
                 let switches = self.parameters.switches;
                 let here_m = self.measured.position_m;
+                self.is_homed = false;
                 self.homing.start(method, &switches.see(here_m, here_m));
             }
             Some(DriveMode::Homing) if falls => self.homing.interrupt(),
@@ -136,12 +137,14 @@ impl DriveNode {
         let velocity_m_s = match self.homing.step(seen, is_at_rest) {
             Order::None => return,
             Order::Move { sign, is_quick } => {
+                let sign = sign * self.parameters.switches.sign();
                 sign * if is_quick { law.velocity_m_s } else { creep_m_s }
             }
             Order::Rest => 0.0,
             Order::Done { home_m } => {
                 if let Some(home_m) = home_m {
                     self.home_m = home_m;
+                    self.is_homed = true;
                     self.read_units();
                 }
                 return;

@@ -71,6 +71,9 @@ impl DriveNode {
         }
         if self.state() == State::OperationEnabled {
             word |= self.mode_bits();
+        } else if self.is_homed && self.mode() == Some(DriveMode::Homing) {
+            // A master can ask without power whether the axis is homed.
+            word |= BIT_12;
         }
         if self.has_following_error {
             word |= Statusword::FOLLOWING_ERROR;
@@ -109,7 +112,7 @@ impl DriveNode {
             Some(DriveMode::Homing) => {
                 let is_at_rest = !self.motion.is_ramping() && self.motion.demand_m_s().abs() <= 0.0;
                 bit(is_at_rest && !self.homing.is_under_way(), TARGET_REACHED)
-                    | bit(self.homing.is_done(), BIT_12)
+                    | bit(self.homing.is_done() || self.is_homed, BIT_12)
                     | bit(self.homing.has_failed(), BIT_13)
             }
         }

@@ -86,14 +86,34 @@ fn a_homing_is_written_to_the_drive() {
         "",
         "[axis.homing]\nkind = \"drive\"\nmethod = 17\nspeed_switch_m_s = 0.01\nspeed_zero_m_s = 0.002\nacceleration_m_s2 = 0.5",
     );
-    let setup = campaign::drive_setup(&described, &described.axes[0], true).unwrap();
+    let mut setup = campaign::drive_setup(&described, &described.axes[0], true).unwrap();
     let mut bus = InProcess::new(machine(&described), 256);
+    let line = bring_up(&mut bus, &setup).unwrap_err().to_string();
+    assert!(line.contains("node 1: not homed: its homing method (0x6098) is 0"), "{line}");
+    setup.is_to_be_homed = true;
     bring_up(&mut bus, &setup).unwrap();
+    // The settings alone are no evidence.
+    setup.is_to_be_homed = false;
+    let line = bring_up(&mut bus, &setup).unwrap_err().to_string();
+    assert!(line.contains("it has found no home since power-on"), "{line}");
     let client = SdoClient::new(rig::node(1), std::time::Duration::from_secs(2));
     let mut number = |index, sub| client.upload_u32(&mut bus, index, sub).unwrap();
     let found = [number(0x6098, 0), number(0x6099, 1), number(0x6099, 2), number(0x609A, 0)];
     assert_eq!(found, [17, 1_000_000, 200_000, 50_000_000]);
     assert_eq!(number(0x607C, 0), 0);
+}
+
+#[test]
+fn an_axis_that_is_not_homed_does_not_run() {
+    let needed = cell("", "[axis.homing]\nkind = \"drive\"\nmethod = 35");
+    let line = run(&needed, machine(&needed)).unwrap_err();
+    assert!(
+        line.contains("cell.toml: axis x (node 1) is not homed:")
+            && line.contains("nothing has moved; `ilc-rt home cell.toml x` homes it"),
+        "{line}"
+    );
+    let absolute = cell("", "[axis.homing]\nkind = \"absolute\"");
+    assert!(run(&absolute, machine(&absolute)).is_ok());
 }
 
 #[test]

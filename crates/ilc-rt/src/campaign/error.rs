@@ -73,6 +73,20 @@ pub enum CampaignError {
         /// Codes in words.
         fault: String,
     },
+    /// A drive that has to find its home first.
+    #[error(
+        "{file}: axis {axis} (node {node}) is not homed: {why}; nothing has moved; `ilc-rt home {file} {axis}` homes it"
+    )]
+    NotHomed {
+        /// Cell description.
+        file: String,
+        /// Name of the axis.
+        axis: String,
+        /// Its node.
+        node: u8,
+        /// Evidence.
+        why: String,
+    },
     /// A drive does not tell its faults or its position.
     #[error("{file}: axis {axis}: {source}")]
     Commissioning {

@@ -70,7 +70,8 @@ impl Frozen {
         };
         let mut nothing = cell.clone();
         nothing.learning.law = LawName::None;
-        plan.name_law(&nothing, FROZEN, &chosen.parameters());
+        let parameters = chosen.parameters();
+        plan.name_law(&nothing, FROZEN, &parameters, &parameters);
         Ok(Self {
             origin: chosen.origin.clone(),
             allowed: options.relearn_above.unwrap_or_else(|| cell.learning.rollback()),

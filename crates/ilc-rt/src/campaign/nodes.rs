@@ -45,19 +45,21 @@ pub(super) fn prepare(
     let refused = |key: String, bus: u8| {
         let file = file.clone();
         let address = addresses.get(usize::from(bus)).cloned().unwrap_or_default();
-        move |source: BringUpError| CampaignError::BringUp {
-            file,
-            key,
-            address,
-            source: Box::new(source),
-        }
+        move |source: BringUpError| refusal(file, key, address, source)
     };
     let resets = session.reset_faults || cell.safety.reset_faults;
     let mut maps = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
-        let key = format!("[[axis]] {} node = {}", axis.name, axis.node);
         let found =
-            bring_up(bus, &drive_setup(cell, axis, lockstep)?).map_err(refused(key, axis.bus))?;
+            bring_up(bus, &drive_setup(cell, axis, lockstep)?).map_err(|source| match source {
+                BringUpError::NotHomed { node, why } => CampaignError::NotHomed {
+                    file: file.clone(),
+                    axis: axis.name.clone(),
+                    node: node.get(),
+                    why,
+                },
+                source => refused(key_of(axis), axis.bus)(source),
+            })?;
         if let Some(code) = found.fault.filter(|_| resets) {
             let (name, node, meaning) = (&axis.name, axis.node, emcy::meaning(code));
             tracing::warn!(
@@ -85,6 +87,15 @@ pub(super) fn prepare(
         }
     }
     Ok(maps)
+}
+
+/// Returns the key of an axis' node.
+fn key_of(axis: &Axis) -> String {
+    format!("[[axis]] {} node = {}", axis.name, axis.node)
+}
+
+fn refusal(file: String, key: String, address: String, source: BringUpError) -> CampaignError {
+    CampaignError::BringUp { file, key, address, source: Box::new(source) }
 }
 
 /// Starts all nodes together.
@@ -185,5 +196,6 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
         rpdo_deadline_ms: if lockstep { 0 } else { deadline_ms },
         answer_timeout: Duration::from_secs_f64(cell.safety.answer_timeout_s),
         own: super::own::of(axis),
+        is_to_be_homed: false,
     })
 }

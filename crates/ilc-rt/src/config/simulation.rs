@@ -136,9 +136,11 @@ pub struct AxisSimulation {
     pub expansion_per_k: f64,
     /// Position at power-on.
     pub position_start_m: f64,
-    /// Place of the negative limit switch; a twentieth of the travel below `position_min_m` if absent.
+    /// Place of the limit switch at the lower end of the axis (of a `reversed` axis the positive one of the drive); a
+    /// twentieth of the travel below `position_min_m` if absent.
     pub switch_min_m: Option<f64>,
-    /// Place of the positive limit switch; a twentieth of the travel above `position_max_m` if absent.
+    /// Place of the limit switch at the upper end of the axis (of a `reversed` axis the negative one of the drive); a
+    /// twentieth of the travel above `position_max_m` if absent.
     pub switch_max_m: Option<f64>,
     /// Place of the home switch, which is closed from there upwards; none if absent.
     pub switch_home_m: Option<f64>,

@@ -247,5 +247,6 @@ pub(crate) fn setup(mode: Mode) -> DriveSetup {
         rpdo_deadline_ms: 0,
         answer_timeout: ANSWER,
         own: DriveOwn::default(),
+        is_to_be_homed: false,
     }
 }

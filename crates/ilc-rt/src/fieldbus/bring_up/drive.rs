@@ -60,6 +60,8 @@ pub struct DriveSetup {
     pub answer_timeout: Duration,
     /// Values of this drive that the cell description states.
     pub own: DriveOwn,
+    /// True if the caller homes the drive next; otherwise one that has to be homed is refused until it is.
+    pub is_to_be_homed: bool,
 }
 
 /// Identity of a drive.
@@ -116,6 +118,10 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     }
     let fault = remote.fault()?;
     remote.take_power(setup)?;
+    if let Some(homing) = setup.own.homing.filter(|_| !setup.is_to_be_homed) {
+        // Before the settings of the homing are written: they tell by which method it was homed.
+        remote.check_homed(&homing, setup.answer_timeout)?;
+    }
 
     process_data::close_all(&mut remote)?;
     remote.ensure_all(&settings::communication(node, setup.heartbeat_ms, setup.cycle_us))?;

@@ -128,6 +128,14 @@ pub enum BringUpError {
         /// reason.
         refusal: Option<AbortCode>,
     },
+    /// A drive that has to be homed, and does not tell that it is.
+    #[error("node {node}: not homed: {why}")]
+    NotHomed {
+        /// The node.
+        node: NodeId,
+        /// Evidence.
+        why: String,
+    },
     /// A missing object.
     #[error("node {node}: object {object} ({name}): the node has none, and needs it {purpose}")]
     Missing {

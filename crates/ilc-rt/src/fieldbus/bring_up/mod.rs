@@ -7,6 +7,7 @@
 
 mod drive;
 mod error;
+mod homed;
 pub mod listen;
 mod misfit;
 mod own;
@@ -21,6 +22,7 @@ pub use drive::{
     DriveIdentity, DriveSetup, EncoderIdentity, FOLLOWING_ERROR_TIME_MS, bring_up, bring_up_encoder,
 };
 pub use error::BringUpError;
+pub use homed::{enter_homing_mode, is_homed};
 pub use misfit::{Found, Required};
 pub use own::{DriveOwn, HomingObjects, StartUpObject, is_keepable, is_set};
 pub use sdo_client::{SdoClient, SdoError, Stray, TRIES};

@@ -88,6 +88,12 @@ impl Statusword {
     pub const INTERNAL_LIMIT: u16 = 1 << 11;
     /// Bit 12 in cyclic modes: the drive follows the target.
     pub const FOLLOWS_TARGET: u16 = 1 << 12;
+    /// Bit 10 in homing mode: the axis is at rest.
+    pub const TARGET_REACHED: u16 = 1 << 10;
+    /// Bit 12 in homing mode: home was found.
+    pub const HOMING_ATTAINED: u16 = 1 << 12;
+    /// Bit 13 in homing mode: home could not be found.
+    pub const HOMING_ERROR: u16 = 1 << 13;
     /// Bit 13 in CSP: following error.
     pub const FOLLOWING_ERROR: u16 = 1 << 13;
 
