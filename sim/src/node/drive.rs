@@ -62,6 +62,7 @@ pub struct Measured {
 ///
 /// Frames come in by [`receive`](Self::receive), time by [`step`](Self::step); neither allocates.
 #[derive(Clone, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "independent flags of the statusword")]
 pub struct DriveNode {
     pub(super) communication: Communication,
     pub(super) slots: DriveSlots,

@@ -171,8 +171,11 @@ mod tests {
         }
     }
 
-    /// The commands of the profile: mask and value of a controlword, then the transitions.
-    const COMMANDS: [(u16, u16, &[(State, State)]); 6] = {
+    /// Mask and value of a controlword, and its transitions.
+    type Command = (u16, u16, &'static [(State, State)]);
+
+    /// The commands of the profile.
+    const COMMANDS: [Command; 6] = {
         use State::{
             OperationEnabled as Enabled, QuickStopActive as QuickStop, ReadyToSwitchOn as Ready,
             SwitchOnDisabled as Disabled, SwitchedOn as On,

@@ -70,8 +70,8 @@ mod tests {
         }
     }
 
-    /// From wall to wall at relative velocity w the load coasts for b/w and is thrown back within
-    /// half a period of the contact, pi/w_c with w_c^2 = k (1/m_c + 1/m_f).
+    // From wall to wall at relative velocity w the load coasts for b/w and is thrown back within
+    // half a period of the contact, pi/w_c with w_c^2 = k (1/m_c + 1/m_f).
     #[test]
     fn it_bounces_with_the_period_of_play_and_contact() {
         let (backlash_m, relative_m_s) = (1e-3, 0.05);

@@ -11,6 +11,7 @@ use super::friction::Friction;
 
 /// Bristles with their mean deflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "each ends in its unit")]
 pub(super) struct Bristles {
     stiffness_n_m: f64,
     damping_n_s_m: f64,

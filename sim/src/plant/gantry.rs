@@ -270,5 +270,10 @@ impl Plant for Gantry {
 mod tests;
 
 #[cfg(test)]
-#[allow(clippy::float_cmp, reason = "what is off must not change a bit")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small positive counts; what is off must not change a bit"
+)]
 mod machine_tests;

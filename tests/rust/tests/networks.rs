@@ -31,7 +31,7 @@ const RUNS: u32 = 3;
 /// A cell on a CAN bus that has time for the small maps only.
 fn on_a_slow_bus(name: &str) -> Cell {
     let mut cell = short(name);
-    cell.bus.address = "can:can0".to_owned();
+    "can:can0".clone_into(&mut cell.bus.address);
     cell.bus.bitrate_bit_s = if cell.cell.cycle_us == 1000 { 1_000_000 } else { 500_000 };
     cell
 }

@@ -26,6 +26,7 @@ const RELEARN_RATIO_MAX: f64 = 1e6;
 
 /// Options of everything that moves axes: a campaign or an experiment.
 #[derive(Clone, Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub struct Session {
     /// Bus address in place of the cell's.
     #[arg(long, value_name = "ADDRESS", help = bus_help())]

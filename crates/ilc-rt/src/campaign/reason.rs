@@ -42,19 +42,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             distance(cell, index, following_error_m)
         ),
         StopReason::NotEnabled { axis: index, statusword } => {
-            let state = Statusword(statusword)
-                .state()
-                .map_or_else(|| "no known state".to_owned(), |state| state.to_string());
-            format!(
-                "drive of {} is not enabled: statusword 0x{statusword:04X}, {state}{}",
-                axis(index),
-                if power_lost(statusword) {
-                    "; its power stage is off, as after an emergency stop (STO): it stays off until a \
-                     person starts again"
-                } else {
-                    ""
-                }
-            )
+            format!("drive of {} is not enabled: {}", axis(index), off(statusword))
         }
         StopReason::SilentAxis { axis: index, cycles } => {
             format!("drive of {} is silent: {}", axis(index), unanswered(cycles))
@@ -118,6 +106,19 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
         ),
         StopReason::Bus(error) => format!("{error}"),
     }
+}
+
+/// Names the state of a drive that is not enabled, and an emergency stop as its likely cause.
+fn off(statusword: u16) -> String {
+    let state = Statusword(statusword).state();
+    let state = state.map_or_else(|| "no known state".to_owned(), |state| state.to_string());
+    let cause = if power_lost(statusword) {
+        "; its power stage is off, as after an emergency stop (STO): it stays off until a person \
+         starts again"
+    } else {
+        ""
+    };
+    format!("statusword 0x{statusword:04X}, {state}{cause}")
 }
 
 /// Names the origin of a stop request.

@@ -160,25 +160,20 @@ fn described(cell: &Cell, now: &Traveling) -> String {
 
 fn end(arrival: &Arrival, ends_by_release: bool, written: bool) -> u8 {
     match arrival.status {
-        EndStatus::Fault => {
-            show::complain(&format!("controlled stop: {}", arrival.reason));
-            EXIT_FAULT
-        }
-        EndStatus::Completed => {
-            show::say(&arrival.reason);
-            if written { 0 } else { EXIT_FAILURE }
-        }
         EndStatus::Interrupted if arrival.signal != 0 => {
             show::complain(&arrival.reason);
             u8::try_from(128 + arrival.signal).unwrap_or(EXIT_FAULT)
         }
-        EndStatus::Interrupted if ends_by_release => {
-            show::say(&arrival.reason);
-            if written { 0 } else { EXIT_FAILURE }
-        }
-        EndStatus::Interrupted => {
+        EndStatus::Interrupted if ends_by_release => done(arrival, written),
+        EndStatus::Completed => done(arrival, written),
+        EndStatus::Fault | EndStatus::Interrupted => {
             show::complain(&format!("controlled stop: {}", arrival.reason));
             EXIT_FAULT
         }
     }
+}
+
+fn done(arrival: &Arrival, written: bool) -> u8 {
+    show::say(&arrival.reason);
+    if written { 0 } else { EXIT_FAILURE }
 }

@@ -160,7 +160,12 @@ pub enum ObjectValue {
 
 impl ObjectValue {
     fn digits(bytes: &[u8]) -> String {
-        bytes.iter().map(|byte| format!("{byte:02X}")).collect()
+        bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
+            for digit in [byte >> 4, byte & 15] {
+                text.extend(char::from_digit(u32::from(digit), 16).map(|c| c.to_ascii_uppercase()));
+            }
+            text
+        })
     }
 }
 
@@ -240,19 +245,17 @@ pub fn write_object(
     kind: Option<DataType>,
     value: &str,
 ) -> Result<DataType, CommissioningError> {
-    let kind = match kind {
-        Some(kind) => kind,
-        None => {
-            let bytes = client.upload(bus, address.index, address.sub)?;
-            match DataType::likely(address, &bytes) {
-                DataType::Bytes => {
-                    let types = DataType::names().join(", ");
-                    let n_bytes = bytes.len();
-                    return Err(CommissioningError::TypeNeeded { address, n_bytes, types });
-                }
-                kind => kind,
-            }
+    let kind = if let Some(kind) = kind {
+        kind
+    } else {
+        let bytes = client.upload(bus, address.index, address.sub)?;
+        let likely = DataType::likely(address, &bytes);
+        if matches!(likely, DataType::Bytes) {
+            let types = DataType::names().join(", ");
+            let n_bytes = bytes.len();
+            return Err(CommissioningError::TypeNeeded { address, n_bytes, types });
         }
+        likely
     };
     client.download(bus, address.index, address.sub, &kind.encode(value)?)?;
     Ok(kind)

@@ -93,6 +93,12 @@ impl Feed {
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    reason = "tests are cold"
+)]
 mod tests {
     use super::*;
     use proptest::prelude::*;

@@ -44,7 +44,7 @@ pub enum DataSheetError {
         name: &'static str,
         /// Value or property found.
         found: String,
-        /// What is needed.
+        /// Requirement.
         needed: String,
     },
     /// A value that depends on the node number, which is not known.

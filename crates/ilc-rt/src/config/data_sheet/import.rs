@@ -255,8 +255,15 @@ fn take(found: &mut Imported, address: ObjectAddress, object: &SheetObject, valu
     let option = i16::try_from(value).ok();
     match (index, sub) {
         // Taken above, or no settings at all.
-        (objects::ENCODER_RESOLUTION | objects::GEAR_RATIO | objects::FEED_CONSTANT, _)
-        | (objects::IDENTITY | objects::POSITION_UNIT | objects::VELOCITY_UNIT, _) => return,
+        (
+            objects::ENCODER_RESOLUTION
+            | objects::GEAR_RATIO
+            | objects::FEED_CONSTANT
+            | objects::IDENTITY
+            | objects::POSITION_UNIT
+            | objects::VELOCITY_UNIT,
+            _,
+        ) => {}
         (objects::HOME_OFFSET, 0) => drive.home_offset = i32::try_from(value).ok(),
         (objects::POLARITY, 0) if value & 0xC0 == value && [0, 0xC0].contains(&value) => {
             drive.polarity = u8::try_from(value).unwrap_or(0);

@@ -14,8 +14,10 @@ pub fn section(imported: &Imported) -> String {
     axis.insert("drive", Item::Table(table(&imported.drive)));
     document.insert("axis", Item::Table(axis));
     let lacks = imported.lacks.iter().map(ToString::to_string);
-    let comments: String =
-        lacks.chain(imported.remarks.iter().cloned()).map(|line| format!("# {line}\n")).collect();
+    let mut comments = String::new();
+    for line in lacks.chain(imported.remarks.iter().cloned()) {
+        comments.extend(["# ", &line, "\n"]);
+    }
     format!("{comments}{document}")
 }
 
@@ -116,7 +118,7 @@ fn table(drive: &Drive) -> Table {
 }
 
 fn names(list: &[ObjectName]) -> Item {
-    value(Array::from_iter(list.iter().map(ToString::to_string)))
+    value(list.iter().map(ToString::to_string).collect::<Array>())
 }
 
 /// Returns a number in hexadecimal, as data sheets give it.

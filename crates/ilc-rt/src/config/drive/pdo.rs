@@ -42,7 +42,8 @@ impl DrivePdo {
             ("motion", &self.motion, motion),
         ] {
             let Some(list) = list else { continue };
-            let mapped: Result<Vec<MappedObject>, String> = list.iter().map(mapped).collect();
+            let mapped: Result<Vec<MappedObject>, String> =
+                list.iter().copied().map(mapped).collect();
             let mapped = mapped.map_err(|reason| (key, reason))?;
             *part = PdoLayout::new(&mapped).map_err(|error| (key, error.to_string()))?;
         }
@@ -53,7 +54,7 @@ impl DrivePdo {
 }
 
 /// Returns an object with its length in the profile.
-fn mapped(name: &ObjectName) -> Result<MappedObject, String> {
+fn mapped(name: ObjectName) -> Result<MappedObject, String> {
     let bits = match name.index {
         objects::MODE_OF_OPERATION | objects::MODE_DISPLAY => 8,
         objects::CONTROLWORD
