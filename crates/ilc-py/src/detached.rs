@@ -18,6 +18,10 @@ pub(crate) fn detached<T: Send, F: Send + FnOnce() -> T>(py: Python<'_>, work: F
 ///
 /// # Errors
 /// - The exception that a signal handler raised, `KeyboardInterrupt` for Ctrl-C.
+#[expect(
+    clippy::redundant_closure_for_method_calls,
+    reason = "the method itself is not general enough in its lifetime"
+)]
 pub(crate) fn interruptible<T: Send, F: Send + FnOnce() -> T>(
     py: Python<'_>,
     work: F,

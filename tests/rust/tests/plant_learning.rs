@@ -158,8 +158,8 @@ fn campaign(cell: &Cell, from_tool: bool, delay: usize, iterations: usize) -> Ve
     let n = reference.len() / n_axes;
     let mut input = vec![vec![0.0; n]; n_axes];
     let response = |axis: &ilc_rt::config::Axis| {
-        let model = axis.model.unwrap();
-        let (hz, damping) = (model.natural_frequency_hz.unwrap(), model.damping.unwrap());
+        let model = axis.model.expect("a model");
+        let (hz, damping) = (model.natural_frequency_hz.expect("csp"), model.damping.expect("csp"));
         impulse_response(hz, damping, delay, cell.cycle_s())
     };
     let responses: Vec<Vec<f64>> = cell.axes.iter().map(response).collect();

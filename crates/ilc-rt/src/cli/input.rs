@@ -27,7 +27,7 @@ enum Verb {
 #[derive(Args)]
 #[command(after_help = "Examples:
   ilc-rt input export gantry.toml --from best gantry-input.json
-  ilc-rt input export gantry.toml --from 12 --library /var/lib/ilc/gantry.db gantry-input.json")]
+  ilc-rt input export gantry.toml --from 2 --library gantry.db gantry-input.json")]
 struct ExportArguments {
     /// Cell description.
     cell: PathBuf,

@@ -30,7 +30,7 @@ impl PdCondition {
     /// Evaluates the condition for a square model.
     ///
     /// # Errors
-    /// - [`LearningError::Model`] for a continuous model.
+    /// - [`LearningError::Model`](crate::learning::LearningError::Model) for a continuous model.
     pub fn new(gains: PdGains, model: &StateSpace) -> Result<Self> {
         let channels = model.n_inputs().min(model.n_outputs());
         let parameters = model.markov(gains.lead_samples + 1)?;
