@@ -123,9 +123,9 @@ class DriftEvent:
 
     name: ClassVar[str] = "drift"
     index: int
-    ratio: float | None
     allowed: float
     origin: str
+    ratio: float | None = None
     relearned_in: str | None = None
 
 

@@ -69,7 +69,7 @@ def drift(event: DriftEvent) -> str:
 
     Examples
     --------
-    >>> drift(DriftEvent(7, 2.0, 1.5, "run 3 of campaign c"))
+    >>> drift(DriftEvent(7, 1.5, "run 3 of campaign c", 2.0))
     'drift: the error of run 7 is 2.00 times that of run 3 of campaign c, 1.5 is allowed'
     """
     times = "beyond" if event.ratio is None else f"{event.ratio:.2f} times"

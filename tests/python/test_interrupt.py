@@ -10,10 +10,10 @@ import pytest
 #: Names that every call may use.
 SET_UP = """
 import numpy as np
-from ilc_rt import PdIlc, StateSpace, analyze, second_order, tune
+from ilc_rt import PdIlc, StateSpace, analyze, discretize, second_order, tune
 from ilc_rt.fits import fit_second_order
 
-axis = second_order(60.0, 0.6).discretize(0.001)
+axis = discretize(second_order(60.0, 0.6), 0.001)
 full = np.full((600, 600), 1e-3)
 wide = StateSpace(full, np.ones((600, 1)), np.ones((1, 600)), [[0.0]], 0.001)
 frequency_hz = np.linspace(1.0, 400.0, 3_000_000)

@@ -56,5 +56,5 @@ def test_a_drift_is_an_event_of_its_own() -> None:
     event = parse_event(
         '{"event": "drift", "index": 7, "ratio": 2.0, "allowed": 1.5, "origin": "run 3"}'
     )
-    assert event == DriftEvent(7, 2.0, 1.5, "run 3")
+    assert event == DriftEvent(7, 1.5, "run 3", 2.0)
     assert StartEvent.__dataclass_fields__["ctl"].default is None
