@@ -19,7 +19,7 @@ SHIFTS = [(293.15, 4), (353.15, 4), (293.15, 2), (353.15, 2)]
 
 def campaign(law: str, folder: Path) -> list[tuple[float, float]]:
     """Return the temperature and the RMS error of each run of a campaign resumed per shift."""
-    runs = []
+    runs: list[tuple[float, float]] = []
     for shift, (temperature_k, n_runs) in enumerate(SHIFTS):
         text = CELL.read_text(encoding="utf-8").replace('law = "relevance"', f'law = "{law}"')
         cell = folder / f"{law}.toml"
@@ -35,7 +35,8 @@ def campaign(law: str, folder: Path) -> list[tuple[float, float]]:
         learning = Campaign(
             cell, library=folder / f"{law}.db", resume=shift > 0, disturbance=thermometer
         )
-        runs += [(temperature_k, record.tracking_rms_m) for record in learning.run(n_runs)]
+        records = learning.run(len(runs) + n_runs)
+        runs += [(temperature_k, record.tracking_rms_m) for record in records]
     return runs
 
 

@@ -63,3 +63,13 @@ def test_an_axis_is_identified_and_drawn(gantry: Path, tmp_path: Path) -> None:
     assert len(factors) == 2
     assert factors[0] < factors[1] < 1.0
     assert (tmp_path / "06_identify.png").stat().st_size > 10_000
+
+
+def test_what_was_learned_cold_is_recalled(gantry: Path, tmp_path: Path) -> None:
+    """Back in the cold, the first run is as good as the last one there; not without recall."""
+    said = run_example(gantry.with_name("07_warm_and_cold.py"), tmp_path)
+    rows = [[float(v) for v in re.findall(r"([\d.]+) µm", line)] for line in said.splitlines()]
+    plain_um, relevant_um = zip(*(row for row in rows if row), strict=True)
+    assert len(plain_um) == 12
+    assert relevant_um[8] < 1.1 * relevant_um[3]
+    assert relevant_um[8] < 0.3 * plain_um[8]
