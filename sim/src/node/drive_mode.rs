@@ -16,7 +16,7 @@ pub enum DriveMode {
 }
 
 impl DriveMode {
-    /// The modes whose targets the drive makes by itself.
+    /// Modes in which the drive generates its own targets (profile modes and homing).
     const OWN: [Self; 3] = [Self::ProfilePosition, Self::ProfileVelocity, Self::Homing];
 
     /// Returns all modes.

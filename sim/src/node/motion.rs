@@ -180,7 +180,7 @@ impl Motion {
         }
     }
 
-    /// Returns the velocity demand, 0 if there is none.
+    /// Returns the velocity demand; 0 without a demand.
     pub fn demand_m_s(&self) -> f64 {
         match self.phase {
             Phase::Velocity { velocity_m_s } | Phase::Ramp { velocity_m_s, .. } => velocity_m_s,

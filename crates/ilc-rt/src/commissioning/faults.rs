@@ -16,7 +16,7 @@ const HISTORY_MAX: u32 = 16;
 pub struct Faults {
     /// Statusword, object 0x6041.
     pub statusword: u16,
-    /// Error code, object 0x603F; 0 if there is none.
+    /// Error code, object 0x603F; 0 without an error.
     pub code: u16,
     /// Emergency codes, object 0x1003, newest first.
     pub history: Vec<u16>,
