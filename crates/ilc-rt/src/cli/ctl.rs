@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
+use clap::Args;
 
 use super::figures::FiguresFile;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
@@ -17,42 +17,10 @@ pub(super) struct CtlArguments {
     /// Cell description.
     cell: PathBuf,
     #[command(subcommand)]
-    verb: Verb,
+    verb: Command,
     /// Write the state after the command to a file; - for standard output.
     #[arg(long, value_name = "FILE", global = true)]
     json: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, Subcommand)]
-enum Verb {
-    /// Let the waiting run start.
-    Start,
-    /// Hold the path where it is, and every start.
-    Pause,
-    /// Go on after a pause.
-    Resume,
-    /// Bring the axes to rest and end.
-    Stop,
-    /// Print the state.
-    Status,
-    /// Set the feed override.
-    Feed {
-        /// 1 to 100 percent.
-        percent: u32,
-    },
-}
-
-impl From<Verb> for Command {
-    fn from(verb: Verb) -> Self {
-        match verb {
-            Verb::Start => Self::Start,
-            Verb::Pause => Self::Pause,
-            Verb::Resume => Self::Resume,
-            Verb::Stop => Self::Stop,
-            Verb::Status => Self::Status,
-            Verb::Feed { percent } => Self::Feed { percent },
-        }
-    }
 }
 
 /// Sends a command; returns the exit status.
@@ -65,7 +33,7 @@ pub(super) fn ctl(arguments: &CtlArguments) -> u8 {
         },
     };
     let replied = Cell::load(&arguments.cell).map_err(|error| error.to_string()).and_then(|cell| {
-        send(&cell.cell.name, arguments.verb.into()).map_err(|error| error.to_string())
+        send(&cell.cell.name, arguments.verb).map_err(|error| error.to_string())
     });
     let Reply { refused, status } = match replied {
         Ok(reply) => reply,

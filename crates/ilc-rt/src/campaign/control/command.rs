@@ -7,18 +7,18 @@ use super::shared::{Shared, Status};
 use crate::servo::FEED_WHOLE;
 
 /// A command of a client.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::Subcommand)]
 #[serde(tag = "command", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Command {
     /// Let the waiting run start.
     Start,
-    /// Hold the path, and every start.
+    /// Hold the path where it is, and every start.
     Pause,
     /// Go on after a pause.
     Resume,
     /// Bring the axes to rest and end.
     Stop,
-    /// Report only.
+    /// Print the state.
     Status,
     /// Set the feed override.
     Feed {
