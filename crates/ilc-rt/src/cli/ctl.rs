@@ -32,9 +32,9 @@ pub(super) fn ctl(arguments: &CtlArguments) -> u8 {
             reserved => reserved,
         },
     };
-    let replied = Cell::load(&arguments.cell).map_err(|error| error.to_string()).and_then(|cell| {
-        send(&cell.cell.name, arguments.verb).map_err(|error| error.to_string())
-    });
+    let replied = Cell::load(&arguments.cell)
+        .map_err(|error| error.to_string())
+        .and_then(|cell| send(&cell.cell.name, arguments.verb).map_err(|error| error.to_string()));
     let Reply { refused, status } = match replied {
         Ok(reply) => reply,
         Err(line) => {
