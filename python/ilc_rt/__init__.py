@@ -18,53 +18,28 @@ from ilc_rt._native import (
 from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
 from ilc_rt.campaign import Campaign, Law
 from ilc_rt.errors import BadInputError, CampaignError, FaultError
-from ilc_rt.laws import (
-    AdjointIlc,
-    ConstrainedIlc,
-    ErrorFeedforwardIlc,
-    FlexibleIlc,
-    Gate,
-    Ladder,
-    ModelInverseIlc,
-    NormOptimalIlc,
-    PdIlc,
-    RelevanceIlc,
-    RelevanceWeights,
-    ThroughJacobian,
-)
+from ilc_rt.laws import *  # noqa: F403
 from ilc_rt.library import Library
 from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 
 __all__ = [
-    "AdjointIlc",
     "Analysis",
     "BadInputError",
     "Campaign",
     "CampaignError",
     "CampaignResult",
     "Cell",
-    "ConstrainedIlc",
-    "ErrorFeedforwardIlc",
     "FaultError",
-    "FlexibleIlc",
-    "Gate",
     "IterationRecord",
-    "Ladder",
     "Law",
     "LearningError",
     "Library",
     "ModelError",
-    "ModelInverseIlc",
-    "NormOptimalIlc",
-    "PdIlc",
-    "RelevanceIlc",
-    "RelevanceWeights",
     "Repeatability",
     "SignalError",
     "StateSpace",
-    "ThroughJacobian",
     "TimeVarying",
     "TrajectoryError",
     "Tuning",
@@ -83,3 +58,4 @@ __all__ = [
     "tune",
     "weights",
 ]
+__all__ += laws.__all__

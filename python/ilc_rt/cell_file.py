@@ -84,24 +84,24 @@ def _is_equal(found: object, value: float) -> bool:
 
 def _replace(place: Path, text: str, name: str) -> None:
     """Replace a file by one that the controller accepts, or leave it unchanged."""
+    try:
+        Cell._check(text, name)
+    except ValueError as error:
+        message = f"{name}: left as it was: {' '.join(str(error).split())}"
+        raise BadInputError(message) from error
     draft: str | None = None
     try:
-        # In the same folder: files that it names are there, and a rename within a folder is atomic.
+        # In the same folder: a rename within a folder is atomic.
         handle, draft = tempfile.mkstemp(prefix=f".{place.stem}-", suffix=".toml", dir=place.parent)
         with os.fdopen(handle, "wb") as file:
             file.write(text.encode("utf-8"))
             file.flush()
             os.fsync(file.fileno())
         Path(draft).chmod(place.stat().st_mode & 0o7777)
-        Cell.load(draft, allow_divergent=True)
         Path(draft).replace(place)
         draft = None
     except OSError as error:
         message = f"{name}: cannot be written: {error.strerror}"
-        raise BadInputError(message) from error
-    except ValueError as error:
-        told = " ".join(str(error).split()).replace(str(draft), name)
-        message = f"{name}: left as it was: {told}"
         raise BadInputError(message) from error
     finally:
         if draft is not None:

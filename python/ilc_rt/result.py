@@ -265,8 +265,7 @@ def library_rows(library: str | Path, cell: str | None = None) -> list[dict[str,
     try:
         return list(Library(str(library)).list(cell))
     except (ValueError, OSError, RuntimeError) as error:
-        message = str(error) if str(library) in str(error) else f"{library}: {error}"
-        raise BadInputError(message) from error
+        raise BadInputError(str(error)) from error
 
 
 def micrometres(length_m: float | None) -> str:

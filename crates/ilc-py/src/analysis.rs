@@ -7,7 +7,7 @@ use std::ffi::CString;
 
 use ilc_rt::learning::analysis::{self, Analysis, Method, Question, Uncertainty};
 use ilc_rt::learning::law::norm_optimal::{NormOptimal, Weights};
-use ilc_rt::learning::tune::{Knowledge, RUNS_MAX, TuningStep, tune as propose};
+use ilc_rt::learning::tune::{Knowledge, TuningStep, tune as propose};
 use ilc_rt::learning::{self, Law};
 use ilc_rt::model::StateSpace;
 use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
@@ -15,16 +15,15 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_signal, misfit, read_array, read_vector};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, ByName, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::laws;
 use crate::python_law::Channels;
 use crate::whole::number;
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn analyze<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn analyze<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let model = a.model("model")?;
     let law = a.get("law")?;
@@ -56,11 +55,7 @@ fn analyze<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, Py
 }
 
 /// Returns the figures of an analysis by the names of `ilc_rt.Analysis`.
-fn figures<'py>(
-    py: Python<'py>,
-    found: &Analysis,
-    model: &StateSpace,
-) -> PyResult<Bound<'py, PyDict>> {
+fn figures<'py>(py: Python<'py>, found: &Analysis, model: &StateSpace) -> ByName<'py> {
     let array = |values: &[f64]| give_signal(py, values.to_vec(), 1, true);
     let signal = |values: &Option<Vec<f64>>, n_channels| {
         let values = values.clone();
@@ -105,9 +100,8 @@ fn figures<'py>(
     Ok(figures)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn refuse_divergent(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn refuse_divergent(keywords: Option<Keywords<'_, '_>>) -> PyResult<()> {
     let a = Arguments::of(keywords)?;
     let (model, n_samples) = (a.model("model")?, a.whole("n_samples")?);
     let law = a.get("law")?;
@@ -187,9 +181,8 @@ fn read_law(
     laws::apart("law", object, n_samples, channels(model))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn tune<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn tune<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (model, n_samples) = (a.model("model")?, a.whole("n_samples")?);
     let knowledge = Knowledge {
@@ -220,7 +213,7 @@ fn tune<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDic
 }
 
 #[pyfunction]
-fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> ByName<'py> {
     let py = errors.py();
     let (values, shape) = read_array("errors", errors)?;
     let (count, n_samples, n_channels) = match shape[..] {
@@ -249,12 +242,4 @@ fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>
         figures.set_item(name, value)?;
     }
     Ok(figures)
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(analyze, module)?)?;
-    module.add_function(wrap_pyfunction!(refuse_divergent, module)?)?;
-    module.add_function(wrap_pyfunction!(tune, module)?)?;
-    module.add("TUNING_RUNS_MAX", RUNS_MAX)?;
-    module.add_function(wrap_pyfunction!(repeatability, module)?)
 }

@@ -13,9 +13,16 @@ use crate::argument::{Matrix, Signal, misfit, read_array, read_vector};
 use crate::model_argument::read_model;
 use crate::whole::{each, number, pair, refused, shown, whole};
 
+/// The keywords of a call from Python.
+pub(crate) type Keywords<'a, 'py> = &'a Bound<'py, PyDict>;
+/// Figures by name, as returned to Python.
+pub(crate) type ByName<'py> = PyResult<Bound<'py, PyDict>>;
+/// An array, as returned to Python.
+pub(crate) type Array<'py> = PyResult<Bound<'py, PyAny>>;
+
 /// The keyword arguments of one call.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Arguments<'a, 'py>(&'a Bound<'py, PyDict>);
+pub(crate) struct Arguments<'a, 'py>(Keywords<'a, 'py>);
 
 impl<'a, 'py> Arguments<'a, 'py> {
     /// Wraps the keywords of a call.

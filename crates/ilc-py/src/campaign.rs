@@ -34,7 +34,7 @@ const SIGTERM: i32 = 15;
 
 /// Events of a campaign that runs inside this process, one JSON object each.
 #[pyclass(name = "EventStream", module = "ilc_rt._native", frozen)]
-struct EventStream {
+pub(crate) struct EventStream {
     events: Mutex<Receiver<String>>,
     thread: Mutex<Option<JoinHandle<Result<(), CampaignError>>>>,
     stop: Arc<AtomicI32>,
@@ -118,10 +118,9 @@ impl Drop for EventStream {
 /// Returns EventStream: An iterator of JSON texts.
 /// Raises ValueError if an option cannot be used; from the iterator, before anything moves, if
 ///     something else cannot.
-#[pyfunction]
-#[pyo3(signature = (cell, arguments, verb="run", law=None, disturbance=None))]
+#[pyfunction(signature = (cell, arguments, verb="run", law=None, disturbance=None))]
 #[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
-fn run_events(
+pub(crate) fn run_events(
     cell: &Bound<'_, PyCell>,
     arguments: Vec<String>,
     verb: &str,
@@ -199,7 +198,7 @@ impl Work {
 /// Raises ValueError with the name of the option, its value and the allowed values.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
-fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
+pub(crate) fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
     Work::parse(verb, &arguments).map(drop)
 }
 
@@ -207,7 +206,7 @@ fn check_options(verb: &str, arguments: Vec<String>) -> PyResult<()> {
 ///
 /// Returns a JSON list: name, flags, help, kind, default, choices, placeholder.
 #[pyfunction]
-fn described_options(verb: &str) -> PyResult<String> {
+pub(crate) fn described_options(verb: &str) -> PyResult<String> {
     let options = match verb {
         "run" => described::<Options>(),
         "identify" => described::<IdentifyOptions>(),
@@ -240,11 +239,4 @@ fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
         Ok(machine) => Ok(Box::new(InProcess::new(machine, LOOPBACK_FRAMES))),
         Err(error) => Err(CampaignError::Simulation { file, reason: error.to_string() }),
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<EventStream>()?;
-    module.add_function(wrap_pyfunction!(check_options, module)?)?;
-    module.add_function(wrap_pyfunction!(described_options, module)?)?;
-    module.add_function(wrap_pyfunction!(run_events, module)?)
 }

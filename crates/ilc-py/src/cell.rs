@@ -62,6 +62,17 @@ impl PyCell {
         })
     }
 
+    /// Refuse a text that `load` would refuse as the contents of this file.
+    ///
+    /// A diverging law is accepted.
+    #[staticmethod]
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
+    fn _check(text: &str, path: std::path::PathBuf) -> PyResult<()> {
+        let mut cell = Cell::parse(text, &path.display().to_string()).or_raise()?;
+        cell.learning.allow_divergent = true;
+        Plan::new(&cell, None, false).or_raise()?.law(&cell).or_raise().map(drop)
+    }
+
     /// Pickled and copied as the file that it is read from.
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
         slf.get().made.reduce(slf.get_type().as_any())
@@ -175,8 +186,4 @@ impl PyCell {
     fn __repr__(&self) -> String {
         format!("Cell({:?}, {} axes, {})", self.name(), self.n_axes(), self.bus())
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyCell>()
 }

@@ -6,10 +6,10 @@ use numpy::IntoPyArray;
 use numpy::ndarray::Array3;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::PyList;
 
 use crate::argument::{Signal, give_signal, misfit, read_vector};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::made::Made;
@@ -17,13 +17,13 @@ use crate::whole::whole;
 
 #[pyclass(name = "Line", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
-struct PyLine(Line, Made);
+pub(crate) struct PyLine(Line, Made);
 
 #[pymethods]
 impl PyLine {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let a = Arguments::of(keywords)?;
         let point = |name: &str| read_point(name, &a.get(name)?);
         Ok(Self(Line { from_m: point("from_m")?, to_m: point("to_m")? }, Made::of(a)?))
@@ -40,13 +40,13 @@ impl PyLine {
 
 #[pyclass(name = "Arc", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
-struct PyArc(Arc, Made);
+pub(crate) struct PyArc(Arc, Made);
 
 #[pymethods]
 impl PyArc {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let a = Arguments::of(keywords)?;
         let point = |name: &str| read_point(name, &a.get(name)?);
         let axis = a.maybe("axis", read_point)?.unwrap_or([0.0, 0.0, 1.0]);
@@ -63,9 +63,8 @@ impl PyArc {
     }
 }
 
-#[pyfunction]
-#[pyo3(signature = (reference_m, actual_m, window=None))]
-fn contour_error<'py>(
+#[pyfunction(signature = (reference_m, actual_m, window=None))]
+pub(crate) fn contour_error<'py>(
     py: Python<'py>,
     reference_m: &Bound<'py, PyAny>,
     actual_m: &Bound<'py, PyAny>,
@@ -96,7 +95,7 @@ fn contour_error<'py>(
 }
 
 #[pyfunction]
-fn coupling_gains<'py>(
+pub(crate) fn coupling_gains<'py>(
     py: Python<'py>,
     reference_m: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
@@ -106,7 +105,7 @@ fn coupling_gains<'py>(
 }
 
 #[pyfunction]
-fn projection_across<'py>(
+pub(crate) fn projection_across<'py>(
     py: Python<'py>,
     reference_m: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
@@ -187,12 +186,4 @@ fn read_shapes(object: &Bound<'_, PyAny>, window: Option<usize>) -> PyResult<Opt
         )));
     }
     Ok(Some(shapes))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyLine>()?;
-    module.add_class::<PyArc>()?;
-    module.add_function(wrap_pyfunction!(contour_error, module)?)?;
-    module.add_function(wrap_pyfunction!(coupling_gains, module)?)?;
-    module.add_function(wrap_pyfunction!(projection_across, module)?)
 }

@@ -8,10 +8,9 @@ use ilc_rt::control::{
 use ilc_rt::model::StateSpace;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::argument::{Matrix, Signal, give_signal, misfit, read_vector};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Keywords};
 use crate::error::OrRaise;
 use crate::guard::Guarded;
 use crate::made::Made;
@@ -20,7 +19,7 @@ use crate::whole::{Real, number};
 
 #[pyclass(name = "Pid", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
-struct PyPid {
+pub(crate) struct PyPid {
     made: Made,
     dt_s: f64,
     pid: Guarded<Pid>,
@@ -30,7 +29,7 @@ struct PyPid {
 impl PyPid {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let a = Arguments::of(keywords)?;
         let dt_s = positive("dt_s", a.number("dt_s")?)?;
         let filter_s = positive("filter_s", a.number("filter_s")?)?;
@@ -99,13 +98,13 @@ impl PyPid {
 
 #[pyclass(name = "Cascade", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
-struct PyCascade(Guarded<Cascade>, Made);
+pub(crate) struct PyCascade(Guarded<Cascade>, Made);
 
 #[pymethods]
 impl PyCascade {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let a = Arguments::of(keywords)?;
         let plain = |name| finite(name, a.number(name)?);
         let gains = CascadeGains {
@@ -165,13 +164,13 @@ impl PyCascade {
 
 #[pyclass(name = "CrossCoupled", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
-struct PyCrossCoupled(Guarded<CrossCoupled>, Made);
+pub(crate) struct PyCrossCoupled(Guarded<CrossCoupled>, Made);
 
 #[pymethods]
 impl PyCrossCoupled {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let a = Arguments::of(keywords)?;
         let controller = a.get("controller")?;
         let mut pid = *controller.cast::<PyPid>()?.get().pid.borrow(a.py())?;
@@ -243,10 +242,4 @@ fn read_pair(name: &str, object: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
         [first, second] => Ok([first, second]),
         ref other => Err(misfit(name, &[other.len()], "(2,)")),
     }
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyPid>()?;
-    module.add_class::<PyCascade>()?;
-    module.add_class::<PyCrossCoupled>()
 }

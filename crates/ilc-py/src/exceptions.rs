@@ -2,7 +2,6 @@
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
-use pyo3::prelude::*;
 
 create_exception!(ilc_rt, ModelError, PyValueError, "A model that cannot be used as asked.");
 create_exception!(ilc_rt, SignalError, PyValueError, "A filter or signal that cannot be used.");
@@ -10,13 +9,3 @@ create_exception!(ilc_rt, LearningError, PyValueError, "A law or argument that c
 create_exception!(ilc_rt.kinematics, KinematicsError, PyValueError, "No such pose or mechanism.");
 create_exception!(ilc_rt.trajectory, ContourError, PyValueError, "Not a path or not an arc.");
 create_exception!(ilc_rt, TrajectoryError, PyValueError, "A motion that cannot be planned.");
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let py = module.py();
-    module.add("ModelError", py.get_type::<ModelError>())?;
-    module.add("SignalError", py.get_type::<SignalError>())?;
-    module.add("TrajectoryError", py.get_type::<TrajectoryError>())?;
-    module.add("LearningError", py.get_type::<LearningError>())?;
-    module.add("KinematicsError", py.get_type::<KinematicsError>())?;
-    module.add("ContourError", py.get_type::<ContourError>())
-}

@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::read_vector;
+use crate::arguments::ByName;
 use crate::cell::PyCell;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
@@ -53,13 +54,13 @@ impl From<IdentificationError> for Failure {
 /// Raises ValueError if an option cannot be used, or an amplitude is beyond a limit.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
-fn identify_axis<'py>(
+pub(crate) fn identify_axis<'py>(
     py: Python<'py>,
     cell: &Bound<'py, PyCell>,
     arguments: Vec<String>,
     excite: &Bound<'py, PyAny>,
     report: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> ByName<'py> {
     let cell = &cell.get().cell;
     let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
     let mut raised = None;
@@ -98,7 +99,7 @@ fn identify_axis<'py>(
 /// Return the experiment of options, words of ``ilc-rt identify``, in the default band if they give none.
 #[pyfunction]
 #[expect(clippy::needless_pass_by_value, reason = "as Python hands them over")]
-fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'_, PyDict>> {
+pub(crate) fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> ByName<'_> {
     let options: ExperimentOptions = parse(&arguments).map_err(PyValueError::new_err)?;
     let axis = options.axis.clone().unwrap_or_default();
     let at_m = options.at_m;
@@ -109,7 +110,7 @@ fn single_experiment(py: Python<'_>, arguments: Vec<String>) -> PyResult<Bound<'
 ///
 /// Returns signals, response, models, uncertainty and doubt by name.
 #[pyfunction]
-fn evaluate_experiment<'py>(
+pub(crate) fn evaluate_experiment<'py>(
     py: Python<'py>,
     u: &Bound<'py, PyAny>,
     y: &Bound<'py, PyAny>,
@@ -117,7 +118,7 @@ fn evaluate_experiment<'py>(
     from_hz: Real,
     to_hz: Real,
     dt_s: Real,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> ByName<'py> {
     let (u, y) = (read_vector("u", u)?, read_vector("y", y)?);
     let period_samples = whole("period_samples", period_samples)?;
     let (band_hz, dt_s) = ((from_hz.0, to_hz.0), dt_s.0);
@@ -126,7 +127,7 @@ fn evaluate_experiment<'py>(
 }
 
 /// Returns the figures of an experiment, as the arguments of `ilc_rt.experiment.Experiment`.
-fn figures<'py>(py: Python<'py>, experiment: &Experiment) -> PyResult<Bound<'py, PyDict>> {
+fn figures<'py>(py: Python<'py>, experiment: &Experiment) -> ByName<'py> {
     let (figures, excitation) = (PyDict::new(py), &experiment.excitation);
     figures.set_item("axis", &experiment.axis)?;
     figures.set_item("waveform", waveform_name(excitation.waveform))?;
@@ -140,7 +141,7 @@ fn figures<'py>(py: Python<'py>, experiment: &Experiment) -> PyResult<Bound<'py,
 }
 
 /// Returns the result of an identification, as arguments of `ilc_rt.identification.Identification`.
-fn describe(py: Python<'_>, found: Identified) -> PyResult<Bound<'_, PyDict>> {
+fn describe(py: Python<'_>, found: Identified) -> ByName<'_> {
     let array = |values: Vec<f64>| PyArray1::from_vec(py, values);
     let result = PyDict::new(py);
     result.set_item("axis_model", found.section())?;
@@ -159,10 +160,4 @@ fn describe(py: Python<'_>, found: Identified) -> PyResult<Bound<'_, PyDict>> {
     result.set_item("u", array(found.input))?;
     result.set_item("y", array(found.output))?;
     Ok(result)
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(identify_axis, module)?)?;
-    module.add_function(wrap_pyfunction!(single_experiment, module)?)?;
-    module.add_function(wrap_pyfunction!(evaluate_experiment, module)?)
 }

@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::read_vector;
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Array, ByName, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::experiment::read_waveform;
@@ -45,10 +45,7 @@ fn read_measured(a: Arguments<'_, '_>) -> PyResult<FrequencyResponse> {
 }
 
 /// Returns a measured response by the names of `ilc_rt.fits.FrequencyResponse`.
-pub(crate) fn give_measured(
-    py: Python<'_>,
-    measured: FrequencyResponse,
-) -> PyResult<Bound<'_, PyDict>> {
+pub(crate) fn give_measured(py: Python<'_>, measured: FrequencyResponse) -> ByName<'_> {
     let figures = PyDict::new(py);
     figures.set_item("frequency_hz", give(py, measured.frequency_hz))?;
     figures.set_item("response", give(py, measured.response))?;
@@ -57,23 +54,20 @@ pub(crate) fn give_measured(
     Ok(figures)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn check_response<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn check_response<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     give_measured(a.py(), read_measured(a)?)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn relative_deviation<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn relative_deviation<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
     let a = Arguments::of(keywords)?;
     Ok(give(a.py(), read_measured(a)?.relative_deviation()))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn frequency_response<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn frequency_response<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (u, y, dt_s) = (a.vector("u")?, a.vector("y")?, a.number("dt_s")?);
     let overlap_samples = a.maybe_whole("overlap_samples")?;
@@ -93,9 +87,8 @@ fn frequency_response<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bo
     give_measured(a.py(), found.or_raise()?)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn fit_second_order<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn fit_second_order<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
     let known = Known { gain: a.maybe_number("gain")?, delay_s: a.maybe_number("delay_s")? };
@@ -104,10 +97,7 @@ fn fit_second_order<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Boun
 }
 
 /// Returns a fit by the names of `ilc_rt.fits.SecondOrderFit`.
-pub(crate) fn give_second_order<'py>(
-    py: Python<'py>,
-    fit: &SecondOrderFit,
-) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn give_second_order<'py>(py: Python<'py>, fit: &SecondOrderFit) -> ByName<'py> {
     let model = &fit.model;
     let figures = PyDict::new(py);
     for (name, value) in [
@@ -138,26 +128,23 @@ fn read_second_order(a: Arguments<'_, '_>) -> PyResult<SecondOrder> {
     })
 }
 
-#[pyfunction]
-#[pyo3(signature = (frequency_hz, /, **model))]
-fn second_order_response<'py>(
+#[pyfunction(signature = (frequency_hz, /, **model))]
+pub(crate) fn second_order_response<'py>(
     frequency_hz: &Bound<'py, PyAny>,
-    model: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Bound<'py, PyAny>> {
+    model: Option<Keywords<'_, 'py>>,
+) -> Array<'py> {
     let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
     let a = Arguments::of(model)?;
     Ok(give(a.py(), read_second_order(a)?.response(&frequency_hz)))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**model))]
-fn second_order_model(model: Option<&Bound<'_, PyDict>>) -> PyResult<PyStateSpace> {
+#[pyfunction(signature = (**model))]
+pub(crate) fn second_order_model(model: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
     read_second_order(Arguments::of(model)?)?.state_space().or_raise().map(PyStateSpace)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn fit_velocity_loop<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn fit_velocity_loop<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (measured, gain_per_s) = (read_measured(a)?, a.number("position_gain_per_s")?);
     let (dt_s, delay_s) = (a.number("dt_s")?, a.maybe_number("delay_s")?);
@@ -166,10 +153,7 @@ fn fit_velocity_loop<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bou
 }
 
 /// Returns a fit by the names of `ilc_rt.fits.VelocityLoopFit`.
-pub(crate) fn give_velocity_loop<'py>(
-    py: Python<'py>,
-    fit: &VelocityLoopFit,
-) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn give_velocity_loop<'py>(py: Python<'py>, fit: &VelocityLoopFit) -> ByName<'py> {
     let model = &fit.model;
     let figures = PyDict::new(py);
     for (name, value) in [
@@ -189,12 +173,11 @@ pub(crate) fn give_velocity_loop<'py>(
     Ok(figures)
 }
 
-#[pyfunction]
-#[pyo3(signature = (frequency_hz, /, **model))]
-fn velocity_loop_response<'py>(
+#[pyfunction(signature = (frequency_hz, /, **model))]
+pub(crate) fn velocity_loop_response<'py>(
     frequency_hz: &Bound<'py, PyAny>,
-    model: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Bound<'py, PyAny>> {
+    model: Option<Keywords<'_, 'py>>,
+) -> Array<'py> {
     let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
     let a = Arguments::of(model)?;
     let model = VelocityLoop {
@@ -207,9 +190,8 @@ fn velocity_loop_response<'py>(
     Ok(give(a.py(), model.response(&frequency_hz)))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn fit_rational<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn fit_rational<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (n_zeros, n_poles) = (a.whole("n_zeros")?, a.whole("n_poles")?);
     let (measured, dt_s) = (read_measured(a)?, a.maybe_number("dt_s")?);
@@ -227,19 +209,17 @@ fn fit_rational<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'p
 /// Frequencies and bounds.
 type Bounds<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn uncertainty<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bounds<'py>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn uncertainty<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bounds<'py>> {
     let a = Arguments::of(keywords)?;
     let (measured, model) = (read_measured(a)?, read_complex("model", &a.get("model")?)?);
     let found = identify::uncertainty(&measured, &model, a.number("deviations")?).or_raise()?;
     Ok((give(a.py(), found.frequency_hz), give(a.py(), found.bound)))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn excitation<'py>(
-    keywords: Option<&Bound<'py, PyDict>>,
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn excitation<'py>(
+    keywords: Option<Keywords<'_, 'py>>,
 ) -> PyResult<(Bound<'py, PyAny>, usize, usize)> {
     let a = Arguments::of(keywords)?;
     let dt_s = a.number("dt_s")?;
@@ -268,18 +248,4 @@ fn read_complex(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<Complex<f
 
 fn give<T: numpy::Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyAny> {
     Array1::from(values).into_pyarray(py).into_any()
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_response, module)?)?;
-    module.add_function(wrap_pyfunction!(relative_deviation, module)?)?;
-    module.add_function(wrap_pyfunction!(frequency_response, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_second_order, module)?)?;
-    module.add_function(wrap_pyfunction!(second_order_response, module)?)?;
-    module.add_function(wrap_pyfunction!(second_order_model, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_velocity_loop, module)?)?;
-    module.add_function(wrap_pyfunction!(velocity_loop_response, module)?)?;
-    module.add_function(wrap_pyfunction!(fit_rational, module)?)?;
-    module.add_function(wrap_pyfunction!(uncertainty, module)?)?;
-    module.add_function(wrap_pyfunction!(excitation, module)?)
 }

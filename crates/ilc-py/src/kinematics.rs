@@ -4,17 +4,16 @@ use ilc_rt::kinematics::{Delta, Gantry, KinematicsError};
 use numpy::IntoPyArray;
 use numpy::ndarray::{Array2, Array3};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_signal, misfit};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Keywords};
 use crate::error::OrRaise;
 use crate::exceptions;
 use crate::made::Made;
 
 #[pyclass(name = "Delta", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
-struct PyDelta {
+pub(crate) struct PyDelta {
     made: Made,
     delta: Delta,
 }
@@ -23,7 +22,7 @@ struct PyDelta {
 impl PyDelta {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let a = Arguments::of(keywords)?;
         let delta = Delta::new(a.number("base_m")?, a.number("crank_m")?, a.number("rod_m")?);
         Ok(Self { made: Made::of(a)?, delta: delta.or_raise()? })
@@ -118,7 +117,7 @@ impl PyDelta {
 
 #[pyclass(name = "Gantry", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
-struct PyGantry {
+pub(crate) struct PyGantry {
     made: Made,
     gantry: Gantry,
 }
@@ -127,7 +126,7 @@ struct PyGantry {
 impl PyGantry {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let a = Arguments::of(keywords)?;
         let gantry = Gantry::new(a.number("orthogonality_rad")?).or_raise()?;
         Ok(Self { made: Made::of(a)?, gantry })
@@ -223,9 +222,4 @@ fn pairs<'py>(
     }
     let mapped: Vec<f64> = signal.values.as_chunks().0.iter().flat_map(|pair| map(*pair)).collect();
     give_signal(py, mapped, 2, signal.is_flat)
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyDelta>()?;
-    module.add_class::<PyGantry>()
 }

@@ -1,6 +1,6 @@
 //! Python bindings of `ilc-rt`: conversion, shape checks and error mapping only.
 //!
-//! One file per family of Python names, each with its `register`; `argument` checks input,
+//! One file per family of Python names, exported below; `argument` checks input,
 //! `exceptions` and `error` define the exceptions, and `detached` releases the interpreter.
 //!
 //! Family: `laws` and `python_law` call each other: an inner law may be written in Python.
@@ -38,29 +38,59 @@ mod transport;
 mod weights;
 mod whole;
 
-use pyo3::prelude::*;
-
 /// The compiled part of `ilc_rt`.
-#[pymodule]
-fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    exceptions::register(module)?;
-    model::register(module)?;
-    time_varying::register(module)?;
-    identify::register(module)?;
-    signal::register(module)?;
-    kinematics::register(module)?;
-    contour::register(module)?;
-    control::register(module)?;
-    trajectory::register(module)?;
-    transport::register(module)?;
-    laws::register(module)?;
-    weights::register(module)?;
-    analysis::register(module)?;
-    cell::register(module)?;
-    library::register(module)?;
-    campaign::register(module)?;
-    experiment::register(module)?;
-    made::register(module)?;
-    Ok(())
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name is Python's")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+    #[pymodule_export]
+    const TUNING_RUNS_MAX: usize = ilc_rt::learning::tune::RUNS_MAX;
+    #[pymodule_export]
+    use super::analysis::{analyze, refuse_divergent, repeatability, tune};
+    #[pymodule_export]
+    use super::campaign::{EventStream, check_options, described_options, run_events};
+    #[pymodule_export]
+    use super::cell::PyCell;
+    #[pymodule_export]
+    use super::contour::{PyArc, PyLine, contour_error, coupling_gains, projection_across};
+    #[pymodule_export]
+    use super::control::{PyCascade, PyCrossCoupled, PyPid};
+    #[pymodule_export]
+    use super::exceptions::{
+        ContourError, KinematicsError, LearningError, ModelError, SignalError, TrajectoryError,
+    };
+    #[pymodule_export]
+    use super::experiment::{evaluate_experiment, identify_axis, single_experiment};
+    #[pymodule_export]
+    use super::identify::{
+        check_response, excitation, fit_rational, fit_second_order, fit_velocity_loop,
+        frequency_response, relative_deviation, second_order_model, second_order_response,
+        uncertainty, velocity_loop_response,
+    };
+    #[pymodule_export]
+    use super::kinematics::{PyDelta, PyGantry};
+    #[pymodule_export]
+    use super::laws::{PyLaw, recalled::check_relevance_weights};
+    #[pymodule_export]
+    use super::library::PyLibrary;
+    #[pymodule_export]
+    use super::made::{_made, _made_of_kind};
+    #[pymodule_export]
+    use super::model::{PyStateSpace, discretize, from_transfer_function, second_order};
+    #[pymodule_export]
+    use super::signal::{PyFilter, instantaneous_frequency, zero_phase};
+    #[pymodule_export]
+    use super::time_varying::PyTimeVarying;
+    #[pymodule_export]
+    use super::trajectory::{
+        butterfly, exponential_sigmoid, gcode, jerk_limited, modulated, raster, sigmoid_pair,
+        spiral, spline, tracking_index,
+    };
+    #[pymodule_export]
+    use super::transport::transports;
+    #[pymodule_export]
+    use super::weights::{
+        contour_weights, coupled_weights, formation_errors, formation_weights, schedule,
+    };
 }

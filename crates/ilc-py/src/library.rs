@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_signal, misfit, read_disturbance};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, ByName, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::made::Made;
@@ -40,7 +40,7 @@ enum Held {
 impl PyLibrary {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let a = Arguments::of(keywords)?;
         let (made, path) = (Made::of(a)?, a.get("path")?.extract::<PathBuf>()?);
         if path.as_os_str() == ":memory:" {
@@ -76,7 +76,7 @@ impl PyLibrary {
     }
 
     /// Return a run with its arrays.
-    fn load<'py>(&self, py: Python<'py>, id: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+    fn load<'py>(&self, py: Python<'py>, id: &Bound<'py, PyAny>) -> ByName<'py> {
         let id = whole::id(id)?;
         let row = detached(py, || self.read(|library| library.load(id))).or_raise()?;
         let run = describe(py, &row)?;
@@ -126,7 +126,7 @@ impl PyLibrary {
 
     /// Store a run that was made elsewhere.
     #[pyo3(signature = (**keywords))]
-    fn _append(&self, py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<i64> {
+    fn _append(&self, py: Python<'_>, keywords: Option<Keywords<'_, '_>>) -> PyResult<i64> {
         let a = Arguments::of(keywords)?;
         let u = a.signal("u")?;
         let alike = |name: &str, signal: &Bound<'_, PyAny>| {
@@ -240,7 +240,7 @@ impl PyLibrary {
     }
 }
 
-fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
+fn describe<'py>(py: Python<'py>, row: &Row) -> ByName<'py> {
     let run = PyDict::new(py);
     run.set_item("id", row.id)?;
     run.set_item("created_utc", &row.created_utc)?;
@@ -261,8 +261,4 @@ fn describe<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyDict>> {
     run.update(py.import("json")?.call_method1("loads", (described,))?.cast()?)?;
     run.set_item("digest", &row.digest)?;
     Ok(run)
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyLibrary>()
 }

@@ -6,7 +6,6 @@
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use pyo3::wrap_pyfunction;
 
 use crate::arguments::Arguments;
 
@@ -51,9 +50,8 @@ impl Made {
 }
 
 /// Creates an object again by its recorded call.
-#[pyfunction]
-#[pyo3(signature = (cls, how, arguments))]
-fn _made<'py>(
+#[pyfunction(signature = (cls, how, arguments))]
+pub(crate) fn _made<'py>(
     cls: &Bound<'py, PyAny>,
     how: Option<&str>,
     arguments: &Bound<'py, PyDict>,
@@ -64,7 +62,7 @@ fn _made<'py>(
 
 /// Makes a law or a filter again from its kind, for copies and pickles: `native` is its class here.
 #[pyfunction]
-fn _made_of_kind<'py>(
+pub(crate) fn _made_of_kind<'py>(
     class: &Bound<'py, PyAny>,
     native: &str,
     kind: &str,
@@ -86,9 +84,4 @@ pub(crate) fn reduce_kind<'py>(
     let parts = (object.get_type(), native, kind, arguments);
     let attributes = object.getattr_opt("__dict__")?;
     Ok((maker, parts, attributes).into_pyobject(object.py())?.into_any())
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(_made, module)?)?;
-    module.add_function(wrap_pyfunction!(_made_of_kind, module)?)
 }

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
@@ -302,36 +302,26 @@ impl PyStateSpace {
     }
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn from_transfer_function(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<PyStateSpace> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn from_transfer_function(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
     let a = Arguments::of(keywords)?;
     let dt_s = a.maybe("dt_s", read_sample_time)?.flatten();
     let (num, den) = (a.vector("num")?, a.vector("den")?);
     model::from_transfer_function(&num, &den, dt_s).or_raise().map(PyStateSpace)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn second_order(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<PyStateSpace> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn second_order(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
     let a = Arguments::of(keywords)?;
     let (w0, damping) = (a.number("natural_frequency_rad_s")?, a.number("damping")?);
     model::second_order(w0, damping).or_raise().map(PyStateSpace)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn discretize(keywords: Option<&Bound<'_, PyDict>>) -> PyResult<PyStateSpace> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn discretize(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
     let a = Arguments::of(keywords)?;
     let methods = [("zoh", Method::ZeroOrderHold), ("tustin", Method::Tustin)];
     let (model, dt_s) = (a.model("model")?, a.number("dt_s")?);
     let method = a.choice("method", &methods)?;
     model::discretize(&model, dt_s, method).or_raise().map(PyStateSpace)
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyStateSpace>()?;
-    module.add_function(wrap_pyfunction!(from_transfer_function, module)?)?;
-    module.add_function(wrap_pyfunction!(second_order, module)?)?;
-    module.add_function(wrap_pyfunction!(discretize, module)?)
 }

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
 use crate::argument::{Signal, give_signal, read_vector};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Array, ByName, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::exceptions;
@@ -31,7 +31,7 @@ pub(crate) struct PyFilter {
 impl PyFilter {
     #[new]
     #[pyo3(signature = (kind, /, **arguments))]
-    fn new(py: Python<'_>, kind: String, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(py: Python<'_>, kind: String, arguments: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let none = PyDict::new(py);
         let kept = Arguments::new(arguments.unwrap_or(&none)).kept()?;
         let a = Arguments::new(&kept);
@@ -105,7 +105,7 @@ impl PyFilter {
     }
 
     /// Parameters of the filter by name, in addition to its arguments.
-    fn _figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn _figures<'py>(&self, py: Python<'py>) -> ByName<'py> {
         let figures = self.arguments.bind(py).copy()?;
         match &self.filter {
             QFilter::Gaussian(filter) => {
@@ -230,7 +230,7 @@ fn filtered<'py>(
 }
 
 #[pyfunction]
-fn zero_phase<'py>(
+pub(crate) fn zero_phase<'py>(
     py: Python<'py>,
     filter: &Bound<'py, PyAny>,
     x: &Bound<'py, PyAny>,
@@ -238,19 +238,10 @@ fn zero_phase<'py>(
     filtered(py, &without_lag(&read_filter("filter", Some(filter))?), x)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn instantaneous_frequency<'py>(
-    keywords: Option<&Bound<'py, PyDict>>,
-) -> PyResult<Bound<'py, PyAny>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn instantaneous_frequency<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
     let a = Arguments::of(keywords)?;
     let (x, dt_s) = (a.vector("x")?, a.number("dt_s")?);
     let found = detached(a.py(), || signal::instantaneous_frequency(&x, dt_s)).or_raise()?;
     give_signal(a.py(), found, 1, true)
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyFilter>()?;
-    module.add_function(wrap_pyfunction!(zero_phase, module)?)?;
-    module.add_function(wrap_pyfunction!(instantaneous_frequency, module)?)
 }

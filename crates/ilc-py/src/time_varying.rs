@@ -188,7 +188,3 @@ impl PyTimeVarying {
         )
     }
 }
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyTimeVarying>()
-}

@@ -11,16 +11,16 @@ use ilc_rt::trajectory::exponential::listing::{ListedLeg, Listing};
 use ilc_rt::trajectory::kind::RasterSection;
 use ilc_rt::trajectory::program::{GcodeSetting, read_gcode};
 use ilc_rt::trajectory::{
-    AxisLimits, ExponentialSigmoid, Interpolator, Linear, LinearSetting, MAX_AXES,
-    ModulatedSegment, MoveError, POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion,
-    TrackingIndex, TrajectoryError, points_program,
+    AxisLimits, ExponentialSigmoid, Linear, LinearSetting, MAX_AXES, ModulatedSegment, MoveError,
+    POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion, TrackingIndex, TrajectoryError,
+    points_program,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{give_signal, read_vector};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, ByName, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::exceptions;
@@ -29,14 +29,12 @@ use crate::exceptions;
 type Alpha = (usize, String, f64, Vec<(f64, f64)>);
 /// A planned motion.
 type Planned = Result<(SampledMotion, Vec<Alpha>), TrajectoryError>;
-/// The keywords of a call from Python.
-type Keywords<'a, 'py> = &'a Bound<'py, PyDict>;
 
 const SETTINGS: [(&str, LinearSetting); 2] =
     [("complete", LinearSetting::CompleteEveryMove), ("on_time", LinearSetting::StartOnTime)];
 
 /// Plans a motion while other Python threads run, and returns its samples by name.
-fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> PyResult<Bound<'_, PyDict>> {
+fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> ByName<'_> {
     let begun = Instant::now();
     let (motion, alphas) = interruptible(py, plan)?.or_raise()?;
     let computing_s = begun.elapsed().as_secs_f64();
@@ -174,31 +172,8 @@ fn sample_run(curve: &impl Curve, limits: &RunLimits, dt_s: f64) -> Planned {
     Ok((Run::plan(curve, limits, dt_s)?.motion().clone(), Vec::new()))
 }
 
-fn sample_path(spec: &PathSpec, limits: &[AxisLimits], dt_s: f64) -> Planned {
-    let mut plan = Interpolator::plan(spec, limits, dt_s)?;
-    let n_axes = plan.n_axes();
-    let mut motion = SampledMotion { dt_s, n_axes, ..SampledMotion::default() };
-    for _ in 0..plan.n_samples() {
-        let setpoint = plan.next();
-        motion.position_m.extend_from_slice(&setpoint.position_m[..n_axes]);
-        motion.velocity_m_s.extend_from_slice(&setpoint.velocity_m_s[..n_axes]);
-    }
-    let v = &motion.velocity_m_s;
-    let last = v.len();
-    motion.acceleration_m_s2 = (0..last)
-        .map(|i| {
-            // At rest at both ends, where there is no neighbour.
-            let inside = i >= n_axes && i + n_axes < last;
-            if inside { (v[i + n_axes] - v[i - n_axes]) / (2.0 * dt_s) } else { 0.0 }
-        })
-        .collect();
-    motion.programmed_m.clone_from(&motion.position_m);
-    Ok((motion, Vec::new()))
-}
-
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn jerk_limited<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn jerk_limited<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
     let feeds = read_each("feed_m_s", &a.get("feed_m_s")?, points.len() - 1)?;
@@ -210,9 +185,8 @@ fn jerk_limited<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py,
     planned(a.py(), || sample_linear(&points[0], &segments, &limits, setting, dt_s))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn exponential_sigmoid<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn exponential_sigmoid<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
     let n_legs = points.len() - 1;
@@ -234,9 +208,8 @@ fn exponential_sigmoid<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bou
     planned(a.py(), || sample_exponential(&points[0], &segments, &limits, &alpha_max, dt_s))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn modulated<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn modulated<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
     let [start, end] = &points[..] else {
@@ -266,9 +239,8 @@ fn modulated<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, Py
     }
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn sigmoid_pair<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn sigmoid_pair<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (velocity, amplitude) = (a.pair("velocity_m_s")?, a.pair("amplitude_m")?);
     let (omega, phase_zero) = (a.pair("omega_rad_s")?, a.pair("phase_zero_s")?);
@@ -289,18 +261,16 @@ fn sigmoid_pair<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py,
     planned(a.py(), || Ok((pair.sample(duration_s, dt_s)?, Vec::new())))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn spline<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn spline<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (points, dt_s) = (read_points(a)?, a.number("dt_s")?);
     let limits = read_run_limits(a, points[0].len())?;
     planned(a.py(), || sample_run(&Spline::through(&points)?, &limits, dt_s))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn butterfly<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn butterfly<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (limits, dt_s) = (read_run_limits(a, 2)?, a.number("dt_s")?);
     let (scale_m, turns) = (a.number("scale_m")?, a.number("turns")?);
@@ -308,9 +278,8 @@ fn butterfly<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, Py
     planned(a.py(), || sample_run(&Butterfly::new(scale_m, turns, center)?, &limits, dt_s))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn spiral<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn spiral<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (limits, dt_s) = (read_run_limits(a, 2)?, a.number("dt_s")?);
     let (pitch_m, turns) = (a.number("pitch_m")?, a.number("turns")?);
@@ -318,9 +287,8 @@ fn spiral<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDic
     planned(a.py(), || sample_run(&Spiral::new(pitch_m, turns, center)?, &limits, dt_s))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn raster<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn raster<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let (limits, start, dt_s) = (read_limits(a, 2)?, read_place(a, "start_m")?, a.number("dt_s")?);
     let raster = RasterSection {
@@ -337,9 +305,8 @@ fn raster<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDic
     })
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
     let a = Arguments::of(keywords)?;
     let text = a.get("text")?;
     let bytes = match text.extract::<&[u8]>() {
@@ -366,12 +333,11 @@ fn gcode<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<Bound<'py, PyDict
         dwell_before_s: program.dwell_before_s,
         dwell_after_s: 0.0,
     };
-    planned(a.py(), || sample_path(&spec, &limits, dt_s))
+    planned(a.py(), || Ok((SampledMotion::of_path(&spec, &limits, dt_s)?, Vec::new())))
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn tracking_index(keywords: Option<Keywords<'_, '_>>) -> PyResult<(f64, f64)> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn tracking_index(keywords: Option<Keywords<'_, '_>>) -> PyResult<(f64, f64)> {
     let a = Arguments::of(keywords)?;
     let programmed = a.signal("programmed_m")?;
     let gains = (a.number("k_e")?, a.number("k_a")?);
@@ -385,17 +351,4 @@ fn tracking_index(keywords: Option<Keywords<'_, '_>>) -> PyResult<(f64, f64)> {
     )
     .or_raise()?;
     Ok((index.tracking, index.acceleration))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(jerk_limited, module)?)?;
-    module.add_function(wrap_pyfunction!(exponential_sigmoid, module)?)?;
-    module.add_function(wrap_pyfunction!(modulated, module)?)?;
-    module.add_function(wrap_pyfunction!(sigmoid_pair, module)?)?;
-    module.add_function(wrap_pyfunction!(spline, module)?)?;
-    module.add_function(wrap_pyfunction!(butterfly, module)?)?;
-    module.add_function(wrap_pyfunction!(spiral, module)?)?;
-    module.add_function(wrap_pyfunction!(raster, module)?)?;
-    module.add_function(wrap_pyfunction!(gcode, module)?)?;
-    module.add_function(wrap_pyfunction!(tracking_index, module)?)
 }

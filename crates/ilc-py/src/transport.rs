@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 
 /// Return the description of each kind of bus, with the keys of `ilc_rt.transports.Transport`.
 #[pyfunction]
-fn transports(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+pub(crate) fn transports(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     SCHEMES
         .iter()
         .map(|scheme| {
@@ -20,8 +20,4 @@ fn transports(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
             Ok(kind)
         })
         .collect()
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(transports, module)?)
 }

@@ -8,10 +8,9 @@ use numpy::IntoPyArray;
 use numpy::ndarray::Array3;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::argument::{Matrix, give_signal, misfit, read_array};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Array, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::whole::{each, number, pair, shown, whole};
@@ -133,17 +132,15 @@ fn read_formation(a: Arguments<'_, '_>, n_agents: usize, n_axes: usize) -> PyRes
     Formation::of_pairs(n_agents, n_axes, &pairs, &axes).or_raise()
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn contour_weights<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn contour_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
     let a = Arguments::of(keywords)?;
     let (weight, n_samples, p) = read_contour(a)?;
     give_blocks(a.py(), &weight, n_samples, p)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn coupled_weights<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn coupled_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
     let a = Arguments::of(keywords)?;
     let matrices = read_matrices("coupling", &a.get("coupling")?)?;
     let (n_samples, p) = (matrices.len(), matrices[0].ncols());
@@ -155,9 +152,8 @@ fn coupled_weights<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound
     give_blocks(a.py(), &weight, n_samples, p)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn schedule<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn schedule<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
     let a = Arguments::of(keywords)?;
     let n_samples = a.whole("n_samples")?;
     let steps = Schedule::new(&read_segments(&a.get("segments")?)?).or_raise()?;
@@ -186,9 +182,8 @@ fn read_segments(object: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, f64)>> {
     })
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn formation_weights<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn formation_weights<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
     let a = Arguments::of(keywords)?;
     let (n_agents, n_axes) = (a.whole("n_agents")?, a.whole("n_axes")?);
     let n_samples = a.whole("n_samples")?;
@@ -196,9 +191,8 @@ fn formation_weights<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bou
     give_blocks(a.py(), &weight, n_samples, n_agents * n_axes)
 }
 
-#[pyfunction]
-#[pyo3(signature = (**keywords))]
-fn formation_errors<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Bound<'py, PyAny>> {
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn formation_errors<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
     let a = Arguments::of(keywords)?;
     let (e, n_agents) = (a.signal("e")?, a.whole("n_agents")?);
     if n_agents == 0 || !e.n_channels.is_multiple_of(n_agents) {
@@ -209,12 +203,4 @@ fn formation_errors<'py>(keywords: Option<&Bound<'py, PyDict>>) -> PyResult<Boun
     let rows = formation.shape().nrows();
     let values = detached(a.py(), || formation.errors(&e.values)).or_raise()?;
     give_signal(a.py(), values, rows, false)
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(contour_weights, module)?)?;
-    module.add_function(wrap_pyfunction!(coupled_weights, module)?)?;
-    module.add_function(wrap_pyfunction!(schedule, module)?)?;
-    module.add_function(wrap_pyfunction!(formation_weights, module)?)?;
-    module.add_function(wrap_pyfunction!(formation_errors, module)?)
 }

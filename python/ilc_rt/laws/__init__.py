@@ -5,7 +5,7 @@ from `Law`, whose `update` is the same for all; a custom law is any object with 
 disturbance=None)``.
 """
 
-from ilc_rt._native import Law
+from ilc_rt._native import Law as Law
 from ilc_rt.laws.around import Gate, Ladder, ThroughJacobian
 from ilc_rt.laws.constrained import ConstrainedIlc
 from ilc_rt.laws.filtered import ErrorFeedforwardIlc, PdIlc
@@ -21,7 +21,6 @@ __all__ = [
     "FlexibleIlc",
     "Gate",
     "Ladder",
-    "Law",
     "ModelInverseIlc",
     "NormOptimalIlc",
     "PdIlc",

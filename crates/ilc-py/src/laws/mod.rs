@@ -12,7 +12,7 @@ mod figure;
 mod kinds;
 pub(crate) mod legacy;
 mod optimal;
-mod recalled;
+pub(crate) mod recalled;
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::argument::{Layout, read_disturbance};
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, ByName, Keywords};
 use crate::error::OrRaise;
 use crate::guard::{Borrowed, Guarded};
 use crate::made::reduce_kind;
@@ -142,7 +142,7 @@ struct State {
 impl PyLaw {
     #[new]
     #[pyo3(signature = (kind, /, **arguments))]
-    fn new(py: Python<'_>, kind: &str, arguments: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(py: Python<'_>, kind: &str, arguments: Option<Keywords<'_, '_>>) -> PyResult<Self> {
         let mut builders = BUILDERS.into_iter().flatten().copied();
         let Some((kind, build)) = builders.find(|(name, _)| *name == kind) else {
             let kinds: Vec<&str> = BUILDERS.into_iter().flatten().map(|(name, _)| *name).collect();
@@ -258,7 +258,7 @@ impl PyLaw {
 
     /// Parameters of the law by name, as they were given.
     #[getter]
-    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn parameters<'py>(&self, py: Python<'py>) -> ByName<'py> {
         self.arguments.bind(py).copy()
     }
 
@@ -401,9 +401,4 @@ impl PyLaw {
 /// Reads disturbances; `None` is an empty one.
 fn read_told(name: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
     given.map_or_else(|| Ok(Vec::new()), |given| read_disturbance(name, given))
-}
-
-pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyLaw>()?;
-    module.add_function(wrap_pyfunction!(recalled::check_relevance_weights, module)?)
 }

@@ -157,7 +157,7 @@ fn read_weights(object: &Bound<'_, PyAny>) -> PyResult<RelevanceWeights> {
 
 /// Refuses invalid weights of the relevance.
 #[pyfunction]
-pub(super) fn check_relevance_weights(weights: &Bound<'_, PyAny>) -> PyResult<()> {
+pub(crate) fn check_relevance_weights(weights: &Bound<'_, PyAny>) -> PyResult<()> {
     read_weights(weights).map(drop)
 }
 

@@ -1,8 +1,9 @@
 //! The state of a motion at one time, and a whole motion as tables.
 
-use crate::interpolate::{AxisLimits, MAX_AXES};
+use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES};
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::grid::{CYCLE_S, check_time, n_ticks_after};
+use crate::trajectory::path::PathSpec;
 use crate::trajectory::verify::Verification;
 
 /// Position and its derivatives at one time; axes beyond the motion's own stay at 0.
@@ -71,6 +72,38 @@ impl SampledMotion {
             motion.acceleration_m_s2.extend_from_slice(&state.acceleration_m_s2[..n_axes]);
             motion.programmed_m.extend_from_slice(&programmed_m[..n_axes]);
         }
+        Ok(motion)
+    }
+
+    /// Plans a path, and samples it as the loop plays it.
+    ///
+    /// The accelerations are central differences of the velocities: at rest at both ends.
+    ///
+    /// # Shapes
+    /// - `limits`: one entry for each coordinate of `spec.start_m`
+    /// # Real Time
+    /// Cold: allocates.
+    /// # Errors
+    /// Those of [`Interpolator::plan`].
+    pub fn of_path(
+        spec: &PathSpec,
+        limits: &[AxisLimits],
+        dt_s: f64,
+    ) -> Result<Self, TrajectoryError> {
+        let mut plan = Interpolator::plan(spec, limits, dt_s)?;
+        let n_axes = plan.n_axes();
+        let mut motion = Self { dt_s, n_axes, ..Self::default() };
+        for _ in 0..plan.n_samples() {
+            let setpoint = plan.next();
+            motion.position_m.extend_from_slice(&setpoint.position_m[..n_axes]);
+            motion.velocity_m_s.extend_from_slice(&setpoint.velocity_m_s[..n_axes]);
+        }
+        let v = &motion.velocity_m_s;
+        let inside = |i: &usize| *i >= n_axes && *i + n_axes < v.len();
+        let acceleration = |i: usize| (v[i + n_axes] - v[i - n_axes]) / (2.0 * dt_s);
+        motion.acceleration_m_s2 =
+            (0..v.len()).map(|i| Some(i).filter(inside).map_or(0.0, acceleration)).collect();
+        motion.programmed_m.clone_from(&motion.position_m);
         Ok(motion)
     }
 
