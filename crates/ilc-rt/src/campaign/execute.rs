@@ -8,7 +8,6 @@ use super::control::{Server, Shared};
 use super::error::{CampaignError, ResumeError};
 use super::frozen::{self, Frozen};
 use super::input::InputError;
-use super::keep::Keep;
 use super::keeper::Keeper;
 use super::learner::{Learner, set_disturbance};
 use super::nodes;
@@ -93,22 +92,8 @@ pub fn identify(
         growth_allowed: f64::INFINITY,
         frozen: None,
     };
-    let options = Options {
-        session: session.clone(),
-        iterations: 1,
-        learning: false,
-        resume: false,
-        allow_divergent: false,
-        frozen: false,
-        input_from: None,
-        input_file: None,
-        relearn_above: None,
-        forever: false,
-        keep: Keep::All,
-        ctl: false,
-        start: StartOn::AtOnce,
-        disturbance: super::Disturbance::default(),
-    };
+    let once = Options { iterations: 1, learning: false, ..Options::default() };
+    let options = Options { session: session.clone(), ..once };
     execute(cell, &options, bus, campaign, observe)
 }
 

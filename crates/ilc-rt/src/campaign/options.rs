@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicI32;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{ArgAction, Args};
+use clap::{ArgAction, Args, Command, FromArgMatches};
 
 use super::disturbance::Disturbance;
 use super::input::Source;
@@ -129,6 +129,14 @@ pub enum StartOn {
     AtOnce,
     /// A command, after the axes have settled.
     Command,
+}
+
+impl Default for Options {
+    /// Returns the options of a command line without any.
+    fn default() -> Self {
+        let matches = Self::augment_args(Command::new("")).get_matches_from([""]);
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
 }
 
 impl Options {
