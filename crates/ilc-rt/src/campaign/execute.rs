@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::announce::Announcer;
+use super::before_run;
 use super::claim::{Claim, claim};
 use super::control::{Server, Shared};
 use super::error::{CampaignError, ResumeError};
@@ -166,6 +167,12 @@ fn execute(
         if options.ctl { Some(Server::open(&cell.cell.name, Arc::clone(&shared))?) } else { None };
     let mut announcer = Announcer::new(observe, telemetry, shared, cell.cycle_s(), cell.n_axes());
     announcer.publish(&Event::State { state: StateName::BringingUp, iteration: first });
+    if session.home {
+        bus = match before_run::home(cell, session, bus, &mut announcer, first)? {
+            Ok(bus) => bus,
+            Err(end) => return Ok(Outcome { campaign: plan.meta.campaign, ..end }),
+        };
+    }
     let maps = nodes::start(cell, bus.as_mut(), session)?;
 
     // After being switched off, drives start elsewhere than the last run left them. One run with

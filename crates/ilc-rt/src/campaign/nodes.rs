@@ -9,7 +9,7 @@ use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::design;
 use crate::fieldbus::Bus;
 use crate::fieldbus::bring_up::{
-    BringUpError, DriveSetup, SdoClient, bring_up, bring_up_encoder, enter_homing_mode, listen,
+    BringUpError, DriveIdentity, DriveSetup, SdoClient, bring_up, bring_up_encoder, enter_homing_mode, listen,
 };
 use crate::fieldbus::canopen::{NmtCommand, emcy};
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
@@ -42,7 +42,7 @@ pub(super) fn prepare(
     let mut maps = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
         let setup = drive_setup(cell, axis, session.lockstep)?;
-        maps.push(bring_up_axis(cell, axis, bus, session, &setup)?);
+        maps.push(bring_up_axis(cell, axis, bus, session, &setup)?.map);
     }
     if let Some(tool) = &cell.tcp_encoder {
         bring_up_encoder(bus, design::node(cell, tool.node)?, timeout(cell, session)).map_err(
@@ -58,14 +58,17 @@ pub(super) fn prepare(
     Ok(maps)
 }
 
-/// Resets, checks and configures the drives of some axes for homing; they wait without power in homing mode.
+/// Resets, checks and configures the drives of some axes for homing. Returns which of them are homed already, unless
+/// they are to be homed again; all others wait without power in homing mode.
 pub(super) fn prepare_homing(
     cell: &Cell,
     bus: &mut dyn Bus,
     session: &Session,
     axes: &[&Axis],
-) -> Result<(), CampaignError> {
+    again: bool,
+) -> Result<Vec<bool>, CampaignError> {
     refuse_company(cell, bus)?;
+    let mut are_homed = Vec::with_capacity(axes.len());
     for axis in axes {
         let setup = drive_setup(cell, axis, session.lockstep)?;
         let deadline_ms = if session.lockstep { 0 } else { HOMING_DEADLINE_MS };
@@ -75,7 +78,7 @@ pub(super) fn prepare_homing(
             is_to_be_homed: true,
             ..setup
         };
-        bring_up_axis(cell, axis, bus, session, &setup)?;
+        let is_homed = bring_up_axis(cell, axis, bus, session, &setup)?.is_homed && !again;
         if resets(cell, session) {
             ask(cell, axis, session, |client| {
                 if commissioning::faults(bus, client)?.in_fault() {
@@ -85,10 +88,34 @@ pub(super) fn prepare_homing(
             })?;
         }
         refuse_fault(cell, axis, bus, session)?;
-        enter_homing_mode(bus, &client(cell, axis, session)?, timeout(cell, session))
-            .map_err(|source| refusal(cell, key_of(axis), axis.bus, source))?;
+        if !is_homed {
+            enter_homing_mode(bus, &client(cell, axis, session)?, timeout(cell, session))
+                .map_err(|source| refusal(cell, key_of(axis), axis.bus, source))?;
+        }
+        are_homed.push(is_homed);
     }
-    Ok(())
+    Ok(are_homed)
+}
+
+/// Brings the drive of an axis up as for a run, which it has to be homed for; returns its position.
+///
+/// # Errors
+/// One line.
+pub(super) fn confirm_homed(
+    cell: &Cell,
+    axis: &Axis,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<f64, String> {
+    let said = |error: CampaignError| match error {
+        CampaignError::NotHomed { why, .. } => format!(
+            "the drive found its home, but does not tell so when it is asked for a run: {why}"
+        ),
+        error => error.to_string(),
+    };
+    let setup = drive_setup(cell, axis, session.lockstep).map_err(|error| error.to_string())?;
+    bring_up_axis(cell, axis, bus, session, &setup).map_err(said)?;
+    position(cell, axis, bus, session).map_err(said)
 }
 
 fn bring_up_axis(
@@ -97,7 +124,7 @@ fn bring_up_axis(
     bus: &mut dyn Bus,
     session: &Session,
     setup: &DriveSetup,
-) -> Result<PdoMap, CampaignError> {
+) -> Result<DriveIdentity, CampaignError> {
     let found = bring_up(bus, setup).map_err(|source| match source {
         BringUpError::NotHomed { node, why } => CampaignError::NotHomed {
             file: cell.file.display().to_string(),
@@ -113,7 +140,7 @@ fn bring_up_axis(
             "drive of axis {name} (node {node}) was in fault, which is reset: 0x{code:04X} {meaning}"
         );
     }
-    Ok(found.map)
+    Ok(found)
 }
 
 fn refuse_fault(
@@ -167,25 +194,31 @@ pub(super) fn positions(
     bus: &mut dyn Bus,
     session: &Session,
 ) -> Result<Vec<f64>, CampaignError> {
-    let mut all_m = Vec::with_capacity(cell.n_axes());
-    for axis in &cell.axes {
-        let scale = design::axis_scale(cell, axis)?;
-        let counts = ask(cell, axis, session, |client| {
-            Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
-        })?;
-        all_m.push(scale.position_m(counts.cast_signed()));
-    }
-    Ok(all_m)
+    cell.axes.iter().map(|axis| position(cell, axis, bus, session)).collect()
+}
+
+/// Reads the position of an axis.
+pub(super) fn position(
+    cell: &Cell,
+    axis: &Axis,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<f64, CampaignError> {
+    let scale = design::axis_scale(cell, axis)?;
+    let counts = ask(cell, axis, session, |client| {
+        Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
+    })?;
+    Ok(scale.position_m(counts.cast_signed()))
 }
 
 /// Returns the time-out of each answer.
-fn timeout(cell: &Cell, session: &Session) -> Duration {
+pub(super) fn timeout(cell: &Cell, session: &Session) -> Duration {
     let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
     Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s)
 }
 
 /// Returns a client of the drive of an axis.
-pub(super) fn client(
+fn client(
     cell: &Cell,
     axis: &Axis,
     session: &Session,

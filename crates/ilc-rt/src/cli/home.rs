@@ -9,26 +9,31 @@ use super::moving::{Moving, axis};
 use super::run::{open, stop_on_signals};
 use super::target::answered;
 use super::{EXIT_BAD_INPUT, EXIT_FAULT, show};
-use crate::campaign::{self, Homed};
-use crate::config::{Cell, HomingKind};
+use crate::campaign::{self, Homed, homing_axes};
+use crate::config::Cell;
 use crate::record::EndStatus;
 
 #[derive(Args)]
 #[command(
     after_help = "Each drive searches its home by [axis.homing], those with a lower order first, those with the same order together,
-and is switched off. The axes come to rest by quick stop when the pipe at standard input or the parent is gone, after
-homing.timeout_s, and all of them when one fails.
+and is switched off. An axis that rests outside its limits there, as on a limit switch, is then brought inside along a
+jerk-limited line. One that is homed already searches nothing without --again. The axes come to rest by quick stop on
+Ctrl-C, when the pipe at standard input or the parent is gone, after homing.timeout_s, and all of them when one fails.
 Exit status: 0 homed, 2 refused (nothing moved), 3 not homed, 130 after Ctrl-C.
 
 Examples:
   ilc-rt home gantry.toml
-  ilc-rt home gantry.toml x --json -"
+  ilc-rt home gantry.toml --axis x --again --json -"
 )]
 pub(super) struct HomeArguments {
     /// Cell description.
     cell: PathBuf,
-    /// Axes to home; all that have kind = \"drive\" if none is given.
+    /// Axis to home; may be repeated. All that have kind = "drive" if none is given.
+    #[arg(long, value_name = "NAME")]
     axis: Vec<String>,
+    /// Home those again that are homed already.
+    #[arg(long)]
+    again: bool,
     #[command(flatten)]
     moving: Moving,
 }
@@ -49,7 +54,7 @@ fn make(arguments: &HomeArguments) -> Result<Homed, String> {
         open(&arguments.cell, moving.bus.as_deref()).map_err(|error| error.to_string())?;
     let axes = chosen(&cell, &arguments.axis)?;
     if axes.is_empty() {
-        let reason = "no axis has [axis.homing] kind = \"drive\"; none needs homing".to_owned();
+        let reason = "no axis has [axis.homing] kind = \"drive\": none needs homing".to_owned();
         return Ok(Homed { status: EndStatus::Completed, reason, signal: 0, axes: Vec::new() });
     }
     let man = DeadMan::new(None)?;
@@ -61,21 +66,22 @@ fn make(arguments: &HomeArguments) -> Result<Homed, String> {
         }
         if heard { man.released() } else { Some("nobody reads the output any more".to_owned()) }
     };
-    campaign::home(&cell, &axes, &session, bus, &mut report).map_err(|error| error.to_string())
+    campaign::home(&cell, &axes, arguments.again, &session, bus, &mut report)
+        .map_err(|error| error.to_string())
 }
 
 /// Returns the axes named, or all that a drive homes.
 fn chosen(cell: &Cell, names: &[String]) -> Result<Vec<usize>, String> {
-    let is_homed = |index: usize| cell.axes[index].homing.kind == HomingKind::Drive;
+    let all = homing_axes(cell);
     if names.is_empty() {
-        return Ok((0..cell.n_axes()).filter(|index| is_homed(*index)).collect());
+        return Ok(all);
     }
     let mut found = Vec::new();
     for name in names {
         let index = axis(cell, name)?;
-        if !is_homed(index) {
+        if !all.contains(&index) {
             return Err(format!(
-                "axis {name}: its drive searches no home: allowed with [axis.homing] kind = \"drive\""
+                "--axis {name}: its drive searches no home; allowed: an axis with [axis.homing] kind = \"drive\""
             ));
         }
         if !found.contains(&index) {
@@ -88,7 +94,8 @@ fn chosen(cell: &Cell, names: &[String]) -> Result<Vec<usize>, String> {
 fn end(homed: &Homed) -> u8 {
     for axis in &homed.axes {
         if let Some(position_m) = axis.position_m {
-            show::say(&format!("axis {}: homed, at {position_m:.6}", axis.axis));
+            let how = if axis.was_homed { "was homed before" } else { "homed" };
+            show::say(&format!("axis {}: {how}, at {position_m:.6} {}", axis.axis, axis.unit));
         }
     }
     match homed.status {

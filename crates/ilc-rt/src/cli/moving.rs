@@ -46,6 +46,7 @@ impl Moving {
             lockstep: self.lockstep,
             simulated: self.simulated,
             reset_faults: self.reset_faults,
+            home: false,
             library: PathBuf::new(),
             telemetry: false,
             stop,

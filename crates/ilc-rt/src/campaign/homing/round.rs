@@ -4,10 +4,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::time::{Duration, Instant};
 
+use super::Report;
 use super::seeker::Seeker;
+use crate::campaign::nodes;
 use crate::campaign::options::Session;
 use crate::config::{Axis, Cell};
-use crate::fieldbus::canopen::{NodeId, sync};
+use crate::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use crate::fieldbus::cia402::pdo_map::{COMMAND_PDO, STATUS_PDO};
 use crate::fieldbus::cia402::{PdoMap, Scale};
 use crate::fieldbus::{Bus, BusError, Frame};
@@ -26,7 +28,8 @@ pub(super) struct Round<'a> {
     cycle: Duration,
     /// Cycles between two reports.
     every: u32,
-    lockstep: bool,
+    /// In lock-step: the time to wait for the answers.
+    wait: Option<Duration>,
     stop: Arc<AtomicI32>,
 }
 
@@ -45,7 +48,7 @@ impl<'a> Round<'a> {
             map: PdoMap::of_homing(),
             cycle: Duration::from_secs_f64(cell.cycle_s()),
             every,
-            lockstep: session.lockstep,
+            wait: session.lockstep.then(|| nodes::timeout(cell, session)),
             stop: Arc::clone(&session.stop),
         }
     }
@@ -58,9 +61,12 @@ impl<'a> Round<'a> {
         mut self,
         bus: &mut dyn Bus,
         began: &str,
-        report: &mut dyn FnMut(Option<&str>) -> Option<String>,
+        report: &mut Report<'_>,
     ) -> Result<Option<String>, BusError> {
         let mut wish = report(Some(began));
+        for (node, _, _) in self.stations.iter() {
+            bus.send(&NmtCommand::Start.frame(Some(*node)))?;
+        }
         let mut next = Instant::now();
         for cycle in 1_u32.. {
             next = (next + self.cycle).max(Instant::now());
@@ -98,8 +104,9 @@ impl<'a> Round<'a> {
         }
         bus.send(&sync::frame())?;
         let mut answers = vec![None; self.stations.len()];
+        let until = self.wait.map_or(next, |wait| Instant::now() + wait);
         loop {
-            let left = next.saturating_duration_since(Instant::now());
+            let left = until.saturating_duration_since(Instant::now());
             let Some(frame) = bus.recv(left)? else { break };
             for ((node, _, _), answer) in self.stations.iter().zip(&mut answers) {
                 if frame.id() == STATUS_PDO.default_cob_id(*node) {
@@ -107,11 +114,11 @@ impl<'a> Round<'a> {
                     *answer = reading.and_then(|got| Some((got.statusword?, got.position_counts)));
                 }
             }
-            if self.lockstep && answers.iter().all(Option::is_some) {
+            if self.wait.is_some() && answers.iter().all(Option::is_some) {
                 break;
             }
         }
-        if !self.lockstep {
+        if self.wait.is_none() {
             // A bus in this program does not wait.
             std::thread::sleep(next.saturating_duration_since(Instant::now()));
         }
