@@ -1,4 +1,4 @@
-"""The page of the first machine, block by block, on one pair of simulated drives with the habits of real ones."""
+"""The page of the first machine, line by line, on drives with the habits of real ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import time
 from typing import TYPE_CHECKING
 
 import pytest
-from documentation_fixture import ROOT, Block, blocks
+from documentation_fixture import PAGE_OF_ITS_OWN as PAGE
+from documentation_fixture import Block, blocks
 from processes_fixture import DEADLINE_S, Process, free_port, program
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.timeout(600)
 
-PAGE = ROOT / "docs" / "first-machine.md"
 #: The machine of the page: what its drives and its mechanics are, which no cell of it says.
 MACHINE = {
     "x": "mass_kg = 150.0\nnatural_frequency_hz = 15.0\ndamping = 1.0\ncoulomb_n = 60.0\n"
@@ -155,16 +155,16 @@ def test_the_page_leads_to_a_learned_contour(reader: Reader) -> None:
             for line in filter(None, block.text.splitlines()):
                 if line.startswith("ilc-rt home") and "--axis" in line:
                     # Without a home nothing moves.
+                    jog = ["jog", "machine.toml", "x", "0.001", "--bus", reader.bus]
                     refused = subprocess.run(
-                        [program("ilc-rt"), "jog", "machine.toml", "x", "0.001", "--bus", reader.bus],
+                        [program("ilc-rt"), *jog],
                         cwd=reader.folder, capture_output=True, text=True, check=False,
                     )  # fmt: skip
                     assert refused.returncode == 2
                     assert "axis x (node 1) is not homed" in refused.stderr
-                if "ctl machine.toml pause" in line:
-                    reader.until_state("running")
-                if "ctl machine.toml resume" in line:
-                    reader.until_state("paused")
+                if line == "ilc-rt ctl machine.toml stop":
+                    # The part is made.
+                    reader.until_state(": waiting, run 1")
                 reader.type(line)
                 if line == "ilc-rt jog first.toml y 0.003":
                     assert reader.position_m("first.toml", 1) == pytest.approx(0.003, abs=1e-5)

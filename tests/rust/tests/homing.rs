@@ -16,10 +16,15 @@ use ilc_tests::{Scratch, example_text};
 
 /// The limit switches of the gantry lie a twentieth of its travel beyond the limits.
 const SWITCHES_M: [f64; 2] = [-0.026, 0.106];
+/// Place of x at power-on.
+const START_M: f64 = 0.0437;
 
 /// Returns a gantry with two short moves, and a homing of each axis.
 fn cell(x: &str, y: &str) -> Cell {
-    let text = example_text("01_gantry.toml");
+    // Between two index pulses.
+    let text = example_text("01_gantry.toml")
+        .replace("position_start_m = 0.04", "position_start_m = 0.0437")
+        .replace("position_start_m = 0.02", "position_start_m = 0.0237");
     let program = text.find("[[program.segment]]").unwrap();
     let learning = text.find("[learning]").unwrap();
     let (axes, rest) = text[..program].split_once("[tcp_encoder]").unwrap();
@@ -70,12 +75,12 @@ fn is_at_rest(tap: &Tap) {
     let machine = line.machine();
     for axis in 0..2 {
         let velocity_m_s = machine.plant().encoder_velocity_m_s(axis);
-        assert!(velocity_m_s.abs() < 1e-4, "axis {axis}: {velocity_m_s}");
+        assert!(velocity_m_s.abs() < 1e-3, "axis {axis}: {velocity_m_s}");
     }
     assert!(!machine.is_energised());
 }
 
-/// Runs the program once; returns the outcome and the states that were told.
+/// Runs the program once; returns status and reason of its end.
 fn run(cell: &Cell, tap: &Tap, change: impl Fn(&mut Options)) -> Result<(EndStatus, String), String> {
     let scratch = Scratch::new();
     let mut options = options(scratch.file("library.db"), 1);
@@ -93,18 +98,18 @@ fn every_method_homes_an_axis_that_then_runs() {
         (2, false, 0.10),
         (17, false, low_m),
         (18, false, high_m),
-        (33, false, 0.03),
+        (33, false, 0.04),
         (34, false, 0.05),
-        (35, false, 0.04),
-        (37, false, 0.04),
+        (35, false, START_M),
+        (37, false, START_M),
         // The negative direction of the drive is the positive one of the axis.
         (1, true, 0.10),
         (2, true, -0.02),
         (17, true, high_m),
         (18, true, low_m),
         (33, true, 0.05),
-        (34, true, 0.03),
-        (35, true, 0.04),
+        (34, true, 0.04),
+        (35, true, START_M),
     ] {
         for polarity in [0, 192] {
             let mut cell = cell(&method(number, home_m, ""), "");
@@ -135,7 +140,8 @@ fn an_axis_on_its_switch_is_brought_inside_slowly() {
     let homed = home(&cell, &tap);
     assert_eq!(homed.status, EndStatus::Completed, "{}", homed.reason);
     // A hundredth of the travel inside.
-    assert!((plant_m(&tap, 0) - (-0.02 + 0.0012)).abs() < 2e-5, "{}", plant_m(&tap, 0));
+    // Friction leaves it some micrometres short of that.
+    assert!((plant_m(&tap, 0) - (-0.02 + 0.0012)).abs() < 1e-4, "{}", plant_m(&tap, 0));
     let path_m = tap.line().plant_m(0);
     let lowest = path_m.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).unwrap().0;
     let (dt_s, limits) = (cell.cycle_s(), &cell.axes[0].limits);
@@ -179,7 +185,7 @@ fn a_way_inside_that_is_broken_off_is_made_later() {
 #[test]
 fn turns_follow_their_order_and_a_homed_axis_is_left_alone() {
     let cell = cell(
-        &method(33, 0.03, "order = 2\n"),
+        &method(33, 0.04, "order = 2\n"),
         &method(34, 0.03, "order = 1\n"),
     );
     let tap = Tap::new(&cell);
@@ -210,8 +216,8 @@ fn turns_follow_their_order_and_a_homed_axis_is_left_alone() {
 
 #[test]
 fn a_homing_that_takes_too_long_ends_at_rest() {
-    let slow = method(33, 0.03, "order = 2\n");
-    let cell = cell(&slow, &method(17, SWITCHES_M[0], "timeout_s = 0.5\n"));
+    let later = method(33, 0.04, "order = 2\n");
+    let cell = cell(&later, &method(17, SWITCHES_M[0], "timeout_s = 0.5\n"));
     let tap = Tap::new(&cell);
     let homed = home(&cell, &tap);
     assert_eq!(homed.status, EndStatus::Fault);
@@ -249,7 +255,7 @@ fn a_request_to_stop_brings_every_axis_to_rest() {
     assert_eq!((homed.status, homed.signal), (EndStatus::Interrupted, 0));
     assert_eq!(homed.reason, "standard input was closed");
     is_at_rest(&tap);
-    assert!((-0.02..0.039).contains(&plant_m(&tap, 0)), "it moved, and stopped before its switch");
+    assert!((-0.02..0.0427).contains(&plant_m(&tap, 0)), "it moved, and stopped before its switch");
     assert!(homed.axes.iter().all(|axis| axis.error.as_deref() == Some("broken off")));
 
     let tap = Tap::new(&both);
@@ -299,19 +305,19 @@ fn a_drive_that_is_lost_or_faults_stops_the_other() {
 #[test]
 fn a_home_offset_of_the_drive_shifts_its_zero() {
     // The zero lies 2 000 000 counts, or 20 mm, above the home.
-    let homing = method(35, 0.06, "") + "[axis.drive]\nhome_offset = 2_000_000\n";
+    let homing = method(35, START_M + 0.02, "") + "[axis.drive]\nhome_offset = 2_000_000\n";
     let cell = cell(&homing, "");
     let tap = Tap::new(&cell);
     let homed = home(&cell, &tap);
     assert_eq!(homed.status, EndStatus::Completed, "{}", homed.reason);
     let shown_m = homed.axes[0].position_m.unwrap();
-    assert!((shown_m - 0.04).abs() < 1e-6, "{shown_m}");
+    assert!((shown_m - START_M).abs() < 1e-6, "{shown_m}");
     assert_eq!(run(&cell, &tap, |_| {}).map(|end| end.0), Ok(EndStatus::Completed));
 }
 
 #[test]
 fn a_run_homes_first_where_that_is_asked_for() {
-    let needed = cell(&method(17, SWITCHES_M[0], ""), &method(33, 0.01, "order = 2\n"));
+    let needed = cell(&method(17, SWITCHES_M[0], ""), &method(33, 0.02, "order = 2\n"));
     let (tap, scratch) = (Tap::new(&needed), Scratch::new());
     let mut options = options(scratch.file("library.db"), 1);
     options.session.home = true;

@@ -14,7 +14,7 @@ use super::keeper::Keeper;
 use super::learner::{Learner, set_disturbance};
 use super::nodes;
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session, StartOn};
-use super::pace::Pacer;
+use super::pace::{MAILBOX, Pacer};
 use super::resume::{Resumed, to_resume};
 use super::rollback::RollbackPolicy;
 use super::running::{Parts, Running};
@@ -28,9 +28,6 @@ use crate::library::Library;
 use crate::record::{Event, StateName};
 use crate::rt::RtReport;
 use crate::servo::{Cycle, Orders, mailbox};
-
-/// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
-pub(super) const MAILBOX: usize = 8192;
 
 /// Runs a campaign on a bus (`cell.bus.address`, open), with the cell's law or another one; `observe` is
 /// called with every event.

@@ -114,7 +114,11 @@ impl<'a> Round<'a> {
                     *answer = reading.and_then(|got| Some((got.statusword?, got.position_counts)));
                 }
             }
-            if self.wait.is_some() && answers.iter().all(Option::is_some) {
+            let is_complete = || {
+                let mut all = self.stations.iter().zip(&answers);
+                all.all(|((_, _, seeker), answer)| answer.is_some() || seeker.is_over())
+            };
+            if self.wait.is_some() && is_complete() {
                 break;
             }
         }

@@ -12,14 +12,18 @@ const GRACE: u32 = 3;
 pub(super) struct Patience {
     /// Without an answer.
     pub(super) silent: u32,
+    /// Without an answer of a drive that is being stopped: it is lost.
+    pub(super) lost: u32,
     /// From power off to operation enabled.
     pub(super) enabling: u32,
     /// From the start to a sign that the drive is at it.
     pub(super) starting: u32,
     /// Whole homing.
     pub(super) search: u32,
-    /// At the same position: it is at rest.
+    /// At about the same position: it is at rest.
     pub(super) rest: u32,
+    /// Largest way in that time, in counts.
+    pub(super) rest_counts: u32,
     /// From a quick stop to power off.
     pub(super) stopping: u32,
 }
@@ -51,7 +55,9 @@ enum Phase {
     Ready,
     Starting,
     Searching,
-    /// Home was found, and power goes off.
+    /// Home was found, and the axis comes to rest.
+    Resting,
+    /// Power goes off.
     Leaving,
     /// Quick stop, then power off.
     Stopping,
@@ -71,8 +77,10 @@ pub(super) struct Seeker {
     is_under_way: bool,
     /// The method moves the axis.
     moves: bool,
-    /// Last position, and cycles at it.
+    /// Last position.
     counts: Option<i32>,
+    /// A position, and the cycles since the axis was farther from it than at rest.
+    anchor: Option<i32>,
     still: u32,
     failure: Option<Failure>,
     patience: Patience,
@@ -89,6 +97,7 @@ impl Seeker {
             is_under_way: false,
             moves,
             counts: None,
+            anchor: None,
             still: 0,
             failure: None,
             patience,
@@ -117,7 +126,7 @@ impl Seeker {
 
     /// Brings the axis to rest and switches it off, as home is not to be found any more.
     pub(super) fn break_off(&mut self) {
-        if !matches!(self.phase, Phase::Stopping | Phase::Leaving | Phase::Off) {
+        if !matches!(self.phase, Phase::Resting | Phase::Stopping | Phase::Leaving | Phase::Off) {
             self.fail(Failure::BrokenOff);
         }
     }
@@ -141,6 +150,10 @@ impl Seeker {
             self.silent += 1;
             match self.phase {
                 Phase::Off => {}
+                Phase::Stopping | Phase::Leaving if self.silent > self.patience.lost => {
+                    self.failure = self.failure.or(Some(Failure::Silent));
+                    self.phase = Phase::Off;
+                }
                 Phase::Stopping | Phase::Leaving => self.give_up(Failure::Silent),
                 _ if self.silent > self.patience.silent => self.fail(Failure::Silent),
                 _ => {}
@@ -148,26 +161,46 @@ impl Seeker {
             return;
         };
         self.silent = 0;
-        self.still = if counts == self.counts { self.still.saturating_add(1) } else { 0 };
-        self.counts = counts.or(self.counts);
+        self.watch(counts);
         match self.phase {
             Phase::Enabling => self.enable(word),
             Phase::Ready => {
                 self.enter(Phase::Starting, Controlword(Controlword::ENABLE_OPERATION.0 | GO));
             }
             Phase::Starting | Phase::Searching => self.search(word),
+            Phase::Resting => match word.state() {
+                Some(State::Fault | State::FaultReactionActive) => self.fail(Failure::Fault),
+                Some(State::OperationEnabled) if !self.is_at_rest() => {}
+                _ => self.enter(Phase::Leaving, Controlword::SHUTDOWN),
+            },
             Phase::Leaving => {
                 self.controlword = Controlword::DISABLE_VOLTAGE.0;
                 self.switch_off(word);
             }
             Phase::Stopping => {
-                if self.still >= self.patience.rest || self.cycles > self.patience.stopping / 2 {
+                if self.is_at_rest() {
                     self.controlword = Controlword::DISABLE_VOLTAGE.0;
                 }
                 self.switch_off(word);
             }
             Phase::Off => {}
         }
+    }
+
+    fn watch(&mut self, counts: Option<i32>) {
+        let Some(counts) = counts else { return };
+        let is_near = |anchor: i32| anchor.abs_diff(counts) <= self.patience.rest_counts;
+        if self.anchor.is_some_and(is_near) {
+            self.still = self.still.saturating_add(1);
+        } else {
+            (self.anchor, self.still) = (Some(counts), 0);
+        }
+        self.counts = Some(counts);
+    }
+
+    /// Returns whether the axis is at rest, or has had the time to come to it.
+    fn is_at_rest(&self) -> bool {
+        self.still >= self.patience.rest || self.cycles > self.patience.stopping / 2
     }
 
     fn enable(&mut self, word: Statusword) {
@@ -199,7 +232,7 @@ impl Seeker {
             if has_failed {
                 self.fail(Failure::Error(word));
             } else if is_there {
-                self.enter(Phase::Leaving, Controlword::SHUTDOWN);
+                self.rest();
             }
             return;
         }
@@ -211,11 +244,17 @@ impl Seeker {
         } else if self.cycles > self.patience.starting {
             // A drive may set its position so quickly that it never shows it.
             if !self.moves && is_there {
-                self.enter(Phase::Leaving, Controlword::SHUTDOWN);
+                self.rest();
             } else {
                 self.fail(Failure::NotStarted);
             }
         }
+    }
+
+    /// Waits for the rest, with the command that found the home.
+    fn rest(&mut self) {
+        self.enter(Phase::Resting, Controlword(self.controlword));
+        self.still = 0;
     }
 
     fn switch_off(&mut self, word: Statusword) {
@@ -252,7 +291,16 @@ mod tests {
     use super::*;
 
     const PATIENCE: Patience =
-        Patience { silent: 2, enabling: 5, starting: 10, search: 50, rest: 2, stopping: 20 };
+        Patience {
+            silent: 2,
+            lost: 20,
+            enabling: 5,
+            starting: 10,
+            search: 50,
+            rest: 2,
+            rest_counts: 0,
+            stopping: 20,
+        };
     const ENABLED: u16 = 0x0237;
     const OFF: u16 = 0x0250;
 
@@ -280,7 +328,12 @@ mod tests {
         }
         say(&mut seeker, ENABLED);
         assert_eq!(say(&mut seeker, ENABLED | 0x1000), 0x1F, "found, but not at rest");
-        assert_eq!(say(&mut seeker, ENABLED | 0x1400), 0x06);
+        assert_eq!(say(&mut seeker, ENABLED | 0x1400), 0x1F, "told to be at rest");
+        seeker.step(Some((Statusword(ENABLED | 0x1400), Some(9))));
+        assert_eq!(seeker.command().0, 0x1F, "still moving");
+        seeker.step(Some((Statusword(ENABLED | 0x1400), Some(9))));
+        seeker.step(Some((Statusword(ENABLED | 0x1400), Some(9))));
+        assert_eq!(seeker.command().0, 0x06);
         assert_eq!(say(&mut seeker, 0x0231), 0x00);
         say(&mut seeker, OFF);
         assert!(seeker.is_over());

@@ -19,8 +19,10 @@ use crate::record::EndStatus;
 const ENABLING_S: f64 = 5.0;
 /// Time from the start to a sign that the drive is at it.
 const STARTING_S: f64 = 1.0;
-/// Time at the same position that is rest.
+/// Time at about the same position that is rest.
 const REST_S: f64 = 0.1;
+/// Velocity that is rest, as a share of the limit.
+const REST_SHARE: f64 = 1e-4;
 /// Time from a quick stop to power off.
 const STOPPING_S: f64 = 10.0;
 /// Cycles without an answer in lock-step, where each of them is waited for.
@@ -38,7 +40,7 @@ pub(super) fn take(
     for task in turn.iter() {
         let node = design::node(cell, task.axis.node)?;
         let scale = design::axis_scale(cell, task.axis)?;
-        let patience = patience(cell, session, task.homing.timeout_s);
+        let patience = patience(cell, session, task);
         stations.push((node, scale, Seeker::new(Homing::moves(task.homing.method), patience)));
     }
     let searching: Vec<String> = turn
@@ -92,21 +94,29 @@ fn conclude(
     first
 }
 
-fn patience(cell: &Cell, session: &Session, timeout_s: f64) -> Patience {
+fn patience(cell: &Cell, session: &Session, task: &Task<'_>) -> Patience {
     let forgiven_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let cycles = |span_s: f64| (span_s / cell.cycle_s()).ceil() as u32;
+    let rest_m = REST_SHARE * task.axis.limits.velocity_max_m_s * REST_S;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let rest_counts = (rest_m * task.axis.counts_per_m).ceil() as u32;
     let silent_max = cell.safety.silent_cycles_max;
+    let (silent, lost) = if session.lockstep {
+        let silent = silent_max.min(SILENT_IN_LOCKSTEP);
+        (silent, 2 * silent)
+    } else {
+        (silent_max + cycles(forgiven_s), cycles(STOPPING_S))
+    };
     Patience {
-        silent: if session.lockstep {
-            silent_max.min(SILENT_IN_LOCKSTEP)
-        } else {
-            silent_max + cycles(forgiven_s)
-        },
+        silent,
+        lost,
         enabling: cycles(ENABLING_S),
         starting: cycles(STARTING_S),
-        search: cycles(timeout_s),
+        search: cycles(task.homing.timeout_s),
         rest: cycles(REST_S),
+        // An encoder at rest may flicker between two counts.
+        rest_counts: rest_counts.max(1),
         stopping: cycles(STOPPING_S),
     }
 }
