@@ -147,10 +147,12 @@ def test_a_killed_homing_leaves_the_drive_at_rest(bench: Bench) -> None:
     assert found["axes"][0]["homed"]
 
 
-def test_lost_drives_end_a_homing(bench: Bench) -> None:
-    cell = cell_with(bench, homing(17, -0.026, speed_m_s=0.005))
-    drives = bench.drives(cell)
-    process = bench.start("ilc-rt", "home", cell, "--bus", bench.bus, "--simulated-drives")
+@pytest.mark.parametrize("pace", ["--simulated-drives", "--lockstep"])
+def test_lost_drives_end_a_homing(bench: Bench, pace: str) -> None:
+    """Also in lock-step, where each answer is waited for."""
+    cell = cell_with(bench, homing(17, -0.026, "timeout_s = 600.0", speed_m_s=0.001))
+    drives = bench.drives(cell, *([pace] if pace == "--lockstep" else []))
+    process = bench.start("ilc-rt", "home", cell, "--bus", bench.bus, pace)
     process.line_with("homing: x shows")
     drives.signal(signal.SIGKILL)
     assert process.end() == 3
