@@ -103,6 +103,9 @@ class Campaign:
     reset_faults : bool
         Reset faults that the drives have when the program starts; otherwise they are named, and
         nothing moves.
+    home : bool
+        Home the axes that are not homed before anything else; otherwise they are named, and nothing
+        moves.
     telemetry : bool
         Publish on Zenoh; never with ``loopback:``.
 
@@ -158,6 +161,7 @@ class Campaign:
         disturbance: Callable[[int], ArrayLike] | ArrayLike | None = None,
         allow_divergent: bool = False,
         reset_faults: bool = False,
+        home: bool = False,
         telemetry: bool = True,
     ) -> None:
         if isinstance(cell, Cell):
@@ -185,6 +189,7 @@ class Campaign:
         self.resume = resume
         self.learning = learning
         self.reset_faults = reset_faults
+        self.home = home
         self.frozen = frozen
         self.input_from = input_from
         self.input_file = input_file
@@ -269,7 +274,7 @@ class Campaign:
         values: dict[str, object] = {
             "bus": self.bus, "measure": self.measure, "lockstep": self.lockstep,
             "simulated": self.simulated, "library": self.library, "telemetry": self.telemetry,
-            "reset_faults": self.reset_faults,
+            "reset_faults": self.reset_faults, "home": self.home,
         }  # fmt: skip
         if self.experiment is not None:
             return "identify", arguments("identify", values) + self.experiment.arguments()

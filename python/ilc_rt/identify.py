@@ -108,6 +108,7 @@ def multisine(
     drives: Drives = "auto",
     library: str | Path | None = None,
     reset_faults: bool = False,
+    home: bool = False,
     telemetry: bool = True,
     observe: Observer | None = None,
     tell: Callable[[str], None] | None = None,
@@ -139,7 +140,7 @@ def multisine(
         Sample time in seconds, for a function; a cell has its own.
     at_m : float or None
         Position that the axis is excited around; the program's start if None.
-    measure, bus, lockstep, drives, reset_faults, telemetry
+    measure, bus, lockstep, drives, reset_faults, home, telemetry
         As for `Campaign`.
     library : path or None
         Library that the experiment is stored in; None for no library.
@@ -173,7 +174,7 @@ def multisine(
     return identify(
         system, waveform="multisine", axis=axis, amplitude=amplitude, from_hz=from_hz, to_hz=to_hz,
         period_s=period_s, periods=periods, dt_s=dt_s, at_m=at_m, measure=measure, bus=bus,
-        lockstep=lockstep, drives=drives, library=library, reset_faults=reset_faults,
+        lockstep=lockstep, drives=drives, library=library, reset_faults=reset_faults, home=home,
         telemetry=telemetry, observe=observe, tell=tell, duration_s=duration_s,
     )  # fmt: skip
 

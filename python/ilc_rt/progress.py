@@ -38,6 +38,7 @@ REMARKS_SHOWN = 8
 UNTIL_STOPPED = 2**32 - 1
 WORDS = {
     "bringing_up": "bringing the drives up",
+    "homing": "homing",
     "enabling": "switching the drives on",
     "returning": "returning to the start",
     "settling": "settling at the start",

@@ -93,6 +93,13 @@ fn zero_m(axis: &ilc_rt::config::Axis) -> f64 {
     }
 }
 
+/// Returns the counts of a drive's encoder along its axis: on the bus they grow with the axis unless it is reversed, and
+/// the polarity of the drive turns them on their way there.
+fn counts_per_m(axis: &ilc_rt::config::Axis) -> f64 {
+    let is_turned = axis.drive.polarity != 0;
+    if axis.reversed == is_turned { axis.counts_per_m } else { -axis.counts_per_m }
+}
+
 impl Machine {
     /// Creates the machine of a cell description, at rest and not yet booted.
     ///
@@ -119,7 +126,7 @@ impl Machine {
         for axis in &cell.axes {
             let node = node_of(axis.node)?;
             let parameters = DriveParameters {
-                counts_per_m: if axis.reversed { -axis.counts_per_m } else { axis.counts_per_m },
+                counts_per_m: counts_per_m(axis),
                 zero_m: zero_m(axis),
                 position_min_m: axis.limits.position_min_m,
                 position_max_m: axis.limits.position_max_m,

@@ -133,14 +133,26 @@ def with_drives_by_hand(text: str, folder: Path) -> None:
     text, is_bus = re.subn(r"can:\S+", address, text)
     if not is_bus:
         text = f"{text} --bus {address}"
-    if re.search(r"ilc-rt (enable|jog|goto) ", text):
+    if re.search(r"ilc-rt (enable|jog|goto|home) ", text):
         text = f"{text} --simulated-drives"
-    drives = Process([program("ilc-sim"), "run", ROOT / NETWORK_CELL, "--bus", address], folder)
+    cell = ROOT / NETWORK_CELL
+    if "ilc-rt home " in text:
+        cell = homed_by_drive(folder)
+    drives = Process([program("ilc-sim"), "run", cell, "--bus", address], folder)
     try:
         drives.line_with("ready")
         run(text, folder)
     finally:
         drives.close()
+
+
+def homed_by_drive(folder: Path) -> Path:
+    """Let the drive of x search its home, and return the cell."""
+    cell = folder / "gantry.toml"
+    homing = '[axis.homing]\nkind = "drive"\nmethod = 33\nspeed_zero_m_s = 0.01\noffset_m = 0.04\n'
+    text = cell.read_text(encoding="utf-8")
+    cell.write_text(text.replace("[axis.model]", f"{homing}\n[axis.model]", 1), encoding="utf-8")
+    return cell
 
 
 def drives_alone(text: str, folder: Path) -> None:
@@ -212,7 +224,7 @@ def test_a_line_that_one_is_told_to_type_works(command: Command, folder: Path) -
         drives_alone(text, folder)
     elif re.match(r"ilc-rt (run|identify)", text):
         with_drives(text, folder)
-    elif re.match(r"(yes \| )?ilc-rt (scan|sdo|status|reset|enable|jog|goto|disable) ", text):
+    elif re.match(r"(yes \| )?ilc-rt (scan|sdo|status|reset|enable|home|jog|goto|disable) ", text):
         with_drives_by_hand(text, folder)
     else:
         run(text, folder)

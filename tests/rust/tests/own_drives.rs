@@ -109,9 +109,7 @@ fn an_axis_that_is_not_homed_does_not_run() {
     let line = run(&needed, machine(&needed)).unwrap_err();
     assert!(
         line.contains("cell.toml: axis x (node 1) is not homed:")
-            && line.contains(
-                "nothing has moved; home it with the tool of its drive, then start again"
-            ),
+            && line.contains("nothing has moved; `ilc-rt home cell.toml --axis x` homes it"),
         "{line}"
     );
     let absolute = cell("", "[axis.homing]\nkind = \"absolute\"");

@@ -75,7 +75,8 @@ pub enum CampaignError {
     },
     /// A drive that has to find its home first.
     #[error(
-        "{file}: axis {axis} (node {node}) is not homed: {why}; nothing has moved; home it with the tool of its drive, then start again"
+        "{file}: axis {axis} (node {node}) is not homed: {why}; nothing has moved; `ilc-rt home {file} \
+         --axis {axis}` homes it, or --home before the first run"
     )]
     NotHomed {
         /// Cell description.

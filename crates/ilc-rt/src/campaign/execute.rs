@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::announce::Announcer;
+use super::before_run;
 use super::claim::{Claim, claim};
 use super::control::{Server, Shared};
 use super::error::{CampaignError, ResumeError};
@@ -12,7 +13,7 @@ use super::keeper::Keeper;
 use super::learner::{Learner, set_disturbance};
 use super::nodes;
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session, StartOn};
-use super::pace::Pacer;
+use super::pace::{MAILBOX, Pacer};
 use super::resume::{Resumed, to_resume};
 use super::rollback::RollbackPolicy;
 use super::running::{Parts, Running};
@@ -26,9 +27,6 @@ use crate::library::Library;
 use crate::record::{Event, StateName};
 use crate::rt::RtReport;
 use crate::servo::{Cycle, Orders, mailbox};
-
-/// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
-pub(super) const MAILBOX: usize = 8192;
 
 /// Runs a campaign on a bus (`cell.bus.address`, open), with the cell's law or another one; `observe` is
 /// called with every event.
@@ -151,6 +149,12 @@ fn execute(
         if options.ctl { Some(Server::open(&cell.cell.name, Arc::clone(&shared))?) } else { None };
     let mut announcer = Announcer::new(observe, telemetry, shared, cell.cycle_s(), cell.n_axes());
     announcer.publish(&Event::State { state: StateName::BringingUp, iteration: first });
+    if session.home {
+        bus = match before_run::home(cell, session, bus, &mut announcer, first)? {
+            Ok(bus) => bus,
+            Err(end) => return Ok(Outcome { campaign: plan.meta.campaign, ..end }),
+        };
+    }
     let maps = nodes::start(cell, bus.as_mut(), session)?;
 
     // After being switched off, drives start elsewhere than the last run left them. One run with

@@ -5,6 +5,7 @@
 //! reads the loop's mailbox and never shares anything else with it.
 
 mod announce;
+mod before_run;
 mod buses;
 mod claim;
 mod collect;
@@ -15,6 +16,7 @@ mod error;
 mod execute;
 mod fault;
 mod frozen;
+mod homing;
 pub mod input;
 mod keep;
 mod keeper;
@@ -35,6 +37,7 @@ pub use buses::open_buses;
 pub use disturbance::{Disturbance, DisturbanceError};
 pub use error::{CampaignError, ResumeError};
 pub use execute::{identify, run};
+pub use homing::{Homed, HomedAxis, home, homing_axes};
 pub use keep::Keep;
 pub use nodes::drive_setup;
 pub use options::{Options, Outcome, Session, StartOn};

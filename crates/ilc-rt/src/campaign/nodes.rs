@@ -9,7 +9,7 @@ use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::design;
 use crate::fieldbus::Bus;
 use crate::fieldbus::bring_up::{
-    BringUpError, DriveSetup, SdoClient, bring_up, bring_up_encoder, listen,
+    BringUpError, DriveIdentity, DriveSetup, SdoClient, bring_up, bring_up_encoder, enter_homing_mode, listen,
 };
 use crate::fieldbus::canopen::{NmtCommand, emcy};
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
@@ -17,6 +17,8 @@ use crate::fieldbus::cia402::{PdoMap, objects};
 
 /// Heartbeat of the nodes in real time.
 const HEARTBEAT_MS: u16 = 100;
+/// Time without a command after which a drive gives a homing up; the watching thread is not a real-time one.
+const HOMING_DEADLINE_MS: u16 = 200;
 
 /// Resets, checks and configures all nodes, then starts them together; returns the process data of each
 /// axis as mapped. No axis moves.
@@ -36,57 +38,131 @@ pub(super) fn prepare(
     bus: &mut dyn Bus,
     session: &Session,
 ) -> Result<Vec<PdoMap>, CampaignError> {
-    let lockstep = session.lockstep;
-    let file = cell.file.display().to_string();
-    let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
-    let answer_timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
     refuse_company(cell, bus)?;
-    let addresses: Vec<String> = cell.addresses().map(str::to_owned).collect();
-    let refused = |key: String, bus: u8| {
-        let file = file.clone();
-        let address = addresses.get(usize::from(bus)).cloned().unwrap_or_default();
-        move |source: BringUpError| refusal(file, key, address, source)
-    };
-    let resets = session.reset_faults || cell.safety.reset_faults;
     let mut maps = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
-        let found =
-            bring_up(bus, &drive_setup(cell, axis, lockstep)?).map_err(|source| match source {
-                BringUpError::NotHomed { node, why } => CampaignError::NotHomed {
-                    file: file.clone(),
-                    axis: axis.name.clone(),
-                    node: node.get(),
-                    why,
-                },
-                source => refused(key_of(axis), axis.bus)(source),
-            })?;
-        if let Some(code) = found.fault.filter(|_| resets) {
-            let (name, node, meaning) = (&axis.name, axis.node, emcy::meaning(code));
-            tracing::warn!(
-                "drive of axis {name} (node {node}) was in fault, which is reset: 0x{code:04X} {meaning}"
-            );
-        }
-        maps.push(found.map);
+        let setup = drive_setup(cell, axis, session.lockstep)?;
+        maps.push(bring_up_axis(cell, axis, bus, session, &setup)?.map);
     }
     if let Some(tool) = &cell.tcp_encoder {
-        bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
-            .map_err(refused(format!("[tcp_encoder] node = {}", tool.node), 0))?;
+        bring_up_encoder(bus, design::node(cell, tool.node)?, timeout(cell, session)).map_err(
+            |source| refusal(cell, format!("[tcp_encoder] node = {}", tool.node), 0, source),
+        )?;
     }
-    if resets {
+    if resets(cell, session) {
         return Ok(maps);
     }
     for axis in &cell.axes {
-        let found = ask(cell, axis, session, |client| commissioning::faults(bus, client))?;
-        if found.in_fault() {
-            return Err(CampaignError::Faulted {
-                file,
-                axis: axis.name.clone(),
-                node: axis.node,
-                fault: found.sentence(),
-            });
-        }
+        refuse_fault(cell, axis, bus, session)?;
     }
     Ok(maps)
+}
+
+/// Resets, checks and configures the drives of some axes for homing. Returns which of them are homed already, unless
+/// they are to be homed again; all others wait without power in homing mode.
+pub(super) fn prepare_homing(
+    cell: &Cell,
+    bus: &mut dyn Bus,
+    session: &Session,
+    axes: &[&Axis],
+    again: bool,
+) -> Result<Vec<bool>, CampaignError> {
+    refuse_company(cell, bus)?;
+    let mut are_homed = Vec::with_capacity(axes.len());
+    for axis in axes {
+        let setup = drive_setup(cell, axis, session.lockstep)?;
+        let deadline_ms = if session.lockstep { 0 } else { HOMING_DEADLINE_MS };
+        let setup = DriveSetup {
+            map: PdoMap::of_homing(),
+            rpdo_deadline_ms: setup.rpdo_deadline_ms.max(deadline_ms),
+            is_to_be_homed: true,
+            ..setup
+        };
+        let is_homed = bring_up_axis(cell, axis, bus, session, &setup)?.is_homed && !again;
+        if resets(cell, session) {
+            ask(cell, axis, session, |client| {
+                if commissioning::faults(bus, client)?.in_fault() {
+                    commissioning::reset(bus, client)?;
+                }
+                Ok(())
+            })?;
+        }
+        refuse_fault(cell, axis, bus, session)?;
+        if !is_homed {
+            enter_homing_mode(bus, &client(cell, axis, session)?, timeout(cell, session))
+                .map_err(|source| refusal(cell, key_of(axis), axis.bus, source))?;
+        }
+        are_homed.push(is_homed);
+    }
+    Ok(are_homed)
+}
+
+/// Brings the drive of an axis up as for a run, which it has to be homed for; returns its position.
+///
+/// # Errors
+/// One line.
+pub(super) fn confirm_homed(
+    cell: &Cell,
+    axis: &Axis,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<f64, String> {
+    let said = |error: CampaignError| match error {
+        CampaignError::NotHomed { why, .. } => format!(
+            "the drive found its home, but does not tell so when it is asked for a run: {why}"
+        ),
+        error => error.to_string(),
+    };
+    let setup = drive_setup(cell, axis, session.lockstep).map_err(|error| error.to_string())?;
+    bring_up_axis(cell, axis, bus, session, &setup).map_err(said)?;
+    position(cell, axis, bus, session).map_err(said)
+}
+
+fn bring_up_axis(
+    cell: &Cell,
+    axis: &Axis,
+    bus: &mut dyn Bus,
+    session: &Session,
+    setup: &DriveSetup,
+) -> Result<DriveIdentity, CampaignError> {
+    let found = bring_up(bus, setup).map_err(|source| match source {
+        BringUpError::NotHomed { node, why } => CampaignError::NotHomed {
+            file: cell.file.display().to_string(),
+            axis: axis.name.clone(),
+            node: node.get(),
+            why,
+        },
+        source => refusal(cell, key_of(axis), axis.bus, source),
+    })?;
+    if let Some(code) = found.fault.filter(|_| resets(cell, session)) {
+        let (name, node, meaning) = (&axis.name, axis.node, emcy::meaning(code));
+        tracing::warn!(
+            "drive of axis {name} (node {node}) was in fault, which is reset: 0x{code:04X} {meaning}"
+        );
+    }
+    Ok(found)
+}
+
+fn refuse_fault(
+    cell: &Cell,
+    axis: &Axis,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<(), CampaignError> {
+    let found = ask(cell, axis, session, |client| commissioning::faults(bus, client))?;
+    if !found.in_fault() {
+        return Ok(());
+    }
+    Err(CampaignError::Faulted {
+        file: cell.file.display().to_string(),
+        axis: axis.name.clone(),
+        node: axis.node,
+        fault: found.sentence(),
+    })
+}
+
+fn resets(cell: &Cell, session: &Session) -> bool {
+    session.reset_faults || cell.safety.reset_faults
 }
 
 /// Returns the key of an axis' node.
@@ -94,8 +170,13 @@ fn key_of(axis: &Axis) -> String {
     format!("[[axis]] {} node = {}", axis.name, axis.node)
 }
 
-fn refusal(file: String, key: String, address: String, source: BringUpError) -> CampaignError {
-    CampaignError::BringUp { file, key, address, source: Box::new(source) }
+fn refusal(cell: &Cell, key: String, bus: u8, source: BringUpError) -> CampaignError {
+    CampaignError::BringUp {
+        file: cell.file.display().to_string(),
+        key,
+        address: cell.addresses().nth(usize::from(bus)).unwrap_or_default().to_owned(),
+        source: Box::new(source),
+    }
 }
 
 /// Starts all nodes together.
@@ -113,27 +194,46 @@ pub(super) fn positions(
     bus: &mut dyn Bus,
     session: &Session,
 ) -> Result<Vec<f64>, CampaignError> {
-    let mut all_m = Vec::with_capacity(cell.n_axes());
-    for axis in &cell.axes {
-        let scale = design::axis_scale(cell, axis)?;
-        let counts = ask(cell, axis, session, |client| {
-            Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
-        })?;
-        all_m.push(scale.position_m(counts.cast_signed()));
-    }
-    Ok(all_m)
+    cell.axes.iter().map(|axis| position(cell, axis, bus, session)).collect()
+}
+
+/// Reads the position of an axis.
+pub(super) fn position(
+    cell: &Cell,
+    axis: &Axis,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<f64, CampaignError> {
+    let scale = design::axis_scale(cell, axis)?;
+    let counts = ask(cell, axis, session, |client| {
+        Ok(client.upload_u32(bus, objects::POSITION_ACTUAL, 0)?)
+    })?;
+    Ok(scale.position_m(counts.cast_signed()))
+}
+
+/// Returns the time-out of each answer.
+pub(super) fn timeout(cell: &Cell, session: &Session) -> Duration {
+    let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
+    Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s)
+}
+
+/// Returns a client of the drive of an axis.
+fn client(
+    cell: &Cell,
+    axis: &Axis,
+    session: &Session,
+) -> Result<SdoClient, ConfigError> {
+    Ok(SdoClient::new(design::node(cell, axis.node)?, timeout(cell, session)))
 }
 
 /// Asks the drive of an axis.
-fn ask<T>(
+pub(super) fn ask<T>(
     cell: &Cell,
     axis: &Axis,
     session: &Session,
     question: impl FnOnce(&SdoClient) -> Result<T, CommissioningError>,
 ) -> Result<T, CampaignError> {
-    let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
-    let timeout = Duration::from_secs_f64(cell.safety.answer_timeout_s + stall_s);
-    let client = SdoClient::new(design::node(cell, axis.node)?, timeout);
+    let client = client(cell, axis, session)?;
     question(&client).map_err(|source| CampaignError::Commissioning {
         file: cell.file.display().to_string(),
         axis: axis.name.clone(),

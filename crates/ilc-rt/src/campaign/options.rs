@@ -43,6 +43,9 @@ pub struct Session {
     /// Reset faults that the drives have when the program starts, in place of a refusal that names them.
     #[arg(long)]
     pub reset_faults: bool,
+    /// Home the axes that are not homed before anything else, in place of a refusal that names them.
+    #[arg(long)]
+    pub home: bool,
     /// Library file that every run is stored in.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     pub library: PathBuf,

@@ -10,6 +10,8 @@ use crate::interpolate::MAX_AXES;
 use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
 use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
 
+/// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
+pub(super) const MAILBOX: usize = 8192;
 /// Period at which the mailbox of a loop on its own thread is read.
 const READ_EVERY: Duration = Duration::from_millis(2);
 /// Time before a tick at which the loop's thread stops sleeping and busy-waits.

@@ -122,7 +122,7 @@ fn off(statusword: u16) -> String {
 }
 
 /// Names the origin of a stop request.
-fn asked(signal: i32) -> String {
+pub(super) fn asked(signal: i32) -> String {
     match signal {
         libc::SIGINT => "stopped by Ctrl-C".to_owned(),
         libc::SIGTERM => "stopped by SIGTERM".to_owned(),

@@ -4,11 +4,10 @@
 use std::sync::Arc;
 
 use super::error::CampaignError;
-use super::execute::MAILBOX;
 use super::fault::fault;
 use super::nodes;
 use super::options::{SIMULATED_PATIENCE_S, Session};
-use super::pace::Pacer;
+use super::pace::{MAILBOX, Pacer};
 use super::reason::sentence;
 use crate::config::{Axis, Cell};
 use crate::design::{self, Plan};

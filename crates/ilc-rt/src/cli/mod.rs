@@ -10,6 +10,7 @@ mod drive;
 mod enable;
 mod figures;
 mod goto;
+mod home;
 mod identify;
 mod init;
 mod input;
@@ -86,6 +87,8 @@ enum Verb {
     Reset(reset::ResetArguments),
     /// Switch the drives of a cell on, and hold their positions until released.
     Enable(enable::EnableArguments),
+    /// Let the drives search their home, as [axis.homing] says.
+    Home(home::HomeArguments),
     /// Move one axis by a distance, or for as long as input arrives.
     Jog(jog::JogArguments),
     /// Move axes to positions.
@@ -135,6 +138,7 @@ pub fn main() -> ExitCode {
         Verb::Status(arguments) => status::status(&arguments),
         Verb::Reset(arguments) => reset::reset(&arguments),
         Verb::Enable(arguments) => enable::enable(&arguments),
+        Verb::Home(arguments) => home::home(&arguments),
         Verb::Jog(arguments) => jog::jog(&arguments),
         Verb::Goto(arguments) => goto::goto(&arguments),
         Verb::Disable(arguments) => reset::disable(&arguments),

@@ -1,7 +1,8 @@
 //! Shared part of the verbs that move axes by hand: options, the cell and its axes, reports, exit status.
 
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::time::Duration;
 
 use clap::Args;
@@ -33,7 +34,24 @@ pub(super) struct Moving {
     reset_faults: bool,
     /// Write the end and the positions to a file; - for standard output.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub(super) json: Option<PathBuf>,
+}
+
+impl Moving {
+    /// Returns the options of everything that moves axes.
+    pub(super) fn session(&self, stop: Arc<AtomicI32>) -> Session {
+        Session {
+            bus: self.bus.clone(),
+            measure: None,
+            lockstep: self.lockstep,
+            simulated: self.simulated,
+            reset_faults: self.reset_faults,
+            home: false,
+            library: PathBuf::new(),
+            telemetry: false,
+            stop,
+        }
+    }
 }
 
 /// Request of a verb: the move, and its dead man's switch.
@@ -99,16 +117,7 @@ fn make(
     if !man.wait_for_first(|| stop.load(Ordering::Relaxed) != 0) {
         return Ok(None);
     }
-    let session = Session {
-        bus: moving.bus.clone(),
-        measure: None,
-        lockstep: moving.lockstep,
-        simulated: moving.simulated,
-        reset_faults: moving.reset_faults,
-        library: PathBuf::new(),
-        telemetry: false,
-        stop,
-    };
+    let session = moving.session(stop);
     let mut heard = true;
     let mut report = |now: Option<&Traveling>| {
         if let Some(now) = now {

@@ -76,6 +76,9 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
             ))
         }
         Event::Iteration { index, figures, .. } => Some(runs.row(*index, figures)),
+        Event::State { state: StateName::Homing, .. } => {
+            Some("homing the axes that are not homed".to_owned())
+        }
         Event::State { state: StateName::Stopping, iteration } => {
             Some(format!("bringing the axes to rest (run {iteration})"))
         }

@@ -98,7 +98,7 @@ impl Homing {
     }
 
     /// Returns true if the method moves the axis.
-    pub(super) fn moves(method: i8) -> bool {
+    pub(crate) fn moves(method: i8) -> bool {
         !matches!(method, 35 | 37)
     }
 

@@ -135,6 +135,8 @@ pub enum Event {
 pub enum StateName {
     /// Nodes are reset, checked and configured.
     BringingUp,
+    /// Drives search their home.
+    Homing,
     /// Drives are enabled, holding their position.
     Enabling,
     /// Axes move to the start.

@@ -20,6 +20,8 @@ pub enum FaultKind {
     WrongLength,
     /// The tool measurement did not answer; `value` is the number of cycles.
     SilentTool,
+    /// An axis did not find its home, or rests outside its limits there.
+    NotHomed,
     /// A node restarted.
     NodeRestarted,
     /// A node left operation; `code` is its NMT state.

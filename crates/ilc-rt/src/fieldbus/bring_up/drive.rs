@@ -60,7 +60,7 @@ pub struct DriveSetup {
     pub answer_timeout: Duration,
     /// Values of this drive that the cell description states.
     pub own: DriveOwn,
-    /// True if the caller homes the drive next; otherwise one that has to be homed is refused until it is.
+    /// True if the caller may home the drive next; otherwise one that has to be homed is refused until it is.
     pub is_to_be_homed: bool,
 }
 
@@ -77,6 +77,8 @@ pub struct DriveIdentity {
     pub fault: Option<u16>,
     /// Process data as mapped.
     pub map: PdoMap,
+    /// It told that it is homed, or needs no homing.
+    pub is_homed: bool,
 }
 
 /// Identity of an encoder node.
@@ -118,10 +120,14 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     }
     let fault = remote.fault()?;
     remote.take_power(setup)?;
-    if let Some(homing) = setup.own.homing.filter(|_| !setup.is_to_be_homed) {
-        // Before the settings of the homing are written: they tell by which method it was homed.
-        remote.check_homed(&homing, setup.answer_timeout)?;
-    }
+    // Before the settings of the homing are written: they tell by which method it was homed.
+    let is_homed = match setup.own.homing {
+        None => true,
+        Some(homing) => match remote.check_homed(&homing, setup.answer_timeout) {
+            Err(BringUpError::NotHomed { .. }) if setup.is_to_be_homed => false,
+            checked => checked.map(|()| true)?,
+        },
+    };
 
     process_data::close_all(&mut remote)?;
     remote.ensure_all(&settings::communication(node, setup.heartbeat_ms, setup.cycle_us))?;
@@ -149,7 +155,7 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     remote.set_mode(setup.mode, setup.answer_timeout)?;
     remote.ensure_all(&settings::offsets())?;
     remote.check_start_up()?;
-    Ok(DriveIdentity { device_type, supported_modes, identity, fault, map })
+    Ok(DriveIdentity { device_type, supported_modes, identity, fault, map, is_homed })
 }
 
 /// Resets an encoder node, checks its identity and maps its two positions; leaves it

@@ -165,6 +165,16 @@ impl PdoMap {
         Self::choose(mode, OptionalObjects::NONE, OptionalObjects::ALL, 8)
     }
 
+    /// Returns the map of a homing: a command without a target, as the drive makes its own.
+    pub fn of_homing() -> Self {
+        let mut command = PdoLayout::EMPTY;
+        command.add(objects::CONTROLWORD, 16);
+        let mut status = PdoLayout::EMPTY;
+        status.add(objects::STATUSWORD, 16);
+        status.add(objects::POSITION_ACTUAL, 32);
+        Self { command, answers: [status, PdoLayout::EMPTY] }
+    }
+
     /// Checks a map that was put together object by object, for frames of up to `bytes_max`.
     ///
     /// # Errors

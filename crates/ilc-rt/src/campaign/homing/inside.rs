@@ -1,0 +1,163 @@
+//! The way back inside: an axis that found its home on a limit switch rests outside its limits, where no verb moves
+//! it. The servo loop brings it inside along a jerk-limited line, alone on the bus. For `homing` only.
+
+use super::lent::Lent;
+use super::{End, Report, Task};
+use crate::campaign::error::CampaignError;
+use crate::campaign::nodes;
+use crate::campaign::options::Session;
+use crate::campaign::travel::{Goal, Travel, Traveling, travel};
+use crate::config::{Axis, Cell, LawName, Learning, Measure};
+use crate::fieldbus::{Bus, BusError};
+use crate::record::EndStatus;
+use crate::trajectory::kind::{PathKind, Program, Segment};
+
+/// Distance from the limit at which an axis comes to rest inside, as a share of its travel.
+const INSIDE_SHARE: f64 = 0.01;
+
+/// Brings the axes that are homed, and rest outside their limits, inside; returns the bus.
+pub(super) fn bring(
+    cell: &Cell,
+    tasks: &mut [Task<'_>],
+    session: &Session,
+    bus: Box<dyn Bus>,
+    report: &mut Report<'_>,
+) -> Result<(End, Box<dyn Bus>), CampaignError> {
+    let mut outside: Vec<(&mut Task<'_>, f64)> = tasks
+        .iter_mut()
+        .filter_map(|task| {
+            let inside_m = task.result.position_m.and_then(|at_m| inside_m(task.axis, at_m))?;
+            Some((task, inside_m))
+        })
+        .collect();
+    if outside.is_empty() {
+        return Ok((End::completed(), bus));
+    }
+    let alone = alone(cell, &outside);
+    let goals = outside.iter().enumerate().map(|(axis, (_, to_m))| (axis, Goal::At(*to_m)));
+    let way = Travel { goals: goals.collect(), speed_m_s: None, hold_s: Some(0.0) };
+    let (lent, returned) = Lent::new(bus);
+    let mut tell = |now: Option<&Traveling>| {
+        let line = now.map(|now| described(&alone, now));
+        report(line.as_deref())
+    };
+    let arrival = travel(&alone, &way, session, Box::new(lent), &mut tell);
+    let Ok(mut bus) = returned.recv() else {
+        return Err(CampaignError::Start {
+            file: cell.file.display().to_string(),
+            address: cell.bus.address.clone(),
+            source: BusError::Closed,
+        });
+    };
+    let (status, reason, signal) = match arrival {
+        Ok(arrival) => (arrival.status, arrival.reason, arrival.signal),
+        Err(error) => (EndStatus::Fault, error.to_string(), 0),
+    };
+    let mut left = None;
+    for (task, _) in &mut outside {
+        // With the limits of the cell again, which the drive keeps as well.
+        let confirmed = nodes::confirm_homed(cell, task.axis, bus.as_mut(), session);
+        let error = match confirmed {
+            Ok(at_m) => {
+                task.result.position_m = Some(at_m);
+                inside_m(task.axis, at_m).map(|_| stays_outside(cell, task.axis, at_m))
+            }
+            Err(error) => Some(error),
+        };
+        if left.is_none() {
+            left.clone_from(&error);
+        }
+        task.result.error = error;
+    }
+    let end = match (status, left) {
+        (EndStatus::Completed, None) => End::completed(),
+        (EndStatus::Completed, Some(left)) => End::fault(left),
+        (_, Some(left)) => End { status, reason: format!("{reason}; {left}"), signal },
+        (_, None) => End { status, reason, signal },
+    };
+    Ok((end, bus))
+}
+
+/// Returns the place inside to which an axis is brought; `None` if it is inside.
+fn inside_m(axis: &Axis, at_m: f64) -> Option<f64> {
+    let limits = &axis.limits;
+    let (low_m, high_m) = (limits.position_min_m, limits.position_max_m);
+    let half_count_m = 0.5 / axis.counts_per_m;
+    let margin_m = INSIDE_SHARE * (high_m - low_m);
+    if at_m < low_m - half_count_m {
+        Some(low_m + margin_m)
+    } else if at_m > high_m + half_count_m {
+        Some(high_m - margin_m)
+    } else {
+        None
+    }
+}
+
+fn stays_outside(cell: &Cell, axis: &Axis, at_m: f64) -> String {
+    let (unit, limits) = (axis.unit.symbol(), &axis.limits);
+    format!(
+        "axis {name} is homed, but rests at {at_m:.6} {unit}, outside {} to {} {unit}: `ilc-rt home {} --axis {name}` \
+         brings it inside",
+        limits.position_min_m,
+        limits.position_max_m,
+        cell.file.display(),
+        name = axis.name,
+    )
+}
+
+/// Returns a cell of these axes alone, whose limits reach to where they are. It learns nothing.
+fn alone(cell: &Cell, outside: &[(&mut Task<'_>, f64)]) -> Cell {
+    let mut alone = cell.clone();
+    alone.axes = outside
+        .iter()
+        .map(|(task, _)| {
+            let mut axis = task.axis.clone();
+            let margin_m =
+                INSIDE_SHARE * (axis.limits.position_max_m - axis.limits.position_min_m);
+            if let Some(at_m) = task.result.position_m {
+                let limits = &mut axis.limits;
+                limits.position_min_m = limits.position_min_m.min(at_m - margin_m);
+                limits.position_max_m = limits.position_max_m.max(at_m + margin_m);
+            }
+            axis
+        })
+        .collect();
+    alone.tcp_encoder = None;
+    alone.learning =
+        Learning { law: LawName::None, measure: Measure::Encoder, ..Learning::default() };
+    alone.simulation.changes = Vec::new();
+    let to_m: Vec<f64> = outside.iter().map(|(_, to_m)| *to_m).collect();
+    alone.program = Program {
+        start_m: to_m.clone(),
+        kind: PathKind::default(),
+        file: None,
+        rapid_m_s: None,
+        block_delete: false,
+        curvature_acceleration_max_m_s2: None,
+        butterfly: None,
+        spiral: None,
+        raster: None,
+        modulated: None,
+        segments: vec![Segment {
+            to_m,
+            feed_m_s: None,
+            center_m: None,
+            clockwise: false,
+            dwell_s: 0.0,
+        }],
+        ..alone.program
+    };
+    alone
+}
+
+fn described(cell: &Cell, now: &Traveling) -> String {
+    let shown = cell.axes.iter().zip(&now.position_m);
+    let shown: Vec<String> = shown
+        .map(|(axis, at_m)| format!("{} {at_m:.6} {}", axis.name, axis.unit.symbol()))
+        .collect();
+    if shown.is_empty() {
+        let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
+        return format!("bringing inside the limits: {}", names.join(", "));
+    }
+    format!("bringing inside the limits: {}", shown.join(", "))
+}
