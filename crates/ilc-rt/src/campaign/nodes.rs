@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::error::CampaignError;
+use super::inputs::{self, Words};
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::commissioning::{self, CommissioningError};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
@@ -25,17 +26,18 @@ pub(super) fn start(
     bus: &mut dyn Bus,
     session: &Session,
 ) -> Result<Vec<PdoMap>, CampaignError> {
-    let maps = prepare(cell, bus, session)?;
+    let (maps, _) = prepare(cell, bus, session)?;
     go(cell, bus)?;
     Ok(maps)
 }
 
-/// Resets, checks and configures all nodes; they wait for [`go`]. Returns the process data of each axis as mapped.
+/// Resets, checks and configures all nodes; they wait for [`go`]. Returns the process data of each axis as mapped, and
+/// its digital inputs.
 pub(super) fn prepare(
     cell: &Cell,
     bus: &mut dyn Bus,
     session: &Session,
-) -> Result<Vec<PdoMap>, CampaignError> {
+) -> Result<(Vec<PdoMap>, Words), CampaignError> {
     let lockstep = session.lockstep;
     let file = cell.file.display().to_string();
     let stall_s = if session.forgives_stalls() { SIMULATED_PATIENCE_S } else { 0.0 };
@@ -72,8 +74,10 @@ pub(super) fn prepare(
         bring_up_encoder(bus, design::node(cell, tool.node)?, answer_timeout)
             .map_err(refused(format!("[tcp_encoder] node = {}", tool.node), 0))?;
     }
+    let words = read_inputs(cell, bus, session)?;
+    inputs::permit(cell, &words)?;
     if resets {
-        return Ok(maps);
+        return Ok((maps, words));
     }
     for axis in &cell.axes {
         let found = ask(cell, axis, session, |client| commissioning::faults(bus, client))?;
@@ -86,7 +90,7 @@ pub(super) fn prepare(
             });
         }
     }
-    Ok(maps)
+    Ok((maps, words))
 }
 
 /// Returns the key of an axis' node.
@@ -124,8 +128,21 @@ pub(super) fn positions(
     Ok(all_m)
 }
 
+/// Reads the digital inputs of every drive that has named ones.
+fn read_inputs(cell: &Cell, bus: &mut dyn Bus, session: &Session) -> Result<Words, CampaignError> {
+    let mut words = vec![None; cell.n_axes()];
+    for (word, axis) in words.iter_mut().zip(&cell.axes) {
+        if cell.inputs.iter().any(|input| input.axis == axis.name) {
+            *word = Some(ask(cell, axis, session, |client| {
+                Ok(client.upload_u32(bus, objects::DIGITAL_INPUTS, 0)?)
+            })?);
+        }
+    }
+    Ok(words)
+}
+
 /// Asks the drive of an axis.
-fn ask<T>(
+pub(super) fn ask<T>(
     cell: &Cell,
     axis: &Axis,
     session: &Session,
