@@ -349,9 +349,10 @@ fn an_emergency_stop_is_rearmed_by_a_person_only() {
 #[test]
 fn by_hand_an_axis_leaves_its_limit_switch_but_does_not_go_on() {
     let mut cell = cell(CELLS[0]);
-    cell.inputs.push(input("far end", 1, Level::High, InputUse::Limit));
-    // At the switch from the start.
-    cell.axes[0].simulation.switch_max_m = Some(0.03);
+    // Closed from there upwards, and not known to the drive itself, which would not reach it.
+    let far_end = input("far end", 2, Level::High, InputUse::Limit);
+    cell.inputs.push(Input { direction: Some(Direction::Positive), ..far_end });
+    cell.axes[0].simulation.switch_home_m = Some(0.03);
     cell.axes[0].simulation.position_start_m = 0.035;
     let session = options(Scratch::new().file("a.db"), 1).session;
     let go = |distance_m: f64| {
@@ -363,7 +364,7 @@ fn by_hand_an_axis_leaves_its_limit_switch_but_does_not_go_on() {
     let refusal = go(0.01).unwrap_err();
     assert!(
         refusal
-            .contains("allowed away from limit switch far end (bit 1 of 0x60FD of axis x, node 1)"),
+            .contains("allowed away from limit switch far end (bit 2 of 0x60FD of axis x, node 1)"),
         "{refusal}"
     );
     assert_eq!(go(-0.02).unwrap().status, EndStatus::Completed);
