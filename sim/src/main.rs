@@ -41,7 +41,7 @@ A running controller lets it happen with --simulated-drives; a real drive has no
 
 Examples:
   ilc-sim input gantry.toml door off
-  ilc-sim input gantry.toml start on";
+  ilc-sim input gantry.toml go on";
 
 #[derive(Debug, Subcommand)]
 enum Verb {
