@@ -84,13 +84,14 @@ class Campaign:
         that of the run it comes from. None never does; a `DriftEvent` tells the drift all the same.
     forever : bool
         Run until stopped, in place of a number of runs.
-    keep : int, {"all", "best"}
+    keep : int, {"all", "best"} or None
         Runs that stay in the library when nothing is learned from them: all, every n-th, or the
-        best; the newest always does.
+        best; the newest always does. None is what the cell description says in ``[library]``.
     ctl : bool
         Accept commands of ``ilc-rt ctl`` on a socket of this user; `StartEvent` has its path.
-    start : {"at-once", "command"}
-        Start each run at once, or when ``ilc-rt ctl CELL start`` asks for it; this needs `ctl`.
+    start : {"at-once", "command", "input"}
+        Start each run at once, when ``ilc-rt ctl CELL start`` asks for it, which needs `ctl`, or at
+        a press of the start button among the ``[[input]]`` of the cell.
     disturbance : callable, array_like of float64 or None
         Measured disturbance before each run, e.g. a temperature: stored with
         the run, and given to the law for the next run. Either one row per run,
@@ -155,9 +156,9 @@ class Campaign:
         input_file: str | Path | None = None,
         relearn_above: float | None = None,
         forever: bool = False,
-        keep: int | str = "all",
+        keep: int | str | None = None,
         ctl: bool = False,
-        start: Literal["at-once", "command"] = "at-once",
+        start: Literal["at-once", "command", "input"] = "at-once",
         disturbance: Callable[[int], ArrayLike] | ArrayLike | None = None,
         allow_divergent: bool = False,
         reset_faults: bool = False,
@@ -253,7 +254,7 @@ class Campaign:
                     if event is not None:
                         self.result.follow(event)
                         yield event
-                if self.keep != "all":
+                if self.keep != "all" and Path(self.library).is_file():
                     self.result.forget_unkept()
                 self._check_end(controller)
             finally:

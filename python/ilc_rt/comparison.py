@@ -133,12 +133,16 @@ class Comparison:
 
         A remark repeated in consecutive runs appears once.
         """
+        return [line for _, line in self.numbered_remarks()]
+
+    def numbered_remarks(self) -> list[tuple[int, str]]:
+        """Return the lines of `remarks`, each with the number of its run."""
         before: str | None = None
         lines = []
         for record in self.records:
             remark = remark_on(record)
             if remark and remark != before:
-                lines.append(f"run {record.index}: {remark}")
+                lines.append((record.index, f"run {record.index}: {remark}"))
             before = remark
         return lines
 

@@ -49,6 +49,8 @@ class FaultError(CampaignError):
         Cause, e.g. ``"following_error"``; `docs/events.schema.json` lists all.
     axis, node : str or None, int or None
         Axis and node, if it concerns a single one.
+    input : str or None
+        Name of the digital input that caused it.
     code : int or None
         Number defined by the kind, e.g. an emergency code.
     value, limit, unit : float or None, float or None, str or None
@@ -70,6 +72,7 @@ class FaultError(CampaignError):
         kind: str = "",
         axis: str | None = None,
         node: int | None = None,
+        input: str | None = None,
         code: int | None = None,
         value: float | None = None,
         limit: float | None = None,

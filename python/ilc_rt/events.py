@@ -78,6 +78,27 @@ class StateEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class InputState:
+    """A digital input of the cell; `use` is "guard", "start", "stop" or "limit".
+
+    `on` is True for a closed guard, a pressed button and a limit switch that is reached, None
+    before the input is known.
+    """
+
+    name: str
+    use: str
+    on: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class InputsEvent:
+    """Digital inputs have changed; `inputs` has all of the cell, in their order."""
+
+    name: ClassVar[str] = "inputs"
+    inputs: tuple[InputState, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ProgressEvent:
     """Progress of the run."""
 
@@ -159,7 +180,7 @@ class FaultEvent:
 
     `kind` is the cause, e.g. ``"following_error"``; `axis` and `node` give the place, `code` is a
     number defined by the kind, e.g. an emergency code, `value` is the value found and `limit` the
-    allowed one, in `unit`.
+    allowed one, in `unit`. `input` is the name of a digital input that caused it.
     """
 
     name: ClassVar[str] = "fault"
@@ -167,6 +188,7 @@ class FaultEvent:
     kind: str = ""
     axis: str | None = None
     node: int | None = None
+    input: str | None = None
     code: int | None = None
     value: float | None = None
     limit: float | None = None
@@ -190,6 +212,7 @@ class EndEvent:
 Event = (
     StartEvent
     | StateEvent
+    | InputsEvent
     | ProgressEvent
     | IterationEvent
     | JudgedEvent
@@ -204,6 +227,7 @@ _CLASSES: dict[str, type[Any]] = {
     for cls in (
         StartEvent,
         StateEvent,
+        InputsEvent,
         ProgressEvent,
         IterationEvent,
         JudgedEvent,
@@ -287,6 +311,11 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Event:
             values["rt"] = _real_time_report(report) if report else None
         elif cls is IterationEvent:
             values |= {key: tuple(v) for key, v in values.items() if isinstance(v, list)}
+        elif cls is InputsEvent:
+            values["inputs"] = tuple(
+                InputState(str(one["name"]), str(one["use"]), one.get("on"))
+                for one in values["inputs"]
+            )
         elif cls is FaultEvent:
             values["cycles"] = _last_cycles(values.get("cycles"))
         elif cls is LatencyEvent:

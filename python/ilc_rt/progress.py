@@ -20,6 +20,7 @@ from ilc_rt.events import (
     StartEvent,
     StateEvent,
 )
+from ilc_rt.result import UNTIL_STOPPED
 from ilc_rt.table import headings, plain_line, run_cells, runs_table
 from ilc_rt.text import printable
 
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 # Number of remarks below the table in a terminal: the newest ones.
 REMARKS_SHOWN = 8
-# Number of runs of a campaign that runs until it is stopped.
-UNTIL_STOPPED = 2**32 - 1
 WORDS = {
     "bringing_up": "bringing the drives up",
     "homing": "homing",
@@ -99,7 +98,8 @@ class CampaignView:
         self._task = self._bar.add_task("starting", total=1.0)
         self._runs = 0
         self._names: tuple[str, ...] = ()
-        self._remarked = 0
+        # Number of the newest run whose remark was printed.
+        self._remarked = -1
 
     def __enter__(self) -> Self:
         """Start drawing."""
@@ -157,7 +157,8 @@ class CampaignView:
         names = headings(comparison)
         if not self._names:
             # Remarks on the earlier runs of a resumed campaign were shown when they were made.
-            self._remarked = len(_remarks(result)) if len(result.records) > 1 else 0
+            if len(result.records) > 1:
+                self._remarked = result.records[-2].index
         if names != self._names:
             # Once, and again if the errors have outgrown their unit.
             self._names = names
@@ -166,10 +167,10 @@ class CampaignView:
         self._print_remarks(result)
 
     def _print_remarks(self, result: CampaignResult) -> None:
-        remarks = _remarks(result)
-        for remark in remarks[self._remarked :]:
-            print(f"     {remark}")
-        self._remarked = len(remarks)
+        for index, remark in result.comparison.numbered_remarks():
+            if index > self._remarked:
+                print(f"     {printable(remark)}")
+                self._remarked = index
         sys.stdout.flush()
 
     def _finish(self, result: CampaignResult) -> None:

@@ -28,6 +28,12 @@ from ilc_rt.record import IterationRecord
 STANDARD_OUTPUT = Path("-")
 
 
+#: Number of runs of a campaign that runs until it is stopped.
+UNTIL_STOPPED = 2**32 - 1
+#: Runs of such a campaign that its result keeps.
+ENDLESS_RECORDS = 200
+
+
 @dataclass(slots=True)
 class CampaignResult:
     """Result of a campaign, collected from its events or from the library.
@@ -35,7 +41,7 @@ class CampaignResult:
     Attributes
     ----------
     records : list of IterationRecord
-        The runs in order.
+        The runs in order; of a campaign that runs until it is stopped the first and the newest 199.
     start : StartEvent or None
         Setup; None for a campaign read from a library.
     latency : LatencyEvent or None
@@ -126,6 +132,9 @@ class CampaignResult:
                 self._recall_earlier_runs(event.first_index)
         elif isinstance(event, IterationEvent):
             self.records.append(IterationRecord.from_event(event, self.library))
+            if self._is_endless and len(self.records) > ENDLESS_RECORDS:
+                # The first one is what the others are compared with.
+                del self.records[1]
         elif isinstance(event, JudgedEvent):
             self._judge(event)
         elif isinstance(event, LatencyEvent):
@@ -135,6 +144,10 @@ class CampaignResult:
         elif isinstance(event, EndEvent):
             self.status = event.status
             self.reason = event.reason or self.reason
+
+    @property
+    def _is_endless(self) -> bool:
+        return self.start is not None and self.start.iterations == UNTIL_STOPPED
 
     @property
     def unkept(self) -> bool:

@@ -9,6 +9,7 @@ pub mod event;
 pub mod machine;
 pub mod node;
 pub mod plant;
+mod script;
 
 pub use event::{Change, Event};
 pub use machine::{ClockMode, Machine, MachineError};

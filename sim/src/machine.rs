@@ -12,6 +12,7 @@ use crate::event::{Change, Event};
 use crate::node::switches::Switches;
 use crate::node::{Dictionary, DriveNode, DriveParameters, EncoderNode, Measured};
 use crate::plant::{Demand, Gantry, Plant};
+use crate::script::{Happening, Script};
 
 /// Number of events kept until they are taken; older ones are dropped.
 const EVENTS_MAX: usize = 64;
@@ -83,6 +84,7 @@ pub struct Machine {
     time_us: u64,
     has_booted: bool,
     events: VecDeque<Event>,
+    script: Script,
 }
 
 /// Returns the place at which a drive shows 0 after power-on: with an encoder that is not absolute, wherever the axis is.
@@ -165,6 +167,7 @@ impl Machine {
             time_us: 0,
             has_booted: false,
             events: VecDeque::with_capacity(EVENTS_MAX),
+            script: Script::new(cell),
         };
         machine.measure();
         Ok(machine)
@@ -207,6 +210,17 @@ impl Machine {
             self.note(node, Change::Muted);
         }
         true
+    }
+
+    /// Switches the digital inputs of a drive that are on beside its switches. Returns true if it exists.
+    pub fn set_inputs(&mut self, node: NodeId, inputs: u32) -> bool {
+        let axis = self.axes.iter_mut().find(|axis| axis.drive.node() == node);
+        axis.map(|axis| axis.drive.set_inputs(inputs)).is_some()
+    }
+
+    /// Activates the safe torque off of all drives, as an emergency stop does, or releases it.
+    pub fn set_torque_off(&mut self, is_off: bool) {
+        self.axes.iter_mut().for_each(|axis| axis.drive.set_torque_off(is_off));
     }
 
     /// Returns the time since power-on.
@@ -260,6 +274,13 @@ impl Machine {
     }
 
     fn step(&mut self, out: &mut dyn FnMut(Frame)) {
+        while let Some((axis, what)) = self.script.due(self.time_us) {
+            let Some(axis) = self.axes.get_mut(axis) else { continue };
+            match what {
+                Happening::Inputs(inputs) => axis.drive.set_inputs(inputs),
+                Happening::TorqueOff(is_off) => axis.drive.set_torque_off(is_off),
+            }
+        }
         for (number, (axis, demand)) in self.axes.iter_mut().zip(&mut self.demands).enumerate() {
             let share = axis.drive.force_share();
             if std::mem::replace(&mut axis.force_share, share).to_bits() != share.to_bits() {

@@ -16,6 +16,7 @@ use ilc_sim::{ClockMode, Machine, eds};
 
 mod drive_clock;
 mod presence;
+mod press;
 mod run;
 
 use run::{Habits, Mute};
@@ -34,6 +35,13 @@ Examples:
   ilc-sim run examples/01_gantry.toml --bus can:vcan0
   ilc-sim run examples/01_gantry.toml --mute 1@5
   ilc-sim eds examples/01_gantry.toml --node 1 > drive.eds";
+
+const INPUT_EXAMPLES: &str = "\
+A running controller lets it happen with --simulated-drives; a real drive has no such object.
+
+Examples:
+  ilc-sim input gantry.toml door off
+  ilc-sim input gantry.toml go on";
 
 #[derive(Debug, Subcommand)]
 enum Verb {
@@ -58,6 +66,19 @@ enum Verb {
         /// axes come to rest first.
         #[arg(long)]
         with_parent: bool,
+    },
+    /// Switches an input of a cell whose drives run in another process: closes a guard, presses a button.
+    #[command(after_help = INPUT_EXAMPLES)]
+    Input {
+        /// Cell description.
+        cell: PathBuf,
+        /// Name of the input.
+        name: String,
+        /// New state: a closed guard and a pressed button are on.
+        #[arg(value_parser = ["on", "off"])]
+        state: String,
+        #[arg(long, value_name = "ADDRESS", help = bus_help())]
+        bus: Option<String>,
     },
     /// Prints the electronic data sheet (EDS) of a node.
     Eds {
@@ -98,6 +119,13 @@ fn carry_out(verb: Verb) -> Result<(), Failure> {
     match verb {
         Verb::Run { cell, bus, lockstep, mute, sync_lost_after, with_parent } => {
             run(&cell, bus, lockstep, &Habits { sync_lost_after, mutes: mute, with_parent })
+        }
+        Verb::Input { cell, name, state, bus } => {
+            let mut cell = load(&cell)?;
+            if let Some(bus) = bus {
+                cell.bus.address = bus;
+            }
+            press::switch(&cell, &name, state == "on").map_err(Failure::Broken)
         }
         Verb::Eds { cell, node } => print_eds(&cell, node),
     }

@@ -155,6 +155,19 @@ def homed_by_drive(folder: Path) -> Path:
     return cell
 
 
+def with_hands(text: str, folder: Path) -> None:
+    """Switch an input of simulated drives of this host."""
+    address = f"udp:239.74.163.2:{free_port()}"
+    cell = ROOT / "examples" / "08_inputs.toml"
+    (folder / "gantry.toml").write_text(cell.read_text(encoding="utf-8"), encoding="utf-8")
+    drives = Process([program("ilc-sim"), "run", cell, "--bus", address], folder)
+    try:
+        drives.line_with("ready")
+        run(f"{text} --bus {address}", folder)
+    finally:
+        drives.close()
+
+
 def drives_alone(text: str, folder: Path) -> None:
     """Run the simulated drives, and end them with Ctrl-C."""
     text = re.sub(r"--bus \S+", "", text) + f" --bus udp:239.74.163.2:{free_port()}"
@@ -220,6 +233,8 @@ def test_a_line_that_one_is_told_to_type_works(command: Command, folder: Path) -
     text = shorter(command.text)
     if re.match(r"ilc monitor|python examples/02_monitor", text):
         watched(text, folder)
+    elif text.startswith("ilc-sim input"):
+        with_hands(text, folder)
     elif text.startswith("ilc-sim run"):
         drives_alone(text, folder)
     elif re.match(r"ilc-rt (run|identify)", text):

@@ -18,6 +18,9 @@ use super::switches::Switches;
 use super::units::Units;
 use crate::plant::Demand;
 
+/// Controlword that switches the power stage off.
+pub(super) const DISABLE_VOLTAGE: u16 = 0;
+
 /// Parameters set by the maker of the drive and the integrator, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveParameters {
@@ -73,6 +76,7 @@ pub struct DriveNode {
     pub(super) motion: Motion,
     pub(super) measured: Measured,
     pub(super) is_halted: bool,
+    pub(super) is_torque_off: bool,
     /// Time since the following error left its window.
     pub(super) astray_us: u64,
     pub(super) has_following_error: bool,
@@ -119,6 +123,7 @@ impl DriveNode {
             motion: Motion::default(),
             measured: Measured::default(),
             is_halted: false,
+            is_torque_off: false,
             astray_us: 0,
             has_following_error: false,
             controlword: 0,
@@ -166,6 +171,20 @@ impl DriveNode {
     /// Sets the measurements from now on.
     pub fn measure(&mut self, measured: Measured) {
         self.measured = measured;
+    }
+
+    /// Switches the digital inputs that are on beside the switches of the axis.
+    pub fn set_inputs(&mut self, inputs: u32) {
+        self.set(self.slots.simulated_inputs, inputs.into());
+    }
+
+    /// Activates safe torque off: the power stage is off, and no controlword switches it on; or releases it, which
+    /// alone switches nothing on.
+    pub fn set_torque_off(&mut self, is_off: bool) {
+        self.is_torque_off = is_off;
+        if is_off {
+            self.command(DISABLE_VOLTAGE);
+        }
     }
 
     /// Boots: self-test, boot-up message, pre-operational.

@@ -9,7 +9,7 @@ use super::homing;
 use super::value::Value;
 
 /// Further digital inputs that are on, as bits of 0x60FD: what a cable would do to a real drive.
-pub const SIMULATED_INPUTS: u16 = 0x2001;
+pub use ilc_rt::fieldbus::network::SIMULATED_INPUTS;
 
 /// Writing an error code makes the drive fail with it.
 pub const SIMULATED_FAULT: u16 = 0x2002;

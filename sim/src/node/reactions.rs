@@ -4,7 +4,7 @@ use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::emcy;
 use ilc_rt::fieldbus::cia402::State;
 
-use super::drive::DriveNode;
+use super::drive::{DISABLE_VOLTAGE, DriveNode};
 use super::drive_mode::DriveMode;
 
 /// Bit 8 of the controlword.
@@ -18,7 +18,9 @@ impl DriveNode {
         let controlword = u16::try_from(self.number(self.slots.controlword)).unwrap_or(0);
         let was_fault = self.state() == State::Fault;
         let was_enabled = self.state() == State::OperationEnabled;
-        self.command(controlword);
+        // A fault can be reset without torque, but nothing more.
+        let is_held = self.is_torque_off && !was_fault;
+        self.command(if is_held { DISABLE_VOLTAGE } else { controlword });
         if was_fault && self.state() != State::Fault {
             self.has_following_error = false;
             self.set(self.slots.error_code, 0);

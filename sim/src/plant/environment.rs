@@ -77,7 +77,10 @@ impl Environment {
         });
         Self {
             time_s: 0.0,
-            is_constant: changes.is_empty(),
+            is_constant: changes.iter().all(|change| {
+                let quantities = [change.temperature_k, change.payload_kg, change.force_n];
+                quantities.iter().all(Option::is_none)
+            }),
             temperature_k: quantity(simulation.temperature_k, &|n| changes[n].temperature_k),
             axes: axes.collect(),
         }
@@ -117,6 +120,8 @@ mod tests {
             temperature_k: None,
             payload_kg: None,
             force_n: None,
+            digital_inputs: None,
+            torque_off: None,
         }
     }
 

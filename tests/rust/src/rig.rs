@@ -13,7 +13,9 @@ use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{CommandRpdo1, State};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
-use ilc_rt::servo::{Cycle, Mailbox, Message, PhaseName, Sample, StopReason, TickStatus, mailbox};
+use ilc_rt::servo::{
+    Cycle, InputBits, Mailbox, Message, Orders, PhaseName, Sample, StopReason, TickStatus, mailbox,
+};
 use ilc_sim::Machine;
 
 use crate::campaign::machine;
@@ -192,6 +194,8 @@ pub struct Rig {
     pub samples: Vec<Sample>,
     /// Cycles that came with the stop.
     pub before: Vec<Sample>,
+    /// Digital inputs as told last.
+    pub inputs: InputBits,
     /// Reason of the stop, if the axes were stopped.
     pub reason: Option<StopReason>,
     /// SYNCs sent before the tick in which the stop began.
@@ -240,7 +244,19 @@ impl Rig {
         Self::on(Tap::new(cell), cell, runs, lockstep)
     }
 
-    fn on(mut tap: Tap, cell: &Cell, runs: u32, lockstep: bool) -> Self {
+    /// Same as [`new`](Self::new), with runs that wait for a press of the start button.
+    ///
+    /// # Panics
+    /// If a node cannot be brought up.
+    pub fn waiting(cell: &Cell, runs: u32) -> Self {
+        Self::with(Tap::new(cell), cell, runs, true, true)
+    }
+
+    fn on(tap: Tap, cell: &Cell, runs: u32, lockstep: bool) -> Self {
+        Self::with(tap, cell, runs, lockstep, false)
+    }
+
+    fn with(mut tap: Tap, cell: &Cell, runs: u32, lockstep: bool, on_input: bool) -> Self {
         let mut maps = Vec::new();
         for axis in &cell.axes {
             let setup = drive_setup(cell, axis, true).expect("a validated cell");
@@ -253,9 +269,11 @@ impl Rig {
         tap.send(&NmtCommand::Start.frame(None)).expect("the bus carries");
         let mut plan = Plan::new(cell, None, lockstep).expect("the cell can be run");
         plan.servo.runs = 0..runs;
+        plan.servo.starts_on_input = on_input;
         let n_samples = plan.n_samples();
         let stop = Arc::new(AtomicI32::new(0));
         let (mail, loop_side) = mailbox(4096, Arc::clone(&stop));
+        let loop_side = loop_side.following(Arc::new(Orders::new(!on_input)));
         let network = plan.network(Box::new(tap.clone()), &maps);
         let cycle = Cycle::new(network, plan.servo, plan.interpolator, loop_side);
         Self {
@@ -264,6 +282,7 @@ impl Rig {
             tap,
             samples: Vec::new(),
             before: Vec::with_capacity(64),
+            inputs: InputBits::default(),
             reason: None,
             stopping_at: None,
             ended: Vec::new(),
@@ -304,6 +323,7 @@ impl Rig {
                 }
                 Message::RunStarted { run, table } => self.started.push((run, table)),
                 Message::RunEnded { run, overruns, .. } => self.ended.push((run, overruns)),
+                Message::Inputs(bits) => self.inputs = bits,
                 Message::Before(sample) => self.before.push(sample),
                 Message::Stopping(reason) => {
                     (self.reason, self.stopping_at) = (Some(reason), Some(n_syncs));

@@ -81,7 +81,11 @@ fn is_at_rest(tap: &Tap) {
 }
 
 /// Runs the program once; returns status and reason of its end.
-fn run(cell: &Cell, tap: &Tap, change: impl Fn(&mut Options)) -> Result<(EndStatus, String), String> {
+fn run(
+    cell: &Cell,
+    tap: &Tap,
+    change: impl Fn(&mut Options),
+) -> Result<(EndStatus, String), String> {
     let scratch = Scratch::new();
     let mut options = options(scratch.file("library.db"), 1);
     change(&mut options);
@@ -128,7 +132,11 @@ fn every_method_homes_an_axis_that_then_runs() {
             assert!((-0.02..=0.10).contains(&shown_m), "{case}: {shown_m}");
             let again = home(&cell, &tap);
             assert!(again.axes[0].was_homed, "{case}");
-            assert_eq!(run(&cell, &tap, |_| {}).map(|end| end.0), Ok(EndStatus::Completed), "{case}");
+            assert_eq!(
+                run(&cell, &tap, |_| {}).map(|end| end.0),
+                Ok(EndStatus::Completed),
+                "{case}"
+            );
         }
     }
 }
@@ -149,7 +157,10 @@ fn an_axis_on_its_switch_is_brought_inside_slowly() {
         let velocity_m_s = (three[1] - three[0]) / dt_s;
         let acceleration_m_s2 = (three[2] - 2.0 * three[1] + three[0]) / (dt_s * dt_s);
         assert!(velocity_m_s < 1.1 * cell.jog_velocity_m_s(0), "{velocity_m_s}");
-        assert!(acceleration_m_s2.abs() < 1.5 * limits.acceleration_max_m_s2, "{acceleration_m_s2}");
+        assert!(
+            acceleration_m_s2.abs() < 1.5 * limits.acceleration_max_m_s2,
+            "{acceleration_m_s2}"
+        );
     }
     // The drive has the limits of the cell again, not those of the way inside.
     let client = SdoClient::new(node(1), Duration::from_secs(2));
@@ -184,10 +195,7 @@ fn a_way_inside_that_is_broken_off_is_made_later() {
 
 #[test]
 fn turns_follow_their_order_and_a_homed_axis_is_left_alone() {
-    let cell = cell(
-        &method(33, 0.04, "order = 2\n"),
-        &method(34, 0.03, "order = 1\n"),
-    );
+    let cell = cell(&method(33, 0.04, "order = 2\n"), &method(34, 0.03, "order = 1\n"));
     let tap = Tap::new(&cell);
     let mut lines: Vec<String> = Vec::new();
     let homed = watched(&cell, &tap, false, &mut |line| {

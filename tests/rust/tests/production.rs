@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use ilc_rt::campaign::control::{Command, STOPPED_BY_COMMAND, send};
 use ilc_rt::campaign::input::{self, InputError, Source};
-use ilc_rt::campaign::{self, CampaignError, Keep, Options, Outcome, StartOn};
-use ilc_rt::config::{Cell, LawName, Measure};
+use ilc_rt::campaign::{self, CampaignError, Options, Outcome, StartOn};
+use ilc_rt::config::{Cell, Keep, LawName, Measure};
 use ilc_rt::design::Plan;
 use ilc_rt::library::{Library, Row};
 use ilc_rt::record::{EndStatus, Event, StateName};
@@ -213,14 +213,14 @@ fn an_exported_input_is_used_by_its_task_alone() {
 fn runs_without_learning_are_thinned_and_numbered_on() {
     let (cell, scratch) = (short("01_gantry.toml"), Scratch::new());
     let library = scratch.file("a.db");
-    run(&cell, &Options { keep: Keep::Best, ..options(library.clone(), 3) }).unwrap();
+    run(&cell, &Options { keep: Some(Keep::Best), ..options(library.clone(), 3) }).unwrap();
     assert_eq!(rows(&library).len(), 3, "what a law learned from stays");
-    run(&cell, &Options { keep: Keep::Every(2), ..frozen(library.clone(), 6) }).unwrap();
+    run(&cell, &Options { keep: Some(Keep::Every(2)), ..frozen(library.clone(), 6) }).unwrap();
     let indices: Vec<u32> = rows(&library)[3..].iter().map(|row| row.record.index).collect();
     assert_eq!(indices, [0, 2, 4, 5]);
     let plain = scratch.file("b.db");
     let unlearned = |resume, iterations| Options {
-        keep: Keep::Every(10),
+        keep: Some(Keep::Every(10)),
         learning: false,
         resume,
         ..options(plain.clone(), iterations)

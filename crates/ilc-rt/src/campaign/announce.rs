@@ -61,6 +61,7 @@ impl<'a> Announcer<'a> {
             Event::Iteration { .. } | Event::Judged { .. } | Event::Drift { .. } => "iteration",
             Event::Fault { .. } => "fault",
             Event::Latency { .. } => "latency",
+            Event::Inputs { .. } => "inputs",
             Event::Start { .. }
             | Event::State { .. }
             | Event::Progress { .. }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::control::STOPPED_BY_COMMAND;
 use super::fault::{fault, last_cycles};
 use super::keeper::{StoreEvent, Stored};
 use super::learner::Learner;
@@ -38,9 +39,9 @@ impl Running<'_> {
         };
         match result {
             Some(Ok(id)) => {
-                self.publish_stored(id, &record);
+                let place = self.publish_stored(id, &record);
                 if asked {
-                    self.unjudged.push_back((id, self.runs.len() - 1));
+                    self.unjudged.push_back((id, place));
                     self.amend_stored();
                 }
             }
@@ -52,14 +53,15 @@ impl Running<'_> {
         }
     }
 
-    fn publish_stored(&mut self, id: i64, record: &IterationRecord) {
+    /// Publishes a stored run; returns its place.
+    fn publish_stored(&mut self, id: i64, record: &IterationRecord) -> usize {
         self.announcer.publish(&Event::Iteration {
             id,
             index: record.index,
             digest: record.digest(),
             figures: record.figures.clone(),
         });
-        self.runs.push((record.index, record.figures.clone()));
+        self.runs.add(record.index, record.figures.clone())
     }
 
     /// Waits until all runs are stored, and retries those that could not be.
@@ -149,10 +151,19 @@ impl Running<'_> {
         self.announcer.publish(&Event::End { status, reason: reason.clone(), iterations });
         let signal = match self.stopping {
             Some(StopReason::Asked(signal)) if self.failure.is_none() => signal,
+            // A person ended it on the machine, as by a command.
+            Some(StopReason::StopButton { .. }) if self.failure.is_none() => STOPPED_BY_COMMAND,
             _ => 0,
         };
         let axis_units = cell.axes.iter().map(|axis| axis.unit.symbol()).collect();
-        Outcome { status, reason, signal, campaign: self.campaign, axis_units, runs: self.runs }
+        Outcome {
+            status,
+            reason,
+            signal,
+            campaign: self.campaign,
+            axis_units,
+            runs: self.runs.into_newest(),
+        }
     }
 }
 

@@ -73,6 +73,22 @@ pub enum CampaignError {
         /// Codes in words.
         fault: String,
     },
+    /// An input that does not permit a start.
+    #[error("{file}: {what}; nothing has moved")]
+    Interlock {
+        /// Cell description.
+        file: String,
+        /// The input, and what to do.
+        what: String,
+    },
+    /// There is no button to wait for.
+    #[error(
+        "--start input: allowed for a cell with an [[input]] of use = \"start\"; {file} has none"
+    )]
+    NoStartInput {
+        /// Cell description.
+        file: String,
+    },
     /// A drive that has to find its home first.
     #[error(
         "{file}: axis {axis} (node {node}) is not homed: {why}; nothing has moved; `ilc-rt home {file} \

@@ -9,6 +9,7 @@ use super::control::{Server, Shared};
 use super::error::{CampaignError, ResumeError};
 use super::frozen::{self, Frozen};
 use super::input::InputError;
+use super::inputs;
 use super::keeper::Keeper;
 use super::learner::{Learner, set_disturbance};
 use super::nodes;
@@ -18,7 +19,7 @@ use super::resume::{Resumed, to_resume};
 use super::rollback::RollbackPolicy;
 use super::running::{Parts, Running};
 use super::telemetry::Telemetry;
-use crate::config::Cell;
+use crate::config::{Cell, Keep};
 use crate::design::{DesignError, Plan};
 use crate::fieldbus::Bus;
 use crate::identification::Experiment;
@@ -44,6 +45,7 @@ pub fn run(
     let options = &options.counted();
     let cell = &options.apply(cell.clone());
     let session = &options.session;
+    inputs::require_start(cell, options)?;
     let mut plan = Plan::new(cell, session.measure, session.lockstep)?;
     let relearns = !options.frozen || options.relearn_above.is_some();
     let (name, law) = if let Some(law) = law.filter(|_| relearns) {
@@ -91,7 +93,7 @@ pub fn identify(
         frozen: None,
     };
     let once = Options { iterations: 1, learning: false, ..Options::default() };
-    let options = Options { session: session.clone(), ..once };
+    let options = Options { session: session.clone(), keep: Some(Keep::All), ..once };
     execute(cell, &options, bus, campaign, observe)
 }
 
@@ -143,7 +145,8 @@ fn execute(
         None
     };
     let orders = Arc::new(Orders::new(options.start == StartOn::AtOnce));
-    let shared = Arc::new(Shared::new(Arc::clone(&orders), Arc::clone(&session.stop)));
+    let shared = Shared::new(Arc::clone(&orders), Arc::clone(&session.stop));
+    let shared = Arc::new(shared.starting(options.start == StartOn::Command));
     // Before anything moves: a cell that cannot be commanded as asked is not started.
     let server =
         if options.ctl { Some(Server::open(&cell.cell.name, Arc::clone(&shared))?) } else { None };
@@ -162,6 +165,8 @@ fn execute(
     let warm_up = u32::from(!resumed.runs.is_empty());
     plan.servo.runs = first - warm_up..options.iterations;
     plan.servo.resets_faults |= session.reset_faults;
+    plan.simulated = session.simulated;
+    plan.servo.starts_on_input = options.start == StartOn::Input;
     if session.forgives_stalls() {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
         let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;
@@ -169,10 +174,11 @@ fn execute(
         plan.servo.overrun_cycles_max = plan.servo.overrun_cycles_max.max(patience);
     }
     let meta = Arc::new(plan.meta.clone());
+    let keep = options.keep.unwrap_or(cell.library.keep);
     let keeper = if session.lockstep {
-        Keeper::in_line(library, meta, options.keep)
+        Keeper::in_line(library, meta, keep)
     } else {
-        Keeper::on_thread(library, meta, options.keep)?
+        Keeper::on_thread(library, meta, keep)?
     };
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
     if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next.take()) {

@@ -22,6 +22,17 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
         let axis = cell.axes.iter().find(|axis| axis.node == node);
         Fault { axis: axis.map(|axis| axis.name.clone()), node: Some(node), ..Fault::new(kind) }
     };
+    let of_input = |kind, index: usize| {
+        let input = cell.inputs.get(index);
+        let axis = cell.axes.iter().find(|axis| input.is_some_and(|own| own.axis == axis.name));
+        Fault {
+            axis: axis.map(|axis| axis.name.clone()),
+            node: axis.map(|axis| axis.node),
+            code: input.map(|input| input.bit.into()),
+            input: input.map(|input| input.name.clone()),
+            ..Fault::new(kind)
+        }
+    };
     let counted = |fault: Fault, cycles: u32, limit: u32| Fault {
         value: Some(cycles.into()),
         limit: Some(limit.into()),
@@ -31,7 +42,9 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
     let limits = |index: usize| cell.axes.get(index).map(|axis| axis.limits);
     let silent_max = cell.safety.silent_cycles_max;
     Some(match reason {
-        StopReason::Asked(_) => return None,
+        StopReason::Asked(_) | StopReason::StopButton { .. } => return None,
+        StopReason::GuardOpen { input } => of_input(FaultKind::GuardOpen, input),
+        StopReason::LimitSwitch { input, .. } => of_input(FaultKind::LimitSwitch, input),
         StopReason::DriveFault { axis, code, following_error_m } => Fault {
             code: Some(code.into()),
             value: Some(following_error_m),

@@ -4,38 +4,8 @@
 //! through the law again. They are always kept. Of other runs the newest always stays, as the number
 //! of the next one follows from it.
 
-use std::str::FromStr;
-
+use crate::config::Keep;
 use crate::record::{IterationRecord, Meta};
-
-/// Runs to keep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Keep {
-    /// All.
-    #[default]
-    All,
-    /// Every n-th, by the number of the run.
-    Every(u32),
-    /// The one with the smallest error.
-    Best,
-}
-
-impl FromStr for Keep {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "all" => Ok(Self::All),
-            "best" => Ok(Self::Best),
-            _ => text
-                .parse()
-                .ok()
-                .filter(|n| *n > 0)
-                .map(Self::Every)
-                .ok_or_else(|| "allowed: all, best, or a number from 1".to_owned()),
-        }
-    }
-}
 
 /// The runs stored so far that may have to go.
 #[derive(Debug)]

@@ -10,7 +10,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use super::error::CampaignError;
-use super::keep::{Keep, Thinning};
+use super::keep::Thinning;
+use crate::config::Keep;
 use crate::library::{Library, LibraryError};
 use crate::record::{Figures, IterationRecord, Meta};
 

@@ -3,13 +3,15 @@
 use std::time::Duration;
 
 use super::error::CampaignError;
+use super::inputs::{self, Words};
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::commissioning::{self, CommissioningError};
 use crate::config::{Axis, AxisUnit, Cell, ConfigError};
 use crate::design;
 use crate::fieldbus::Bus;
 use crate::fieldbus::bring_up::{
-    BringUpError, DriveIdentity, DriveSetup, SdoClient, bring_up, bring_up_encoder, enter_homing_mode, listen,
+    BringUpError, DriveIdentity, DriveSetup, SdoClient, bring_up, bring_up_encoder,
+    enter_homing_mode, listen,
 };
 use crate::fieldbus::canopen::{NmtCommand, emcy};
 use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
@@ -27,17 +29,18 @@ pub(super) fn start(
     bus: &mut dyn Bus,
     session: &Session,
 ) -> Result<Vec<PdoMap>, CampaignError> {
-    let maps = prepare(cell, bus, session)?;
+    let (maps, _) = prepare(cell, bus, session)?;
     go(cell, bus)?;
     Ok(maps)
 }
 
-/// Resets, checks and configures all nodes; they wait for [`go`]. Returns the process data of each axis as mapped.
+/// Resets, checks and configures all nodes; they wait for [`go`]. Returns the process data of each axis as mapped, and
+/// its digital inputs.
 pub(super) fn prepare(
     cell: &Cell,
     bus: &mut dyn Bus,
     session: &Session,
-) -> Result<Vec<PdoMap>, CampaignError> {
+) -> Result<(Vec<PdoMap>, Words), CampaignError> {
     refuse_company(cell, bus)?;
     let mut maps = Vec::with_capacity(cell.n_axes());
     for axis in &cell.axes {
@@ -49,13 +52,15 @@ pub(super) fn prepare(
             |source| refusal(cell, format!("[tcp_encoder] node = {}", tool.node), 0, source),
         )?;
     }
+    let words = read_inputs(cell, bus, session)?;
+    inputs::permit(cell, &words)?;
     if resets(cell, session) {
-        return Ok(maps);
+        return Ok((maps, words));
     }
     for axis in &cell.axes {
         refuse_fault(cell, axis, bus, session)?;
     }
-    Ok(maps)
+    Ok((maps, words))
 }
 
 /// Resets, checks and configures the drives of some axes for homing. Returns which of them are homed already, unless
@@ -94,6 +99,7 @@ pub(super) fn prepare_homing(
         }
         are_homed.push(is_homed);
     }
+    inputs::permit(cell, &read_inputs(cell, bus, session)?)?;
     Ok(are_homed)
 }
 
@@ -218,12 +224,21 @@ pub(super) fn timeout(cell: &Cell, session: &Session) -> Duration {
 }
 
 /// Returns a client of the drive of an axis.
-fn client(
-    cell: &Cell,
-    axis: &Axis,
-    session: &Session,
-) -> Result<SdoClient, ConfigError> {
+fn client(cell: &Cell, axis: &Axis, session: &Session) -> Result<SdoClient, ConfigError> {
     Ok(SdoClient::new(design::node(cell, axis.node)?, timeout(cell, session)))
+}
+
+/// Reads the digital inputs of every drive that has named ones.
+fn read_inputs(cell: &Cell, bus: &mut dyn Bus, session: &Session) -> Result<Words, CampaignError> {
+    let mut words = vec![None; cell.n_axes()];
+    for (word, axis) in words.iter_mut().zip(&cell.axes) {
+        if cell.inputs.iter().any(|input| input.axis == axis.name) {
+            *word = Some(ask(cell, axis, session, |client| {
+                Ok(client.upload_u32(bus, objects::DIGITAL_INPUTS, 0)?)
+            })?);
+        }
+    }
+    Ok(words)
 }
 
 /// Asks the drive of an axis.

@@ -13,8 +13,7 @@ use clap::{ArgAction, Args, Command, FromArgMatches};
 
 use super::disturbance::Disturbance;
 use super::input::Source;
-use super::keep::Keep;
-use crate::config::{Cell, LawName, Measure};
+use crate::config::{Cell, Keep, LawName, Measure};
 use crate::fieldbus::transport::syntaxes;
 use crate::record::{EndStatus, Figures};
 
@@ -105,16 +104,18 @@ pub struct Options {
     /// Run until stopped, in place of a number of runs.
     #[arg(long, conflicts_with = "iterations")]
     pub forever: bool,
-    /// Runs that stay in the library when nothing is learned from them; the newest always does.
-    #[arg(long, value_name = "all|N|best", default_value = "all")]
-    pub keep: Keep,
+    /// Runs that stay in the library when nothing is learned from them, in place of the cell's; the newest always
+    /// does.
+    #[arg(long, value_name = "all|N|best")]
+    pub keep: Option<Keep>,
     /// Accept commands of `ilc-rt ctl` on a socket of this user.
     #[arg(long)]
     pub ctl: bool,
-    /// Start each run at once, or when `ilc-rt ctl CELL start` asks for it.
+    /// Start each run at once, when `ilc-rt ctl CELL start` asks for it, or at a press of the button of an [[input]]
+    /// with use = "start".
     #[arg(
         long,
-        value_parser = PossibleValuesParser::new(["at-once", "command"]).map(start_on),
+        value_parser = PossibleValuesParser::new(["at-once", "command", "input"]).map(start_on),
         default_value = "at-once",
         requires_if("command", "ctl")
     )]
@@ -132,6 +133,8 @@ pub enum StartOn {
     AtOnce,
     /// A command, after the axes have settled.
     Command,
+    /// A press of a button of the cell, after the axes have settled.
+    Input,
 }
 
 impl Default for Options {
@@ -160,6 +163,7 @@ impl Options {
             // They wrap a law.
             (cell.learning.ladder, cell.learning.gate) = (None, None);
         }
+        cell.library.keep = self.keep.unwrap_or(cell.library.keep);
         if let Some(address) = &self.session.bus {
             address.clone_into(&mut cell.bus.address);
         }
@@ -179,7 +183,11 @@ fn measure(name: String) -> Measure {
 
 #[expect(clippy::needless_pass_by_value, reason = "as the parser of arguments hands it on")]
 fn start_on(name: String) -> StartOn {
-    if name == "command" { StartOn::Command } else { StartOn::AtOnce }
+    match name.as_str() {
+        "command" => StartOn::Command,
+        "input" => StartOn::Input,
+        _ => StartOn::AtOnce,
+    }
 }
 
 /// Parses a ratio of two errors.
@@ -206,6 +214,6 @@ pub struct Outcome {
     pub campaign: String,
     /// Units of the axes, in their order.
     pub axis_units: Vec<&'static str>,
-    /// Number and figures of every run of the campaign, resumed ones included.
+    /// Number and figures of every run of the campaign, resumed ones included; with `forever` of the newest 200.
     pub runs: Vec<(u32, Figures)>,
 }

@@ -1,9 +1,10 @@
 //! Reason of a stop, as a sentence that names axis, node and numbers.
 
 use super::control::STOPPED_BY_COMMAND;
+use super::inputs;
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::commissioning::power_lost;
-use crate::config::{AxisUnit, Cell};
+use crate::config::{AxisUnit, Cell, Direction, Input};
 use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
 use crate::servo::{StopReason, Stranger};
@@ -105,7 +106,25 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             emcy::CODE_RPDO_TIMEOUT
         ),
         StopReason::Bus(error) => format!("{error}"),
+        StopReason::GuardOpen { input } => of_input(cell, input, |input| inputs::open(cell, input)),
+        StopReason::StopButton { input } => of_input(cell, input, |input| {
+            format!("stopped by the button {}", inputs::place(cell, input))
+        }),
+        StopReason::LimitSwitch { input, axis: index } => of_input(cell, input, |input| {
+            let towards = cell.axes.get(index).and_then(|axis| input.direction_of(axis));
+            format!(
+                "{}: limit switch {} is reached in {} direction: move away from it by hand (`ilc-rt jog`)",
+                axis(index),
+                inputs::place(cell, input),
+                towards.map_or("its", Direction::name)
+            )
+        }),
     }
+}
+
+/// Describes a stop by an input.
+fn of_input(cell: &Cell, input: usize, describe: impl FnOnce(&Input) -> String) -> String {
+    cell.inputs.get(input).map_or_else(|| format!("stopped by input {input}"), describe)
 }
 
 /// Names the state of a drive that is not enabled, and an emergency stop as its likely cause.

@@ -1,10 +1,14 @@
 //! Decision on the input of the next run: learned, the best one so far, or the last one again.
 
+use std::collections::VecDeque;
+
 use crate::record::{Figures, IterationRecord};
 use crate::servo::Mailbox;
 
 /// Number of rollbacks after which learning is switched off.
 const ROLLBACKS_MAX: u32 = 2;
+/// Tables whose computing time may still be asked for: one in use, two that wait, one more.
+const TABLES_MAX: usize = 4;
 /// Reason for learning being off.
 const GROWN: &str = "the error grew twice";
 
@@ -36,8 +40,10 @@ pub(super) struct RollbackPolicy {
     /// Number of the table for the next run.
     promised: u32,
     late_updates: u32,
-    /// Computing time of each table passed to the loop; table n at n - 1.
-    update_ms: Vec<f64>,
+    /// Tables passed to the loop so far.
+    n_sent: u32,
+    /// Number and computing time of the newest of them, oldest first.
+    update_ms: VecDeque<(u32, f64)>,
     table_in_use: u32,
     /// Overruns are not a disturbance, as the plant paused as well.
     forgives_overruns: bool,
@@ -51,7 +57,8 @@ impl RollbackPolicy {
             rollbacks: 0,
             promised: 0,
             late_updates: 0,
-            update_ms: Vec::new(),
+            n_sent: 0,
+            update_ms: VecDeque::new(),
             table_in_use: 0,
             forgives_overruns: false,
         }
@@ -80,17 +87,14 @@ impl RollbackPolicy {
     }
 
     fn next_number(&self) -> u32 {
-        u32::try_from(self.update_ms.len() + 1).unwrap_or(u32::MAX)
+        self.n_sent.saturating_add(1)
     }
 
     /// Writes the learning figures of a run into its record.
     pub(super) fn annotate(&self, record: &mut IterationRecord) {
         record.figures.late_updates = self.late_updates;
-        record.figures.update_ms = (self.table_in_use as usize)
-            .checked_sub(1)
-            .and_then(|table| self.update_ms.get(table))
-            .copied()
-            .unwrap_or(0.0);
+        let sent = self.update_ms.iter().find(|(table, _)| *table == self.table_in_use);
+        record.figures.update_ms = sent.map_or(0.0, |(_, update_ms)| *update_ms);
     }
 
     /// Decides on the input after a run, and marks the run if the best input is restored because of
@@ -149,7 +153,11 @@ impl RollbackPolicy {
         // late.
         self.promised = number;
         if mail.send_table(number, input.into_boxed_slice()).is_ok() {
-            self.update_ms.push(update_ms);
+            self.n_sent = number;
+            self.update_ms.push_back((number, update_ms));
+            if self.update_ms.len() > TABLES_MAX {
+                self.update_ms.pop_front();
+            }
         }
     }
 }

@@ -7,14 +7,16 @@ use super::claim::Claim;
 use super::collect::Collector;
 use super::disturbance::Disturbance;
 use super::frozen::Frozen;
+use super::inputs;
 use super::keeper::Keeper;
 use super::learner::{Learner, UpdateResult};
 use super::options::Options;
 use super::resume::Resumed;
 use super::rollback::{Decision, RollbackPolicy};
+use super::runs::Runs;
 use crate::config::Cell;
 use crate::design::Plan;
-use crate::record::{AxisKinds, Event, FaultKind, Figures, IterationRecord, StateName};
+use crate::record::{AxisKinds, Event, FaultKind, IterationRecord, StateName};
 use crate::servo::{Mailbox, Message, PhaseName, Sample, StopReason};
 
 /// Time between two progress events.
@@ -22,6 +24,7 @@ const PROGRESS_S: f64 = 0.1;
 
 /// A campaign whose loop runs.
 pub(super) struct Running<'a> {
+    cell: &'a Cell,
     pub(super) collector: Collector,
     pub(super) announcer: Announcer<'a>,
     pub(super) keeper: Keeper,
@@ -36,7 +39,7 @@ pub(super) struct Running<'a> {
     pub(super) frozen: Option<Frozen>,
     /// Event at the start of the campaign.
     pub(super) start: Event,
-    pub(super) runs: Vec<(u32, Figures)>,
+    pub(super) runs: Runs,
     disturbance: Disturbance,
     /// Disturbance of the current run, or of the next one between two runs.
     pub(super) current_disturbance: Vec<f64>,
@@ -76,7 +79,7 @@ pub(super) struct Parts<'a> {
 
 impl<'a> Running<'a> {
     pub(super) fn new(
-        cell: &Cell,
+        cell: &'a Cell,
         options: &Options,
         plan: Plan,
         parts: Parts<'a>,
@@ -90,6 +93,7 @@ impl<'a> Running<'a> {
         )]
         let progress_every = ((PROGRESS_S / cell.cycle_s()) as u32).max(1);
         Self {
+            cell,
             collector: Collector::new(
                 plan.n_samples(),
                 AxisKinds::new(&plan.meta.input_units, cell.n_axes()),
@@ -107,7 +111,7 @@ impl<'a> Running<'a> {
             learner: parts.learner,
             frozen: parts.frozen,
             start: parts.start,
-            runs: resumed.runs,
+            runs: Runs::new(resumed.runs, options.forever),
             disturbance: options.disturbance.clone().or_file(cell),
             current_disturbance: resumed.next_disturbance,
             first,
@@ -161,6 +165,10 @@ impl Running<'_> {
                 }
                 Message::RunEnded { run, .. } if run < self.first => {}
                 Message::RunEnded { overruns, scaled, .. } => self.run_ended(overruns, scaled),
+                Message::Inputs(bits) => {
+                    let inputs = inputs::states(self.cell, bits);
+                    self.announcer.publish(&Event::Inputs { inputs });
+                }
                 Message::Before(sample) => self.before.push(sample),
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
@@ -202,7 +210,7 @@ impl Running<'_> {
     /// Adds the law's decision to a run that was stored while it computed.
     fn amend(&mut self, update: &UpdateResult) {
         let Some((id, place)) = self.unjudged.pop_front() else { return };
-        let Some((index, figures)) = self.runs.get_mut(place) else { return };
+        let Some((index, figures)) = self.runs.at(place) else { return };
         let before = figures.clone();
         update.annotate(figures);
         if *figures == before {

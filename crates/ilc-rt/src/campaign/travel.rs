@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::error::CampaignError;
 use super::fault::fault;
+use super::inputs;
 use super::nodes;
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use super::pace::{MAILBOX, Pacer};
@@ -90,7 +91,7 @@ pub fn travel(
             check_inside(cell, &cell.axes[*axis], *position_m)?;
         }
     }
-    let maps = nodes::prepare(cell, bus.as_mut(), session)?;
+    let (maps, words) = nodes::prepare(cell, bus.as_mut(), session)?;
     let mut to_m = nodes::positions(cell, bus.as_mut(), session)?;
     for (axis, goal) in &travel.goals {
         let (described, at_m) = (&cell.axes[*axis], to_m[*axis]);
@@ -102,6 +103,16 @@ pub fn travel(
             Goal::Limit(_) => limits.position_max_m,
         };
         check_inside(cell, described, to_m[*axis])?;
+        if let Some(input) = inputs::blocking(cell, &words, *axis, to_m[*axis] - at_m) {
+            return Err(CampaignError::Travel {
+                axis: described.name.clone(),
+                what: format!("destination {:.6} {}", to_m[*axis], described.unit.symbol()),
+                allowed: format!(
+                    "away from limit switch {}, which is reached",
+                    inputs::place(cell, input)
+                ),
+            });
+        }
     }
     let speed_m_s = travel.speed_m_s.unwrap_or_else(|| {
         let moved = travel.goals.iter().map(|(axis, _)| cell.jog_velocity_m_s(*axis));
@@ -118,6 +129,7 @@ pub fn travel(
     plan.servo.return_feed_m_s = speed_m_s;
     plan.servo.approach_feed_m_s = speed_m_s;
     plan.servo.resets_faults |= session.reset_faults;
+    plan.simulated = session.simulated;
     plan.servo.settle_ticks = travel.hold_s.map_or(u32::MAX, |hold_s| ticks(hold_s + REST_S));
     if session.forgives_stalls() {
         let patience = ticks(SIMULATED_PATIENCE_S);
@@ -261,7 +273,10 @@ impl Journey {
                     self.tell(Some(()), report);
                 }
                 Message::Stopping(reason) => self.stopping = Some(reason),
-                Message::RunStarted { .. } | Message::RunEnded { .. } | Message::Before(_) => {}
+                Message::RunStarted { .. }
+                | Message::RunEnded { .. }
+                | Message::Before(_)
+                | Message::Inputs(_) => {}
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The table of runs, and their outcome in a sentence: the words and signs of `ilc`, in ASCII.
 
+use std::collections::VecDeque;
 use std::fmt::Write as _;
 
 use super::quantity::{Unit, change, digits, less};
@@ -8,11 +9,17 @@ use crate::record::{AxisKinds, Figures};
 /// Share of the last run's error below which a better run is mentioned.
 const BEST_SHARE: f64 = 0.9;
 
+/// Number of runs that are kept of a campaign without an end.
+const RUNS_KEPT: usize = 200;
+
 /// The runs of a campaign as they arrive.
 #[derive(Default)]
 pub(super) struct Runs {
     kinds: Option<AxisKinds>,
-    ended: Vec<(u32, Figures)>,
+    /// All runs; of a campaign without an end the first one and the newest ones.
+    ended: VecDeque<(u32, Figures)>,
+    n_ended: usize,
+    is_endless: bool,
     /// Head of the table.
     heading: String,
     /// Latest remark, printed once.
@@ -20,14 +27,19 @@ pub(super) struct Runs {
 }
 
 impl Runs {
-    /// Starts a campaign with the units of its inputs.
-    pub(super) fn begin(&mut self, input_units: &[String], n_axes: usize) {
+    /// Starts a campaign with the units of its inputs and the number of its runs.
+    pub(super) fn begin(&mut self, input_units: &[String], n_axes: usize, iterations: u32) {
         self.kinds = Some(AxisKinds::new(input_units, n_axes));
+        self.is_endless = iterations == u32::MAX;
     }
 
     /// Returns a row of the table, with the heading before the first one and a remark after it.
     pub(super) fn row(&mut self, index: u32, figures: &Figures) -> String {
-        self.ended.push((index, figures.clone()));
+        self.ended.push_back((index, figures.clone()));
+        self.n_ended += 1;
+        if self.is_endless && self.ended.len() > RUNS_KEPT {
+            self.ended.remove(1);
+        }
         let heading = heading(&self.columns());
         // Once, and again if the errors have outgrown their unit.
         let mut text = if heading == self.heading { String::new() } else { heading.clone() };
@@ -67,8 +79,8 @@ impl Runs {
 
     /// Returns the result of learning as a sentence.
     pub(super) fn sentence(&self) -> Option<String> {
-        let (first, last) = (&self.ended.first()?.1, &self.ended.last()?.1);
-        let n = self.ended.len();
+        let (first, last) = (&self.ended.front()?.1, &self.ended.back()?.1);
+        let n = self.n_ended;
         if self.by_contour() {
             return Some(format!(
                 "Contour error {}.",
@@ -118,7 +130,7 @@ impl Runs {
             "from {} to {}{less} within {} runs{aside}",
             unit.with(before),
             unit.with(after),
-            values.len()
+            self.n_ended
         )
     }
 
@@ -131,7 +143,7 @@ impl Runs {
     /// Returns true if runs are compared by their contour error, i.e. if every run has one.
     fn by_contour(&self) -> bool {
         self.ended.iter().all(|(_, figures)| figures.contour_inf_m.is_some())
-            && self.ended.first().is_some_and(|(_, first)| first.contour_inf_m > Some(0.0))
+            && self.ended.front().is_some_and(|(_, first)| first.contour_inf_m > Some(0.0))
     }
 
     fn compared(&self, figures: &Figures) -> f64 {
@@ -140,7 +152,7 @@ impl Runs {
     }
 
     fn columns(&self) -> Vec<Column<'_>> {
-        let Some((_, first)) = self.ended.first() else { return Vec::new() };
+        let Some((_, first)) = self.ended.front() else { return Vec::new() };
         let Some(kinds) = &self.kinds else { return Vec::new() };
         let mut columns: Vec<Column<'_>> = Vec::new();
         if kinds.is_mixed() {
@@ -207,7 +219,7 @@ mod tests {
     fn runs(units: &[&str], figures: &[Figures]) -> (Runs, Vec<String>) {
         let units: Vec<_> = units.iter().map(|unit| (*unit).to_owned()).collect();
         let mut runs = Runs::default();
-        runs.begin(&units, units.len());
+        runs.begin(&units, units.len(), 10);
         let rows = (0..).zip(figures).map(|(index, run)| runs.row(index, run)).collect();
         (runs, rows)
     }
@@ -241,6 +253,21 @@ mod tests {
         assert_eq!(Runs::default().sentence(), None);
         let (far, rows) = runs(&["m"], &[tracked(1e-9, None), tracked(1e-3, None)]);
         assert!(!rows[1].contains('%') && !far.sentence().unwrap().contains('%'));
+    }
+
+    #[test]
+    fn an_endless_campaign_keeps_its_first_run_and_the_newest() {
+        let mut runs = Runs::default();
+        runs.begin(&["m".to_owned()], 1, u32::MAX);
+        runs.row(0, &tracked(1e-3, None));
+        for index in 1..1000 {
+            runs.row(index, &tracked(1e-4, None));
+        }
+        assert_eq!(runs.ended.len(), RUNS_KEPT);
+        assert_eq!(
+            runs.sentence().unwrap(),
+            "Tracking error from 1000 um to 100 um (90.0 % less) within 1000 runs."
+        );
     }
 
     #[test]

@@ -57,9 +57,10 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
             campaign,
             ctl,
             rt,
+            iterations,
             ..
         } => {
-            runs.begin(input_units, *n_axes);
+            runs.begin(input_units, *n_axes, *iterations);
             let thread = rt.as_ref().map_or_else(String::new, |rt| {
                 let memory = if rt.mlock { "locked" } else { "not locked" };
                 let notes: String = rt.notes.iter().flat_map(|note| ["\n  note: ", note]).collect();
@@ -107,6 +108,9 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
             )
         )),
         Event::Judged { index, remark, .. } => runs.judged(*index, remark.as_deref()),
-        Event::State { .. } | Event::Progress { .. } | Event::Fault { .. } => None,
+        Event::State { .. }
+        | Event::Inputs { .. }
+        | Event::Progress { .. }
+        | Event::Fault { .. } => None,
     }
 }

@@ -82,7 +82,8 @@ fn one(
     let scale = axis_scale(cell, axis).map_err(|error| error.to_string())?;
     let client = target.client(node);
     let unit = axis.unit.symbol();
-    axis_status(target.bus.as_mut(), &client, &axis.name, unit, scale, nmt)
+    let named: Vec<_> = cell.inputs.iter().filter(|input| input.axis == axis.name).collect();
+    axis_status(target.bus.as_mut(), &client, &axis.name, unit, scale, &named, nmt)
         .map_err(|error| error.to_string())
 }
 
@@ -123,6 +124,9 @@ fn described(status: &AxisStatus, cell: &Cell) -> String {
     }
     if let Some(inputs) = status.inputs.as_ref().filter(|inputs| !inputs.is_empty()) {
         add(format!("active inputs: {}", inputs.join(", ")));
+    }
+    for input in &status.named_inputs {
+        add(format!("{} {}: {}", input.purpose, input.name, input.in_words()));
     }
     text
 }

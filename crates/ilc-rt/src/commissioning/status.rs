@@ -5,9 +5,11 @@ use serde::Serialize;
 use super::error::CommissioningError;
 use super::faults::{Faults, faults, find};
 use super::words::{input_names, mode_name, warning_names};
+use crate::config::Input;
 use crate::fieldbus::Bus;
 use crate::fieldbus::bring_up::SdoClient;
 use crate::fieldbus::cia402::{Scale, Statusword, objects};
+use crate::record::InputState;
 
 /// Status of an axis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -32,12 +34,14 @@ pub struct AxisStatus {
     pub following_error_m: Option<f64>,
     /// Inputs that are active, object 0x60FD.
     pub inputs: Option<Vec<String>>,
+    /// Inputs that the cell description names.
+    pub named_inputs: Vec<InputState>,
     /// Statusword, error code and history.
     #[serde(flatten)]
     pub faults: Faults,
 }
 
-/// Reads the status of an axis; its name, unit and NMT state are the caller's.
+/// Reads the status of an axis; its name, unit, inputs and NMT state are the caller's.
 ///
 /// # Errors
 /// [`CommissioningError`] if the drive does not answer, or is not a drive.
@@ -47,6 +51,7 @@ pub fn axis_status(
     axis: &str,
     unit: &'static str,
     scale: Scale,
+    named: &[&Input],
     nmt: Option<String>,
 ) -> Result<AxisStatus, CommissioningError> {
     let faults = faults(bus, client)?;
@@ -71,6 +76,14 @@ pub fn axis_status(
         unit,
         following_error_m,
         inputs: inputs.map(input_names),
+        named_inputs: named
+            .iter()
+            .map(|input| InputState {
+                name: input.name.clone(),
+                purpose: input.purpose.name().to_owned(),
+                on: inputs.map(|word| input.is_on(word)),
+            })
+            .collect(),
         faults,
     })
 }

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::axis::{Axis, AxisUnit};
 use super::error::ConfigError;
 use super::file::{CELL_BYTES_MAX, read_file};
+use super::input::Input;
 use super::learning::Learning;
+use super::library::LibrarySection;
 use super::simulation::Simulation;
 use crate::schema::field_order;
 use crate::trajectory::kind::Program;
@@ -34,6 +36,9 @@ pub struct Cell {
     /// `[[axis]]`, in the order of the coordinates of the program.
     #[serde(rename = "axis")]
     pub axes: Vec<Axis>,
+    /// `[[input]]`, digital inputs of the drives: guards, buttons, limit switches.
+    #[serde(rename = "input", default)]
+    pub inputs: Vec<Input>,
     /// `[tcp_encoder]`, a measurement of the tool centre point on the bus.
     pub tcp_encoder: Option<TcpEncoder>,
     /// `[program]`
@@ -44,6 +49,9 @@ pub struct Cell {
     /// `[safety]`
     #[serde(default)]
     pub safety: Safety,
+    /// `[library]`
+    #[serde(default)]
+    pub library: LibrarySection,
     /// `[telemetry]`
     #[serde(default)]
     pub telemetry: Telemetry,

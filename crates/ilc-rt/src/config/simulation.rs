@@ -31,7 +31,7 @@ pub struct Simulation {
 }
 
 /// `[[simulation.change]]`: a change of temperature, payload or load of the simulated machine, linear over
-/// a time.
+/// a time, or of the digital inputs and the safe torque off of its drives, at once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
@@ -43,7 +43,7 @@ pub struct SimulationChange {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e6))]
     pub over_s: f64,
-    /// Axis of payload and force; all axes without it.
+    /// Axis of payload, force, inputs and torque; all axes without it.
     pub axis: Option<String>,
     /// New temperature of the machine.
     #[schemars(range(min = 200.0, max = 500.0))]
@@ -54,6 +54,12 @@ pub struct SimulationChange {
     /// New constant force on the carriage, e.g. of a cable or of gravity.
     #[schemars(range(min = -1e7, max = 1e7))]
     pub force_n: Option<f64>,
+    /// New digital inputs of the drive that are on beside its switches, as bits of object 0x60FD, from `after_s`
+    /// on.
+    pub digital_inputs: Option<u32>,
+    /// Safe torque off of the drive, as by an emergency stop: `true` takes its power, `false` allows it again, from
+    /// `after_s` on.
+    pub torque_off: Option<bool>,
 }
 
 impl Default for Simulation {

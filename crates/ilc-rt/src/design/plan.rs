@@ -6,7 +6,7 @@ use super::error::DesignError;
 use super::fingerprint;
 use super::law::{self, Prepared};
 use super::traffic::{self, BusTraffic};
-use crate::config::{Axis, Cell, ConfigError, Measure, mode};
+use crate::config::{Axis, Cell, ConfigError, Input, InputUse, Level, Measure, mode};
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{PdoMap, Scale};
@@ -14,7 +14,7 @@ use crate::fieldbus::{AxisNetwork, Bus, CanopenAxes, Station};
 use crate::model::{ModelError, StateSpace};
 use crate::record::Meta;
 use crate::rt::Nanos;
-use crate::servo::{AxisSpec, Pace, ServoSpec, ToolSpec};
+use crate::servo::{AxisSpec, InputRole, InputSpec, Pace, ServoSpec, ToolSpec};
 use crate::trajectory::{AxisLimits, Interpolator};
 
 /// Timeout for enabling the drives.
@@ -35,6 +35,8 @@ pub struct Plan {
     pub meta: Meta,
     /// Fingerprint under which versions up to 0.1 kept the same campaign.
     pub(crate) legacy_fingerprint: String,
+    /// True if the drives are simulated; filled in by the campaign.
+    pub simulated: bool,
     /// Cyclic traffic of each bus, in the worst case.
     pub traffic: Vec<BusTraffic>,
 }
@@ -93,6 +95,7 @@ impl Plan {
                 axis_names: cell.axes.iter().map(|axis| axis.name.clone()).collect(),
                 input_units: cell.axes.iter().map(|axis| input_unit(axis).to_owned()).collect(),
             },
+            simulated: false,
             traffic,
         })
     }
@@ -105,7 +108,8 @@ impl Plan {
         let axes = self.servo.axes.iter().zip(maps);
         let stations =
             axes.map(|(axis, &map)| Station { node: axis.node, mode: axis.mode, map }).collect();
-        Box::new(CanopenAxes::new(bus, stations, self.servo.tool.map(|tool| tool.node)))
+        let tool = self.servo.tool.map(|tool| tool.node);
+        Box::new(CanopenAxes::new(bus, stations, tool).simulated(self.simulated))
     }
 
     /// Returns the number of samples in a run.
@@ -224,6 +228,8 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
                 })
             })
             .transpose()?,
+        inputs: cell.inputs.iter().filter_map(|input| input_spec(cell, input)).collect(),
+        starts_on_input: false,
         cycle: Nanos::from_micros(cell.cell.cycle_us),
         pace: if lockstep {
             Pace::Answers(Duration::from_secs_f64(cell.safety.answer_timeout_s))
@@ -236,10 +242,30 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
         approach_feed_m_s: cell.safety.approach_velocity_m_s.unwrap_or(cell.program.feed_m_s),
         resets_faults: cell.safety.reset_faults,
         settle_ticks: ticks(cell.program.settle_s),
-        enable_ticks: ticks(ENABLE_S),
+        // A guard has to be steady before the drives are switched on.
+        enable_ticks: ticks(ENABLE_S)
+            + cell.inputs.iter().map(|input| input.debounce_cycles).max().unwrap_or(0),
         silent_cycles_max: cell.safety.silent_cycles_max,
         overrun_cycles_max: cell.safety.overrun_cycles_max,
         hold_cycles_max: 0,
+    })
+}
+
+/// Returns what the loop watches of an input; `None` for one that validation would have refused.
+fn input_spec(cell: &Cell, input: &Input) -> Option<InputSpec> {
+    let axis = cell.axes.iter().position(|axis| axis.name == input.axis)?;
+    let role = match input.purpose {
+        InputUse::Guard => InputRole::Guard,
+        InputUse::Start => InputRole::Start,
+        InputUse::Stop => InputRole::Stop,
+        InputUse::Limit => InputRole::Limit(input.direction_of(&cell.axes[axis])?.sign()),
+    };
+    Some(InputSpec {
+        axis,
+        mask: 1 << input.bit,
+        is_high: input.active == Level::High,
+        role,
+        debounce_cycles: input.debounce_cycles,
     })
 }
 

@@ -29,16 +29,19 @@ pub struct BusTraffic {
 ///
 /// A drive without one of the optional objects gets a smaller map at bring-up.
 pub fn pdo_map(cell: &Cell, axis: &Axis) -> PdoMap {
-    one_map(axis, is_small(cell, axis.bus))
+    one_map(cell, axis, is_small(cell, axis.bus))
 }
 
-/// Returns the process data that the cell description states, or those that the bus has time for.
-fn one_map(axis: &Axis, small: bool) -> PdoMap {
-    match axis.drive.pdo.map(axis.interface) {
+/// Returns the process data that the cell description states, or those that the bus has time for, with the
+/// digital inputs of an axis that has named ones.
+fn one_map(cell: &Cell, axis: &Axis, small: bool) -> PdoMap {
+    let map = match axis.drive.pdo.map(axis.interface) {
         Ok(Some(map)) => map,
         _ if small => PdoMap::small(axis.interface),
         _ => PdoMap::full(axis.interface),
-    }
+    };
+    let has_inputs = cell.inputs.iter().any(|input| input.axis == axis.name);
+    if has_inputs { map.with_inputs(PAYLOAD_MAX) } else { map }
 }
 
 /// Returns the traffic of each bus.
@@ -97,7 +100,7 @@ fn is_small(cell: &Cell, number: u8) -> bool {
 fn payloads(cell: &Cell, number: u8, small: bool) -> Vec<usize> {
     let own = cell.axes.iter().filter(|axis| axis.bus == number);
     let tool = cell.tcp_encoder.iter().filter(|_| number == 0).map(|_| TOOL_BYTES);
-    let drives = own.flat_map(|axis| one_map(axis, small).frame_bytes().collect::<Vec<_>>());
+    let drives = own.flat_map(|axis| one_map(cell, axis, small).frame_bytes().collect::<Vec<_>>());
     EVERY_CYCLE.into_iter().chain(drives).chain(tool).collect()
 }
 

@@ -3,7 +3,7 @@
 //! Their JSON schema is `docs/events.schema.json`, which the Python classes are tested against.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::fault::Fault;
 use super::figures::Figures;
@@ -53,6 +53,11 @@ pub enum Event {
         state: StateName,
         /// The run it belongs to.
         iteration: u32,
+    },
+    /// Digital inputs have changed.
+    Inputs {
+        /// All inputs of the cell, in their order.
+        inputs: Vec<InputState>,
     },
     /// Progress of the current run; about ten per second.
     Progress {
@@ -127,6 +132,33 @@ pub enum Event {
         /// Runs kept in the whole campaign.
         iterations: u32,
     },
+}
+
+/// A digital input of a cell.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct InputState {
+    /// Name.
+    pub name: String,
+    /// `guard`, `start`, `stop` or `limit`.
+    #[serde(rename = "use")]
+    pub purpose: String,
+    /// True for a closed guard, a pressed button, a limit switch that is reached; absent before it is known.
+    pub on: Option<bool>,
+}
+
+impl InputState {
+    /// Returns its state in a word.
+    pub fn in_words(&self) -> &'static str {
+        match (self.purpose.as_str(), self.on) {
+            (_, None) => "unknown",
+            ("guard", Some(true)) => "closed",
+            ("guard", Some(false)) => "open",
+            ("limit", Some(true)) => "reached",
+            ("limit", Some(false)) => "free",
+            (_, Some(true)) => "pressed",
+            (_, Some(false)) => "released",
+        }
+    }
 }
 
 /// States of a cell, as published.

@@ -42,6 +42,10 @@ pub enum FaultKind {
     Overrun,
     /// The bus failed; `code` is the error number of the system, if there is one.
     Bus,
+    /// A guard is open; `input` names it, `code` is its bit in object 0x60FD.
+    GuardOpen,
+    /// An axis moved towards a limit switch that it has reached; `input` names it, `code` is its bit in object 0x60FD.
+    LimitSwitch,
     /// A run could not be stored.
     Library,
     /// The law refused a run.
@@ -63,6 +67,8 @@ pub struct Fault {
     pub axis: Option<String>,
     /// CANopen node, if it concerns one node.
     pub node: Option<u8>,
+    /// Name of the digital input, if it concerns one.
+    pub input: Option<String>,
     /// Number defined by the kind.
     pub code: Option<u32>,
     /// Value found.
@@ -100,6 +106,7 @@ impl Fault {
             kind,
             axis: None,
             node: None,
+            input: None,
             code: None,
             value: None,
             limit: None,

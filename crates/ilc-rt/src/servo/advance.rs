@@ -35,7 +35,7 @@ impl Cycle {
                 if ticks_left > 0 || !self.input.faded() {
                     self.phase = Phase::Settling { ticks_left: ticks_left.saturating_sub(1) };
                 } else if self.run < self.spec.runs.end {
-                    self.waits = !self.mail.orders.may_start(self.run);
+                    self.waits = !self.may_start();
                     if !self.waits {
                         return self.start_run();
                     }

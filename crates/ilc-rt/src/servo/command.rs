@@ -73,8 +73,10 @@ impl Cycle {
             return Controlword::DISABLE_VOLTAGE;
         };
         match self.phase {
-            // No drive is enabled before all are known to be within their limits.
-            Phase::Enabling { .. } if !self.all_heard() => Controlword::DISABLE_VOLTAGE,
+            // No drive is enabled before all are known to be within their limits, and all guards closed.
+            Phase::Enabling { .. } if !self.all_heard() || !self.inputs_permit() => {
+                Controlword::DISABLE_VOLTAGE
+            }
             Phase::Enabling { .. } if state == State::Fault && self.spec.resets_faults => {
                 Controlword::fault_reset_after(drive.sent.controlword)
             }

@@ -5,6 +5,7 @@
 use super::feed::Feed;
 use super::gate::Gate;
 use super::input::LearnedInput;
+use super::inputs::{self, INPUTS_MAX, InputBits};
 use super::mailbox::{LoopSide, Message, Sample, StopReason, Table};
 use super::mode;
 use super::node::Drive;
@@ -49,6 +50,12 @@ pub struct Cycle {
     /// True if the axes rest at the start because the run is not released.
     pub(super) waits: bool,
     pub(super) input: LearnedInput,
+    /// Digital inputs, in the order of their specifications.
+    pub(super) inputs: [inputs::Input; INPUTS_MAX],
+    /// As told last.
+    pub(super) input_bits: InputBits,
+    /// True in the tick of a press of a start button.
+    pub(super) is_pressed: bool,
     pub(super) phase: Phase,
     pub(super) reference: Setpoint,
     /// The last three commands of each axis, newest first, in m or m/s by its mode: the initial
@@ -114,6 +121,9 @@ impl Cycle {
             run_scaled: 0,
             waits: false,
             input: LearnedInput::new(input_max, step_max, fade_ticks),
+            inputs: Default::default(),
+            input_bits: InputBits::default(),
+            is_pressed: false,
             phase: Phase::Enabling { ticks: 0 },
             reference: Setpoint {
                 position_m: [0.0; MAX_AXES],
@@ -149,6 +159,7 @@ impl Cycle {
             return TickStatus::Running;
         }
         self.give_out();
+        self.read_inputs();
         let fault = received.err().or_else(|| self.find_fault());
         let before = self.phase_name();
         if let Some(reason) = fault {

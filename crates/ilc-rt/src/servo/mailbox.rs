@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicI32, Ordering};
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use super::inputs::InputBits;
 use super::orders::Orders;
 use super::phase::PhaseName;
 use crate::fieldbus::BusError;
@@ -140,6 +141,23 @@ pub enum StopReason {
     },
     /// The bus failed.
     Bus(BusError),
+    /// A guard is open.
+    GuardOpen {
+        /// Input.
+        input: usize,
+    },
+    /// A stop button is pressed.
+    StopButton {
+        /// Input.
+        input: usize,
+    },
+    /// An axis moves towards a limit switch that it has reached.
+    LimitSwitch {
+        /// Input.
+        input: usize,
+        /// Axis.
+        axis: usize,
+    },
 }
 
 impl StopReason {
@@ -163,7 +181,10 @@ impl StopReason {
             | Self::NotFinite { .. }
             | Self::Stalled { .. }
             | Self::Overrun { .. }
-            | Self::Bus(_) => None,
+            | Self::Bus(_)
+            | Self::GuardOpen { .. }
+            | Self::StopButton { .. }
+            | Self::LimitSwitch { .. } => None,
         }
     }
 }
@@ -193,6 +214,8 @@ pub enum Message {
     },
     /// A cycle before a stop, complete or not; oldest first, followed by the stop.
     Before(Sample),
+    /// Digital inputs have changed.
+    Inputs(InputBits),
     /// The axes are being stopped.
     Stopping(StopReason),
 }

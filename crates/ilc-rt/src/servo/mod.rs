@@ -9,6 +9,7 @@ mod cycle;
 mod feed;
 mod gate;
 mod input;
+mod inputs;
 mod mailbox;
 mod mode;
 mod node;
@@ -25,6 +26,7 @@ mod strangers;
 
 pub use crate::fieldbus::network::Stranger;
 pub use cycle::{Cycle, TickStatus};
+pub use inputs::{INPUTS_MAX, InputBits, InputRole, InputSpec};
 pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, mailbox};
 pub use orders::{FEED_WHOLE, Orders};
 pub use phase::PhaseName;

@@ -3,6 +3,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use crate::fieldbus::cia402::{CommandRpdo1, Controlword, State, Statusword};
+use crate::fieldbus::network::AnswerPart;
 
 /// The last known state of one drive.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +29,9 @@ pub(super) struct Drive {
     pub(super) jump_m: Option<f64>,
     /// Length of the last unreadable TPDO1 and TPDO2, if there was one.
     pub(super) unreadable: [Option<u8>; 2],
+    /// Last digital inputs, and the part of the answer that has them.
+    pub(super) inputs: Option<u32>,
+    pub(super) inputs_part: AnswerPart,
     /// Last command sent.
     pub(super) sent: CommandRpdo1,
 }
@@ -45,6 +49,8 @@ impl Default for Drive {
             distrusted: false,
             jump_m: None,
             unreadable: [None; 2],
+            inputs: None,
+            inputs_part: AnswerPart::Motion,
             sent: CommandRpdo1 {
                 controlword: Controlword::DISABLE_VOLTAGE,
                 target_counts: 0,

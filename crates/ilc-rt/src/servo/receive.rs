@@ -94,6 +94,9 @@ impl Cycle {
             }
             drive.status(statusword, encoder_m);
         }
+        if let Some(word) = reading.digital_inputs {
+            (drive.inputs, drive.inputs_part) = (Some(word), part);
+        }
         // In a fault it has no demand any more; the last following error before counts.
         if let Some(counts) = reading.following_error_counts {
             drive.reports_following_error = true;
@@ -128,7 +131,10 @@ impl Cycle {
         if self.stall.streak() > self.spec.overrun_cycles_max {
             return Some(StopReason::Overrun { cycles: self.stall.streak() });
         }
-        let fault = silence.or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)));
+        // An open guard may have taken the power of a drive as well, and is the cause then.
+        let fault = silence
+            .or_else(|| self.input_fault())
+            .or_else(|| (0..self.n_axes()).find_map(|axis| self.axis_fault(axis)));
         for drive in &mut self.drives {
             drive.jump_m = None;
         }

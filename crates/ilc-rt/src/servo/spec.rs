@@ -4,6 +4,7 @@
 
 use std::time::Duration;
 
+use super::inputs::InputSpec;
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{Mode, Scale};
@@ -59,6 +60,10 @@ pub struct ServoSpec {
     pub axes: Vec<AxisSpec>,
     /// Tool measurement, if there is one.
     pub tool: Option<ToolSpec>,
+    /// Digital inputs; those beyond [`INPUTS_MAX`](super::INPUTS_MAX) are ignored.
+    pub inputs: Vec<InputSpec>,
+    /// True if a press of a start button releases the run that waits.
+    pub starts_on_input: bool,
     /// Servo cycle.
     pub cycle: Nanos,
     /// Source of the pace.

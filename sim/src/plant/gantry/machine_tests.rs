@@ -12,6 +12,8 @@ fn change() -> SimulationChange {
         temperature_k: None,
         payload_kg: None,
         force_n: None,
+        digital_inputs: None,
+        torque_off: None,
     }
 }
 

@@ -50,8 +50,13 @@ fn order(shared: &Shared, command: Command) -> Result<(), String> {
     let orders = &shared.orders;
     let status = shared.status();
     match command {
-        Command::Start if status.state == "waiting" && !status.paused => {
+        Command::Start
+            if status.state == "waiting" && !status.paused && shared.starts_by_command =>
+        {
             orders.release(shared.waiting_run());
+        }
+        Command::Start if status.state == "waiting" && !shared.starts_by_command => {
+            return Err("start: the cell waits for its start button (--start input)".to_owned());
         }
         Command::Start => {
             let paused = if status.paused { ", paused: resume it first" } else { "" };

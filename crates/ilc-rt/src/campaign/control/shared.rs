@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-use crate::record::{Event, StateName};
+use crate::record::{Event, InputState, StateName};
 use crate::servo::Orders;
 
 /// State of a campaign.
@@ -33,6 +33,9 @@ pub struct Status {
     pub last_tracking_rms_m: Option<f64>,
     /// Its error over that of the run a frozen input was taken from.
     pub last_frozen_ratio: Option<f64>,
+    /// Digital inputs.
+    #[serde(default)]
+    pub inputs: Vec<InputState>,
 }
 
 impl Status {
@@ -49,6 +52,7 @@ impl Status {
                 self.state = name(*state);
                 self.iteration = *iteration;
             }
+            Event::Inputs { inputs } => self.inputs.clone_from(inputs),
             Event::Iteration { index, figures, .. } => {
                 self.last_index = Some(*index);
                 self.last_tracking_rms_m = Some(figures.tracking_rms_m);
@@ -72,13 +76,21 @@ pub struct Shared {
     status: Mutex<Status>,
     /// Run that the loop waits with, which a resumed campaign does not count.
     waiting_run: AtomicU32,
+    /// True if runs wait for commands.
+    pub(super) starts_by_command: bool,
 }
 
 impl Shared {
     /// Creates it for a loop that follows `orders`, and stops at a number in `stop`.
     pub fn new(orders: Arc<Orders>, stop: Arc<AtomicI32>) -> Self {
         let (status, waiting_run) = (Mutex::new(Status::default()), AtomicU32::new(0));
-        Self { orders, stop, status, waiting_run }
+        Self { orders, stop, status, waiting_run, starts_by_command: true }
+    }
+
+    /// Sets whether runs wait for commands; otherwise one to start is refused.
+    #[must_use]
+    pub fn starting(self, starts_by_command: bool) -> Self {
+        Self { starts_by_command, ..self }
     }
 
     /// Changes the published state.

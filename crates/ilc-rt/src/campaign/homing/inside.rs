@@ -112,8 +112,7 @@ fn alone(cell: &Cell, outside: &[(&mut Task<'_>, f64)]) -> Cell {
         .iter()
         .map(|(task, _)| {
             let mut axis = task.axis.clone();
-            let margin_m =
-                INSIDE_SHARE * (axis.limits.position_max_m - axis.limits.position_min_m);
+            let margin_m = INSIDE_SHARE * (axis.limits.position_max_m - axis.limits.position_min_m);
             if let Some(at_m) = task.result.position_m {
                 let limits = &mut axis.limits;
                 limits.position_min_m = limits.position_min_m.min(at_m - margin_m);

@@ -290,17 +290,16 @@ impl Seeker {
 mod tests {
     use super::*;
 
-    const PATIENCE: Patience =
-        Patience {
-            silent: 2,
-            lost: 20,
-            enabling: 5,
-            starting: 10,
-            search: 50,
-            rest: 2,
-            rest_counts: 0,
-            stopping: 20,
-        };
+    const PATIENCE: Patience = Patience {
+        silent: 2,
+        lost: 20,
+        enabling: 5,
+        starting: 10,
+        search: 50,
+        rest: 2,
+        rest_counts: 0,
+        stopping: 20,
+    };
     const ENABLED: u16 = 0x0237;
     const OFF: u16 = 0x0250;
 

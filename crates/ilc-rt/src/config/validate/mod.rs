@@ -4,6 +4,7 @@ mod axis;
 mod checker;
 mod drive;
 mod homing;
+mod input;
 mod learning;
 mod program;
 mod simulation;
@@ -79,6 +80,7 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     for axis in &cell.axes {
         axis::check(axis, cell.simulation.step_us, &v)?;
     }
+    input::check(cell, &v)?;
     if let Some(tcp) = &cell.tcp_encoder {
         v.that(
             cell.axes.len() <= 2,

@@ -175,6 +175,25 @@ impl PdoMap {
         Self { command, answers: [status, PdoLayout::EMPTY] }
     }
 
+    /// Returns the map with the digital inputs (0x60FD) in its answers, if it has none yet: where they fit into
+    /// TPDO1 or TPDO2 of up to `bytes_max`, or in the place of the velocity, which the loop can do without.
+    #[must_use]
+    pub fn with_inputs(self, bytes_max: usize) -> Self {
+        if self.carries(objects::DIGITAL_INPUTS) {
+            return self;
+        }
+        let added = |mut map: Self, part: usize| {
+            let layout = map.answers.get_mut(part)?;
+            layout.add(objects::DIGITAL_INPUTS, 32);
+            (layout.n_bytes() <= bytes_max && layout.carries(objects::DIGITAL_INPUTS))
+                .then_some(map)
+        };
+        added(self, 0)
+            .or_else(|| added(self, 1))
+            .or_else(|| added(self.without(objects::VELOCITY_ACTUAL), 1))
+            .unwrap_or(self)
+    }
+
     /// Checks a map that was put together object by object, for frames of up to `bytes_max`.
     ///
     /// # Errors
@@ -194,6 +213,7 @@ impl PdoMap {
                     objects::POSITION_ACTUAL
                     | objects::VELOCITY_ACTUAL
                     | objects::FOLLOWING_ERROR_ACTUAL
+                    | objects::DIGITAL_INPUTS
                     | objects::POSITION_OFFSET
                     | objects::VELOCITY_OFFSET => (32, "32"),
                     objects::MODE_OF_OPERATION => (8, "8"),
@@ -365,6 +385,7 @@ impl PdoLayout {
                 objects::VELOCITY_ACTUAL => reading.velocity_counts_s = long(),
                 objects::TORQUE_ACTUAL => reading.torque = word().map(u16::cast_signed),
                 objects::FOLLOWING_ERROR_ACTUAL => reading.following_error_counts = long(),
+                objects::DIGITAL_INPUTS => reading.digital_inputs = long().map(i32::cast_unsigned),
                 _ => {}
             }
         }
@@ -385,6 +406,8 @@ pub struct Reading {
     pub torque: Option<i16>,
     /// Demand minus actual position, in counts.
     pub following_error_counts: Option<i32>,
+    /// Digital inputs.
+    pub digital_inputs: Option<u32>,
 }
 
 #[cfg(test)]

@@ -16,6 +16,9 @@ use crate::fieldbus::{Bus, BusError, Frame};
 /// Bases of the identifiers of the four receive PDOs.
 const RPDOS: [u16; 4] = [0x200, 0x300, 0x400, 0x500];
 
+/// Object of a simulated drive with its digital inputs: who writes it presses a button, and commands no axis.
+pub const SIMULATED_INPUTS: u16 = 0x2001;
+
 /// Time for the answer of a drive in fault; the axes are at rest by then.
 const ERROR_CODE_WAIT: Duration = Duration::from_millis(100);
 
@@ -35,6 +38,8 @@ pub struct CanopenAxes {
     bus: Box<dyn Bus>,
     stations: Vec<Station>,
     tool: Option<NodeId>,
+    /// True if the nodes are simulated.
+    simulated: bool,
 }
 
 impl fmt::Debug for CanopenAxes {
@@ -46,7 +51,13 @@ impl fmt::Debug for CanopenAxes {
 impl CanopenAxes {
     /// Creates the network of some drives, in the order of the axes. Cold.
     pub fn new(bus: Box<dyn Bus>, stations: Vec<Station>, tool: Option<NodeId>) -> Self {
-        Self { bus, stations, tool }
+        Self { bus, stations, tool, simulated: false }
+    }
+
+    /// Sets whether the nodes are simulated: their inputs may then be switched by other programs.
+    #[must_use]
+    pub fn simulated(self, simulated: bool) -> Self {
+        Self { simulated, ..self }
     }
 
     /// Returns the message in a frame.
@@ -105,7 +116,8 @@ impl CanopenAxes {
                 .then_some(Stranger::Nmt(command, node));
         }
         let to = |base| cob_id::node_of(base, frame.id()).filter(|node| self.is_ours(*node));
-        if let Some(node) = to(cob_id::SDO_REQUEST).filter(|_| !only_reads(frame)) {
+        let changes = !(only_reads(frame) || self.simulated && presses(frame));
+        if let Some(node) = to(cob_id::SDO_REQUEST).filter(|_| changes) {
             return Some(Stranger::Request(node));
         }
         RPDOS.iter().find_map(|base| to(*base)).map(Stranger::Command)
@@ -163,4 +175,10 @@ impl AxisNetwork for CanopenAxes {
 /// exchanges no objects, so that the answers confuse none of its own requests.
 fn only_reads(frame: &Frame) -> bool {
     matches!(frame.payload().first().map(|command| command >> 5), Some(2..=5))
+}
+
+/// Returns whether an SDO request writes the inputs of a simulated drive.
+fn presses(frame: &Frame) -> bool {
+    let [low, high] = SIMULATED_INPUTS.to_le_bytes();
+    matches!(frame.payload(), [command, a, b, ..] if command >> 5 == 1 && [*a, *b] == [low, high])
 }

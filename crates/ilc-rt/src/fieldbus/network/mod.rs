@@ -13,7 +13,7 @@ use super::bus::BusError;
 use super::canopen::{NmtCommand, NmtState, NodeId};
 use super::cia402::{CommandRpdo1, Reading};
 
-pub use canopen::{CanopenAxes, Station};
+pub use canopen::{CanopenAxes, SIMULATED_INPUTS, Station};
 
 /// A network of axes that exchanges commands and answers once per cycle.
 ///
