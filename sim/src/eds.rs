@@ -30,11 +30,9 @@ fn sections(text: &mut String, dictionary: &Dictionary, product: &str) -> fmt::R
     writeln!(text, "DynamicChannelsSupported=0\nGroupMessaging=0")?;
     writeln!(text, "NrOfRXPDO=4\nNrOfTXPDO=4\nLSS_Supported=0\n")?;
 
-    let groups: Vec<&[Entry]> = dictionary
-        .entries()
-        .chunk_by(|a, b| a.address.index == b.address.index)
-        .filter(|group| !group[0].is_hidden())
-        .collect();
+    let shown = dictionary.entries().iter().filter(|entry| !entry.is_hidden());
+    let shown: Vec<Entry> = shown.copied().collect();
+    let groups: Vec<&[Entry]> = shown.chunk_by(|a, b| a.address.index == b.address.index).collect();
     let is_mandatory =
         |index| matches!(index, objects::DEVICE_TYPE | objects::ERROR_REGISTER | objects::IDENTITY);
     let is_manufacturers = |index| (0x2000..0x6000).contains(&index);

@@ -140,6 +140,7 @@ impl Machine {
                 switches: Switches::of(axis),
                 inputs: axis.simulation.digital_inputs,
                 quirks: axis.simulation.quirks,
+                payload_max: cell.format(axis.bus).payload_max(),
             };
             let drive = DriveNode::new(node, parameters)
                 .map_err(|code| MachineError::Dictionary { node, code })?;

@@ -145,11 +145,11 @@ fn run(path: &Path, bus: Option<String>, lockstep: bool, habits: &Habits) -> Res
         )));
     }
     let clock = if lockstep { ClockMode::LockStep } else { ClockMode::RealTime };
+    address.clone_into(&mut cell.bus.address);
     let machine = machine(&cell, clock)?;
     for mute in &habits.mutes {
         require_node(&machine, mute.node, "--mute")?;
     }
-    address.clone_into(&mut cell.bus.address);
     let bus = open_buses(&cell, GroupSide::Drives)
         .map_err(|(_, error)| Failure::Input(error.to_string()))?;
     run::run(&cell, machine, bus, &address, clock, habits).map_err(|error| match error {

@@ -112,7 +112,7 @@ impl Outlet {
     fn send(&mut self, frame: Frame) {
         match self.bus.send(&frame) {
             Ok(()) => self.n_sent += 1,
-            Err(BusError::Full) => self.n_dropped += 1,
+            Err(BusError::Full | BusError::Down) => self.n_dropped += 1,
             Err(error) => self.broken = Some(error),
         }
     }
@@ -160,7 +160,15 @@ pub(crate) fn run(
     print(&ready(cell, address, clock));
     machine.boot(&mut |frame| outlet.send(frame));
     while !stop.load(Ordering::Relaxed) {
-        let received = outlet.bus.recv(BATCH).map_err(failed)?;
+        let received = match outlet.bus.recv(BATCH) {
+            Ok(received) => received,
+            // As drives do: they stay, and carry on once the bus does.
+            Err(error) if error.may_pass() => {
+                print(&format!("{address}: {error}"));
+                None
+            }
+            Err(error) => return Err(failed(error)),
+        };
         if clock == ClockMode::RealTime {
             let n_steps = match &received {
                 Some(frame) if sync::is_sync(frame) => drive_clock.at_sync(start.elapsed()),

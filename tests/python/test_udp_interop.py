@@ -6,6 +6,7 @@ frame with the next identifier. ``make test-python`` builds it.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import socket
@@ -62,7 +63,21 @@ def bus(port: int) -> Iterator[can.BusABC]:
 @pytest.fixture
 def echo(bus_echo: Path, bus: can.BusABC, port: int) -> Iterator[subprocess.Popen[str]]:
     """Start the echo program and stop it by a frame."""
-    command = [str(bus_echo), f"udp:{GROUP}:{port}"]
+    with echoing(bus_echo, bus, f"udp:{GROUP}:{port}") as process:
+        yield process
+
+
+@pytest.fixture
+def echo_fd(bus_echo: Path, bus: can.BusABC, port: int) -> Iterator[subprocess.Popen[str]]:
+    """Start the echo program on a bus with CAN FD."""
+    with echoing(bus_echo, bus, f"udp:{GROUP}:{port}?fd=1") as process:
+        yield process
+
+
+@contextlib.contextmanager
+def echoing(program: Path, bus: can.BusABC, address: str) -> Iterator[subprocess.Popen[str]]:
+    """Run the echo program on a bus and stop it by a frame."""
+    command = [str(program), address]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline().startswith("ready")
@@ -131,6 +146,25 @@ def test_other_kinds_of_frames_are_passed_over(bus: can.BusABC, foreign: can.Mes
     bus.send(can.Message(arbitration_id=0x200, data=[2], is_extended_id=False))
     # An answer to the foreign frame would arrive first.
     assert receive_answer(bus).arbitration_id == 0x201
+
+
+@pytest.mark.usefixtures("echo_fd")
+def test_every_length_of_can_fd_comes_back(bus: can.BusABC) -> None:
+    for length in (*range(9), 12, 16, 20, 24, 32, 48, 64):
+        data = bytes((7 * n) % 256 for n in range(length))
+        sent = can.Message(
+            arbitration_id=0x200, data=data, is_extended_id=False, is_fd=True, bitrate_switch=True
+        )
+        bus.send(sent)
+        answer = receive_answer(bus)
+        assert (answer.arbitration_id, bytes(answer.data), answer.dlc) == (0x201, data, length)
+        assert answer.is_fd
+        assert answer.bitrate_switch
+        assert not answer.error_state_indicator
+    # Classical frames are understood on such a bus, and answered in its format.
+    bus.send(can.Message(arbitration_id=0x200, data=[2], is_extended_id=False))
+    answer = receive_answer(bus)
+    assert (bytes(answer.data), answer.is_fd) == (b"\x02", True)
 
 
 def test_a_wrong_address_is_one_clear_line(bus_echo: Path) -> None:

@@ -10,7 +10,7 @@ use ilc_rt::campaign::{self, CampaignError, Disturbance, Options};
 use ilc_rt::cli::{IdentifyOptions, described, parse};
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Bus;
-use ilc_rt::fieldbus::transport::{self, GroupSide, loopback::InProcess};
+use ilc_rt::fieldbus::transport::{self, GroupSide, in_process};
 use ilc_rt::learning::Law;
 use ilc_rt::record::Event;
 use ilc_sim::machine::{ClockMode, Machine};
@@ -236,7 +236,9 @@ fn open(cell: &Cell) -> Result<Box<dyn Bus>, CampaignError> {
             .map_err(|(place, source)| CampaignError::Bus { place, source });
     }
     match Machine::from_cell(cell, ClockMode::LockStep) {
-        Ok(machine) => Ok(Box::new(InProcess::new(machine, LOOPBACK_FRAMES))),
+        Ok(machine) => {
+            Ok(in_process(&cell.bus.address, machine, cell.cell.cycle_us, LOOPBACK_FRAMES))
+        }
         Err(error) => Err(CampaignError::Simulation { file, reason: error.to_string() }),
     }
 }

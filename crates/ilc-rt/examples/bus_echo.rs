@@ -35,7 +35,7 @@ fn echo(bus: &mut dyn Bus) -> Result<(), ilc_rt::fieldbus::BusError> {
         if frame.id() == STOP {
             return Ok(());
         }
-        if let Some(answer) = Frame::new(frame.id() + 1, frame.payload()) {
+        if let Some(answer) = Frame::fd(frame.id() + 1, frame.payload()) {
             bus.send(&answer)?;
         }
     }

@@ -111,6 +111,9 @@ impl Communication {
         for index in drive_objects::lacking(quirks) {
             self.dictionary.hide(index);
         }
+        for (index, sub) in drive_objects::lacking_subs(quirks) {
+            self.dictionary.hide_sub(index, sub);
+        }
         if quirks.lacks_emergencies {
             self.emergencies.silence();
         }
@@ -120,6 +123,11 @@ impl Communication {
         };
         self.sync.lose_every(quirks.sync_lost_every);
         self.pdos = PdoEngine::new(&self.dictionary);
+    }
+
+    /// Takes PDOs of up to so many bytes: 64 on a bus with CAN FD.
+    pub fn take_payloads_of(&mut self, n_bytes: usize) {
+        self.dictionary.take_payloads_of(n_bytes);
     }
 
     /// Returns whether the mode may be changed now.

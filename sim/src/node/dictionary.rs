@@ -1,6 +1,7 @@
 //! The object dictionary: objects, access rights and current values.
 
 use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
+use ilc_rt::fieldbus::frame::PAYLOAD_MAX;
 
 use super::drive_mode::DriveMode;
 use super::value::Value;
@@ -134,13 +135,25 @@ impl Slot {
 #[derive(Clone, Debug)]
 pub struct Dictionary {
     entries: Vec<Entry>,
+    /// Longest PDO, in bytes.
+    payload_max: usize,
 }
 
 impl Dictionary {
     /// Sorts the objects.
     pub fn new(mut entries: Vec<Entry>) -> Self {
         entries.sort_by_key(|entry| entry.address);
-        Self { entries }
+        Self { entries, payload_max: PAYLOAD_MAX }
+    }
+
+    /// Sets the longest PDO, in bytes: 64 on a bus with CAN FD.
+    pub fn take_payloads_of(&mut self, n_bytes: usize) {
+        self.payload_max = n_bytes;
+    }
+
+    /// Returns the longest PDO, in bytes.
+    pub fn payload_max(&self) -> usize {
+        self.payload_max
     }
 
     /// Returns all objects, in order.
@@ -155,13 +168,27 @@ impl Dictionary {
         }
     }
 
+    /// Hides a sub-index from the bus, as if the node lacked it.
+    pub fn hide_sub(&mut self, index: u16, sub: u8) {
+        let address = ObjectAddress::new(index, sub);
+        for entry in self.entries.iter_mut().filter(|entry| entry.address == address) {
+            entry.is_hidden = true;
+        }
+    }
+
     /// Finds an object.
     ///
     /// # Errors
     /// [`AbortCode::NoObject`], or [`AbortCode::NoSubIndex`] if only the sub-index is missing.
     pub fn find(&self, address: ObjectAddress) -> Result<Slot, AbortCode> {
         match self.entries.binary_search_by_key(&address, |entry| entry.address) {
-            Ok(place) if self.entries[place].is_hidden => Err(AbortCode::NoObject),
+            Ok(place) if self.entries[place].is_hidden => {
+                let is_left = self
+                    .entries
+                    .iter()
+                    .any(|entry| entry.address.index == address.index && !entry.is_hidden);
+                Err(if is_left { AbortCode::NoSubIndex } else { AbortCode::NoObject })
+            }
             Ok(place) => Ok(Slot(place)),
             Err(place) => {
                 let near = [place.checked_sub(1), Some(place)];

@@ -48,6 +48,8 @@ pub struct DriveParameters {
     pub inputs: u32,
     /// Deviations from the profile.
     pub quirks: Quirks,
+    /// Longest payload of a frame on its bus, in bytes.
+    pub payload_max: usize,
 }
 
 /// Measurements of the drive.
@@ -106,6 +108,7 @@ impl DriveNode {
     pub fn new(node: NodeId, parameters: DriveParameters) -> Result<Self, AbortCode> {
         let mut communication = Communication::new(node, drive_objects::all(node, &parameters))?;
         let slots = DriveSlots::find(communication.dictionary())?;
+        communication.take_payloads_of(parameters.payload_max);
         communication.take_habits(&parameters.quirks);
         let units = Units::read(
             communication.dictionary(),

@@ -76,9 +76,21 @@ pub fn lacking(quirks: &Quirks) -> impl Iterator<Item = u16> {
         (quirks.lacks_following_error_time, objects::FOLLOWING_ERROR_TIME),
         (quirks.lacks_emergencies, objects::COB_ID_EMCY),
         (quirks.lacks_emergencies, objects::INHIBIT_TIME_EMCY),
+        (quirks.lacks_consumer_heartbeat, objects::CONSUMER_HEARTBEAT),
     ]
     .into_iter()
     .filter_map(|(lacks, index)| lacks.then_some(index))
+}
+
+/// Returns the sub-indices that the PDOs of a drive with these quirks lack.
+pub fn lacking_subs(quirks: &Quirks) -> impl Iterator<Item = (u16, u8)> {
+    let all = (0..4).flat_map(|offset| {
+        let status = PdoNumber::transmit(offset).communication_index();
+        let of_status = [3, 5, 6].map(|sub| (quirks.lacks_status_times, (status, sub)));
+        let command = PdoNumber::receive(offset).communication_index();
+        of_status.into_iter().chain([(quirks.lacks_command_timeout, (command, 5))])
+    });
+    all.filter_map(|(lacks, address)| lacks.then_some(address))
 }
 
 /// Returns the part of a map whose objects exist.

@@ -3,6 +3,7 @@
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::ObjectAddress;
 use ilc_rt::fieldbus::canopen::pdo::{COB_INVALID, MappedObject, PdoNumber};
+use ilc_rt::fieldbus::frame::{FD_PAYLOAD_MAX, length_on_bus};
 
 use super::dictionary::{Dictionary, Slot};
 use super::pdo_rules;
@@ -89,7 +90,7 @@ impl Pdo {
     }
 
     fn pack(&self, cob_id: u16, dictionary: &Dictionary) -> Frame {
-        let mut payload = [0; 8];
+        let mut payload = [0; FD_PAYLOAD_MAX];
         let mut rest = &mut payload[..];
         for &(slot, n_bytes) in self.objects() {
             let encoded = dictionary.entry(slot).value().encode();
@@ -99,7 +100,7 @@ impl Pdo {
             }
             rest = after;
         }
-        Frame::new(cob_id, &payload[..self.n_bytes.min(8)]).unwrap_or_default()
+        Frame::fd(cob_id, &payload[..length_on_bus(self.n_bytes)]).unwrap_or_default()
     }
 
     fn is_synchronous(&self) -> bool {

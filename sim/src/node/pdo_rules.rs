@@ -6,9 +6,6 @@ use ilc_rt::fieldbus::canopen::{AbortCode, ObjectAddress};
 use super::dictionary::{Dictionary, Mappable};
 use super::standard_objects::MAPPED_MAX;
 
-/// Bytes of a classical CAN frame.
-const PDO_BYTES_MAX: u32 = 8;
-
 /// Returns the PDO whose parameters are at `index`, if there is one.
 pub fn pdo_at(index: u16) -> Option<PdoNumber> {
     let offset = u8::try_from(index & 0x1FF).ok().filter(|offset| *offset < 4)?;
@@ -86,12 +83,12 @@ fn check_cob_id(present: u32, wanted: u32) -> Result<(), AbortCode> {
 fn check_count(dictionary: &Dictionary, pdo: PdoNumber, count: u32) -> Result<(), AbortCode> {
     let count = u8::try_from(count).ok().filter(|count| *count <= MAPPED_MAX);
     let count = count.ok_or(AbortCode::PdoTooLong)?;
-    let mut n_bytes = 0;
+    let mut n_bytes = 0_usize;
     for sub in 1..=count {
         let entry = parameter(dictionary, ObjectAddress::new(pdo.mapping_index(), sub));
-        n_bytes += u32::from(check_object(dictionary, pdo.direction, entry)?);
+        n_bytes += usize::from(check_object(dictionary, pdo.direction, entry)?);
     }
-    if n_bytes > PDO_BYTES_MAX { Err(AbortCode::PdoTooLong) } else { Ok(()) }
+    if n_bytes > dictionary.payload_max() { Err(AbortCode::PdoTooLong) } else { Ok(()) }
 }
 
 /// Returns the length in bytes of the object of a mapping entry, if the PDO may carry it.

@@ -6,7 +6,7 @@ use ilc_rt::campaign::{self, Options, Outcome};
 use ilc_rt::cli::parse;
 use ilc_rt::config::{Cell, Measure};
 use ilc_rt::fieldbus::Bus;
-use ilc_rt::fieldbus::transport::InProcess;
+use ilc_rt::fieldbus::transport;
 use ilc_rt::library::Library;
 use ilc_rt::record::Figures;
 use ilc_sim::{ClockMode, Machine};
@@ -26,7 +26,7 @@ pub fn machine(cell: &Cell) -> Machine {
 
 /// The simulated machine in the caller's own thread.
 pub fn in_process(cell: &Cell) -> Box<dyn Bus> {
-    Box::new(InProcess::new(machine(cell), ANSWERS))
+    transport::in_process(&cell.bus.address, machine(cell), cell.cell.cycle_us, ANSWERS)
 }
 
 /// Options of a campaign in lock-step, without telemetry.

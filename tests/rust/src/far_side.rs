@@ -35,8 +35,12 @@ impl FarSide {
         let told = Arc::clone(&over);
         let thread = std::thread::spawn(move || {
             while !told.load(Ordering::Relaxed) {
-                let Ok(received) = bus.recv(LOOK) else { return };
-                let Some(frame) = received else { continue };
+                let frame = match bus.recv(LOOK) {
+                    Ok(Some(frame)) => frame,
+                    Ok(None) => continue,
+                    Err(error) if error.may_pass() => continue,
+                    Err(_) => return,
+                };
                 meddle(&mut machine);
                 let mut answers = Vec::new();
                 machine.receive(&frame, &mut |answer| answers.push(answer));

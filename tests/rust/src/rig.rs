@@ -50,6 +50,8 @@ pub struct Line {
     pending: Vec<(i32, u16)>,
     injected: VecDeque<Frame>,
     meddle: Option<(u32, Meddle)>,
+    /// Frames that the bus refuses, as its transmit queue is full.
+    refused: u32,
     distort: Option<Distort>,
     /// Axis by axis, SYNC by SYNC: position of the plant after the SYNC was answered.
     plant_m: Vec<f64>,
@@ -70,6 +72,11 @@ impl Line {
     /// Acts on the machine just before the n-th SYNC from now.
     pub fn meddle_after(&mut self, n_syncs: u32, meddle: Meddle) {
         self.meddle = Some((n_syncs, meddle));
+    }
+
+    /// Refuses the next frames, as a bus does whose transmit queue is full.
+    pub fn refuse(&mut self, n_frames: u32) {
+        self.refused = n_frames;
     }
 
     /// Distorts every answer from now on.
@@ -140,6 +147,7 @@ impl Tap {
             nodes,
             injected: VecDeque::with_capacity(FRAMES),
             meddle: None,
+            refused: 0,
             distort: None,
             plant_m: Vec::with_capacity(ROWS),
         })))
@@ -154,6 +162,10 @@ impl Tap {
 impl Bus for Tap {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let mut line = self.line();
+        if line.refused > 0 {
+            line.refused -= 1;
+            return Err(BusError::Full);
+        }
         line.note(frame);
         let sent = line.bus.send(frame);
         if sync::is_sync(frame) {

@@ -123,7 +123,10 @@ fn a_drive_that_cannot_run_is_refused_with_the_object() {
     for (changed, expected) in [
         (without(&text, "6040]"), "the drive has no object 0x6040:00 (Controlword), which is needed to enable it"),
         (without(&text, "607A]"), "0x607A:00 (Target position), which is needed for the command"),
-        (without(&text, "1400sub5]"), "0x1400:05 (RPDO communication parameter), which is needed to stop"),
+        (
+            without(&without(&text, "1400sub5]"), "1016sub1]"),
+            "0x1400:05 (RPDO communication parameter), which is needed to stop",
+        ),
         (text.replace("131474", "131473"), "0x1000:00 (Device type) = 0x00020191"),
         (configured(&text, "6502", "1"), "object 0x6502:00 (Supported drive modes) = 0x00000001: it lacks cyclic"),
         (
@@ -143,6 +146,14 @@ fn what_a_drive_lacks_is_said() {
         imported(&text).unwrap().lacks.iter().map(ToString::to_string).collect();
     assert!(lacks.contains(&"lacks 0x60B2:00 (Torque offset): no torque feed-forward".to_owned()));
     assert!(lacks.iter().any(|lack| lack.starts_with("lacks 0x605A:00 (Quick stop option code)")));
+}
+
+#[test]
+fn a_drive_without_a_timeout_of_commands_watches_the_heartbeat() {
+    let found = imported(&without(&simulated(), "1400sub5]")).unwrap();
+    let lacks: Vec<String> = found.lacks.iter().map(ToString::to_string).collect();
+    let line = lacks.iter().find(|lack| lack.starts_with("lacks 0x1400:05")).unwrap();
+    assert!(line.contains("the heartbeat of the controller"), "{line}");
 }
 
 #[test]

@@ -113,10 +113,14 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
         StopReason::Overrun { cycles } => {
             counted(Fault::new(FaultKind::Overrun), cycles, cell.safety.overrun_cycles_max)
         }
+        StopReason::Congested { cycles } => counted(Fault::new(FaultKind::Bus), cycles, silent_max),
+        StopReason::Bus(BusError::Controller(fact)) => {
+            Fault { code: Some(fact.class()), ..Fault::new(FaultKind::CanController) }
+        }
         StopReason::Bus(error) => {
             let code = match error {
                 BusError::Os(number) => u32::try_from(number).ok(),
-                BusError::Full | BusError::Closed => None,
+                _ => None,
             };
             Fault { code, ..Fault::new(FaultKind::Bus) }
         }

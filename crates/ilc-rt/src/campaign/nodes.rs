@@ -309,6 +309,7 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
         velocity_unit: axis.drive.velocity_unit.or(units.map(|(_, velocity)| velocity)),
         heartbeat_ms: if lockstep { 0 } else { HEARTBEAT_MS },
         rpdo_deadline_ms: if lockstep { 0 } else { deadline_ms },
+        controller: design::node(cell, cell.controller_node())?,
         answer_timeout: Duration::from_secs_f64(cell.safety.answer_timeout_s),
         own: super::own::of(axis),
         is_to_be_homed: false,

@@ -5,6 +5,7 @@ use super::inputs;
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::commissioning::power_lost;
 use crate::config::{AxisUnit, Cell, Direction, Input};
+use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
 use crate::servo::{StopReason, Stranger};
@@ -104,6 +105,11 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             ms(cycles),
             axis(index),
             emcy::CODE_RPDO_TIMEOUT
+        ),
+        StopReason::Congested { cycles } => format!(
+            "the bus did not take every frame for {cycles} cycles ({:.0} ms): {}",
+            ms(cycles),
+            BusError::Full
         ),
         StopReason::Bus(error) => format!("{error}"),
         StopReason::GuardOpen { input } => of_input(cell, input, |input| inputs::open(cell, input)),

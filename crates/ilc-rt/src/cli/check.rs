@@ -85,12 +85,15 @@ fn describe(arguments: &CheckArguments) -> Result<(), DesignError> {
 /// Describes the traffic of a bus.
 fn traffic(bus: &BusTraffic) -> String {
     let is_real = scheme_of(&bus.address).is_some_and(|scheme| scheme.has_bits);
+    let kind = if bus.rates.data_bit_s.is_some() { "CAN FD" } else { "classical CAN" };
+    let data = bus.rates.data_bit_s.map(|rate| format!(" (data phase {rate} bit/s)"));
     format!(
-        "bus {}: {:.0} us per cycle at worst{} {} bit/s, {:.0} % of the period{}",
+        "bus {}: {:.0} us per cycle at worst{} {} bit/s{}, {:.0} % of the period{}",
         bus.address,
         bus.load.us_per_cycle,
-        if is_real { " at" } else { "; that is on a classical CAN bus of" },
-        bus.bitrate_bit_s,
+        if is_real { " at".to_owned() } else { format!("; that is on a {kind} bus of") },
+        bus.rates.nominal_bit_s,
+        data.unwrap_or_default(),
         bus.load.ratio() * 100.0,
         if bus.small { "; the smallest process data, as there is no time for more" } else { "" }
     )

@@ -12,9 +12,12 @@ use super::input::Input;
 use super::learning::Learning;
 use super::library::LibrarySection;
 use super::simulation::Simulation;
+use crate::fieldbus::transport::{Format, format_of};
 use crate::schema::field_order;
 use crate::trajectory::kind::Program;
 
+/// Highest CANopen node number.
+const NODE_MAX: u8 = 127;
 /// Default velocity of `jog` and `goto`, as a share of the limit of the axis.
 const JOG_SHARE: f64 = 0.1;
 
@@ -77,9 +80,10 @@ pub struct CellSection {
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]
 pub struct BusSection {
-    /// Bus: `can:vcan0`, `udp:239.74.163.2[:port]`, `zenoh:KEY` or `loopback:`; `--bus` replaces it.
+    /// Bus: `can:vcan0`, `udp:239.74.163.2[:port]`, `zenoh:KEY` or `loopback:`; `--bus` replaces it. With `?fd=1` it has
+    /// CAN FD, if every node takes it; `data_bitrate=N` is the bit rate of its data phase.
     pub address: String,
-    /// Bit rate of a CAN bus, for the load check.
+    /// Bit rate of a CAN bus, for the load check; with CAN FD that of arbitration.
     #[serde(default = "default_bitrate_bit_s")]
     #[schemars(range(min = 10_000, max = 1_000_000))]
     pub bitrate_bit_s: u32,
@@ -129,6 +133,10 @@ pub struct Safety {
     /// first move has the feed of the program, and `jog` and `goto` a tenth of the velocity limit of their axis.
     #[schemars(range(min = 1e-6, max = 100.0))]
     pub approach_velocity_m_s: Option<f64>,
+    /// Node number of the controller, whose heartbeat is watched by drives without a time-out of their commands
+    /// (object 0x1400:05); the highest free one if it is not given.
+    #[schemars(range(min = 1, max = 127))]
+    pub controller_node: Option<u8>,
     /// Reset faults that the drives have when a run starts. Otherwise they are named, and nothing moves.
     pub reset_faults: bool,
 }
@@ -140,6 +148,7 @@ impl Default for Safety {
             overrun_cycles_max: 50,
             answer_timeout_s: 2.0,
             approach_velocity_m_s: None,
+            controller_node: None,
             reset_faults: false,
         }
     }
@@ -212,6 +221,29 @@ impl Cell {
     /// Returns the address of each bus: `[bus]`, then every `[[extra_bus]]`.
     pub fn addresses(&self) -> impl Iterator<Item = &str> {
         std::iter::once(&self.bus).chain(&self.extra_buses).map(|bus| bus.address.as_str())
+    }
+
+    /// Returns the node number of the controller.
+    pub fn controller_node(&self) -> u8 {
+        let is_free = |number: &u8| {
+            self.axes.iter().all(|axis| axis.node != *number)
+                && self.tcp_encoder.is_none_or(|tool| tool.node != *number)
+        };
+        let free = || (1..=NODE_MAX).rev().find(is_free).unwrap_or(NODE_MAX);
+        self.safety.controller_node.unwrap_or_else(free)
+    }
+
+    /// Returns a bus by its number: 0 is `[bus]`, n the n-th `[[extra_bus]]`.
+    pub fn bus(&self, number: u8) -> &BusSection {
+        match number.checked_sub(1) {
+            Some(extra) => self.extra_buses.get(usize::from(extra)).unwrap_or(&self.bus),
+            None => &self.bus,
+        }
+    }
+
+    /// Returns the format of the frames of a bus, by its number.
+    pub fn format(&self, bus: u8) -> Format {
+        format_of(&self.bus(bus).address)
     }
 
     /// Returns the unit of each axis, in order.

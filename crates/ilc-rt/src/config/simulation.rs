@@ -189,6 +189,12 @@ pub struct Quirks {
     pub lacks_following_error_time: bool,
     /// No emergency messages, and no 0x1014.
     pub lacks_emergencies: bool,
+    /// No time-out of commands, 0x1400:05: the drive watches the heartbeat of the controller.
+    pub lacks_command_timeout: bool,
+    /// No consumer heartbeat, 0x1016.
+    pub lacks_consumer_heartbeat: bool,
+    /// No inhibit time, event timer and SYNC start value of TPDOs, 0x1800:03, :05 and :06.
+    pub lacks_status_times: bool,
 }
 
 impl Default for Quirks {
@@ -205,6 +211,9 @@ impl Default for Quirks {
             lacks_interpolation_period: false,
             lacks_following_error_time: false,
             lacks_emergencies: false,
+            lacks_command_timeout: false,
+            lacks_consumer_heartbeat: false,
+            lacks_status_times: false,
         }
     }
 }

@@ -9,7 +9,7 @@ use super::traffic::{self, BusTraffic};
 use crate::config::{Axis, Cell, ConfigError, Input, InputUse, Level, Measure, mode};
 use crate::control::PositionLoop;
 use crate::fieldbus::canopen::NodeId;
-use crate::fieldbus::cia402::{PdoMap, Scale};
+use crate::fieldbus::cia402::{PdoMap, Scale, Supervision};
 use crate::fieldbus::{AxisNetwork, Bus, CanopenAxes, Station};
 use crate::model::{ModelError, StateSpace};
 use crate::record::Meta;
@@ -17,6 +17,8 @@ use crate::rt::Nanos;
 use crate::servo::{AxisSpec, InputRole, InputSpec, Pace, ServoSpec, ToolSpec};
 use crate::trajectory::{AxisLimits, Interpolator};
 
+/// Heartbeats of the controller within the time after which a drive stops without them.
+const BEATS_PER_DEADLINE: u32 = 4;
 /// Timeout for enabling the drives.
 const ENABLE_S: f64 = 3.0;
 
@@ -37,6 +39,8 @@ pub struct Plan {
     pub(crate) legacy_fingerprint: String,
     /// True if the drives are simulated; filled in by the campaign.
     pub simulated: bool,
+    /// Node number of the controller.
+    controller: NodeId,
     /// Cyclic traffic of each bus, in the worst case.
     pub traffic: Vec<BusTraffic>,
 }
@@ -75,6 +79,7 @@ impl Plan {
         let reference_m = interpolator.reference();
         Ok(Self {
             servo: servo_spec(&cell, lockstep)?,
+            controller: node(&cell, cell.controller_node())?,
             interpolator,
             reference_m,
             legacy_fingerprint: String::new(),
@@ -104,12 +109,21 @@ impl Plan {
     ///
     /// # Shapes
     /// - `maps`: the process data of each axis as mapped at bring-up
-    pub fn network(&self, bus: Box<dyn Bus>, maps: &[PdoMap]) -> Box<dyn AxisNetwork> {
+    pub fn network(&self, mut bus: Box<dyn Bus>, maps: &[PdoMap]) -> Box<dyn AxisNetwork> {
+        let tool = self.servo.tool.map(|tool| tool.node);
+        let nodes = self.servo.axes.iter().map(|axis| axis.node).chain(tool);
+        // A system that cannot filter passes everything on, and the loop skips what is foreign.
+        let _ = bus.keep_to(&nodes.map(NodeId::get).collect::<Vec<_>>());
         let axes = self.servo.axes.iter().zip(maps);
         let stations =
             axes.map(|(axis, &map)| Station { node: axis.node, mode: axis.mode, map }).collect();
-        let tool = self.servo.tool.map(|tool| tool.node);
-        Box::new(CanopenAxes::new(bus, stations, tool).simulated(self.simulated))
+        let network = CanopenAxes::new(bus, stations, tool).simulated(self.simulated);
+        if maps.iter().all(|map| map.supervision != Supervision::Heartbeat) {
+            return Box::new(network);
+        }
+        // Some of them may be lost before a drive stops.
+        let every = (self.servo.silent_cycles_max / BEATS_PER_DEADLINE).max(1);
+        Box::new(network.with_heartbeat(self.controller, every))
     }
 
     /// Returns the number of samples in a run.

@@ -1,13 +1,15 @@
 //! Cyclic traffic of a cell: the process data of each drive, and the time that it takes on each bus.
 
 use crate::config::{Axis, BusSection, Cell};
-use crate::fieldbus::cia402::PdoMap;
+use crate::fieldbus::cia402::{OptionalObjects, PdoMap};
 use crate::fieldbus::frame::PAYLOAD_MAX;
 use crate::fieldbus::load::{self, BitRates, Load, LoadError};
-use crate::fieldbus::transport::scheme_of;
+use crate::fieldbus::transport::{format_of, scheme_of};
 
 /// Bytes of SYNC, and of the frame reserved for SDO, heartbeat and EMCY.
 const EVERY_CYCLE: [usize; 2] = [0, PAYLOAD_MAX];
+/// Bit rate of a data phase that every transceiver for CAN FD has, in bit/s.
+const FD_DATA_BIT_S: u32 = 5_000_000;
 /// Bytes of the answer of an encoder node.
 const TOOL_BYTES: usize = 8;
 
@@ -16,8 +18,8 @@ const TOOL_BYTES: usize = 8;
 pub struct BusTraffic {
     /// Address of the bus.
     pub address: String,
-    /// Nominal bit rate, in bit/s.
-    pub bitrate_bit_s: u32,
+    /// Its bit rates; of a bus without any, for comparison.
+    pub rates: BitRates,
     /// Worst-case bus time of a cycle; of a bus without a bit rate, for comparison.
     pub load: Load,
     /// True if the small maps are used, as the full ones do not fit.
@@ -35,13 +37,15 @@ pub fn pdo_map(cell: &Cell, axis: &Axis) -> PdoMap {
 /// Returns the process data that the cell description states, or those that the bus has time for, with the
 /// digital inputs of an axis that has named ones.
 fn one_map(cell: &Cell, axis: &Axis, small: bool) -> PdoMap {
-    let map = match axis.drive.pdo.map(axis.interface) {
+    let payload_max = cell.format(axis.bus).payload_max();
+    let all = OptionalObjects::ALL;
+    let map = match axis.drive.pdo.map(axis.interface, payload_max) {
         Ok(Some(map)) => map,
         _ if small => PdoMap::small(axis.interface),
-        _ => PdoMap::full(axis.interface),
+        _ => PdoMap::choose(axis.interface, all, all, payload_max),
     };
     let has_inputs = cell.inputs.iter().any(|input| input.axis == axis.name);
-    if has_inputs { map.with_inputs(PAYLOAD_MAX) } else { map }
+    if has_inputs { map.with_inputs(payload_max) } else { map }
 }
 
 /// Returns the traffic of each bus.
@@ -52,7 +56,7 @@ pub(super) fn of(cell: &Cell) -> Result<Vec<BusTraffic>, (String, LoadError)> {
     let numbers = 0..=u8::try_from(cell.extra_buses.len()).unwrap_or(u8::MAX);
     numbers
         .map(|number| {
-            let bus = bus_of(cell, number);
+            let bus = cell.bus(number);
             let small = is_small(cell, number);
             let frames = payloads(cell, number, small);
             let load = if has_bits(bus) {
@@ -61,18 +65,9 @@ pub(super) fn of(cell: &Cell) -> Result<Vec<BusTraffic>, (String, LoadError)> {
                 // As fast as the machine; stated for comparison.
                 Load::of(&frames, cell.cycle_s(), rates(bus))
             };
-            let (address, bitrate_bit_s) = (bus.address.clone(), bus.bitrate_bit_s);
-            Ok(BusTraffic { address, bitrate_bit_s, load, small })
+            Ok(BusTraffic { address: bus.address.clone(), rates: rates(bus), load, small })
         })
         .collect()
-}
-
-/// Returns the bus of a number: 0 is `[bus]`, n the n-th `[[extra_bus]]`.
-fn bus_of(cell: &Cell, number: u8) -> &BusSection {
-    match number.checked_sub(1) {
-        Some(extra) => cell.extra_buses.get(usize::from(extra)).unwrap_or(&cell.bus),
-        None => &cell.bus,
-    }
 }
 
 fn key(number: u8) -> String {
@@ -81,16 +76,19 @@ fn key(number: u8) -> String {
 
 /// Returns whether a bus has a bit rate of its own.
 fn has_bits(bus: &BusSection) -> bool {
-    scheme_of(&bus.address).is_some_and(|scheme| scheme.has_bits)
+    format_of(&bus.address).kept_bit_s.is_some()
+        || scheme_of(&bus.address).is_some_and(|scheme| scheme.has_bits)
 }
 
+/// Returns the bit rates of a bus: those that its address states, or else those of its section.
 fn rates(bus: &BusSection) -> BitRates {
-    BitRates::classical(bus.bitrate_bit_s)
+    let format = format_of(&bus.address);
+    format.rates_at(format.kept_bit_s.unwrap_or(bus.bitrate_bit_s))
 }
 
 /// Returns whether a bus carries the small maps, as it has no time for the full ones.
 fn is_small(cell: &Cell, number: u8) -> bool {
-    let bus = bus_of(cell, number);
+    let bus = cell.bus(number);
     let full = payloads(cell, number, false);
     has_bits(bus) && !Load::of(&full, cell.cycle_s(), rates(bus)).fits(bus.load_max)
 }
@@ -113,9 +111,15 @@ fn check(cell: &Cell, bus: &BusSection, number: u8, frames: &[usize]) -> Result<
                 "what fits: [cell] cycle_us = {:.0} with the smallest process data",
                 load.cycle_needed_us(load_max)
             )];
-            let faster = BitRates::classical(1_000_000);
+            let faster = BitRates { nominal_bit_s: 1_000_000, ..rates };
             if rates != faster && Load::of(frames, cell.cycle_s(), faster).fits(load_max) {
                 ways.push("bitrate_bit_s = 1000000".to_owned());
+            }
+            let fd = BitRates { data_bit_s: Some(FD_DATA_BIT_S), ..rates };
+            if rates.data_bit_s.is_none() && Load::of(frames, cell.cycle_s(), fd).fits(load_max) {
+                ways.push(format!(
+                    "CAN FD, if every drive takes it (`?fd=1&data_bitrate={FD_DATA_BIT_S}` in the address)"
+                ));
             }
             let n_axes = cell.axes.iter().filter(|axis| axis.bus == number).count();
             let per_bus = (1..n_axes).rev().find(|&n| {
@@ -170,6 +174,7 @@ mod tests {
             "need 1570 us at worst, 800 us are allowed (80 % of 1000 us)",
             "[cell] cycle_us = 2000 with the smallest process data",
             "3 buses ([[extra_bus]]) of 2 axes at most",
+            "CAN FD, if every drive takes it (`?fd=1&data_bitrate=5000000` in the address)",
         ] {
             assert!(line.contains(part), "{line}");
         }
@@ -189,6 +194,33 @@ mod tests {
         let mut simulated = cell.clone();
         simulated.bus.address = "udp:239.74.163.2".to_owned();
         assert!(!of(&simulated).unwrap()[0].small, "only a real bus has a bit rate");
+    }
+
+    #[test]
+    fn can_fd_carries_six_axes_at_1_khz_with_all_that_the_drives_offer() {
+        let mut cell = cell(6);
+        cell.bus.address = "can:can0?fd=1&data_bitrate=5000000".to_owned();
+        cell.bus.load_max = 0.9;
+        let traffic = of(&cell).unwrap();
+        // SYNC, the reserve, and for each axis a command of 8 and an answer of 16 bytes.
+        let expected_us = 40.6 + 56.6 + 6.0 * (56.6 + 72.6);
+        assert!((traffic[0].load.us_per_cycle - expected_us).abs() < 0.5, "{traffic:?}");
+        assert!(!traffic[0].small);
+        let map = pdo_map(&cell, &cell.axes[0]);
+        assert_eq!(map.frame_bytes().collect::<Vec<_>>(), [8, 16]);
+        cell.bus.address = "can:can0?fd=1".to_owned();
+        let line = of(&cell).unwrap_err().1.to_string();
+        assert!(!line.contains("CAN FD") && line.contains("are allowed"), "{line}");
+    }
+
+    #[test]
+    fn a_bus_in_memory_has_the_bit_rate_of_its_address() {
+        let mut cell = cell(6);
+        cell.bus.address = "loopback:".to_owned();
+        assert!(of(&cell).is_ok());
+        cell.bus.address = "loopback:?bitrate=1000000".to_owned();
+        let (_, error) = of(&cell).unwrap_err();
+        assert!(error.to_string().contains("need 1570 us at worst"), "{error}");
     }
 
     #[test]

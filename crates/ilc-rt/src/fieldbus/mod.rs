@@ -6,6 +6,7 @@
 
 pub mod bring_up;
 pub mod bus;
+pub mod can_fact;
 pub mod canopen;
 pub mod cia402;
 pub mod frame;
@@ -14,5 +15,6 @@ pub mod network;
 pub mod transport;
 
 pub use bus::{Bus, BusError};
+pub use can_fact::CanFact;
 pub use frame::Frame;
 pub use network::{AxisNetwork, CanopenAxes, Station};

@@ -40,12 +40,16 @@ pub enum FaultKind {
     Stall,
     /// The loop could not keep its cycle; `value` is the number of cycles missed.
     Overrun,
-    /// The bus failed; `code` is the error number of the system, if there is one.
+    /// The bus failed, or took no frames for `value` cycles; `code` is the error number of the system, if there
+    /// is one.
     Bus,
     /// A guard is open; `input` names it, `code` is its bit in object 0x60FD.
     GuardOpen,
     /// An axis moved towards a limit switch that it has reached; `input` names it, `code` is its bit in object 0x60FD.
     LimitSwitch,
+    /// The CAN controller reports a fault of the bus; `code` is its class as Linux numbers it, e.g. 0x40 for
+    /// bus-off, 0x20 for a missing acknowledgement.
+    CanController,
     /// A run could not be stored.
     Library,
     /// The law refused a run.

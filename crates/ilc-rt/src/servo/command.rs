@@ -7,14 +7,17 @@ use super::gate::Bounds;
 use super::mailbox::StopReason;
 use super::mode::{self, Moment};
 use super::phase::Phase;
+use super::spec::Pace;
+use crate::fieldbus::BusError;
 use crate::fieldbus::cia402::{Controlword, State, next_command};
 
 impl Cycle {
     /// Sends every drive its command, then exchanges. A command that the bus cannot take is missed by
-    /// the drive: it extrapolates for a cycle, and a persistent silence is detected.
+    /// the drive: it extrapolates for a cycle; too many such cycles in a row stop the axes.
     pub(super) fn command(&mut self) {
         let mut newest = self.commanded[0];
         let mut fault = None;
+        let mut is_full = false;
         for axis in 0..self.n_axes() {
             let mode = mode::of(self.spec.axes[axis].mode);
             let mut target = self.target(axis);
@@ -30,15 +33,29 @@ impl Cycle {
             let sent = &mut self.drives[axis].sent;
             sent.controlword = controlword;
             mode.write(target, spec.scale, sent);
-            let _ = self.network.write(axis, sent);
+            is_full |= self.network.write(axis, sent) == Err(BusError::Full);
         }
         self.commanded = [newest, self.commanded[0], self.commanded[1]];
-        if let Err(error) = self.network.exchange() {
-            fault = fault.or(Some(StopReason::Bus(error)));
+        match self.network.exchange() {
+            Ok(()) => {}
+            Err(BusError::Full) => is_full = true,
+            Err(error) => fault = fault.or(Some(StopReason::Bus(error))),
         }
+        fault = fault.or(self.congestion(is_full));
         if let Some(reason) = fault {
             self.begin_stop(reason);
         }
+    }
+
+    /// Counts the cycles in a row in which the bus did not take every frame.
+    fn congestion(&mut self, is_full: bool) -> Option<StopReason> {
+        self.congested = if is_full { self.congested.saturating_add(1) } else { 0 };
+        // Paced by answers there is none to wait for.
+        let max = match self.spec.pace {
+            Pace::Answers(_) => 0,
+            Pace::Clock => self.spec.silent_cycles_max,
+        };
+        (self.congested > max).then_some(StopReason::Congested { cycles: self.congested })
     }
 
     /// Returns the bounded target of an axis, in the unit of its mode.

@@ -65,6 +65,8 @@ pub struct Cycle {
     pub(super) run: u32,
     pub(super) stall: Stall,
     pub(super) run_overruns: u32,
+    /// Consecutive cycles in which the bus did not take every frame.
+    pub(super) congested: u32,
     pub(super) stopping: Option<StopReason>,
     pub(super) limits: [AxisLimits; MAX_AXES],
     pub(super) start_m: [f64; MAX_AXES],
@@ -135,6 +137,7 @@ impl Cycle {
             run: spec.runs.start,
             stall: Stall::default(),
             run_overruns: 0,
+            congested: 0,
             stopping: None,
             limits: AxisLimits::padded(&limits),
             start_m,

@@ -139,6 +139,11 @@ pub enum StopReason {
         /// Consecutive cycles missed.
         cycles: u32,
     },
+    /// The bus took no frames.
+    Congested {
+        /// Consecutive cycles with a frame that was not sent.
+        cycles: u32,
+    },
     /// The bus failed.
     Bus(BusError),
     /// A guard is open.
@@ -181,10 +186,11 @@ impl StopReason {
             | Self::NotFinite { .. }
             | Self::Stalled { .. }
             | Self::Overrun { .. }
-            | Self::Bus(_)
             | Self::GuardOpen { .. }
             | Self::StopButton { .. }
-            | Self::LimitSwitch { .. } => None,
+            | Self::LimitSwitch { .. }
+            | Self::Congested { .. }
+            | Self::Bus(_) => None,
         }
     }
 }

@@ -10,6 +10,7 @@ use super::pending::Part;
 use super::phase::Phase;
 use super::silence::saturate;
 use super::spec::Pace;
+use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::{NmtState, emcy};
 use crate::fieldbus::cia402::{Reading, State};
 use crate::fieldbus::network::{AnswerPart, Arrival};
@@ -38,6 +39,10 @@ impl Cycle {
             match self.network.next(timeout) {
                 Ok(Some(arrival)) => left = left.and(self.take(arrival)),
                 Ok(None) => return left,
+                // Frames are behind it.
+                Err(error @ BusError::Controller(_)) => {
+                    left = left.and(Err(StopReason::Bus(error)))
+                }
                 Err(error) => return Err(StopReason::Bus(error)),
             }
         }

@@ -245,6 +245,7 @@ pub(crate) fn setup(mode: Mode) -> DriveSetup {
         velocity_unit: None,
         heartbeat_ms: 0,
         rpdo_deadline_ms: 0,
+        controller: node(127),
         answer_timeout: ANSWER,
         own: DriveOwn::default(),
         is_to_be_homed: false,

@@ -28,6 +28,7 @@ impl Drop for Lent {
     }
 }
 
+/// It keeps to no nodes: the lender speaks to others later.
 impl Bus for Lent {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         self.bus.as_mut().map_or(Err(BusError::Closed), |bus| bus.send(frame))

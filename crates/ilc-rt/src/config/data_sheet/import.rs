@@ -37,7 +37,7 @@ impl std::fmt::Display for Lack {
 }
 
 /// Objects without which no drive runs.
-const NEEDED: [(u16, u8, &str); 10] = [
+const NEEDED: [(u16, u8, &str); 9] = [
     (objects::CONTROLWORD, 0, "to enable it"),
     (objects::STATUSWORD, 0, "to know its state"),
     (objects::MODE_OF_OPERATION, 0, "to choose the mode"),
@@ -45,17 +45,17 @@ const NEEDED: [(u16, u8, &str); 10] = [
     (objects::POSITION_ACTUAL, 0, "to measure the position"),
     (objects::RPDO_COMMUNICATION, 1, "for the command of every cycle"),
     (objects::RPDO_COMMUNICATION, 2, "for the command of every cycle"),
-    (
-        objects::RPDO_COMMUNICATION,
-        5,
-        "to stop when no command arrives; only in lock-step a drive runs without it",
-    ),
     (objects::TPDO_COMMUNICATION, 1, "for the status of every cycle"),
     (objects::TPDO_COMMUNICATION, 2, "for the status of every cycle"),
 ];
 
 /// Objects that make a difference.
-const WANTED: [(u16, u8, &str); 21] = [
+const WANTED: [(u16, u8, &str); 22] = [
+    (
+        objects::RPDO_COMMUNICATION,
+        5,
+        "it watches the heartbeat of the controller ([safety] controller_node) instead of its commands",
+    ),
     (objects::CONNECTION_LOSS_OPTION, 0, "its reaction to a lost connection cannot be set"),
     (objects::QUICK_STOP_OPTION, 0, "its quick stop brakes as the drive is made"),
     (objects::FAULT_REACTION_OPTION, 0, "its reaction to a fault is as the drive is made"),
@@ -93,6 +93,7 @@ const TORQUE_LIMITS: [u16; 4] = [
 /// [`DataSheetError`] for a drive that could not run, with the object that it lacks.
 pub fn import(sheet: &DataSheet, mode: Mode) -> Result<Imported, DataSheetError> {
     check_drive(sheet, mode)?;
+    check_supervision(sheet)?;
     let mut found = Imported { drive: identity(sheet), lacks: lacks(sheet), remarks: Vec::new() };
     found.drive.pdo = process_data(sheet, mode)?;
     ratios(sheet, &mut found.drive)?;
@@ -143,6 +144,21 @@ fn check_drive(sheet: &DataSheet, mode: Mode) -> Result<(), DataSheetError> {
         }
     }
     Ok(())
+}
+
+/// Refuses a drive that would not notice that commands stop coming: CiA 301 makes both ways optional.
+fn check_supervision(sheet: &DataSheet) -> Result<(), DataSheetError> {
+    let (index, sub) = (objects::RPDO_COMMUNICATION, 5);
+    if sheet.get(index, sub).is_some() || sheet.get(objects::CONSUMER_HEARTBEAT, 1).is_some() {
+        return Ok(());
+    }
+    Err(DataSheetError::Missing {
+        file: sheet.file.clone(),
+        object: ObjectAddress::new(index, sub),
+        name: objects::name(index).unwrap_or(""),
+        purpose: "to stop when no command arrives, as it cannot watch the heartbeat of the controller \
+                  (0x1016:01) either; only in lock-step a drive runs without both",
+    })
 }
 
 fn lacks(sheet: &DataSheet) -> Vec<Lack> {

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 use super::ObjectName;
 use crate::fieldbus::canopen::pdo::MappedObject;
 use crate::fieldbus::cia402::{Mode, PdoLayout, PdoMap, objects};
-use crate::fieldbus::frame::PAYLOAD_MAX;
 use crate::schema::field_order;
 
 /// `[axis.drive.pdo]`: the objects that the drive exchanges in every cycle, in order. With one of the
@@ -26,11 +25,15 @@ pub struct DrivePdo {
 }
 
 impl DrivePdo {
-    /// Returns the process data in a mode; `None` if none are stated.
+    /// Returns the process data in a mode, in frames of up to `payload_max` bytes; `None` if none are stated.
     ///
     /// # Errors
     /// Key and reason, if an object is unknown, missing, or does not fit.
-    pub fn map(&self, mode: Mode) -> Result<Option<PdoMap>, (&'static str, String)> {
+    pub fn map(
+        &self,
+        mode: Mode,
+        payload_max: usize,
+    ) -> Result<Option<PdoMap>, (&'static str, String)> {
         if self.command.is_none() && self.status.is_none() && self.motion.is_none() {
             return Ok(None);
         }
@@ -48,7 +51,7 @@ impl DrivePdo {
             *part = PdoLayout::new(&mapped).map_err(|error| (key, error.to_string()))?;
         }
         let key = if self.command.is_some() { "command" } else { "status" };
-        map.check(mode, PAYLOAD_MAX).map_err(|error| (key, error.to_string()))?;
+        map.check(mode, payload_max).map_err(|error| (key, error.to_string()))?;
         Ok(Some(map))
     }
 }

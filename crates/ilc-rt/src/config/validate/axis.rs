@@ -43,7 +43,8 @@ pub(super) fn nodes(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let mut taken: Vec<(u8, String)> = Vec::new();
     let axes = cell.axes.iter().map(|axis| (axis.node, format!("[[axis]] {} node", axis.name)));
     let tcp = cell.tcp_encoder.iter().map(|tcp| (tcp.node, "[tcp_encoder] node".to_owned()));
-    for (node, key) in axes.chain(tcp) {
+    let own = cell.safety.controller_node.map(|node| (node, "[safety] controller_node".to_owned()));
+    for (node, key) in axes.chain(tcp).chain(own) {
         v.that((1..=NODE_MAX).contains(&node), &key, &node, "1 to 127")?;
         if let Some((_, other)) = taken.iter().find(|(seen, _)| *seen == node) {
             return Err(v.refuse(
@@ -75,7 +76,7 @@ pub(super) fn buses(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
 }
 
 /// Checks the ranges of an axis, and the requirements of its interface.
-pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), ConfigError> {
+pub(super) fn check(axis: &Axis, cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
     let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
     let l = &axis.limits;
     v.that(
@@ -112,8 +113,8 @@ pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), Config
         return Err(v.refuse(&at("position_loop"), &found, &allowed));
     }
     homing::check(axis, v)?;
-    drive::check(axis, v)?;
-    simulation::check(axis, step_us, v)
+    drive::check(axis, cell.format(axis.bus).payload_max(), v)?;
+    simulation::check(axis, cell.simulation.step_us, v)
 }
 
 /// Checks that a model has what the interface needs, and nothing else.

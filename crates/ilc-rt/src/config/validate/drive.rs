@@ -10,8 +10,8 @@ const START_UP_MAX: usize = 500;
 /// Polarity of a drive that reverses positions and velocities itself.
 const REVERSED: u8 = 0xC0;
 
-/// Checks what an axis states of its drive.
-pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
+/// Checks what an axis states of its drive, on a bus with frames of up to `payload_max` bytes.
+pub(super) fn check(axis: &Axis, payload_max: usize, v: &Checker) -> Result<(), ConfigError> {
     let at = |key: &str| format!("[[axis]] {}: drive.{key}", axis.name);
     let drive = &axis.drive;
     v.that(
@@ -47,7 +47,7 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
         &"0x607C",
         "not with homing.kind = \"drive\", which starts from home_offset",
     )?;
-    pdo(axis, v)
+    pdo(axis, payload_max, v)
 }
 
 /// Refuses to keep what a stop depends on, and what bring-up never sets.
@@ -112,8 +112,8 @@ fn start_up(axis: &Axis, object: &StartUp, v: &Checker) -> Result<(), ConfigErro
 }
 
 /// Checks that the process data hold what the loop cannot do without.
-fn pdo(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
-    match axis.drive.pdo.map(axis.interface) {
+fn pdo(axis: &Axis, payload_max: usize, v: &Checker) -> Result<(), ConfigError> {
+    match axis.drive.pdo.map(axis.interface, payload_max) {
         Ok(_) => Ok(()),
         Err((key, reason)) => {
             Err(v.refuse(&format!("[[axis]] {}: drive.pdo.{key}", axis.name), &"a list", &reason))

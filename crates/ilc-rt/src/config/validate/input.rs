@@ -57,7 +57,8 @@ pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
             }
             (_, None) => {}
         }
-        let stated = axis.drive.pdo.map(axis.interface).ok().flatten();
+        let payload_max = cell.format(axis.bus).payload_max();
+        let stated = axis.drive.pdo.map(axis.interface, payload_max).ok().flatten();
         v.that(
             stated.is_none_or(|map| map.carries(objects::DIGITAL_INPUTS)),
             &format!("[[axis]] {}: drive.pdo", axis.name),

@@ -78,7 +78,7 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
     v.ranges(cell)?;
     axis::buses(cell, &v)?;
     for axis in &cell.axes {
-        axis::check(axis, cell.simulation.step_us, &v)?;
+        axis::check(axis, cell, &v)?;
     }
     input::check(cell, &v)?;
     if let Some(tcp) = &cell.tcp_encoder {

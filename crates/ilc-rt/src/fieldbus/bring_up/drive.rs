@@ -9,7 +9,9 @@ use super::sdo_client::SdoClient;
 use super::{process_data, scaling, settings};
 use crate::fieldbus::Bus;
 use crate::fieldbus::canopen::{Heartbeat, NmtCommand, NmtState, NodeId};
-use crate::fieldbus::cia402::{Controlword, Mode, PdoMap, State, Statusword, objects, pdo_map};
+use crate::fieldbus::cia402::{
+    Controlword, Mode, PdoMap, State, Statusword, Supervision, objects, pdo_map,
+};
 
 /// Time that the following error may exceed its window before the drive faults (object 0x6066), in ms.
 pub const FOLLOWING_ERROR_TIME_MS: u16 = 10;
@@ -56,6 +58,8 @@ pub struct DriveSetup {
     /// Time without a command after which the drive stops, in milliseconds; 0: never
     /// (lock-step).
     pub rpdo_deadline_ms: u16,
+    /// Node number of the controller, whose heartbeat is watched by a drive without a time-out of its commands.
+    pub controller: NodeId,
     /// Time-out for the drive to boot, and to answer each request.
     pub answer_timeout: Duration,
     /// Values of this drive that the cell description states.
@@ -132,8 +136,12 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     process_data::close_all(&mut remote)?;
     remote.ensure_all(&settings::communication(node, setup.heartbeat_ms, setup.cycle_us))?;
     remote.forget_heartbeats()?;
-    let map = remote.supported(setup.map)?;
-    let deadline_ms = setup.rpdo_deadline_ms;
+    let mut map = remote.supported(setup.map)?;
+    let mut deadline_ms = setup.rpdo_deadline_ms;
+    if deadline_ms > 0 && !remote.has_command_timeout()? {
+        remote.watch_heartbeat(setup.controller, deadline_ms)?;
+        (map.supervision, deadline_ms) = (Supervision::Heartbeat, 0);
+    }
     for (number, layout, deadline_ms) in [
         (pdo_map::COMMAND_PDO, map.command, deadline_ms),
         (pdo_map::STATUS_PDO, map.answers[0], 0),
@@ -281,6 +289,22 @@ impl Remote<'_> {
         for sub in 1..=u8::try_from(n_watched).unwrap_or(u8::MAX) {
             self.ensure(&settings::watched_heartbeat(sub))?;
         }
+        Ok(())
+    }
+
+    /// Returns whether the drive can watch its commands: the event timer of an RPDO is optional in CiA 301.
+    fn has_command_timeout(&mut self) -> Result<bool, BringUpError> {
+        let index = pdo_map::COMMAND_PDO.communication_index();
+        Ok(self.find("time-out of the commands", index, 5)?.is_some())
+    }
+
+    /// Lets the drive watch the heartbeat of the controller, from the first one on.
+    fn watch_heartbeat(
+        &mut self,
+        controller: NodeId,
+        deadline_ms: u16,
+    ) -> Result<(), BringUpError> {
+        self.ensure(&settings::controller_heartbeat(controller, deadline_ms))?;
         Ok(())
     }
 

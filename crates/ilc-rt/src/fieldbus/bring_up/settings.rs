@@ -51,6 +51,14 @@ pub(super) fn watched_heartbeat(sub: u8) -> Setting {
     Setting::new(objects::CONSUMER_HEARTBEAT, sub, Kind::U32, Need::Exactly(0))
 }
 
+/// Returns the consumer heartbeat entry of a drive that watches the controller, as it cannot watch its commands.
+pub(super) fn controller_heartbeat(controller: NodeId, deadline_ms: u16) -> Setting {
+    let entry = i64::from(controller.get()) << 16 | i64::from(deadline_ms);
+    Setting::new(objects::CONSUMER_HEARTBEAT, 1, Kind::U32, Need::Exactly(entry)).needed(
+        "to stop when commands stop coming: it has no time-out of its commands (0x1400:05), which would do as well",
+    )
+}
+
 /// Returns the required settings of every kind of stop.
 pub(super) fn reactions(setup: &DriveSetup) -> Vec<Setting> {
     use Kind::{I16, U32};

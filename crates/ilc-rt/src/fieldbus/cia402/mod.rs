@@ -11,6 +11,6 @@ pub mod units;
 
 pub use mode::Mode;
 pub use pdo_map::{CommandRpdo1, DriveMotionTpdo2, EncoderSample, StatusTpdo1};
-pub use process_data::{MapError, OptionalObjects, PdoLayout, PdoMap, Reading};
+pub use process_data::{MapError, OptionalObjects, PdoLayout, PdoMap, Reading, Supervision};
 pub use state::{Controlword, State, Statusword, next_command};
 pub use units::Scale;

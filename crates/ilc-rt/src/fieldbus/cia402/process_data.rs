@@ -11,6 +11,7 @@ use super::pdo_map::CommandRpdo1;
 use super::state::Statusword;
 use crate::fieldbus::canopen::ObjectAddress;
 use crate::fieldbus::canopen::pdo::MappedObject;
+use crate::fieldbus::frame::length_on_bus;
 
 /// Largest number of objects in a PDO.
 pub const OBJECTS_MAX: usize = 8;
@@ -104,6 +105,16 @@ impl OptionalObjects {
     }
 }
 
+/// Way in which a drive notices that commands stop coming.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Supervision {
+    /// By the time-out of its commands (event timer of RPDO1), where it is set.
+    #[default]
+    Commands,
+    /// By the heartbeat of the controller: the drive has no such time-out, which CiA 301 makes optional.
+    Heartbeat,
+}
+
 /// The process data of a drive: RPDO1 carries the command, TPDO1 state and position, TPDO2 what does not
 /// fit there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,6 +123,8 @@ pub struct PdoMap {
     pub command: PdoLayout,
     /// TPDO1 and TPDO2; the second one may be empty: it is not sent then.
     pub answers: [PdoLayout; 2],
+    /// Supervision of the commands.
+    pub supervision: Supervision,
 }
 
 impl PdoMap {
@@ -152,7 +165,7 @@ impl PdoMap {
                 motion.add(index, bits);
             }
         }
-        Self { command, answers: [status, motion] }
+        Self { command, answers: [status, motion], supervision: Supervision::default() }
     }
 
     /// Returns the map with everything that the profile offers, on classical CAN: three PDOs of 8 bytes.
@@ -172,7 +185,7 @@ impl PdoMap {
         let mut status = PdoLayout::EMPTY;
         status.add(objects::STATUSWORD, 16);
         status.add(objects::POSITION_ACTUAL, 32);
-        Self { command, answers: [status, PdoLayout::EMPTY] }
+        Self { command, answers: [status, PdoLayout::EMPTY], supervision: Supervision::default() }
     }
 
     /// Returns the map with the digital inputs (0x60FD) in its answers, if it has none yet: where they fit into
@@ -265,6 +278,7 @@ impl PdoMap {
         Self {
             command: self.command.without(index),
             answers: [first.without(index), second.without(index)],
+            supervision: self.supervision,
         }
     }
 
@@ -274,7 +288,7 @@ impl PdoMap {
         [self.command, first, second]
             .into_iter()
             .filter(|layout| !layout.is_empty())
-            .map(|layout| layout.n_bytes())
+            .map(|layout| layout.frame_bytes())
     }
 }
 
@@ -307,9 +321,14 @@ impl PdoLayout {
         self.len == 0
     }
 
-    /// Returns the length of a frame.
+    /// Returns the length of the objects.
     pub fn n_bytes(&self) -> usize {
         self.objects().iter().map(|object| usize::from(object.bits / 8)).sum()
+    }
+
+    /// Returns the length of its frame: that of the objects, filled up to the next one that CAN FD has.
+    pub fn frame_bytes(&self) -> usize {
+        length_on_bus(self.n_bytes())
     }
 
     /// Returns whether an object of sub-index 0 is in it.
@@ -369,7 +388,7 @@ impl PdoLayout {
 
     /// Reads an answer; `None` if its length is not that of the map.
     pub fn read(&self, payload: &[u8]) -> Option<Reading> {
-        if payload.len() != self.n_bytes() {
+        if payload.len() != self.frame_bytes() {
             return None;
         }
         let mut reading = Reading::default();

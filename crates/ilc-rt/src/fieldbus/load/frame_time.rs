@@ -2,7 +2,7 @@
 //!
 //! Source: ISO 11898-1, frame formats with 11-bit identifiers; the FD figure is an upper bound.
 
-use crate::fieldbus::frame::PAYLOAD_MAX;
+use crate::fieldbus::frame::{FD_PAYLOAD_MAX, PAYLOAD_MAX, length_on_bus};
 
 /// Bits of a classical frame without payload: 34 stuffable bits of header and CRC, at most 8 stuff
 /// bits, 13 bits of tail and interframe space.
@@ -18,11 +18,6 @@ const FD_DATA_BITS: usize = 5;
 const FD_CRC_BITS: [usize; 2] = [27, 32];
 /// Longest payload with the shorter CRC.
 const FD_SHORT_CRC_BYTES: usize = 16;
-
-/// Largest payload of a CAN FD frame.
-pub const FD_PAYLOAD_MAX: usize = 64;
-/// Lengths of a CAN FD payload above 8 bytes.
-const FD_LENGTHS: [usize; 7] = [12, 16, 20, 24, 32, 48, 64];
 
 /// The bit rates of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,16 +49,11 @@ impl BitRates {
         let Some(data_bit_s) = self.data_bit_s else {
             return (EMPTY_FRAME_BITS + BITS_PER_BYTE * payload_bytes) as f64 * nominal_bit_us;
         };
-        let n = if payload_bytes > PAYLOAD_MAX { fd_length(payload_bytes) } else { payload_bytes };
+        let n = length_on_bus(payload_bytes);
         let crc = FD_CRC_BITS[usize::from(n > FD_SHORT_CRC_BYTES)];
         let data = FD_DATA_BITS + 8 * n + ((21 + 8 * n) / 4 - 4) + crc;
         FD_NOMINAL_BITS as f64 * nominal_bit_us + data as f64 * 1e6 / f64::from(data_bit_s)
     }
-}
-
-/// Returns the length on the bus of an FD payload of more than 8 bytes.
-fn fd_length(payload_bytes: usize) -> usize {
-    FD_LENGTHS.into_iter().find(|&length| length >= payload_bytes).unwrap_or(FD_PAYLOAD_MAX)
 }
 
 #[cfg(test)]

@@ -7,4 +7,4 @@ mod budget;
 mod frame_time;
 
 pub use budget::{Load, LoadError, check};
-pub use frame_time::{BitRates, FD_PAYLOAD_MAX};
+pub use frame_time::BitRates;

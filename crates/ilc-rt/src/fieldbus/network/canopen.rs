@@ -7,10 +7,12 @@ use std::time::Duration;
 
 use super::{AnswerPart, Arrival, AxisNetwork, Stranger};
 use crate::fieldbus::bring_up::SdoClient;
-use crate::fieldbus::canopen::{Emergency, Heartbeat, NmtCommand, NodeId, cob_id, emcy, sync};
+use crate::fieldbus::canopen::{
+    Emergency, Heartbeat, NmtCommand, NmtState, NodeId, ObjectAddress, cob_id, emcy, sync,
+};
 use crate::fieldbus::cia402::pdo_map::{COMMAND_PDO, DRIVE_MOTION_PDO, ENCODER_PDO, STATUS_PDO};
-use crate::fieldbus::cia402::{CommandRpdo1, EncoderSample, Mode, PdoMap, objects};
-use crate::fieldbus::frame::PAYLOAD_MAX;
+use crate::fieldbus::cia402::{CommandRpdo1, EncoderSample, Mode, PdoMap, Supervision, objects};
+use crate::fieldbus::frame::FD_PAYLOAD_MAX;
 use crate::fieldbus::{Bus, BusError, Frame};
 
 /// Bases of the identifiers of the four receive PDOs.
@@ -40,6 +42,17 @@ pub struct CanopenAxes {
     tool: Option<NodeId>,
     /// True if the nodes are simulated.
     simulated: bool,
+    beat: Option<Beat>,
+}
+
+/// The heartbeat of the controller, for the drives that watch it.
+#[derive(Clone, Copy, Debug)]
+struct Beat {
+    frame: Frame,
+    /// Exchanges from one to the next.
+    every: u32,
+    /// Exchanges until the next one.
+    left: u32,
 }
 
 impl fmt::Debug for CanopenAxes {
@@ -51,13 +64,48 @@ impl fmt::Debug for CanopenAxes {
 impl CanopenAxes {
     /// Creates the network of some drives, in the order of the axes. Cold.
     pub fn new(bus: Box<dyn Bus>, stations: Vec<Station>, tool: Option<NodeId>) -> Self {
-        Self { bus, stations, tool, simulated: false }
+        Self { bus, stations, tool, simulated: false, beat: None }
     }
 
     /// Sets whether the nodes are simulated: their inputs may then be switched by other programs.
     #[must_use]
     pub fn simulated(self, simulated: bool) -> Self {
         Self { simulated, ..self }
+    }
+
+    /// Returns the network with a heartbeat of the controller, at every so many exchanges. Cold.
+    #[must_use]
+    pub fn with_heartbeat(self, controller: NodeId, every: u32) -> Self {
+        let frame = Heartbeat { node: controller, state: NmtState::Operational }.encode();
+        Self { beat: Some(Beat { frame, every, left: 0 }), ..self }
+    }
+
+    /// Sends the heartbeat if it is due.
+    fn beat(&mut self) -> Result<(), BusError> {
+        let Some(beat) = &mut self.beat else { return Ok(()) };
+        if beat.left > 0 {
+            beat.left -= 1;
+            return Ok(());
+        }
+        beat.left = beat.every.saturating_sub(1);
+        self.bus.send(&beat.frame)
+    }
+
+    /// Ends the watch of the drives over the heartbeat, which ends as well.
+    fn release_watch(&mut self) {
+        let ObjectAddress { index, sub } = ObjectAddress::new(objects::CONSUMER_HEARTBEAT, 1);
+        let [low, high] = index.to_le_bytes();
+        // An expedited download of four bytes; its answer is not waited for.
+        let nothing = [0x23, low, high, sub, 0, 0, 0, 0];
+        for station in &self.stations {
+            let id = cob_id::of(cob_id::SDO_REQUEST, station.node);
+            if station.map.supervision == Supervision::Heartbeat
+                && let Some(request) = Frame::new(id, &nothing)
+            {
+                // One that is lost leaves a drive that is off, and reports the missing heartbeat.
+                let _ = self.bus.send(&request);
+            }
+        }
     }
 
     /// Returns the message in a frame.
@@ -132,16 +180,17 @@ impl CanopenAxes {
 impl AxisNetwork for CanopenAxes {
     fn write(&mut self, axis: usize, command: &CommandRpdo1) -> Result<(), BusError> {
         let Some(station) = self.stations.get(axis) else { return Ok(()) };
-        let mut payload = [0; PAYLOAD_MAX];
-        let n_bytes = station.map.command.write(station.mode, command, &mut payload);
-        let payload = payload.get(..n_bytes).unwrap_or(&[]);
+        let mut payload = [0; FD_PAYLOAD_MAX];
+        station.map.command.write(station.mode, command, &mut payload);
+        let payload = payload.get(..station.map.command.frame_bytes()).unwrap_or(&[]);
         // Checked at set-up: a map fits a frame.
-        let frame = Frame::new(COMMAND_PDO.default_cob_id(station.node), payload);
+        let frame = Frame::fd(COMMAND_PDO.default_cob_id(station.node), payload);
         frame.map_or(Ok(()), |frame| self.bus.send(&frame))
     }
 
     fn exchange(&mut self) -> Result<(), BusError> {
-        self.bus.send(&sync::frame())
+        let beat = self.beat();
+        beat.and(self.bus.send(&sync::frame()))
     }
 
     fn next(&mut self, timeout: Duration) -> Result<Option<Arrival>, BusError> {
@@ -157,10 +206,11 @@ impl AxisNetwork for CanopenAxes {
 
     fn part_bytes(&self, axis: usize, part: AnswerPart) -> u8 {
         let layout = self.stations.get(axis).and_then(|own| own.map.answers.get(part.index()));
-        layout.map_or(0, |layout| u8::try_from(layout.n_bytes()).unwrap_or(u8::MAX))
+        layout.map_or(0, |layout| u8::try_from(layout.frame_bytes()).unwrap_or(u8::MAX))
     }
 
     fn release(&mut self) -> Result<(), BusError> {
+        self.release_watch();
         self.bus.send(&NmtCommand::PreOperational.frame(None))
     }
 

@@ -13,6 +13,8 @@ use crate::fieldbus::{Bus, BusError, Frame};
 
 /// Node numbers, 0 (all nodes) to 127.
 const NUMBERS: usize = 128;
+/// Lowest identifier of a heartbeat.
+const HEARTBEATS: u16 = 0x700;
 /// Longest wait on one bus while the others are not looked at.
 const SLICE: Duration = Duration::from_micros(200);
 /// Largest number of repeated broadcasts skipped in one look.
@@ -36,6 +38,8 @@ pub struct Group {
     side: GroupSide,
     /// A broadcast that waits until the other buses are read.
     held: Option<Frame>,
+    /// Bus of the frame that was read last.
+    last: usize,
 }
 
 impl Group {
@@ -49,7 +53,7 @@ impl Group {
         for (node, bus) in nodes {
             place[usize::from(node) % NUMBERS] = bus;
         }
-        Self { buses, place, side, held: None }
+        Self { buses, place, side, held: None, last: 0 }
     }
 
     /// Returns the next frame that has already arrived.
@@ -80,6 +84,7 @@ impl Group {
         match self.buses[place].recv(timeout)? {
             None => Ok(Taken::Nothing),
             Some(frame) if self.side == GroupSide::Controller || node_of(&frame) != 0 => {
+                self.last = place;
                 Ok(Taken::Frame(frame))
             }
             Some(frame) => {
@@ -107,7 +112,9 @@ fn node_of(frame: &Frame) -> u8 {
 impl Bus for Group {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
         let node = node_of(frame);
-        if node > 0 {
+        // The heartbeat of the controller is for the drives on every bus.
+        let is_to_all = self.side == GroupSide::Controller && frame.id() >= HEARTBEATS;
+        if node > 0 && !is_to_all {
             let place = usize::from(self.place[usize::from(node)]);
             return self.buses.get_mut(place).map_or(Ok(()), |bus| bus.send(frame));
         }
@@ -118,6 +125,20 @@ impl Bus for Group {
             sent = sent.and(now);
         }
         sent
+    }
+
+    #[expect(clippy::disallowed_types, reason = "cold: set-up")]
+    fn keep_to(&mut self, nodes: &[u8]) -> Result<(), BusError> {
+        for (number, bus) in (0_u8..).zip(&mut self.buses) {
+            let is_on_it = |node: &u8| self.place[usize::from(*node) % NUMBERS] == number;
+            let own: Vec<u8> = nodes.iter().copied().filter(is_on_it).collect();
+            bus.keep_to(&own)?;
+        }
+        Ok(())
+    }
+
+    fn arrival(&self) -> Option<Duration> {
+        self.buses.get(self.last)?.arrival()
     }
 
     fn recv(&mut self, timeout: Duration) -> Result<Option<Frame>, BusError> {
@@ -203,6 +224,15 @@ mod tests {
         }
         controller.send(&NmtCommand::Start.frame(NodeId::new(1))).unwrap();
         assert_eq!(all(&mut drives), [0x000]);
+    }
+
+    #[test]
+    fn the_heartbeat_of_the_controller_is_for_every_bus() {
+        let (mut controller, mut drives) = groups();
+        controller.send(&Frame::new(0x77F, &[5]).unwrap()).unwrap();
+        assert_eq!(all(&mut drives), [0x77F, 0x77F]);
+        drives.send(&Frame::new(0x702, &[5]).unwrap()).unwrap();
+        assert_eq!(all(&mut controller), [0x702]);
     }
 
     #[test]

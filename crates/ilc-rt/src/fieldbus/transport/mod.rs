@@ -13,6 +13,7 @@ pub mod loopback;
 pub(crate) mod opening;
 mod queue;
 pub mod socketcan;
+pub mod timed;
 pub mod udp_codec;
 pub mod udp_multicast;
 mod wait;
@@ -20,7 +21,11 @@ pub mod zenoh;
 
 pub use group::{Group, GroupSide};
 pub use loopback::{InProcess, Loopback, Responder};
-pub use opening::{Address, OpenError, SCHEMES, Scheme, ZenohSettings, open, scheme_of, syntaxes};
+pub use opening::{
+    Address, Format, OpenError, SCHEMES, Scheme, ZenohSettings, format_of, open, scheme_of,
+    syntaxes,
+};
 pub use socketcan::SocketCan;
+pub use timed::{Timed, in_process};
 pub use udp_multicast::UdpMulticast;
 pub use zenoh::ZenohBus;

@@ -2,7 +2,8 @@
 //!
 //! A msgpack map from the names of `can.Message`'s fields to their values. python-can refuses a map
 //! with unknown names, so [`encode()`] writes exactly its eleven; [`decode()`] skips unknown names,
-//! accepts any order, and refuses anything but a classical data frame with an 11-bit identifier.
+//! accepts any order, and refuses anything but a data frame with an 11-bit identifier, in the format of the bus:
+//! classical, or CAN FD and classical.
 //!
 //! Source: python-can 4, `can/interfaces/udp_multicast/utils.py`, `pack_message` and `unpack_message`.
 
@@ -12,9 +13,9 @@ use rmp::Marker;
 use rmp::decode::{self, Bytes, RmpRead};
 use rmp::encode::{self, RmpWrite};
 
-use super::super::frame::{Frame, PAYLOAD_MAX};
+use super::super::frame::{FD_PAYLOAD_MAX, Frame, PAYLOAD_MAX};
 
-/// Buffer size for every encoded frame; the longest takes 162.
+/// Buffer size for every encoded frame; the longest takes 218.
 pub const ENCODED_MAX_BYTES: usize = 256;
 
 /// An encoded frame.
@@ -31,16 +32,25 @@ impl Encoded {
     }
 }
 
-/// Returns the datagram for a frame, or `None` if it does not fit, which no [`Frame`] can cause.
+/// Returns the datagram for a frame of classical CAN, or `None` if it has more than 8 bytes.
 pub fn encode(frame: &Frame) -> Option<Encoded> {
+    encode_in(false, frame)
+}
+
+/// Returns the datagram for a frame of CAN FD with bit rate switch, or of classical CAN; `None` if classical CAN
+/// does not carry it.
+pub fn encode_in(is_fd: bool, frame: &Frame) -> Option<Encoded> {
+    if !is_fd && frame.payload().len() > PAYLOAD_MAX {
+        return None;
+    }
     let mut bytes = [0; ENCODED_MAX_BYTES];
-    let n_left = write(&mut bytes, frame)?;
+    let n_left = write(&mut bytes, frame, is_fd)?;
     let len = ENCODED_MAX_BYTES - n_left;
     Some(Encoded { bytes, len })
 }
 
 /// Writes the map and returns the number of bytes of `bytes` left.
-fn write(bytes: &mut [u8], frame: &Frame) -> Option<usize> {
+fn write(bytes: &mut [u8], frame: &Frame, is_fd: bool) -> Option<usize> {
     let payload = frame.payload();
     let mut rest = bytes;
     let out = &mut rest;
@@ -59,8 +69,8 @@ fn write(bytes: &mut [u8], frame: &Frame) -> Option<usize> {
     encode::write_uint(out, payload.len() as u64).ok()?;
     key(out, "data")?;
     encode::write_bin(out, payload).ok()?;
-    flag(out, "is_fd", false)?;
-    flag(out, "bitrate_switch", false)?;
+    flag(out, "is_fd", is_fd)?;
+    flag(out, "bitrate_switch", is_fd)?;
     flag(out, "error_state_indicator", false)?;
     Some(rest.len())
 }
@@ -74,24 +84,30 @@ fn flag<W: RmpWrite>(out: &mut W, name: &str, value: bool) -> Option<()> {
     encode::write_bool(out, value).ok()
 }
 
-/// Returns the frame in a datagram, or `None` if it contains no CANopen frame: malformed bytes,
-/// extended, remote, error and FD frames, or a length that does not match the data.
+/// Returns the frame in a datagram, or `None` if it contains no CANopen frame of classical CAN: malformed
+/// bytes, extended, remote, error and FD frames, or a length that does not match the data.
 pub fn decode(datagram: &[u8]) -> Option<Frame> {
+    decode_in(false, datagram)
+}
+
+/// Returns the frame in a datagram, of CAN FD too if `is_fd`.
+pub fn decode_in(is_fd: bool, datagram: &[u8]) -> Option<Frame> {
     let mut bytes = Bytes::new(datagram);
     let n_entries = decode::read_map_len(&mut bytes).ok()?;
     let mut fields = Fields::default();
     for _ in 0..n_entries {
         fields.read_entry(&mut bytes)?;
     }
-    if bytes.remaining_slice().is_empty() { fields.frame() } else { None }
+    if bytes.remaining_slice().is_empty() { fields.frame(is_fd) } else { None }
 }
 
 /// The fields of `can.Message` that determine the frame.
 #[derive(Default)]
 struct Fields<'a> {
     arbitration_id: u32,
-    /// Extended, remote, error or FD.
+    /// Remote or error.
     foreign: bool,
+    is_fd: bool,
     /// python-can treats a message without this field as extended.
     standard: bool,
     dlc: Option<u32>,
@@ -104,7 +120,8 @@ impl<'a> Fields<'a> {
         match take(bytes, n_name)? {
             b"arbitration_id" => self.arbitration_id = decode::read_int(bytes).ok()?,
             b"is_extended_id" => self.standard = !decode::read_bool(bytes).ok()?,
-            b"is_remote_frame" | b"is_error_frame" | b"is_fd" => {
+            b"is_fd" => self.is_fd = decode::read_bool(bytes).ok()?,
+            b"is_remote_frame" | b"is_error_frame" => {
                 self.foreign |= decode::read_bool(bytes).ok()?;
             }
             b"dlc" => self.dlc = Some(decode::read_int(bytes).ok()?),
@@ -117,12 +134,14 @@ impl<'a> Fields<'a> {
         Some(())
     }
 
-    fn frame(&self) -> Option<Frame> {
+    fn frame(&self, takes_fd: bool) -> Option<Frame> {
         let len_agrees = self.dlc.is_none_or(|dlc| dlc as usize == self.data.len());
-        if self.foreign || !self.standard || !len_agrees || self.data.len() > PAYLOAD_MAX {
+        let len_max = if self.is_fd { FD_PAYLOAD_MAX } else { PAYLOAD_MAX };
+        let is_known = !self.foreign && (takes_fd || !self.is_fd);
+        if !is_known || !self.standard || !len_agrees || self.data.len() > len_max {
             return None;
         }
-        Frame::new(u16::try_from(self.arbitration_id).ok()?, self.data)
+        Frame::fd(u16::try_from(self.arbitration_id).ok()?, self.data)
     }
 }
 
@@ -267,6 +286,30 @@ mod tests {
     fn the_longest_frame_fits_with_room() {
         let encoded = encode(&Frame::new(0x7FF, &[0xFF; 8]).unwrap()).unwrap();
         assert_eq!(encoded.as_bytes().len(), 162);
+        let encoded = encode_in(true, &Frame::fd(0x7FF, &[0xFF; 64]).unwrap()).unwrap();
+        assert_eq!(encoded.as_bytes().len(), 218);
+    }
+
+    #[test]
+    fn fd_is_for_buses_with_it() {
+        let long = Frame::fd(0x181, &[5; 12]).unwrap();
+        let short = Frame::new(0x181, &[5; 3]).unwrap();
+        assert!(encode(&long).is_none());
+        for frame in [long, short] {
+            let datagram = encode_in(true, &frame).unwrap();
+            assert_eq!(decode_in(true, datagram.as_bytes()), Some(frame));
+            assert_eq!(decode(datagram.as_bytes()), None);
+        }
+        // Classical frames are frames of such a bus, but not longer ones.
+        assert_eq!(decode_in(true, encode(&short).unwrap().as_bytes()), Some(short));
+        let nine = [("is_fd", Value::Bool(true)), ("data", Value::Bin(vec![0; 9]))];
+        let classical = [("is_fd", Value::Bool(false)), ("data", Value::Bin(vec![0; 12]))];
+        for entries in [nine, classical] {
+            let mut all = plain();
+            all.retain(|(name, _)| !["dlc", "data"].contains(name));
+            all.extend(entries);
+            assert_eq!(decode_in(true, &map(&all)), None);
+        }
     }
 
     #[test]
@@ -316,8 +359,15 @@ mod tests {
         }
 
         #[test]
+        fn every_fd_frame_comes_back(id in 0_u16..=0x7FF, payload in prop::collection::vec(any::<u8>(), 64), n in 0_usize..=64) {
+            if let Some(frame) = Frame::fd(id, &payload[..n]) {
+                prop_assert_eq!(decode_in(true, encode_in(true, &frame).unwrap().as_bytes()), Some(frame));
+            }
+        }
+
+        #[test]
         fn garbage_never_panics(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
-            let _ = decode(&bytes);
+            let _ = decode_in(true, &bytes);
         }
 
         #[test]

@@ -16,8 +16,8 @@ use socket2::{Domain, Protocol, SockAddr, Socket, Type};
 
 use super::super::bus::{Bus, BusError};
 use super::super::frame::Frame;
-use super::opening::OpenError;
-use super::udp_codec::{decode, encode};
+use super::opening::{Format, OpenError};
+use super::udp_codec::{decode_in, encode_in};
 use super::wait::Deadline;
 
 /// python-can's port for this interface.
@@ -43,6 +43,7 @@ pub struct UdpMulticast {
     sender: UdpSocket,
     /// Source address of own frames.
     own: SocketAddr,
+    format: Format,
 }
 
 impl UdpMulticast {
@@ -63,7 +64,13 @@ impl UdpMulticast {
         let receiver = receiver(group, port, ttl).map_err(os("joining the group"))?;
         let sender = sender(group, port, ttl).map_err(os("addressing the group"))?;
         let own = sender.local_addr().map_err(os("reading the own address"))?;
-        Ok(Self { receiver, sender, own })
+        Ok(Self { receiver, sender, own, format: Format::default() })
+    }
+
+    /// Returns the endpoint with frames of another format than classical CAN.
+    #[must_use]
+    pub fn with_format(self, format: Format) -> Self {
+        Self { format, ..self }
     }
 
     /// Returns the next frame from another sender, if one has arrived.
@@ -73,7 +80,7 @@ impl UdpMulticast {
             match self.receiver.recv_from(&mut datagram) {
                 Ok((_, source)) if source == self.own => {}
                 Ok((len, _)) => {
-                    if let Some(frame) = decode(&datagram[..len]) {
+                    if let Some(frame) = decode_in(self.format.is_fd, &datagram[..len]) {
                         return Ok(Next::Frame(frame));
                     }
                 }
@@ -97,7 +104,10 @@ enum Next {
 
 impl Bus for UdpMulticast {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
-        let encoded = encode(frame).ok_or(BusError::Os(libc::EMSGSIZE))?;
+        if frame.payload().len() > self.format.payload_max() {
+            return Err(BusError::TooLong);
+        }
+        let encoded = encode_in(self.format.is_fd, frame).ok_or(BusError::Os(libc::EMSGSIZE))?;
         match self.sender.send(encoded.as_bytes()) {
             Ok(_) => Ok(()),
             Err(error) => Err(bus_error(&error)),

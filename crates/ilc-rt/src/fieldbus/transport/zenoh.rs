@@ -11,7 +11,7 @@ use std::fmt;
 use std::time::Duration;
 
 use super::super::bus::{Bus, BusError};
-use super::super::frame::{Frame, PAYLOAD_MAX};
+use super::super::frame::{FD_PAYLOAD_MAX, Frame};
 use super::opening::{Ends, Link, OpenError, ZenohSettings};
 use super::queue::{Inbox, Outbox};
 
@@ -26,6 +26,7 @@ pub struct ZenohBus {
     outgoing: Outbox,
     incoming: Inbox,
     link: Link,
+    payload_max: usize,
 }
 
 impl ZenohBus {
@@ -40,7 +41,7 @@ impl ZenohBus {
     /// [`OpenError::Zenoh`] with the failed step, e.g. listening on an endpoint in use.
     pub fn open(settings: &ZenohSettings) -> Result<Self, OpenError> {
         let Ends { outgoing, incoming, link } = Link::open(settings)?;
-        let bus = Self { outgoing, incoming, link };
+        let bus = Self { outgoing, incoming, link, payload_max: settings.format.payload_max() };
         if !settings.connect.is_empty() {
             bus.wait_for_peer(CONNECT_WAIT);
         }
@@ -58,6 +59,9 @@ impl ZenohBus {
 
 impl Bus for ZenohBus {
     fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        if frame.payload().len() > self.payload_max {
+            return Err(BusError::TooLong);
+        }
         self.outgoing.put(frame)?;
         self.link.wake_publisher();
         Ok(())
@@ -75,8 +79,8 @@ impl fmt::Debug for ZenohBus {
 }
 
 /// Returns the bytes of a frame on Zenoh and their number.
-pub(super) fn encode(frame: &Frame) -> ([u8; ID_BYTES + PAYLOAD_MAX], usize) {
-    let mut bytes = [0; ID_BYTES + PAYLOAD_MAX];
+pub(super) fn encode(frame: &Frame) -> ([u8; ID_BYTES + FD_PAYLOAD_MAX], usize) {
+    let mut bytes = [0; ID_BYTES + FD_PAYLOAD_MAX];
     let payload = frame.payload();
     let len = ID_BYTES + payload.len();
     bytes[..ID_BYTES].copy_from_slice(&frame.id().to_le_bytes());
@@ -84,8 +88,8 @@ pub(super) fn encode(frame: &Frame) -> ([u8; ID_BYTES + PAYLOAD_MAX], usize) {
     (bytes, len)
 }
 
-/// Returns the frame in a sample, or `None` if it is invalid.
-pub(super) fn decode(bytes: &[u8]) -> Option<Frame> {
+/// Returns the frame in a sample, or `None` if it is invalid, or longer than the bus carries.
+pub(super) fn decode(bytes: &[u8], payload_max: usize) -> Option<Frame> {
     let (id, payload) = bytes.split_first_chunk::<ID_BYTES>()?;
-    Frame::new(u16::from_le_bytes(*id), payload)
+    Frame::fd(u16::from_le_bytes(*id), payload).filter(|_| payload.len() <= payload_max)
 }

@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use super::SCHEMES;
 use super::error::OpenError;
+use super::format::Format;
 use super::scheme::{Parts, Place, Scheme};
 use crate::fieldbus::Bus;
 
@@ -23,6 +24,11 @@ impl Address {
     /// Returns whether no frame leaves this host.
     pub fn stays_on_host(&self) -> bool {
         self.place.stays_on_host()
+    }
+
+    /// Returns the format of its frames.
+    pub fn format(&self) -> Format {
+        self.place.format()
     }
 
     /// Opens the bus.
@@ -50,6 +56,11 @@ impl FromStr for Address {
 pub fn scheme_of(address: &str) -> Option<&'static Scheme> {
     let (name, _) = address.split_once(':')?;
     SCHEMES.into_iter().find(|scheme| scheme.name == name)
+}
+
+/// Returns the format of the frames at an address; that of classical CAN for one that cannot be opened.
+pub fn format_of(address: &str) -> Format {
+    address.parse().map_or_else(|_| Format::default(), |address: Address| address.format())
 }
 
 /// Returns the syntax of the allowed addresses, as a sentence lists them; without in-process buses
@@ -85,7 +96,7 @@ mod tests {
             );
         }
         assert!(!"udp:239.1.1.1?ttl=1".parse::<Address>().unwrap().stays_on_host());
-        assert!(!syntaxes(false).contains("loopback:") && syntaxes(true).ends_with("or loopback:"));
+        assert!(!syntaxes(false).contains("loopback:") && syntaxes(true).contains("or loopback:"));
     }
 
     #[test]
@@ -107,12 +118,23 @@ mod tests {
             ("tcp:1.2.3.4", "is not a bus address"),
             ("can:", "1 to 15 printable characters"),
             ("can:a/b", "interface `a/b`"),
-            ("can:vcan0?ttl=1", "a CAN interface takes none"),
+            ("can:vcan0?ttl=1", "option `ttl` is not allowed: `fd` and `data_bitrate` are"),
+            ("can:vcan0?fd=yes", "fd `yes` is not allowed: `1` for CAN FD"),
+            ("can:vcan0?fd=1&data_bitrate=9000000", "data_bitrate `9000000` is not allowed: 10000"),
+            ("can:vcan0?data_bitrate=5000000", "with `fd=1` only"),
+            ("udp:239.1.1.1?fd=2", "fd `2` is not allowed"),
+            ("zenoh:a?fd=2", "fd `2` is not allowed"),
+            ("loopback:?bitrate=2000000", "bitrate `2000000` is not allowed: 10000 to 1000000"),
+            (
+                "loopback:?rate=1",
+                "option `rate` is not allowed: `bitrate`, `fd` and `data_bitrate`",
+            ),
+            ("loopback:here", "place `here` is not allowed: nothing"),
             ("udp:192.168.0.1", "group `192.168.0.1` is not allowed: 224.0.0.0"),
             ("udp:239.1.1.1:0", "port `0` is not allowed: 1 to 65535"),
             ("udp:239.1.1.1:65536", "port `65536`"),
             ("udp:239.1.1.1?ttl=256", "ttl `256`"),
-            ("udp:239.1.1.1?hops=2", "option `hops` is not allowed: `ttl` is"),
+            ("udp:239.1.1.1?hops=2", "option `hops` is not allowed: `ttl`, `fd` and"),
             ("zenoh:", "one key without wildcards"),
             ("zenoh:a/*", "one key without wildcards"),
             (
@@ -139,6 +161,25 @@ mod tests {
             assert!(line.contains(expected) && line.contains(address), "{address}: {line}");
             assert!(!line.contains('\n'), "{line}");
         }
+    }
+
+    #[test]
+    fn the_format_of_the_frames_is_part_of_the_address() {
+        assert_eq!(format_of("can:can0"), Format::default());
+        assert_eq!(format_of("no bus"), Format::default());
+        for address in
+            ["can:can0?fd=1&data_bitrate=5000000", "udp:239.1.1.1?fd=1&data_bitrate=5000000"]
+        {
+            let format = format_of(address);
+            assert_eq!(
+                (format.payload_max(), format.data_bit_s),
+                (64, Some(5_000_000)),
+                "{address}"
+            );
+        }
+        assert_eq!(format_of("zenoh:a?fd=1").payload_max(), 64);
+        let kept = format_of("loopback:?bitrate=500000");
+        assert_eq!((kept.kept_bit_s, kept.payload_max()), (Some(500_000), 8));
     }
 
     #[test]

@@ -55,6 +55,15 @@ pub enum OpenError {
         /// CAN interfaces of this machine.
         available: Vec<String>,
     },
+    /// An interface for classical frames.
+    #[error(
+        "`can:{interface}?fd=1`: the interface carries classical frames only; \
+         `ip link set {interface} type can bitrate N dbitrate N fd on` turns CAN FD on, and of a virtual one `mtu 72`"
+    )]
+    NoFd {
+        /// Requested interface.
+        interface: String,
+    },
     /// An error of the operating system.
     #[error("`{address}`: {action} failed: {source}")]
     Os {

@@ -4,12 +4,13 @@
 //! transport is an endpoint beside this folder, a file in it that describes and opens it, and a
 //! line in [`SCHEMES`].
 //!
-//! Family: `address`, `error` and `scheme`: an address is parsed by its scheme, and rejected with
+//! Family: `address`, `error`, `format` and `scheme`: an address is parsed by its scheme, and rejected with
 //! the list of schemes.
 
 mod address;
 mod can;
 mod error;
+mod format;
 mod loopback;
 mod scheme;
 mod udp;
@@ -17,8 +18,9 @@ mod zenoh;
 mod zenoh_link;
 pub(crate) mod zenoh_reach;
 
-pub use address::{Address, scheme_of, syntaxes};
+pub use address::{Address, format_of, scheme_of, syntaxes};
 pub use error::OpenError;
+pub use format::Format;
 pub use scheme::Scheme;
 pub use zenoh::ZenohSettings;
 pub(super) use zenoh_link::{Ends, Link};

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::error::OpenError;
+use super::format::Format;
 use crate::fieldbus::Bus;
 
 /// One kind of bus.
@@ -36,6 +37,9 @@ pub(super) trait Place: fmt::Debug {
 
     /// Returns whether no frame leaves this host.
     fn stays_on_host(&self) -> bool;
+
+    /// Returns the format of its frames.
+    fn format(&self) -> Format;
 }
 
 /// An address in its parts: `SCHEME:PLACE?OPTION=VALUE&…`.

@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use super::error::OpenError;
+use super::format::Format;
 use super::scheme::{Parts, Place, Scheme};
 use super::zenoh_reach::stays_on_host;
 use crate::fieldbus::Bus;
@@ -11,7 +12,7 @@ use crate::fieldbus::transport::ZenohBus;
 /// A key expression of Zenoh.
 pub(super) static SCHEME: Scheme = Scheme {
     name: "zenoh",
-    syntax: "zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off][&insecure=1]",
+    syntax: "zenoh:KEY[?listen=ENDPOINT][&connect=ENDPOINT][&scouting=off][&insecure=1][&fd=1][&data_bitrate=N]",
     example: "zenoh:ilc/bus/gantry",
     summary: "CAN over Zenoh; stays on this host, an endpoint off it needs `insecure=1`",
     has_bits: false,
@@ -31,6 +32,8 @@ pub struct ZenohSettings {
     pub connect: Vec<String>,
     /// True to discover other endpoints on this host by multicast.
     pub scouting: bool,
+    /// Format of the frames.
+    pub format: Format,
 }
 
 impl Place for ZenohSettings {
@@ -40,6 +43,10 @@ impl Place for ZenohSettings {
 
     fn stays_on_host(&self) -> bool {
         self.listen.iter().chain(&self.connect).all(|endpoint| stays_on_host(endpoint))
+    }
+
+    fn format(&self) -> Format {
+        self.format
     }
 }
 
@@ -63,10 +70,16 @@ impl ZenohSettings {
             ));
         }
         let key = parts.place.to_owned();
-        let mut settings = Self { key, listen: Vec::new(), connect: Vec::new(), scouting: true };
+        let format = Format::default();
+        let mut settings =
+            Self { key, listen: Vec::new(), connect: Vec::new(), scouting: true, format };
         let mut insecure = false;
         for option in parts.options() {
-            match option? {
+            let option = option?;
+            if settings.format.take(parts, option)? {
+                continue;
+            }
+            match option {
                 ("listen", endpoint) => settings.listen.push(endpoint.to_owned()),
                 ("connect", endpoint) => settings.connect.push(endpoint.to_owned()),
                 ("scouting", "off") => settings.scouting = false,
@@ -77,11 +90,13 @@ impl ZenohSettings {
                 ("insecure", "1") => insecure = true,
                 ("insecure", value) => return Err(parts.refuse("insecure", value, "`1` is")),
                 (name, _) => {
-                    let allowed = "`listen`, `connect`, `scouting` and `insecure` are";
+                    let allowed =
+                        "`listen`, `connect`, `scouting`, `insecure`, `fd` and `data_bitrate` are";
                     return Err(parts.refuse("option", name, allowed));
                 }
             }
         }
+        settings.format = settings.format.checked(parts)?;
         let mut endpoints = settings.listen.iter().chain(&settings.connect);
         if let Some(far) = endpoints.find(|endpoint| !stays_on_host(endpoint))
             && !insecure

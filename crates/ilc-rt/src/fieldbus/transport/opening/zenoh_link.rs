@@ -76,7 +76,7 @@ impl Link {
         let config = config(settings).map_err(refused("configuring the session"))?;
         let session = zenoh::open(config).wait().map_err(refused("opening the session"))?;
         let (bell, incoming) =
-            subscribe(&session, &settings.key).map_err(refused("subscribing to the key"))?;
+            subscribe(&session, settings).map_err(refused("subscribing to the key"))?;
         let publisher = session
             .declare_publisher(format!("{}/{}", settings.key, session.zid()))
             .congestion_control(CongestionControl::Drop)
@@ -157,22 +157,26 @@ fn config(settings: &ZenohSettings) -> zenoh::Result<zenoh::Config> {
     Ok(config)
 }
 
-fn subscribe(session: &Session, key: &str) -> zenoh::Result<(Bell, Consumer<Frame>)> {
+fn subscribe(
+    session: &Session,
+    settings: &ZenohSettings,
+) -> zenoh::Result<(Bell, Consumer<Frame>)> {
+    let payload_max = settings.format.payload_max();
     let (ringer, bell) = bell()?;
     let (sink, incoming) = RingBuffer::new(RING_FRAMES);
     // Zenoh may call from several of its threads; only they contend for this lock.
     let sink = Mutex::new((sink, ringer));
     session
-        .declare_subscriber(format!("{key}/*"))
+        .declare_subscriber(format!("{}/*", settings.key))
         .allowed_origin(Locality::Remote)
-        .callback(move |sample| deliver(&sink, &sample))
+        .callback(move |sample| deliver(&sink, &sample, payload_max))
         .background()
         .wait()?;
     Ok((bell, incoming))
 }
 
-fn deliver(sink: &Mutex<(Producer<Frame>, Ringer)>, sample: &Sample) {
-    if let Some(frame) = decode(&sample.payload().to_bytes()) {
+fn deliver(sink: &Mutex<(Producer<Frame>, Ringer)>, sample: &Sample, payload_max: usize) {
+    if let Some(frame) = decode(&sample.payload().to_bytes(), payload_max) {
         let mut sink = sink.lock().unwrap_or_else(PoisonError::into_inner);
         // A receiver that is a whole buffer behind loses the newest frame, as on any CAN
         // controller.

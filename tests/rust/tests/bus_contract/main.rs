@@ -1,7 +1,8 @@
 //! The contract of every transport, tested on each of them.
 //!
 //! The cases are written once against the `Bus` trait; each transport provides two endpoints of one
-//! bus. SocketCAN needs an interface: `tests/vcan/run` provides one where the machine has none.
+//! bus. SocketCAN needs an interface: `tests/vcan/run` provides one where the machine has none; `can` has what only
+//! it does.
 
 #![allow(
     clippy::unwrap_used,
@@ -11,14 +12,16 @@
     reason = "a test may panic, and prints figures and what it skips"
 )]
 
-use std::cell::Cell;
-use std::fs::File;
+mod can;
+
 use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};
 
 use ilc_rt::fieldbus::transport::{self, ZenohBus, ZenohSettings, loopback, udp_codec};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_tests::counting::{Counting, allocations};
+
+use can::{can_ends, can_interface};
 
 type Ends = (Box<dyn Bus>, Box<dyn Bus>);
 
@@ -150,6 +153,33 @@ fn allocates_nothing_in_the_callers_thread((mut a, mut b): Ends) {
     assert_ne!(allocations() - before, 0, "the count counts");
 }
 
+/// Frames of every length that CAN FD has.
+fn carries_long_frames((mut a, mut b): Ends) {
+    let bytes: [u8; 64] = std::array::from_fn(|n| u8::try_from(n * 3 + 1).unwrap());
+    let lengths = (0..=8).chain([12, 16, 20, 24, 32, 48, 64]);
+    let frames: Vec<Frame> = lengths.map(|n| Frame::fd(0x181, &bytes[..n]).unwrap()).collect();
+    for _ in 0..20 {
+        for frame in &frames {
+            a.send(frame).unwrap();
+        }
+        for frame in &frames {
+            assert_eq!(receive(&mut *b), *frame);
+        }
+    }
+    let before = allocations();
+    for frame in &frames {
+        b.send(frame).unwrap();
+        assert_eq!(receive(&mut *a), *frame);
+    }
+    assert_eq!(allocations() - before, 0);
+}
+
+fn refuses_long_frames((mut a, mut b): Ends) {
+    assert_eq!(a.send(&Frame::fd(0x181, &[0; 12]).unwrap()), Err(BusError::TooLong));
+    a.send(&numbered(8)).unwrap();
+    assert_eq!(receive(&mut *b), numbered(8));
+}
+
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
@@ -181,7 +211,33 @@ macro_rules! contract {
 contract!(over_loopback, Some(super::loopback_ends()));
 contract!(over_udp, Some(super::udp_ends(&super::udp_address())));
 contract!(over_zenoh, Some(super::boxed(super::zenoh_ends())));
-contract!(over_can, super::can_interface().map(|name| super::can_ends(&name)));
+contract!(over_can, super::can_interface().map(|name| super::can_ends(&name, "")));
+contract!(over_udp_fd, Some(super::udp_ends(&format!("{}?fd=1", super::udp_address()))));
+contract!(over_can_fd, super::can_interface().map(|name| super::can_ends(&name, "?fd=1")));
+
+contract!(long_over_loopback, Some(super::loopback_ends()), [carries_long_frames]);
+contract!(
+    long_over_udp,
+    Some(super::udp_ends(&format!("{}?fd=1", super::udp_address()))),
+    [carries_long_frames]
+);
+contract!(
+    long_over_zenoh,
+    Some(super::boxed(super::zenoh_ends_with("&fd=1"))),
+    [carries_long_frames]
+);
+contract!(
+    long_over_can,
+    super::can_interface().map(|name| super::can_ends(&name, "?fd=1")),
+    [carries_long_frames]
+);
+contract!(short_over_udp, Some(super::udp_ends(&super::udp_address())), [refuses_long_frames]);
+contract!(short_over_zenoh, Some(super::boxed(super::zenoh_ends())), [refuses_long_frames]);
+contract!(
+    short_over_can,
+    super::can_interface().map(|name| super::can_ends(&name, "")),
+    [refuses_long_frames]
+);
 
 fn loopback_ends() -> Ends {
     let (a, b) = loopback::pair(64).unwrap();
@@ -201,11 +257,16 @@ fn udp_ends(address: &str) -> Ends {
 }
 
 fn zenoh_ends() -> (ZenohBus, ZenohBus) {
+    zenoh_ends_with("")
+}
+
+fn zenoh_ends_with(options: &str) -> (ZenohBus, ZenohBus) {
     for _ in 0..10 {
         // Free when queried; if another process takes it before Zenoh does, the next one will do.
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let open = |role: &str| {
-            let address = format!("zenoh:test/bus?{role}=tcp/127.0.0.1:{port}&scouting=off");
+            let address =
+                format!("zenoh:test/bus?{role}=tcp/127.0.0.1:{port}&scouting=off{options}");
             let settings: ZenohSettings = address.parse().unwrap();
             ZenohBus::open(&settings)
         };
@@ -219,27 +280,6 @@ fn zenoh_ends() -> (ZenohBus, ZenohBus) {
 
 fn boxed((a, b): (ZenohBus, ZenohBus)) -> Ends {
     (Box::new(a), Box::new(b))
-}
-
-/// Returns the CAN interface for tests, locked by one test at a time; `None` where there is none.
-fn can_interface() -> Option<String> {
-    thread_local!(static LOCK: Cell<Option<File>> = const { Cell::new(None) });
-    let name = match std::env::var("ILC_TEST_CAN") {
-        Ok(name) => name,
-        Err(_) if std::path::Path::new("/sys/class/net/vcan0").exists() => "vcan0".to_owned(),
-        Err(_) => {
-            eprintln!("SKIPPED: no vcan0 and ILC_TEST_CAN is not set; see tests/vcan/run");
-            return None;
-        }
-    };
-    let lock = File::create(std::env::temp_dir().join("ilc-rt-can-test.lock")).unwrap();
-    lock.lock().unwrap();
-    LOCK.set(Some(lock));
-    Some(name)
-}
-
-fn can_ends(interface: &str) -> Ends {
-    udp_ends(&format!("can:{interface}"))
 }
 
 #[test]
@@ -328,34 +368,6 @@ fn zenoh_skips_what_is_no_frame() {
 }
 
 #[test]
-fn socketcan_skips_what_is_no_frame_of_ours() {
-    use socketcan::{
-        CanDataFrame, CanFdFrame, CanFdSocket, CanRemoteFrame, EmbeddedFrame, ExtendedId, Socket,
-        StandardId,
-    };
-
-    let Some(interface) = can_interface() else { return };
-    let mut bus = transport::open(&format!("can:{interface}")).unwrap();
-    let stranger = CanFdSocket::open(&interface).unwrap();
-    let standard = StandardId::new(0x181).unwrap();
-    let extended = ExtendedId::new(0x181).unwrap();
-    stranger.write_frame(&CanDataFrame::new(extended, &[1]).unwrap()).unwrap();
-    stranger.write_frame(&CanRemoteFrame::new_remote(standard, 2).unwrap()).unwrap();
-    // An interface for classical frames only refuses it, which is as good as ignoring it.
-    let _ = stranger.write_frame(&CanFdFrame::new(standard, &[0; 16]).unwrap());
-    stranger.write_frame(&CanDataFrame::new(standard, &[2, 3]).unwrap()).unwrap();
-    assert_eq!(receive(&mut *bus), Frame::new(0x181, &[2, 3]).unwrap());
-    assert_eq!(bus.recv(Duration::ZERO).unwrap(), None);
-}
-
-#[test]
-fn an_interface_that_is_not_there_is_named() {
-    let error = transport::open("can:nocan7").err().expect("opened what is not there").to_string();
-    assert!(error.contains("can:nocan7"), "{error}");
-    assert!(error.contains("has no CAN") || error.contains("no such CAN interface"), "{error}");
-}
-
-#[test]
 fn a_loopback_whose_other_end_is_gone_is_closed() {
     let (mut a, mut b) = loopback::pair(4).unwrap();
     a.send(&numbered(3)).unwrap();
@@ -387,7 +399,7 @@ fn round_trip_times() {
         ("zenoh", boxed(zenoh_ends())),
     ];
     if let Some(interface) = can_interface() {
-        ends.push(("socketcan", can_ends(&interface)));
+        ends.push(("socketcan", can_ends(&interface, "")));
     }
     for (name, (mut a, mut b)) in ends {
         let echo = std::thread::spawn(move || {
