@@ -16,13 +16,29 @@ from ilc_rt._native import (
     __version__,
 )
 from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
+from ilc_rt.ask_tell import Experiment
 from ilc_rt.campaign import Campaign, Law
-from ilc_rt.errors import BadInputError, CampaignError, FaultError
-from ilc_rt.laws import *  # noqa: F403
+from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError
+from ilc_rt.laws import (
+    AdjointIlc,
+    ConstrainedIlc,
+    ErrorFeedforwardIlc,
+    FlexibleIlc,
+    Gate,
+    Ladder,
+    ModelInverseIlc,
+    NormOptimalIlc,
+    PdIlc,
+    RelevanceIlc,
+    RelevanceWeights,
+    ThroughJacobian,
+)
 from ilc_rt.library import Library
 from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
+from ilc_rt.simulation import simulate
+from ilc_rt.trial_result import TrialResult
 
 __all__ = [
     "Analysis",
@@ -31,17 +47,27 @@ __all__ = [
     "CampaignError",
     "CampaignResult",
     "Cell",
+    "ConstrainedIlc",
+    "ErrorFeedforwardIlc",
+    "Experiment",
     "FaultError",
     "IterationRecord",
     "Law",
     "LearningError",
     "Library",
     "ModelError",
+    "ModelInverseIlc",
+    "NormOptimalIlc",
+    "PdIlc",
+    "PlantError",
+    "RelevanceIlc",
+    "RelevanceWeights",
     "Repeatability",
     "SignalError",
     "StateSpace",
     "TimeVarying",
     "TrajectoryError",
+    "TrialResult",
     "Tuning",
     "__version__",
     "analyze",
@@ -54,6 +80,7 @@ __all__ = [
     "repeatability",
     "second_order",
     "signal",
+    "simulate",
     "trajectory",
     "tune",
     "weights",

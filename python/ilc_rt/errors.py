@@ -90,3 +90,37 @@ class BadInputError(CampaignError):
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason, EXIT_BAD_INPUT)
+
+
+class PlantError(ValueError):
+    """An output of a plant that is NaN or infinite.
+
+    Parameters
+    ----------
+    trial, sample, channel : int
+        Run, sample and output, each from 0.
+    value : float
+        The value found.
+    result : object or None
+        The `ilc_rt.TrialResult` of the runs before, if a simulation was made.
+
+    Examples
+    --------
+    >>> str(PlantError(3, 17, 0, float("nan")))
+    'trial 3, sample 17, output 0: the plant returned nan; only finite numbers are allowed'
+    """
+
+    def __init__(
+        self, trial: int, sample: int, channel: int, value: float, result: object = None
+    ) -> None:
+        super().__init__(
+            f"trial {trial}, sample {sample}, output {channel}: the plant returned {value}; "
+            "only finite numbers are allowed"
+        )
+        self.trial, self.sample, self.channel, self.value = trial, sample, channel, value
+        self.result = result
+
+    def __reduce__(self) -> tuple[type[PlantError], tuple[int, int, int, float, object]]:
+        """Return what makes it again, also in another process."""
+        found = (self.trial, self.sample, self.channel, self.value, self.result)
+        return type(self), found

@@ -110,7 +110,7 @@ def right_values() -> dict[str, object]:
         "segments": [(0, 1.0), (20, 2.0)], "n_agents": 2, "n_axes": 1, "positions_m": line(),
         "position_m": 0.0, "velocity_m_s": 0.0, "uncertainty": 0.2, "noise_std": 1e-3,
         "n_runs": 5, "method": "zoh", "e_m": line(), "errors_m": line(),
-        "plant": both(),
+        "plant": axis(), "trials": 3, "disturbance": None, "initial_state": [0.0, 0.0],
     }  # fmt: skip
 
 
