@@ -21,6 +21,7 @@ from ilc_rt.campaign import Campaign, Law
 from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError
 from ilc_rt.laws import (
     AdjointIlc,
+    BasisFunctions,
     ConstrainedIlc,
     ErrorFeedforwardIlc,
     FlexibleIlc,
@@ -43,6 +44,7 @@ from ilc_rt.trial_result import TrialResult
 __all__ = [
     "Analysis",
     "BadInputError",
+    "BasisFunctions",
     "Campaign",
     "CampaignError",
     "CampaignResult",

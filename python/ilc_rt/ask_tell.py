@@ -245,7 +245,12 @@ class Experiment:
         bad = np.argwhere(~np.isfinite(values))
         if len(bad):
             sample, channel = int(bad[0][0]), int(bad[0][1]) if values.ndim > 1 else 0
-            raise PlantError(self.trial, sample, channel, float(values[tuple(bad[0])]))
+            found = float(values[tuple(bad[0])])
+            message = (
+                f"trial {self.trial}, sample {sample}, output {channel}: the plant returned "
+                f"{found}; only finite numbers are allowed"
+            )
+            raise PlantError(message, trial=self.trial, sample=sample, channel=channel, value=found)
         return values.astype(np.float64)
 
     def _learn(self, record: IterationRecord, coming: Array | None) -> tuple[Array, float]:

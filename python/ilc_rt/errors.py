@@ -97,30 +97,31 @@ class PlantError(ValueError):
 
     Parameters
     ----------
+    reason : str
+        One readable line.
     trial, sample, channel : int
         Run, sample and output, each from 0.
-    value : float
+    value : float or None
         The value found.
     result : object or None
         The `ilc_rt.TrialResult` of the runs before, if a simulation was made.
 
     Examples
     --------
-    >>> str(PlantError(3, 17, 0, float("nan")))
-    'trial 3, sample 17, output 0: the plant returned nan; only finite numbers are allowed'
+    >>> PlantError("trial 3, sample 17: the plant returned nan", trial=3, sample=17).sample
+    17
     """
 
     def __init__(
-        self, trial: int, sample: int, channel: int, value: float, result: object = None
+        self,
+        reason: str,
+        *,
+        trial: int = 0,
+        sample: int = 0,
+        channel: int = 0,
+        value: float | None = None,
+        result: object = None,
     ) -> None:
-        super().__init__(
-            f"trial {trial}, sample {sample}, output {channel}: the plant returned {value}; "
-            "only finite numbers are allowed"
-        )
+        super().__init__(reason)
         self.trial, self.sample, self.channel, self.value = trial, sample, channel, value
         self.result = result
-
-    def __reduce__(self) -> tuple[type[PlantError], tuple[int, int, int, float, object]]:
-        """Return what makes it again, also in another process."""
-        found = (self.trial, self.sample, self.channel, self.value, self.result)
-        return type(self), found

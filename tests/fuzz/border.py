@@ -36,7 +36,7 @@ MEMORY_MAX = 6 << 30
 SILENCE_MAX_S = 60.0
 ALLOWED = (ValueError, TypeError, MemoryError, OSError, CampaignError)
 # Runs machines, or writes files to a given place.
-SKIPPED = {"Campaign", "Law", "CampaignResult", "IterationRecord", "Experiment", "Identification",
+SKIPPED = {"Campaign", "Law", "CampaignResult", "TrialResult", "IterationRecord", "Experiment", "Identification",
            "swept_sine", "Library", "Cell"}  # fmt: skip
 # Figures that may be infinite by definition: unbounded growth, no limit, the deviation of a
 # parameter that the measurement does not determine.
@@ -71,7 +71,7 @@ def odd_values(rng: random.Random) -> list[object]:
 
 def right_values() -> dict[str, object]:
     """Return a valid argument for each parameter name."""
-    from classes_fixture import ERROR, N, U, axis, both, line, low_pass, response
+    from classes_fixture import ERROR, N, U, axis, line, low_pass, response
 
     from ilc_rt import PdIlc, RelevanceWeights, identify, trajectory
     from ilc_rt.control import Pid

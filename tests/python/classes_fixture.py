@@ -8,6 +8,7 @@ import ilc_rt
 from ilc_rt import (
     AdjointIlc,
     BadInputError,
+    BasisFunctions,
     CampaignError,
     CampaignResult,
     Cell,
@@ -109,6 +110,10 @@ EXAMPLES = {
     ),
     AdjointIlc: (lambda: AdjointIlc(axis(), N, q_filter=low_pass()), updated),
     ModelInverseIlc: (lambda: ModelInverseIlc(axis(), N, 0.5, low_pass()), updated),
+    BasisFunctions: (
+        lambda: BasisFunctions(axis(), ERROR, ["velocity", "coulomb"], r=0.1, lead_samples=2),
+        updated,
+    ),
     ThroughJacobian: (
         lambda: ThroughJacobian(PdIlc(0.4, 0.0), np.array([[2.0, 0.1], [0.0, 1.0]])),
         lambda law: updated(law, 2),
@@ -196,7 +201,7 @@ EXAMPLES = {
     IterationRecord: (lambda: IterationRecord.from_row(ROW, "nowhere.db"), None),
     CampaignResult: (lambda: CampaignResult("nowhere.db", cell="gantry"), None),
     CampaignError: (lambda: CampaignError("node 2 is silent", exit_code=3), None),
-    PlantError: (lambda: PlantError(3, 17, 0, float("nan")), None),
+    PlantError: (lambda: PlantError("nan at sample 17", trial=3, sample=17), None),
     TrialResult: (lambda: simulate(axis(), PdIlc(0.4, 0.0), ERROR, trials=3), None),
     FaultError: (lambda: FaultError("node 2 is silent", kind="silent_drive", node=2), None),
     BadInputError: (lambda: BadInputError("no such file"), None),

@@ -7,6 +7,8 @@ disturbance=None)``.
 
 from ilc_rt._native import Law as Law
 from ilc_rt.laws.around import Gate, Ladder, ThroughJacobian
+from ilc_rt.laws.basis import PositionHarmonic, position_harmonics
+from ilc_rt.laws.basis_functions import BasisFunctions
 from ilc_rt.laws.constrained import ConstrainedIlc
 from ilc_rt.laws.filtered import ErrorFeedforwardIlc, PdIlc
 from ilc_rt.laws.modelled import AdjointIlc, ModelInverseIlc
@@ -16,6 +18,7 @@ from ilc_rt.laws.relevance_weights import RelevanceWeights
 
 __all__ = [
     "AdjointIlc",
+    "BasisFunctions",
     "ConstrainedIlc",
     "ErrorFeedforwardIlc",
     "FlexibleIlc",
@@ -24,7 +27,9 @@ __all__ = [
     "ModelInverseIlc",
     "NormOptimalIlc",
     "PdIlc",
+    "PositionHarmonic",
     "RelevanceIlc",
     "RelevanceWeights",
     "ThroughJacobian",
+    "position_harmonics",
 ]
