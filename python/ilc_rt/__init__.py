@@ -18,7 +18,7 @@ from ilc_rt._native import (
 from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
 from ilc_rt.ask_tell import Experiment
 from ilc_rt.campaign import Campaign, Law
-from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError
+from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError, SweepError
 from ilc_rt.laws import (
     AdjointIlc,
     BasisFunctions,
@@ -39,6 +39,8 @@ from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 from ilc_rt.simulation import simulate
+from ilc_rt.sweep_result import SweepResult
+from ilc_rt.sweeping import grid, latin_hypercube, sweep
 from ilc_rt.trial_result import TrialResult
 
 __all__ = [
@@ -67,6 +69,9 @@ __all__ = [
     "Repeatability",
     "SignalError",
     "StateSpace",
+    "SweepError",
+    "SweepResult",
+    "ThroughJacobian",
     "TimeVarying",
     "TrajectoryError",
     "TrialResult",
@@ -76,13 +81,16 @@ __all__ = [
     "control",
     "discretize",
     "from_transfer_function",
+    "grid",
     "identify",
     "kinematics",
+    "latin_hypercube",
     "laws",
     "repeatability",
     "second_order",
     "signal",
     "simulate",
+    "sweep",
     "trajectory",
     "tune",
     "weights",

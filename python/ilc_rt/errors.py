@@ -125,3 +125,13 @@ class PlantError(ValueError):
         super().__init__(reason)
         self.trial, self.sample, self.channel, self.value = trial, sample, channel, value
         self.result = result
+
+
+class SweepError(RuntimeError):
+    """A case of a sweep that failed.
+
+    Examples
+    --------
+    >>> str(SweepError("case 3 (mass_kg = 0.0): ZeroDivisionError: division by zero"))[:6]
+    'case 3'
+    """
