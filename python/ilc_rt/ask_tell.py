@@ -43,7 +43,7 @@ class Experiment:
     reference : array_like, shape (n_samples,) or (n_samples, n_outputs)
         Reference of the output.
     library : path or None
-        Library file in which every run is stored as soon as it is told; None keeps them in memory.
+        Library file that every run is stored in at once; None keeps them in memory.
     name : str
         Name of the experiment, in place of a cell's.
     campaign : str or None
@@ -163,7 +163,7 @@ class Experiment:
         Returns
         -------
         ndarray of float64, shape (n_samples,) or (n_samples, n_inputs)
-            The same until the run is told.
+            The same until `tell` is called.
 
         Raises
         ------

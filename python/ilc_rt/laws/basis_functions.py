@@ -67,7 +67,7 @@ class BasisFunctions(PythonLaw):
 
     References
     ----------
-    [vandewijdeven2010], Eq. (11) to (14); [bolder2015], Section II.
+    [vandewijdeven2010]; [bolder2015].
 
     Examples
     --------
