@@ -18,6 +18,7 @@ from ilc_rt._native import (
 from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
 from ilc_rt.ask_tell import Experiment
 from ilc_rt.campaign import Campaign, Law
+from ilc_rt.compared import Compared, compare
 from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError, SweepError
 from ilc_rt.laws import (
     AdjointIlc,
@@ -51,6 +52,7 @@ __all__ = [
     "CampaignError",
     "CampaignResult",
     "Cell",
+    "Compared",
     "ConstrainedIlc",
     "ErrorFeedforwardIlc",
     "Experiment",
@@ -78,6 +80,7 @@ __all__ = [
     "Tuning",
     "__version__",
     "analyze",
+    "compare",
     "control",
     "discretize",
     "from_transfer_function",

@@ -38,10 +38,10 @@ def natural_frequencies(model: StateSpace) -> tuple[Array, Array]:
     ([15.0, 15.0], [0.6, 0.6])
     """
     # LAPACK isolates the poles of a chain of delays, so that they are exactly zero.
-    poles = np.asarray(np.linalg.eigvals(model.a), dtype=np.complex128)
+    poles = np.linalg.eigvals(model.a).astype(np.complex128)
     if model.dt_s is not None:
-        poles = np.asarray(np.log(poles[np.abs(poles) > 1e-12])) / model.dt_s
-    size: Array = np.abs(poles).astype(np.float64)
+        poles = np.log(poles[np.abs(poles) > 1e-12]).astype(np.complex128) / model.dt_s
+    size = np.abs(poles).astype(np.float64)
     damping = np.where(size > 0.0, -poles.real / np.where(size > 0.0, size, 1.0), 1.0)
     order = np.argsort(size, kind="stable")
     return size[order] / (2.0 * np.pi), damping[order]

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from ilc_rt import CampaignResult, PdIlc, discretize, pictures, plots, second_order, simulate
+from ilc_rt import (
+    CampaignResult,
+    PdIlc,
+    compare,
+    discretize,
+    pictures,
+    plots,
+    second_order,
+    simulate,
+)
 from ilc_rt.report import render
 
 N = 100
@@ -95,6 +104,34 @@ def test_the_pages_of_a_campaign_take_a_simulation(two) -> None:
     for draw in (plots.convergence, plots.tracking, plots.learned_input):
         assert draw(two[0]) is not None
     assert "PdIlc" in render(two[0])
+
+
+def test_results_are_compared_in_a_table(two, finished: CampaignResult) -> None:
+    found = compare({"slow": two[0], "fast": two[1]})
+    for row, result in zip(found.rows, two, strict=True):
+        rms = result.figures()["tracking_rms_m"]
+        assert (row["first"], row["best"], row["last"]) == (rms[0], rms.min(), rms[-1])
+        assert row["runs"] == 4
+    assert found.rows[0]["runs_to_tenth"] is None
+    assert found.rows[1]["runs_to_tenth"] == 3
+    assert str(found).splitlines()[0].startswith("result")
+    assert "µm" in str(found)
+    assert found._repr_html_().count("<tr>") == 3
+    assert compare({"cell": finished}, "contour_inf_m").rows[0]["runs"] == 3
+
+
+@pytest.mark.parametrize(
+    ("results", "figure", "error", "words"),
+    [
+        ({}, "tracking_rms_m", ValueError, "at least one"),
+        ([1], "tracking_rms_m", TypeError, "results is a list"),
+        ({"a": 1}, "tracking_rms_m", TypeError, "a: a int"),
+        (None, "contour_inf_m", ValueError, "slow: not every run has the figure"),
+    ],
+)
+def test_what_cannot_be_compared_is_named(two, results, figure, error, words: str) -> None:
+    with pytest.raises(error, match=words):
+        compare({"slow": two[0]} if results is None else results, figure)
 
 
 def test_a_unit_without_a_prefix_is_shown_as_it_is() -> None:
