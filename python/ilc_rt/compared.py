@@ -1,4 +1,4 @@
-"""Comparison of several results in a table: which law is better, by how much, after how many runs."""
+"""Comparison of several results in a table: by how much, and after how many runs."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Compared:
     unit : str
         Its unit.
     rows : tuple of dict
-        ``name``, ``runs``, ``first``, ``best``, ``last``, and ``runs_to_tenth``: number of the first
-        run below a tenth of the first error, or None.
+        ``name``, ``runs``, ``first``, ``best``, ``last``, and ``runs_to_tenth``: number of the
+        first run below a tenth of the first error, or None.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def compare(results: Mapping[str, CampaignResult], figure: str = "tracking_rms_m
     --------
     >>> import numpy as np
     >>> from ilc_rt import PdIlc, compare, simulate
-    >>> results = {f"kp = {kp}": simulate([0.0, 1.0], PdIlc(kp=kp), np.ones(9)) for kp in (0.5, 0.9)}
+    >>> results = {kp: simulate([0.0, 1.0], PdIlc(kp=kp), np.ones(9)) for kp in (0.5, 0.9)}
     >>> [row["runs_to_tenth"] for row in compare(results).rows]
     [None, None]
     """
