@@ -20,21 +20,7 @@ from ilc_rt.ask_tell import Experiment
 from ilc_rt.campaign import Campaign, Law
 from ilc_rt.compared import Compared, compare
 from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError, SweepError
-from ilc_rt.laws import (
-    AdjointIlc,
-    BasisFunctions,
-    ConstrainedIlc,
-    ErrorFeedforwardIlc,
-    FlexibleIlc,
-    Gate,
-    Ladder,
-    ModelInverseIlc,
-    NormOptimalIlc,
-    PdIlc,
-    RelevanceIlc,
-    RelevanceWeights,
-    ThroughJacobian,
-)
+from ilc_rt.laws import *  # noqa: F403
 from ilc_rt.library import Library
 from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.record import IterationRecord
@@ -47,14 +33,11 @@ from ilc_rt.trial_result import TrialResult
 __all__ = [
     "Analysis",
     "BadInputError",
-    "BasisFunctions",
     "Campaign",
     "CampaignError",
     "CampaignResult",
     "Cell",
     "Compared",
-    "ConstrainedIlc",
-    "ErrorFeedforwardIlc",
     "Experiment",
     "FaultError",
     "IterationRecord",
@@ -62,18 +45,12 @@ __all__ = [
     "LearningError",
     "Library",
     "ModelError",
-    "ModelInverseIlc",
-    "NormOptimalIlc",
-    "PdIlc",
     "PlantError",
-    "RelevanceIlc",
-    "RelevanceWeights",
     "Repeatability",
     "SignalError",
     "StateSpace",
     "SweepError",
     "SweepResult",
-    "ThroughJacobian",
     "TimeVarying",
     "TrajectoryError",
     "TrialResult",

@@ -29,7 +29,6 @@ __all__ = [
     "Gate",
     "HigherOrderIlc",
     "Ladder",
-    "Law",
     "ModelFreeIlc",
     "ModelInverseIlc",
     "NormOptimalIlc",
