@@ -111,7 +111,8 @@ def right_values() -> dict[str, object]:
         "position_m": 0.0, "velocity_m_s": 0.0, "uncertainty": 0.2, "noise_std": 1e-3,
         "n_runs": 5, "method": "zoh", "e_m": line(), "errors_m": line(),
         "plant": axis(), "trials": 3, "disturbance": None, "initial_state": [0.0, 0.0],
-        "points": [20, 59], "basis": ["velocity"], "function": float, "cases": [{"x": 1.0}], "ranges": {"a": (0.0, 1.0)},
+        "points": [20, 59], "basis": ["velocity"], "function": float,
+        "cases": [{"x": 1.0}], "ranges": {"a": (0.0, 1.0)},
     }  # fmt: skip
 
 
