@@ -10,7 +10,7 @@ use pyo3::types::{PyDict, PyList, PySlice};
 use crate::argument::{
     Matrix, Signal, give_matrix, give_signal, is_flat_output, misfit, read_matrix, read_vector,
 };
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
