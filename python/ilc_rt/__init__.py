@@ -16,13 +16,19 @@ from ilc_rt._native import (
     __version__,
 )
 from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
+from ilc_rt.ask_tell import Experiment
 from ilc_rt.campaign import Campaign, Law
-from ilc_rt.errors import BadInputError, CampaignError, FaultError
+from ilc_rt.compared import Compared, compare
+from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError, SweepError
 from ilc_rt.laws import *  # noqa: F403
 from ilc_rt.library import Library
 from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
+from ilc_rt.simulation import simulate
+from ilc_rt.sweep_result import SweepResult
+from ilc_rt.sweeping import grid, latin_hypercube, sweep
+from ilc_rt.trial_result import TrialResult
 
 __all__ = [
     "Analysis",
@@ -31,29 +37,40 @@ __all__ = [
     "CampaignError",
     "CampaignResult",
     "Cell",
+    "Compared",
+    "Experiment",
     "FaultError",
     "IterationRecord",
     "Law",
     "LearningError",
     "Library",
     "ModelError",
+    "PlantError",
     "Repeatability",
     "SignalError",
     "StateSpace",
+    "SweepError",
+    "SweepResult",
     "TimeVarying",
     "TrajectoryError",
+    "TrialResult",
     "Tuning",
     "__version__",
     "analyze",
+    "compare",
     "control",
     "discretize",
     "from_transfer_function",
+    "grid",
     "identify",
     "kinematics",
+    "latin_hypercube",
     "laws",
     "repeatability",
     "second_order",
     "signal",
+    "simulate",
+    "sweep",
     "trajectory",
     "tune",
     "weights",

@@ -21,6 +21,7 @@ from ilc_rt.commands import (
     repeatability,
     reproduce,
     run,
+    sweep,
     tune,
 )
 from ilc_rt.errors import (
@@ -71,6 +72,7 @@ app.command("identify")(identify.identify)
 app.command("repeatability")(repeatability.repeatability)
 app.command("plot")(plot.plot)
 app.command("tune")(tune.tune)
+app.command("sweep")(sweep.sweep)
 app.add_typer(library.app, name="library")
 app.command("monitor")(monitor.monitor)
 FURTHER = {entry.name: entry for entry in entry_points(group="ilc_rt.verbs")}

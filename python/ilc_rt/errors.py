@@ -90,3 +90,48 @@ class BadInputError(CampaignError):
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason, EXIT_BAD_INPUT)
+
+
+class PlantError(ValueError):
+    """An output of a plant that is NaN or infinite.
+
+    Parameters
+    ----------
+    reason : str
+        One readable line.
+    trial, sample, channel : int
+        Run, sample and output, each from 0.
+    value : float or None
+        The value found.
+    result : object or None
+        The `ilc_rt.TrialResult` of the runs before, if a simulation was made.
+
+    Examples
+    --------
+    >>> PlantError("trial 3, sample 17: the plant returned nan", trial=3, sample=17).sample
+    17
+    """
+
+    def __init__(
+        self,
+        reason: str,
+        *,
+        trial: int = 0,
+        sample: int = 0,
+        channel: int = 0,
+        value: float | None = None,
+        result: object = None,
+    ) -> None:
+        super().__init__(reason)
+        self.trial, self.sample, self.channel, self.value = trial, sample, channel, value
+        self.result = result
+
+
+class SweepError(RuntimeError):
+    """A case of a sweep that failed.
+
+    Examples
+    --------
+    >>> str(SweepError("case 3 (mass_kg = 0.0): ZeroDivisionError: division by zero"))[:6]
+    'case 3'
+    """

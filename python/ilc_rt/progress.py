@@ -155,10 +155,9 @@ class CampaignView:
     def _print_plain(self, result: CampaignResult) -> None:
         comparison = result.comparison
         names = headings(comparison)
-        if not self._names:
-            # Remarks on the earlier runs of a resumed campaign were shown when they were made.
-            if len(result.records) > 1:
-                self._remarked = result.records[-2].index
+        # Remarks on the earlier runs of a resumed campaign were shown when they were made.
+        if not self._names and len(result.records) > 1:
+            self._remarked = result.records[-2].index
         if names != self._names:
             # Once, and again if the errors have outgrown their unit.
             self._names = names

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 # Change beyond which a percentage is meaningless.
 CHANGE_MAX_PERCENT = 1e4
+# Units with a prefix; any other one is shown as it is.
+BASES = ("m", "rad", "m/s", "rad/s")
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
 
@@ -46,13 +48,15 @@ def unit_for(base: str, size: float | None) -> Unit:
     """Return a suitable unit for a quantity of this size.
 
     `size` is that of the quantity, or of the first of a row of quantities; `base` is ``"m"``,
-    ``"rad"``, ``"m/s"`` or ``"rad/s"``.
+    ``"rad"``, ``"m/s"`` or ``"rad/s"``, or any other unit, which gets no prefix.
 
     Examples
     --------
     >>> unit_for("m", 1e-3).symbol, unit_for("rad", 0.02).symbol, unit_for("m", 4e-8).symbol
     ('µm', 'mrad', 'nm')
     """
+    if base not in BASES:
+        return Unit(base, base, 1.0)
     largest = abs(size) if size is not None and math.isfinite(size) else 0.0
     if largest >= 1e-2:
         scale, prefix = PREFIXES[0]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ilc_rt import _native
 from ilc_rt.given import given
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["FrequencyResponse", "excitation", "frequency_response", "uncertainty"]
@@ -89,6 +91,46 @@ class FrequencyResponse:
             self.coherence[inside],
             self.n_averages,
         )
+
+    def to_control(self) -> Any:  # noqa: ANN401 (python-control is optional)
+        """Return the response as an object of python-control.
+
+        Returns
+        -------
+        control.FrequencyResponseData
+            One input, one output; frequencies in rad/s.
+
+        Raises
+        ------
+        ImportError
+            If python-control is not installed.
+        """
+        return import_module("control").frd(self.response, 2.0 * np.pi * self.frequency_hz)
+
+    @classmethod
+    def from_control(cls, data: Any) -> FrequencyResponse:  # noqa: ANN401 (python-control is optional)
+        """Return a response of python-control, with coherence 1.
+
+        Parameters
+        ----------
+        data : control.FrequencyResponseData
+            One input, one output.
+
+        Raises
+        ------
+        ValueError
+            If there are several inputs or outputs.
+        TypeError
+            If it is not such an object.
+        """
+        omega, values = getattr(data, "omega", None), getattr(data, "frdata", None)
+        if omega is None or values is None:
+            message = f"data is a {type(data).__name__}; control.FrequencyResponseData is needed"
+            raise TypeError(message)
+        if np.ndim(values) != 3 or np.shape(values)[:2] != (1, 1):
+            message = f"data has shape {np.shape(values)}: one input and one output are needed"
+            raise ValueError(message)
+        return cls(np.asarray(omega) / (2.0 * np.pi), np.asarray(values)[0, 0])
 
     def __repr__(self) -> str:
         """Return the number of frequencies and their range."""

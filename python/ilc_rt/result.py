@@ -23,6 +23,7 @@ from ilc_rt.events import (
 from ilc_rt.library import Library
 from ilc_rt.quantity import digits
 from ilc_rt.record import IterationRecord
+from ilc_rt.result_views import Views
 
 # Path that stands for standard output.
 STANDARD_OUTPUT = Path("-")
@@ -35,7 +36,7 @@ ENDLESS_RECORDS = 200
 
 
 @dataclass(slots=True)
-class CampaignResult:
+class CampaignResult(Views):
     """Result of a campaign, collected from its events or from the library.
 
     Attributes

@@ -8,9 +8,11 @@ import ilc_rt
 from ilc_rt import (
     AdjointIlc,
     BadInputError,
+    BasisFunctions,
     CampaignError,
     CampaignResult,
     Cell,
+    Compared,
     ConstrainedIlc,
     ErrorFeedforwardIlc,
     FaultError,
@@ -21,22 +23,36 @@ from ilc_rt import (
     ModelInverseIlc,
     NormOptimalIlc,
     PdIlc,
+    PlantError,
     RelevanceIlc,
     RelevanceWeights,
     StateSpace,
+    SweepResult,
     ThroughJacobian,
     TimeVarying,
+    TrialResult,
     analyze,
+    compare,
     discretize,
+    grid,
     identify,
     kinematics,
     repeatability,
     second_order,
     signal,
+    simulate,
+    sweep,
     trajectory,
     tune,
 )
 from ilc_rt.control import Cascade, CrossCoupled, Pid
+from ilc_rt.laws import (
+    HigherOrderIlc,
+    ModelFreeIlc,
+    PointToPointIlc,
+    PositionHarmonic,
+    StableInverseIlc,
+)
 
 ROOT = Path(__file__).parents[2]
 MODULES = ["ilc_rt"] + [
@@ -106,6 +122,15 @@ EXAMPLES = {
     ),
     AdjointIlc: (lambda: AdjointIlc(axis(), N, q_filter=low_pass()), updated),
     ModelInverseIlc: (lambda: ModelInverseIlc(axis(), N, 0.5, low_pass()), updated),
+    BasisFunctions: (
+        lambda: BasisFunctions(axis(), ERROR, ["velocity", "coulomb"], r=0.1, lead_samples=2),
+        updated,
+    ),
+    HigherOrderIlc: (lambda: HigherOrderIlc(PdIlc(0.4, 0.0), (1.5, -0.5)), updated),
+    PointToPointIlc: (lambda: PointToPointIlc(axis(), N, [20, 59], gain=0.5, r=0.1), updated),
+    StableInverseIlc: (lambda: StableInverseIlc(axis(), N, q_filter=low_pass()), updated),
+    ModelFreeIlc: (lambda: ModelFreeIlc(0.5, probe=0.2), updated),
+    PositionHarmonic: (lambda: PositionHarmonic(0.01, 2), lambda psi: psi(ERROR, 0.002)),
     ThroughJacobian: (
         lambda: ThroughJacobian(PdIlc(0.4, 0.0), np.array([[2.0, 0.1], [0.0, 1.0]])),
         lambda law: updated(law, 2),
@@ -192,7 +217,14 @@ EXAMPLES = {
     Cell: (lambda: Cell.load(ROOT / "examples" / "01_gantry.toml"), lambda cell: cell.reference()),
     IterationRecord: (lambda: IterationRecord.from_row(ROW, "nowhere.db"), None),
     CampaignResult: (lambda: CampaignResult("nowhere.db", cell="gantry"), None),
+    SweepResult: (lambda: sweep(lambda a: {"b": 2 * a}, grid(a=[1.0, 2.0])), None),
     CampaignError: (lambda: CampaignError("node 2 is silent", exit_code=3), None),
+    PlantError: (lambda: PlantError("nan at sample 17", trial=3, sample=17), None),
+    Compared: (
+        lambda: compare({"p": simulate(axis(), PdIlc(0.4, 0.0), ERROR, trials=3)}),
+        str,
+    ),
+    TrialResult: (lambda: simulate(axis(), PdIlc(0.4, 0.0), ERROR, trials=3), None),
     FaultError: (lambda: FaultError("node 2 is silent", kind="silent_drive", node=2), None),
     BadInputError: (lambda: BadInputError("no such file"), None),
 }

@@ -16,8 +16,8 @@ from classes_fixture import EXAMPLES, MODULES, N, axis, both, line, updated
 import ilc_rt
 from ilc_rt import Campaign, Gate, Library, NormOptimalIlc, PdIlc
 
-# Not values: a connection to a file, an interface, a running controller.
-OTHERS = {Library, ilc_rt.Law, ilc_rt.signal.Filter, Campaign}
+# Not values: a connection to a file, an interface, a running controller or experiment.
+OTHERS = {Library, ilc_rt.Law, ilc_rt.signal.Filter, Campaign, ilc_rt.Experiment}
 
 
 def attributes(thing):

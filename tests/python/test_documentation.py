@@ -55,6 +55,8 @@ SHORTER = (
     (r"^ilc reproduce(?!.* --from)(.*)$", r"ilc reproduce\1 --reduced"),
     (r"^ilc-rt latency(?!.* --seconds)(.*)$", r"ilc-rt latency\1 --seconds 1"),
     (r"--seconds \d+", "--seconds 1"),
+    (r"--samples \d+", "--samples 2"),
+    (r"^ilc sweep(?!.* --iterations)(.*)$", r"ilc sweep\1 --iterations 2"),
     (r"^(ilc library (?:show|export) \S+) \d+", r"\1 1"),
     # These run this very test, or its prerequisites.
     (r"^make ([a-z-]+)", r"make --dry-run --directory {root} \1"),

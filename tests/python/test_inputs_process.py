@@ -57,9 +57,7 @@ def test_each_run_starts_at_a_press_and_an_open_door_ends_it(
 ) -> None:
     bench.drives(feeder, *pace)
     assert status(bench, feeder) == {"door": True, "go": False, "halt": False, "far end": False}
-    controller = bench.controller(
-        feeder, *pace, "--simulated-drives", "--start", "input", runs=5
-    )
+    controller = bench.controller(feeder, *pace, "--simulated-drives", "--start", "input", runs=5)
     for run in range(2):
         controller.event(event="state", state="waiting", iteration=run)
         press(bench, feeder, "go", "on")

@@ -3,15 +3,18 @@
 use ilc_rt::model::{self, Method, StateSpace};
 use numpy::IntoPyArray;
 use numpy::ndarray::{Array1, Array3};
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList, PySlice};
 
-use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
+use crate::argument::{
+    Matrix, Signal, give_matrix, give_signal, is_flat_output, misfit, read_matrix, read_vector,
+};
 use crate::arguments::{Arguments, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
-use crate::whole::whole;
+use crate::whole::{number, whole};
 
 /// Linear time-invariant model, in discrete or continuous time.
 ///
@@ -25,6 +28,10 @@ use crate::whole::whole;
 /// ModelError if models, sample times or signals are incompatible, a loop is not well posed, a continuous-time
 /// model is to be simulated, or numbers overflow; ValueError or TypeError if an array has the wrong shape,
 /// dtype or a number that is not finite.
+///
+/// ``G * H`` is G after H, ``G + H`` and ``G - H`` their sum and difference for the same input, ``-G``, ``2 * G`` and
+/// ``G / 2`` scale, a matrix is a gain; ``G ** -1`` is the inverse, if D has one; ``G[i, j]`` leads from input j to
+/// output i, also with slices and lists. ``print(G)`` shows matrices, poles in Hz and delays, as a notebook does.
 ///
 /// Examples
 /// --------
@@ -45,6 +52,75 @@ impl PyStateSpace {
     pub(crate) fn model(&self) -> &StateSpace {
         &self.0
     }
+}
+
+/// Second operand of a product.
+enum Operand {
+    Factor(f64),
+    Model(StateSpace),
+}
+
+impl PyStateSpace {
+    /// Reads a factor, a matrix as a gain, or a model; `n_signals` is the size of a factor's gain.
+    fn operand(&self, other: &Bound<'_, PyAny>, n_signals: usize) -> PyResult<Operand> {
+        if is_number(other)? {
+            return number("factor", other).map(Operand::Factor);
+        }
+        if is_array(other)? {
+            let gain = read_matrix("gain", other)?;
+            if gain.nrows() != n_signals && gain.ncols() != n_signals {
+                let (rows, cols) = gain.shape();
+                return Err(misfit("gain", &[rows, cols], &format!("{n_signals} rows or columns")));
+            }
+            return StateSpace::static_gain(gain, self.0.dt_s()).or_raise().map(Operand::Model);
+        }
+        read_model("operand", other).map(Operand::Model)
+    }
+
+    /// Reads a model, or a number or matrix as a gain of the size of this model.
+    fn addend(&self, other: &Bound<'_, PyAny>) -> PyResult<StateSpace> {
+        let gain = if is_number(other)? {
+            let (rows, cols) = (self.0.n_outputs(), self.0.n_inputs());
+            Matrix::from_element(rows, cols, number("addend", other)?)
+        } else if is_array(other)? {
+            read_matrix("addend", other)?
+        } else {
+            return read_model("operand", other);
+        };
+        StateSpace::static_gain(gain, self.0.dt_s()).or_raise()
+    }
+}
+
+fn is_number(object: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let numbers = object.py().import("numbers")?.getattr("Number")?;
+    object.is_instance(&numbers)
+}
+
+fn is_array(object: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(object.hasattr("__array__")? && !object.hasattr("A")? || object.is_instance_of::<PyList>())
+}
+
+/// Reads one index, a slice or a list of indices; negative ones count from the end.
+fn chosen(what: &str, object: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<usize>> {
+    let range = object.py().import("builtins")?.getattr("range")?.call1((count,))?;
+    let from_end = |index: &Bound<'_, PyAny>| -> PyResult<usize> {
+        let found = range.get_item(index).map_err(|_| {
+            PyIndexError::new_err(format!("{what} = {index}: there are {count}, numbered from 0"))
+        })?;
+        found.extract()
+    };
+    if object.is_instance_of::<PyList>() {
+        return object.try_iter()?.map(|index| from_end(&index?)).collect();
+    }
+    if object.is_instance_of::<PySlice>() {
+        return range.get_item(object)?.try_iter()?.map(|index| index?.extract()).collect();
+    }
+    Ok(vec![from_end(object)?])
+}
+
+/// Calls a view of models, which are written in Python.
+fn shown<'py>(model: &Bound<'py, PyStateSpace>, view: &str) -> PyResult<Bound<'py, PyAny>> {
+    model.py().import("ilc_rt.model_views")?.call_method1(view, (model,))
 }
 
 #[pymethods]
@@ -282,6 +358,91 @@ impl PyStateSpace {
         let dt_s = self.0.dt_s().unwrap_or(0.0);
         let arguments = (self.a(py), self.b(py), self.c(py), self.d(py), dt_s);
         py.import("control")?.getattr("StateSpace")?.call1(arguments)
+    }
+
+    /// Return natural frequencies in Hz and dampings of the poles, each of shape (n_states,), in the order of
+    /// the frequencies.
+    ///
+    /// Of a discrete-time model, those of the continuous-time poles that it samples.
+    fn natural_frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown(slf, "natural_frequencies")
+    }
+
+    /// Leaves products and sums with arrays to this class.
+    #[classattr]
+    fn __array_ufunc__() -> Option<bool> {
+        None
+    }
+
+    fn __mul__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match self.operand(other, self.0.n_inputs())? {
+            Operand::Factor(factor) => self.0.scaled(factor),
+            Operand::Model(first) => first.series(&self.0),
+        }
+        .or_raise()
+        .map(Self)
+    }
+
+    fn __rmul__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match self.operand(other, self.0.n_outputs())? {
+            Operand::Factor(factor) => self.0.scaled(factor),
+            Operand::Model(next) => self.0.series(&next),
+        }
+        .or_raise()
+        .map(Self)
+    }
+
+    fn __truediv__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
+        self.0.scaled(1.0 / number("divisor", other)?).or_raise().map(Self)
+    }
+
+    fn __add__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
+        self.0.sum(&self.addend(other)?).or_raise().map(Self)
+    }
+
+    fn __radd__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
+        self.__add__(other)
+    }
+
+    fn __sub__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let negative = self.addend(other)?.scaled(-1.0).or_raise()?;
+        self.0.sum(&negative).or_raise().map(Self)
+    }
+
+    fn __rsub__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let negative = self.0.scaled(-1.0).or_raise()?;
+        self.addend(other)?.sum(&negative).or_raise().map(Self)
+    }
+
+    fn __neg__(&self) -> PyResult<Self> {
+        self.0.scaled(-1.0).or_raise().map(Self)
+    }
+
+    fn __pow__(&self, exponent: i32, modulo: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        if modulo.is_some() || !(-16..=16).contains(&exponent) || exponent == 0 {
+            let line = format!("exponent = {exponent}: allowed -16 to 16, without 0 and modulo");
+            return Err(PyValueError::new_err(line));
+        }
+        let base = if exponent < 0 { self.0.inverse().or_raise()? } else { self.0.clone() };
+        let mut power = base.clone();
+        for _ in 1..exponent.unsigned_abs() {
+            power = power.series(&base).or_raise()?;
+        }
+        Ok(Self(power))
+    }
+
+    fn __getitem__(&self, channels: (Bound<'_, PyAny>, Bound<'_, PyAny>)) -> PyResult<Self> {
+        let outputs = chosen("output", &channels.0, self.0.n_outputs())?;
+        let inputs = chosen("input", &channels.1, self.0.n_inputs())?;
+        self.0.select(&outputs, &inputs).or_raise().map(Self)
+    }
+
+    fn __str__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown(slf, "text")
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        shown(slf, "page")
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {

@@ -93,6 +93,41 @@ impl PyTimeVarying {
         TimeVarying::new(samples.or_raise()?).or_raise().map(Self)
     }
 
+    /// Return the model of deviations from a trajectory of ``x[k+1] = f(x[k], u[k])``, ``y[k] = h(x[k], u[k])``.
+    ///
+    /// - f: function of a state (n_states,) and an input (n_inputs,) that returns the next state; with `h` None
+    ///   the states are the outputs.
+    /// - x, u: the trajectory, shapes (n_samples, n_states) and (n_samples, n_inputs) or (n_samples,).
+    /// - jacobian: function of the same that returns A, B, C and D, in place of central differences.
+    /// - step: step of the differences relative to the size of the value.
+    ///
+    /// Raises ValueError or TypeError, naming the sample, if a function returns another shape or a number that is not
+    /// finite.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> from ilc_rt import TimeVarying
+    /// >>> def pendulum(x, u):
+    /// ...     return np.array([x[0] + 0.01 * x[1], x[1] + 0.01 * (u[0] - 9.81 * np.sin(x[0]))])
+    /// >>> rest = TimeVarying.linearize(pendulum, np.zeros((3, 2)), np.zeros(3), 0.01)
+    /// >>> rest.a[0].round(6).tolist()
+    /// [[1.0, 0.01], [-0.0981, 1.0]]
+    #[staticmethod]
+    #[pyo3(signature = (f, x, u, dt_s, h=None, jacobian=None, step=1e-6))]
+    fn linearize<'py>(
+        f: &Bound<'py, PyAny>,
+        x: &Bound<'py, PyAny>,
+        u: &Bound<'py, PyAny>,
+        dt_s: &Bound<'py, PyAny>,
+        h: Option<&Bound<'py, PyAny>>,
+        jacobian: Option<&Bound<'py, PyAny>>,
+        step: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let linearization = f.py().import("ilc_rt.linearization")?;
+        linearization.call_method1("linearize", (f, x, u, dt_s, h, jacobian, step))
+    }
+
     /// Pickled and copied as its matrices.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());

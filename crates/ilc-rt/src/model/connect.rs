@@ -119,7 +119,11 @@ impl StateSpace {
         )
     }
 
-    fn same_time(&self, action: &'static str, other: &Self) -> Result<Option<f64>, ModelError> {
+    pub(super) fn same_time(
+        &self,
+        action: &'static str,
+        other: &Self,
+    ) -> Result<Option<f64>, ModelError> {
         // Compared as a ratio, because sample times are often computed (1.0 / 1000.0) on one side
         // only.
         let same = match (self.dt_s, other.dt_s) {
@@ -146,14 +150,14 @@ fn zeros(rows: &StateSpace, cols: &StateSpace) -> DMatrix<f64> {
     DMatrix::zeros(rows.n_states(), cols.n_states())
 }
 
-fn stack(top: &DMatrix<f64>, bottom: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn stack(top: &DMatrix<f64>, bottom: &DMatrix<f64>) -> DMatrix<f64> {
     let mut stacked = DMatrix::zeros(top.nrows() + bottom.nrows(), top.ncols());
     stacked.view_mut((0, 0), top.shape()).copy_from(top);
     stacked.view_mut((top.nrows(), 0), bottom.shape()).copy_from(bottom);
     stacked
 }
 
-fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn beside(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     let mut joined = DMatrix::zeros(left.nrows(), left.ncols() + right.ncols());
     joined.view_mut((0, 0), left.shape()).copy_from(left);
     joined.view_mut((0, left.ncols()), right.shape()).copy_from(right);
@@ -164,7 +168,7 @@ fn blocks([[a, b], [c, d]]: [[DMatrix<f64>; 2]; 2]) -> DMatrix<f64> {
     stack(&beside(&a, &b), &beside(&c, &d))
 }
 
-fn block_diagonal(first: &DMatrix<f64>, second: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn block_diagonal(first: &DMatrix<f64>, second: &DMatrix<f64>) -> DMatrix<f64> {
     let right = DMatrix::zeros(first.nrows(), second.ncols());
     let left = DMatrix::zeros(second.nrows(), first.ncols());
     blocks([[first.clone(), right], [left, second.clone()]])

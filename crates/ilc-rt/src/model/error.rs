@@ -111,6 +111,9 @@ pub enum ModelError {
     /// A singular algebraic loop.
     #[error("the feedback loop is not well posed: I + D_c D_p is singular")]
     AlgebraicLoop,
+    /// An inverse that is not proper.
+    #[error("there is no proper inverse: D is singular; delay the inverse, or invert in time")]
+    NoInverse,
     /// An improper transfer function, which has no state-space model.
     #[error(
         "numerator of degree {numerator} over denominator of degree {denominator}; a proper transfer function is needed"

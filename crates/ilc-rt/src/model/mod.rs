@@ -5,6 +5,7 @@
 //! learning laws work on. It runs when things are set up, never in the tick; `learning`, `servo`'s
 //! set-up code, `config`, `design` and the Python bindings may import it.
 
+mod algebra;
 mod connect;
 mod discretize;
 mod error;
