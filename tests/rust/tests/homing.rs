@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use ilc_rt::campaign::{self, Homed, Options, homing_axes};
-use ilc_rt::config::Cell;
+use ilc_rt::config::{Cell, Input, InputUse, Level};
 use ilc_rt::fieldbus::bring_up::SdoClient;
 use ilc_rt::fieldbus::cia402::State;
 use ilc_rt::record::{EndStatus, Event, FaultKind, StateName};
@@ -364,4 +364,45 @@ fn a_run_whose_homing_fails_ends_before_it_begins() {
     assert_eq!(faults, [(FaultKind::NotHomed, Some("x".to_owned()))]);
     assert_eq!(ends, [(EndStatus::Fault, outcome.reason, 0)]);
     is_at_rest(&tap);
+}
+
+/// Returns an input of the drive of y.
+fn input_of_y(name: &str, bit: u8, active: Level, purpose: InputUse) -> Input {
+    let (name, axis) = (name.to_owned(), "y".to_owned());
+    Input { name, axis, bit, active, purpose, direction: None, debounce_cycles: 5 }
+}
+
+#[test]
+fn a_guard_that_opens_ends_a_homing_also_on_another_drive() {
+    let mut guarded = cell(&method(17, SWITCHES_M[0], ""), "");
+    guarded.inputs = vec![
+        input_of_y("door", 16, Level::High, InputUse::Guard),
+        input_of_y("halt", 18, Level::Low, InputUse::Stop),
+    ];
+    guarded.axes[1].simulation.digital_inputs = 0x0005_0000;
+    for (opened, name) in [(0x0004_0000, "door"), (0x0001_0000, "halt")] {
+        for moment in ["homing: ", "bringing inside"] {
+            let tap = Tap::new(&guarded);
+            let mut is_open = false;
+            let homed = watched(&guarded, &tap, false, &mut |line| {
+                // The first line of the way inside comes before the drives are on.
+                if line.is_some_and(|line| line.starts_with(moment) && line.contains(" m")) {
+                    tap.line().meddle(|machine, _| assert!(machine.set_inputs(node(2), opened)));
+                    is_open = true;
+                }
+                None
+            });
+            assert!(is_open, "{moment}");
+            assert_ne!(homed.status, EndStatus::Completed, "{moment} {name}");
+            assert!(homed.reason.contains(name), "{}", homed.reason);
+            is_at_rest(&tap);
+            let session = options(std::path::PathBuf::new(), 1).session;
+            let bus = Box::new(tap.clone());
+            let refused = campaign::home(&guarded, &[0], true, &session, bus, &mut |_| None);
+            assert!(refused.unwrap_err().to_string().contains(name));
+            tap.line().meddle(|machine, _| assert!(machine.set_inputs(node(2), 0x0005_0000)));
+            let homed = home(&guarded, &tap);
+            assert_eq!(homed.status, EndStatus::Completed, "{}", homed.reason);
+        }
+    }
 }

@@ -14,17 +14,25 @@ pub(super) type Words = Vec<Option<u32>>;
 /// # Errors
 /// [`CampaignError::Interlock`] for an open guard, or a stop button that is pressed.
 pub(super) fn permit(cell: &Cell, words: &Words) -> Result<(), CampaignError> {
-    for input in &cell.inputs {
-        let what = match (input.purpose, is_on(cell, input, words)) {
-            (InputUse::Guard, false) => open(cell, input),
-            (InputUse::Stop, true) => {
-                format!("stop button {} is pressed: release it", place(cell, input))
-            }
-            _ => continue,
-        };
-        return Err(CampaignError::Interlock { file: cell.file.display().to_string(), what });
-    }
-    Ok(())
+    forbidding(cell, words).map_or(Ok(()), |what| {
+        Err(CampaignError::Interlock { file: cell.file.display().to_string(), what })
+    })
+}
+
+/// Returns the sentence for the first open guard or pressed stop button.
+pub(super) fn forbidding(cell: &Cell, words: &Words) -> Option<String> {
+    cell.inputs.iter().find_map(|input| match (input.purpose, is_on(cell, input, words)) {
+        (InputUse::Guard, false) => Some(open(cell, input)),
+        (InputUse::Stop, true) => {
+            Some(format!("stop button {} is pressed: release it", place(cell, input)))
+        }
+        _ => None,
+    })
+}
+
+/// Returns true if an input may stop all axes.
+pub(super) fn stops_all(input: &Input) -> bool {
+    matches!(input.purpose, InputUse::Guard | InputUse::Stop)
 }
 
 /// Returns the limit switch that an axis has reached in the direction of a move, if it has.

@@ -229,7 +229,11 @@ fn client(cell: &Cell, axis: &Axis, session: &Session) -> Result<SdoClient, Conf
 }
 
 /// Reads the digital inputs of every drive that has named ones.
-fn read_inputs(cell: &Cell, bus: &mut dyn Bus, session: &Session) -> Result<Words, CampaignError> {
+pub(super) fn read_inputs(
+    cell: &Cell,
+    bus: &mut dyn Bus,
+    session: &Session,
+) -> Result<Words, CampaignError> {
     let mut words = vec![None; cell.n_axes()];
     for (word, axis) in words.iter_mut().zip(&cell.axes) {
         if cell.inputs.iter().any(|input| input.axis == axis.name) {

@@ -1,12 +1,13 @@
 //! The way back inside: an axis that found its home on a limit switch rests outside its limits, where no verb moves
-//! it. The servo loop brings it inside along a jerk-limited line, alone on the bus. For `homing` only.
+//! it. The servo loop brings it inside along a jerk-limited line, alone unless a guard
+//! is wired to another drive. For `homing` only.
 
 use super::lent::Lent;
 use super::{End, Report, Task};
 use crate::campaign::error::CampaignError;
-use crate::campaign::nodes;
 use crate::campaign::options::Session;
 use crate::campaign::travel::{Goal, Travel, Traveling, travel};
+use crate::campaign::{inputs, nodes};
 use crate::config::{Axis, Cell, LawName, Learning, Measure};
 use crate::fieldbus::{Bus, BusError};
 use crate::record::EndStatus;
@@ -33,15 +34,24 @@ pub(super) fn bring(
     if outside.is_empty() {
         return Ok((End::completed(), bus));
     }
-    let alone = alone(cell, &outside);
-    let goals = outside.iter().enumerate().map(|(axis, (_, to_m))| (axis, Goal::At(*to_m)));
-    let way = Travel { goals: goals.collect(), speed_m_s: None, hold_s: Some(0.0) };
+    // A guard on another drive is watched only where that drive takes part.
+    let is_outside = |name: &str| outside.iter().any(|(task, _)| task.axis.name == name);
+    let is_guarded_elsewhere =
+        cell.inputs.iter().any(|input| inputs::stops_all(input) && !is_outside(&input.axis));
+    let widened = widened(cell, &outside);
+    let moved = if is_guarded_elsewhere { widened } else { alone(widened, &outside) };
+    let place = |name: &str| moved.axes.iter().position(|axis| axis.name == name);
+    let goals = outside
+        .iter()
+        .filter_map(|(task, to_m)| Some((place(&task.axis.name)?, Goal::At(*to_m))))
+        .collect();
+    let way = Travel { goals, speed_m_s: None, hold_s: Some(0.0) };
     let (lent, returned) = Lent::new(bus);
     let mut tell = |now: Option<&Traveling>| {
-        let line = now.map(|now| described(&alone, now));
+        let line = now.map(|now| described(&moved, now));
         report(line.as_deref())
     };
-    let arrival = travel(&alone, &way, session, Box::new(lent), &mut tell);
+    let arrival = travel(&moved, &way, session, Box::new(lent), &mut tell);
     let Ok(mut bus) = returned.recv() else {
         return Err(CampaignError::Start {
             file: cell.file.display().to_string(),
@@ -105,27 +115,32 @@ fn stays_outside(cell: &Cell, axis: &Axis, at_m: f64) -> String {
     )
 }
 
-/// Returns a cell of these axes alone, whose limits reach to where they are. It learns nothing.
-fn alone(cell: &Cell, outside: &[(&mut Task<'_>, f64)]) -> Cell {
-    let mut alone = cell.clone();
-    alone.axes = outside
-        .iter()
-        .map(|(task, _)| {
-            let mut axis = task.axis.clone();
-            let margin_m = INSIDE_SHARE * (axis.limits.position_max_m - axis.limits.position_min_m);
-            if let Some(at_m) = task.result.position_m {
-                let limits = &mut axis.limits;
-                limits.position_min_m = limits.position_min_m.min(at_m - margin_m);
-                limits.position_max_m = limits.position_max_m.max(at_m + margin_m);
-            }
-            axis
-        })
-        .collect();
+/// Returns the cell with the limits of these axes reaching to where they are.
+fn widened(cell: &Cell, outside: &[(&mut Task<'_>, f64)]) -> Cell {
+    let mut widened = cell.clone();
+    for (task, _) in outside {
+        let axis = widened.axes.iter_mut().find(|axis| axis.name == task.axis.name);
+        let (Some(axis), Some(at_m)) = (axis, task.result.position_m) else { continue };
+        let limits = &mut axis.limits;
+        let margin_m = INSIDE_SHARE * (limits.position_max_m - limits.position_min_m);
+        limits.position_min_m = limits.position_min_m.min(at_m - margin_m);
+        limits.position_max_m = limits.position_max_m.max(at_m + margin_m);
+    }
+    widened
+}
+
+/// Returns a cell of these axes alone. It learns nothing.
+fn alone(cell: Cell, outside: &[(&mut Task<'_>, f64)]) -> Cell {
+    let mut alone = cell;
+    let target_m =
+        |name: &str| outside.iter().find(|(task, _)| task.axis.name == name).map(|(_, to_m)| *to_m);
+    alone.axes.retain(|axis| target_m(&axis.name).is_some());
+    alone.inputs.retain(|input| target_m(&input.axis).is_some());
     alone.tcp_encoder = None;
     alone.learning =
         Learning { law: LawName::None, measure: Measure::Encoder, ..Learning::default() };
     alone.simulation.changes = Vec::new();
-    let to_m: Vec<f64> = outside.iter().map(|(_, to_m)| *to_m).collect();
+    let to_m: Vec<f64> = alone.axes.iter().filter_map(|axis| target_m(&axis.name)).collect();
     alone.program = Program {
         start_m: to_m.clone(),
         kind: PathKind::default(),

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use super::Report;
 use super::seeker::Seeker;
-use crate::campaign::nodes;
 use crate::campaign::options::Session;
+use crate::campaign::{inputs, nodes};
 use crate::config::{Axis, Cell};
 use crate::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use crate::fieldbus::cia402::pdo_map::{COMMAND_PDO, STATUS_PDO};
@@ -16,18 +16,24 @@ use crate::fieldbus::{Bus, BusError, Frame};
 
 /// Time between two reports.
 const REPORT_S: f64 = 0.2;
+/// Time between two looks at guards and stop buttons.
+const LOOK_S: f64 = 0.05;
 
 /// A drive of the turn.
 pub(super) type Station = (NodeId, Scale, Seeker);
 
 /// A turn in progress.
 pub(super) struct Round<'a> {
+    cell: &'a Cell,
+    session: &'a Session,
     axes: &'a [&'a Axis],
     stations: &'a mut [Station],
     map: PdoMap,
     cycle: Duration,
     /// Cycles between two reports.
     every: u32,
+    /// Cycles between two looks at guards and stop buttons, if the cell has any.
+    look_every: Option<u32>,
     /// In lock-step: the time to wait for the answers.
     wait: Option<Duration>,
     stop: Arc<AtomicI32>,
@@ -35,19 +41,24 @@ pub(super) struct Round<'a> {
 
 impl<'a> Round<'a> {
     pub(super) fn new(
-        cell: &Cell,
-        session: &Session,
+        cell: &'a Cell,
+        session: &'a Session,
         axes: &'a [&'a Axis],
         stations: &'a mut [Station],
     ) -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small")]
-        let every = ((REPORT_S / cell.cycle_s()) as u32).max(1);
+        let cycles = |span_s: f64| ((span_s / cell.cycle_s()) as u32).max(1);
+        let every = cycles(REPORT_S);
+        let look_every = cell.inputs.iter().any(inputs::stops_all).then(|| cycles(LOOK_S));
         Self {
+            cell,
+            session,
             axes,
             stations,
             map: PdoMap::of_homing(),
             cycle: Duration::from_secs_f64(cell.cycle_s()),
             every,
+            look_every,
             wait: session.lockstep.then(|| nodes::timeout(cell, session)),
             stop: Arc::clone(&session.stop),
         }
@@ -78,12 +89,23 @@ impl<'a> Round<'a> {
             if self.stations.iter().all(|(_, _, seeker)| seeker.is_over()) {
                 break;
             }
+            if wish.is_none() && self.look_every.is_some_and(|every| cycle.is_multiple_of(every)) {
+                wish = self.look(bus);
+            }
             if wish.is_none() {
                 let line = cycle.is_multiple_of(self.every).then(|| self.described());
                 wish = report(line.as_deref());
             }
         }
         Ok(wish)
+    }
+
+    /// Asks the drives for their inputs, between two cycles; returns the reason of an input to stop.
+    fn look(&self, bus: &mut dyn Bus) -> Option<String> {
+        match nodes::read_inputs(self.cell, bus, self.session) {
+            Ok(words) => inputs::forbidding(self.cell, &words),
+            Err(error) => Some(error.to_string()),
+        }
     }
 
     fn described(&self) -> String {
