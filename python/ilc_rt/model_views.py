@@ -1,4 +1,4 @@
-"""Views of models: text and page with matrices, poles and delays; natural frequencies.
+"""Views of models: text, page, natural frequencies, objects of other libraries.
 
 The compiled `StateSpace` calls them.
 """
@@ -115,3 +115,18 @@ def _facts(model: StateSpace) -> list[tuple[str, str]]:
         # Of a model whose poles cannot be computed the matrices are shown.
         pass
     return facts
+
+
+def to_scipy(model: StateSpace) -> object:
+    """Return the model as an object of scipy.signal, discrete-time if it is."""
+    from scipy.signal import StateSpace as OfScipy
+
+    time = {} if model.dt_s is None else {"dt": model.dt_s}
+    return OfScipy(model.a, model.b, model.c, model.d, **time)
+
+
+def to_control(model: StateSpace) -> object:
+    """Return the model as an object of python-control, discrete-time if it is."""
+    from control import StateSpace as OfControl
+
+    return OfControl(model.a, model.b, model.c, model.d, model.dt_s or 0.0)

@@ -82,7 +82,7 @@ def test_models_of_python_control_are_operands() -> None:
         (lambda: X * "2", TypeError, "operand"),
         (lambda: X[2, 0], IndexError, "output = 2: there are 1"),
         (lambda: X[0, 1.5], IndexError, "input = 1.5"),
-        (lambda: X + 1j, TypeError, "addend"),
+        (lambda: X + 1j, TypeError, "gain"),
         (lambda: X * np.nan, ValueError, "finite"),
     ],
 )

@@ -3,14 +3,10 @@
 use ilc_rt::model::{self, Method, StateSpace};
 use numpy::IntoPyArray;
 use numpy::ndarray::{Array1, Array3};
-use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PySlice};
 
-use crate::argument::{
-    Matrix, Signal, give_matrix, give_signal, is_flat_output, misfit, read_matrix, read_vector,
-};
-use crate::arguments::{Arguments, Keywords};
+use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
+use crate::arguments::{Arguments, Array, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
@@ -54,73 +50,18 @@ impl PyStateSpace {
     }
 }
 
-/// Second operand of a product.
-enum Operand {
-    Factor(f64),
-    Model(StateSpace),
-}
-
-impl PyStateSpace {
-    /// Reads a factor, a matrix as a gain, or a model; `n_signals` is the size of a factor's gain.
-    fn operand(&self, other: &Bound<'_, PyAny>, n_signals: usize) -> PyResult<Operand> {
-        if is_number(other)? {
-            return number("factor", other).map(Operand::Factor);
-        }
-        if is_array(other)? {
-            let gain = read_matrix("gain", other)?;
-            if gain.nrows() != n_signals && gain.ncols() != n_signals {
-                let (rows, cols) = gain.shape();
-                return Err(misfit("gain", &[rows, cols], &format!("{n_signals} rows or columns")));
-            }
-            return StateSpace::static_gain(gain, self.0.dt_s()).or_raise().map(Operand::Model);
-        }
-        read_model("operand", other).map(Operand::Model)
-    }
-
-    /// Reads a model, or a number or matrix as a gain of the size of this model.
-    fn addend(&self, other: &Bound<'_, PyAny>) -> PyResult<StateSpace> {
-        let gain = if is_number(other)? {
-            let (rows, cols) = (self.0.n_outputs(), self.0.n_inputs());
-            Matrix::from_element(rows, cols, number("addend", other)?)
-        } else if is_array(other)? {
-            read_matrix("addend", other)?
-        } else {
-            return read_model("operand", other);
-        };
-        StateSpace::static_gain(gain, self.0.dt_s()).or_raise()
-    }
-}
-
-fn is_number(object: &Bound<'_, PyAny>) -> PyResult<bool> {
-    let numbers = object.py().import("numbers")?.getattr("Number")?;
-    object.is_instance(&numbers)
-}
-
-fn is_array(object: &Bound<'_, PyAny>) -> PyResult<bool> {
-    Ok(object.hasattr("__array__")? && !object.hasattr("A")? || object.is_instance_of::<PyList>())
-}
-
-/// Reads one index, a slice or a list of indices; negative ones count from the end.
-fn chosen(what: &str, object: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<usize>> {
-    let range = object.py().import("builtins")?.getattr("range")?.call1((count,))?;
-    let from_end = |index: &Bound<'_, PyAny>| -> PyResult<usize> {
-        let found = range.get_item(index).map_err(|_| {
-            PyIndexError::new_err(format!("{what} = {index}: there are {count}, numbered from 0"))
-        })?;
-        found.extract()
-    };
-    if object.is_instance_of::<PyList>() {
-        return object.try_iter()?.map(|index| from_end(&index?)).collect();
-    }
-    if object.is_instance_of::<PySlice>() {
-        return range.get_item(object)?.try_iter()?.map(|index| index?.extract()).collect();
-    }
-    Ok(vec![from_end(object)?])
-}
-
 /// Calls a view of models, which are written in Python.
-fn shown<'py>(model: &Bound<'py, PyStateSpace>, view: &str) -> PyResult<Bound<'py, PyAny>> {
+fn shown<'py>(model: &Bound<'py, PyStateSpace>, view: &str) -> Array<'py> {
     model.py().import("ilc_rt.model_views")?.call_method1(view, (model,))
+}
+
+/// Calls an operator of models, which are written in Python, over `_gain`, `_scaled`, `_sum` and `_select`.
+fn operated<'py>(
+    model: &Bound<'py, PyStateSpace>,
+    operator: &str,
+    other: &Bound<'py, PyAny>,
+) -> Array<'py> {
+    model.py().import("ilc_rt.model_algebra")?.call_method1(operator, (model, other))
 }
 
 #[pymethods]
@@ -205,7 +146,7 @@ impl PyStateSpace {
         py: Python<'py>,
         u: &Bound<'py, PyAny>,
         x0: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> Array<'py> {
         let u = Signal::read("u", u)?.with_channels("u", self.0.n_inputs())?;
         let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
         let y = interruptible(py, || self.0.simulate(&u.values, x0.as_deref()))?.or_raise()?;
@@ -213,7 +154,7 @@ impl PyStateSpace {
     }
 
     /// Return the first `n` Markov parameters D, CB, CAB, ..., shape (n, n_outputs, n_inputs).
-    fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> Array<'py> {
         let n = whole("n", n)?;
         let parameters = interruptible(py, || self.0.markov(n))?.or_raise()?;
         let shape = (n, self.0.n_outputs(), self.0.n_inputs());
@@ -224,14 +165,14 @@ impl PyStateSpace {
     /// Return the lifted-system matrix of runs of `n` samples, shape (n * n_outputs, n * n_inputs).
     ///
     /// The block lower-triangular Toeplitz matrix of the Markov parameters, sample by sample.
-    fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> Array<'py> {
         let n = whole("n", n)?;
         let lifted = interruptible(py, || self.0.lifted(n))?.or_raise()?;
         Ok(give_matrix(py, &lifted))
     }
 
     /// Return the poles, the eigenvalues of A, in no particular order.
-    fn poles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn poles<'py>(&self, py: Python<'py>) -> Array<'py> {
         let poles = self.0.poles().or_raise()?;
         Ok(Array1::from(poles).into_pyarray(py).into_any())
     }
@@ -261,22 +202,18 @@ impl PyStateSpace {
     }
 
     /// Return the finite invariant zeros, in no particular order [emami1982].
-    fn zeros<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn zeros<'py>(&self, py: Python<'py>) -> Array<'py> {
         let zeros = interruptible(py, || self.0.zeros())?.or_raise()?;
         Ok(Array1::from(zeros).into_pyarray(py).into_any())
     }
 
     /// Return the static gain G(0) or G(z = 1), shape (n_outputs, n_inputs).
-    fn dc_gain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn dc_gain<'py>(&self, py: Python<'py>) -> Array<'py> {
         Ok(give_matrix(py, &self.0.dc_gain().or_raise()?))
     }
 
     /// Return C (q I - A)^-1 B + D at frequencies in rad/s, shape (n_frequencies, n_outputs, n_inputs).
-    fn frequency_response<'py>(
-        &self,
-        py: Python<'py>,
-        w_rad_s: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn frequency_response<'py>(&self, py: Python<'py>, w_rad_s: &Bound<'py, PyAny>) -> Array<'py> {
         let w = read_vector("w_rad_s", w_rad_s)?;
         let response = interruptible(py, || self.0.frequency_response(&w))?.or_raise()?;
         let shape = (w.len(), self.0.n_outputs(), self.0.n_inputs());
@@ -341,30 +278,23 @@ impl PyStateSpace {
     ///
     /// Returns scipy.signal.StateSpace: Discrete if this model is.
     /// Raises ImportError if SciPy is not installed.
-    fn to_scipy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let arguments = (self.a(py), self.b(py), self.c(py), self.d(py));
-        let keywords = PyDict::new(py);
-        if let Some(dt_s) = self.0.dt_s() {
-            keywords.set_item("dt", dt_s)?;
-        }
-        py.import("scipy.signal")?.getattr("StateSpace")?.call(arguments, Some(&keywords))
+    fn to_scipy<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        shown(slf, "to_scipy")
     }
 
     /// Return the model as an object of python-control.
     ///
     /// Returns control.StateSpace: Discrete if this model is.
     /// Raises ImportError if python-control is not installed.
-    fn to_control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let dt_s = self.0.dt_s().unwrap_or(0.0);
-        let arguments = (self.a(py), self.b(py), self.c(py), self.d(py), dt_s);
-        py.import("control")?.getattr("StateSpace")?.call1(arguments)
+    fn to_control<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        shown(slf, "to_control")
     }
 
     /// Return natural frequencies in Hz and dampings of the poles, each of shape (n_states,), in the order of
     /// the frequencies.
     ///
     /// Of a discrete-time model, those of the continuous-time poles that it samples.
-    fn natural_frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+    fn natural_frequencies<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
         shown(slf, "natural_frequencies")
     }
 
@@ -374,74 +304,81 @@ impl PyStateSpace {
         None
     }
 
-    fn __mul__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
-        match self.operand(other, self.0.n_inputs())? {
-            Operand::Factor(factor) => self.0.scaled(factor),
-            Operand::Model(first) => first.series(&self.0),
-        }
-        .or_raise()
-        .map(Self)
+    /// Return a model of another library, or this class itself, as this class.
+    #[staticmethod]
+    fn _of(operand: &Bound<'_, PyAny>) -> PyResult<Self> {
+        read_model("operand", operand).map(Self)
     }
 
-    fn __rmul__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
-        match self.operand(other, self.0.n_outputs())? {
-            Operand::Factor(factor) => self.0.scaled(factor),
-            Operand::Model(next) => self.0.series(&next),
-        }
-        .or_raise()
-        .map(Self)
+    fn _gain(&self, gain: &Bound<'_, PyAny>) -> PyResult<Self> {
+        StateSpace::static_gain(read_matrix("gain", gain)?, self.0.dt_s()).or_raise().map(Self)
     }
 
-    fn __truediv__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
-        self.0.scaled(1.0 / number("divisor", other)?).or_raise().map(Self)
+    fn _scaled(&self, factor: &Bound<'_, PyAny>) -> PyResult<Self> {
+        self.0.scaled(number("factor", factor)?).or_raise().map(Self)
     }
 
-    fn __add__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
-        self.0.sum(&self.addend(other)?).or_raise().map(Self)
+    fn _sum(&self, other: &Bound<'_, Self>) -> PyResult<Self> {
+        self.0.sum(&other.get().0).or_raise().map(Self)
     }
 
-    fn __radd__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
-        self.__add__(other)
+    fn _inverse(&self) -> PyResult<Self> {
+        self.0.inverse().or_raise().map(Self)
     }
 
-    fn __sub__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let negative = self.addend(other)?.scaled(-1.0).or_raise()?;
-        self.0.sum(&negative).or_raise().map(Self)
-    }
-
-    fn __rsub__(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let negative = self.0.scaled(-1.0).or_raise()?;
-        self.addend(other)?.sum(&negative).or_raise().map(Self)
+    fn _select(&self, outputs: Vec<usize>, inputs: Vec<usize>) -> PyResult<Self> {
+        self.0.select(&outputs, &inputs).or_raise().map(Self)
     }
 
     fn __neg__(&self) -> PyResult<Self> {
         self.0.scaled(-1.0).or_raise().map(Self)
     }
 
-    fn __pow__(&self, exponent: i32, modulo: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        if modulo.is_some() || !(-16..=16).contains(&exponent) || exponent == 0 {
-            let line = format!("exponent = {exponent}: allowed -16 to 16, without 0 and modulo");
-            return Err(PyValueError::new_err(line));
-        }
-        let base = if exponent < 0 { self.0.inverse().or_raise()? } else { self.0.clone() };
-        let mut power = base.clone();
-        for _ in 1..exponent.unsigned_abs() {
-            power = power.series(&base).or_raise()?;
-        }
-        Ok(Self(power))
+    fn __mul__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
+        operated(slf, "product", other)
     }
 
-    fn __getitem__(&self, channels: (Bound<'_, PyAny>, Bound<'_, PyAny>)) -> PyResult<Self> {
-        let outputs = chosen("output", &channels.0, self.0.n_outputs())?;
-        let inputs = chosen("input", &channels.1, self.0.n_inputs())?;
-        self.0.select(&outputs, &inputs).or_raise().map(Self)
+    fn __rmul__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
+        operated(slf, "product_after", other)
     }
 
-    fn __str__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+    fn __truediv__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
+        operated(slf, "quotient", other)
+    }
+
+    fn __add__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
+        operated(slf, "sum_of", other)
+    }
+
+    fn __radd__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
+        operated(slf, "sum_of", other)
+    }
+
+    fn __sub__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
+        operated(slf, "difference", other)
+    }
+
+    fn __rsub__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
+        operated(slf, "difference_from", other)
+    }
+
+    fn __getitem__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
+        operated(slf, "channels", other)
+    }
+
+    fn __pow__<'py>(
+        slf: &Bound<'py, Self>,
+        exponent: &Bound<'py, PyAny>,
+        _modulo: Option<&Bound<'py, PyAny>>,
+    ) -> Array<'py> {
+        operated(slf, "power", exponent)
+    }
+
+    fn __str__<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
         shown(slf, "text")
     }
 
-    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
         shown(slf, "page")
     }
 
