@@ -107,11 +107,9 @@ def _chosen(name: str, key: _Key, count: int) -> list[int]:
     numbers = range(count)
     if isinstance(key, slice):
         return list(numbers[key])
-    chosen = []
-    for index in key if isinstance(key, list) else [key]:
-        try:
-            chosen.append(numbers[index])
-        except (IndexError, TypeError) as error:
-            message = f"{name} = {index}: there are {count}, numbered from 0"
-            raise IndexError(message) from error
-    return chosen
+    chosen = key if isinstance(key, list) else [key]
+    try:
+        return [numbers[index] for index in chosen]
+    except (IndexError, TypeError) as error:
+        message = f"{name} = {key}: there are {count}, numbered from 0"
+        raise IndexError(message) from error
