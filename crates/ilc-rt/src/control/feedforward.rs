@@ -9,6 +9,8 @@
 pub struct Feedforward {
     /// Share of the reference velocity.
     pub velocity: f64,
+    /// Time by which the set point is ahead of the program.
+    pub lead_s: f64,
     /// Force per reference acceleration.
     pub mass_kg: f64,
     /// Force per reference velocity.
@@ -56,6 +58,7 @@ mod tests {
     fn hand_computed_force() {
         let forward = Feedforward {
             velocity: 1.0,
+            lead_s: 0.0,
             mass_kg: 20.0,
             viscous_n_s_m: 30.0,
             coulomb_n: 15.0,
