@@ -113,7 +113,7 @@ pub(super) fn check(axis: &Axis, cell: &Cell, v: &Checker) -> Result<(), ConfigE
         };
         return Err(v.refuse(&at("position_loop"), &found, &allowed));
     }
-    torque::check(axis, v)?;
+    torque::check(axis, cell.format(axis.bus).payload_max(), v)?;
     homing::check(axis, v)?;
     drive::check(axis, cell.format(axis.bus).payload_max(), v)?;
     simulation::check(axis, cell.simulation.step_us, v)

@@ -6,7 +6,7 @@ use crate::config::{Axis, ConfigError, InputKind, mode};
 use crate::fieldbus::cia402::objects;
 
 /// Checks the entry point of the learned input, and the sections that torques and feed-forwards need.
-pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
+pub(super) fn check(axis: &Axis, payload_max: usize, v: &Checker) -> Result<(), ConfigError> {
     let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
     let (name, design) = (axis.interface.name(), mode::of(axis.interface));
     let input = axis.input_kind();
@@ -43,7 +43,7 @@ pub(super) fn check(axis: &Axis, v: &Checker) -> Result<(), ConfigError> {
         "a torque needs [axis.force] rated_n and mass_kg",
     )?;
     if axis.has_torque_offset()
-        && let Ok(Some(map)) = axis.drive.pdo.map(axis.interface)
+        && let Ok(Some(map)) = axis.drive.pdo.map(axis.interface, payload_max)
         && !map.command.carries(objects::TORQUE_OFFSET)
     {
         let needed = "0x60B2 among them, for the torque that this axis gets";

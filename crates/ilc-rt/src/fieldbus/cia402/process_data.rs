@@ -199,7 +199,8 @@ impl PdoMap {
         let mut status = PdoLayout::EMPTY;
         status.add(objects::STATUSWORD, 16);
         status.add(objects::POSITION_ACTUAL, 32);
-        Self { command, answers: [status, PdoLayout::EMPTY], supervision: Supervision::default() }
+        let (offset, answers) = (PdoLayout::EMPTY, [status, PdoLayout::EMPTY]);
+        Self { command, offset, answers, supervision: Supervision::default() }
     }
 
     /// Returns the map with the digital inputs (0x60FD) in its answers, if it has none yet: where they fit into
