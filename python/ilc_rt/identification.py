@@ -39,7 +39,8 @@ class Identification:
         Fitted gain, natural frequency, damping and delay.
     described : SecondOrderFit or VelocityLoopFit
         Model that ``[axis.model]`` can express: unit gain and whole samples of
-        delay; the velocity loop alone for a csv axis.
+        delay; the velocity loop alone for a csv axis; any gain if the input is an offset of
+        velocity or torque.
     uncertainty : tuple of two arrays
         Frequencies in Hz, and the bound of the residual of `described` at each: ``|H/G - 1|`` plus
         three standard deviations of the measurement.
@@ -51,17 +52,18 @@ class Identification:
         Sample time in seconds.
     experiment : Experiment
         The experiment, with the actual amplitude.
-    interface : {"csp", "csv"} or None
+    interface : {"csp", "csv", "cst"} or None
         Mode of the axis; None if it is not an axis of a cell.
     doubt : str or None
         Reason not to use the model, if there is one.
     axis_model : str
-        The section ``[axis.model]`` with the described model.
+        The section ``[axis.model]`` with the described model; for a torque also the mass, in
+        ``[axis.force]``.
     followed : bool
         False if the output does not follow the input: the figures are then meaningless.
     input_unit : str or None
-        Unit of the input: m, m/s, rad or rad/s; None if it is not an axis of a cell. The output has
-        the same without ``/s``.
+        Unit of the input: m, m/s, N, rad, rad/s or N m; None if it is not an axis of a cell. The
+        output is in m or rad.
     """
 
     measured: FrequencyResponse
@@ -73,7 +75,7 @@ class Identification:
     period_samples: int
     dt_s: float
     experiment: Experiment
-    interface: Literal["csp", "csv"] | None = None
+    interface: Literal["csp", "csv", "cst"] | None = None
     doubt: str | None = None
     axis_model: str = ""
     followed: bool = True

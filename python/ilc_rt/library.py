@@ -136,7 +136,7 @@ class Library(_native.Library):
         Parameters
         ----------
         u : ndarray of float64, shape (n_samples,) or (n_samples, n_axes)
-            Its learned input, in m or m/s.
+            Its learned input, in m, m/s or N.
         e : ndarray of float64, same shape as `u`
             Its error in m, reference minus measurement.
         cycle_s : float

@@ -10,6 +10,8 @@ CHANGE_MAX_PERCENT = 1e4
 # Units with a prefix; any other one is shown as it is.
 BASES = ("m", "rad", "m/s", "rad/s")
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
+FORCES = {"N": "m", "N m": "rad"}
+"""Units of a force, with those of the position that it moves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +67,17 @@ def unit_for(base: str, size: float | None) -> Unit:
     else:
         scale, prefix = PREFIXES[1]
     return Unit(prefix + base, base, scale)
+
+
+def axis_unit(input_unit: str) -> str:
+    """Return the unit of the position of an axis, m or rad, by that of its learned input.
+
+    Examples
+    --------
+    >>> axis_unit("rad/s"), axis_unit("m"), axis_unit("N m")
+    ('rad', 'm', 'rad')
+    """
+    return FORCES.get(input_unit, input_unit.removesuffix("/s"))
 
 
 def digits(value: float) -> str:

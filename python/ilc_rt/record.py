@@ -77,7 +77,7 @@ class IterationRecord(Figures):
 
     @property
     def input(self) -> NDArray[np.float64]:
-        """Learned input, shape (n_samples, n_axes), in m or m/s (csv axes)."""
+        """Learned input, shape (n_samples, n_axes), in m, m/s or N."""
         return self._signal("input")
 
     @property

@@ -21,7 +21,7 @@ from ilc_rt.events import (
     StartEvent,
 )
 from ilc_rt.library import Library
-from ilc_rt.quantity import digits
+from ilc_rt.quantity import axis_unit, digits
 from ilc_rt.record import IterationRecord
 from ilc_rt.result_views import Views
 
@@ -166,12 +166,12 @@ class CampaignResult(Views):
         return self.start.bus if self.start else ""
 
     def input_unit(self, axis: int) -> str:
-        """Return the unit of the learned input of an axis: m, m/s, rad or rad/s."""
+        """Return the unit of the learned input of an axis: m, m/s, N, rad, rad/s or N m."""
         return self.input_units[axis] if axis < len(self.input_units) else "m"
 
     def axis_unit(self, axis: int) -> str:
         """Return the unit of the position of an axis: m or rad."""
-        return self.input_unit(axis).removesuffix("/s")
+        return axis_unit(self.input_unit(axis))
 
     @property
     def axis_units(self) -> tuple[str, ...]:

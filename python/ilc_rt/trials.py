@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import tomlkit
 
-from ilc_rt._native import StateSpace
 from ilc_rt.laws import NormOptimalIlc
-from ilc_rt.models import discretize, from_transfer_function, second_order
+from ilc_rt.models import discretize, from_transfer_function
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ilc_rt._native import Cell
+    from ilc_rt._native import Cell, StateSpace
 
     Array = NDArray[np.float64]
 
@@ -38,69 +37,79 @@ FRICTION_SHARE = 0.05
 class BelievedAxis:
     """An axis according to its cell, with its part of the program.
 
+    Inputs are counted as the weights of a law count them: a torque by the travel that it holds.
+
     Attributes
     ----------
-    name : str
-        Name of the axis.
-    unit : {"m", "rad"}
-        Unit of its position.
-    interface : {"csp", "csv"}
-        Its command mode.
-    dt_s : float
-        Servo cycle in seconds.
+    cell : Cell
+        The cell description.
+    index : int
+        Number of the axis in it.
     way : ndarray of float64, shape (n_samples,)
-        Set points of a run, from its start.
-    natural_frequency_hz, damping : float
-        Of the position loop; of a csv axis those of loop and drive together.
-    delay_samples : int
-        Dead time: cycles from a command to its first effect.
-    velocity_bandwidth_hz, position_gain_per_s, velocity_feedforward : float
-        Loop gain of a csv axis; 0 for a csp axis.
+        Set points of a run, from its start; of a long program only the beginning.
     """
 
-    name: str
-    unit: Literal["m", "rad"]
-    interface: Literal["csp", "csv"]
-    dt_s: float
+    cell: Cell
+    index: int
     way: Array
-    natural_frequency_hz: float
-    damping: float
-    delay_samples: int
-    velocity_bandwidth_hz: float = 0.0
-    position_gain_per_s: float = 0.0
-    velocity_feedforward: float = 0.0
 
-    def model(self, frequency: float = 1.0, damping: float = 1.0, delay: int = 0) -> StateSpace:
-        """Return the closed loop from learned input to position.
+    @property
+    def name(self) -> str:
+        """Name of the axis."""
+        return self.cell.axis_names[self.index]
 
-        `frequency` and `damping` are factors: of natural frequency (csp) or velocity bandwidth
-        (csv), and of damping (csp); `delay` counts cycles in addition to `delay_samples`.
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Unit of its position."""
+        return self.cell.axis_units[self.index]
+
+    @property
+    def dt_s(self) -> float:
+        """Servo cycle in seconds."""
+        return self.cell.cycle_s
+
+    @property
+    def natural_frequency_hz(self) -> float:
+        """Natural frequency of its position loop, wherever it is closed."""
+        return self.cell.natural_frequencies_hz[self.index]
+
+    @property
+    def input_bound(self) -> tuple[str, float]:
+        """Key and value of the bound of its learned input."""
+        return self.cell.input_bounds[self.index]
+
+    @property
+    def input_scale(self) -> float:
+        """Unit of the weights per unit of that input."""
+        return self.cell.input_scales[self.index]
+
+    def perturbed(
+        self, frequency: float = 1.0, damping: float = 1.0, delay: int = 0
+    ) -> tuple[StateSpace, Array]:
+        """Return the model from learned input to position, and the way of a run without learning.
+
+        `frequency` and `damping` are factors of what the model of the axis describes; `delay`
+        counts cycles in addition to its own.
         """
-        turn, n_delay = 2.0 * np.pi, max(self.delay_samples + delay, 0)
-        if self.interface == "csp":
-            loop = second_order(
-                turn * frequency * self.natural_frequency_hz, damping * self.damping
-            )
-            return discretize(loop, self.dt_s).delayed(n_delay)
-        bandwidth = turn * frequency * self.velocity_bandwidth_hz
-        velocity = from_transfer_function([bandwidth], [1.0, bandwidth, 0.0])
-        gain = [[self.position_gain_per_s]]
-        nothing = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0))
-        # The loop sees a position that is one cycle old.
-        controller = StateSpace(*nothing, gain, self.dt_s).delayed(1)
-        return discretize(velocity, self.dt_s).delayed(n_delay).feedback(controller)
+        model, way = self.cell.perturbed(self.index, frequency, damping, delay)
+        return model, way[: len(self.way)]
 
-    def drive(self) -> Array:
-        """Return the input of a run without learning, in the unit of the axis input."""
-        if self.interface == "csp":
-            return self.way
-        ahead = np.append(self.way[1:], self.way[-1:])
-        velocity = (ahead - self.way) / self.dt_s
-        return self.position_gain_per_s * self.way + self.velocity_feedforward * velocity
+    def model(self) -> StateSpace:
+        """Return the closed loop from learned input to position."""
+        return self.perturbed()[0]
 
     def first_error(self) -> Array:
         """Return the error of a run without learning, by the model."""
-        return self.way - self.model().simulate(self.drive())
+        return self.way - self.perturbed()[1]
+
+    def gain(self) -> float:
+        """Return the gain of the model: at rest, or its peak if a steady input has no effect."""
+        model = self.model()
+        static = abs(float(model.dc_gain()[0, 0]))
+        highest = np.pi / self.dt_s
+        w_rad_s = np.geomspace(0.01 * min(self.natural_frequency_hz, highest), 0.99 * highest, 200)
+        peak = float(np.abs(model.frequency_response(w_rad_s)).max())
+        return static if static > 0.1 * peak else peak
 
     def direction(self) -> Array:
         """Return the direction of motion at each sample; at rest, the last direction."""
@@ -124,67 +133,54 @@ def believed_axes(
     """
     written = tomlkit.parse(Path(cell.path).read_text(encoding="utf-8-sig")).unwrap()
     way = cell.reference()[:samples_max] - cell.reference()[0]
-    axes = []
-    for index, axis in enumerate(written["axis"]):
-        model, loop = axis.get("model", {}), axis.get("position_loop", {})
-        interface = cell.interfaces[index]
-        bandwidth_hz = gain = 0.0
-        if interface == "csp":
-            natural_hz, damping = model["natural_frequency_hz"], model["damping"]
-        else:
-            bandwidth_hz, gain = model["velocity_bandwidth_hz"], loop["gain_per_s"]
-            natural_hz = float(np.sqrt(gain * bandwidth_hz / (2.0 * np.pi)))
-            damping = 0.5 * bandwidth_hz / natural_hz
-        axes.append(
-            BelievedAxis(
-                cell.axis_names[index], cell.axis_units[index], interface, cell.cycle_s,
-                np.ascontiguousarray(way[:, index]), float(natural_hz), float(damping),
-                int(model.get("delay_samples", 0)), float(bandwidth_hz), float(gain),
-                float(loop.get("velocity_feedforward", 0.0)),
-            )
-        )  # fmt: skip
-    return axes, written
+    columns = (np.ascontiguousarray(way[:, index]) for index in range(cell.n_axes))
+    return [BelievedAxis(cell, index, column) for index, column in enumerate(columns)], written
 
 
 @dataclass(frozen=True)
 class Suspect:
     """A perturbed axis.
 
-    `plant` leads from the learned input to the measured position; `friction` is the input needed to
-    overcome it; `what` is how the axis differs from the model, in words.
+    `plant` leads from the learned input to the measured position; `way` is that of a run without
+    learning; `what` is how the axis differs from the model, in words.
     """
 
     what: str
     plant: StateSpace
-    friction: float = 0.0
+    way: Array
 
 
 def suspects(axis: BelievedAxis, uncertainty: float, known_hz: float) -> list[Suspect]:
     """Return perturbed axes, the most demanding first.
 
     Up to `known_hz` the model is right within `uncertainty`: natural frequency, damping and delay
-    vary. Above it dynamics are arbitrary, such as a mode between drive and tool. Friction acts
-    at every frequency.
+    vary. Above it dynamics are arbitrary, such as a mode between drive and tool. Friction, which
+    takes a constant input against the direction of motion, acts at every frequency.
     """
-    model = axis.model()
-    gain = abs(float(model.dc_gain()[0, 0]))
-    friction = FRICTION_SHARE * float(np.abs(axis.first_error()).max()) / gain
+    model, way = axis.perturbed()
+    friction = FRICTION_SHARE * float(np.abs(axis.way - way).max()) / axis.gain()
+    stuck = way - model.simulate(friction * axis.direction())
     half = 0.5 * uncertainty
     nyquist_hz = 0.5 / axis.dt_s
     modes = [place * known_hz for place in MODE_PLACES if place * known_hz < 0.9 * nyquist_hz]
-    found = [
-        Suspect(f"friction and a mode at {hz:.3g} Hz", model.series(axis.mode(hz)), friction)
-        for hz in modes
-    ]
-    found += [Suspect(f"a mode at {hz:.3g} Hz", model.series(axis.mode(hz))) for hz in modes]
+
+    def behind(hz: float, way: Array) -> tuple[StateSpace, Array]:
+        return model.series(axis.mode(hz)), axis.mode(hz).simulate(way)
+
+    found = [Suspect(f"friction and a mode at {hz:.3g} Hz", *behind(hz, stuck)) for hz in modes]
+    found += [Suspect(f"a mode at {hz:.3g} Hz", *behind(hz, way)) for hz in modes]
     found += [
-        Suspect("friction", model, friction),
-        Suspect("slower, less damped, a cycle later", axis.model(1 - half, 1 - uncertainty, 1)),
-        Suspect("faster, more damped, a cycle earlier", axis.model(1 + half, 1 + uncertainty, -1)),
-        Suspect("slower", axis.model(frequency=1 - half)),
-        Suspect("faster", axis.model(frequency=1 + half)),
-        Suspect("a cycle later", axis.model(delay=1)),
-        Suspect("as its model", model),
+        Suspect("friction", model, stuck),
+        Suspect(
+            "slower, less damped, a cycle later", *axis.perturbed(1 - half, 1 - uncertainty, 1)
+        ),
+        Suspect(
+            "faster, more damped, a cycle earlier", *axis.perturbed(1 + half, 1 + uncertainty, -1)
+        ),
+        Suspect("slower", *axis.perturbed(frequency=1 - half)),
+        Suspect("faster", *axis.perturbed(frequency=1 + half)),
+        Suspect("a cycle later", *axis.perturbed(delay=1)),
+        Suspect("as its model", model, way),
     ]
     return found
 
@@ -239,8 +235,6 @@ class Bench:
         self.axis, self.noise = axis, noise
         self.model = axis.model()
         self.suspects = suspects(axis, uncertainty, known_hz)
-        drive, direction = axis.drive(), axis.direction()
-        self._drives = [drive - suspect.friction * direction for suspect in self.suspects]
         # The same noise for all weights, so that they differ by more than chance.
         shape = (n_runs + 1, len(axis.way))
         self._noise = noise * np.random.default_rng(1).standard_normal(shape) if noise else None
@@ -253,10 +247,10 @@ class Bench:
             self.model, n_samples, q=weights.q, s=weights.s, r=weights.r, rate=weights.rate
         )
         trials = []
-        for suspect, drive in zip(self.suspects, self._drives, strict=True):
+        for suspect in self.suspects:
             u, rms = np.zeros(n_samples), np.zeros(self._n_runs + 1)
             for run in range(self._n_runs + 1):
-                e = self.axis.way - suspect.plant.simulate(drive + u)
+                e = self.axis.way - suspect.way - suspect.plant.simulate(u)
                 if self._noise is not None:
                     e = e + self._noise[run]
                 rms[run] = np.sqrt(np.mean(e * e))
@@ -264,7 +258,6 @@ class Bench:
                     return None
                 if run < self._n_runs:
                     u = law.update(u, e)
-            trials.append(
-                Trial(self.axis.name, suspect.what, rms, float(np.abs(u).max(initial=0.0)))
-            )
+            peak = float(np.abs(u).max(initial=0.0)) / self.axis.input_scale
+            trials.append(Trial(self.axis.name, suspect.what, rms, peak))
         return trials

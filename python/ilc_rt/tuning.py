@@ -208,7 +208,7 @@ def propose_weights(
     return Proposal(
         cell=described.name, law=law, section=section, weights=weights,
         reasons=_reasons(search, weights, trials, low, known_of, noise_m, along), along=along,
-        trials=tuple(trials), notes=_notes(law, moving, written, trials),
+        trials=tuple(trials), notes=_notes(law, moving, trials),
         uncertainty=low, known_hz=known_of, noise=noise_m, n_runs=n_runs,
         units={axis.name: axis.unit for axis in axes},
     )  # fmt: skip
@@ -336,20 +336,14 @@ def _reasons(
     return tuple(reasons)
 
 
-def _notes(
-    law: str, axes: list[BelievedAxis], written: dict[str, Any], trials: list[Trial]
-) -> tuple[str, ...]:
+def _notes(law: str, axes: list[BelievedAxis], trials: list[Trial]) -> tuple[str, ...]:
     notes = []
     if law not in TUNED_LAWS:
         notes.append(
             f'[learning] law = "{law}" does not read these weights: law = "norm_optimal" does'
         )
-    learning = written.get("learning", {})
     for axis in axes:
-        key, default = (
-            ("input_max_m", 0.005) if axis.interface == "csp" else ("input_max_m_s", 0.05)
-        )
-        bound = float(learning.get(key, default))
+        key, bound = axis.input_bound
         own = [trial for trial in trials if trial.axis == axis.name]
         needed = own[-1].input_peak
         if needed > bound:

@@ -35,8 +35,7 @@ class WeightSearch:
         self.refused: float | None = None
         self.held = True
         bases = [
-            abs(float(bench.model.dc_gain()[0, 0]))
-            / (bench.axis.dt_s * 2.0 * np.pi * bench.axis.natural_frequency_hz)
+            bench.axis.gain() / (bench.axis.dt_s * 2.0 * np.pi * bench.axis.natural_frequency_hz)
             for bench in benches
         ]
         low, high = 0.25 * min(bases) * levels[0] ** 0.5, 32.0 * max(bases) * levels[-1] ** 0.5

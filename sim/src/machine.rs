@@ -288,6 +288,7 @@ impl Machine {
                 self.plant.limit_force(number, share);
             }
             *demand = if axis.is_muted { Demand::Off } else { axis.drive.step(self.step_us, out) };
+            self.plant.feed_force(number, axis.drive.force_offset_n());
         }
         if let Some(tool) = self.tool.as_mut().filter(|tool| !tool.is_muted) {
             tool.encoder.step(self.step_us, out);

@@ -137,6 +137,35 @@ def test_a_velocity_loop_is_identified_through_its_position_loop(bench):
 
 
 @pytest.mark.parametrize(
+    ("cell", "axis", "mass_kg"),
+    [("10_cst", "y", 150.0), ("11_csp_torque", "y", 20.0), ("13_csv_torque", "y", 20.0)],
+)
+def test_a_torque_shows_the_mass(cell, axis, mass_kg):
+    found = identify.multisine(
+        f"examples/{cell}.toml",
+        axis=axis,
+        measure="encoder",
+        bus="loopback:",
+        from_hz=3.0,
+        to_hz=30.0,
+    )
+    assert (found.input_unit, found.doubt) == ("N", None)
+    section = found.section()
+    assert "[axis.force]" in section
+    line = next(line for line in section.splitlines() if line.startswith("mass_kg"))
+    assert float(line.split("=")[1]) == pytest.approx(mass_kg, rel=0.25)
+
+
+def test_a_velocity_offset_shows_the_position_loop_of_the_drive():
+    found = identify.multisine(
+        "examples/12_csp_velocity.toml", axis="y", measure="encoder", bus="loopback:"
+    )
+    assert (found.input_unit, found.doubt) == ("m/s", None)
+    line = next(line for line in found.section().splitlines() if "natural_frequency" in line)
+    assert float(line.split("=")[1]) == pytest.approx(15.0, rel=0.15)
+
+
+@pytest.mark.parametrize(
     ("options", "said"),
     [
         ({"amplitude": 0.006, "to_hz": 2.0}, "learning.input_max_m = 0.006"),

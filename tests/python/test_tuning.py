@@ -13,11 +13,17 @@ from ilc_rt import Campaign, Cell
 from ilc_rt.cell_file import changed_text, write_values
 from ilc_rt.cli import main
 from ilc_rt.errors import BadInputError
-from ilc_rt.trials import BelievedAxis, Bench, Weights, believed_axes
+from ilc_rt.trials import Bench, Weights, believed_axes
 from ilc_rt.tuning import propose_weights
 
 README = {"uncertainty": 0.3, "noise_m": 1e-6}
 SHIPPED = ["examples/01_gantry.toml", "examples/02_parallel.toml", "examples/04_gcode.toml"]
+OFFSETS = [
+    "examples/10_cst.toml",
+    "examples/11_csp_torque.toml",
+    "examples/12_csp_velocity.toml",
+    "examples/13_csv_torque.toml",
+]
 
 
 def copied(tmp_path, cell):
@@ -45,6 +51,14 @@ def test_a_shipped_cell_learns_with_what_is_proposed(cell, options, tmp_path):
     assert_learns(path, tmp_path, 0.15)
 
 
+@pytest.mark.parametrize("cell", OFFSETS)
+def test_a_cell_that_learns_an_offset_learns_with_what_is_proposed(cell, tmp_path):
+    path = copied(tmp_path, cell)
+    found = propose_weights(path)
+    assert found.write(path)
+    assert_learns(path, tmp_path, 0.3)
+
+
 def test_the_cell_of_the_demo_gets_what_the_first_example_gets():
     demo = propose_weights("python/ilc_rt/data/gantry.toml")
     assert demo.weights == propose_weights(GANTRY).weights
@@ -59,7 +73,7 @@ def test_another_cell_learns_with_what_is_proposed(seed, tmp_path):
     assert contour[-1] < 0.3 * contour[0]
 
 
-@pytest.mark.parametrize("cell", SHIPPED)
+@pytest.mark.parametrize("cell", SHIPPED + OFFSETS)
 def test_the_axes_of_the_trials_are_those_of_the_controller(cell):
     described = Cell.load(cell)
     axes, _ = believed_axes(described)
@@ -69,7 +83,9 @@ def test_the_axes_of_the_trials_are_those_of_the_controller(cell):
         whole = np.zeros_like(way)
         whole[:, index] = way[:, index]
         np.testing.assert_allclose(
-            axis.model().simulate(way[:, index]), model.simulate(whole)[:, index], atol=1e-12
+            axis.model().simulate(way[:, index]),
+            model.simulate(whole / described.input_scales[index])[:, index],
+            atol=1e-12,
         )
         np.testing.assert_allclose(
             axis.first_error(), described.first_error()[:, index], atol=1e-12
@@ -293,7 +309,7 @@ def test_contour_weights_as_the_manual_says_learn_nearly_as_well(tmp_path):
 
 
 def test_a_trial_stops_when_its_error_grows():
-    axis = BelievedAxis("x", "m", "csp", 0.002, np.linspace(0.0, 0.1, 400), 15.0, 0.6, 3)
+    (_, axis), _ = believed_axes(Cell.load(GANTRY))
     bench = Bench(axis, 0.3, 19.5, 0.0, 10)
     assert bench.try_weights(Weights(1.0, 0.0, 0.0, 0.5), 1.2) is None
     trials = bench.try_weights(Weights(1.0, 0.0, 0.0, 20.0), 1.2)

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use ilc_rt::config::{Axis, Cell, Measure};
+use ilc_rt::config::{Axis, Cell, Measure, mode};
 use ilc_rt::design::{self, Plan};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::argument::give_signal;
@@ -114,11 +115,42 @@ impl PyCell {
         self.cell.axes.iter().map(|axis| axis.name.clone()).collect()
     }
 
-    /// Command interface of each axis: `csp` (input in m) or `csv` (in m/s).
+    /// Command interface of each axis: `csp`, `csv` or `cst`.
     #[getter]
     fn interfaces(&self) -> Vec<&'static str> {
         let name = |axis: &Axis| axis.interface.name();
         self.cell.axes.iter().map(name).collect()
+    }
+
+    /// Quantity that the learned input of each axis is added to: `position` (in m), `velocity` (in m/s)
+    /// or `torque` (in N).
+    #[getter]
+    fn inputs(&self) -> Vec<&'static str> {
+        self.cell.axes.iter().map(|axis| axis.input_kind().name()).collect()
+    }
+
+    /// Bound of the learned input of each axis: its key in `[learning]`, and the value.
+    #[getter]
+    fn input_bounds(&self) -> Vec<(&'static str, f64)> {
+        let bound = |axis: &Axis| {
+            let input = axis.input_kind();
+            (mode::bound_key(input), mode::bound_of(input, &self.cell.learning))
+        };
+        self.cell.axes.iter().map(bound).collect()
+    }
+
+    /// Unit in which the weights of a law count the learned input of each axis, per unit of that input: the
+    /// travel in metres that a newton holds if it learns a torque, 1 otherwise.
+    #[getter]
+    fn input_scales(&self) -> Vec<f64> {
+        self.cell.axes.iter().map(mode::scale_of).collect()
+    }
+
+    /// Natural frequency of the position loop of each axis in Hz, by its model.
+    #[getter]
+    fn natural_frequencies_hz(&self) -> Vec<f64> {
+        let of = |axis: &Axis| mode::of(axis.interface).natural_frequency_hz(axis);
+        self.cell.axes.iter().map(of).collect()
     }
 
     /// Unit of the position of each axis: `m`, or `rad` for a rotary one.
@@ -181,6 +213,41 @@ impl PyCell {
     fn first_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let error = design::first_error(&self.cell, &self.reference_m).or_raise()?;
         give_signal(py, error, self.cell.n_axes(), false)
+    }
+
+    /// Return an axis that differs from its model, for trials of weights.
+    ///
+    /// - axis : int: Its index.
+    /// - frequency : float: Factor of the natural frequency (csp), of the velocity bandwidth (csv), or of the
+    ///   natural frequency by another mass (cst).
+    /// - damping : float: Factor of the damping (csp).
+    /// - delay : int: Cycles in addition to `delay_samples`.
+    ///
+    /// Returns tuple of StateSpace and ndarray of float64, shape (n_samples,): The model from the learned
+    /// input, counted by `input_scales`, to the position, and the way of a run without learning. Raises
+    /// ValueError for factors that give no model.
+    #[pyo3(signature = (axis, frequency=1.0, damping=1.0, delay=0))]
+    fn perturbed<'py>(
+        &self,
+        py: Python<'py>,
+        axis: usize,
+        frequency: f64,
+        damping: f64,
+        delay: i64,
+    ) -> PyResult<(PyStateSpace, Bound<'py, PyAny>)> {
+        if axis >= self.cell.n_axes() {
+            let message = format!("axis = {axis}; 0 to {} is needed", self.cell.n_axes() - 1);
+            return Err(PyValueError::new_err(message));
+        }
+        let factors = [frequency, damping];
+        if !factors.iter().all(|factor| factor.is_finite() && *factor > 0.0) {
+            let message = format!("factors = {frequency}, {damping}; positive numbers are needed");
+            return Err(PyValueError::new_err(message));
+        }
+        let (model, way_m) =
+            design::perturbed_axis(&self.cell, &self.reference_m, axis, factors, delay)
+                .or_raise()?;
+        Ok((PyStateSpace::from(model), give_signal(py, way_m, 1, true)?))
     }
 
     fn __repr__(&self) -> String {

@@ -23,7 +23,7 @@ from ilc_rt.commands.options import (
 from ilc_rt.errors import BadInputError
 from ilc_rt.export import export_run
 from ilc_rt.library import Library
-from ilc_rt.quantity import unit_for
+from ilc_rt.quantity import axis_unit, unit_for
 from ilc_rt.result import STANDARD_OUTPUT, json_text, library_rows, write_text
 from ilc_rt.text import printable
 
@@ -193,7 +193,7 @@ def trim(library: LibraryArgument, keep: Keep, cell: CellName = None) -> None:
 
 def error_text(row: Mapping[str, Any], figure: str) -> str:
     """Return a figure of a run in the unit of its axes: angles if all axes are rotary."""
-    units = {str(unit).removesuffix("/s") for unit in row["input_units"]}
+    units = {axis_unit(str(unit)) for unit in row["input_units"]}
     base = "rad" if units == {"rad"} else "m"
     return unit_for(base, row[figure]).text(row[figure])
 

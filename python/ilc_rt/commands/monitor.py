@@ -24,6 +24,7 @@ from ilc_rt.events import (
 )
 from ilc_rt.monitor import Message, Monitor
 from ilc_rt.progress import WORDS, describe
+from ilc_rt.quantity import axis_unit
 from ilc_rt.record import IterationRecord
 from ilc_rt.table import headings, plain_line, run_cells
 from ilc_rt.text import printable
@@ -111,8 +112,7 @@ class _View:
             if event.remark:
                 typer.echo(f"{message.cell}: run {event.index}: {printable(event.remark)}")
         elif isinstance(event, StartEvent):
-            units = (unit.removesuffix("/s") for unit in event.input_units)
-            self._units[message.cell] = tuple(units)
+            self._units[message.cell] = tuple(map(axis_unit, event.input_units))
             typer.echo(describe(event))
         elif isinstance(event, StateEvent):
             run = "" if event.iteration is None else f" (run {event.iteration})"

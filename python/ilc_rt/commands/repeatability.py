@@ -18,7 +18,7 @@ from ilc_rt.commands.options import (
 )
 from ilc_rt.comparison import Comparison
 from ilc_rt.events import Event, IterationEvent, StartEvent
-from ilc_rt.quantity import digits, unit_for
+from ilc_rt.quantity import axis_unit, digits, unit_for
 from ilc_rt.record import IterationRecord
 from ilc_rt.repeatable import check_repeatability
 from ilc_rt.text import NAME_MAX, printable
@@ -42,7 +42,7 @@ def repeatability(
 
     def tell(event: Event) -> None:
         if isinstance(event, StartEvent):
-            units[:] = [unit.removesuffix("/s") for unit in event.input_units]
+            units[:] = map(axis_unit, event.input_units)
         elif isinstance(event, IterationEvent):
             comparison = Comparison([IterationRecord.from_event(event, "")], units)
             errors = [c for c in comparison.tracking() if c.name.startswith("RMS")]

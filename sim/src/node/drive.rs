@@ -235,11 +235,17 @@ impl DriveNode {
         }
         let dt_s = f64::from(step_us) * 1e-6;
         self.pursue(step_us);
+        // A ramp or a hold follows no target, and so none of its offsets.
+        let feedforward_m_s = if self.motion.follows_target() {
+            self.units.velocity_m_s(self.number(self.slots.velocity_offset))
+        } else {
+            0.0
+        };
         let demand = self.motion.step(
             &self.motion_limits(),
             self.measured.position_m,
             self.measured.velocity_m_s,
-            self.units.velocity_m_s(self.number(self.slots.velocity_offset)),
+            feedforward_m_s,
             dt_s,
         );
         self.end_ramp();

@@ -190,6 +190,8 @@ fn motion(parameters: &DriveParameters) -> Vec<Entry> {
         ),
         Entry::constant(objects::RATED_CURRENT, 0, "Motor rated current", Value::U32(RATED_MA)),
         object(objects::DC_LINK_VOLTAGE, Value::U32(DC_LINK_MV)),
+        input(objects::TARGET_TORQUE, Value::I16(0)),
+        output(objects::TORQUE_DEMAND, Value::I16(0)),
         output(objects::TORQUE_ACTUAL, Value::I16(0)),
         input(objects::TARGET_POSITION, Value::I32(0)),
         Entry::constant(limit, 0, "Highest sub-index", Value::U8(2)),

@@ -41,6 +41,8 @@ slots! {
     error_time_ms = objects::FOLLOWING_ERROR_TIME, 0;
     velocity_demand = objects::VELOCITY_DEMAND, 0;
     velocity_actual = objects::VELOCITY_ACTUAL, 0;
+    target_torque = objects::TARGET_TORQUE, 0;
+    torque_demand = objects::TORQUE_DEMAND, 0;
     torque_actual = objects::TORQUE_ACTUAL, 0;
     target_position = objects::TARGET_POSITION, 0;
     position_min = objects::POSITION_LIMIT, 1;
@@ -75,6 +77,7 @@ slots! {
     velocity_unit = objects::VELOCITY_UNIT, 0;
     position_offset = objects::POSITION_OFFSET, 0;
     velocity_offset = objects::VELOCITY_OFFSET, 0;
+    torque_offset = objects::TORQUE_OFFSET, 0;
     period = objects::INTERPOLATION_PERIOD, 1;
     period_exponent = objects::INTERPOLATION_PERIOD, 2;
     following_error = objects::FOLLOWING_ERROR_ACTUAL, 0;

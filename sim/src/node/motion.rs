@@ -37,6 +37,9 @@ enum Phase {
     Velocity {
         velocity_m_s: f64,
     },
+    Force {
+        force_n: f64,
+    },
     /// Brakes to standstill.
     Ramp {
         velocity_m_s: f64,
@@ -105,7 +108,11 @@ impl Motion {
             Phase::Position { .. } | Phase::Hold { .. } => {
                 self.demand_m().unwrap_or(self.limited_m)
             }
-            Phase::Off | Phase::Velocity { .. } | Phase::Ramp { .. } | Phase::Profile { .. } => {
+            Phase::Off
+            | Phase::Velocity { .. }
+            | Phase::Force { .. }
+            | Phase::Ramp { .. }
+            | Phase::Profile { .. } => {
                 return;
             }
         };
@@ -137,7 +144,11 @@ impl Motion {
         let profile = match self.phase {
             Phase::Profile { profile, .. } => profile,
             Phase::Hold { position_m } => Profile { position_m, velocity_m_s: 0.0 },
-            Phase::Off | Phase::Position { .. } | Phase::Velocity { .. } | Phase::Ramp { .. } => {
+            Phase::Off
+            | Phase::Position { .. }
+            | Phase::Velocity { .. }
+            | Phase::Force { .. }
+            | Phase::Ramp { .. } => {
                 return;
             }
         };
@@ -154,15 +165,32 @@ impl Motion {
         match self.phase {
             Phase::Profile { profile, goal, .. } => profile.has_reached(goal),
             Phase::Hold { .. } => true,
-            Phase::Off | Phase::Position { .. } | Phase::Velocity { .. } | Phase::Ramp { .. } => {
-                false
-            }
+            Phase::Off
+            | Phase::Position { .. }
+            | Phase::Velocity { .. }
+            | Phase::Force { .. }
+            | Phase::Ramp { .. } => false,
         }
     }
 
     /// Returns whether the axis is held, so that a profile may begin.
     pub fn is_holding(&self) -> bool {
         matches!(self.phase, Phase::Hold { .. })
+    }
+
+    /// Sets a force target.
+    pub fn force_target(&mut self, force_n: f64) {
+        if matches!(self.phase, Phase::Force { .. } | Phase::Hold { .. }) {
+            self.phase = Phase::Force { force_n };
+        }
+    }
+
+    /// Returns the force demand; `None` if the drive closes a loop of its own.
+    pub fn demand_n(&self) -> Option<f64> {
+        match self.phase {
+            Phase::Force { force_n } => Some(force_n),
+            _ => None,
+        }
     }
 
     /// Returns the interpolated position before limits; `None` if the drive does not control
@@ -176,7 +204,7 @@ impl Motion {
             }
             Phase::Hold { position_m } => Some(position_m),
             Phase::Profile { profile, .. } => Some(profile.position_m),
-            Phase::Off | Phase::Velocity { .. } | Phase::Ramp { .. } => None,
+            Phase::Off | Phase::Velocity { .. } | Phase::Force { .. } | Phase::Ramp { .. } => None,
         }
     }
 
@@ -188,13 +216,18 @@ impl Motion {
                 self.last_delta_m / period_s
             }
             Phase::Profile { profile, .. } => profile.velocity_m_s,
-            Phase::Off | Phase::Position { .. } | Phase::Hold { .. } => 0.0,
+            Phase::Off | Phase::Position { .. } | Phase::Force { .. } | Phase::Hold { .. } => 0.0,
         }
     }
 
     /// Returns true if a limit of the drive changed the demand.
     pub fn is_limited(&self) -> bool {
         self.is_limited
+    }
+
+    /// Returns whether a target is being followed, not a ramp or a hold.
+    pub fn follows_target(&self) -> bool {
+        matches!(self.phase, Phase::Position { .. } | Phase::Velocity { .. } | Phase::Force { .. })
     }
 
     /// Returns whether there is a ramp under way.
@@ -223,6 +256,10 @@ impl Motion {
                 // Its own velocity is fed forward, so that the axis does not lag behind.
                 return Demand::Position { position_m, velocity_m_s };
             }
+            Phase::Force { force_n } => {
+                let force_n = *force_n;
+                return self.force_demand(force_n, limits, velocity_m_s);
+            }
             Phase::Velocity { velocity_m_s: wanted_m_s } => {
                 let wanted_m_s = *wanted_m_s;
                 return self.velocity_demand(wanted_m_s, limits, position_m, dt_s);
@@ -242,6 +279,13 @@ impl Motion {
             }
         }
         self.position_demand(limits, feedforward_m_s, dt_s)
+    }
+
+    /// A drive without a velocity loop of its own does not drive beyond its speed limit.
+    fn force_demand(&mut self, asked_n: f64, limits: &MotionLimits, velocity_m_s: f64) -> Demand {
+        self.is_limited =
+            velocity_m_s.abs() >= limits.velocity_max_m_s && asked_n * velocity_m_s > 0.0;
+        Demand::Force { force_n: if self.is_limited { 0.0 } else { asked_n } }
     }
 
     fn velocity_demand(

@@ -29,6 +29,10 @@ impl DriveNode {
             (self.slots.position_actual, units.position(position_m)),
             (self.slots.velocity_demand, units.velocity(self.motion.demand_m_s())),
             (self.slots.velocity_actual, units.velocity(velocity_m_s)),
+            (self.slots.torque_demand, {
+                let demand_n = self.motion.demand_n().unwrap_or(force_n);
+                rounded(demand_n / force_max_n * 1000.0)
+            }),
             (self.slots.torque_actual, rounded(force_n / force_max_n * 1000.0)),
             (self.slots.following_error, rounded(self.following_error_counts())),
         ];

@@ -17,6 +17,7 @@ impl DriveNode {
         let dictionary = self.communication.dictionary_mut();
         dictionary.take_written(self.slots.target_position);
         dictionary.take_written(self.slots.target_velocity);
+        dictionary.take_written(self.slots.target_torque);
     }
 
     /// Applies the target of the active mode at SYNC.
@@ -28,9 +29,11 @@ impl DriveNode {
         let dictionary = self.communication.dictionary_mut();
         let has_position = dictionary.take_written(self.slots.target_position);
         let has_velocity = dictionary.take_written(self.slots.target_velocity);
+        let has_torque = dictionary.take_written(self.slots.target_torque);
         match self.mode() {
             Some(DriveMode::Cyclic(Mode::Csp)) => self.take_position(has_position),
             Some(DriveMode::Cyclic(Mode::Csv)) => self.take_velocity(has_velocity),
+            Some(DriveMode::Cyclic(Mode::Cst)) => self.take_torque(has_torque),
             // The drive's own modes take their targets when they need them.
             _ => {}
         }
@@ -53,6 +56,33 @@ impl DriveNode {
                 + self.units.velocity_m_s(self.number(self.slots.velocity_offset));
             self.motion.velocity_target(velocity_m_s);
         }
+    }
+
+    fn take_torque(&mut self, is_new: bool) {
+        if is_new {
+            let force_n = self.force_n(self.number(self.slots.target_torque))
+                + self.force_n(self.number(self.slots.torque_offset));
+            self.motion.force_target(force_n);
+        }
+    }
+
+    /// Returns the force of 0x60B2, which the drive adds to its own loops while it follows a target
+    /// of position or velocity.
+    pub fn force_offset_n(&self) -> f64 {
+        if self.motion.follows_target()
+            && matches!(self.mode(), Some(DriveMode::Cyclic(mode)) if !mode.targets_torque())
+        {
+            self.force_n(self.number(self.slots.torque_offset))
+        } else {
+            0.0
+        }
+    }
+
+    /// Converts thousandths of the rated torque.
+    fn force_n(&self, thousandths: i64) -> f64 {
+        // A reversed motor turns the other way for the same torque.
+        let force_max_n = self.parameters.force_max_n.copysign(self.parameters.counts_per_m);
+        thousandths as f64 * 1e-3 * force_max_n
     }
 
     /// Reports the active mode; a change while enabled begins with a hold.

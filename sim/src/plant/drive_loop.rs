@@ -37,6 +37,10 @@ impl DriveLoop {
 
     /// Returns the force of the motor; `integral_n` is the state of the velocity controller.
     ///
+    /// `feedforward_n` is added to the output of the velocity controller. A ramp after a force demand
+    /// begins with an empty integral: the force of a motion that ends does not brake it, and would
+    /// only decay with the integral time.
+    ///
     /// At the force limit the integral accepts only errors that lead out of saturation
     /// (anti-windup).
     pub(super) fn force_n(
@@ -44,6 +48,7 @@ impl DriveLoop {
         demand: Demand,
         position_m: f64,
         velocity_m_s: f64,
+        feedforward_n: f64,
         integral_n: &mut f64,
         dt_s: f64,
     ) -> f64 {
@@ -56,13 +61,18 @@ impl DriveLoop {
                 self.position_gain_per_s * (target_m - position_m) + feedforward_m_s
             }
             Demand::Velocity { velocity_m_s: wanted_m_s } => wanted_m_s,
+            Demand::Force { force_n } if force_n.is_finite() => {
+                *integral_n = 0.0;
+                return force_n.clamp(-self.force_max_n, self.force_max_n);
+            }
+            Demand::Force { .. } => return 0.0,
         };
         let error_n = self.velocity_gain_n_s_m * (wanted_m_s - velocity_m_s);
         // A NaN demand must not corrupt the state permanently.
         if !error_n.is_finite() {
             return 0.0;
         }
-        let asked_n = error_n + *integral_n;
+        let asked_n = error_n + *integral_n + feedforward_n;
         let given_n = asked_n.clamp(-self.force_max_n, self.force_max_n);
         if (asked_n - given_n) * error_n <= 0.0 {
             *integral_n += error_n * dt_s / self.integral_time_s;

@@ -38,6 +38,8 @@ pub struct GantryAxis {
     state: State,
     integral_n: f64,
     force_n: f64,
+    /// Force added to that of the drive's loops.
+    feedforward_n: f64,
     /// Error of the encoder in this step.
     noise_m: f64,
 }
@@ -83,6 +85,7 @@ impl GantryAxis {
             state: [simulation.position_start_m, 0.0, 0.0, 0.0],
             integral_n: 0.0,
             force_n: 0.0,
+            feedforward_n: 0.0,
             noise_m: 0.0,
         };
         axis.prepare(STEP_S);
@@ -127,6 +130,7 @@ impl GantryAxis {
             demand,
             self.state[0] + self.noise_m,
             self.state[1],
+            self.feedforward_n,
             &mut self.integral_n,
             dt_s,
         );
@@ -233,6 +237,12 @@ impl Plant for Gantry {
     fn limit_force(&mut self, axis: usize, share: f64) {
         if let Some(axis) = self.axes.get_mut(axis) {
             axis.drive.force_max_n = axis.force_max_n * share;
+        }
+    }
+
+    fn feed_force(&mut self, axis: usize, force_n: f64) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.feedforward_n = force_n;
         }
     }
 

@@ -31,6 +31,11 @@ pub enum Demand {
         /// Target velocity.
         velocity_m_s: f64,
     },
+    /// Apply a force; the drive closes no loop.
+    Force {
+        /// Target force.
+        force_n: f64,
+    },
 }
 
 /// Axes with encoders, motors and a tool.
@@ -42,6 +47,9 @@ pub trait Plant: Send {
     /// Limits the force of an axis' motor to this share from now on, 0 to 1; a plant without forces
     /// ignores it.
     fn limit_force(&mut self, _axis: usize, _share: f64) {}
+    /// Adds this force to those of the drive's own loops from now on; a plant without forces ignores
+    /// it.
+    fn feed_force(&mut self, _axis: usize, _force_n: f64) {}
     /// Returns the position at the axis' own encoder.
     fn encoder_m(&self, axis: usize) -> f64;
     /// Returns the velocity at the axis' own encoder.

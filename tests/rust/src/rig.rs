@@ -30,6 +30,8 @@ const FRAMES: usize = 256;
 pub struct Row {
     /// Target of each axis, in counts or counts per second.
     pub target_counts: Vec<i32>,
+    /// Torque, or torque offset, of each axis in thousandths.
+    pub torque: Vec<i16>,
     /// Controlword of each axis.
     pub controlword: Vec<u16>,
 }
@@ -45,9 +47,9 @@ pub type Distort = Box<dyn FnMut(usize, Frame, &mut VecDeque<Frame>) + Send>;
 pub struct Line {
     bus: InProcess<Machine>,
     nodes: Vec<NodeId>,
-    /// Axis by axis, SYNC by SYNC: target and controlword.
-    rows: Vec<(i32, u16)>,
-    pending: Vec<(i32, u16)>,
+    /// Axis by axis, SYNC by SYNC: the command.
+    rows: Vec<CommandRpdo1>,
+    pending: Vec<CommandRpdo1>,
     injected: VecDeque<Frame>,
     meddle: Option<(u32, Meddle)>,
     /// Frames that the bus refuses, as its transmit queue is full.
@@ -92,8 +94,9 @@ impl Line {
     /// Returns the commands sent with each SYNC.
     pub fn rows(&self) -> impl Iterator<Item = Row> {
         self.rows.chunks(self.nodes.len()).map(|row| Row {
-            target_counts: row.iter().map(|command| command.0).collect(),
-            controlword: row.iter().map(|command| command.1).collect(),
+            target_counts: row.iter().map(|command| command.target_counts).collect(),
+            torque: row.iter().map(|command| command.torque_offset).collect(),
+            controlword: row.iter().map(|command| command.controlword.0).collect(),
         })
     }
 
@@ -105,7 +108,7 @@ impl Line {
     fn note(&mut self, frame: &Frame) {
         for (axis, node) in self.nodes.iter().enumerate() {
             if let Some(command) = CommandRpdo1::decode(frame, *node) {
-                self.pending[axis] = (command.target_counts, command.controlword.0);
+                self.pending[axis] = command;
             }
         }
         if !sync::is_sync(frame) {
@@ -143,7 +146,7 @@ impl Tap {
         Self(Arc::new(Mutex::new(Line {
             bus: InProcess::new(machine(cell), FRAMES),
             rows: Vec::with_capacity(ROWS),
-            pending: vec![(0, 0); nodes.len()],
+            pending: vec![CommandRpdo1::default(); nodes.len()],
             nodes,
             injected: VecDeque::with_capacity(FRAMES),
             meddle: None,

@@ -10,7 +10,14 @@ use ilc_tests::example_text;
 use proptest::prelude::{any, prop, proptest};
 
 const FILE: &str = "cell.toml";
-const EXAMPLES: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
+const EXAMPLES: [&str; 6] = [
+    "01_gantry.toml",
+    "02_parallel.toml",
+    "10_cst.toml",
+    "11_csp_torque.toml",
+    "12_csp_velocity.toml",
+    "13_csv_torque.toml",
+];
 
 /// Returns the refusal of a cell before anything moves, as in a campaign.
 fn refusal(text: &str) -> Option<String> {

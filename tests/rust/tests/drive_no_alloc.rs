@@ -43,7 +43,7 @@ fn cycles_faults_and_questions_allocate_nothing() {
         // From cycle 300 on the controller is silent: deadline, emergency, ramp, fault.
         if cycle < 300 {
             let target_counts = start_counts + 1000 * (cycle - 20).max(0);
-            let command = CommandRpdo1 { controlword, target_counts, torque_offset: 0 };
+            let command = CommandRpdo1 { controlword, target_counts, ..CommandRpdo1::default() };
             bus.send(&command.encode(node)).unwrap();
         }
         bus.send(&question).unwrap();

@@ -11,7 +11,7 @@ use ilc_tests::campaign::{in_process, options};
 use ilc_tests::rig::Rig;
 use ilc_tests::{Scratch, example_text, short};
 
-const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
+const CELLS: [&str; 3] = ["01_gantry.toml", "02_parallel.toml", "10_cst.toml"];
 
 /// Returns the short cell with an axis at a given position.
 fn standing(name: &str, axis: usize, start_m: f64) -> Cell {
@@ -47,6 +47,7 @@ fn an_axis_outside_its_limits_is_refused_and_nothing_moves() {
                         match spec.interface {
                             Mode::Csp => assert!(target == at || target == 0, "{target}"),
                             Mode::Csv => assert_eq!(target, 0),
+                            Mode::Cst => assert_eq!(row.torque[number], 0),
                         }
                     }
                 }
@@ -122,6 +123,7 @@ fn a_sum_beyond_the_limits_brakes_ahead_of_them() {
         let size = match cell.axes[0].interface {
             Mode::Csp => 0.004,
             Mode::Csv => 0.05,
+            Mode::Cst => 190.0,
         };
         let table = (0..2 * n_samples).map(|i| {
             let turn = (i / 2) as f64 / n_samples as f64 * std::f64::consts::TAU;

@@ -29,7 +29,7 @@ fn command(to: u8) -> Frame {
     let command = CommandRpdo1 {
         controlword: Controlword::ENABLE_OPERATION,
         target_counts: 0,
-        torque_offset: 0,
+        ..CommandRpdo1::default()
     };
     command.encode(node(to))
 }

@@ -1,6 +1,6 @@
 //! Faults in fields, for programs; `reason` makes the sentence of the same stop.
 
-use crate::config::Cell;
+use crate::config::{Cell, InputKind, mode};
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::emcy;
 use crate::interpolate::MAX_AXES;
@@ -103,6 +103,14 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
         StopReason::Jump { axis, step_m } => {
             Fault { value: Some(step_m), ..of_axis(FaultKind::PositionJump, axis) }
         }
+        StopReason::NoMotion { axis, force_n } => Fault {
+            value: Some(force_n),
+            unit: cell
+                .axes
+                .get(axis)
+                .map(|axis| mode::unit_of(InputKind::Torque, axis.unit).to_owned()),
+            ..of_axis(FaultKind::NoMotion, axis)
+        },
         StopReason::NotFinite { axis } => of_axis(FaultKind::NotFinite, axis),
         StopReason::Stalled { axis, cycles } => Fault {
             code: Some(emcy::CODE_RPDO_TIMEOUT.into()),

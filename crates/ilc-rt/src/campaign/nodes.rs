@@ -14,7 +14,7 @@ use crate::fieldbus::bring_up::{
     enter_homing_mode, listen,
 };
 use crate::fieldbus::canopen::{NmtCommand, emcy};
-use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN};
+use crate::fieldbus::cia402::units::{UNIT_METRE, UNIT_RADIAN, per_mille};
 use crate::fieldbus::cia402::{PdoMap, objects};
 
 /// Heartbeat of the nodes in real time.
@@ -311,6 +311,10 @@ pub fn drive_setup(cell: &Cell, axis: &Axis, lockstep: bool) -> Result<DriveSetu
         acceleration_max_counts_s2: unsigned(limits.acceleration_max_m_s2),
         position_unit: axis.drive.position_unit.or(units.map(|(position, _)| position)),
         velocity_unit: axis.drive.velocity_unit.or(units.map(|(_, velocity)| velocity)),
+        torque_max: axis
+            .force
+            .map_or(0, |force| per_mille(force.max_n(), force.rated_n).unsigned_abs()),
+        needs_torque_offset: axis.has_torque_offset(),
         heartbeat_ms: if lockstep { 0 } else { HEARTBEAT_MS },
         rpdo_deadline_ms: if lockstep { 0 } else { deadline_ms },
         controller: design::node(cell, cell.controller_node())?,

@@ -4,7 +4,7 @@ use super::control::STOPPED_BY_COMMAND;
 use super::inputs;
 use super::options::{SIMULATED_PATIENCE_S, Session};
 use crate::commissioning::power_lost;
-use crate::config::{AxisUnit, Cell, Direction, Input};
+use crate::config::{AxisUnit, Cell, Direction, Input, InputKind, mode};
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::{NmtCommand, NmtState, emcy};
 use crate::fieldbus::cia402::Statusword;
@@ -90,6 +90,12 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             "{}: its position jumped by {} from one answer to the next, farther than it can move",
             axis(index),
             distance(cell, index, step_m)
+        ),
+        StopReason::NoMotion { axis: index, force_n } => format!(
+            "{}: its position stands still although the force grew by {force_n:.1} {}, which must move \
+             it: it is blocked, or its encoder has failed",
+            axis(index),
+            cell.axes.get(index).map_or("N", |axis| mode::unit_of(InputKind::Torque, axis.unit))
         ),
         StopReason::NotFinite { axis: index } => {
             format!("{}: the command was not a finite number", axis(index))

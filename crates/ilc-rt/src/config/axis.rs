@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::drive::Drive;
 use super::homing::Homing;
 use super::simulation::AxisSimulation;
-pub use crate::fieldbus::cia402::Mode;
+use super::torque::{CascadeControl, Feedforward, Force};
+pub use crate::fieldbus::cia402::{InputKind, Mode};
 pub use crate::interpolate::AxisUnit;
 use crate::schema::field_order;
 
@@ -27,8 +28,14 @@ pub struct Axis {
     pub bus: u8,
     /// Command interface. `csp`: the drive closes the position loop, the learned input (m) is added to
     /// the set point. `csv`: the position loop is in the controller, the learned input (m/s) is added to
-    /// the velocity command.
+    /// the velocity command. `cst`: the whole cascade is in the controller, the learned input (N) is
+    /// added to the torque.
     pub interface: Mode,
+    /// Quantity that the learned input is added to. csp: `position`, or `velocity` (object 0x60B1) or
+    /// `torque` (0x60B2); csv: `velocity` or `torque` (0x60B2); cst: `torque`. The first one is the
+    /// default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub input: Option<InputKind>,
     /// Unit of its coordinate; every quantity of a rotary axis whose name ends in `_m`,
     /// `_m_s`, … is in rad, rad/s, …
     #[serde(default)]
@@ -47,6 +54,12 @@ pub struct Axis {
     pub model: Option<AxisModel>,
     /// `[axis.position_loop]`: for `interface = "csv"` only.
     pub position_loop: Option<PositionLoop>,
+    /// `[axis.force]`: needed by everything in torque.
+    pub force: Option<Force>,
+    /// `[axis.cascade]`: for `interface = "cst"` only.
+    pub cascade: Option<CascadeControl>,
+    /// `[axis.feedforward]`
+    pub feedforward: Option<Feedforward>,
     /// `[axis.homing]`: reference of the position.
     #[serde(default)]
     pub homing: Homing,
@@ -56,6 +69,32 @@ pub struct Axis {
     /// `[axis.simulation]`: physics, read by the simulated drives only.
     #[serde(default)]
     pub simulation: AxisSimulation,
+}
+
+impl Axis {
+    /// Returns the quantity that the learned input is added to.
+    pub fn input_kind(&self) -> InputKind {
+        self.input.unwrap_or(self.interface.inputs()[0])
+    }
+
+    /// Returns whether the drive gets a velocity offset (object 0x60B1) in every cycle.
+    pub fn has_velocity_offset(&self) -> bool {
+        let forward = self.feedforward.is_some_and(|forward| forward.velocity > 0.0);
+        self.interface.targets_position() && (self.input_kind() == InputKind::Velocity || forward)
+    }
+
+    /// Returns whether the drive gets a torque beside its target (object 0x60B2) in every cycle.
+    pub fn has_torque_offset(&self) -> bool {
+        self.has_torque() && !self.interface.targets_torque()
+    }
+
+    /// Returns whether the drive gets a torque (object 0x60B2, or 0x6071) in every cycle.
+    pub fn has_torque(&self) -> bool {
+        let forward = self
+            .feedforward
+            .is_some_and(|forward| forward.acceleration > 0.0 || forward.friction > 0.0);
+        self.interface.targets_torque() || self.input_kind() == InputKind::Torque || forward
+    }
 }
 
 /// `[axis.limits]`: limits that are never exceeded.

@@ -24,12 +24,15 @@ macro_rules! learning {
             pub law: LawName,
             /// The measurement to learn from; `--measure` replaces it.
             pub measure: Measure,
-            /// Bound of the learned input of a csp axis.
+            /// Bound of the learned input of an axis that learns a position.
             #[schemars(range(min = 0.0, max = 1.0))]
             pub input_max_m: f64,
-            /// Bound of the learned input of a csv axis.
+            /// Bound of the learned input of an axis that learns a velocity.
             #[schemars(range(min = 0.0, max = 10.0))]
             pub input_max_m_s: f64,
+            /// Bound of the learned input of an axis that learns a torque (N, or N m).
+            #[schemars(range(min = 0.0, max = 1e6))]
+            pub input_max_n: f64,
             /// Growth of the RMS error over the best run at which the best input is restored
             /// (rollback), 1.5 by default; after two rollbacks learning stays off. Not with a gate.
             #[schemars(range(min = 1.0, max = 1e3))]
@@ -53,6 +56,7 @@ macro_rules! learning {
                     measure: Measure::Tcp,
                     input_max_m: 0.005,
                     input_max_m_s: 0.05,
+                    input_max_n: 50.0,
                     rollback_ratio: None,
                     allow_divergent: false,
                     disturbance_file: None,

@@ -18,10 +18,11 @@ mod learning;
 mod library;
 pub mod mode;
 mod simulation;
+mod torque;
 mod validate;
 
 pub use crate::trajectory::kind::{Corner, PathKind, Program, Segment};
-pub use axis::{Axis, AxisModel, AxisUnit, Limits, Mode, PositionLoop};
+pub use axis::{Axis, AxisModel, AxisUnit, InputKind, Limits, Mode, PositionLoop};
 pub use cell::{BusSection, Cell, CellSection, Safety, TcpEncoder, Telemetry};
 pub use drive::{Drive, DrivePdo, ObjectName, StartUp};
 pub use error::ConfigError;
@@ -31,6 +32,7 @@ pub use input::{Direction, INPUTS_MAX, Input, InputUse, Level};
 pub use learning::{Learning, Measure};
 pub use library::{Keep, LibrarySection};
 pub use simulation::{AxisSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange};
+pub use torque::{CascadeControl, Feedforward, Force};
 pub use validate::check;
 
 pub use crate::learning::law::LawName;

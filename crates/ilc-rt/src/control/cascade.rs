@@ -5,7 +5,7 @@
 use super::{Bounded, clamp_finite};
 
 /// Gains, feed-forward and limits of a [`Cascade`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CascadeGains {
     /// Position gain `k_v`: velocity per position error.
     pub position_gain_per_s: f64,
@@ -45,12 +45,15 @@ pub struct Cascade {
     gains: CascadeGains,
     dt_s: f64,
     integral_n: f64,
+    /// Output of the last tick, and what it added to the integral.
+    asked_n: f64,
+    added_n: f64,
 }
 
 impl Cascade {
     /// Creates the controller at rest.
     pub fn new(gains: CascadeGains, dt_s: f64) -> Self {
-        Self { gains, dt_s, integral_n: 0.0 }
+        Self { gains, dt_s, integral_n: 0.0, asked_n: 0.0, added_n: 0.0 }
     }
 
     /// Returns the force of this tick; `learned_n` is added before saturation.
@@ -75,17 +78,31 @@ impl Cascade {
             return clamp_finite(f64::NAN, gains.force_max_n);
         }
         let output = clamp_finite(force, gains.force_max_n);
+        (self.asked_n, self.added_n) = (output.value, 0.0);
         let winds_up = output.saturated && error_m_s * output.value > 0.0;
         if gains.integral_time_s > 0.0 && !winds_up {
             let share = self.dt_s / gains.integral_time_s;
-            self.integral_n += gains.velocity_gain_n_s_m * share * error_m_s;
+            self.added_n = gains.velocity_gain_n_s_m * share * error_m_s;
+            self.integral_n += self.added_n;
         }
         output
     }
 
+    /// Records the force that was really commanded after a further limit. Anti-windup: if that limit
+    /// acts against the error, the integral forgets what it added in this tick.
+    ///
+    /// # Real Time
+    /// Hot.
+    pub fn given(&mut self, given_n: f64) {
+        if (self.asked_n - given_n) * self.added_n > 0.0 {
+            self.integral_n -= self.added_n;
+        }
+        self.added_n = 0.0;
+    }
+
     /// Resets the controller to rest.
     pub fn reset(&mut self) {
-        self.integral_n = 0.0;
+        (self.integral_n, self.asked_n, self.added_n) = (0.0, 0.0, 0.0);
     }
 }
 
@@ -120,6 +137,22 @@ mod tests {
         assert!((cascade.step(reference, 0.0, 0.1, 0.5).value - 8.0).abs() < 1e-12);
         assert_eq!(cascade.step(reference, -1.0, 0.0, 0.0).value, 30.0);
         assert!(!cascade.step(reference, f64::NAN, 0.0, 0.0).finite);
+    }
+
+    #[test]
+    fn a_limit_behind_it_does_not_wind_it_up() {
+        let gains = second_order(94.0, 1.0, 20.0, 0.1);
+        let (mut held, mut free) = (Cascade::new(gains, 1e-3), Cascade::new(gains, 1e-3));
+        let ahead = CascadeReference { position_m: 1e-3, ..CascadeReference::default() };
+        for _ in 0..1000 {
+            let asked_n = held.step(ahead, 0.0, 0.0, 0.0).value;
+            held.given(asked_n.min(5.0));
+            let asked_n = free.step(ahead, 0.0, 0.0, 0.0).value;
+            free.given(asked_n);
+        }
+        let rest = CascadeReference::default();
+        assert_eq!(held.step(rest, 0.0, 0.0, 0.0).value, 0.0);
+        assert!(free.step(rest, 0.0, 0.0, 0.0).value > 1000.0);
     }
 
     /// Gains with which a mass follows as `omega^2 / (s^2 + 2 delta omega s + omega^2)`, apart from

@@ -8,6 +8,7 @@
 
 mod cascade;
 mod cross_coupled;
+mod feedforward;
 mod limits;
 mod pid;
 mod position_loop;
@@ -15,6 +16,7 @@ mod slew;
 
 pub use cascade::{Cascade, CascadeGains, CascadeReference};
 pub use cross_coupled::{CrossCoupled, variable_gains};
+pub use feedforward::Feedforward;
 pub use limits::{Bounded, clamp_finite};
 pub use pid::{Derivative, Pid, PidGains, PidMatrices};
 pub use position_loop::PositionLoop;

@@ -3,7 +3,7 @@
 
 use serde_json::json;
 
-use crate::config::Cell;
+use crate::config::{Axis, Cell, InputKind};
 use crate::record::{Meta, fingerprint};
 
 /// Returns the digest of the canonical JSON of everything that determines what a law learns; `law`
@@ -13,13 +13,26 @@ pub(super) fn of(cell: &Cell, meta: &Meta, law: &str, parameters: &str) -> Strin
         .axes
         .iter()
         .map(|axis| {
-            json!({
+            let mut described = json!({
                 "name": axis.name,
                 "interface": axis.interface,
                 "limits": axis.limits,
                 "model": axis.model,
                 "position_loop": axis.position_loop,
-            })
+            });
+            // Later keys only where they are used: campaigns of before they existed can be resumed.
+            for (key, value) in [
+                ("input", json!(axis.input)),
+                ("force", json!(axis.force)),
+                ("cascade", json!(axis.cascade)),
+                ("feedforward", json!(axis.feedforward)),
+                ("input_max_n", json!(learned_torque_max_n(cell, axis))),
+            ] {
+                if !value.is_null() {
+                    described[key] = value;
+                }
+            }
+            described
         })
         .collect();
     let whole = json!({
@@ -36,6 +49,10 @@ pub(super) fn of(cell: &Cell, meta: &Meta, law: &str, parameters: &str) -> Strin
         "learning": is_named(cell, law).then(|| cell.learning.law_json()),
     });
     fingerprint(&whole.to_string())
+}
+
+fn learned_torque_max_n(cell: &Cell, axis: &Axis) -> Option<f64> {
+    (axis.input_kind() == InputKind::Torque).then_some(cell.learning.input_max_n)
 }
 
 fn is_named(cell: &Cell, law: &str) -> bool {

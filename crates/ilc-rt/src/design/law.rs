@@ -4,12 +4,12 @@
 
 use super::error::DesignError;
 use super::forecast;
-use super::plan::model;
-use crate::config::{Cell, ConfigError};
+use super::plan::weighed_model;
+use crate::config::{Cell, ConfigError, InputKind, mode};
 use crate::learning::gate::Gate;
 use crate::learning::ladder::Ladder;
 use crate::learning::law::{BuildError, LawContext, LawTables};
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Scaled};
 
 /// A law that may start.
 #[expect(missing_debug_implementations, reason = "laws need not have one")]
@@ -28,8 +28,13 @@ pub(super) fn prepare(cell: &Cell, reference_m: &[f64]) -> Result<Prepared, Desi
     let Some(law) = build_law(cell, reference_m)? else {
         return Ok(Prepared { law: None, verdict: String::new(), warnings: Vec::new() });
     };
+    forecast::check_effort(cell, reference_m)?;
     let mut law = wrap_law(law, cell).map_err(|source| refused(cell, source.into()))?;
     let (verdict, warnings) = forecast::judge(law.as_mut(), cell, n_samples)?;
+    let scale: Vec<f64> = cell.axes.iter().map(mode::scale_of).collect();
+    if cell.axes.iter().any(|axis| axis.input_kind() == InputKind::Torque) {
+        law = Box::new(Scaled::new(law, scale).map_err(|source| refused(cell, source.into()))?);
+    }
     Ok(Prepared { law: Some(law), verdict, warnings })
 }
 
@@ -45,8 +50,12 @@ fn build_law(cell: &Cell, reference_m: &[f64]) -> Result<Option<Box<dyn Law>>, D
     let Some(parameters) = cell.learning.parameters(cell.learning.law) else {
         return Ok(None);
     };
-    let model = model(cell)?;
-    let context = LawContext { cell: &cell.for_laws(), model: &model, reference_m };
+    let model = weighed_model(cell)?;
+    let mut for_laws = cell.for_laws();
+    for (axis, own) in for_laws.axes.iter_mut().zip(&cell.axes) {
+        axis.input_max *= mode::scale_of(own);
+    }
+    let context = LawContext { cell: &for_laws, model: &model, reference_m };
     parameters.build(&context).map(Some).map_err(|source| refused(cell, source))
 }
 

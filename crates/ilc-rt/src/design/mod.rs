@@ -14,7 +14,7 @@ mod program;
 mod traffic;
 
 pub use error::DesignError;
-pub use forecast::{first_error, learning_model};
+pub use forecast::{first_error, learning_model, perturbed_axis};
 pub use law::Prepared;
 pub use plan::Plan;
 pub(crate) use plan::{axis_scale, input_unit, node};

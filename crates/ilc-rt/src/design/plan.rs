@@ -6,15 +6,15 @@ use super::error::DesignError;
 use super::fingerprint;
 use super::law::{self, Prepared};
 use super::traffic::{self, BusTraffic};
-use crate::config::{Axis, Cell, ConfigError, Input, InputUse, Level, Measure, mode};
-use crate::control::PositionLoop;
+use crate::config::{Axis, Cell, ConfigError, Force, Input, InputUse, Level, Measure, mode};
+use crate::control::{Feedforward, PositionLoop};
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{PdoMap, Scale, Supervision};
 use crate::fieldbus::{AxisNetwork, Bus, CanopenAxes, Station};
 use crate::model::{ModelError, StateSpace};
 use crate::record::Meta;
 use crate::rt::Nanos;
-use crate::servo::{AxisSpec, InputRole, InputSpec, Pace, ServoSpec, ToolSpec};
+use crate::servo::{AxisSpec, ForceSpec, InputRole, InputSpec, Pace, ServoSpec, ToolSpec};
 use crate::trajectory::{AxisLimits, Interpolator};
 
 /// Heartbeats of the controller within the time after which a drive stops without them.
@@ -168,6 +168,21 @@ impl Plan {
 /// # Errors
 /// [`DesignError::Config`] for an axis without a model, [`DesignError::Model`] for an unusable one.
 pub(super) fn model(cell: &Cell) -> Result<StateSpace, DesignError> {
+    closed_loops(cell, mode::learned_model)
+}
+
+/// Returns the model that the laws use: its inputs are counted in the unit of their weights.
+///
+/// # Errors
+/// As [`model`].
+pub(super) fn weighed_model(cell: &Cell) -> Result<StateSpace, DesignError> {
+    closed_loops(cell, |axis, cycle_s| mode::weighed_model(axis, axis, cycle_s))
+}
+
+fn closed_loops(
+    cell: &Cell,
+    of_axis: impl Fn(&Axis, f64) -> Result<StateSpace, ModelError>,
+) -> Result<StateSpace, DesignError> {
     if let Some(axis) = cell.axes.iter().find(|axis| axis.model.is_none()) {
         let key = format!("[[axis]] {}: model", axis.name);
         let (law, file, name) = (cell.learning.law.as_str(), cell.file.display(), &axis.name);
@@ -176,16 +191,14 @@ pub(super) fn model(cell: &Cell) -> Result<StateSpace, DesignError> {
         );
         return Err(refused(cell, &key, &"missing", &allowed).into());
     }
-    closed_loops(cell)
-        .map_err(|source| DesignError::Model { file: cell.file.display().to_string(), source })
-}
-
-fn closed_loops(cell: &Cell) -> Result<StateSpace, ModelError> {
-    let mut models =
-        cell.axes.iter().map(|axis| mode::of(axis.interface).nominal_model(axis, cell.cycle_s()));
-    let first =
-        models.next().unwrap_or_else(|| StateSpace::static_gain(nalgebra::dmatrix![1.0], None))?;
-    models.try_fold(first, |all, next| all.append(&next?))
+    let mut models = cell.axes.iter().map(|axis| of_axis(axis, cell.cycle_s()));
+    let mut whole = || {
+        let first = models
+            .next()
+            .unwrap_or_else(|| StateSpace::static_gain(nalgebra::dmatrix![1.0], None))?;
+        models.try_fold(first, |all, next| all.append(&next?))
+    };
+    whole().map_err(|source| DesignError::Model { file: cell.file.display().to_string(), source })
 }
 
 fn axis_limits(axis: &Axis) -> AxisLimits {
@@ -197,7 +210,7 @@ fn axis_limits(axis: &Axis) -> AxisLimits {
 }
 
 pub(crate) fn input_unit(axis: &Axis) -> &'static str {
-    mode::of(axis.interface).input_unit(axis.unit)
+    mode::unit_of(axis.input_kind(), axis.unit)
 }
 
 fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
@@ -229,7 +242,20 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
                             .position_loop
                             .map_or(0.0, |p| p.velocity_feedforward),
                     },
-                    input_max: mode::of(axis.interface).input_max(&cell.learning),
+                    input: axis.input_kind(),
+                    input_max: mode::bound_of(axis.input_kind(), &cell.learning),
+                    cascade: mode::cascade_gains(axis),
+                    velocity_share: axis
+                        .cascade
+                        .map_or(1.0, |cascade| cascade.velocity_share(cell.cycle_s())),
+                    force: axis.force.map(|force| ForceSpec {
+                        rated_n: force.rated_n,
+                        max_n: force.max_n(),
+                        mass_kg: force.mass_kg,
+                        coulomb_n: force.coulomb_n,
+                        integral_time_s: force.integral_time_s.unwrap_or(0.0),
+                    }),
+                    feedforward: feedforward(axis),
                 })
             })
             .collect::<Result<_, ConfigError>>()?,
@@ -283,6 +309,20 @@ fn input_spec(cell: &Cell, input: &Input) -> Option<InputSpec> {
     })
 }
 
+/// Returns the feed-forwards of an axis, from their shares.
+fn feedforward(axis: &Axis) -> Feedforward {
+    let share = axis.feedforward.unwrap_or_default();
+    let of = |value: fn(&Force) -> f64| axis.force.as_ref().map_or(0.0, value);
+    Feedforward {
+        velocity: share.velocity,
+        lead_s: share.lead_s,
+        mass_kg: share.acceleration * of(|force| force.mass_kg),
+        viscous_n_s_m: share.friction * of(|force| force.viscous_n_s_m),
+        coulomb_n: share.friction * of(|force| force.coulomb_n),
+        coulomb_velocity_m_s: of(|force| force.coulomb_velocity_m_s),
+    }
+}
+
 /// Returns the node of a validated number.
 pub(crate) fn node(cell: &Cell, number: u8) -> Result<NodeId, ConfigError> {
     NodeId::new(number).ok_or_else(|| refused(cell, "node", &number, "1 to 127"))
@@ -298,7 +338,12 @@ fn scale(cell: &Cell, counts_per_m: f64) -> Result<Scale, ConfigError> {
     Scale::new(counts_per_m).ok_or_else(|| refused(cell, "counts_per_m", &counts_per_m, "above 0"))
 }
 
-fn refused(cell: &Cell, key: &str, value: &dyn std::fmt::Display, allowed: &str) -> ConfigError {
+pub(super) fn refused(
+    cell: &Cell,
+    key: &str,
+    value: &dyn std::fmt::Display,
+    allowed: &str,
+) -> ConfigError {
     ConfigError::Value {
         file: cell.file.display().to_string(),
         key: key.to_owned(),

@@ -41,9 +41,15 @@ fn one_map(cell: &Cell, axis: &Axis, small: bool) -> PdoMap {
     let all = OptionalObjects::ALL;
     let map = match axis.drive.pdo.map(axis.interface, payload_max) {
         Ok(Some(map)) => map,
-        _ if small => PdoMap::small(axis.interface),
+        _ if small => {
+            // The loop cannot do without an offset that it commands.
+            let torque_offset = axis.has_torque_offset();
+            let wanted = OptionalObjects { torque_offset, ..OptionalObjects::NONE };
+            PdoMap::choose(axis.interface, wanted, all, payload_max)
+        }
         _ => PdoMap::choose(axis.interface, all, all, payload_max),
     };
+    let map = if axis.has_velocity_offset() { map.with_velocity_offset() } else { map };
     let has_inputs = cell.inputs.iter().any(|input| input.axis == axis.name);
     if has_inputs { map.with_inputs(payload_max) } else { map }
 }

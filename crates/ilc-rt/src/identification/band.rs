@@ -3,10 +3,8 @@
 //! Friction and unmodelled modes spoil the fit of a wide band: acceleration grows with the square
 //! of the frequency, so a narrower band permits a larger amplitude.
 
-use std::f64::consts::TAU;
-
 use super::identified::{Described, Identified};
-use crate::config::{Axis, Cell};
+use crate::config::{Axis, Cell, mode};
 
 /// Upper ends of the bands, relative to the natural frequency in the cell.
 const SHARES: [f64; 4] = [1.5, 1.0, 0.75, 0.5];
@@ -50,23 +48,7 @@ impl BandSearch {
     /// 1.5 times the lowest one with which the axis keeps its allowed following error.
     pub fn new(cell: &Cell, axis: &Axis) -> Self {
         let model = axis.model.as_ref();
-        let expected_hz = match axis.position_loop {
-            None => model.and_then(|model| model.natural_frequency_hz).unwrap_or_else(|| {
-                // A loop of second order follows a velocity 2 d / w0 behind, which must be less than
-                // the allowed following error at full speed.
-                let limits = &axis.limits;
-                2.0 * limits.velocity_max_m_s / (TAU * limits.following_error_max_m)
-            }),
-            // kv and the velocity loop make a second-order loop with w0^2 = kv 2 pi f.
-            Some(position_loop) => {
-                let gain_per_s = position_loop.gain_per_s;
-                // A loop that is damped critically has 2 pi f = 4 kv.
-                let bandwidth_hz = model
-                    .and_then(|model| model.velocity_bandwidth_hz)
-                    .unwrap_or(4.0 * gain_per_s / TAU);
-                (gain_per_s * bandwidth_hz / TAU).sqrt()
-            }
-        };
+        let expected_hz = mode::of(axis.interface).natural_frequency_hz(axis);
         let highest_hz = HIGHEST / cell.cycle_s();
         let expected_hz =
             if model.is_some() { expected_hz } else { expected_hz.clamp(FROM_HZ, highest_hz) };
@@ -129,6 +111,8 @@ impl BandSearch {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     fn search(change: (&str, &str)) -> BandSearch {

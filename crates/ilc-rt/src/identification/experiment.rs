@@ -178,7 +178,7 @@ impl Experiment {
         let margin_m =
             (center_m - limits.position_min_m).min(limits.position_max_m - center_m).max(0.0);
         let peaks = Peaks { value: peak, rate, curvature: curve };
-        let (travel_m, demands) = mode::of(axis.interface).demands(axis, &cell.learning, peaks);
+        let (travel_m, demands) = mode::demands(axis, &cell.learning, peaks);
         let demand = |what, needed, allowed, unit| Demand { what, needed, allowed, unit };
         let mut demands = demands.to_vec();
         demands.push(demand(

@@ -1,8 +1,10 @@
 //! Evaluation of an experiment: response of the axis, model, and residual.
 
+use std::f64::consts::TAU;
+
 use super::error::IdentificationError;
 use super::experiment::{Experiment, Signals};
-use crate::config::Cell;
+use crate::config::{Cell, InputKind, mode};
 use crate::model::ModelError;
 use crate::model::identify::{
     Averaging, Doubt, FrequencyResponse, Known, SecondOrder, SecondOrderFit, Uncertainty,
@@ -24,6 +26,13 @@ const STILL: f64 = 1e-6;
 pub enum Form {
     /// Second order with any gain: not an axis of a cell.
     Free,
+    /// Position loop of a csp axis, from the velocity or torque behind it: any gain.
+    Offset {
+        /// The input is a torque, which shows the mass as well.
+        is_torque: bool,
+    },
+    /// Loops of known gains around a mass, from a torque: any gain.
+    Mass,
     /// Position loop of a csp axis: unit gain.
     Position,
     /// Velocity loop of a csv axis, in the position loop of the controller.
@@ -46,6 +55,8 @@ pub struct Identified {
     pub uncertainty: Uncertainty,
     /// Reason not to use the model, if there is one.
     pub doubt: Option<Doubt>,
+    /// Form of the described model.
+    pub form: Form,
     /// Samples in a period.
     pub period_samples: usize,
     /// Input of the evaluated periods.
@@ -112,6 +123,9 @@ fn describe(
     };
     let tried: Vec<Described> = match form {
         Form::Free => return second_order(None, free.delay_samples()),
+        Form::Offset { .. } | Form::Mass => {
+            delays(free, dt_s).map(|n| second_order(None, n)).collect::<Result<_, _>>()?
+        }
         Form::Position => {
             delays(free, dt_s).map(|n| second_order(Some(1.0), n)).collect::<Result<_, _>>()?
         }
@@ -185,7 +199,8 @@ impl Identified {
             Described::Velocity(fit) => fit.model.response(&measured.frequency_hz),
         };
         let uncertainty = uncertainty(&measured, &model, DEVIATIONS)?;
-        let beyond = || described.beyond_cell().filter(|_| form != Form::Free);
+        let beyond =
+            || described.beyond_cell().filter(|_| !matches!(form, Form::Free | Form::Mass));
         let doubt = doubt(&measured, described.residual_rms()).or_else(beyond);
         Ok(Self {
             measured,
@@ -193,6 +208,7 @@ impl Identified {
             described,
             uncertainty,
             doubt,
+            form,
             period_samples,
             input: u,
             output: y,
@@ -223,9 +239,15 @@ impl Identified {
             let rows = rows.start * n_axes..rows.end * n_axes;
             values[rows].chunks_exact(n_axes).map(|row| sign * row[index]).collect()
         };
-        let form = axis.position_loop.map_or(Form::Position, |position_loop| Form::Velocity {
-            position_gain_per_s: position_loop.gain_per_s,
-        });
+        let is_torque = axis.input_kind() == InputKind::Torque;
+        let form = match (axis.input_kind(), axis.position_loop) {
+            (InputKind::Position, _) => Form::Position,
+            (InputKind::Velocity, Some(position_loop)) => {
+                Form::Velocity { position_gain_per_s: position_loop.gain_per_s }
+            }
+            _ if !mode::of(axis.interface).closes_position_loop() => Form::Offset { is_torque },
+            _ => Form::Mass,
+        };
         Self::evaluate(
             column(&signals.input, 1.0),
             // The set point is constant, so the error changes with the measurement.
@@ -246,17 +268,35 @@ impl Identified {
         self.described.residual_rms()
     }
 
-    /// Returns the section `[axis.model]` with the described model, for a cell description.
+    /// Returns the section `[axis.model]` with the described model, for a cell description; for a torque also
+    /// the mass, in `[axis.force]`.
     pub fn section(&self) -> String {
         let figures = match self.described {
+            Described::Position(_) if self.form == Form::Mass => String::new(),
             Described::Position(SecondOrderFit { model, .. }) => format!(
-                "natural_frequency_hz = {:.3}\ndamping = {:.4}",
+                "natural_frequency_hz = {:.3}\ndamping = {:.4}\n",
                 model.natural_frequency_hz, model.damping
             ),
             Described::Velocity(VelocityLoopFit { model, .. }) => {
-                format!("velocity_bandwidth_hz = {:.3}", model.bandwidth_hz)
+                format!("velocity_bandwidth_hz = {:.3}\n", model.bandwidth_hz)
             }
         };
-        format!("[axis.model]\n{figures}\ndelay_samples = {}\n", self.described.delay_samples())
+        let delay = self.described.delay_samples();
+        let mass = self.mass_kg().map_or_else(String::new, |mass_kg| {
+            format!("\n# beside what is there\n[axis.force]\nmass_kg = {mass_kg:.4}\n")
+        });
+        format!("[axis.model]\n{figures}delay_samples = {delay}\n{mass}")
+    }
+
+    /// Returns the moving mass that a torque shows: above the natural frequency of its loops only the mass
+    /// acts, `y/F = 1 / (m s^2)`, so `m = 1 / (K w0^2)`.
+    pub fn mass_kg(&self) -> Option<f64> {
+        let (Described::Position(fit), Form::Mass | Form::Offset { is_torque: true }) =
+            (self.described, self.form)
+        else {
+            return None;
+        };
+        let natural_rad_s = TAU * fit.model.natural_frequency_hz;
+        Some(1.0 / (fit.model.gain * natural_rad_s * natural_rad_s))
     }
 }

@@ -17,6 +17,7 @@ pub mod ladder;
 pub mod law;
 mod operator;
 mod repeatability;
+mod scaled;
 mod structure;
 pub mod sweep;
 pub mod tune;
@@ -24,6 +25,7 @@ pub mod weights;
 
 pub use error::{LearningError, Result};
 pub use repeatability::{Repeatability, repeatability};
+pub use scaled::Scaled;
 pub use structure::{LowPass, Structure, Surrogate};
 
 /// A learning law: computes the input of the next run from the error of the last.

@@ -14,7 +14,9 @@ impl AxisKinds {
     /// Derives the kinds from the units of the learned inputs; an axis without one is linear.
     pub fn new(input_units: &[String], n_axes: usize) -> Self {
         let unit = |axis: usize| input_units.get(axis).map_or("m", String::as_str);
-        Self { rotary: (0..n_axes).map(|axis| unit(axis).starts_with("rad")).collect() }
+        Self {
+            rotary: (0..n_axes).map(|axis| matches!(unit(axis), "rad" | "rad/s" | "N m")).collect(),
+        }
     }
 
     /// Returns the number of axes.
@@ -82,8 +84,9 @@ mod tests {
         assert!(mixed.is_mixed() && !mixed.all_rotary());
         assert_eq!(mixed.comparable(), [0, 2]);
         assert_eq!(mixed.columns(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], &[0, 2]), [1.0, 3.0, 4.0, 6.0]);
-        let turning = kinds(&["rad", "rad/s"]);
-        assert_eq!(turning.comparable(), [0, 1]);
+        let turning = kinds(&["rad", "rad/s", "N m"]);
+        assert_eq!(turning.comparable(), [0, 1, 2]);
+        assert!(kinds(&["N", "N m"]).is_mixed());
         assert!(!kinds(&["m", "m"]).is_mixed());
     }
 

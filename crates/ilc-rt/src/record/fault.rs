@@ -34,6 +34,8 @@ pub enum FaultKind {
     OutsideLimits,
     /// A position jumped farther than the axis can move.
     PositionJump,
+    /// The position of an axis stands still under a force that must move it; `value` is its increase.
+    NoMotion,
     /// A number in the command was not finite.
     NotFinite,
     /// A drive missed its commands because this computer stalled; `value` is the number of cycles.

@@ -9,8 +9,6 @@ use super::phase::Phase;
 use crate::fieldbus::cia402::State;
 use crate::interpolate::{MAX_AXES, PointToPoint};
 
-/// Time at rest after a stop before the drives are switched off.
-const REST_S: f64 = 0.1;
 /// Time-out for the drives to switch off.
 const DISABLE_S: f64 = 0.5;
 
@@ -55,7 +53,7 @@ impl Cycle {
                 self.reference = stop.next(dt_s);
                 self.phase = if !self.reference.done || !self.input.faded() {
                     Phase::Stopping { stop, rest_ticks }
-                } else if f64::from(rest_ticks) * dt_s < REST_S {
+                } else if f64::from(rest_ticks) * dt_s < self.rest_s {
                     Phase::Stopping { stop, rest_ticks: rest_ticks + 1 }
                 } else {
                     Phase::Disabling { ticks: 0 }
@@ -101,7 +99,7 @@ impl Cycle {
         for past in &mut self.commanded {
             past[axis] = command;
         }
-        self.gates[axis].begin(command);
+        self.loops[axis].begin(command);
     }
 
     fn return_to_start(&mut self) {

@@ -6,6 +6,7 @@ use super::cycle::Cycle;
 use super::gate::Bounds;
 use super::mailbox::StopReason;
 use super::mode::{self, Moment};
+use super::pending::Part;
 use super::phase::Phase;
 use super::spec::Pace;
 use crate::fieldbus::BusError;
@@ -20,7 +21,9 @@ impl Cycle {
         let mut is_full = false;
         for axis in 0..self.n_axes() {
             let mode = mode::of(self.spec.axes[axis].mode);
-            let mut target = self.target(axis);
+            let now = self.moment(axis);
+            let mut loops = self.loops[axis];
+            let mut target = mode.target(&now, &mut loops);
             if !target.is_finite() {
                 fault = fault.or(Some(StopReason::NotFinite { axis }));
                 // The stop begins from there.
@@ -28,12 +31,20 @@ impl Cycle {
                 target = mode.extrapolate(last);
             }
             newest[axis] = target;
-            let controlword = self.controlword(axis);
+            let mut sent = self.drives[axis].sent;
+            sent.controlword = self.controlword(axis);
+            mode.write(target, &now, &mut sent);
             let spec = &self.spec.axes[axis];
-            let sent = &mut self.drives[axis].sent;
-            sent.controlword = controlword;
-            mode.write(target, spec.scale, sent);
-            is_full |= self.network.write(axis, sent) == Err(BusError::Full);
+            if self.has_offset[axis] {
+                loops.offset(mode, &now);
+                sent.torque_offset = spec.per_mille(loops.force_offset_n);
+                if let Some(counts_s) = spec.scale.to_counts(loops.velocity_offset) {
+                    sent.velocity_offset = counts_s;
+                }
+            }
+            self.drives[axis].sent = sent;
+            self.loops[axis] = loops;
+            is_full |= self.network.write(axis, &sent) == Err(BusError::Full);
         }
         self.commanded = [newest, self.commanded[0], self.commanded[1]];
         match self.network.exchange() {
@@ -58,27 +69,31 @@ impl Cycle {
         (self.congested > max).then_some(StopReason::Congested { cycles: self.congested })
     }
 
-    /// Returns the bounded target of an axis, in the unit of its mode.
-    fn target(&mut self, axis: usize) -> f64 {
+    /// Returns an axis as its mode sees it.
+    fn moment(&self, axis: usize) -> Moment<'_> {
         let spec = &self.spec.axes[axis];
         let drive = &self.drives[axis];
-        let now = Moment {
+        #[expect(clippy::cast_precision_loss, reason = "a count of cycles")]
+        let unanswered = self.pending.silence(Part::Status(axis)) as f64;
+        Moment {
             spec,
             phase: &self.phase,
             enabled: drive.enabled(),
             encoder_m: drive.encoder_m,
+            encoder_m_s: drive.encoder_m_s,
+            unanswered,
             reference_m: self.reference.position_m[axis],
             reference_m_s: self.reference.velocity_m_s[axis],
+            reference_m_s2: self.reference_m_s2[axis],
             input: self.input.value()[axis],
-            last: [self.commanded[0][axis], self.commanded[1][axis]],
+            last: self.commanded.map(|command| command[axis]),
             bounds: Bounds {
                 limits: spec.limits,
                 position_min_m: spec.position_min_m,
                 position_max_m: spec.position_max_m,
                 dt_s: self.spec.cycle.as_secs_f64(),
             },
-        };
-        mode::of(spec.mode).target(&now, &mut self.gates[axis])
+        }
     }
 
     fn controlword(&self, axis: usize) -> Controlword {
@@ -103,18 +118,26 @@ impl Cycle {
             | Phase::Running { .. } => next_command(state),
             // A drive that has disabled itself in a stop stays off.
             Phase::Stopping { .. } => match state {
+                State::OperationEnabled if self.brakes_itself(axis) => Controlword::QUICK_STOP,
                 State::OperationEnabled => Controlword::ENABLE_OPERATION,
                 State::QuickStopActive => Controlword::QUICK_STOP,
                 _ => Controlword::DISABLE_VOLTAGE,
             },
             Phase::Disabling { .. } | Phase::Stopped => match state {
-                State::OperationEnabled | State::QuickStopActive if drive.distrusted => {
+                State::OperationEnabled | State::QuickStopActive
+                    if drive.distrusted && !self.brakes_itself(axis) =>
+                {
                     Controlword::QUICK_STOP
                 }
                 State::OperationEnabled | State::SwitchedOn => Controlword::SHUTDOWN,
                 _ => Controlword::DISABLE_VOLTAGE,
             },
         }
+    }
+
+    /// Returns true if a stop of this axis is the quick stop of its drive.
+    fn brakes_itself(&self, axis: usize) -> bool {
+        mode::of(self.spec.axes[axis].mode).closes_velocity_loop()
     }
 
     /// Returns true if every drive has reported its state and position.

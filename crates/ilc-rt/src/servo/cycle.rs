@@ -3,15 +3,14 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 use super::feed::Feed;
-use super::gate::Gate;
 use super::input::LearnedInput;
 use super::inputs::{self, INPUTS_MAX, InputBits};
 use super::mailbox::{LoopSide, Message, Sample, StopReason, Table};
-use super::mode;
+use super::mode::{self, AxisLoops};
 use super::node::Drive;
 use super::pending::PendingCycles;
 use super::phase::{Phase, PhaseName};
-use super::spec::ServoSpec;
+use super::spec::{AxisSpec, ServoSpec};
 use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::AxisNetwork;
 use crate::fieldbus::canopen::emcy;
@@ -20,6 +19,37 @@ use crate::rt::Nanos;
 
 /// Longest fade-out of the learned input after a run.
 const FADE_MAX_S: f64 = 0.2;
+
+/// Multiple of the acceleration limit up to which a change of the reference velocity is an
+/// acceleration.
+const REFERENCE_SHARE: f64 = 1.1;
+/// Time at rest after a stop before the drives are switched off.
+const REST_S: f64 = 0.1;
+
+/// Integral times of a drive that its velocity needs to decay once an offset has faded out.
+const INTEGRAL_TIMES: f64 = 5.0;
+/// Integral time of a drive that the cell does not describe.
+const USUAL_S: f64 = 0.1;
+/// Longest time for that.
+const DECAY_MAX_S: f64 = 5.0;
+
+/// Returns the time at rest after a stop, whatever the measurement says. A drive that brakes by itself
+/// may need all the time from its highest velocity. One whose torque offset is withdrawn creeps until its
+/// integral has taken the force over.
+fn rest_s(spec: &ServoSpec) -> f64 {
+    let braking_s = |axis: &AxisSpec| {
+        if mode::of(axis.mode).closes_velocity_loop() {
+            axis.limits.velocity_max_m_s / axis.limits.acceleration_max_m_s2
+                + INTEGRAL_TIMES * USUAL_S
+        } else if axis.has_offset() {
+            let integral_time_s = axis.force.map_or(USUAL_S, |force| force.integral_time_s);
+            (INTEGRAL_TIMES * integral_time_s).min(DECAY_MAX_S)
+        } else {
+            0.0
+        }
+    };
+    REST_S + spec.axes.iter().map(braking_s).fold(0.0, f64::max)
+}
 
 /// True if the loop has more to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +91,13 @@ pub struct Cycle {
     /// The last three commands of each axis, newest first, in m or m/s by its mode: the initial
     /// state of a stop.
     pub(super) commanded: [[f64; MAX_AXES]; 3],
-    pub(super) gates: [Gate; MAX_AXES],
+    pub(super) loops: [AxisLoops; MAX_AXES],
+    /// Change of the reference velocity in this tick.
+    pub(super) reference_m_s2: [f64; MAX_AXES],
+    /// True for an axis whose drive gets offsets with its command.
+    pub(super) has_offset: [bool; MAX_AXES],
+    /// Time at rest after a stop before the drives are switched off.
+    pub(super) rest_s: f64,
     pub(super) run: u32,
     pub(super) stall: Stall,
     pub(super) run_overruns: u32,
@@ -95,12 +131,13 @@ impl Cycle {
     ) -> Self {
         let dt_s = spec.cycle.as_secs_f64();
         let parts: Vec<[bool; 2]> = (0..spec.axes.len()).map(|axis| network.parts(axis)).collect();
-        let (mut input_max, mut step_max) = ([0.0; MAX_AXES], [0.0; MAX_AXES]);
+        let [mut input_max, mut step_max, mut bend_max] = [[0.0; MAX_AXES]; 3];
         let limits: Vec<AxisLimits> = spec.axes.iter().map(|axis| axis.limits).collect();
         let mut start_m = [0.0; MAX_AXES];
         for (i, axis) in spec.axes.iter().enumerate().take(MAX_AXES) {
             input_max[i] = axis.input_max;
-            step_max[i] = mode::of(axis.mode).input_step_max(&axis.limits, dt_s);
+            step_max[i] = axis.input_step_max(dt_s);
+            bend_max[i] = axis.input_bend_max(dt_s);
             start_m[i] = spec.start_m.get(i).copied().unwrap_or(0.0);
         }
         #[expect(
@@ -122,7 +159,7 @@ impl Cycle {
             feed,
             run_scaled: 0,
             waits: false,
-            input: LearnedInput::new(input_max, step_max, fade_ticks),
+            input: LearnedInput::new(input_max, step_max, bend_max, fade_ticks),
             inputs: Default::default(),
             input_bits: InputBits::default(),
             is_pressed: false,
@@ -133,7 +170,16 @@ impl Cycle {
                 done: false,
             },
             commanded: [[0.0; MAX_AXES]; 3],
-            gates: [Gate::default(); MAX_AXES],
+            loops: std::array::from_fn(|axis| {
+                spec.axes
+                    .get(axis)
+                    .map_or_else(AxisLoops::default, |axis| AxisLoops::new(axis, dt_s))
+            }),
+            reference_m_s2: [0.0; MAX_AXES],
+            has_offset: std::array::from_fn(|axis| {
+                spec.axes.get(axis).is_some_and(AxisSpec::has_offset)
+            }),
+            rest_s: rest_s(&spec),
             run: spec.runs.start,
             stall: Stall::default(),
             run_overruns: 0,
@@ -168,7 +214,9 @@ impl Cycle {
         if let Some(reason) = fault {
             self.begin_stop(reason);
         }
+        let before_m_s = self.reference.velocity_m_s;
         let at = self.advance();
+        self.accelerate(&before_m_s);
         self.watch_age();
         let after = self.phase_name();
         if before != after {
@@ -198,6 +246,17 @@ impl Cycle {
     pub fn fault(&self, axis: usize) -> Option<u16> {
         let drive = self.drives.get(axis).filter(|drive| drive.faulted())?;
         Some(drive.emergency.unwrap_or(emcy::CODE_RESET))
+    }
+
+    /// Sets the acceleration of the reference; of a jump, as at the start of a stop, what the limits
+    /// allow.
+    fn accelerate(&mut self, before_m_s: &[f64; MAX_AXES]) {
+        let dt_s = self.spec.cycle.as_secs_f64();
+        for axis in 0..self.n_axes() {
+            let max_m_s2 = REFERENCE_SHARE * self.limits[axis].acceleration_max_m_s2;
+            let change_m_s = self.reference.velocity_m_s[axis] - before_m_s[axis];
+            self.reference_m_s2[axis] = (change_m_s / dt_s).min(max_m_s2).max(-max_m_s2);
+        }
     }
 
     /// Returns the network when the loop is over.

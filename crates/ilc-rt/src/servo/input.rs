@@ -18,11 +18,19 @@ pub(super) struct LearnedInput {
 }
 
 impl LearnedInput {
-    /// Creates it with bound `max`, rate limit `step_max` per tick, and a fade-out of `fade_ticks`.
-    pub(super) fn new(max: [f64; MAX_AXES], step_max: [f64; MAX_AXES], fade_ticks: u32) -> Self {
+    /// Creates it with bound `max`, rate limit `step_max` per tick and its bound `bend_max` from tick to
+    /// tick, and a fade-out of `fade_ticks`.
+    pub(super) fn new(
+        max: [f64; MAX_AXES],
+        step_max: [f64; MAX_AXES],
+        bend_max: [f64; MAX_AXES],
+        fade_ticks: u32,
+    ) -> Self {
         Self {
             max,
-            slew: step_max.map(SlewLimiter::new),
+            slew: std::array::from_fn(|axis| {
+                SlewLimiter::new(step_max[axis]).bending(bend_max[axis], max[axis])
+            }),
             value: [0.0; MAX_AXES],
             fade_from: [0.0; MAX_AXES],
             fade_ticks: fade_ticks.max(1),
@@ -69,11 +77,18 @@ impl LearnedInput {
         }
     }
 
-    /// Drops the input at once, because it has become part of the set point.
-    pub(super) fn absorb(&mut self) {
-        self.value = [0.0; MAX_AXES];
-        self.fade_from = [0.0; MAX_AXES];
-        self.fade_tick = self.fade_ticks;
+    /// Drops the input at once, because it has become part of the set point, but for the axes where
+    /// it `stays` and is still to be faded out.
+    pub(super) fn absorb(&mut self, stays: &[bool; MAX_AXES]) {
+        for axis in 0..MAX_AXES {
+            if !stays[axis] {
+                self.value[axis] = 0.0;
+                self.fade_from[axis] = 0.0;
+            }
+        }
+        if !stays.contains(&true) {
+            self.fade_tick = self.fade_ticks;
+        }
     }
 
     /// Returns whether no input is left.
@@ -87,7 +102,7 @@ mod tests {
     use super::*;
 
     fn input() -> LearnedInput {
-        LearnedInput::new([1.0; MAX_AXES], [0.25; MAX_AXES], 10)
+        LearnedInput::new([1.0; MAX_AXES], [0.25; MAX_AXES], [f64::INFINITY; MAX_AXES], 10)
     }
 
     #[test]
@@ -100,6 +115,23 @@ mod tests {
             last = input.value()[0];
         }
         assert_eq!(input.follow(&[0.0, f64::NAN]), Err(1));
+    }
+
+    #[test]
+    fn what_became_part_of_a_command_is_dropped_and_an_offset_fades() {
+        let mut input = input();
+        assert_eq!(input.follow(&[0.2, 0.2]), Ok(()));
+        let mut stays = [false; MAX_AXES];
+        stays[1] = true;
+        input.absorb(&stays);
+        assert!(input.value()[0] == 0.0 && input.value()[1] == 0.2 && !input.faded());
+        for _ in 0..10 {
+            input.fade();
+        }
+        assert!(input.faded() && input.value()[1] == 0.0);
+        assert_eq!(input.follow(&[0.2, 0.2]), Ok(()));
+        input.absorb(&[false; MAX_AXES]);
+        assert!(input.faded() && input.value()[1] == 0.0);
     }
 
     #[test]

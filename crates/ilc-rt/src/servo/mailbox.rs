@@ -122,6 +122,13 @@ pub enum StopReason {
         /// Size of the jump, from one answer to the next.
         step_m: f64,
     },
+    /// The position of an axis stands still under a force that must move it.
+    NoMotion {
+        /// Axis.
+        axis: usize,
+        /// Increase of the force since it stands still.
+        force_n: f64,
+    },
     /// A number in the command was not finite.
     NotFinite {
         /// Axis.
@@ -172,7 +179,8 @@ impl StopReason {
             Self::SilentAxis { axis, .. }
             | Self::SilentPdo { axis, pdo: 1, .. }
             | Self::FollowingError { axis, .. }
-            | Self::Jump { axis, .. } => Some(axis),
+            | Self::Jump { axis, .. }
+            | Self::NoMotion { axis, .. } => Some(axis),
             Self::Asked(_)
             | Self::DriveFault { .. }
             | Self::NotEnabled { .. }

@@ -31,4 +31,4 @@ pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, mailbox};
 pub use orders::{FEED_WHOLE, Orders};
 pub use phase::PhaseName;
 pub use realtime::{Timing, run_on_clock};
-pub use spec::{AxisSpec, Pace, ServoSpec, ToolSpec};
+pub use spec::{AxisSpec, ForceSpec, Pace, ServoSpec, ToolSpec};

@@ -15,6 +15,12 @@ pub(super) struct Drive {
     pub(super) statusword: u16,
     /// Last position.
     pub(super) encoder_m: f64,
+    /// Filtered difference of the positions.
+    pub(super) encoder_m_s: f64,
+    /// Difference of the last two positions, per cycle between them.
+    pub(super) raw_m_s: f64,
+    /// Answers with the same position, and the command at the first of them.
+    pub(super) still: (u32, f64),
     /// Last following error: reported by the drive, or computed.
     pub(super) following_error_m: f64,
     /// True if it reports its following error.
@@ -42,6 +48,9 @@ impl Default for Drive {
             heard: false,
             statusword: 0,
             encoder_m: 0.0,
+            encoder_m_s: 0.0,
+            raw_m_s: 0.0,
+            still: (0, 0.0),
             following_error_m: 0.0,
             reports_following_error: false,
             emergency: None,
@@ -55,6 +64,7 @@ impl Default for Drive {
                 controlword: Controlword::DISABLE_VOLTAGE,
                 target_counts: 0,
                 torque_offset: 0,
+                velocity_offset: 0,
             },
         }
     }
@@ -71,6 +81,32 @@ impl Drive {
             // Reports from before it could be enabled are not the cause of a later fault.
             self.emergency = None;
         }
+    }
+
+    /// Derives the velocity from the step to a new position, which took a cycle, or as many as were
+    /// not answered: whichever explains it better. Returns the change of the velocity.
+    pub(super) fn derive(&mut self, step_m: f64, cycles: f64, share: f64, dt_s: f64) -> f64 {
+        let [one_m_s, all_m_s] = [step_m / dt_s, step_m / (dt_s * cycles)];
+        let is_late = (one_m_s - self.raw_m_s).abs() <= (all_m_s - self.raw_m_s).abs();
+        let velocity_m_s = if is_late { one_m_s } else { all_m_s };
+        let change_m_s = velocity_m_s - self.raw_m_s;
+        self.raw_m_s = velocity_m_s;
+        // Without a filter exactly the difference.
+        self.encoder_m_s = if share < 1.0 {
+            self.encoder_m_s + share * (velocity_m_s - self.encoder_m_s)
+        } else {
+            velocity_m_s
+        };
+        change_m_s
+    }
+
+    /// Counts answers with the same position; `command` is the one before this answer.
+    pub(super) fn watch_standstill(&mut self, step_m: f64, command: f64) {
+        self.still = if step_m.abs() > 0.0 {
+            (0, command)
+        } else {
+            (self.still.0.saturating_add(1), self.still.1)
+        };
     }
 
     /// Returns the state in its statusword, if it is defined.

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::cycle::Cycle;
 use super::mailbox::StopReason;
+use super::mode;
 use super::pending::Part;
 use super::phase::Phase;
 use super::silence::saturate;
@@ -26,6 +27,9 @@ const JUMP_SHARE: f64 = 0.1;
 const OUTSIDE_SHARE: f64 = 0.02;
 /// Cycles without an answer after which a position is too old to be used for the following error.
 const STALE_CYCLES: u64 = 5;
+
+/// Answers with the same position after which an axis counts as standing still.
+const STILL_CYCLES: u32 = 5;
 
 impl Cycle {
     /// Takes every available message; paced by answers, waits until all have arrived.
@@ -96,6 +100,16 @@ impl Cycle {
                 && step_m.abs() > JUMP_WAYS * way_m + JUMP_SHARE * spec.following_error_max_m
             {
                 drive.jump_m = drive.jump_m.or(Some(step_m));
+            }
+            if drive.heard {
+                let (dt_s, before_m_s) = (self.spec.cycle.as_secs_f64(), drive.raw_m_s);
+                let change_m_s = drive.derive(step_m, cycles, spec.velocity_share, dt_s);
+                drive.watch_standstill(step_m, self.commanded[0][axis]);
+                if mode::of(spec.mode).closes_velocity_loop()
+                    && change_m_s.abs() > spec.velocity_jump_m_s(dt_s)
+                {
+                    drive.jump_m = drive.jump_m.or(Some(step_m - before_m_s * dt_s));
+                }
             }
             drive.status(statusword, encoder_m);
         }
@@ -192,6 +206,12 @@ impl Cycle {
         }
         if let Some(step_m) = drive.jump_m {
             return Some(StopReason::Jump { axis, step_m });
+        }
+        if mode::of(spec.mode).closes_velocity_loop() && drive.still.0 >= STILL_CYCLES {
+            let force_n = self.commanded[0][axis] - drive.still.1;
+            if force_n.abs() > spec.moving_force_n() {
+                return Some(StopReason::NoMotion { axis, force_n });
+            }
         }
         // A late position answers an earlier command; one that is long overdue is compared with the
         // newest.

@@ -1,8 +1,9 @@
 //! Start of a stop: every axis ramps from its last command to rest, for any failure.
 //!
-//! A stop is open loop in both modes. Its set points start from the last commands, learned input
+//! A stop is open loop in every mode. Its set points start from the last commands, learned input
 //! included, so that nothing steps; no measurement takes part in it, so that a frozen, late or
-//! false one can neither drive the axis on nor hold it back. Only then are the drives disabled.
+//! false one can neither drive the axis on nor hold it back. A drive in torque mode brakes
+//! by its own quick stop. Only then are the drives disabled.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
@@ -47,10 +48,18 @@ impl Cycle {
             let mode = mode::of(self.spec.axes[axis].mode);
             let last = self.commanded.map(|command| command[axis]);
             position_m[axis] = mode.position_m(last[0], position_m[axis]);
-            [velocity_m_s[axis], acceleration_m_s2[axis]] = mode.motion(last, dt_s);
+            [velocity_m_s[axis], acceleration_m_s2[axis]] =
+                mode.motion(last, self.reference.velocity_m_s[axis], dt_s);
         }
-        // It is part of the last commands, from which the stop continues.
-        self.input.absorb();
+        // It is part of the last commands, from which the stop continues; in an offset it fades out.
+        let stays = |axis: usize| {
+            self.has_offset[axis] && {
+                let spec = &self.spec.axes[axis];
+                spec.input != spec.mode.inputs()[0]
+            }
+        };
+        let stays: [bool; MAX_AXES] = std::array::from_fn(stays);
+        self.input.absorb(&stays);
         let stop = ControlledStop::new(
             &position_m,
             &velocity_m_s,

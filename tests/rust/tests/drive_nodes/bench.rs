@@ -79,7 +79,7 @@ to_m = [0.01, 0.01]
     Cell::parse(&text, "bench.toml").unwrap()
 }
 
-/// Axes that follow every demand at once, up to a velocity; a stuck one does not move at all.
+/// Axes of 1 kg that follow every demand at once; a stuck one does not move at all.
 pub(crate) struct Ideal {
     position_m: [f64; 2],
     velocity_m_s: [f64; 2],
@@ -97,6 +97,7 @@ impl Plant for Ideal {
                 Demand::Off => 0.0,
                 Demand::Position { position_m, .. } => (position_m - self.position_m[axis]) / dt_s,
                 Demand::Velocity { velocity_m_s } => velocity_m_s,
+                Demand::Force { force_n } => self.velocity_m_s[axis] + force_n * dt_s,
             };
             let is_stuck = self.is_stuck.load(Ordering::Relaxed);
             self.velocity_m_s[axis] = if is_stuck { 0.0 } else { wanted_m_s };
@@ -188,7 +189,7 @@ impl Bench {
 
     /// Runs one cycle: command first, then SYNC, at which the drive takes over the last command.
     pub(crate) fn cycle(&mut self, controlword: Controlword, target_counts: i32) -> Answer {
-        let command = CommandRpdo1 { controlword, target_counts, torque_offset: 0 };
+        let command = CommandRpdo1 { controlword, target_counts, ..CommandRpdo1::default() };
         self.bus.send(&command.encode(node(1))).unwrap();
         self.sync()
     }
@@ -243,6 +244,8 @@ pub(crate) fn setup(mode: Mode) -> DriveSetup {
         acceleration_max_counts_s2: 10_000_000,
         position_unit: None,
         velocity_unit: None,
+        torque_max: 0,
+        needs_torque_offset: false,
         heartbeat_ms: 0,
         rpdo_deadline_ms: 0,
         controller: node(127),

@@ -44,7 +44,7 @@ fn run() -> Vec<Frame> {
             let command = CommandRpdo1 {
                 controlword: next_command(status[axis].statusword.state().unwrap()),
                 target_counts: if cycle < 20 { start } else { start + swing },
-                torque_offset: 0,
+                ..CommandRpdo1::default()
             };
             bus.send(&command.encode(node)).unwrap();
         }

@@ -131,8 +131,7 @@ fn check_drive(sheet: &DataSheet, mode: Mode) -> Result<(), DataSheetError> {
         let needed = format!("it lacks {mode}, which interface = \"{}\" needs", mode.name());
         return Err(unfit(objects::SUPPORTED_MODES, format!("0x{modes:08X}"), needed));
     }
-    let [_, target, _] = mode.command_objects();
-    let target = (target, 0, "for the command of the interface");
+    let target = (mode.target().0, 0, "for the command of the interface");
     for (index, sub, purpose) in NEEDED.into_iter().chain([target]) {
         if sheet.get(index, sub).is_none() {
             return Err(DataSheetError::Missing {
@@ -194,8 +193,8 @@ fn identity(sheet: &DataSheet) -> Drive {
 /// Returns the smallest process data that carry what the mode needs; those of the drive if it has them
 /// fixed.
 fn process_data(sheet: &DataSheet, mode: Mode) -> Result<DrivePdo, DataSheetError> {
-    let [controlword, target, _] = mode.command_objects();
-    let command = one(sheet, objects::RPDO_MAPPING, &[controlword, target])?;
+    let command = [objects::CONTROLWORD, mode.target().0];
+    let command = one(sheet, objects::RPDO_MAPPING, &command)?;
     let status = [objects::STATUSWORD, objects::POSITION_ACTUAL];
     let status = one(sheet, objects::TPDO_MAPPING, &status)?;
     Ok(DrivePdo { command: Some(command), status: Some(status), motion: Some(Vec::new()) })

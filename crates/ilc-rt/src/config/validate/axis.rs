@@ -1,7 +1,7 @@
 //! Contradictions within `[[axis]]`.
 
 use super::checker::Checker;
-use super::{drive, homing, simulation};
+use super::{drive, homing, simulation, torque};
 use crate::config::{Axis, AxisModel, Cell, ConfigError, Mode, mode};
 use crate::record::{NAME_MAX, is_hidden};
 
@@ -104,14 +104,16 @@ pub(super) fn check(axis: &Axis, cell: &Cell, v: &Checker) -> Result<(), ConfigE
     }
     let design = mode::of(axis.interface);
     let name = axis.interface.name();
-    if design.closes_position_loop() != axis.position_loop.is_some() {
-        let (found, allowed) = if design.closes_position_loop() {
+    if design.needs_position_loop() != axis.position_loop.is_some() {
+        let (found, allowed) = if design.needs_position_loop() {
             ("missing", format!("interface \"{name}\" needs [axis.position_loop] gain_per_s"))
         } else {
-            ("given", format!("interface \"{name}\" has its position loop in the drive; remove it"))
+            let place = if design.closes_position_loop() { "[axis.cascade]" } else { "the drive" };
+            ("given", format!("interface \"{name}\" has its position loop in {place}; remove it"))
         };
         return Err(v.refuse(&at("position_loop"), &found, &allowed));
     }
+    torque::check(axis, cell.format(axis.bus).payload_max(), v)?;
     homing::check(axis, v)?;
     drive::check(axis, cell.format(axis.bus).payload_max(), v)?;
     simulation::check(axis, cell.simulation.step_us, v)

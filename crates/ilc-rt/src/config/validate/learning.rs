@@ -50,8 +50,8 @@ impl Cell {
                 .iter()
                 .map(|axis| LawAxis {
                     name: &axis.name,
-                    corrects_set_point: !mode::of(axis.interface).closes_position_loop(),
-                    input_max: mode::of(axis.interface).input_max(&self.learning),
+                    input: axis.input_kind(),
+                    input_max: mode::bound_of(axis.input_kind(), &self.learning),
                     position_min: axis.limits.position_min_m,
                     position_max: axis.limits.position_max_m,
                     velocity_max: axis.limits.velocity_max_m_s,

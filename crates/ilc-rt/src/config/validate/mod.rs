@@ -8,6 +8,7 @@ mod input;
 mod learning;
 mod program;
 mod simulation;
+mod torque;
 
 use super::cell::Cell;
 use super::error::ConfigError;

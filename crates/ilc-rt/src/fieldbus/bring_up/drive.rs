@@ -53,6 +53,10 @@ pub struct DriveSetup {
     pub position_unit: Option<u32>,
     /// The SI unit equal to one count per second, coded as in object 0x60A9, if there is one.
     pub velocity_unit: Option<u32>,
+    /// Largest torque that is commanded, in thousandths of the rated torque; 0: none.
+    pub torque_max: u16,
+    /// True if the loop commands a torque offset (object 0x60B2) that must arrive.
+    pub needs_torque_offset: bool,
     /// Heartbeat period of the drive, in milliseconds; 0: off (lock-step).
     pub heartbeat_ms: u16,
     /// Time without a command after which the drive stops, in milliseconds; 0: never
@@ -136,7 +140,7 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     process_data::close_all(&mut remote)?;
     remote.ensure_all(&settings::communication(node, setup.heartbeat_ms, setup.cycle_us))?;
     remote.forget_heartbeats()?;
-    let mut map = remote.supported(setup.map)?;
+    let mut map = remote.supported(setup)?;
     let mut deadline_ms = setup.rpdo_deadline_ms;
     if deadline_ms > 0 && !remote.has_command_timeout()? {
         remote.watch_heartbeat(setup.controller, deadline_ms)?;
@@ -144,6 +148,7 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     }
     for (number, layout, deadline_ms) in [
         (pdo_map::COMMAND_PDO, map.command, deadline_ms),
+        (pdo_map::OFFSET_PDO, map.offset, 0),
         (pdo_map::STATUS_PDO, map.answers[0], 0),
         (pdo_map::DRIVE_MOTION_PDO, map.answers[1], 0),
     ] {
@@ -162,6 +167,9 @@ pub fn bring_up(bus: &mut dyn Bus, setup: &DriveSetup) -> Result<DriveIdentity, 
     }
     remote.set_mode(setup.mode, setup.answer_timeout)?;
     remote.ensure_all(&settings::offsets())?;
+    if setup.mode.targets_torque() {
+        remote.ensure(&settings::no_torque())?;
+    }
     remote.check_start_up()?;
     Ok(DriveIdentity { device_type, supported_modes, identity, fault, map, is_homed })
 }
@@ -272,9 +280,14 @@ impl Remote<'_> {
         Ok(Some(u16::from_le_bytes([low, high])))
     }
 
-    /// Returns a map without the optional objects that the node does not have.
-    fn supported(&mut self, mut map: PdoMap) -> Result<PdoMap, BringUpError> {
+    /// Returns the map without the optional objects that the node does not have.
+    fn supported(&mut self, setup: &DriveSetup) -> Result<PdoMap, BringUpError> {
+        let mut map = setup.map;
         for index in process_data::OPTIONAL {
+            // One that cannot be done without is refused where it is mapped.
+            if index == objects::TORQUE_OFFSET && setup.needs_torque_offset {
+                continue;
+            }
             if map.carries(index) && !self.has("process data", index)? {
                 map = map.without(index);
             }

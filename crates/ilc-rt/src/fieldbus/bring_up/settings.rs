@@ -79,7 +79,12 @@ pub(super) fn reactions(setup: &DriveSetup) -> Vec<Setting> {
         // Fault or quick stop; neither continue nor coast.
         or(connection_loss, objects::CONNECTION_LOSS_OPTION, &[1, 3]),
         // The quick-stop ramp, then off or held.
-        or(quick_stop, objects::QUICK_STOP_OPTION, &[2, 6]),
+        if setup.mode.targets_torque() {
+            or(quick_stop, objects::QUICK_STOP_OPTION, &[2, 6])
+                .needed("to brake in every controlled stop")
+        } else {
+            or(quick_stop, objects::QUICK_STOP_OPTION, &[2, 6])
+        },
         // Applied to an axis at rest: disabled at once, or by a ramp.
         option(objects::SHUTDOWN_OPTION, &[0, 1]),
         option(objects::DISABLE_OPTION, &[1, 0]),
@@ -109,10 +114,10 @@ pub(super) fn motion(setup: &DriveSetup) -> Vec<Setting> {
         at_least(objects::MAX_VELOCITY, U32, velocity),
         Setting::new(objects::MAX_ACCELERATION, 0, U32, margin.clone()),
         Setting::new(objects::MAX_DECELERATION, 0, U32, margin),
-        at_least(objects::MAX_TORQUE, U16, RATED),
-        at_least(objects::MAX_CURRENT, U16, RATED),
-        at_least(objects::POSITIVE_TORQUE_LIMIT, U16, RATED),
-        at_least(objects::NEGATIVE_TORQUE_LIMIT, U16, RATED),
+        at_least(objects::MAX_TORQUE, U16, RATED.max(setup.torque_max.into())),
+        at_least(objects::MAX_CURRENT, U16, RATED.max(setup.torque_max.into())),
+        at_least(objects::POSITIVE_TORQUE_LIMIT, U16, RATED.max(setup.torque_max.into())),
+        at_least(objects::NEGATIVE_TORQUE_LIMIT, U16, RATED.max(setup.torque_max.into())),
         Setting::new(
             objects::FOLLOWING_ERROR_WINDOW,
             0,
@@ -164,6 +169,11 @@ pub(super) fn offsets() -> [Setting; 3] {
         none(objects::VELOCITY_OFFSET, Kind::I32),
         none(objects::TORQUE_OFFSET, Kind::I16),
     ]
+}
+
+/// Returns the required target of a drive in torque mode: no force before it is commanded.
+pub(super) fn no_torque() -> Setting {
+    Setting::new(objects::TARGET_TORQUE, 0, Kind::I16, Need::Exactly(0))
 }
 
 /// Returns the interpolation period; a drive without it uses the period of SYNC.

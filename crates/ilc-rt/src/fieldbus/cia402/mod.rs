@@ -9,7 +9,7 @@ pub mod process_data;
 pub mod state;
 pub mod units;
 
-pub use mode::Mode;
+pub use mode::{InputKind, Mode};
 pub use pdo_map::{CommandRpdo1, DriveMotionTpdo2, EncoderSample, StatusTpdo1};
 pub use process_data::{MapError, OptionalObjects, PdoLayout, PdoMap, Reading, Supervision};
 pub use state::{Controlword, State, Statusword, next_command};

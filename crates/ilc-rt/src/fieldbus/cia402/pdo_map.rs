@@ -4,8 +4,11 @@
 //! |---|---|---|---|
 //! | RPDO1, CSP | 6040 controlword | 607A target position | 60B2 torque offset |
 //! | RPDO1, CSV | 6040 controlword | 60FF target velocity | 60B2 torque offset |
+//! | RPDO1, CST | 6040 controlword | 607A demanded position | 6071 target torque |
 //! | TPDO1 | 6041 statusword | 6064 position | 6077 torque |
 //!
+//! RPDO2, for drives that get a velocity offset only, is 60B1, 32 bits; it has no codec here, as it is
+//! written by `process_data` alone.
 //! TPDO2 is 606C velocity and 60F4 following error, 32 bits each; TPDO1 of an encoder node is two
 //! positions of 32 bits. Little-endian throughout.
 
@@ -20,6 +23,8 @@ use crate::fieldbus::canopen::{NodeId, ObjectAddress};
 
 /// The PDO that carries [`CommandRpdo1`].
 pub const COMMAND_PDO: PdoNumber = PdoNumber::receive(0);
+/// The PDO that carries the velocity offset.
+pub const OFFSET_PDO: PdoNumber = PdoNumber::receive(1);
 /// The PDO that carries [`StatusTpdo1`].
 pub const STATUS_PDO: PdoNumber = PdoNumber::transmit(0);
 /// The PDO that carries [`DriveMotionTpdo2`].
@@ -55,10 +60,12 @@ const fn mapped(index: u16, sub: u8, bits: u8) -> MappedObject {
 pub struct CommandRpdo1 {
     /// Controlword.
     pub controlword: Controlword,
-    /// Target: position in counts (CSP), velocity in counts/s (CSV).
+    /// Target: position in counts (CSP), velocity in counts/s (CSV); demanded position (CST).
     pub target_counts: i32,
-    /// Torque feed-forward, thousandths of the rated torque.
+    /// Torque feed-forward, target torque in CST, thousandths of the rated torque.
     pub torque_offset: i16,
+    /// Velocity feed-forward, in counts/s: in RPDO2.
+    pub velocity_offset: i32,
 }
 
 /// TPDO1 of a drive: its status in every cycle.
@@ -104,7 +111,12 @@ impl CommandRpdo1 {
     pub fn decode(frame: &Frame, node: NodeId) -> Option<Self> {
         let (word, target_counts, torque_offset) =
             split_word_long_word(payload(frame, COMMAND_PDO, node)?);
-        Some(Self { controlword: Controlword(word), target_counts, torque_offset })
+        Some(Self {
+            controlword: Controlword(word),
+            target_counts,
+            torque_offset,
+            ..Self::default()
+        })
     }
 }
 
@@ -206,11 +218,13 @@ mod tests {
             |map: &[MappedObject]| map.iter().map(|object| u32::from(object.bits)).sum::<u32>();
         assert_eq!(bits(&command_map(Mode::Csp)), 64);
         assert_eq!(bits(&command_map(Mode::Csv)), 64);
+        assert_eq!(bits(&command_map(Mode::Cst)), 64);
         assert_eq!(bits(&STATUS_MAP), 64);
         assert_eq!(bits(&DRIVE_MOTION_MAP), 64);
         assert_eq!(bits(&ENCODER_MAP), 64);
         assert_eq!(command_map(Mode::Csp)[1].entry(), 0x607A_0020);
         assert_eq!(command_map(Mode::Csv)[1].entry(), 0x60FF_0020);
+        assert_eq!(command_map(Mode::Cst)[2].entry(), 0x6071_0010);
     }
 
     #[test]
@@ -219,6 +233,7 @@ mod tests {
             controlword: Controlword::ENABLE_OPERATION,
             target_counts: -2,
             torque_offset: 0x0102,
+            ..CommandRpdo1::default()
         };
         let frame = command.encode(NodeId::new(1).unwrap());
         assert_eq!(frame.id(), 0x201);
@@ -232,7 +247,12 @@ mod tests {
         fn all_round_trip(id in 1_u8..=127, word: u16, a: i32, b: i32, last: i16) {
             let node = NodeId::new(id).unwrap();
             let command =
-                CommandRpdo1 { controlword: Controlword(word), target_counts: a, torque_offset: last };
+                CommandRpdo1 {
+                    controlword: Controlword(word),
+                    target_counts: a,
+                    torque_offset: last,
+                    ..CommandRpdo1::default()
+                };
             prop_assert_eq!(CommandRpdo1::decode(&command.encode(node), node), Some(command));
             let status =
                 StatusTpdo1 { statusword: Statusword(word), position_counts: a, torque: last };

@@ -121,6 +121,8 @@ pub enum Supervision {
 pub struct PdoMap {
     /// RPDO1.
     pub command: PdoLayout,
+    /// RPDO2, which carries a velocity offset; empty for a drive that gets none: it is not sent then.
+    pub offset: PdoLayout,
     /// TPDO1 and TPDO2; the second one may be empty: it is not sent then.
     pub answers: [PdoLayout; 2],
     /// Supervision of the commands.
@@ -140,12 +142,14 @@ impl PdoMap {
         bytes_max: usize,
     ) -> Self {
         let extra = wanted.and(supported);
-        let [controlword, target, torque_offset] = mode.command_objects();
+        let [controlword, long, word] = mode.command_objects();
         let mut command = PdoLayout::EMPTY;
         command.add(controlword, 16);
-        command.add(target, 32);
-        if extra.torque_offset {
-            command.add(torque_offset, 16);
+        // All three if the optional one, whichever it is in this mode, is there.
+        for (index, bits) in [(long, 32), (word, 16)] {
+            if extra.torque_offset || index == mode.target().0 {
+                command.add(index, bits);
+            }
         }
         let mut status = PdoLayout::EMPTY;
         status.add(objects::STATUSWORD, 16);
@@ -165,7 +169,17 @@ impl PdoMap {
                 motion.add(index, bits);
             }
         }
-        Self { command, answers: [status, motion], supervision: Supervision::default() }
+        let answers = [status, motion];
+        Self { command, offset: PdoLayout::EMPTY, answers, supervision: Supervision::default() }
+    }
+
+    /// Returns the map with the velocity offset (0x60B1): in RPDO2, unless the command carries it.
+    #[must_use]
+    pub fn with_velocity_offset(mut self) -> Self {
+        if !self.carries(objects::VELOCITY_OFFSET) {
+            self.offset.add(objects::VELOCITY_OFFSET, 32);
+        }
+        self
     }
 
     /// Returns the map with everything that the profile offers, on classical CAN: three PDOs of 8 bytes.
@@ -185,7 +199,8 @@ impl PdoMap {
         let mut status = PdoLayout::EMPTY;
         status.add(objects::STATUSWORD, 16);
         status.add(objects::POSITION_ACTUAL, 32);
-        Self { command, answers: [status, PdoLayout::EMPTY], supervision: Supervision::default() }
+        let (offset, answers) = (PdoLayout::EMPTY, [status, PdoLayout::EMPTY]);
+        Self { command, offset, answers, supervision: Supervision::default() }
     }
 
     /// Returns the map with the digital inputs (0x60FD) in its answers, if it has none yet: where they fit into
@@ -212,8 +227,8 @@ impl PdoMap {
     /// # Errors
     /// [`MapError`] for an object that is missing, has the wrong length, or cannot be commanded.
     pub fn check(&self, mode: Mode, bytes_max: usize) -> Result<(), MapError> {
-        let [_, target, _] = mode.command_objects();
-        for layout in [&self.command, &self.answers[0], &self.answers[1]] {
+        let (target, target_bits) = mode.target();
+        for layout in [&self.command, &self.offset, &self.answers[0], &self.answers[1]] {
             if layout.n_bytes() > bytes_max {
                 return Err(MapError::Bytes { found: layout.n_bytes(), max: bytes_max });
             }
@@ -221,6 +236,7 @@ impl PdoMap {
                 let needed = match object.address.index {
                     objects::CONTROLWORD
                     | objects::STATUSWORD
+                    | objects::TARGET_TORQUE
                     | objects::TORQUE_OFFSET
                     | objects::TORQUE_ACTUAL => (16, "16"),
                     objects::POSITION_ACTUAL
@@ -230,7 +246,8 @@ impl PdoMap {
                     | objects::POSITION_OFFSET
                     | objects::VELOCITY_OFFSET => (32, "32"),
                     objects::MODE_OF_OPERATION => (8, "8"),
-                    index if index == target => (32, "32"),
+                    index if index == target => (target_bits, "32"),
+                    objects::TARGET_POSITION => (32, "32"),
                     // Of others the value is skipped.
                     _ => (object.bits.next_multiple_of(8).max(8), "whole bytes"),
                 };
@@ -240,9 +257,11 @@ impl PdoMap {
                 }
             }
         }
+        let [_, long, _] = mode.command_objects();
         let commands = [
             objects::CONTROLWORD,
             target,
+            long,
             objects::POSITION_OFFSET,
             objects::VELOCITY_OFFSET,
             objects::TORQUE_OFFSET,
@@ -268,7 +287,9 @@ impl PdoMap {
 
     /// Returns whether a PDO carries an object of sub-index 0.
     pub fn carries(&self, index: u16) -> bool {
-        self.command.carries(index) || self.answers.iter().any(|answer| answer.carries(index))
+        self.command.carries(index)
+            || self.offset.carries(index)
+            || self.answers.iter().any(|answer| answer.carries(index))
     }
 
     /// Returns the map without an object.
@@ -277,15 +298,16 @@ impl PdoMap {
         let [first, second] = self.answers;
         Self {
             command: self.command.without(index),
+            offset: self.offset.without(index),
             answers: [first.without(index), second.without(index)],
             supervision: self.supervision,
         }
     }
 
-    /// Returns the lengths of the frames of a cycle, in bytes: command, then answers.
+    /// Returns the lengths of the frames of a cycle, in bytes: commands, then answers.
     pub fn frame_bytes(&self) -> impl Iterator<Item = usize> {
         let [first, second] = self.answers;
-        [self.command, first, second]
+        [self.command, self.offset, first, second]
             .into_iter()
             .filter(|layout| !layout.is_empty())
             .map(|layout| layout.frame_bytes())
@@ -371,9 +393,13 @@ impl PdoLayout {
             let n_bytes = usize::from(object.bits / 8);
             let value = match object.address.index {
                 objects::CONTROLWORD => i32::from(command.controlword.0),
+                // In torque mode it is the target.
+                objects::TARGET_TORQUE => i32::from(command.torque_offset),
+                objects::TORQUE_OFFSET if mode.targets_torque() => 0,
                 objects::TORQUE_OFFSET => i32::from(command.torque_offset),
+                objects::VELOCITY_OFFSET => command.velocity_offset,
                 objects::MODE_OF_OPERATION => i32::from(mode.code()),
-                objects::POSITION_OFFSET | objects::VELOCITY_OFFSET => 0,
+                objects::POSITION_OFFSET => 0,
                 _ => command.target_counts,
             };
             if let (Some(room), Some(bytes)) =

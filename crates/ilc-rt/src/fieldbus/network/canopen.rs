@@ -10,7 +10,9 @@ use crate::fieldbus::bring_up::SdoClient;
 use crate::fieldbus::canopen::{
     Emergency, Heartbeat, NmtCommand, NmtState, NodeId, ObjectAddress, cob_id, emcy, sync,
 };
-use crate::fieldbus::cia402::pdo_map::{COMMAND_PDO, DRIVE_MOTION_PDO, ENCODER_PDO, STATUS_PDO};
+use crate::fieldbus::cia402::pdo_map::{
+    COMMAND_PDO, DRIVE_MOTION_PDO, ENCODER_PDO, OFFSET_PDO, STATUS_PDO,
+};
 use crate::fieldbus::cia402::{CommandRpdo1, EncoderSample, Mode, PdoMap, Supervision, objects};
 use crate::fieldbus::frame::FD_PAYLOAD_MAX;
 use crate::fieldbus::{Bus, BusError, Frame};
@@ -180,12 +182,22 @@ impl CanopenAxes {
 impl AxisNetwork for CanopenAxes {
     fn write(&mut self, axis: usize, command: &CommandRpdo1) -> Result<(), BusError> {
         let Some(station) = self.stations.get(axis) else { return Ok(()) };
-        let mut payload = [0; FD_PAYLOAD_MAX];
-        station.map.command.write(station.mode, command, &mut payload);
-        let payload = payload.get(..station.map.command.frame_bytes()).unwrap_or(&[]);
-        // Checked at set-up: a map fits a frame.
-        let frame = Frame::fd(COMMAND_PDO.default_cob_id(station.node), payload);
-        frame.map_or(Ok(()), |frame| self.bus.send(&frame))
+        // The offset first: the command makes the two complete.
+        for (pdo, layout) in
+            [(OFFSET_PDO, &station.map.offset), (COMMAND_PDO, &station.map.command)]
+        {
+            if layout.is_empty() {
+                continue;
+            }
+            let mut payload = [0; FD_PAYLOAD_MAX];
+            layout.write(station.mode, command, &mut payload);
+            let payload = payload.get(..layout.frame_bytes()).unwrap_or(&[]);
+            // Checked at set-up: a map fits a frame.
+            if let Some(frame) = Frame::fd(pdo.default_cob_id(station.node), payload) {
+                self.bus.send(&frame)?;
+            }
+        }
+        Ok(())
     }
 
     fn exchange(&mut self) -> Result<(), BusError> {

@@ -8,6 +8,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::LawName;
+use crate::fieldbus::cia402::InputKind;
 use crate::learning::{Law, LearningError};
 use crate::model::StateSpace;
 use crate::schema::Violation;
@@ -17,9 +18,8 @@ use crate::schema::Violation;
 pub struct LawAxis<'a> {
     /// Name.
     pub name: &'a str,
-    /// The learned input is added to the set point of a drive that closes the position loop; otherwise
-    /// it is added to the output of the position loop in the controller.
-    pub corrects_set_point: bool,
+    /// Quantity that the learned input is added to.
+    pub input: InputKind,
     /// Bound of the learned input.
     pub input_max: f64,
     /// Lowest position.
@@ -30,6 +30,14 @@ pub struct LawAxis<'a> {
     pub velocity_max: f64,
     /// Acceleration limit.
     pub acceleration_max: f64,
+}
+
+impl LawAxis<'_> {
+    /// Returns true if the learned input is added to the set point of a drive that closes the
+    /// position loop.
+    pub fn corrects_set_point(&self) -> bool {
+        self.input == InputKind::Position
+    }
 }
 
 /// The part of a cell that laws use.
@@ -189,7 +197,8 @@ pub(super) fn needs_inputs(law: LawName, cell: &LawCell) -> Result<(), Violation
     if cell.axes.iter().all(|axis| axis.input_max > 0.0) {
         return Ok(());
     }
-    let allowed = "needs input_max_m (csp axes) and input_max_m_s (csv axes) above 0";
+    let allowed = "needs input_max_m (csp axes) and input_max_m_s (csv axes) above 0, and input_max_n of axes that learn \
+                   a torque";
     Err(LawCell::unfit(law, allowed))
 }
 

@@ -8,6 +8,7 @@ use super::context::{
     BuildError, Example, LawCell, LawContext, LawParameters, check_cutoff, needs_inputs,
 };
 use super::q_filter::{QFilter, QRunner};
+use crate::fieldbus::cia402::InputKind;
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::{Law, LearningError, LowPass, Result, Surrogate};
 use crate::schema::{Violation, field_order};
@@ -47,12 +48,21 @@ impl LawParameters for ErrorFeedforwardParameters {
     fn requires(&self, cell: &LawCell) -> Result<(), Violation> {
         let law = LawName::ErrorFeedforward;
         // The law adds to the output of a controller that keeps acting on the error.
-        if let Some(axis) = cell.axes.iter().find(|axis| axis.corrects_set_point) {
+        if let Some(axis) = cell.axes.iter().find(|axis| axis.corrects_set_point()) {
             return Err(LawCell::unfit(
                 law,
                 format!(
                     "only with interface = \"csv\" on every axis, as it adds to the output of the \
                      position loop here; axis {} has its position loop in the drive",
+                    axis.name
+                ),
+            ));
+        }
+        if let Some(axis) = cell.axes.iter().find(|axis| axis.input == InputKind::Torque) {
+            return Err(LawCell::unfit(
+                law,
+                format!(
+                    "only with velocities, as its gain is per second; axis {} learns a torque",
                     axis.name
                 ),
             ));

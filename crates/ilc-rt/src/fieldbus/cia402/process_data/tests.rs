@@ -14,13 +14,14 @@ fn bytes(map: &PdoMap) -> Vec<usize> {
 }
 
 #[test]
-fn the_full_map_is_the_fixed_one_and_the_small_one_has_six_bytes() {
+fn the_full_map_is_the_fixed_one_and_the_small_one_has_the_target() {
     for mode in Mode::ALL {
         let full = PdoMap::full(mode);
         assert_eq!(full.command.objects(), command_map(mode));
         assert_eq!(full.answers[0].objects(), STATUS_MAP);
         assert_eq!(full.answers[1].objects(), DRIVE_MOTION_MAP);
-        assert_eq!(bytes(&PdoMap::small(mode)), [6, 6]);
+        let command = 2 + usize::from(mode.target().1 / 8);
+        assert_eq!(bytes(&PdoMap::small(mode)), [command, 6]);
         assert_eq!(PdoMap::small(mode).check(mode, 8), Ok(()));
         assert_eq!(full.check(mode, 8), Ok(()));
     }
@@ -78,7 +79,12 @@ proptest! {
         let node = NodeId::new(5).unwrap();
         let map = PdoMap::full(Mode::Csp);
         let command =
-            CommandRpdo1 { controlword: Controlword(word), target_counts: a, torque_offset: last };
+            CommandRpdo1 {
+                controlword: Controlword(word),
+                target_counts: a,
+                torque_offset: last,
+                ..CommandRpdo1::default()
+            };
         let mut payload = [0; 8];
         prop_assert_eq!(map.command.write(Mode::Csp, &command, &mut payload), 8);
         let encoded = command.encode(node);
@@ -104,4 +110,47 @@ proptest! {
             prop_assert_eq!(layout.read(&payload).is_some(), payload.len() == layout.n_bytes());
         }
     }
+}
+
+#[test]
+fn a_torque_is_the_target_in_torque_mode_and_an_offset_in_the_others() {
+    let command = CommandRpdo1 {
+        controlword: Controlword(0x0F),
+        target_counts: 0x0102_0304,
+        torque_offset: -2,
+        velocity_offset: 5,
+    };
+    let mut payload = [0; 8];
+    let small = PdoMap::small(Mode::Cst);
+    assert_eq!(small.check(Mode::Cst, 8), Ok(()));
+    assert_eq!(small.command.write(Mode::Cst, &command, &mut payload), 4);
+    assert_eq!(payload[..4], [0x0F, 0, 0xFE, 0xFF]);
+    let full = PdoMap::full(Mode::Cst);
+    assert_eq!(full.check(Mode::Cst, 8), Ok(()));
+    assert_eq!(full.command.write(Mode::Cst, &command, &mut payload), 8);
+    assert_eq!(payload, [0x0F, 0, 4, 3, 2, 1, 0xFE, 0xFF]);
+    let offset = PdoLayout::new(&[MappedObject {
+        address: ObjectAddress::new(objects::TORQUE_OFFSET, 0),
+        bits: 16,
+    }])
+    .unwrap();
+    assert_eq!(offset.write(Mode::Csv, &command, &mut payload), 2);
+    assert_eq!(payload[..2], [0xFE, 0xFF]);
+    // In torque mode the drive would add it to the target.
+    offset.write(Mode::Cst, &command, &mut payload);
+    assert_eq!(payload[..2], [0, 0]);
+}
+
+#[test]
+fn a_velocity_offset_is_in_the_second_command_unless_the_first_carries_it() {
+    let plain = PdoMap::full(Mode::Csp);
+    let map = plain.with_velocity_offset();
+    assert_eq!(map.check(Mode::Csp, 8), Ok(()));
+    assert_eq!((plain.frame_bytes().count(), map.frame_bytes().count()), (3, 4));
+    let command = CommandRpdo1 { velocity_offset: -3, ..CommandRpdo1::default() };
+    let mut payload = [0; 8];
+    assert_eq!(map.offset.write(Mode::Csp, &command, &mut payload), 4);
+    assert_eq!(payload[..4], (-3_i32).to_le_bytes());
+    let own = PdoMap { command: map.offset, offset: PdoLayout::EMPTY, ..plain };
+    assert!(own.with_velocity_offset().offset.is_empty());
 }

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Bound, Bounds, Constrained, Limit};
+use crate::fieldbus::cia402::InputKind;
 use crate::learning::Law;
 use crate::learning::law::LawName;
 use crate::learning::law::context::{
@@ -76,7 +77,7 @@ impl LawParameters for ConstrainedParameters {
     /// No set point exceeds the limits of its axis, so a wider bound would have no effect.
     fn check(&self, cell: &LawCell) -> Result<(), Violation> {
         let least = |limit: fn(&LawAxis) -> f64| {
-            let csp = cell.axes.iter().filter(|axis| axis.corrects_set_point);
+            let csp = cell.axes.iter().filter(|axis| axis.corrects_set_point());
             csp.map(limit).fold(f64::INFINITY, f64::min)
         };
         let velocity = least(|axis| axis.velocity_max);
@@ -130,14 +131,18 @@ impl ConstrainedParameters {
             upper: each(most),
         };
         let optional = |csp: Option<f64>, csv: Option<f64>| {
-            let value = |axis: &LawAxis| if axis.corrects_set_point { csp } else { csv };
+            let value = |axis: &LawAxis| match axis.input {
+                InputKind::Position => csp,
+                InputKind::Velocity => csv,
+                InputKind::Torque => None,
+            };
             let bound = || within(&|axis| value(axis).unwrap_or(f64::INFINITY));
             (csp.is_some() || csv.is_some()).then(bound)
         };
         let set_point = |axis: &LawAxis, limit: f64| {
-            if axis.corrects_set_point { limit } else { f64::INFINITY }
+            if axis.corrects_set_point() { limit } else { f64::INFINITY }
         };
-        let any_set_point = axes.iter().any(|axis| axis.corrects_set_point);
+        let any_set_point = axes.iter().any(|axis| axis.corrects_set_point());
         let of_set_point = |bound: Bound| any_set_point.then_some(bound);
         Bounds {
             input: Some(within(&|axis| axis.input_max)),
@@ -145,7 +150,7 @@ impl ConstrainedParameters {
             step: optional(self.step_max_m, self.step_max_m_s),
             position: of_set_point(Bound {
                 lower: each(&|axis| {
-                    if axis.corrects_set_point { axis.position_min } else { f64::NEG_INFINITY }
+                    if axis.corrects_set_point() { axis.position_min } else { f64::NEG_INFINITY }
                 }),
                 upper: each(&|axis| set_point(axis, axis.position_max)),
             }),

@@ -290,7 +290,7 @@ mod tests {
     fn cost(text: &str) -> Result<Cost, String> {
         let axis = |name| LawAxis {
             name,
-            corrects_set_point: true,
+            input: crate::fieldbus::cia402::InputKind::Position,
             input_max: 1.0,
             position_min: -1.0,
             position_max: 1.0,
