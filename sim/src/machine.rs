@@ -1,18 +1,22 @@
 //! A whole simulated machine: its nodes, its plant, and their common time.
 
+mod error;
+mod parameters;
+
 use std::collections::VecDeque;
 
-use ilc_rt::config::{Cell, HomingKind};
+use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::Frame;
-use ilc_rt::fieldbus::canopen::{AbortCode, NmtState, NodeId, sync};
+use ilc_rt::fieldbus::canopen::{NmtState, NodeId, sync};
 use ilc_rt::fieldbus::cia402::State;
 use ilc_rt::fieldbus::transport::Responder;
 
 use crate::event::{Change, Event};
-use crate::node::switches::Switches;
-use crate::node::{Dictionary, DriveNode, DriveParameters, EncoderNode, Measured};
-use crate::plant::{Demand, Gantry, Plant};
+use crate::node::{Dictionary, DriveNode, EncoderNode, Measured};
+use crate::plant::{Delta, Demand, Gantry, Plant};
 use crate::script::{Happening, Script};
+
+pub use error::MachineError;
 
 /// Number of events kept until they are taken; older ones are dropped.
 const EVENTS_MAX: usize = 64;
@@ -24,30 +28,6 @@ pub enum ClockMode {
     LockStep,
     /// [`Machine::advance`], at the pace of its caller.
     RealTime,
-}
-
-/// Reason that a cell description is not a valid machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum MachineError {
-    /// An invalid node number.
-    #[error("node {0}: allowed 1 to 127")]
-    Node(u8),
-    /// An object is missing from a node's own table.
-    #[error("node {node}: its object dictionary is incomplete: {code}")]
-    Dictionary {
-        /// The node.
-        node: NodeId,
-        /// Abort code of the look-up.
-        code: AbortCode,
-    },
-    /// A plant with a different number of axes than the cell.
-    #[error("plant: expected {expected} axes, found {found}")]
-    Axes {
-        /// Axes of the cell.
-        expected: usize,
-        /// Axes of the plant.
-        found: usize,
-    },
 }
 
 /// A drive on its axis, and its last published state.
@@ -87,28 +67,17 @@ pub struct Machine {
     script: Script,
 }
 
-/// Returns the place at which a drive shows 0 after power-on: with an encoder that is not absolute, wherever the axis is.
-fn zero_m(axis: &ilc_rt::config::Axis) -> f64 {
-    match axis.homing.kind {
-        HomingKind::Drive => axis.simulation.position_start_m,
-        HomingKind::None | HomingKind::Absolute => axis.homing.offset_m,
-    }
-}
-
-/// Returns the counts of a drive's encoder along its axis: on the bus they grow with the axis unless it is reversed, and
-/// the polarity of the drive turns them on their way there.
-fn counts_per_m(axis: &ilc_rt::config::Axis) -> f64 {
-    let is_turned = axis.drive.polarity != 0;
-    if axis.reversed == is_turned { axis.counts_per_m } else { -axis.counts_per_m }
-}
-
 impl Machine {
     /// Creates the machine of a cell description, at rest and not yet booted.
     ///
     /// # Errors
     /// [`MachineError`] for an unvalidated cell.
     pub fn from_cell(cell: &Cell, clock: ClockMode) -> Result<Self, MachineError> {
-        Self::with_plant(cell, clock, Box::new(Gantry::from_cell(cell)))
+        let plant: Box<dyn Plant> = match &cell.simulation.delta {
+            Some(delta) => Box::new(Delta::from_cell(cell, delta)?),
+            None => Box::new(Gantry::from_cell(cell)),
+        };
+        Self::with_plant(cell, clock, plant)
     }
 
     /// Creates the same nodes on another plant.
@@ -127,21 +96,7 @@ impl Machine {
         let mut axes = Vec::with_capacity(cell.n_axes());
         for axis in &cell.axes {
             let node = node_of(axis.node)?;
-            let parameters = DriveParameters {
-                counts_per_m: counts_per_m(axis),
-                zero_m: zero_m(axis),
-                position_min_m: axis.limits.position_min_m,
-                position_max_m: axis.limits.position_max_m,
-                velocity_max_m_s: axis.limits.velocity_max_m_s,
-                deceleration_m_s2: axis.limits.acceleration_max_m_s2,
-                following_error_max_m: axis.limits.following_error_max_m,
-                force_max_n: axis.simulation.force_max_n,
-                cycle_us: cell.cell.cycle_us,
-                switches: Switches::of(axis),
-                inputs: axis.simulation.digital_inputs,
-                quirks: axis.simulation.quirks,
-                payload_max: cell.format(axis.bus).payload_max(),
-            };
+            let parameters = parameters::of(cell, axis);
             let drive = DriveNode::new(node, parameters)
                 .map_err(|code| MachineError::Dictionary { node, code })?;
             let (nmt, state) = (drive.nmt(), drive.state());

@@ -1,5 +1,7 @@
 //! Communication of every CANopen node: NMT, boot-up, heartbeat, SDO, PDO and EMCY around one dictionary.
 
+mod answers;
+
 use ilc_rt::config::Quirks;
 use ilc_rt::fieldbus::Frame;
 use ilc_rt::fieldbus::canopen::{
@@ -7,13 +9,12 @@ use ilc_rt::fieldbus::canopen::{
 };
 use ilc_rt::fieldbus::cia402::objects;
 
-use super::dictionary::{Dictionary, Entry, Mappable, Slot};
+use super::dictionary::{Dictionary, Entry, Slot};
 use super::drive_objects;
 use super::emergencies::Emergencies;
 use super::heartbeats::Heartbeats;
-use super::object_access::{ObjectAccess, refuse_under_halt};
+use super::object_access::refuse_under_halt;
 use super::pdo_engine::{PdoEngine, Received};
-use super::pdo_rules;
 use super::sdo_server::SdoServer;
 use super::sync_service::{Heard, SyncService};
 
@@ -205,7 +206,11 @@ impl Communication {
                 return Incoming::Nothing;
             }
         }
-        match self.pdos.receive(frame, &mut self.dictionary) {
+        let received = self.pdos.receive(frame, &mut self.dictionary);
+        if self.pdos.take_excess() {
+            self.emergency(emcy::CODE_PDO_EXCESS, out);
+        }
+        match received {
             Received::Applied => Incoming::Written,
             Received::TooShort => {
                 self.emergency(emcy::CODE_PDO_LENGTH, out);
@@ -289,71 +294,6 @@ impl Communication {
                 self.late_answer = None;
                 self.sync.restart();
                 self.boot(out);
-            }
-        }
-    }
-
-    fn answer(&mut self, frame: &Frame, out: &mut dyn FnMut(Frame)) -> Incoming {
-        let mut server = self.sdo;
-        let keeps_mode_under_halt = self.habits.keeps_mode_under_halt;
-        let mut access =
-            ObjectAccess { dictionary: &mut self.dictionary, keeps_mode_under_halt, written: None };
-        let answer = server.answer(frame.payload(), &mut access);
-        let written = access.written;
-        self.sdo = server;
-        if let Some(answer) = answer {
-            let id = cob_id::of(cob_id::SDO_RESPONSE, self.node);
-            if let Some(frame) = Frame::new(id, &answer.encode()) {
-                self.answer_in_time(frame, out);
-            }
-        }
-        let Some(address) = written else { return Incoming::Nothing };
-        self.forget_verification(address);
-        if pdo_rules::pdo_at(address.index).is_some() {
-            self.pdos = PdoEngine::new(&self.dictionary);
-        }
-        match address.index {
-            objects::PRODUCER_HEARTBEAT => self.heartbeats.restart_own(),
-            objects::CONSUMER_HEARTBEAT => self.heartbeats.disarm(),
-            objects::ERROR_HISTORY => self.emergencies.clear(&mut self.dictionary),
-            _ => {}
-        }
-        Incoming::Written
-    }
-
-    /// Sends an SDO answer, at once or after the time that this drive takes.
-    fn answer_in_time(&mut self, answer: Frame, out: &mut dyn FnMut(Frame)) {
-        if let Some((earlier, _)) = self.late_answer.take() {
-            out(earlier);
-        }
-        if self.habits.answer_delay_us == 0 {
-            out(answer);
-        } else {
-            self.late_answer = Some((answer, self.habits.answer_delay_us));
-        }
-    }
-
-    fn answer_late(&mut self, elapsed_us: u64, out: &mut dyn FnMut(Frame)) {
-        let Some((answer, left_us)) = self.late_answer else { return };
-        let left_us = left_us.saturating_sub(elapsed_us);
-        self.late_answer = (left_us > 0).then_some((answer, left_us));
-        if left_us == 0 {
-            out(answer);
-        }
-    }
-
-    /// Clears 0x1020 when the configuration that it stands for is changed.
-    fn forget_verification(&mut self, written: ObjectAddress) {
-        let is_configuration = !matches!(
-            written.index,
-            objects::VERIFY_CONFIGURATION | objects::STORE_PARAMETERS | objects::ERROR_HISTORY
-        ) && self
-            .dictionary
-            .find(written)
-            .is_ok_and(|slot| self.dictionary.entry(slot).mappable == Mappable::No);
-        if is_configuration {
-            for slot in self.slots.verified {
-                self.dictionary.set(slot, 0);
             }
         }
     }

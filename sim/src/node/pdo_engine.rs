@@ -25,6 +25,8 @@ struct Pdo {
     n_bytes: usize,
     latched: Option<Frame>,
     last_sent: Option<Frame>,
+    /// The last frame was longer than the map.
+    is_long: bool,
     n_syncs: u8,
     /// Counter of the SYNC at which it begins; `None` once it has begun, or for any.
     begins_at: Option<u8>,
@@ -43,6 +45,7 @@ impl Pdo {
         n_bytes: 0,
         latched: None,
         last_sent: None,
+        is_long: false,
         n_syncs: 0,
         begins_at: None,
         since_us: None,
@@ -126,12 +129,14 @@ pub enum Received {
 pub struct PdoEngine {
     receive: [Pdo; 4],
     transmit: [Pdo; 4],
+    has_excess: bool,
 }
 
 impl PdoEngine {
     /// Reads all parameters.
     pub fn new(dictionary: &Dictionary) -> Self {
-        let mut engine = Self { receive: [Pdo::EMPTY; 4], transmit: [Pdo::EMPTY; 4] };
+        let mut engine =
+            Self { receive: [Pdo::EMPTY; 4], transmit: [Pdo::EMPTY; 4], has_excess: false };
         for offset in 0..4_u8 {
             let at = usize::from(offset);
             engine.receive[at] = Pdo::load(dictionary, PdoNumber::receive(offset));
@@ -148,6 +153,8 @@ impl PdoEngine {
             received = if frame.payload().len() < pdo.n_bytes {
                 Received::TooShort
             } else {
+                let is_long = frame.payload().len() > pdo.n_bytes;
+                self.has_excess |= is_long && !std::mem::replace(&mut pdo.is_long, is_long);
                 pdo.since_us = Some(0);
                 if pdo.is_synchronous() {
                     pdo.latched = Some(*frame);
@@ -159,6 +166,12 @@ impl PdoEngine {
             };
         }
         received
+    }
+
+    /// Returns true if a frame since the last call was the first one that is longer than its map; its first bytes
+    /// count.
+    pub fn take_excess(&mut self) -> bool {
+        std::mem::take(&mut self.has_excess)
     }
 
     /// Applies the RPDOs that arrived since the last SYNC.

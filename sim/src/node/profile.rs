@@ -19,6 +19,13 @@ pub enum Goal {
         /// The position.
         position_m: f64,
     },
+    /// Pass a position at a velocity, in its direction.
+    Through {
+        /// The position.
+        position_m: f64,
+        /// The velocity.
+        velocity_m_s: f64,
+    },
     /// Keep a velocity.
     Speed {
         /// The velocity.
@@ -46,6 +53,11 @@ impl Profile {
                 let speed_m_s = brakeable_m_s(way_m.abs(), law.deceleration_m_s2, dt_s);
                 speed_m_s.min(law.velocity_m_s).copysign(way_m)
             }
+            Goal::Through { position_m, velocity_m_s } => {
+                let way_m = position_m - self.position_m;
+                let slower_m_s = brakeable_m_s(way_m.abs(), law.deceleration_m_s2, dt_s);
+                slower_m_s.hypot(velocity_m_s).min(law.velocity_m_s).copysign(velocity_m_s)
+            }
         };
         self.velocity_m_s = reachable_m_s(self.velocity_m_s, wanted_m_s, law, dt_s);
         let before_m = self.position_m;
@@ -60,9 +72,12 @@ impl Profile {
         }
     }
 
-    /// Returns whether it rests where its goal is.
+    /// Returns whether it rests where its goal is, or has passed it.
     pub fn has_reached(&self, goal: Goal) -> bool {
         let is_there = match goal {
+            Goal::Through { position_m, velocity_m_s } => {
+                return (self.position_m - position_m) * velocity_m_s.signum() >= 0.0;
+            }
             Goal::Place { position_m } => self.position_m.to_bits() == position_m.to_bits(),
             Goal::Speed { velocity_m_s } => {
                 return self.velocity_m_s.to_bits() == velocity_m_s.to_bits();

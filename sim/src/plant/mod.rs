@@ -5,6 +5,7 @@
 
 mod backlash;
 mod bristles;
+mod delta;
 pub mod drive_loop;
 mod environment;
 pub mod exact_step;
@@ -12,6 +13,7 @@ pub mod friction;
 mod gantry;
 mod noise;
 
+pub use delta::Delta;
 pub use gantry::{Gantry, GantryAxis};
 
 /// Demand of a drive on its motor during one step.

@@ -27,7 +27,7 @@ const SLACK: i64 = 256;
 fn grows(law: LawName, keep: Keep) -> (i64, usize) {
     let (mut cell, scratch) = (short("01_gantry.toml"), Scratch::new());
     cell.learning.law = law;
-    (cell.program.settle_s, cell.program.feed_m_s) = (0.0, 0.4);
+    cell.program.settle_s = 0.0;
     // One axis moves a little.
     cell.program.segments.truncate(1);
     let stop = Arc::new(AtomicI32::new(0));

@@ -11,7 +11,7 @@
 
 use std::collections::BTreeSet;
 
-use ilc_rt::config::Cell;
+use ilc_rt::config::{Cell, Direction, Input, InputUse, Level};
 use ilc_rt::fieldbus::canopen::NmtCommand;
 use ilc_rt::fieldbus::transport::Responder;
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
@@ -107,6 +107,46 @@ fn whole_campaigns_with_swapped_tables() {
         let expected = ["disabling", "enabling", "returning", "running", "settling", "stopped"];
         assert_eq!(watched.phases, BTreeSet::from(expected));
         println!("{name}: {} ticks", watched.n_ticks);
+    }
+}
+
+#[test]
+fn inputs_presses_and_an_open_guard() {
+    for name in CELLS {
+        let mut cell = short(name);
+        for (name, bit, purpose) in [
+            ("door", 16, InputUse::Guard),
+            ("go", 17, InputUse::Start),
+            ("end", 20, InputUse::Limit),
+        ] {
+            cell.inputs.push(Input {
+                name: name.to_owned(),
+                axis: "x".to_owned(),
+                bit,
+                active: Level::High,
+                purpose,
+                direction: (purpose == InputUse::Limit).then_some(Direction::Positive),
+                debounce_cycles: 5,
+            });
+        }
+        cell.axes[0].simulation.digital_inputs = 1 << 16;
+        let rig = Rig::waiting(&cell, 1);
+        let mut watched = Watched { rig, phases: BTreeSet::new(), n_ticks: 0 };
+        while watched.rig.phase.0 != PhaseName::Waiting {
+            watched.tick(0);
+        }
+        let set = |watched: &Watched, inputs: u32| {
+            watched
+                .rig
+                .tap
+                .line()
+                .meddle(|machine, _| assert!(machine.set_inputs(node(1), inputs)));
+        };
+        set(&watched, 0b11 << 16);
+        watched.tick_into_run(0, MIDDLE);
+        set(&watched, 0b10 << 16);
+        watched.tick_to_end();
+        assert_eq!(watched.rig.reason, Some(StopReason::GuardOpen { input: 0 }), "{name}");
     }
 }
 

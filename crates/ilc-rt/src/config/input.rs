@@ -8,8 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::axis::Axis;
 use crate::schema::field_order;
 
-/// Largest number of inputs of a cell.
-pub const INPUTS_MAX: usize = 16;
+pub use crate::servo::INPUTS_MAX;
 
 /// Bit of object 0x60FD of the negative limit switch of a drive.
 const NEGATIVE_LIMIT_SWITCH: u8 = 0;

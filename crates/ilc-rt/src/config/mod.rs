@@ -31,7 +31,9 @@ pub use homing::{DriveHoming, HOMING_METHODS, Homing, HomingKind};
 pub use input::{Direction, INPUTS_MAX, Input, InputUse, Level};
 pub use learning::{Learning, Measure};
 pub use library::{Keep, LibrarySection};
-pub use simulation::{AxisSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange};
+pub use simulation::{
+    AxisSimulation, DeltaSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange,
+};
 pub use torque::{CascadeControl, Feedforward, Force};
 pub use validate::check;
 

@@ -25,9 +25,38 @@ pub struct Simulation {
     /// Temperature of the machine at power-on; motors and scales are nominal at 293.15 K.
     #[schemars(range(min = 200.0, max = 500.0))]
     pub temperature_k: f64,
+    /// `[simulation.delta]`: the axes move a delta mechanism together; without it each one moves its own mass.
+    pub delta: Option<DeltaSimulation>,
     /// `[[simulation.change]]`: changes while the machine runs, each from its time on.
     #[serde(rename = "change")]
     pub changes: Vec<SimulationChange>,
+}
+
+/// `[simulation.delta]`: three rotary axes, the cranks of a delta mechanism, with one platform on their rods. `mass_kg`
+/// of an axis is the inertia that its cascade is tuned for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("x-order" = field_order::<Self>()))]
+pub struct DeltaSimulation {
+    /// Radius of the pivots of the cranks minus that of the joints on the platform.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub base_m: f64,
+    /// Length of the cranks.
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub crank_m: f64,
+    /// Length of the rods.
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub rod_m: f64,
+    /// Inertia of a crank with its motor, in kg m².
+    #[schemars(range(min = 1e-6, max = 1e4))]
+    pub crank_kg_m2: f64,
+    /// Mass of the platform, with its share of the rods.
+    #[schemars(range(min = 0.0, max = 1e4))]
+    pub platform_kg: f64,
+    /// Acceleration of gravity from the platform towards the base; negative for a mechanism that hangs, 0 for none.
+    #[serde(default)]
+    #[schemars(range(min = -20.0, max = 20.0))]
+    pub gravity_m_s2: f64,
 }
 
 /// `[[simulation.change]]`: a change of temperature, payload or load of the simulated machine, linear over
@@ -70,6 +99,7 @@ impl Default for Simulation {
             encoder_noise_m: 0.0,
             seed: 1,
             temperature_k: NOMINAL_TEMPERATURE_K,
+            delta: None,
             changes: Vec::new(),
         }
     }

@@ -119,6 +119,24 @@ fn a_short_command_is_an_emergency_not_a_command() {
 }
 
 #[test]
+fn of_a_long_command_the_first_bytes_count_and_it_is_told_once() {
+    let mut bench = Bench::enabled(Mode::Csp);
+    bench.write(0x1400, 1, &0x8000_0201_u32.to_le_bytes());
+    bench.write(0x1600, 0, &[2]);
+    bench.write(0x1400, 1, &0x0000_0201_u32.to_le_bytes());
+    let quick_stop = [0x02, 0, 0, 0, 0, 0, 0, 0];
+    let long = ilc_rt::fieldbus::Frame::new(0x201, &quick_stop).unwrap();
+    let told: Vec<Vec<u16>> = (0..3)
+        .map(|_| {
+            bench.bus.send(&long).unwrap();
+            bench.sync().emergencies
+        })
+        .collect();
+    assert_eq!(told, [vec![0x8220], vec![], vec![]]);
+    assert_eq!(bench.sync().state(), ilc_rt::fieldbus::cia402::State::QuickStopActive);
+}
+
+#[test]
 fn every_object_of_the_data_sheet_can_be_read_and_has_its_default() {
     let mut bench = Bench::new(ClockMode::LockStep);
     let client = SdoClient::new(node(1), ANSWER);

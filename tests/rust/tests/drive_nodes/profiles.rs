@@ -9,6 +9,7 @@ const NEW_SET_POINT: u16 = ENABLED | 1 << 4;
 const IMMEDIATE: u16 = 1 << 5;
 const RELATIVE: u16 = 1 << 6;
 const HALT: u16 = 1 << 8;
+const BLEND: u16 = 1 << 9;
 const REACHED: u16 = 1 << 10;
 const LIMITED: u16 = 1 << 11;
 const BIT_12: u16 = 1 << 12;
@@ -78,6 +79,48 @@ fn set_points_queue_follow_at_once_or_add_up() {
         assert_eq!(rest[499].position(), expected, "bits {bits:#x}");
         assert_eq!(word(&rest[499]) & (REACHED | BIT_12), REACHED);
     }
+}
+
+#[test]
+fn a_change_on_set_point_passes_the_first_one_without_a_stop() {
+    let start = counts(START_M);
+    let first = start - 10_000;
+    // Beyond the first: at its velocity. So near that it must slow down. Back: a stop between.
+    for (second, slowest) in [(start - 30_000, 95), (start - 10_300, 20), (start - 2_000, 0)] {
+        let mut bench = in_mode(1);
+        bench.cycle(Controlword(NEW_SET_POINT), first);
+        run(&mut bench, ENABLED, first, 30);
+        bench.cycle(Controlword(NEW_SET_POINT | BLEND), second);
+        let waiting = bench.cycle(Controlword(ENABLED | BLEND), second);
+        assert_eq!(word(&waiting) & BIT_12, BIT_12, "no room until the first is passed");
+        let rest = run(&mut bench, ENABLED, second, 600);
+        assert_eq!(rest[599].position(), second);
+        assert_eq!(word(&rest[599]) & (REACHED | BIT_12), REACHED);
+        let passed = rest.windows(2).find(|two| two[1].position() <= first).unwrap();
+        let step = passed[0].position() - passed[1].position();
+        assert!(step >= slowest && (slowest > 0 || step < 20), "{second}: {step} counts a cycle");
+        let lowest = rest.iter().map(Answer::position).min().unwrap();
+        assert_eq!(lowest, first.min(second), "no overshoot");
+        let steps = rest.windows(2).map(|two| two[1].position() - two[0].position());
+        let changes: Vec<i32> = steps.collect();
+        assert!(changes.windows(2).all(|two| (two[1] - two[0]).abs() <= 3), "beyond 2 m/s2");
+    }
+}
+
+#[test]
+fn a_halt_between_blended_set_points_goes_on_through_them() {
+    let mut bench = in_mode(1);
+    let start = counts(START_M);
+    bench.cycle(Controlword(NEW_SET_POINT), start - 10_000);
+    run(&mut bench, ENABLED, 0, 30);
+    bench.cycle(Controlword(NEW_SET_POINT | BLEND), start - 30_000);
+    let halted = run(&mut bench, ENABLED | HALT, 0, 100);
+    assert_eq!(halted[99].position(), halted[60].position());
+    assert!(halted[99].position() > start - 10_000, "before the first");
+    let rest = run(&mut bench, ENABLED, 0, 600);
+    let passed = rest.windows(2).find(|two| two[1].position() <= start - 10_000).unwrap();
+    assert!(passed[0].position() - passed[1].position() > 90, "passed at speed");
+    assert_eq!(rest[599].position(), start - 30_000);
 }
 
 #[test]

@@ -99,6 +99,9 @@ pub fn check(cell: &Cell) -> Result<(), ConfigError> {
         &simulation.step_us,
         "a divisor of [cell] cycle_us",
     )?;
+    if let Some(delta) = &simulation.delta {
+        simulation::delta(cell, delta, &v)?;
+    }
     for change in &simulation.changes {
         let Some(name) = &change.axis else { continue };
         let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();

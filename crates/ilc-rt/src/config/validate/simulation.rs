@@ -1,7 +1,8 @@
 //! Contradictions within `[axis.simulation]`.
 
 use super::checker::Checker;
-use crate::config::{Axis, ConfigError};
+use crate::config::{Axis, AxisUnit, Cell, ConfigError, DeltaSimulation};
+use crate::kinematics::Delta;
 
 /// Checks what the simulated drive of an axis can be.
 pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), ConfigError> {
@@ -44,4 +45,48 @@ pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), Config
     let option = s.quirks.quick_stop_option;
     let key = at("simulation.quirks.quick_stop_option");
     v.that([0, 1, 2, 5, 6].contains(&option), &key, &option, "0, 1, 2, 5 or 6")
+}
+
+/// Checks a delta mechanism: three rotary axes that it can close with, and nothing that it does not have.
+pub(super) fn delta(cell: &Cell, delta: &DeltaSimulation, v: &Checker) -> Result<(), ConfigError> {
+    let n_axes = cell.axes.len();
+    v.that(n_axes == 3, "[[axis]] count", &n_axes, "3 with [simulation.delta]")?;
+    for axis in &cell.axes {
+        let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
+        let allowed = "\"rad\" with [simulation.delta]";
+        v.that(axis.unit == AxisUnit::Rad, &at("unit"), &axis.unit.symbol(), allowed)?;
+        let s = &axis.simulation;
+        for (key, value) in [
+            ("simulation.mode_mass_kg", s.mode_mass_kg),
+            ("simulation.backlash_m", s.backlash_m),
+            ("simulation.bristle_stiffness_n_m", s.bristle_stiffness_n_m),
+            ("simulation.cogging_n", s.cogging_n),
+            ("simulation.resistance_per_k", s.resistance_per_k),
+            ("simulation.expansion_per_k", s.expansion_per_k),
+        ] {
+            v.that(value == 0.0, &at(key), &value, "0 with [simulation.delta]")?;
+        }
+    }
+    for change in &cell.simulation.changes {
+        let is_axis = change.axis.is_some() && change.payload_kg.is_some();
+        v.that(
+            change.force_n.is_none() && change.temperature_k.is_none() && !is_axis,
+            "[[simulation.change]] after_s",
+            &change.after_s,
+            "of force_n, temperature_k and the payload of one axis nothing with [simulation.delta]: the payload is \
+             on the platform",
+        )?;
+    }
+    let start_rad: [f64; 3] = std::array::from_fn(|leg| {
+        cell.axes.get(leg).map_or(0.0, |axis| axis.simulation.position_start_m)
+    });
+    let closes = Delta::new(delta.base_m, delta.crank_m, delta.rod_m)
+        .and_then(|mechanism| mechanism.jacobian(start_rad).map(|_| ()));
+    match closes {
+        Ok(()) => Ok(()),
+        Err(error) => {
+            let allowed = format!("a mechanism that can move from position_start_m: {error}");
+            Err(v.refuse("[simulation.delta] rod_m", &delta.rod_m, &allowed))
+        }
+    }
 }

@@ -10,6 +10,8 @@ use crate::fieldbus::Frame;
 pub const CODE_RESET: u16 = 0x0000;
 /// A PDO shorter than its mapping was not processed.
 pub const CODE_PDO_LENGTH: u16 = 0x8210;
+/// A PDO was too long, and its first bytes were used.
+pub const CODE_PDO_EXCESS: u16 = 0x8220;
 /// An RPDO timed out.
 pub const CODE_RPDO_TIMEOUT: u16 = 0x8250;
 /// A SYNC was longer or shorter than the node expects.
@@ -194,7 +196,7 @@ fn monitoring(code: u16) -> &'static str {
         0x8150 => "CAN identifier used twice",
         0x8100..=0x81FF => "communication",
         CODE_PDO_LENGTH => "PDO too short",
-        0x8220 => "PDO too long",
+        CODE_PDO_EXCESS => "PDO too long",
         0x8230 => "PDO with an unknown destination",
         CODE_SYNC_LENGTH => "SYNC of unexpected length",
         CODE_RPDO_TIMEOUT => "no command (RPDO) in time",

@@ -154,3 +154,29 @@ fn a_velocity_offset_is_in_the_second_command_unless_the_first_carries_it() {
     let own = PdoMap { command: map.offset, offset: PdoLayout::EMPTY, ..plain };
     assert!(own.with_velocity_offset().offset.is_empty());
 }
+
+#[test]
+fn inputs_are_where_they_fit_or_in_the_place_of_the_velocity() {
+    let carried = |map: PdoMap| {
+        map.answers.map(|answer| {
+            answer.objects().iter().map(|object| object.address.index).collect::<Vec<u16>>()
+        })
+    };
+    assert_eq!(
+        carried(PdoMap::full(Mode::Csp).with_inputs(8)),
+        [vec![0x6041, 0x6064, 0x6077], vec![0x60F4, 0x60FD]]
+    );
+    assert_eq!(
+        carried(PdoMap::small(Mode::Csv).with_inputs(8)),
+        [vec![0x6041, 0x6064], vec![0x60FD]]
+    );
+    let wide = PdoMap::choose(Mode::Csp, OptionalObjects::ALL, OptionalObjects::ALL, 64);
+    assert_eq!(
+        carried(wide.with_inputs(64)),
+        [vec![0x6041, 0x6064, 0x6077, 0x606C, 0x60F4, 0x60FD], vec![]]
+    );
+    let mapped = PdoMap::full(Mode::Csp).with_inputs(8);
+    assert_eq!(mapped.with_inputs(8), mapped, "once");
+    let reading = mapped.answers[1].read(&[1, 0, 0, 0, 0x02, 0, 0x01, 0x80]).unwrap();
+    assert_eq!(reading.digital_inputs, Some(0x8001_0002));
+}
