@@ -31,6 +31,8 @@ struct Crank {
     viscous_n_s_m: f64,
     force_max_n: f64,
     integral_n: f64,
+    /// Force that is added to the output of the velocity controller.
+    feedforward_n: f64,
     force_n: f64,
     /// Error of the encoder in this step.
     noise_rad: f64,
@@ -90,6 +92,7 @@ impl Delta {
                 viscous_n_s_m: s.viscous_n_s_m,
                 force_max_n: s.force_max_n,
                 integral_n: 0.0,
+                feedforward_n: 0.0,
                 force_n: 0.0,
                 noise_rad: 0.0,
             }
@@ -208,6 +211,7 @@ impl Plant for Delta {
                 demand,
                 self.angle_rad[leg] + crank.noise_rad,
                 self.rate_rad_s[leg],
+                crank.feedforward_n,
                 &mut crank.integral_n,
                 dt_s,
             );
@@ -232,6 +236,12 @@ impl Plant for Delta {
     fn limit_force(&mut self, axis: usize, share: f64) {
         if let Some(crank) = self.cranks.get_mut(axis) {
             crank.drive.force_max_n = crank.force_max_n * share;
+        }
+    }
+
+    fn feed_force(&mut self, axis: usize, force_n: f64) {
+        if let Some(crank) = self.cranks.get_mut(axis) {
+            crank.feedforward_n = force_n;
         }
     }
 

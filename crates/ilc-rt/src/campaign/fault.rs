@@ -104,17 +104,18 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
             counted(Fault::new(FaultKind::Overrun), cycles, cell.safety.overrun_cycles_max)
         }
         StopReason::Congested { cycles } => counted(Fault::new(FaultKind::Bus), cycles, silent_max),
-        StopReason::Bus(BusError::Controller(fact)) => {
-            Fault { code: Some(fact.class()), ..Fault::new(FaultKind::CanController) }
-        }
-        StopReason::Bus(error) => {
-            let code = match error {
-                BusError::Os(number) => u32::try_from(number).ok(),
-                _ => None,
-            };
-            Fault { code, ..Fault::new(FaultKind::Bus) }
-        }
+        StopReason::Bus(error) => of_bus(error),
     })
+}
+
+/// Returns the fault of an error of the bus.
+fn of_bus(error: BusError) -> Fault {
+    let (kind, code) = match error {
+        BusError::Controller(fact) => (FaultKind::CanController, Some(fact.class())),
+        BusError::Os(number) => (FaultKind::Bus, u32::try_from(number).ok()),
+        _ => (FaultKind::Bus, None),
+    };
+    Fault { code, ..Fault::new(kind) }
 }
 
 /// Returns the node that another master speaks to, if it is a single one.

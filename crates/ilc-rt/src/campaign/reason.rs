@@ -18,29 +18,19 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             |axis| format!("axis {} (node {})", axis.name, axis.node),
         )
     };
-    // In lock-step the loop waits for every answer, so the count of cycles is meaningless.
-    let unanswered = |cycles: u32| {
-        if session.lockstep {
-            format!("no answer in {} s", cell.safety.answer_timeout_s)
-        } else {
-            format!(
-                "no answer in {cycles} cycles ({:.0} ms)",
-                f64::from(cycles) * cell.cycle_s() * 1e3
-            )
-        }
-    };
     let ms = |cycles: u32| f64::from(cycles) * cell.cycle_s() * 1e3;
+    // In lock-step the loop waits for every answer, so the count of cycles is meaningless.
+    let unanswered = |cycles: u32| match session.lockstep {
+        true => format!("no answer in {} s", cell.safety.answer_timeout_s),
+        false => format!("no answer in {cycles} cycles ({:.0} ms)", ms(cycles)),
+    };
     match reason {
         StopReason::Asked(STOPPED_BY_COMMAND) => "stopped by command".to_owned(),
         StopReason::Asked(signal) => asked(signal),
         StopReason::DriveFault { axis: index, code, following_error_m } => format!(
             "drive of {} faulted: {}; its following error was {}",
             axis(index),
-            if code == emcy::CODE_RESET {
-                "no emergency message says why".to_owned()
-            } else {
-                format!("0x{code:04X} {}", emcy::meaning(code))
-            },
+            cause(code),
             distance(cell, index, following_error_m)
         ),
         StopReason::NotEnabled { axis: index, statusword } => {
@@ -75,16 +65,15 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             "another master is on the bus: {} seen that this controller did not send",
             strange(stranger)
         ),
-        StopReason::FollowingError { axis: index, error_m } => format!(
-            "{}: following error {}, limits.following_error_max_m allows {}",
-            axis(index),
-            distance(cell, index, error_m.abs()),
-            distance(
-                cell,
-                index,
-                cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m)
+        StopReason::FollowingError { axis: index, error_m } => {
+            let allowed_m = cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m);
+            format!(
+                "{}: following error {}, limits.following_error_max_m allows {}",
+                axis(index),
+                distance(cell, index, error_m.abs()),
+                distance(cell, index, allowed_m)
             )
-        ),
+        }
         StopReason::OutsideLimits { axis, position_m } => outside(cell, axis, position_m),
         StopReason::Jump { axis: index, step_m } => format!(
             "{}: its position jumped by {} from one answer to the next, farther than it can move",
@@ -123,6 +112,14 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             format!("stopped by the button {}", inputs::place(cell, input))
         }),
         StopReason::LimitSwitch { input, .. } => of_input(cell, input, at_limit),
+    }
+}
+
+/// Describes the cause of a drive's fault.
+fn cause(code: u16) -> String {
+    match code {
+        emcy::CODE_RESET => "no emergency message says why".to_owned(),
+        _ => format!("0x{code:04X} {}", emcy::meaning(code)),
     }
 }
 

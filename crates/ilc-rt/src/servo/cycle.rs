@@ -252,9 +252,9 @@ impl Cycle {
     /// allow.
     fn accelerate(&mut self, before_m_s: &[f64; MAX_AXES]) {
         let dt_s = self.spec.cycle.as_secs_f64();
-        for axis in 0..self.n_axes() {
+        for (axis, before_m_s) in before_m_s.iter().enumerate().take(self.n_axes()) {
             let max_m_s2 = REFERENCE_SHARE * self.limits[axis].acceleration_max_m_s2;
-            let change_m_s = self.reference.velocity_m_s[axis] - before_m_s[axis];
+            let change_m_s = self.reference.velocity_m_s[axis] - before_m_s;
             self.reference_m_s2[axis] = (change_m_s / dt_s).min(max_m_s2).max(-max_m_s2);
         }
     }

@@ -80,8 +80,8 @@ impl LearnedInput {
     /// Drops the input at once, because it has become part of the set point, but for the axes where
     /// it `stays` and is still to be faded out.
     pub(super) fn absorb(&mut self, stays: &[bool; MAX_AXES]) {
-        for axis in 0..MAX_AXES {
-            if !stays[axis] {
+        for (axis, stays) in stays.iter().enumerate() {
+            if !stays {
                 self.value[axis] = 0.0;
                 self.fade_from[axis] = 0.0;
             }
@@ -124,7 +124,8 @@ mod tests {
         let mut stays = [false; MAX_AXES];
         stays[1] = true;
         input.absorb(&stays);
-        assert!(input.value()[0] == 0.0 && input.value()[1] == 0.2 && !input.faded());
+        assert_eq!(input.value()[..2].iter().map(|x| x.to_bits()).collect::<Vec<_>>(), [0.0_f64, 0.2].map(f64::to_bits));
+        assert!(!input.faded());
         for _ in 0..10 {
             input.fade();
         }

@@ -45,7 +45,7 @@ impl Cycle {
                 Ok(None) => return left,
                 // Frames are behind it.
                 Err(error @ BusError::Controller(_)) => {
-                    left = left.and(Err(StopReason::Bus(error)))
+                    left = left.and(Err(StopReason::Bus(error)));
                 }
                 Err(error) => return Err(StopReason::Bus(error)),
             }

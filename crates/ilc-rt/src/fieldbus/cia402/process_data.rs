@@ -393,10 +393,11 @@ impl PdoLayout {
             let n_bytes = usize::from(object.bits / 8);
             let value = match object.address.index {
                 objects::CONTROLWORD => i32::from(command.controlword.0),
-                // In torque mode it is the target.
-                objects::TARGET_TORQUE => i32::from(command.torque_offset),
+                // In torque mode it is the target, to which the drive would add its offset.
                 objects::TORQUE_OFFSET if mode.targets_torque() => 0,
-                objects::TORQUE_OFFSET => i32::from(command.torque_offset),
+                objects::TARGET_TORQUE | objects::TORQUE_OFFSET => {
+                    i32::from(command.torque_offset)
+                }
                 objects::VELOCITY_OFFSET => command.velocity_offset,
                 objects::MODE_OF_OPERATION => i32::from(mode.code()),
                 objects::POSITION_OFFSET => 0,

@@ -127,7 +127,6 @@ impl Bus for Group {
         sent
     }
 
-    #[expect(clippy::disallowed_types, reason = "cold: set-up")]
     fn keep_to(&mut self, nodes: &[u8]) -> Result<(), BusError> {
         for (number, bus) in (0_u8..).zip(&mut self.buses) {
             let is_on_it = |node: &u8| self.place[usize::from(*node) % NUMBERS] == number;

@@ -199,7 +199,6 @@ impl Bus for SocketCan {
         Ok(None)
     }
 
-    #[expect(clippy::disallowed_types, reason = "cold: set-up")]
     fn keep_to(&mut self, nodes: &[u8]) -> Result<(), BusError> {
         // Extended and remote frames match none of them.
         let flags = libc::CAN_EFF_FLAG | libc::CAN_RTR_FLAG;

@@ -142,7 +142,7 @@ impl ConstrainedParameters {
         let set_point = |axis: &LawAxis, limit: f64| {
             if axis.corrects_set_point() { limit } else { f64::INFINITY }
         };
-        let any_set_point = axes.iter().any(|axis| axis.corrects_set_point());
+        let any_set_point = axes.iter().any(LawAxis::corrects_set_point);
         let of_set_point = |bound: Bound| any_set_point.then_some(bound);
         Bounds {
             input: Some(within(&|axis| axis.input_max)),
