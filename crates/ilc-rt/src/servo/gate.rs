@@ -18,10 +18,6 @@ use crate::interpolate::AxisLimits;
 /// lag of the drive, and so changes faster than the axis will ever move: that has to pass.
 const LEARNED_SHARE: f64 = 4.0;
 
-/// Share of the acceleration by which the velocity of a command may differ from that of its request where it has
-/// caught up with it.
-const JOIN_SHARE: f64 = 0.2;
-
 /// Share of the velocity limit from which on a force brakes. A velocity loop overshoots a little
 /// where the program is as fast as its limit.
 const OVERSPEED: f64 = 1.1;
@@ -39,11 +35,21 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Returns the highest velocity from which an axis still comes to rest within `distance_m`,
-    /// including a delay: of half a cycle, and until the deceleration is there: `v t + v^2/2a = d`.
-    fn braking_m_s(&self, distance_m: f64, acceleration_m_s2: f64) -> f64 {
+    /// Returns the highest velocity at a distance from a position limit: that of braking, with the time that the
+    /// deceleration needs by the jerk limit.
+    fn approach_m_s(&self, distance_m: f64, acceleration_m_s2: f64) -> f64 {
         let turning_s = 2.0 * acceleration_m_s2 / (LEARNED_JERK * self.limits.jerk_max_m_s3);
-        let (half_s, distance_m) = (0.5 * self.dt_s + turning_s, distance_m.max(0.0));
+        self.delayed_m_s(distance_m, acceleration_m_s2, 0.5 * self.dt_s + turning_s)
+    }
+
+    /// Returns the highest velocity from which an axis still comes to rest within `distance_m`,
+    /// including one cycle of delay: `v T/2 + v^2/2a = d`.
+    fn braking_m_s(&self, distance_m: f64, acceleration_m_s2: f64) -> f64 {
+        self.delayed_m_s(distance_m, acceleration_m_s2, 0.5 * self.dt_s)
+    }
+
+    fn delayed_m_s(&self, distance_m: f64, acceleration_m_s2: f64, half_s: f64) -> f64 {
+        let distance_m = distance_m.max(0.0);
         let root = half_s * half_s + 2.0 * distance_m / acceleration_m_s2;
         (acceleration_m_s2 * (root.sqrt() - half_s)).max(0.0).min(distance_m / self.dt_s)
     }
@@ -75,7 +81,7 @@ impl Gate {
         let before_m_s = (last[0] - last[1]) / dt_s;
         // The velocity with the acceleration of before, and how far the jerk limit lets it be left.
         let steady_m_s = 2.0 * before_m_s - (last[1] - last[2]) / dt_s;
-        let bend_m_s = LEARNED_JERK * bounds.limits.jerk_max_m_s3 * dt_s * dt_s;
+        let own_bend_m_s = LEARNED_JERK * bounds.limits.jerk_max_m_s3 * dt_s * dt_s;
         let low_m = bounds.position_min_m.min(at_m);
         let high_m = bounds.position_max_m.max(at_m);
         let inside_m = wanted_m.max(low_m).min(high_m);
@@ -84,10 +90,11 @@ impl Gate {
         self.asked_m = wanted_m;
 
         let top_m_s = bounds.limits.velocity_max_m_s;
-        let up_m_s = top_m_s.min(bounds.braking_m_s(high_m - at_m, own));
-        let down_m_s = -top_m_s.min(bounds.braking_m_s(at_m - low_m, own));
+        let up_m_s = top_m_s.min(bounds.approach_m_s(high_m - at_m, own));
+        let down_m_s = -top_m_s.min(bounds.approach_m_s(at_m - low_m, own));
         let wanted_m_s = (inside_m - at_m) / dt_s;
         let catching_up = self.behind || cut;
+        let bend_m_s = if catching_up { own_bend_m_s } else { LEARNED_SHARE * own_bend_m_s };
         let reach = if catching_up { own } else { LEARNED_SHARE * own } * dt_s;
         // Rounding by a count must not restrict a command that is within the limits.
         let slack = 1e-9 * top_m_s;
@@ -96,7 +103,7 @@ impl Gate {
             && (wanted_m_s - before_m_s).abs() <= reach + slack
             && (wanted_m_s - steady_m_s).abs() <= bend_m_s + slack
             // It must be caught up with at its own velocity, or the next cycle would step.
-            && (!catching_up || (wanted_m_s - asked_m_s).abs() <= JOIN_SHARE * reach + slack);
+            && (!catching_up || (wanted_m_s - asked_m_s).abs() <= reach + slack);
         if free {
             self.behind = cut;
             return inside_m;
@@ -111,8 +118,8 @@ impl Gate {
             .max(before_m_s - own * dt_s)
             .min(up_m_s.max(before_m_s - own * dt_s))
             .max(down_m_s.min(before_m_s + own * dt_s))
-            .min(steady_m_s + bend_m_s)
-            .max(steady_m_s - bend_m_s)
+            .min(steady_m_s + own_bend_m_s)
+            .max(steady_m_s - own_bend_m_s)
             .min(top_m_s)
             .max(-top_m_s);
         (at_m + next_m_s * dt_s).max(low_m).min(high_m)

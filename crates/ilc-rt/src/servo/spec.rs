@@ -110,7 +110,7 @@ impl AxisSpec {
 }
 
 /// Multiple of the jerk limit up to which a learned input may bend the motion. The program respects the
-/// limit; what is learned on top of it answers friction and lags, and begins with its own rate.
+/// limit; what is learned on top of it answers friction and lags, and begins with its own value and rate.
 pub(super) const LEARNED_JERK: f64 = 8.0;
 
 /// Motor and mass of an axis.

@@ -38,7 +38,8 @@ proptest! {
             let acceleration = (velocity_m_s - before_m_s) / BOUNDS.dt_s;
             prop_assert!(acceleration.abs() <= LEARNED_SHARE * 8.0 * 1.01, "{acceleration} m/s2");
             let jerk = (acceleration - before_m_s2) / BOUNDS.dt_s;
-            prop_assert!(jerk.abs() <= LEARNED_JERK * 1000.0 * 1.01, "{jerk} m/s3");
+            let most = LEARNED_SHARE * LEARNED_JERK * 1000.0;
+            prop_assert!(jerk.abs() <= most * 1.01, "{jerk} m/s3");
             last = [at_m, last[0], last[1]];
             (before_m_s, before_m_s2) = (velocity_m_s, acceleration);
         }
