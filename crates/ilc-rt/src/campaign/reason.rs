@@ -20,9 +20,12 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
     };
     let ms = |cycles: u32| f64::from(cycles) * cell.cycle_s() * 1e3;
     // In lock-step the loop waits for every answer, so the count of cycles is meaningless.
-    let unanswered = |cycles: u32| match session.lockstep {
-        true => format!("no answer in {} s", cell.safety.answer_timeout_s),
-        false => format!("no answer in {cycles} cycles ({:.0} ms)", ms(cycles)),
+    let unanswered = |cycles: u32| {
+        if session.lockstep {
+            format!("no answer in {} s", cell.safety.answer_timeout_s)
+        } else {
+            format!("no answer in {cycles} cycles ({:.0} ms)", ms(cycles))
+        }
     };
     match reason {
         StopReason::Asked(STOPPED_BY_COMMAND) => "stopped by command".to_owned(),
