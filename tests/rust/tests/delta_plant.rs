@@ -23,12 +23,25 @@ fn the_error_of_coupled_cranks_falls_and_repeats_bit_for_bit() {
 }
 
 #[test]
-fn the_coupling_matters() {
-    let coupled = example("09_delta.toml");
-    let mut light = coupled.clone();
-    light.simulation.delta.as_mut().unwrap().platform_kg = 0.0;
-    let (coupled, light) = (rms_m(&coupled, 1).0[0], rms_m(&light, 1).0[0]);
-    assert!((coupled - light).abs() > 0.05 * light, "{coupled} {light}");
+fn a_crank_that_moves_alone_pulls_at_the_others() {
+    let mut cell = example("09_delta.toml");
+    // Only the first one moves.
+    for segment in &mut cell.program.segments {
+        segment.to_m[1..].fill(0.5);
+    }
+    for (segment, to_rad) in cell.program.segments.iter_mut().zip([0.9, 0.4, 0.7, 0.5]) {
+        segment.to_m[0] = to_rad;
+    }
+    let others = |platform_kg: f64| {
+        let mut cell = cell.clone();
+        cell.simulation.delta.as_mut().unwrap().platform_kg = platform_kg;
+        let kept = run(&cell, 1, None);
+        let error = &kept.outcome.runs[0].1.axes_tracking_inf_m;
+        assert!(error[0] > 0.01, "{error:?}");
+        error[1].max(error[2])
+    };
+    let (coupled, apart) = (others(0.5), others(0.0));
+    assert!(coupled > 1e-3 && coupled > 10.0 * apart, "{coupled} {apart} rad");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::config::Cell;
 use crate::fieldbus::BusError;
-use crate::fieldbus::canopen::emcy;
+use crate::fieldbus::canopen::{NodeId, emcy};
 use crate::interpolate::MAX_AXES;
 use crate::record::{Fault, FaultKind, LastCycles};
 use crate::servo::{Sample, StopReason, Stranger};
@@ -22,17 +22,6 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
         let axis = cell.axes.iter().find(|axis| axis.node == node);
         Fault { axis: axis.map(|axis| axis.name.clone()), node: Some(node), ..Fault::new(kind) }
     };
-    let of_input = |kind, index: usize| {
-        let input = cell.inputs.get(index);
-        let axis = cell.axes.iter().find(|axis| input.is_some_and(|own| own.axis == axis.name));
-        Fault {
-            axis: axis.map(|axis| axis.name.clone()),
-            node: axis.map(|axis| axis.node),
-            code: input.map(|input| input.bit.into()),
-            input: input.map(|input| input.name.clone()),
-            ..Fault::new(kind)
-        }
-    };
     let counted = |fault: Fault, cycles: u32, limit: u32| Fault {
         value: Some(cycles.into()),
         limit: Some(limit.into()),
@@ -43,8 +32,8 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
     let silent_max = cell.safety.silent_cycles_max;
     Some(match reason {
         StopReason::Asked(_) | StopReason::StopButton { .. } => return None,
-        StopReason::GuardOpen { input } => of_input(FaultKind::GuardOpen, input),
-        StopReason::LimitSwitch { input, .. } => of_input(FaultKind::LimitSwitch, input),
+        StopReason::GuardOpen { input } => of_input(FaultKind::GuardOpen, input, cell),
+        StopReason::LimitSwitch { input, .. } => of_input(FaultKind::LimitSwitch, input, cell),
         StopReason::DriveFault { axis, code, following_error_m } => Fault {
             code: Some(code.into()),
             value: Some(following_error_m),
@@ -78,17 +67,10 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
             let code = Some(u32::from(state as u8));
             Fault { code, ..of_node(FaultKind::NodeStopped, node) }
         }
-        StopReason::OtherMaster(stranger) => {
-            let node = match stranger {
-                Stranger::Sync => None,
-                Stranger::Nmt(_, node) => node,
-                Stranger::Command(node) | Stranger::Request(node) => Some(node),
-            };
-            node.map_or_else(
-                || Fault::new(FaultKind::OtherMaster),
-                |node| of_node(FaultKind::OtherMaster, node.get()),
-            )
-        }
+        StopReason::OtherMaster(stranger) => match addressed(stranger) {
+            Some(node) => of_node(FaultKind::OtherMaster, node.get()),
+            None => Fault::new(FaultKind::OtherMaster),
+        },
         StopReason::FollowingError { axis, error_m } => Fault {
             value: Some(error_m),
             limit: limits(axis).map(|limits| limits.following_error_max_m),
@@ -121,6 +103,28 @@ pub(super) fn fault(reason: StopReason, cell: &Cell) -> Option<Fault> {
             Fault { code, ..Fault::new(FaultKind::Bus) }
         }
     })
+}
+
+/// Returns the node that another master speaks to, if it is a single one.
+fn addressed(stranger: Stranger) -> Option<NodeId> {
+    match stranger {
+        Stranger::Sync => None,
+        Stranger::Nmt(_, node) => node,
+        Stranger::Command(node) | Stranger::Request(node) => Some(node),
+    }
+}
+
+/// Returns the fault that an input tells.
+fn of_input(kind: FaultKind, index: usize, cell: &Cell) -> Fault {
+    let input = cell.inputs.get(index);
+    let axis = cell.axes.iter().find(|axis| input.is_some_and(|own| own.axis == axis.name));
+    Fault {
+        axis: axis.map(|axis| axis.name.clone()),
+        node: axis.map(|axis| axis.node),
+        code: input.map(|input| input.bit.into()),
+        input: input.map(|input| input.name.clone()),
+        ..Fault::new(kind)
+    }
 }
 
 /// Returns the last cycles before a stop, one row each.

@@ -2,7 +2,7 @@
 
 use super::error::CampaignError;
 use super::options::{Options, StartOn};
-use crate::config::{Cell, Input, InputUse};
+use crate::config::{Cell, Direction, Input, InputUse};
 use crate::record::InputState;
 use crate::servo::InputBits;
 
@@ -36,7 +36,7 @@ pub(super) fn blocking<'a>(
 ) -> Option<&'a Input> {
     let axis = cell.axes.get(axis)?;
     cell.inputs.iter().find(|input| {
-        let sign = input.direction_of(axis).map_or(0.0, |direction| direction.sign());
+        let sign = input.direction_of(axis).map_or(0.0, Direction::sign);
         input.purpose == InputUse::Limit
             && input.axis == axis.name
             && is_on(cell, input, words)

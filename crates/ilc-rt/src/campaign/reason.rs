@@ -106,25 +106,30 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             emcy::CODE_RPDO_TIMEOUT
         ),
         StopReason::Bus(error) => format!("{error}"),
-        StopReason::GuardOpen { input } => of_input(cell, input, |input| inputs::open(cell, input)),
-        StopReason::StopButton { input } => of_input(cell, input, |input| {
+        StopReason::GuardOpen { input } => of_input(cell, input, inputs::open),
+        StopReason::StopButton { input } => of_input(cell, input, |cell, input| {
             format!("stopped by the button {}", inputs::place(cell, input))
         }),
-        StopReason::LimitSwitch { input, axis: index } => of_input(cell, input, |input| {
-            let towards = cell.axes.get(index).and_then(|axis| input.direction_of(axis));
-            format!(
-                "{}: limit switch {} is reached in {} direction: move away from it by hand (`ilc-rt jog`)",
-                axis(index),
-                inputs::place(cell, input),
-                towards.map_or("its", Direction::name)
-            )
-        }),
+        StopReason::LimitSwitch { input, .. } => of_input(cell, input, at_limit),
     }
 }
 
 /// Describes a stop by an input.
-fn of_input(cell: &Cell, input: usize, describe: impl FnOnce(&Input) -> String) -> String {
-    cell.inputs.get(input).map_or_else(|| format!("stopped by input {input}"), describe)
+fn of_input(cell: &Cell, input: usize, describe: impl FnOnce(&Cell, &Input) -> String) -> String {
+    let named = cell.inputs.get(input).map(|named| describe(cell, named));
+    named.unwrap_or_else(|| format!("stopped by input {input}"))
+}
+
+/// Describes a limit switch that an axis moved towards.
+fn at_limit(cell: &Cell, input: &Input) -> String {
+    let axis = cell.axes.iter().find(|axis| axis.name == input.axis);
+    let towards = axis.and_then(|axis| input.direction_of(axis));
+    format!(
+        "axis {}: limit switch {} is reached in {} direction: move away from it by hand (`ilc-rt jog`)",
+        input.axis,
+        inputs::place(cell, input),
+        towards.map_or("its", Direction::name)
+    )
 }
 
 /// Names the state of a drive that is not enabled, and an emergency stop as its likely cause.

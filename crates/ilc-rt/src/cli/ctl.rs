@@ -62,11 +62,12 @@ pub(super) fn ctl(arguments: &CtlArguments) -> u8 {
 fn sentence(status: &Status) -> String {
     let of = status.iterations.map_or_else(String::new, |n| format!(" of {n}"));
     let paused = if status.paused { ", paused" } else { "" };
-    let inputs: String = status
+    let inputs: Vec<String> = status
         .inputs
         .iter()
         .map(|input| format!("; {} {} {}", input.purpose, input.name, input.in_words()))
         .collect();
+    let inputs = inputs.concat();
     format!(
         "cell {}: {}, run {}{of}, feed {} %{paused}; law {}, campaign {}{inputs}",
         status.cell,

@@ -85,7 +85,7 @@ impl Input {
     }
 
     /// Returns true if it has been on for long enough.
-    fn is_steadily_on(&self, debounce_cycles: u32) -> bool {
+    fn is_steadily_on(self, debounce_cycles: u32) -> bool {
         self.is_on == Some(true) && self.cycles >= debounce_cycles
     }
 }
