@@ -1,8 +1,8 @@
-//! What happens to drives at given times, as `[[simulation.change]]` states it: inputs, safe torque off. For the machine.
+//! Inputs and safe torque off of drives at given times, as `[[simulation.change]]` states them. For the machine.
 
 use ilc_rt::config::Cell;
 
-/// What happens to a drive.
+/// Happening at a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Happening {
     /// These digital inputs are on from now on, beside the switches.
