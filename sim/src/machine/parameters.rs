@@ -1,4 +1,4 @@
-//! What maker and integrator have set in the drive of an axis, from the cell description.
+//! Settings of maker and integrator in the drive of an axis, from the cell description.
 
 use ilc_rt::config::{Axis, Cell, HomingKind};
 
