@@ -69,13 +69,7 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
             strange(stranger)
         ),
         StopReason::FollowingError { axis: index, error_m } => {
-            let allowed_m = cell.axes.get(index).map_or(0.0, |a| a.limits.following_error_max_m);
-            format!(
-                "{}: following error {}, limits.following_error_max_m allows {}",
-                axis(index),
-                distance(cell, index, error_m.abs()),
-                distance(cell, index, allowed_m)
-            )
+            format!("{}: {}", axis(index), lag(cell, index, error_m))
         }
         StopReason::OutsideLimits { axis, position_m } => outside(cell, axis, position_m),
         StopReason::Jump { axis: index, step_m } => format!(
@@ -116,6 +110,16 @@ pub(super) fn sentence(reason: StopReason, cell: &Cell, session: &Session) -> St
         }),
         StopReason::LimitSwitch { input, .. } => of_input(cell, input, at_limit),
     }
+}
+
+/// Describes a following error that is too large.
+fn lag(cell: &Cell, index: usize, error_m: f64) -> String {
+    let allowed_m = cell.axes.get(index).map_or(0.0, |axis| axis.limits.following_error_max_m);
+    format!(
+        "following error {}, limits.following_error_max_m allows {}",
+        distance(cell, index, error_m.abs()),
+        distance(cell, index, allowed_m)
+    )
 }
 
 /// Describes the cause of a drive's fault.

@@ -124,7 +124,10 @@ mod tests {
         let mut stays = [false; MAX_AXES];
         stays[1] = true;
         input.absorb(&stays);
-        assert_eq!(input.value()[..2].iter().map(|x| x.to_bits()).collect::<Vec<_>>(), [0.0_f64, 0.2].map(f64::to_bits));
+        assert_eq!(
+            input.value()[..2].iter().map(|x| x.to_bits()).collect::<Vec<_>>(),
+            [0.0_f64, 0.2].map(f64::to_bits)
+        );
         assert!(!input.faded());
         for _ in 0..10 {
             input.fade();

@@ -3,11 +3,12 @@
 use proptest::prelude::*;
 
 use super::super::pdo_map::{
-    DRIVE_MOTION_MAP, DriveMotionTpdo2, STATUS_MAP, StatusTpdo1, command_map,
+    CommandRpdo1, DRIVE_MOTION_MAP, DriveMotionTpdo2, STATUS_MAP, StatusTpdo1, command_map,
 };
-use super::super::state::Controlword;
+use super::super::state::{Controlword, Statusword};
 use super::*;
 use crate::fieldbus::canopen::NodeId;
+use crate::fieldbus::canopen::pdo::MappedObject;
 
 fn bytes(map: &PdoMap) -> Vec<usize> {
     map.frame_bytes().collect()
