@@ -43,10 +43,10 @@ fn the_drives_stay_alive_and_still() {
         drives.receive(&random(&mut draws), &mut |_| n_answers += 1);
     }
     assert!(n_answers > 1000, "some were requests and SYNCs: {n_answers} answers");
-    for axis in 0..n_axes {
+    for (axis, before_m) in before_m.into_iter().enumerate() {
         let (now_m, state) =
             (drives.plant().encoder_m(axis), drives.drive_state(node(cell.axes[axis].node)));
-        assert!((now_m - before_m[axis]).abs() < 1e-9, "axis {axis} moved to {now_m} m");
+        assert!((now_m - before_m).abs() < 1e-9, "axis {axis} moved to {now_m} m");
         assert_ne!(state, Some(State::OperationEnabled));
     }
     // Alive: each of them is brought up as if nothing had been.
