@@ -161,6 +161,22 @@ def test_a_sine_in_cyclic_position(eds: Path) -> None:
         assert min(seen) == pytest.approx(-5 * MM, rel=0.3)
 
 
+def test_a_push_and_a_pull_in_cyclic_torque(eds: Path) -> None:
+    with running() as (_, network):
+        node = attach(network, 1, eds)
+        assert node.is_op_mode_supported("CYCLIC SYNCHRONOUS TORQUE")
+        enable(network, node, "CYCLIC SYNCHRONOUS TORQUE")
+        before = actual(node)
+        # In thousandths of the rated torque; more than friction holds.
+        node.sdo[0x6071].raw = 300
+        wait_until(lambda: actual(node) > before + MM, "it moves forward")
+        node.sdo[0x6071].raw = -300
+        wait_until(lambda: int(node.tpdo_values[0x606C]) < 0, "it turns back")
+        node.sdo[0x6071].raw = 0
+        wait_until(lambda: abs(int(node.tpdo_values[0x606C])) < MM, "friction stops it", 20.0)
+        assert node.state == "OPERATION ENABLED"
+
+
 def test_quick_stop_that_ends_without_power(eds: Path, tmp_path: Path) -> None:
     cell = changed_cell(tmp_path, "quick_stop_option = 2")
     with running(cell=cell) as (sim, network):
