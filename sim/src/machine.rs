@@ -13,7 +13,7 @@ use ilc_rt::fieldbus::transport::Responder;
 
 use crate::event::{Change, Event};
 use crate::node::{Dictionary, DriveNode, EncoderNode, Measured};
-use crate::plant::{Delta, Demand, Gantry, Plant};
+use crate::plant::{Demand, Gantry, Mechanisms, Plant};
 use crate::script::{Happening, Script};
 
 pub use error::MachineError;
@@ -74,7 +74,7 @@ impl Machine {
     /// [`MachineError`] for an unvalidated cell.
     pub fn from_cell(cell: &Cell, clock: ClockMode) -> Result<Self, MachineError> {
         let plant: Box<dyn Plant> = match &cell.simulation.delta {
-            Some(delta) => Box::new(Delta::from_cell(cell, delta)?),
+            Some(delta) => Box::new(Mechanisms::from_cell(cell, delta)?),
             None => Box::new(Gantry::from_cell(cell)),
         };
         Self::with_plant(cell, clock, plant)

@@ -14,7 +14,7 @@ use super::noise::Noise;
 use super::{Demand, Plant};
 
 /// Number of cranks.
-const LEGS: usize = 3;
+pub(super) const LEGS: usize = 3;
 /// Sweeps over the cranks in which friction and brakes of a step settle.
 const SWEEPS: usize = 40;
 /// Time by which the mechanism is moved on for the rate of its Jacobian.
@@ -64,15 +64,21 @@ pub struct Delta {
 }
 
 impl Delta {
-    /// Creates the mechanism of a cell description, at rest at its start position.
+    /// Creates the mechanism of three axes of a cell description, at rest at its start position.
     ///
     /// # Errors
     /// [`KinematicsError`] for a mechanism that validation would have refused.
-    pub fn from_cell(cell: &Cell, description: &DeltaSimulation) -> Result<Self, KinematicsError> {
+    pub fn from_cell(
+        cell: &Cell,
+        description: &DeltaSimulation,
+        first: usize,
+    ) -> Result<Self, KinematicsError> {
         let mechanism =
             kinematics::Delta::new(description.base_m, description.crank_m, description.rod_m)?;
-        let names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
-        let of = |leg: usize| cell.axes.get(leg).map(|axis| axis.simulation).unwrap_or_default();
+        let names: Vec<&str> =
+            cell.axes.iter().skip(first).map(|axis| axis.name.as_str()).collect();
+        let of =
+            |leg: usize| cell.axes.get(first + leg).map(|axis| axis.simulation).unwrap_or_default();
         let angle_rad: Vector = std::array::from_fn(|leg| of(leg).position_start_m);
         let cranks = std::array::from_fn(|leg| {
             let s = of(leg);
@@ -105,7 +111,7 @@ impl Delta {
             angle_rad,
             rate_rad_s: [0.0; LEGS],
             noise_m: cell.simulation.encoder_noise_m,
-            noise: Noise::new(cell.simulation.seed),
+            noise: Noise::new(cell.simulation.seed.wrapping_add(first as u64)),
             environment: Environment::new(&cell.simulation, &names),
         })
     }

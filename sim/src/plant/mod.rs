@@ -11,10 +11,12 @@ mod environment;
 pub mod exact_step;
 pub mod friction;
 mod gantry;
+mod mechanisms;
 mod noise;
 
 pub use delta::Delta;
 pub use gantry::{Gantry, GantryAxis};
+pub use mechanisms::Mechanisms;
 
 /// Demand of a drive on its motor during one step.
 #[derive(Clone, Copy, Debug, PartialEq)]

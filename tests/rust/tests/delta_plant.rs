@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use ilc_rt::config::{AxisUnit, Cell, SimulationChange, check};
+use ilc_rt::config::{Axis, AxisUnit, Cell, SimulationChange, check};
 use ilc_rt::record::EndStatus;
 use ilc_sim::plant::{Delta, Demand, Plant as _};
 use ilc_tests::campaign::run;
@@ -20,6 +20,40 @@ fn the_error_of_coupled_cranks_falls_and_repeats_bit_for_bit() {
     let (first, digests) = rms_m(&cell, 8);
     assert!(first[7] < 0.2 * first[0], "{first:?}");
     assert_eq!(rms_m(&cell, 8).1, digests);
+}
+
+/// Adds two more mechanisms, with the program of the first one.
+fn three(mut cell: Cell) -> Cell {
+    for number in 1..3_u8 {
+        for axis in cell.axes[..3].to_vec() {
+            let name = format!("{}{number}", axis.name);
+            cell.axes.push(Axis { name, node: axis.node + 10 * number, ..axis });
+        }
+    }
+    cell.program.start_m = cell.program.start_m.repeat(3);
+    for segment in &mut cell.program.segments {
+        segment.to_m = segment.to_m.repeat(3);
+    }
+    cell
+}
+
+#[test]
+fn three_mechanisms_learn_beside_each_other() {
+    let cell = three(example("09_delta.toml"));
+    check(&cell).unwrap();
+    let errors = |cell: &Cell| -> Vec<Vec<f64>> {
+        let runs = run(cell, 4, None).outcome.runs;
+        runs.into_iter().map(|(_, figures)| figures.axes_tracking_rms_m).collect()
+    };
+    let (all, alone) = (errors(&cell), errors(&example("09_delta.toml")));
+    for (all, alone) in all.iter().zip(&alone) {
+        assert_eq!(all.len(), 9);
+        for (axis, error_rad) in all.iter().enumerate() {
+            // Alike but for the noise of the encoders.
+            assert!((error_rad / alone[axis % 3] - 1.0).abs() < 0.1, "axis {axis}: {error_rad}");
+        }
+    }
+    assert!(all[3].iter().zip(&all[0]).all(|(last, first)| last < &(0.5 * first)), "{all:?}");
 }
 
 #[test]
@@ -49,7 +83,7 @@ fn a_payload_is_on_the_platform() {
     let mut cell = example("09_delta.toml");
     let delta = cell.simulation.delta.unwrap();
     let held = |cell: &Cell| {
-        let mut plant = Delta::from_cell(cell, &delta).unwrap();
+        let mut plant = Delta::from_cell(cell, &delta, 0).unwrap();
         let hold = Demand::Position { position_m: 0.4, velocity_m_s: 0.0 };
         for _ in 0..8000 {
             plant.step(&[hold; 3], 250e-6);

@@ -25,15 +25,15 @@ pub struct Simulation {
     /// Temperature of the machine at power-on; motors and scales are nominal at 293.15 K.
     #[schemars(range(min = 200.0, max = 500.0))]
     pub temperature_k: f64,
-    /// `[simulation.delta]`: the axes move a delta mechanism together; without it each one moves its own mass.
+    /// `[simulation.delta]`: three axes move a delta mechanism together; without it each one moves its own mass.
     pub delta: Option<DeltaSimulation>,
     /// `[[simulation.change]]`: changes while the machine runs, each from its time on.
     #[serde(rename = "change")]
     pub changes: Vec<SimulationChange>,
 }
 
-/// `[simulation.delta]`: three rotary axes, the cranks of a delta mechanism, with one platform on their rods. `mass_kg`
-/// of an axis is the inertia that its cascade is tuned for.
+/// `[simulation.delta]`: three rotary axes, the cranks of a delta mechanism, with one platform on their rods; of more
+/// axes each three move a mechanism of their own. `mass_kg` of an axis is the inertia that its cascade is tuned for.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-order" = field_order::<Self>()))]

@@ -22,6 +22,7 @@ fn free(description: DeltaSimulation) -> Delta {
         viscous_n_s_m: 0.0,
         force_max_n: 20.0,
         integral_n: 0.0,
+        feedforward_n: 0.0,
         force_n: 0.0,
         noise_rad: 0.0,
     };

@@ -47,10 +47,11 @@ pub(super) fn check(axis: &Axis, step_us: u32, v: &Checker) -> Result<(), Config
     v.that([0, 1, 2, 5, 6].contains(&option), &key, &option, "0, 1, 2, 5 or 6")
 }
 
-/// Checks a delta mechanism: three rotary axes that it can close with, and nothing that it does not have.
+/// Checks delta mechanisms: three rotary axes each that it can close with, and nothing that it does not have.
 pub(super) fn delta(cell: &Cell, delta: &DeltaSimulation, v: &Checker) -> Result<(), ConfigError> {
     let n_axes = cell.axes.len();
-    v.that(n_axes == 3, "[[axis]] count", &n_axes, "3 with [simulation.delta]")?;
+    let allowed = "3, 6, 9 or 12 with [simulation.delta]";
+    v.that(n_axes.is_multiple_of(3), "[[axis]] count", &n_axes, allowed)?;
     for axis in &cell.axes {
         let at = |key: &str| format!("[[axis]] {}: {key}", axis.name);
         let allowed = "\"rad\" with [simulation.delta]";
@@ -74,19 +75,17 @@ pub(super) fn delta(cell: &Cell, delta: &DeltaSimulation, v: &Checker) -> Result
             "[[simulation.change]] after_s",
             &change.after_s,
             "of force_n, temperature_k and the payload of one axis nothing with [simulation.delta]: the payload is \
-             on the platform",
+             on each platform",
         )?;
     }
-    let start_rad: [f64; 3] = std::array::from_fn(|leg| {
-        cell.axes.get(leg).map_or(0.0, |axis| axis.simulation.position_start_m)
+    let starts_rad: Vec<f64> =
+        cell.axes.iter().map(|axis| axis.simulation.position_start_m).collect();
+    let (starts_rad, _) = starts_rad.as_chunks::<3>();
+    let closes = Delta::new(delta.base_m, delta.crank_m, delta.rod_m).and_then(|mechanism| {
+        starts_rad.iter().try_for_each(|start_rad| mechanism.jacobian(*start_rad).map(|_| ()))
     });
-    let closes = Delta::new(delta.base_m, delta.crank_m, delta.rod_m)
-        .and_then(|mechanism| mechanism.jacobian(start_rad).map(|_| ()));
-    match closes {
-        Ok(()) => Ok(()),
-        Err(error) => {
-            let allowed = format!("a mechanism that can move from position_start_m: {error}");
-            Err(v.refuse("[simulation.delta] rod_m", &delta.rod_m, &allowed))
-        }
-    }
+    closes.map_err(|error| {
+        let allowed = format!("a mechanism that can move from position_start_m: {error}");
+        v.refuse("[simulation.delta] rod_m", &delta.rod_m, &allowed)
+    })
 }
