@@ -148,10 +148,9 @@ fn check_stop(cell: &Cell, rig: &Rig, what: &str) {
                 let at = f64::from(rows[began - 1].target_counts[axis]) / spec.counts_per_m;
                 (at - plant_m[began - 1]).abs()
             }
-            // One that closes the velocity loop (CSV) lags by its time constant.
-            Mode::Csv => 0.02 * v,
-            // The drive hears of its quick stop a cycle later, and its velocity loop overshoots.
-            Mode::Cst => 0.02 * v,
+            // One that closes the velocity loop (CSV) lags by its time constant. In torque mode it hears
+            // of its quick stop a cycle later, and its velocity loop overshoots.
+            Mode::Csv | Mode::Cst => 0.02 * v,
         };
         let way_m = (plant_m[plant_m.len() - 1] - plant_m[began - 1]).abs();
         assert!(
