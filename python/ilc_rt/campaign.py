@@ -384,7 +384,7 @@ def _simulated(transport: Transport, drives: str) -> bool:
         raise BadInputError(message)
     if transport.in_process and drives == "external":
         message = (
-            f"drives = external: {transport.syntax} has no outside; its drives are always simulated"
+            f"drives = external: {transport.name}: has no outside; its drives are always simulated"
         )
         raise BadInputError(message)
     return drives == "simulated" or (drives == "auto" and not transport.has_bits)

@@ -126,7 +126,7 @@ def multisine(
         Name of the cell's axis; optional if it has only one.
     amplitude : float or None
         Peak of the input in its unit: m, m/s, N, rad, rad/s or N m; half of the largest possible
-        one if None. Required for a function.
+        one if None, 90 % of a torque. Required for a function.
     from_hz, to_hz : float or None
         Band in Hz. Without `to_hz` a cell's axis is excited up to 1.5 times the natural frequency
         in its description; if friction or a flexible mode spoils the fit, again in narrower bands,

@@ -43,6 +43,12 @@ class SweepResult:
     values: list[Any]
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        """Refuse results that are not one for each case."""
+        if not isinstance(self.values, list) or len(self.values) != len(self.cases):
+            message = f"values = {self.values!r}; a list with one entry for each case is needed"
+            raise TypeError(message)
+
     def __len__(self) -> int:
         """Return the number of cases."""
         return len(self.cases)

@@ -81,6 +81,9 @@ def sweep(
     if not callable(function):
         message = f"function = {function!r}: a function is needed"
         raise TypeError(message)
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        message = f"executor = {executor!r}: an executor of concurrent.futures is needed"
+        raise TypeError(message)
     every = [_case(number, case) for number, case in enumerate(cases)]
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**128:
         message = f"seed = {seed!r}: a whole number from 0 is needed"

@@ -28,18 +28,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ilc_rt.errors import CampaignError
+from ilc_rt.errors import CampaignError, SweepError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 
 MEMORY_MAX = 6 << 30
 SILENCE_MAX_S = 60.0
-ALLOWED = (ValueError, TypeError, MemoryError, OSError, CampaignError)
+ALLOWED = (ValueError, TypeError, MemoryError, OSError, CampaignError, SweepError)
 # Runs machines, or writes files to a given place.
 SKIPPED = {"Campaign", "Law", "CampaignResult", "TrialResult", "IterationRecord", "Experiment",
            "Identification", "to_parquet", "swept_sine", "Library", "Cell"}  # fmt: skip
 # Figures that may be infinite by definition: unbounded growth, no limit, the deviation of a
-# parameter that the measurement does not determine.
+# parameter that the measurement does not determine. `parameters` are as given: no bound is infinite.
 UNBOUNDED = {"bandwidth_deviation_hz", "gain_deviation", "delay_deviation_s", "damping_deviation",
              "natural_frequency_deviation_hz",
              "transient_growth", "spectral_radius", "expected_rms", "growth", "limit",
@@ -173,7 +173,7 @@ def told(name: str, arguments: dict[str, object]) -> str:
 
 def not_finite(value: object, path: str = "", depth: int = 0) -> str | None:
     """Return the place of a non-finite number in a result."""
-    if depth > 3 or path.rsplit(".", 1)[-1] in UNBOUNDED:
+    if depth > 3 or path.rsplit(".", 1)[-1] in UNBOUNDED or path == ".parameters":
         return None
     if isinstance(value, np.ndarray) and value.dtype.kind in "fc":
         return None if np.isfinite(value).all() else path

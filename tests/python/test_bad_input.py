@@ -61,7 +61,7 @@ OPTIONS = {
         ["cell.toml", "--bus", "can:an-interface-too-long"], ["1 to 15 printable characters"],
     ),
     "drives in another program": (
-        ["cell.toml", "--bus", "loopback:"], ["--bus", "loopback:", "can:INTERFACE, udp:"],
+        ["cell.toml", "--bus", "loopback:"], ["--bus", "loopback:", "can:INTERFACE", "udp:GROUP"],
     ),
     "library in no folder": (
         ["cell.toml", "--library", "nix/library.db"],

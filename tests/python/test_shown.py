@@ -71,7 +71,8 @@ def test_a_path_without_a_contour_is_told_by_its_tracking_error(
 ) -> None:
     """The file, the table, the sentence, the report and the library agree."""
     units, to_m = CASES[case]
-    (tmp_path / "cell.toml").write_text(cell_text(units, to_m))
+    learning = "[learning.norm_optimal]\nrate = 6.0\n"
+    (tmp_path / "cell.toml").write_text(cell_text(units, to_m, learning=learning))
     done = ilc("run", "cell.toml", "--iterations", 4, "--json", "f.json", "--report", "r.html")
     assert done.returncode == 0, done.stderr
     assert not NO_NUMBER.search(done.stdout), done.stdout

@@ -326,6 +326,7 @@ impl PyStateSpace {
         self.0.inverse().or_raise().map(Self)
     }
 
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn _select(&self, outputs: Vec<usize>, inputs: Vec<usize>) -> PyResult<Self> {
         self.0.select(&outputs, &inputs).or_raise().map(Self)
     }

@@ -71,10 +71,26 @@ class PositionHarmonic:
     order: int = 1
     is_cosine: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuse a pitch or an order out of range."""
+        if not isinstance(self.is_cosine, bool):
+            message = f"is_cosine = {self.is_cosine!r}; True or False is needed"
+            raise TypeError(message)
+        _check_harmonic(self.pitch, self.order)
+
     def __call__(self, reference: Array, dt_s: float) -> Array:
         """Return the signal of a reference."""
         phase = 2.0 * np.pi * self.order * reference / self.pitch
         return np.cos(phase) if self.is_cosine else np.sin(phase)
+
+
+def _check_harmonic(pitch: object, order: object) -> None:
+    if not (isinstance(pitch, (int, float)) and np.isfinite(pitch) and pitch > 0):
+        message = f"pitch = {pitch!r}: a finite number above 0 is needed"
+        raise LearningError(message)
+    if not isinstance(order, int) or not 1 <= order <= 100:
+        message = f"order = {order!r}: a whole number from 1 to 100 is needed"
+        raise LearningError(message)
 
 
 def position_harmonics(pitch: float, orders: int = 1) -> tuple[PositionHarmonic, ...]:
@@ -100,12 +116,7 @@ def position_harmonics(pitch: float, orders: int = 1) -> tuple[PositionHarmonic,
     >>> len(position_harmonics(0.01, 3))
     6
     """
-    if not (isinstance(pitch, (int, float)) and np.isfinite(pitch) and pitch > 0):
-        message = f"pitch = {pitch!r}: a finite number above 0 is needed"
-        raise LearningError(message)
-    if not isinstance(orders, int) or not 1 <= orders <= 100:
-        message = f"orders = {orders!r}: a whole number from 1 to 100 is needed"
-        raise LearningError(message)
+    _check_harmonic(pitch, orders)
     return tuple(
         PositionHarmonic(float(pitch), order, is_cosine)
         for order in range(1, orders + 1)

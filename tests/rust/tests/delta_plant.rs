@@ -25,12 +25,14 @@ fn the_error_of_coupled_cranks_falls_and_repeats_bit_for_bit() {
 /// Adds two more mechanisms, with the program of the first one.
 fn three(mut cell: Cell) -> Cell {
     for number in 1..3_u8 {
-        for axis in cell.axes[..3].to_vec() {
+        for axis in cell.axes.clone().into_iter().take(3) {
             let name = format!("{}{number}", axis.name);
             cell.axes.push(Axis { name, node: axis.node + 10 * number, ..axis });
         }
     }
     cell.program.start_m = cell.program.start_m.repeat(3);
+    // Along a path that is longer by this.
+    cell.program.feed_m_s *= 3.0_f64.sqrt();
     for segment in &mut cell.program.segments {
         segment.to_m = segment.to_m.repeat(3);
     }

@@ -4,10 +4,13 @@
 //! of the frequency, so a narrower band permits a larger amplitude.
 
 use super::identified::{Described, Identified};
-use crate::config::{Axis, Cell, mode};
+use crate::config::{Axis, Cell, InputKind, mode};
 
 /// Upper ends of the bands, relative to the natural frequency in the cell.
 const SHARES: [f64; 4] = [1.5, 1.0, 0.75, 0.5];
+/// Ends of the band of a torque behind loops of the drive, relative to the natural frequency: below it they cancel what is
+/// slow, and above it the mass alone answers.
+const TORQUE_SHARES: (f64, [f64; 3]) = (0.25, [2.0, 1.5, 1.25]);
 /// Relative residual of a model up to which its band is accepted.
 const GOOD_RESIDUAL: f64 = 0.12;
 /// Lowest frequency, unless the axis is slow.
@@ -53,8 +56,14 @@ impl BandSearch {
         let expected_hz =
             if model.is_some() { expected_hz } else { expected_hz.clamp(FROM_HZ, highest_hz) };
         let period_s = PERIOD_S.max(5.0 * CYCLES / expected_hz);
-        let from_hz = FROM_HZ.min(0.1 * expected_hz).max(CYCLES / period_s);
-        let mut to_try_hz: Vec<f64> = SHARES
+        let slowest_hz = FROM_HZ.min(0.1 * expected_hz).max(CYCLES / period_s);
+        let (from_hz, shares) = match axis.input_kind() {
+            InputKind::Torque if !axis.interface.targets_torque() => {
+                (TORQUE_SHARES.0 * expected_hz, &TORQUE_SHARES.1[..])
+            }
+            _ => (slowest_hz, &SHARES[..]),
+        };
+        let mut to_try_hz: Vec<f64> = shares
             .iter()
             .map(|share| (share * expected_hz).min(highest_hz))
             .filter(|to_hz| *to_hz >= 2.0 * from_hz)

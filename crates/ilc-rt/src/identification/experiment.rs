@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::error::IdentificationError;
 use crate::config::mode::{self, Demand, Peaks};
-use crate::config::{Axis, Cell, Measure};
+use crate::config::{Axis, Cell, InputKind, Measure};
 use crate::design::{DesignError, Plan, input_unit};
 use crate::model::ModelError;
 use crate::model::identify::{Excitation, ExcitationSignal};
@@ -14,6 +14,8 @@ use crate::trajectory::Interpolator;
 pub(crate) const LAW_NAME: &str = "excitation";
 /// Default amplitude as a share of the largest possible one.
 const AMPLITUDE_SHARE: f64 = 0.5;
+/// Likewise of a torque, of which friction takes its part whatever the amplitude is.
+const TORQUE_SHARE: f64 = 0.9;
 
 /// An experiment with one axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +49,8 @@ pub(crate) struct Planned {
 }
 
 impl Experiment {
-    /// Returns the experiment with half the largest amplitude that the limits of the axis allow.
+    /// Returns the experiment with half the largest amplitude that the limits of the axis allow; with 90 % of it for
+    /// a torque.
     ///
     /// # Errors
     /// [`IdentificationError::Experiment`] or [`IdentificationError::Model`] for an experiment that
@@ -63,7 +66,9 @@ impl Experiment {
             .iter()
             .map(Demand::margin)
             .fold(f64::INFINITY, f64::min);
-        self.excitation.amplitude *= AMPLITUDE_SHARE * tightest;
+        let is_torque = axis.input_kind() == InputKind::Torque;
+        self.excitation.amplitude *=
+            tightest * if is_torque { TORQUE_SHARE } else { AMPLITUDE_SHARE };
         if self.excitation.amplitude.is_nan() || self.excitation.amplitude <= 0.0 {
             return Err(self.refused(cell, "amplitude", "0", "the limits leave no room at all"));
         }

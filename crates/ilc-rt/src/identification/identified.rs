@@ -18,8 +18,10 @@ const DEVIATIONS: f64 = 3.0;
 const WORTH_A_CYCLE: f64 = 1.05;
 /// Largest delay of a cell description, in cycles.
 const DELAY_MAX: usize = 20;
-/// Share of the input below which the output counts as at rest.
+/// Motion per input below which the output counts as at rest: per metre or per m/s.
 const STILL: f64 = 1e-6;
+/// Likewise per newton: hundreds of them move a stiff axis by micrometres only.
+const STILL_M_N: f64 = 1e-12;
 
 /// Form of the model that describes an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +42,16 @@ pub enum Form {
         /// Gain of the position loop.
         position_gain_per_s: f64,
     },
+}
+
+impl Form {
+    /// Returns the motion per input below which the output counts as at rest.
+    fn still(self) -> f64 {
+        match self {
+            Self::Mass | Self::Offset { is_torque: true } => STILL_M_N,
+            _ => STILL,
+        }
+    }
 }
 
 /// An identified axis.
@@ -159,14 +171,19 @@ fn delays(model: &SecondOrder, dt_s: f64) -> std::ops::Range<usize> {
 }
 
 /// Returns a response of zero for an axis that rests, instead of one of rounding errors.
-fn without_rounding(mut measured: FrequencyResponse, u: &[f64], y: &[f64]) -> FrequencyResponse {
+fn without_rounding(
+    mut measured: FrequencyResponse,
+    u: &[f64],
+    y: &[f64],
+    still: f64,
+) -> FrequencyResponse {
     let range = |values: &[f64]| {
         let (low, high) = values
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
         high - low
     };
-    if range(y) <= STILL * range(u) {
+    if range(y) <= still * range(u) {
         for (response, coherence) in measured.response.iter_mut().zip(&mut measured.coherence) {
             (response.re, response.im, *coherence) = (0.0, 0.0, 0.0);
         }
@@ -191,7 +208,7 @@ impl Identified {
     ) -> Result<Self, ModelError> {
         let averaging = Averaging::Periods { period_samples };
         let whole = frequency_response(&u, &y, dt_s, averaging)?.band(band_hz.0, band_hz.1);
-        let measured = without_rounding(whole, &u, &y);
+        let measured = without_rounding(whole, &u, &y, form.still());
         let fit = fit_second_order(&measured, Some(dt_s), Known::default())?;
         let described = describe(&measured, &fit.model, dt_s, form)?;
         let model = match described {

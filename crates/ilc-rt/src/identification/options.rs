@@ -24,7 +24,7 @@ pub struct ExperimentOptions {
     /// Waveform of the excitation.
     #[arg(long, default_value = "multisine", value_parser = waveforms())]
     pub waveform: Waveform,
-    /// Peak of the excitation: m or rad (csp), m/s or rad/s (csv); half of what the limits allow if not given.
+    /// Peak of the excitation: m or rad (csp), m/s or rad/s (csv); half of what the limits allow if not given, 90 % of a torque.
     #[arg(long, value_name = "PEAK")]
     pub amplitude: Option<f64>,
     /// Lowest frequency; 1 Hz, or less for a slow axis, if not given.
@@ -77,7 +77,7 @@ impl ExperimentOptions {
     }
 
     /// Returns the experiment in a band, or in a default one; given options replace the band's own
-    /// values. The default amplitude is half of the largest one.
+    /// values. The default amplitude is half of the largest one, 90 % for a torque.
     ///
     /// # Errors
     /// [`IdentificationError::Experiment`] if it is beyond a limit of the axis.

@@ -4,7 +4,7 @@
 //! run's length is stored. [`analysis`](super::analysis) and the norm of the lifted system use it.
 
 use faer::Mat;
-use nalgebra::{DMatrix, DVector, DVectorView, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::learning::{LearningError, Result};
 
@@ -213,7 +213,7 @@ fn orthogonalise(basis: &[Vec<f64>], next: &mut [f64]) -> Vec<f64> {
     let mut parts = vec![0.0; basis.len()];
     for _ in 0..2 {
         for (vector, part) in basis.iter().zip(&mut parts) {
-            let share = dot(vector, next);
+            let share: f64 = vector.iter().zip(&*next).map(|(v, x)| v * x).sum();
             for (value, v) in next.iter_mut().zip(vector) {
                 *value -= share * v;
             }
@@ -245,13 +245,7 @@ fn unit(mut vector: Vec<f64>) -> Vec<f64> {
 
 /// Returns the Euclidean norm.
 pub(in crate::learning) fn norm(x: &[f64]) -> f64 {
-    dot(x, x).sqrt()
-}
-
-/// Returns the inner product, in several sums at a time: one sum would wait for each addition.
-fn dot(left: &[f64], right: &[f64]) -> f64 {
-    let view = |values| DVectorView::from_slice(values, left.len());
-    view(left).dot(&view(right))
+    x.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
 /// Returns pseudo-random numbers between -1 and 1, reproducible.

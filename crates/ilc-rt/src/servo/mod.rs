@@ -10,6 +10,7 @@ mod feed;
 mod gate;
 mod input;
 mod inputs;
+mod interlock;
 mod mailbox;
 mod mode;
 mod node;
