@@ -39,7 +39,7 @@ ALLOWED = (ValueError, TypeError, MemoryError, OSError, CampaignError, SweepErro
 SKIPPED = {"Campaign", "Law", "CampaignResult", "TrialResult", "IterationRecord", "Experiment",
            "Identification", "to_parquet", "swept_sine", "Library", "Cell"}  # fmt: skip
 # Figures that may be infinite by definition: unbounded growth, no limit, the deviation of a
-# parameter that the measurement does not determine. `parameters` are as given: no bound is infinite.
+# parameter that the measurement does not determine. `parameters` are as given.
 UNBOUNDED = {"bandwidth_deviation_hz", "gain_deviation", "delay_deviation_s", "damping_deviation",
              "natural_frequency_deviation_hz",
              "transient_growth", "spectral_radius", "expected_rms", "growth", "limit",
