@@ -111,7 +111,7 @@ pub struct Options {
     /// Accept commands of `ilc-rt ctl` on a socket of this user.
     #[arg(long)]
     pub ctl: bool,
-    /// Start each run at once, when `ilc-rt ctl CELL start` asks for it, or at a press of the button of an [[input]]
+    /// Start each run at once, when `ilc-rt ctl CELL start` asks for it, or at a press of the button of an `[[input]]`
     /// with use = "start".
     #[arg(
         long,

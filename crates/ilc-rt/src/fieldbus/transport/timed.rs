@@ -1,6 +1,6 @@
 //! A bus in memory whose frames take the time that they take on CAN, in lock-step.
 //!
-//! As [`InProcess`](super::InProcess), but a frame arrives when it would on a bus with this bit rate: one after the
+//! As [`InProcess`], but a frame arrives when it would on a bus with this bit rate: one after the
 //! other, in the worst case of bit stuffing, by arbitration between the oldest frame of the controller and
 //! that of each node. A SYNC begins a cycle; what is not through at its end arrives in a later one, so that a cell
 //! that does not fit loses its answers as on a real bus. No clock of the computer takes part.
