@@ -53,6 +53,7 @@ SHORTER = (
     (r"^ilc (run|demo|identify|repeatability)(?!.* --bus)(.*)$", r"ilc \1\2 --bus loopback:"),
     (r"^ilc repeatability(.*) --runs \d+", r"ilc repeatability\1 --runs 2"),
     (r"^ilc reproduce(?!.* --from)(.*)$", r"ilc reproduce\1 --reduced"),
+    (r"^ilc reproduce all(.* --from.*)$", r"ilc reproduce haas2016\1"),
     (r"^ilc-rt latency(?!.* --seconds)(.*)$", r"ilc-rt latency\1 --seconds 1"),
     (r"--seconds \d+", "--seconds 1"),
     (r"--samples \d+", "--samples 2"),

@@ -274,6 +274,16 @@ fn a_node_that_says_that_it_was_stopped_is_told_as_that() {
 }
 
 #[test]
+fn a_heartbeat_from_before_the_start_is_no_stop() {
+    let before =
+        Heartbeat { node: NodeId::new(X).unwrap(), state: NmtState::PreOperational }.encode();
+    let mut rig = Rig::on_clock(&short(CELLS[0]), 2);
+    rig.tap.line().meddle(move |_, reply| reply(before));
+    rig.tick_into_run(0, 100);
+    assert_eq!(rig.reason, None);
+}
+
+#[test]
 fn a_drive_that_switched_itself_off_is_not_switched_on_again_by_a_stop() {
     for name in CELLS {
         let cell = short(name);

@@ -84,6 +84,8 @@ pub struct Cycle {
     pub(super) inputs: [inputs::Input; INPUTS_MAX],
     /// As told last.
     pub(super) input_bits: InputBits,
+    /// Nodes, by their numbers, that have told that they are operational.
+    pub(super) operational: u128,
     /// True in the tick of a press of a start button.
     pub(super) is_pressed: bool,
     pub(super) phase: Phase,
@@ -161,6 +163,7 @@ impl Cycle {
             waits: false,
             input: LearnedInput::new(input_max, step_max, bend_max, fade_ticks),
             inputs: Default::default(),
+            operational: 0,
             input_bits: InputBits::default(),
             is_pressed: false,
             phase: Phase::Enabling { ticks: 0 },

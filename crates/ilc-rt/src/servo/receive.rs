@@ -73,9 +73,19 @@ impl Cycle {
                 self.drives[axis].emergency = Some(code).filter(|code| *code != emcy::CODE_RESET);
             }
             Arrival::Node { node, state } => {
-                let node = node.get();
+                let (node, bit) = (node.get(), 1_u128 << node.get());
                 return match state {
-                    NmtState::Operational => Ok(()),
+                    NmtState::Operational => {
+                        self.operational |= bit;
+                        Ok(())
+                    }
+                    // Sent before it was started, and read after. One that stays there falls silent.
+                    NmtState::PreOperational
+                        if self.operational & bit == 0
+                            && matches!(self.phase, Phase::Enabling { .. }) =>
+                    {
+                        Ok(())
+                    }
                     NmtState::BootUp => Err(StopReason::NodeLeft { node }),
                     state => Err(StopReason::NodeStopped { node, state }),
                 };
