@@ -33,7 +33,7 @@ const USUAL_S: f64 = 0.1;
 /// Longest time for that.
 const DECAY_MAX_S: f64 = 5.0;
 
-/// Returns the time at rest after a stop, whatever the measurement says. A drive that brakes by itself
+/// Returns the time at rest after a stop, which does not rely on the measurement. A drive that brakes by itself
 /// may need all the time from its highest velocity. One whose torque offset is withdrawn creeps until its
 /// integral has taken the force over.
 fn rest_s(spec: &ServoSpec) -> f64 {

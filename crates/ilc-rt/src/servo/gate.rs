@@ -19,7 +19,7 @@ use crate::interpolate::AxisLimits;
 const LEARNED_SHARE: f64 = 4.0;
 
 /// Share of the velocity limit from which on a force brakes. A velocity loop overshoots a little
-/// where the program is as fast as its limit.
+/// when the program runs at the limit.
 const OVERSPEED: f64 = 1.1;
 /// Cycles in which a force takes a velocity back that is too high; the measurement is one cycle old,
 /// and the force acts one later.

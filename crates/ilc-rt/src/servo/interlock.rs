@@ -1,7 +1,7 @@
 //! Digital inputs in the loop: guards, stop buttons and limit switches stop the axes, a press of a start button
 //! releases a run.
 //!
-//! What endangers counts at once, what permits only when it has been steady: an open guard stops in the tick that
+//! A stop acts at once, a permission only after debouncing: an open guard stops the axes in the tick that
 //! sees it, a closed one permits power after some cycles. An input of a drive that has fallen silent permits nothing;
 //! that silence itself stops the axes (`silence`).
 

@@ -19,7 +19,7 @@ use socketcan::{
 
 use super::{Ends, PATIENCE, receive, udp_ends};
 
-/// Returns the CAN interface for tests, locked by one test at a time; `None` where there is none.
+/// Returns the CAN interface for tests, locked by one test at a time; `None` without one.
 pub(super) fn can_interface() -> Option<String> {
     thread_local!(static LOCK: Cell<Option<File>> = const { Cell::new(None) });
     let name = match std::env::var("ILC_TEST_CAN") {

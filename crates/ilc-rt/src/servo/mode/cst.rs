@@ -77,7 +77,7 @@ impl AxisMode for Cst {
         reference_m
     }
 
-    /// The drive brakes by itself; the set points of the stop only show about where.
+    /// The drive brakes by itself; the set points of the stop are an estimate of its position.
     fn motion(&self, _last: [f64; 3], reference_m_s: f64, _dt_s: f64) -> [f64; 2] {
         [reference_m_s, 0.0]
     }
