@@ -10,7 +10,6 @@ import os
 import queue
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -21,13 +20,13 @@ from typing import TYPE_CHECKING
 import can
 import canopen
 from canopen.profiles.p402 import BaseNode402
+from ports_fixture import GROUP, free_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 ROOT = Path(__file__).resolve().parents[2]
 CELL = ROOT / "examples" / "01_gantry.toml"
-GROUP = "239.74.163.2"
 SYNC_S = 0.01
 PATIENCE_S = 5.0
 COUNTS_PER_M = 100_000_000
@@ -45,12 +44,6 @@ def find_sim() -> Path:
     found = shutil.which("ilc-sim")
     assert found is not None, "ilc-sim is not built: `make build`"
     return Path(found)
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("", 0))
-        return probe.getsockname()[1]
 
 
 def wait_until(holds: Callable[[], bool], what: str, timeout_s: float = PATIENCE_S) -> None:

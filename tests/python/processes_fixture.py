@@ -10,7 +10,6 @@ import json
 import os
 import queue
 import signal
-import socket
 import sqlite3
 import subprocess
 import sys
@@ -18,6 +17,8 @@ import threading
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from ports_fixture import free_bus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -61,13 +62,6 @@ def program(name: str) -> Path:
             return folder / name
     message = f"{name} is not in {' or '.join(map(str, folders))}: run `make build` or set ILC_BIN"
     raise FileNotFoundError(message)
-
-
-def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
-    """Return a free port."""
-    with socket.socket(type=kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Process:
@@ -175,7 +169,7 @@ class Bench:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.bus = f"udp:239.74.163.2:{free_port()}"
+        self.bus = free_bus()
         self.library = folder / "library.db"
         self._processes: list[Process] = []
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from ports_fixture import free_bus
 
 from ilc_rt import (
     BadInputError,
@@ -99,9 +100,7 @@ def test_a_late_law_costs_a_run_and_is_counted(gantry: Path, tmp_path: Path) -> 
             return np.full_like(u, 1e-5)
 
     law = Slow()
-    campaign = Campaign(
-        cell, law=law, library=tmp_path / "l.db", bus="udp:239.74.163.2:43391", lockstep=False
-    )
+    campaign = Campaign(cell, law=law, library=tmp_path / "l.db", bus=free_bus(), lockstep=False)
     for event in campaign.events(3):
         if isinstance(event, StateEvent) and (event.state, event.iteration) == ("running", 1):
             law.may_answer.set()

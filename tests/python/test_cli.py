@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from ports_fixture import free_bus
 
 from ilc_rt import Library
 from ilc_rt.figures import Figures
@@ -97,7 +98,7 @@ def test_the_packaged_cell_is_the_example(gantry: Path) -> None:
 
 def test_processes_over_udp_in_lockstep(ilc: Ilc, gantry: Path, tmp_path: Path) -> None:
     """The real programs, each in its own process."""
-    done = ilc("run", gantry, "--bus", "udp:239.74.163.77", "--lockstep", "--iterations", 2,
+    done = ilc("run", gantry, "--bus", free_bus(), "--lockstep", "--iterations", 2,
                "--json", "f.json")  # fmt: skip
     assert done.returncode == 0, done.stderr
     data = json.loads((tmp_path / "f.json").read_text())
@@ -109,7 +110,7 @@ def test_processes_over_udp_in_lockstep(ilc: Ilc, gantry: Path, tmp_path: Path) 
 def test_ctrl_c_in_a_real_time_run_is_a_controlled_stop(gantry: Path, tmp_path: Path) -> None:
     """SIGINT to the terminal's process group: exit 130, one line, nothing left running."""
     command = [sys.executable, "-m", "ilc_rt.cli", "run", str(gantry), "--iterations", "5",
-               "--bus", "udp:239.74.163.78"]  # fmt: skip
+               "--bus", free_bus()]  # fmt: skip
     with subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         start_new_session=True,
@@ -131,7 +132,7 @@ def test_a_terminal_gets_a_table_and_a_bar(gantry: Path, tmp_path: Path) -> None
     main, side = pty.openpty()
     environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "120", "LINES": "40"}
     with subprocess.Popen(
-        [sys.executable, "-m", "ilc_rt.cli", "run", str(gantry), "--bus", "udp:239.74.163.79",
+        [sys.executable, "-m", "ilc_rt.cli", "run", str(gantry), "--bus", free_bus(),
          "--iterations", "1"],
         cwd=tmp_path, stdout=side, stderr=side, env=environment,
     ) as process:  # fmt: skip

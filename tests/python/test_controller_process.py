@@ -9,7 +9,8 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
-from processes_fixture import PATIENT, Bench, free_port, goodbye
+from ports_fixture import free_port
+from processes_fixture import PATIENT, Bench, goodbye
 
 from ilc_rt.events import parse_event
 from ilc_rt.figures import Figures

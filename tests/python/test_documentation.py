@@ -10,6 +10,7 @@ import os
 import re
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -31,7 +32,8 @@ from documentation_fixture import (
     outside_of_blocks,
     verbs_of,
 )
-from processes_fixture import Process, free_port, program
+from ports_fixture import free_bus, free_port
+from processes_fixture import Process, program
 
 if TYPE_CHECKING:
     from ilc_rt import CampaignResult
@@ -115,7 +117,7 @@ def run(text: str, folder: Path) -> str:
 
 def with_drives(text: str, folder: Path) -> None:
     """Run a line of `ilc-rt` with simulated drives of this host on its bus."""
-    address = f"udp:239.74.163.2:{free_port()}"
+    address = free_bus()
     text, found = re.subn(r"--bus \S+", f"--bus {address}", text)
     if not found:
         text = f"{text} --bus {address}"
@@ -132,7 +134,7 @@ def with_drives(text: str, folder: Path) -> None:
 
 def with_drives_by_hand(text: str, folder: Path) -> None:
     """Run a line of commissioning with simulated drives of this host on its bus."""
-    address = f"udp:239.74.163.2:{free_port()}"
+    address = free_bus()
     text, is_bus = re.subn(r"can:\S+", address, text)
     if not is_bus:
         text = f"{text} --bus {address}"
@@ -160,7 +162,7 @@ def homed_by_drive(folder: Path) -> Path:
 
 def with_hands(text: str, folder: Path) -> None:
     """Switch an input of simulated drives of this host."""
-    address = f"udp:239.74.163.2:{free_port()}"
+    address = free_bus()
     cell = ROOT / "examples" / "08_inputs.toml"
     (folder / "gantry.toml").write_text(cell.read_text(encoding="utf-8"), encoding="utf-8")
     drives = Process([program("ilc-sim"), "run", cell, "--bus", address], folder)
@@ -173,7 +175,7 @@ def with_hands(text: str, folder: Path) -> None:
 
 def drives_alone(text: str, folder: Path) -> None:
     """Run the simulated drives, and end them with Ctrl-C."""
-    text = re.sub(r"--bus \S+", "", text) + f" --bus udp:239.74.163.2:{free_port()}"
+    text = re.sub(r"--bus \S+", "", text) + f" --bus {free_bus()}"
     drives = Process([program("ilc-sim"), *shlex.split(text)[1:]], folder)
     try:
         drives.line_with("ready")
@@ -185,7 +187,7 @@ def drives_alone(text: str, folder: Path) -> None:
 
 def watched(text: str, folder: Path) -> None:
     """Run a line that monitors a cell, and a campaign to monitor."""
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     name, *rest = shlex.split(text)
     if name == "python":
         argv = [sys.executable, rest[0], "2", endpoint]
@@ -207,7 +209,7 @@ def watched(text: str, folder: Path) -> None:
     watcher = Process(argv, folder)
     try:
         # Runs are made until the monitor, which needs a moment to connect, has seen two.
-        bus = f"udp:239.74.163.2:{free_port()}"
+        bus = free_bus()
         argv = [
             *launcher("ilc"),
             "run",

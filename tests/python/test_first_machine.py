@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import pytest
 from documentation_fixture import PAGE_OF_ITS_OWN as PAGE
 from documentation_fixture import Block, blocks
-from processes_fixture import DEADLINE_S, Process, free_port, program
+from ports_fixture import free_bus
+from processes_fixture import DEADLINE_S, Process, program
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,7 +58,7 @@ class Reader:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.bus = f"udp:239.74.163.2:{free_port()}"
+        self.bus = free_bus()
         self.production: Process | None = None
         self.output: dict[str, str] = {}
         self.environment = {

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import can
 import canopen
 import pytest
-from interop_fixture import GROUP, data_sheet, find_sim, free_port
+from interop_fixture import data_sheet, find_sim
 from local_drive_fixture import LocalDrive
+from ports_fixture import GROUP, free_port
 
 if TYPE_CHECKING:
     from pathlib import Path

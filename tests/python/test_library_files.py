@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from ports_fixture import free_bus
 from processes_fixture import Bench
 
 from ilc_rt import Library
@@ -304,9 +305,7 @@ def test_a_campaign_is_gone_on_with_by_one_program_only(bench: Bench) -> None:
     assert bench.controller(cell, "--lockstep", runs=1).end() == 0
     first = bench.controller(cell, "--lockstep", "--resume", runs=10_000)
     first.event(event="iteration", index=1)
-    second = bench.controller(
-        cell, "--lockstep", "--resume", runs=10_000, bus="udp:239.74.163.9:43119"
-    )
+    second = bench.controller(cell, "--lockstep", "--resume", runs=10_000, bus=free_bus())
     assert second.end() == 2
     (line,) = second.errors
     assert line.startswith("ilc-rt: --resume: campaign ")

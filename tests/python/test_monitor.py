@@ -10,6 +10,7 @@ import threading
 from typing import TYPE_CHECKING
 
 import pytest
+from ports_fixture import free_bus, free_port
 
 from ilc_rt.events import EndEvent, IterationEvent, StateEvent
 from ilc_rt.monitor import Message, Monitor
@@ -55,17 +56,10 @@ class Publisher:
         self.session.put(f"ilc/gantry/{topic}", json.dumps(payload))
 
 
-def free_port() -> int:
-    """Return a free port."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.fixture
 def publisher() -> Iterator[Publisher]:
     """Return a session that stands in for a controller."""
-    publisher = Publisher(free_port())
+    publisher = Publisher(free_port(socket.SOCK_STREAM))
     yield publisher
     publisher.session.close()
 
@@ -148,12 +142,12 @@ def test_the_example_ends_after_its_runs(publisher: Publisher, gantry: Path) -> 
 
 def test_a_real_controller_is_followed_from_beginning_to_end(gantry: Path, tmp_path: Path) -> None:
     """A monitor that is already waiting receives everything of a real-time run."""
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     cell = tmp_path / "cell.toml"
     settings = f'[telemetry]\nlisten = ["{endpoint}"]\nscouting = false\n'
     cell.write_text(f"{gantry.read_text()}\n{settings}")
     command = [sys.executable, "-m", "ilc_rt.cli", "run", str(cell), "--iterations", "2",
-               "--bus", "udp:239.74.163.80"]  # fmt: skip
+               "--bus", free_bus()]  # fmt: skip
     seen: list[Message] = []
     with (
         Monitor("gantry", [endpoint], scouting=False) as monitor,

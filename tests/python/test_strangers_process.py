@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from processes_fixture import PATIENT, Bench, Process, free_port, goodbye
+from ports_fixture import free_port
+from processes_fixture import PATIENT, Bench, Process, goodbye
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -13,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from processes_fixture import free_port
+from ports_fixture import free_port
 from sweep_fixture import cluster, drawn, failing, learned
 
 from ilc_rt import BadInputError, SweepError, SweepResult, grid, latin_hypercube, sweep
@@ -52,7 +53,7 @@ def test_a_cluster_of_dask_gives_the_same_bits(serial: SweepResult, tmp_path: Pa
     distributed = pytest.importorskip("distributed")
     gantry = Path(__file__).parents[2] / "examples" / "01_gantry.toml"
     vary = ["--vary", "axis.y.simulation.mass_kg=15:25", "--samples", "3", "--iterations", "3"]
-    with cluster(free_port(), tmp_path) as address:
+    with cluster(free_port(socket.SOCK_STREAM), tmp_path) as address:
         with distributed.Client(address, timeout="60s") as client:
             client.wait_for_workers(2, timeout=120)
             # The workers cannot import this folder.

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from processes_fixture import DEADLINE_S, PATIENT, Bench, Process, free_port, goodbye
+from ports_fixture import free_port
+from processes_fixture import DEADLINE_S, PATIENT, Bench, Process, goodbye
 
 from ilc_rt.events import parse_event
 

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 import zenoh
-from processes_fixture import PATIENT, Bench, Process, free_port, goodbye, program
+from ports_fixture import free_port
+from processes_fixture import PATIENT, Bench, Process, goodbye, program
 
 from ilc_rt import Library
 

@@ -9,20 +9,19 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import socket
 import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import can
 import pytest
+from ports_fixture import GROUP, free_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 ROOT = Path(__file__).resolve().parents[2]
 
-GROUP = "239.74.163.78"
 STOP_ID = 0x7FF
 PATIENCE_S = 20.0
 
@@ -37,14 +36,9 @@ def bus_echo() -> Path:
 
 
 @pytest.fixture
-def port() -> Iterator[int]:
+def port() -> int:
     """Reserve a unique UDP port."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
-        # Shared, since python-can binds the port on every address, this one included.
-        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
-        holder.bind(("127.0.0.1", 0))
-        yield holder.getsockname()[1]
+    return free_port()
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from processes_fixture import free_port
+from ports_fixture import free_bus
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ("ilc-rt", "ilc-sim")
@@ -104,7 +104,7 @@ def test_an_empty_environment_needs_nothing_but_the_wheel(wheel: Path, tmp_path:
     ).stdout.split()  # fmt: skip
     assert all(Path(path).is_relative_to(home) for path in where), where
 
-    bus = f"udp:239.74.163.2:{free_port()}"
+    bus = free_bus()
     demo = subprocess.run(
         [home / "bin" / "ilc", "demo", "--iterations", "2", "--lockstep", "--bus", bus],
         cwd=tmp_path, env=bare, capture_output=True, text=True, check=False, timeout=110,
