@@ -17,6 +17,8 @@ from ilc_papers.barton2010.raster import R, S, raster_m, time_varying_law
 from ilc_papers.barton2010.servo_system import servo
 from ilc_rt import NormOptimalIlc
 
+pytestmark = pytest.mark.xdist_group("barton2010")
+
 GOLDEN = Path(__file__).parents[2] / "tests" / "golden" / "barton2010_appendix_i.json"
 NAMES = (
     "servo",

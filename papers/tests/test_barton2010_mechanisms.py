@@ -11,6 +11,8 @@ from ilc_papers.barton2010.mechanisms_cell import build, tools_m
 from ilc_rt import NormOptimalIlc
 from ilc_rt.kinematics import Delta
 
+pytestmark = pytest.mark.xdist_group("mechanisms")
+
 
 def silent(_: str) -> None:
     """Report nothing."""

@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 from ilc_papers.dimarco2016 import PAPER, campaign, machine
 from ilc_papers.dimarco2016.reference import DT_S, INCH_M, appendix_a
 
+pytestmark = pytest.mark.xdist_group("dimarco2016")
+
 GOLDEN = Path(__file__).parents[2] / "tests" / "golden" / "dimarco_appendix_a.csv"
 LAWS = ("pd", "pd_ilc", "flexible", "dpw", "dpw_top30")
 

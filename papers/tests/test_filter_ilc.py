@@ -22,6 +22,8 @@ from ilc_rt import ErrorFeedforwardIlc
 if TYPE_CHECKING:
     from ilc_papers.paper import Figures
 
+pytestmark = pytest.mark.xdist_group("filter_ilc")
+
 CASES = ["unfiltered", "zero_phase", "switched", "gate", "ladder", "disturbance", "feedforward"]
 
 

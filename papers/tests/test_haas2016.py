@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 
 from ilc_papers.haas2016 import PAPER, constrained, gantry, positioning
 
+pytestmark = pytest.mark.xdist_group("haas2016")
+
 TIMES = list(positioning.SAMPLE_TIMES_S)
 BOUNDS = list(constrained.BOUNDS)
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+pytestmark = pytest.mark.xdist_group("controller")
+
 RUNS = 4
 FIGURES = {"index", *(figure.name for figure in fields(Figures))}
 

@@ -18,6 +18,8 @@ from ilc_rt.result import micrometres
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.xdist_group("report")
+
 VOID = {"meta", "link", "br", "img", "path", "use", "rect", "line", "circle"}
 
 

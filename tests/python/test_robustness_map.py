@@ -15,6 +15,8 @@ from ilc_rt.cell_sweep import RobustnessMap, Variation, parse_variation, robustn
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.xdist_group("robustness map")
+
 MASS = "axis.x.simulation.mode_frequency_hz=8:40:log"
 
 

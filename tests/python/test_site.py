@@ -21,6 +21,9 @@ pytest.importorskip("furo")
 pytest.importorskip("myst_parser")
 
 #: `make docs` puts the pages of rustdoc there, whose links rustdoc itself checks.
+
+pytestmark = pytest.mark.xdist_group("site")
+
 RUST = "rust/"
 
 

@@ -19,6 +19,8 @@ from sweep_fixture import cluster, drawn, failing, learned
 
 from ilc_rt import BadInputError, SweepError, SweepResult, grid, latin_hypercube, sweep
 
+pytestmark = pytest.mark.xdist_group("sweep")
+
 CASES = grid(natural_rad_s=[60.0, 90.0, 120.0], kp=[0.3, 0.6])
 
 
