@@ -13,6 +13,7 @@ from typer import Typer
 
 from ilc_rt._native import __version__
 from ilc_rt.commands import (
+    bridge,
     demo,
     identify,
     library,
@@ -75,6 +76,7 @@ app.command("tune")(tune.tune)
 app.command("sweep")(sweep.sweep)
 app.add_typer(library.app, name="library")
 app.command("monitor")(monitor.monitor)
+app.add_typer(bridge.app, name="bridge")
 FURTHER = {entry.name: entry for entry in entry_points(group="ilc_rt.verbs")}
 for name, entry in FURTHER.items():
     app.command(name)(entry.load())

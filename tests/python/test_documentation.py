@@ -59,6 +59,9 @@ SHORTER = (
     (r"^ilc reproduce(?!.* --from)(.*)$", r"ilc reproduce\1 --reduced"),
     (r"^ilc-rt latency(?!.* --seconds)(.*)$", r"ilc-rt latency\1 --seconds 1"),
     (r"--seconds \d+", "--seconds 1"),
+    # Long enough for a cell to be missed.
+    (r"^ilc bridge (plotjuggler|foxglove)(.*)$", r"ilc bridge \1\2 --timeout 0.2 --no-scouting"),
+    (r"^ilc bridge foxglove(.*)$", r"ilc bridge foxglove\1 --port 0"),
     (r"--samples \d+", "--samples 2"),
     (r"^ilc sweep(?!.* --iterations)(.*)$", r"ilc sweep\1 --iterations 2"),
     (r"^(ilc library (?:show|export) \S+) \d+", r"\1 1"),

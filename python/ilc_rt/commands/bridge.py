@@ -1,0 +1,129 @@
+"""`ilc bridge`: a running controller in PlotJuggler or Foxglove."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ilc_rt.bridge import foxglove as foxglove_bridge
+from ilc_rt.bridge import plotjuggler as plotjuggler_bridge
+from ilc_rt.campaign import load_cell
+from ilc_rt.commands.monitor import (  # noqa: TC001 - typer reads them
+    CellName,
+    Connect,
+    Scouting,
+    Timeout,
+)
+from ilc_rt.errors import BadInputError
+from ilc_rt.monitor import Monitor
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ilc_rt import Cell
+    from ilc_rt.monitor import Message
+
+app = typer.Typer(
+    no_args_is_help=True, help="Show a running controller in PlotJuggler or Foxglove."
+)
+
+Layout = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Write a layout for the cell, given as its TOML file."),
+]
+
+
+@app.command("plotjuggler")
+def plotjuggler(
+    cell: CellName = "*",
+    to: Annotated[
+        str, typer.Option(metavar="HOST[:PORT]", help="Where PlotJuggler's UDP server listens.")
+    ] = f"127.0.0.1:{plotjuggler_bridge.PORT}",
+    layout: Layout = None,
+    connect: Connect = None,
+    scouting: Scouting = True,
+    timeout: Timeout = None,
+) -> None:
+    """Send every servo cycle to PlotJuggler, as JSON over UDP.
+
+    In PlotJuggler start the UDP Server with the protocol json and the time field `timestamp`.
+
+    Example: ilc bridge plotjuggler gantry.toml --layout gantry-plotjuggler.xml
+    """
+    name, described = _described(cell)
+    _write(layout, described, plotjuggler_bridge.layout)
+    host, port = _address(to)
+    with plotjuggler_bridge.PlotJuggler(host, port, described) as bridge:
+        _follow(name, f"{host}:{port}", bridge.show, connect, timeout, scouting=scouting)
+
+
+@app.command("foxglove")
+def foxglove(
+    cell: CellName = "*",
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; 0.0.0.0 for every network.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")
+    ] = foxglove_bridge.PORT,
+    layout: Layout = None,
+    connect: Connect = None,
+    scouting: Scouting = True,
+    timeout: Timeout = None,
+) -> None:
+    """Serve every servo cycle to Foxglove, over its WebSocket.
+
+    In Foxglove choose "Open connection" and the address that is printed.
+
+    Example: ilc bridge foxglove gantry.toml --layout gantry-foxglove.json
+    """
+    name, described = _described(cell)
+    _write(layout, described, foxglove_bridge.layout)
+    with foxglove_bridge.Foxglove(host, port, described) as bridge:
+        _follow(name, bridge.address, bridge.show, connect, timeout, scouting=scouting)
+
+
+def _described(cell: str) -> tuple[str, Cell | None]:
+    """Return the name of a cell, and its description if a file was given."""
+    if Path(cell).suffix != ".toml":
+        return cell, None
+    described = load_cell(cell)
+    return described.name, described
+
+
+def _write(layout: Path | None, cell: Cell | None, text: Callable[[Cell], str]) -> None:
+    if layout is None:
+        return
+    if cell is None:
+        message = f"--layout {layout}: needs the TOML file of the cell, for the names of its axes"
+        raise BadInputError(message)
+    layout.write_text(text(cell), encoding="utf-8")
+    typer.echo(f"wrote {layout}", err=True)
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":") if ":" in text else (text, "", "")
+    if not host or (port and not (port.isdecimal() and 0 < int(port) < 65536)):
+        message = f"--to {text}: HOST or HOST:PORT, with a port from 1 to 65535"
+        raise BadInputError(message)
+    return host, int(port) if port else plotjuggler_bridge.PORT
+
+
+def _follow(
+    cell: str,
+    address: str,
+    show: Callable[[Message], object],
+    connect: list[str] | None,
+    timeout: float | None,
+    *,
+    scouting: bool,
+) -> None:
+    with Monitor(cell, connect or (), scouting=scouting) as watching:
+        whom = "every cell" if cell == "*" else cell
+        typer.echo(f"{whom} to {address}; Ctrl-C ends this, not the machine", err=True)
+        for message in watching.messages(timeout):
+            show(message)
+        if watching.lost:
+            typer.echo(f"{watching.lost} messages came too fast and were left out", err=True)
