@@ -28,8 +28,9 @@ const RING_FRAMES: usize = 4096;
 /// Polling period of [`Link::wait_for_peer`].
 const POLL: Duration = Duration::from_millis(1);
 
-/// Time that a peer may leave its frames unread before they are dropped.
-const STALL_US: u32 = 100_000;
+/// Time that a peer may leave its frames unread before they are dropped: longer than a busy host lets a thread
+/// wait, as a lost frame would end the motion.
+const STALL_US: u32 = 1_000_000;
 
 /// Multicast group for the discovery of bus endpoints. Not that of all Zenoh programs: a bus must
 /// not be found by a mere monitor, and be carried off the host by it.
