@@ -62,7 +62,7 @@ derived: underived ## Write the files and tables that derive from the source
 
 underived: $(VENV)/.test
 	cargo test --release --workspace --quiet --test derived
-	$(BIN)/python -m pytest -q tests/python/test_derived.py
+	$(BIN)/python -m pytest -q tests/python/test_derived.py tests/python/test_theory.py
 
 demo: build ## Ten runs on simulated drives, the error falling, and a report
 	$(BIN)/ilc demo
@@ -107,13 +107,13 @@ check: fmt lint test ## All that a change needs before review
 
 fmt: $(VENV)/.test ## Format
 	cargo fmt --all
-	$(BIN)/ruff format python papers tests examples docs/conf.py
+	$(BIN)/ruff format python papers tests examples docs/conf.py docs/tutorial
 
 lint: $(VENV)/.test docs underived ## Formatting, lints, types, layers, language, derived files, documentation
 	cargo fmt --all --check
 	cargo clippy --release --workspace --all-targets -- -D warnings
-	$(BIN)/ruff format --check python papers tests examples docs/conf.py
-	$(BIN)/ruff check python papers tests examples docs/conf.py
+	$(BIN)/ruff format --check python papers tests examples docs/conf.py docs/tutorial
+	$(BIN)/ruff check python papers tests examples docs/conf.py docs/tutorial
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest ilc_rt._native
 	$(BIN)/lint-imports

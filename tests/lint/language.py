@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import io
+import json
 import re
 import subprocess
 import sys
@@ -106,7 +107,15 @@ def markdown(text: str) -> Iterator[Block]:
     yield Block(1, lines, documents=False)
 
 
-READERS = {".rs": rust, ".py": python, ".pyi": python, ".md": markdown}
+def notebook(text: str) -> Iterator[Block]:
+    """Yield the text of a notebook, and the comments of its code; lines are those of a cell."""
+    for cell in json.loads(text)["cells"]:
+        # A line of magic, e.g. `%matplotlib inline`, is not Python.
+        source = re.sub(r"^%.*", "", "".join(cell["source"]), flags=re.MULTILINE)
+        yield from markdown(source) if cell["cell_type"] == "markdown" else python(source)
+
+
+READERS = {".rs": rust, ".py": python, ".pyi": python, ".md": markdown, ".ipynb": notebook}
 
 
 def findings(path: Path) -> Iterator[tuple[int, str, str]]:
@@ -124,7 +133,7 @@ def findings(path: Path) -> Iterator[tuple[int, str, str]]:
 
 def main() -> int:
     """Check every tracked file; return 1 if a phrase is found."""
-    patterns = ["*.rs", "*.py", "*.pyi", "docs/*.md", "README.md", "ARCHITECTURE.md"]
+    patterns = ["*.rs", "*.py", "*.pyi", "*.ipynb", "docs/*.md", "README.md", "ARCHITECTURE.md"]
     listed = subprocess.run(["git", "ls-files", *patterns, "CONTRIBUTING.md"], cwd=ROOT, check=True,
                             capture_output=True, text=True)  # fmt: skip
     count = 0

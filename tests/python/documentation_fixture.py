@@ -21,7 +21,7 @@ from typer.main import get_command
 from ilc_rt.cli import app
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("docs/theory/*.md")])
 
 #: Its lines need each other: test_first_machine follows it as a whole.
 PAGE_OF_ITS_OWN = ROOT / "docs" / "first-machine.md"

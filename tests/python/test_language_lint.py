@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -54,6 +55,15 @@ def test_python_docstrings_and_comments(lint, tmp_path):
 def test_documents_without_their_code(lint, tmp_path):
     text = "# Title\n\nHow it works. Half the sample rate.\n\n```sh\nanew\n```\n\n`anew`\n"
     assert found(lint, tmp_path / "a.md", text) == [(3, "Half the sample rate")]
+
+
+def test_notebooks_text_and_comments(lint, tmp_path):
+    cells = [
+        {"cell_type": "markdown", "source": ["Starts\n", "anew. `anew`"]},
+        {"cell_type": "code", "source": ["%magic\n", 'x = "anew"  # for ever']},
+    ]
+    text = json.dumps({"cells": cells})
+    assert found(lint, tmp_path / "a.ipynb", text) == [(2, "anew"), (2, "for ever")]
 
 
 def test_no_folder_is_left_out(lint):
