@@ -3,7 +3,18 @@
 `make docs` builds it into build/docs, without network and with warnings as errors.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from docutils import nodes
+from latex2mathml.converter import convert
+
 from ilc_rt import __version__
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+    from sphinx.writers.html5 import HTML5Translator
 
 project = "ilc-rt"
 author = "the authors of ilc-rt"
@@ -13,7 +24,6 @@ release = __version__
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "numpydoc",
 ]
 root_doc = "docs/index"
@@ -44,6 +54,27 @@ autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": True}
 numpydoc_show_class_members = False
 
+# Equations are MathML, which browsers show without a script from the network.
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = f"ilc-rt {release}"
 html_copy_source = False
+
+
+def inline_equation(page: HTML5Translator, node: nodes.Element) -> None:
+    """Write an equation in a line of text."""
+    page.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def equation(page: HTML5Translator, node: nodes.Element) -> None:
+    """Write an equation in a line of its own."""
+    style = "overflow-x: auto; overflow-y: hidden; padding: 0.5em 0"
+    shown = convert(node.astext(), display="block")
+    page.body.append(f'<div style="{style}">{shown}</div>')
+    raise nodes.SkipNode
+
+
+def setup(app: Sphinx) -> None:
+    """Register the renderer of equations."""
+    app.add_html_math_renderer("mathml", (inline_equation, None), (equation, None))

@@ -86,6 +86,18 @@ def test_every_internal_link_has_a_target(site: Path) -> None:
     assert crates <= known, "a link to a crate that this workspace lacks"
 
 
+def test_the_site_needs_no_network(site: Path) -> None:
+    """Scripts, styles and pictures are its own, and equations are MathML."""
+    for path in site.rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=\"https?:[^\"]*", text), path
+    theory = [path.read_text(encoding="utf-8") for path in (site / "docs/theory").glob("*.html")]
+    equations = re.findall(r"<math .*?</math>", "\n".join(theory), re.DOTALL)
+    assert len(equations) > 100
+    # A command that the converter does not know is left as it is.
+    assert not [one for one in equations if "\\" in one]
+
+
 def test_everything_public_is_on_a_page(site: Path) -> None:
     shown = {
         anchor.rsplit(".", 1)[-1]
