@@ -19,7 +19,7 @@ import jupyter_client, nbclient, nbformat
 notebook = nbformat.read(sys.argv[1], as_version=4)
 nbformat.validate(notebook)
 kernel = jupyter_client.AsyncKernelManager(kernel_name="python3", transport="ipc")
-nbclient.NotebookClient(notebook, km=kernel, timeout=240).execute()
+nbclient.NotebookClient(notebook, km=kernel, timeout=900, startup_timeout=900).execute()
 print(json.dumps([cell.get("outputs", []) for cell in notebook.cells]))
 """
 
@@ -28,7 +28,7 @@ def executed(notebook: Path, folder: Path) -> list[dict[str, object]]:
     """Return the outputs of all cells of a notebook, executed in a folder."""
     done = subprocess.run(
         [sys.executable, "-c", EXECUTE, str(notebook)],
-        cwd=folder, capture_output=True, text=True, timeout=280, check=False,
+        cwd=folder, capture_output=True, text=True, timeout=1000, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return [output for cell in json.loads(done.stdout) for output in cell]
@@ -44,7 +44,7 @@ def said(outputs: list[dict[str, object]]) -> str:
     return "\n".join(parts)
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs_as_a_reader_runs_it(notebook: Path, tmp_path: Path) -> None:
     """In an empty folder, with pictures, and without a warning to the reader."""
