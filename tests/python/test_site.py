@@ -20,13 +20,10 @@ if TYPE_CHECKING:
 pytest.importorskip("furo")
 pytest.importorskip("myst_nb")
 
-# A loaded machine needs minutes for half a minute of work.
-pytestmark = pytest.mark.timeout(1200)
+# One build for all tests; a loaded machine needs minutes for half a minute of work.
+pytestmark = [pytest.mark.xdist_group("site"), pytest.mark.timeout(1200)]
 
 #: `make docs` puts the pages of rustdoc there, whose links rustdoc itself checks.
-
-pytestmark = pytest.mark.xdist_group("site")
-
 RUST = "rust/"
 
 
