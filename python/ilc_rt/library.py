@@ -6,11 +6,16 @@ from importlib import import_module
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ilc_rt import _native
+from ilc_rt.errors import BadInputError
 from ilc_rt.given import given
 
 if TYPE_CHECKING:
     import builtins
+    from collections.abc import Iterator
+    from types import TracebackType
 
     from numpy.typing import ArrayLike
     from typing_extensions import Self
@@ -38,12 +43,33 @@ class Library(_native.Library):
     Examples
     --------
     >>> from ilc_rt import Library
-    >>> Library(":memory:").list()
-    []
+    >>> with Library(":memory:") as library:
+    ...     len(library), library.select(law="norm_optimal", tracking_rms_m=(0.0, 1e-5))
+    (0, [])
     """
 
     def __new__(cls, path: str | PathLike[str]) -> Self:
         return super().__new__(cls, path=fspath(path))
+
+    def __enter__(self) -> Self:
+        """Return itself; a library holds no file open between calls."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave the file as it is: every call has written what it stored."""
+
+    def __len__(self) -> int:
+        """Return the number of stored runs."""
+        return len(self.list())
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield the stored runs, oldest first, as `list` gives them."""
+        return iter(self.list())
 
     def list(self, cell: str | None = None) -> list[dict[str, Any]]:
         """Return the stored runs, oldest first, without their arrays.
@@ -66,6 +92,84 @@ class Library(_native.Library):
             If the file cannot be read.
         """
         return super().list(cell)
+
+    def select(self, **wanted: Any) -> builtins.list[dict[str, Any]]:  # noqa: ANN401 (values of any key)
+        """Return the runs whose entries have wanted values, oldest first.
+
+        Parameters
+        ----------
+        **wanted
+            By keys of `list`. A pair of numbers, or of texts, is a range with both ends, either
+            of which may be None; any other value is compared. Dates are compared as texts, so
+            ``created_utc=("2026-11", None)`` has all runs from November 2026 on. A vector of
+            disturbances is in a range if each of its elements is.
+
+        Returns
+        -------
+        list of dict
+            As `list` gives them. A run without a value is never in a range.
+
+        Raises
+        ------
+        BadInputError
+            If a run has no such key; the message names those that it has.
+        OSError
+            If the file cannot be read.
+
+        Examples
+        --------
+        >>> from ilc_rt import Library
+        >>> library = Library(":memory:")
+        >>> library.select(cell="gantry", disturbance=(20.0, 25.0), created_utc=("2026-11", None))
+        []
+        """
+        runs = self.list()
+        unknown = [key for key in wanted if runs and key not in runs[0]]
+        if unknown:
+            message = f"{unknown[0]}: a run has {', '.join(runs[0])}"
+            raise BadInputError(message)
+        return [run for run in runs if all(_is(run[key], value) for key, value in wanted.items())]
+
+    def to_dataframe(self, **wanted: Any) -> Any:  # noqa: ANN401 (pandas is optional)
+        """Return the runs as a table of pandas, one row per run.
+
+        Parameters
+        ----------
+        **wanted
+            As for `select`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The keys of `list` as columns, with ``id`` as index.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        table = import_module("pandas").DataFrame(self.select(**wanted))
+        return table.set_index("id") if len(table) else table
+
+    def to_parquet(self, path: str | PathLike[str], **wanted: Any) -> None:  # noqa: ANN401
+        """Write the runs, without their arrays, to a Parquet file.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            The file.
+        **wanted
+            As for `select`.
+
+        Raises
+        ------
+        ImportError
+            If pyarrow is not installed.
+        OSError
+            If the file cannot be written.
+        """
+        arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+        parquet.write_table(arrow.Table.from_pylist(self.select(**wanted)), fspath(path))
 
     def load(self, id: int) -> dict[str, Any]:
         """Return a run with its arrays.
@@ -222,3 +326,14 @@ class Library(_native.Library):
         """
         # Imported late: `export` imports records, and records import libraries.
         import_module("ilc_rt.export").export_run(self.load(id), path)
+
+
+def _is(value: Any, wanted: Any) -> bool:  # noqa: ANN401 (any value of a run)
+    """Return whether a value is the wanted one, or within the wanted range."""
+    if not isinstance(wanted, tuple) or len(wanted) != 2:
+        return np.array_equal(value, wanted)
+    if value is None:
+        return False
+    low, high = wanted
+    values = np.ravel(value).tolist()
+    return all((low is None or one >= low) and (high is None or one <= high) for one in values)
