@@ -11,8 +11,8 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from ilc_papers.quantity import pair, ratio, verdict
-from ilc_rt import plots
 from ilc_rt.errors import BadInputError
+from ilc_rt.pictures.themes import WIDTH_IN, style
 from ilc_rt.result import write_text
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ def write_page(outcome: Outcome, folder: Path) -> Path:
     """
     for picture in outcome.paper.pictures:
         target = folder / picture_name(outcome, picture.stem)
-        with mpl.rc_context(plots.STYLE):
-            figure = Figure(figsize=(plots.WIDTH_IN, 3.6))
+        with mpl.rc_context(style()):
+            figure = Figure(figsize=(WIDTH_IN, 3.6))
             picture.draw(outcome.figures, figure)
             try:
                 # Without program version or date, so that the same figures give the same file.

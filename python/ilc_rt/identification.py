@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -209,10 +209,12 @@ class Identification:
 
     def figure(self) -> Figure:
         """Return the Bode plot of measurement and model."""
-        from ilc_rt.bode import bode
+        # Imported here, as matplotlib is slow to import.
+        from ilc_rt.pictures import bode
 
-        return bode(
-            self.frequency_hz, self.response, self.coherence,
-            self.described.response(self.frequency_hz), self.uncertainty[1],
-            f"axis {label(self.experiment.axis)}" if self.experiment.axis else "",
-        )  # fmt: skip
+        panels = bode(
+            {"measured": self.measured, "model": self.described},
+            uncertainty=self.uncertainty,
+            title=f"axis {label(self.experiment.axis)}" if self.experiment.axis else "",
+        )
+        return cast("Figure", panels[0].figure)

@@ -22,6 +22,7 @@ import matplotlib as mpl
 from ilc_rt import plots
 from ilc_rt.comparison import note
 from ilc_rt.errors import BadInputError
+from ilc_rt.pictures.themes import style
 from ilc_rt.quantity import digits, in_words, signed, unit_for
 from ilc_rt.result import CampaignResult, write_text
 from ilc_rt.text import printable
@@ -111,7 +112,7 @@ def svg(figure: Figure, name: str) -> str:
     `name` begins the ids, and is unique to each figure of a page.
     """
     buffer = io.StringIO()
-    with mpl.rc_context({**plots.STYLE, "svg.hashsalt": name}), warnings.catch_warnings():
+    with mpl.rc_context({**style(), "svg.hashsalt": name}), warnings.catch_warnings():
         # A name may contain glyphs that the font lacks; the reader's browser has them.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})

@@ -75,7 +75,7 @@ class Views:
         ax : matplotlib.axes.Axes or None
             Axes to draw into; None for new ones.
         **options
-            As for `ilc_rt.plots.errors`.
+            As for `ilc_rt.pictures.errors`.
 
         Returns
         -------

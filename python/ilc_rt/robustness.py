@@ -149,20 +149,20 @@ class RobustnessMap:
             "cases": cases,
         }
 
-    def plot(self, axes: Any = None) -> Any:  # noqa: ANN401 (matplotlib is slow to import)
-        """Draw the last error of each case over each parameter; see `ilc_rt.map_pictures`.
+    def plot(self, ax: Any = None) -> Any:  # noqa: ANN401 (matplotlib is slow to import)
+        """Draw the last error of each case over each parameter; see `ilc_rt.pictures.robustness`.
 
         Parameters
         ----------
-        axes : sequence of matplotlib.axes.Axes or None
-            One per parameter; None for new ones.
+        ax : sequence of matplotlib.axes.Axes or None
+            One per parameter, and one for the first two together; None for new ones.
 
         Returns
         -------
         sequence of matplotlib.axes.Axes
             The axes drawn into.
         """
-        return import_module("ilc_rt.map_pictures").robustness(self, axes=axes)
+        return import_module("ilc_rt.pictures.maps").robustness(self, ax=ax)
 
     def _converges(self, case: dict[str, Any]) -> bool:
         if case["fault"] is not None or case["learning_off"] or case["last_m"] is None:

@@ -14,7 +14,7 @@ from ilc_papers.barton2010.runs import rms, runs
 from ilc_papers.barton2010.servo_system import gain
 from ilc_papers.paper import Claim, Figures, Picture, Tell
 from ilc_rt import NormOptimalIlc, StateSpace, from_transfer_function, signal
-from ilc_rt.plots import WIDTH_IN
+from ilc_rt.pictures.themes import WIDTH_IN
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,7 +13,7 @@ from ilc_papers.barton2010.agents import AXES, DT_S, FORMATION, agents, together
 from ilc_papers.barton2010.runs import runs
 from ilc_papers.paper import Claim, Figures, Picture, Tell
 from ilc_rt import NormOptimalIlc, analyze, trajectory, weights
-from ilc_rt.plots import WIDTH_IN
+from ilc_rt.pictures.themes import WIDTH_IN
 
 if TYPE_CHECKING:
     from collections.abc import Callable

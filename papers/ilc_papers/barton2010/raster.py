@@ -18,7 +18,7 @@ from ilc_papers.barton2010.positioning import (
 )
 from ilc_papers.paper import Claim, Figures, Picture, Tell
 from ilc_rt import NormOptimalIlc, trajectory, weights
-from ilc_rt.plots import FIRST, INK, LAST, WIDTH_IN
+from ilc_rt.pictures.themes import WIDTH_IN, current
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -217,7 +217,7 @@ def _draw_path(figures: Figures, figure: Figure) -> None:
     section = figures["raster"]
     reference_m = np.array(section["reference_m"])
     whole, near = figure.subplots(1, 2)
-    whole.plot(*(1e3 * reference_m.T), color=INK, linewidth=0.8)
+    whole.plot(*(1e3 * reference_m.T), color=current().ink, linewidth=0.8)
     for number, sample in enumerate(section["corner_samples"], start=1):
         whole.annotate(f"t{number}", 1e3 * reference_m[sample])
     whole.set_xlabel("x in mm")
@@ -225,8 +225,8 @@ def _draw_path(figures: Figures, figure: Figure) -> None:
     corner = section["corner_samples"][0]
     shown = slice(corner - round(4 * CORNER_S / DT_S), corner + round(4 * CORNER_S / DT_S))
     for name, colour in (
-        ("programmed", INK), ("feedback", "#9AA0A8"), ("time_invariant", FIRST),
-        ("time_varying", LAST),
+        ("programmed", current().ink), ("feedback", "#9AA0A8"), ("time_invariant", current().first),
+        ("time_varying", current().last),
     ):  # fmt: skip
         error_m = 0.0 if name == "programmed" else np.array(section[name]["error_m"])
         tool_m = (reference_m - error_m - reference_m[corner])[shown]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ilc_papers.paper import Figures, Picture
-from ilc_rt.plots import WIDTH_IN
+from ilc_rt.pictures.themes import WIDTH_IN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

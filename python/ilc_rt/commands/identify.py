@@ -95,15 +95,11 @@ def _draw(found: object, folder: Path, name: str) -> Path:
     # Imported here, as matplotlib is slow to import, and bad input should be reported before.
     import io
 
-    import matplotlib as mpl
-
-    from ilc_rt import plots
     from ilc_rt.identify import Identification
 
     assert isinstance(found, Identification)
     picture = io.BytesIO()
-    with mpl.rc_context(plots.STYLE):
-        found.figure().savefig(picture, format="png")
+    found.figure().savefig(picture, format="png")
     make_folder(folder)
     try:
         (folder / name).write_bytes(picture.getvalue())

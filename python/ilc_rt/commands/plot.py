@@ -37,8 +37,6 @@ def plot(
     """
     result = CampaignResult.from_library(library, campaign)
     # Imported here, as matplotlib is slow to import, and bad input should be reported before.
-    import matplotlib as mpl
-
     from ilc_rt import plots
     from ilc_rt.report import write_report
 
@@ -60,8 +58,7 @@ def plot(
     try:
         for name, figure in figures.items():
             if figure is not None:
-                with mpl.rc_context(plots.STYLE):
-                    figure.savefig(out / f"{name}.png")
+                figure.savefig(out / f"{name}.png")
                 typer.echo(f"picture: {printable(out / name)}.png")
     except OSError as error:
         message = f"{out}: cannot be written: {error.strerror}"

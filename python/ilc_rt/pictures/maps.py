@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
-from ilc_rt.plots import FIRST, INK, LAST, STYLE, WIDTH_IN
+from ilc_rt.pictures.given import panels_or_new
+from ilc_rt.pictures.themes import current, style
 from ilc_rt.quantity import unit_for
 from ilc_rt.text import label
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ilc_rt.robustness import RobustnessMap, Variation
 
 
-def robustness(found: RobustnessMap, *, axes: Sequence[Axes] | None = None) -> list[Axes]:
+def robustness(found: RobustnessMap, *, ax: Axes | Sequence[Axes] | None = None) -> list[Axes]:
     """Draw the last error of each case over each parameter.
 
     Blue circles converge, orange crosses do not; the line is the worst error of each part of the
@@ -31,7 +31,7 @@ def robustness(found: RobustnessMap, *, axes: Sequence[Axes] | None = None) -> l
     ----------
     found : RobustnessMap
         At least one case.
-    axes : sequence of matplotlib.axes.Axes or None
+    ax : sequence of matplotlib.axes.Axes or None
         One per panel; None for new ones.
 
     Returns
@@ -48,11 +48,9 @@ def robustness(found: RobustnessMap, *, axes: Sequence[Axes] | None = None) -> l
         message = "a map needs at least one case"
         raise ValueError(message)
     count = len(found.variations) + (len(found.variations) > 1)
-    with mpl.rc_context(STYLE):
-        panels: list[Axes] = list(axes) if axes is not None else _panels(count)
-        if len(panels) != count:
-            message = f"{len(panels)} axes; {count} are needed"
-            raise ValueError(message)
+    with mpl.rc_context(style()):
+        # Each parameter has a scale of its own below its panel.
+        panels = panels_or_new(ax, count, 0.4 + 2.8 * count, [1.0] * count, share=False)
         unit = unit_for("m", float(np.nanmax(np.append(found.last_m, 0.0))))
         for axes_of_one, variation, row in zip(
             panels, found.variations, found.by_parameter(), strict=False
@@ -60,15 +58,10 @@ def robustness(found: RobustnessMap, *, axes: Sequence[Axes] | None = None) -> l
             _panel(axes_of_one, found, variation, row["parts"], unit)
         if count > 1:
             _pair(panels[-1], found)
-        if axes is None:
+        if ax is None:
             panels[0].set_title(found.sentence(), fontsize=9)
         panels[0].legend()
     return panels
-
-
-def _panels(count: int) -> list[Axes]:
-    figure = Figure(figsize=(WIDTH_IN, 0.4 + 2.8 * count))
-    return list(figure.subplots(count, 1, squeeze=False)[:, 0])
 
 
 def _panel(
@@ -85,8 +78,8 @@ def _panel(
     known = [part for part in parts if part["worst_error_m"] is not None]
     for part in known:
         axes.plot(
-            [part["from"], part["to"]], [part["worst_error_m"] * unit.scale] * 2, color=INK,
-            linewidth=1.2,
+            [part["from"], part["to"]], [part["worst_error_m"] * unit.scale] * 2,
+            color=current().ink, linewidth=1.2,
         )  # fmt: skip
     axes.set_xscale(variation.scale)
     if (last[np.isfinite(last)] > 0.0).any():
@@ -110,4 +103,7 @@ def _pair(axes: Axes, found: RobustnessMap) -> None:
 
 
 def _kinds() -> tuple[tuple[bool, str, str, str], ...]:
-    return (True, LAST, "o", "converges"), (False, FIRST, "x", "does not converge")
+    return (
+        (True, current().last, "o", "converges"),
+        (False, current().first, "x", "does not converge"),
+    )
