@@ -23,6 +23,7 @@ from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError, 
 from ilc_rt.laws import *  # noqa: F403
 from ilc_rt.library import Library
 from ilc_rt.models import discretize, from_transfer_function, second_order
+from ilc_rt.recommendation import Recommendation, recommend
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
 from ilc_rt.simulation import simulate
@@ -46,6 +47,7 @@ __all__ = [
     "Library",
     "ModelError",
     "PlantError",
+    "Recommendation",
     "Repeatability",
     "SignalError",
     "StateSpace",
@@ -66,6 +68,7 @@ __all__ = [
     "kinematics",
     "latin_hypercube",
     "laws",
+    "recommend",
     "repeatability",
     "second_order",
     "signal",
