@@ -26,6 +26,7 @@ from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.recommendation import Recommendation, recommend
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
+from ilc_rt.simulated_tuning import SimulatedTuning, tune_by_simulation
 from ilc_rt.simulation import simulate
 from ilc_rt.sweep_result import SweepResult
 from ilc_rt.sweeping import grid, latin_hypercube, sweep
@@ -50,6 +51,7 @@ __all__ = [
     "Recommendation",
     "Repeatability",
     "SignalError",
+    "SimulatedTuning",
     "StateSpace",
     "SweepError",
     "SweepResult",
@@ -76,6 +78,7 @@ __all__ = [
     "sweep",
     "trajectory",
     "tune",
+    "tune_by_simulation",
     "weights",
 ]
 __all__ += laws.__all__

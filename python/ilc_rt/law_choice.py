@@ -203,9 +203,6 @@ class Task:
 
     def relevant(self, found: Recommendation, disturbance_std: float) -> Recommendation:
         """Return the law around one that weights past runs by their disturbance."""
-        if not 0.0 < disturbance_std < np.inf:
-            message = f"disturbance_std = {disturbance_std}: a finite number above 0 is needed"
-            raise LearningError(message)
         first = rms(self.reference)
         weights = RelevanceWeights(
             error=1.0 / max(first, 1e-12) ** 2, error_rate=0.0,

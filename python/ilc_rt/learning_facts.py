@@ -28,6 +28,8 @@ LIGHT = 0.2
 KNOWN = 0.8
 # Gains of the uncertainty from zero to the Nyquist frequency.
 GRID = 513
+# Places of a mode that are tried within its uncertainty.
+MOVES = 41
 # Distance from the unit circle that counts as outside of it.
 OUTSIDE = 1e-7
 # Order up to which a model is rebuilt from its polynomials.
@@ -234,7 +236,7 @@ def _over_frequency(gains: Array, modes: tuple[Mode, ...], nyquist_hz: float) ->
             change = np.max(
                 [
                     np.abs(_mode_response(at, factor * mode.frequency_hz, mode.damping) / there - 1)
-                    for factor in (1.0 - moved, 1.0 + moved)
+                    for factor in np.linspace(1.0 - moved, 1.0 + moved, MOVES)
                 ],
                 axis=0,
             )

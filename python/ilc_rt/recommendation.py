@@ -117,6 +117,9 @@ def recommend(
     if not isinstance(n_runs, int) or n_runs < 1:
         message = f"n_runs = {n_runs!r}: a whole number from 1 is needed"
         raise LearningError(message)
+    if disturbance_std is not None and not 0.0 < disturbance_std < np.inf:
+        message = f"disturbance_std = {disturbance_std}: a finite number above 0 is needed"
+        raise LearningError(message)
     if model is None:
         return _without_model(bandwidth_hz, delay_samples, dt_s, n_axes)
     facts = learning_facts(model, uncertainty)
