@@ -73,3 +73,17 @@ def test_what_was_learned_cold_is_recalled(gantry: Path, tmp_path: Path) -> None
     assert len(plain_um) == 12
     assert relevant_um[8] < 1.1 * relevant_um[3]
     assert relevant_um[8] < 0.3 * plain_um[8]
+
+
+def test_optuna_chooses_weights_on_simulated_cells(gantry: Path, tmp_path: Path) -> None:
+    """The best trial leaves less than half of what the first guess leaves."""
+    said = run_example(gantry.with_name("14_optuna.py"), tmp_path, "9")
+    lines = [line for line in said.splitlines() if line.startswith("trial")]
+    assert len(lines) == 9
+    rates = [float(value) for value in re.findall(r"rate +([\d.]+) ", said)]
+    assert rates[0] == 15.0
+    assert len(set(rates)) > 5
+    shares = {line.split()[1]: float(line.split()[-2]) for line in lines if "left" in line}
+    number, share = re.search(r"# trial (\d+), ([\d.]+) % left", said).groups()
+    assert shares[number] == float(share) == min(shares.values())
+    assert min(shares.values()) < 0.5 * shares["0"]
