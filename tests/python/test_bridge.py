@@ -90,7 +90,7 @@ def test_cycles_are_equidistant_though_batches_arrive_late(cell: Cell) -> None:
     times += [row.time_s for row in signals.rows(batch(100 + N, iteration=None))]
     steps = [b - a for a, b in pairwise(times)]
     assert steps == pytest.approx([CYCLE_S] * (2 * N - 1))
-    # A loop that starts anew counts anew.
+    # A loop that starts again counts from zero.
     now[0] += 60.0
     assert next(signals.rows(batch(0))).time_s == pytest.approx(now[0] - N * CYCLE_S)
 
