@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -23,12 +22,13 @@ MADE = ("../rust/",)
 
 
 def documents() -> list[Path]:
-    """Return every document that is kept, or about to be."""
-    listed = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.md", "*.ipynb"],
-        cwd=ROOT, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return sorted(ROOT / name for name in listed.stdout.split() if (ROOT / name).exists())
+    """Return every document of the tree; what is built or installed is in other folders."""
+    found = [*ROOT.glob("*.md")]
+    for folder in ("benchmarks", "crates", "docs", "examples", "papers", "python", "sim", "tests"):
+        for ending in ("*.md", "*.ipynb"):
+            found += (ROOT / folder).rglob(ending)
+    # Copies that editors of notebooks keep are in hidden folders.
+    return sorted(one for one in found if "/." not in str(one.relative_to(ROOT)))
 
 
 def markdown(document: Path) -> str:
