@@ -13,7 +13,6 @@ import numpy as np
 from ilc_rt._native import LearningError, ModelError
 from ilc_rt.analysis import Analysis, analyze, tune
 from ilc_rt.laws import AdjointIlc, ModelInverseIlc, NormOptimalIlc, StableInverseIlc
-from ilc_rt.learning_facts import well_scaled
 from ilc_rt.signal import butterworth
 
 if TYPE_CHECKING:
@@ -154,8 +153,7 @@ class _Question:
         ``|Q| (|1 - L P| + |W| |L P|) < 1`` at all frequencies
         """
         facts = self.facts
-        model = well_scaled(self.model) if kind is StableInverseIlc else self.model
-        arguments = {"model": model, "n_samples": self.n_samples, **own}
+        arguments = {"model": self.model, "n_samples": self.n_samples, **own}
         try:
             learned = self._learned(kind, arguments)
         except (LearningError, ModelError) as error:

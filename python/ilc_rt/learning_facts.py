@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ilc_rt._native import LearningError, StateSpace, TimeVarying
-from ilc_rt.models import from_transfer_function
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -32,8 +31,6 @@ GRID = 513
 MOVES = 41
 # Distance from the unit circle that counts as outside of it.
 OUTSIDE = 1e-7
-# Order up to which a model is rebuilt from its polynomials.
-ORDER_MAX = 30
 
 
 @dataclass(frozen=True)
@@ -172,28 +169,6 @@ def learning_facts(model: VaryingModel, uncertainty: float | ArrayLike = 0.3) ->
     )  # fmt: skip
 
 
-def well_scaled(model: StateSpace) -> StateSpace:
-    """Return a model of one input and one output with numbers near 1 in its matrices.
-
-    A model that was given in seconds has entries of very different size, among which small ones
-    count as zero when its zeros are computed.
-
-    Examples
-    --------
-    >>> from ilc_rt import discretize, from_transfer_function
-    >>> plant = discretize(from_transfer_function([2e6], [1.0, 220.0, 24e3, 2e6]), 0.001)
-    >>> sorted(well_scaled(plant).zeros().real.round(3).tolist())
-    [-3.531, -0.254]
-    """
-    if not 0 < model.n_states <= ORDER_MAX or not isinstance(model.dt_s, float):
-        return model
-    den = np.real(np.poly(np.linalg.eigvals(model.a)))
-    # The product of denominator and impulse response is the numerator.
-    num = np.convolve(den, model.markov(len(den))[:, 0, 0])[: len(den)]
-    first = next((i for i, value in enumerate(num) if value != 0.0), None)
-    return model if first is None else from_transfer_function(num[first:], den, model.dt_s)
-
-
 def _gains(uncertainty: float | ArrayLike) -> Array:
     gains = np.atleast_1d(np.asarray(uncertainty, dtype=np.float64))
     if gains.ndim != 1 or not gains.size or not (np.isfinite(gains) & (gains >= 0.0)).all():
@@ -215,7 +190,7 @@ def _modes(model: StateSpace) -> tuple[Mode, ...]:
 def _zeros_outside(model: StateSpace) -> tuple[complex, ...]:
     if (model.n_inputs, model.n_outputs) != (1, 1):
         return ()
-    zeros = np.asarray(well_scaled(model).zeros(), dtype=np.complex128)
+    zeros = np.asarray(model.zeros(), dtype=np.complex128)
     # Zeros at infinity that numerics bring back are no zeros of the plant.
     chosen = zeros[(np.abs(zeros) > 1.0 - OUTSIDE) & (np.abs(zeros) < 1e6)]
     return tuple(complex(zero) for zero in chosen)

@@ -18,7 +18,7 @@ from ilc_rt import (
     second_order,
     simulate,
 )
-from ilc_rt.learning_facts import learning_facts, well_scaled
+from ilc_rt.learning_facts import learning_facts
 
 N = 120
 DT_S = 0.004
@@ -141,7 +141,6 @@ def test_zeros_and_delays_are_facts() -> None:
     sampled = learning_facts(third)
     assert sampled.zeros_outside == pytest.approx([-3.5312], rel=1e-3)
     assert not sampled.is_non_minimum_phase
-    np.testing.assert_allclose(well_scaled(third).markov(40), third.markov(40), atol=1e-12)
     assert learning_facts(plant([0.1], [1.0, 0.0, 0.0])).integrators == 2
 
 

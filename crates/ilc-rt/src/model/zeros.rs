@@ -8,13 +8,16 @@ use super::{ModelError, StateSpace};
 const RANK: f64 = 1e-13;
 /// Largest number of sweeps of the eigenvalue iteration.
 const SWEEPS_MAX: usize = 10_000;
+/// Largest number of passes of the balancing over all states.
+const PASSES_MAX: usize = 50;
 
 impl StateSpace {
     /// Returns the invariant zeros.
     ///
     /// `z` where `[A - z I, B; C, D]` loses rank. The pencil is reduced by orthogonal transforms to
     /// one with a square, invertible `D`; its finite zeros are the eigenvalues of `A - B D^-1 C`.
-    /// No zero at infinity appears as a large finite one.
+    /// No zero at infinity appears as a large finite one. The model is balanced first: units of
+    /// states, inputs and outputs do not matter.
     ///
     /// # Errors
     /// - [`ModelError::Numerics`] if the transfer matrix is rank-deficient at every frequency
@@ -22,12 +25,11 @@ impl StateSpace {
     /// # Source
     /// - \[emami1982\].
     pub fn zeros(&self) -> Result<Vec<Complex<f64>>, ModelError> {
+        let balanced = Pencil::of(self).balanced();
         let tolerance = RANK
-            * [self.a.amax(), self.b.amax(), self.c.amax(), self.d.amax()]
-                .into_iter()
-                .fold(0.0, f64::max)
+            * balanced.amax()
             * (self.n_states() + self.n_inputs().max(self.n_outputs())) as f64;
-        let rows = Pencil::of(self).with_full_row_rank(tolerance);
+        let rows = balanced.with_full_row_rank(tolerance);
         let full = rows.transposed().with_full_row_rank(tolerance).transposed();
         let (p, m) = full.d.shape();
         if full.a.nrows() == 0 {
@@ -68,6 +70,45 @@ struct Pencil {
 impl Pencil {
     fn of(model: &StateSpace) -> Self {
         Self { a: model.a.clone(), b: model.b.clone(), c: model.c.clone(), d: model.d.clone() }
+    }
+
+    fn amax(&self) -> f64 {
+        [&self.a, &self.b, &self.c, &self.d].into_iter().map(DMatrix::amax).fold(0.0, f64::max)
+    }
+
+    /// Scales states, inputs and outputs by powers of two until each state has rows and columns of
+    /// about the same size, and each input and output the size of `A`. The zeros remain.
+    fn balanced(mut self) -> Self {
+        let size = if self.a.amax() > 0.0 { self.a.amax() } else { 1.0 };
+        for _ in 0..PASSES_MAX {
+            let mut settled = true;
+            for col in 0..self.b.ncols() {
+                let scale =
+                    power_of_two(size / self.b.column(col).amax().max(self.d.column(col).amax()));
+                self.b.column_mut(col).scale_mut(scale);
+                self.d.column_mut(col).scale_mut(scale);
+            }
+            for row in 0..self.c.nrows() {
+                let scale = power_of_two(size / self.c.row(row).amax().max(self.d.row(row).amax()));
+                self.c.row_mut(row).scale_mut(scale);
+                self.d.row_mut(row).scale_mut(scale);
+            }
+            for state in 0..self.a.nrows() {
+                let own = self.a[(state, state)].abs();
+                let across = self.a.row(state).lp_norm(1) - own + self.b.row(state).lp_norm(1);
+                let down = self.a.column(state).lp_norm(1) - own + self.c.column(state).lp_norm(1);
+                let scale = power_of_two((across / down).sqrt());
+                settled &= scale == 1.0;
+                self.a.column_mut(state).scale_mut(scale);
+                self.c.column_mut(state).scale_mut(scale);
+                self.a.row_mut(state).unscale_mut(scale);
+                self.b.row_mut(state).unscale_mut(scale);
+            }
+            if settled {
+                break;
+            }
+        }
+        self
     }
 
     fn transposed(self) -> Self {
@@ -121,6 +162,11 @@ impl Pencil {
     }
 }
 
+/// Returns the power of two next to a ratio; 1 for one that is not a positive number.
+fn power_of_two(ratio: f64) -> f64 {
+    if ratio.is_finite() && ratio > 0.0 { ratio.log2().round().exp2() } else { 1.0 }
+}
+
 /// Returns an orthogonal `U` such that `U M` has its nonzero rows first, and their number.
 fn row_compression(matrix: &DMatrix<f64>, tolerance: f64) -> (DMatrix<f64>, usize) {
     let rows = matrix.nrows();
@@ -166,6 +212,51 @@ mod tests {
         let zeros = sorted(held.zeros().unwrap());
         assert!((zeros[0].re + 2.0 + 3.0_f64.sqrt()).abs() < 1e-6, "{zeros:?}");
         assert!((zeros[1].re + 2.0 - 3.0_f64.sqrt()).abs() < 1e-6, "{zeros:?}");
+    }
+
+    #[test]
+    fn units_do_not_matter() {
+        // A third-order loop given in seconds: the entries of its matrices differ by millions. The zeros are
+        // those of the ratio of two polynomials, by arithmetic with 50 digits.
+        let plant = from_transfer_function(&[2e6], &[1.0, 220.0, 24e3, 2e6], None).unwrap();
+        let held = discretize(&plant, 0.001, Method::ZeroOrderHold).unwrap();
+        let zeros = sorted(held.zeros().unwrap());
+        assert_eq!(zeros.len(), 2, "{zeros:?}");
+        assert!((zeros[0].re + 3.531_156_329_4).abs() < 1e-8, "{zeros:?}");
+        assert!((zeros[1].re + 0.253_697_194_3).abs() < 1e-8, "{zeros:?}");
+    }
+
+    #[test]
+    fn other_units_of_states_inputs_and_outputs_have_the_same_zeros() {
+        let first = from_transfer_function(&[1.0, 2.0], &[1.0, 2.0, 9.0], None).unwrap();
+        let second =
+            from_transfer_function(&[3.0, 1.0, 40.0], &[1.0, 2.0, 9.0, 5.0], None).unwrap();
+        let model = first.append(&second).unwrap();
+        let expected = sorted(model.zeros().unwrap());
+        for draw in 0..20_u32 {
+            let mut exponent = (0..).map(|k: u32| {
+                f64::from((k + 1).wrapping_mul(2_654_435_761).wrapping_add(draw * 40_503) % 13)
+                    - 6.0
+            });
+            let mut scale = |n: usize| -> DMatrix<f64> {
+                let powers = exponent.by_ref().take(n).map(|power| 10_f64.powf(power));
+                DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(n, powers))
+            };
+            let (states, inputs, outputs) = (scale(5), scale(2), scale(2));
+            let back = states.clone().try_inverse().unwrap();
+            let scaled = StateSpace::continuous(
+                &back * &model.a * &states,
+                &back * &model.b * &inputs,
+                &outputs * &model.c * &states,
+                &outputs * &model.d * &inputs,
+            )
+            .unwrap();
+            let zeros = sorted(scaled.zeros().unwrap());
+            assert_eq!(zeros.len(), expected.len(), "draw {draw}: {zeros:?}");
+            for (zero, expected) in zeros.iter().zip(&expected) {
+                assert!((zero - expected).norm() < 1e-9, "draw {draw}: {zeros:?}");
+            }
+        }
     }
 
     #[test]
