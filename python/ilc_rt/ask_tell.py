@@ -254,17 +254,15 @@ class Experiment:
         return values.astype(np.float64)
 
     def _learn(self, record: IterationRecord, coming: Array | None) -> tuple[Array, float]:
-        """Return the input learned from a run, and the computing time in ms."""
+        """Return the input for a coming disturbance, and the computing time in ms."""
         assert self.law is not None
-        if coming is not None:
-            self._announce(coming)
         begun = time.perf_counter()
         u, e = record.input, record.error_m
         if self._is_flat:
             e = e[:, 0]
         if self._u.ndim == 1:
             u = u[:, 0]
-        learned = np.asarray(self.law.update(u.copy(), e.copy(), record.disturbance))
+        learned = np.asarray(self.law.update(u.copy(), e.copy(), coming))
         update_ms = 1e3 * (time.perf_counter() - begun)
         if learned.shape != u.shape or learned.dtype.kind not in "iuf":
             message = (
