@@ -7,9 +7,10 @@ import os
 import platform
 import subprocess
 import sys
+import tempfile
 from importlib import metadata
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import bounded
 import update
@@ -55,6 +56,7 @@ def main() -> None:
         f"One update takes {1e3 * million['seconds']:.1f} ms and {million['mb']:.0f} MB over input "
         "and error, the copies at the border to Python and the next input included.",
         "",
+        *many_plants(),
         "## In Rust",
         "",
         "Medians of `cargo bench`.",
@@ -89,6 +91,38 @@ def table(columns: dict[int, dict[str, float]]) -> list[str]:
         )
         rows.append(f"| {name} |{cells}")
     return rows
+
+
+def many_plants() -> list[str]:
+    """Return the section on thousands of plants."""
+    print("many plants ...", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "rows.json")
+        command(sys.executable, str(ROOT / "benchmarks" / "many_plants.py"), "--json", str(file))
+        rows = json.loads(file.read_text())
+    return many_plants_section(rows)
+
+
+def many_plants_section(rows: list[dict[str, Any]]) -> list[str]:
+    """Return the section from the rows of `many_plants.py`, the first two being one and two threads."""
+    each_s = [row["seconds"] / row["plants"] for row in rows]
+    ratio = rows[0]["seconds"] / rows[1]["seconds"]
+    return [
+        "## Thousands of plants",
+        "",
+        "20 runs of 1300 samples with noise on each of many plants that differ from the model (second order),",
+        "norm-optimal; every way gives the same figures bit by bit. Two threads are worth "
+        f"{ratio:.2f} of one.",
+        "",
+        "| way | plants | time | per plant | times ours |",
+        "|---|--:|--:|--:|--:|",
+        *(
+            f"| {row['way']} | {row['plants']} | {readable(row['seconds'])} | {readable(each)} "
+            f"| {each / each_s[1]:.3g} |"
+            for row, each in zip(rows, each_s, strict=True)
+        ),
+        "",
+    ]
 
 
 def criterion_folder() -> Path:

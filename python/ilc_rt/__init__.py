@@ -22,6 +22,8 @@ from ilc_rt.compared import Compared, compare
 from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError, SweepError
 from ilc_rt.laws import *  # noqa: F403
 from ilc_rt.library import Library
+from ilc_rt.many import simulate_many
+from ilc_rt.many_result import ManyResult
 from ilc_rt.models import discretize, from_transfer_function, second_order
 from ilc_rt.recommendation import Recommendation, recommend
 from ilc_rt.record import IterationRecord
@@ -46,6 +48,7 @@ __all__ = [
     "Law",
     "LearningError",
     "Library",
+    "ManyResult",
     "ModelError",
     "PlantError",
     "Recommendation",
@@ -75,6 +78,7 @@ __all__ = [
     "second_order",
     "signal",
     "simulate",
+    "simulate_many",
     "sweep",
     "trajectory",
     "tune",

@@ -69,6 +69,7 @@ __all__ = [
     "second_order_model",
     "second_order_response",
     "sigmoid_pair",
+    "simulate_many",
     "single_experiment",
     "spiral",
     "spline",
@@ -359,6 +360,7 @@ def schedule(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
 def analyze(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def refuse_divergent(**keywords: Any) -> None: ...  # noqa: ANN401
 def tune(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
+def simulate_many(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def repeatability(errors: ArrayLike) -> dict[str, Any]: ...
 def from_transfer_function(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
 def second_order(**keywords: Any) -> StateSpace: ...  # noqa: ANN401

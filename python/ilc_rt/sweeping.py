@@ -198,6 +198,18 @@ def latin_hypercube(
     ]
 
 
+def case_seed(seed: int, number: int) -> int:
+    """Return the seed of a case, which depends on that of the sweep and its number alone.
+
+    Examples
+    --------
+    >>> case_seed(0, 1) == case_seed(0, 1), case_seed(0, 1) == case_seed(0, 2)
+    (True, False)
+    """
+    low, high = np.random.SeedSequence(seed, spawn_key=(number,)).generate_state(2, np.uint32)
+    return int(low) + (int(high) << 32)
+
+
 def encode(value: object) -> Any:  # noqa: ANN401 (a value of JSON)
     """Return a result as a value of JSON; every number keeps all its bits.
 
@@ -317,10 +329,9 @@ def _call(
     offered: tuple[str, ...],
 ) -> Any:  # noqa: ANN401 (what the function returns)  # fmt: skip
     """Call the function for a case; this is what other processes run."""
-    sequence = np.random.SeedSequence(seed, spawn_key=(number,))
     own = {
-        "seed": int(sequence.generate_state(2, np.uint32) @ np.array([1, 2**32], dtype=object)),
-        "rng": np.random.default_rng(sequence),
+        "seed": case_seed(seed, number),
+        "rng": np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,))),
     }
     extra = {name: own[name] for name in offered if name not in case}
     try:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -50,3 +51,28 @@ def test_no_table_of_the_documents_is_empty():
         for line, after in zip(lines, [*lines[1:], ""], strict=True):
             if set(line) <= set("|-: ") and line.startswith("|-"):
                 assert after.startswith("|"), f"{page}: a table without rows"
+
+
+def test_many_plants_are_compared_bit_by_bit(report, tmp_path):
+    """The script on few plants: every way gives the same figures, or it fails."""
+    file = tmp_path / "rows.json"
+    done = subprocess.run(
+        [
+            sys.executable, str(FOLDER / "many_plants.py"), "--plants", "6", "--slow", "4",
+            "--repeats", "1", "--no-dask", "--json", str(file),
+        ],
+        capture_output=True, text=True, check=False, timeout=240,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = json.loads(file.read_text())
+    assert [(row["plants"], row["way"]) for row in rows] == [
+        (6, "simulate_many, one thread"),
+        (6, "simulate_many, two threads"),
+        (4, "simulate_many, one thread"),
+        (4, "sweep, this process"),
+        (4, "sweep, two processes"),
+    ]
+    assert len({row["digest"] for row in rows}) == 2
+    section = report.many_plants_section(rows)
+    assert section[0] == "## Thousands of plants"
+    assert sum(line.startswith("| s") for line in section) == 5

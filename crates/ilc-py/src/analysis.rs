@@ -108,7 +108,7 @@ pub(crate) fn refuse_divergent(keywords: Option<Keywords<'_, '_>>) -> PyResult<(
     if laws::is_python(&law)? {
         return Ok(());
     }
-    let mut law = laws::apart("law", &law, n_samples, channels(&model))?;
+    let mut law = laws::apart("law", &law, n_samples, channels(&model), 0)?;
     let found = interruptible(a.py(), || {
         analysis::refuse_divergent(law.as_mut(), &model, n_samples)?;
         analysis::overreach(law.as_mut(), &model, n_samples)
@@ -178,7 +178,7 @@ fn read_law(
             object.repr()?
         )));
     }
-    laws::apart("law", object, n_samples, channels(model))
+    laws::apart("law", object, n_samples, channels(model), 0)
 }
 
 #[pyfunction(signature = (**keywords))]

@@ -28,6 +28,7 @@ mod kinematics;
 mod laws;
 mod library;
 mod made;
+mod many;
 mod model;
 mod model_argument;
 mod python_law;
@@ -76,6 +77,8 @@ mod _native {
     use super::library::PyLibrary;
     #[pymodule_export]
     use super::made::{_made, _made_of_kind};
+    #[pymodule_export]
+    use super::many::simulate_many;
     #[pymodule_export]
     use super::model::{PyStateSpace, discretize, from_transfer_function, second_order};
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! Laws for an analysis: built separately from their Python objects, and queried through their
+//! Laws for an analysis or a batch: built separately from their Python objects, and queried through their
 //! trait.
 
 use std::sync::Arc;
@@ -10,20 +10,21 @@ use super::{Call, Fits, PyLaw, Size};
 use crate::arguments::Arguments;
 use crate::python_law::{Channels, Frame, PythonLaw};
 
-/// Returns a separate law for an analysis, for runs of this size: the object itself is not used,
+/// Returns a separate law for an analysis or a batch, for runs of this size: the object itself is not used,
 /// unless it is written in Python.
 pub(crate) fn apart(
     name: &str,
     object: &Bound<'_, PyAny>,
     n_samples: usize,
     channels: Channels,
+    n_disturbances: usize,
 ) -> PyResult<Box<dyn Law>> {
     let Ok(law) = object.cast::<PyLaw>() else {
         let frame = Arc::new(Frame::default());
         return Ok(Box::new(PythonLaw::new(name, object, channels, frame)?));
     };
     let this = law.get();
-    let size = Size { n_samples, channels, n_disturbances: 0 };
+    let size = Size { n_samples, channels, n_disturbances };
     let arguments = Arguments::new(this.arguments.bind(object.py()));
     Ok((this.build)(&Call { arguments, size: Some(size), live: None })?.law)
 }

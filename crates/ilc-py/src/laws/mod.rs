@@ -106,7 +106,10 @@ impl<'py> Call<'_, 'py> {
             Some(frame) => {
                 Ok(Box::new(PythonLaw::new(name, &object, channels, Arc::clone(frame))?))
             }
-            None => apart(name, &object, self.size().n_samples, channels),
+            None => {
+                let Size { n_samples, n_disturbances, .. } = self.size();
+                apart(name, &object, n_samples, channels, n_disturbances)
+            }
         }
     }
 }

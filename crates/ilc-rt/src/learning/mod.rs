@@ -3,13 +3,14 @@
 //! This folder holds the [`Law`] trait, one law per file under [`law`], the linear-time solver
 //! ([`sweep`]) shared by the norm-optimal laws, and wrappers of any law: when to stop ([`gate`]) and
 //! how many runs to average ([`ladder`]). [`analysis`] predicts convergence before the first run, and
-//! [`tune`] proposes weights. It runs between iterations, never in the tick; `config`, `design` and
+//! [`tune`] proposes weights, and [`batch`] lets a law learn on many plants at once. It runs between iterations, never in the tick; `config`, `design` and
 //! the Python bindings may import it.
 //!
 //! Family: `error`, `krylov`, `law`, `operator`, `structure` and `weights` share the error of the folder,
 //! which carries that of the bounds, and a law answers with the structure that the analysis asks for.
 
 pub mod analysis;
+pub mod batch;
 mod error;
 pub mod gate;
 mod krylov;

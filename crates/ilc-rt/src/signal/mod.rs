@@ -1,4 +1,4 @@
-//! Filters and the instantaneous frequency of a signal.
+//! Filters, the instantaneous frequency of a signal, and white noise.
 //!
 //! Butterworth low-pass as second-order sections, causal, zero-phase or switched along the run;
 //! Gaussian and symmetric FIR smoothers. Filters are designed at set-up and run without allocation.
@@ -11,6 +11,7 @@ mod error;
 mod fir;
 mod gaussian;
 mod hilbert;
+mod noise;
 mod segments;
 mod sos;
 mod switched;
@@ -22,6 +23,7 @@ pub use error::SignalError;
 pub use fir::FirFilter;
 pub use gaussian::GaussianFilter;
 pub use hilbert::{analytic, instantaneous_frequency};
+pub use noise::WhiteNoise;
 pub use segments::SwitchRule;
 pub use sos::{Section, SosFilter};
 pub use switched::{Segment, Switched, SwitchedFilter};

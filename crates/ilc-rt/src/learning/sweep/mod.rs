@@ -31,7 +31,7 @@ mod recursion;
 mod single;
 mod square_root;
 mod stage;
-mod wide;
+pub(in crate::learning) mod wide;
 
 pub use factor::{FactorError, Form, Gains};
 pub use general::General;

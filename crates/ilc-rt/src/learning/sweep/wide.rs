@@ -1,6 +1,7 @@
 //! SIMD rows of eight numbers, with the widest instructions of the processor.
 //!
-//! For the constant-gain sweep ([`super::lanes`], [`super::single`]). Products and sums are rounded
+//! For the constant-gain sweep ([`super::lanes`], [`super::single`]) and for many plants side by side
+//! ([`crate::learning::batch`]). Products and sums are rounded
 //! separately, never fused, so results are bit-identical on every processor.
 
 #![expect(
@@ -9,15 +10,15 @@
 )]
 
 /// Numbers per row.
-pub(super) const LANES: usize = 8;
+pub(in crate::learning) const LANES: usize = 8;
 
 /// Eight numbers in memory.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(64))]
-pub(super) struct Lanes(pub(super) [f64; LANES]);
+pub(in crate::learning) struct Lanes(pub(in crate::learning) [f64; LANES]);
 
 /// Instructions for rows of eight numbers.
-pub(super) trait Wide: Copy {
+pub(in crate::learning) trait Wide: Copy {
     /// Eight numbers in registers.
     type Row: Copy;
 
@@ -33,6 +34,9 @@ pub(super) trait Wide: Copy {
     /// Returns `left - right`.
     fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row;
 
+    /// Returns the products of the numbers, one by one.
+    fn multiply(self, left: Self::Row, right: Self::Row) -> Self::Row;
+
     /// Returns `factor row`.
     fn scale(self, factor: f64, row: Self::Row) -> Self::Row;
 
@@ -41,7 +45,7 @@ pub(super) trait Wide: Copy {
 }
 
 /// Work to be compiled for each instruction set.
-pub(super) trait Work {
+pub(in crate::learning) trait Work {
     /// Its result.
     type Output;
 
@@ -52,7 +56,7 @@ pub(super) trait Work {
 
 /// Instruction set of the processor.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Instructions {
+pub(in crate::learning) enum Instructions {
     /// The baseline that every supported processor has.
     Portable,
     /// AVX2 in addition.
@@ -62,7 +66,7 @@ pub(super) enum Instructions {
 
 impl Instructions {
     /// Returns the best instruction set of this processor.
-    pub(super) fn best() -> Self {
+    pub(in crate::learning) fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = pulp::x86::V3::try_new() {
             return Self::Avx(simd);
@@ -71,7 +75,7 @@ impl Instructions {
     }
 
     /// Runs the work with these instructions.
-    pub(super) fn run<T: Work>(self, work: T) -> T::Output {
+    pub(in crate::learning) fn run<T: Work>(self, work: T) -> T::Output {
         match self {
             Self::Portable => work.with(Portable),
             #[cfg(target_arch = "x86_64")]
@@ -82,7 +86,7 @@ impl Instructions {
 
 /// The baseline instructions.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Portable;
+pub(in crate::learning) struct Portable;
 
 impl Wide for Portable {
     type Row = [f64; LANES];
@@ -105,6 +109,11 @@ impl Wide for Portable {
     #[inline(always)]
     fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row {
         std::array::from_fn(|lane| left[lane] - right[lane])
+    }
+
+    #[inline(always)]
+    fn multiply(self, left: Self::Row, right: Self::Row) -> Self::Row {
+        std::array::from_fn(|lane| left[lane] * right[lane])
     }
 
     #[inline(always)]
@@ -167,6 +176,12 @@ mod avx {
         fn subtract(self, left: Self::Row, right: Self::Row) -> Self::Row {
             let simd = self.avx;
             [simd._mm256_sub_pd(left[0], right[0]), simd._mm256_sub_pd(left[1], right[1])]
+        }
+
+        #[inline(always)]
+        fn multiply(self, left: Self::Row, right: Self::Row) -> Self::Row {
+            let simd = self.avx;
+            [simd._mm256_mul_pd(left[0], right[0]), simd._mm256_mul_pd(left[1], right[1])]
         }
 
         #[inline(always)]

@@ -1,0 +1,101 @@
+//! Figures of a run, rounded as NumPy rounds them.
+
+/// Numbers that are summed in one pass; longer sums are halved.
+const BLOCK: usize = 128;
+/// Partial sums of a pass.
+const PARTS: usize = 8;
+
+/// Returns the largest absolute value; infinite if a value is not a number.
+pub(super) fn largest(values: &[f64]) -> f64 {
+    // Partial results, as one comparison would wait for another.
+    let mut most = [0.0_f64; PARTS];
+    let chunks = values.chunks_exact(PARTS);
+    let rest = chunks.remainder();
+    for chunk in chunks {
+        for (most, value) in most.iter_mut().zip(chunk) {
+            let size = value.abs();
+            *most = if size <= *most { *most } else { size };
+        }
+    }
+    let sizes = most.into_iter().chain(rest.iter().map(|value| value.abs()));
+    sizes.fold(0.0, |most, size| if size.is_nan() { f64::INFINITY } else { most.max(size) })
+}
+
+/// Returns the RMS over time of the Euclidean norm of all channels; `squares` is a workspace of one number per
+/// sample.
+///
+/// `numpy.sqrt(numpy.mean(numpy.sum(e * e, axis=1)))`
+pub(super) fn rms(error: &[f64], n_channels: usize, squares: &mut [f64]) -> f64 {
+    if n_channels == 1 {
+        for (square, value) in squares.iter_mut().zip(error) {
+            *square = value * value;
+        }
+    } else {
+        for (square, sample) in squares.iter_mut().zip(error.chunks_exact(n_channels)) {
+            *square = sum_of(sample, |value| value * value);
+        }
+    }
+    (sum_of(squares, |square| square) / squares.len() as f64).sqrt()
+}
+
+/// Returns a sum in the order in which NumPy adds (pairwise summation).
+fn sum_of(values: &[f64], term: impl Fn(f64) -> f64 + Copy) -> f64 {
+    let n = values.len();
+    if n > BLOCK {
+        let half = n / 2 - n / 2 % PARTS;
+        let (first, second) = values.split_at(half);
+        return sum_of(first, term) + sum_of(second, term);
+    }
+    let chunks = values.chunks_exact(PARTS);
+    let rest = chunks.remainder();
+    let mut parts: Option<[f64; PARTS]> = None;
+    for chunk in chunks {
+        let terms: [f64; PARTS] = std::array::from_fn(|i| term(chunk[i]));
+        parts = Some(match parts {
+            None => terms,
+            Some(parts) => std::array::from_fn(|i| parts[i] + terms[i]),
+        });
+    }
+    let [a, b, c, d, e, f, g, h] = parts.unwrap_or_default();
+    rest.iter().fold(((a + b) + (c + d)) + ((e + f) + (g + h)), |sum, value| sum + term(*value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_those_of_numpy() {
+        // v = (numpy.arange(n) % 97) * 0.1 + 1e-3; numpy.sum(v * v), whose last digits depend on the order.
+        for (n, expected) in [
+            (1, 1e-06),
+            (7, 0.9142070000000002),
+            (8, 1.4056080000000004),
+            (9, 2.0472090000000005),
+            (100, 2996.341900000001),
+            (127, 3081.9283270000005),
+            (128, 3090.9343280000003),
+            (129, 3100.550529),
+            (200, 5993.135600000001),
+            (1300, 39142.125100000005),
+            (9001, 277151.644601),
+        ] {
+            let values: Vec<f64> = (0..n).map(|k| f64::from(k % 97) * 0.1 + 1e-3).collect();
+            assert_eq!(sum_of(&values, |value| value * value), expected, "{n}");
+        }
+    }
+
+    #[test]
+    fn the_largest_value_is_found_everywhere_and_nan_is_infinite() {
+        for place in 0..20 {
+            let mut values = vec![0.5; 20];
+            values[place] = -3.0;
+            assert_eq!(largest(&values), 3.0);
+            values[place] = f64::NAN;
+            assert_eq!(largest(&values), f64::INFINITY, "{place}");
+            values[place] = f64::NEG_INFINITY;
+            assert_eq!(largest(&values), f64::INFINITY);
+        }
+        assert_eq!(largest(&[]), 0.0);
+    }
+}
