@@ -211,7 +211,7 @@ def test_each_plant_may_have_a_law_of_its_own() -> None:
 
 def test_a_plant_that_diverges_is_infinite_and_its_neighbours_learn_on() -> None:
     plants = [MODEL] * 9
-    plants[3] = -40.0 * MODEL
+    plants[3] = -4000.0 * MODEL
     plants[6] = StateSpace([[1e9]], [[1.0]], [[1.0]], [[0.0]], DT_S)
     found = simulate_many(plants, PdIlc(kp=0.5), REFERENCE, trials=200, keep="signals")
     assert found.diverged.tolist() == [number in (3, 6) for number in range(9)]
