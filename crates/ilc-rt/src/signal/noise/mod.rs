@@ -168,7 +168,7 @@ mod tests {
         let mut last = 0.0;
         for _ in 0..n {
             let x = noise.draw();
-            sums.iter_mut().enumerate().for_each(|(i, sum)| *sum += x.powi(i as i32 + 1));
+            sums.iter_mut().zip(1..).for_each(|(sum, power)| *sum += x.powi(power));
             beyond += usize::from(x.abs() > TAIL);
             product += last * x;
             last = x;
