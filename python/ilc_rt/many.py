@@ -160,7 +160,7 @@ def simulate_many(
 
 
 def _check_numbers(
-    trials: object, noise_std: object, seed: object, threads: object, keep: object
+    trials: object, noise_std: float, seed: object, threads: object, keep: object
 ) -> None:
     for name, value, least, greatest in (
         ("trials", trials, 1, TRIALS_MAX),
@@ -205,7 +205,7 @@ def _laws(law: object, n_plants: int) -> tuple[list[Any], list[int]]:
         message = f"law: {len(law)} laws; one, or {n_plants} as there are plants, is needed"
         raise ValueError(message)
     numbers: dict[int, int] = {}
-    laws = []
+    laws: list[Any] = []
     for place, one in enumerate(law):
         if id(one) not in numbers:
             _require_native(f"law[{place}]", one)

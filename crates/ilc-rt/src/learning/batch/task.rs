@@ -68,7 +68,7 @@ pub enum BatchError {
     Plant {
         /// Its index.
         plant: usize,
-        /// What is wrong, and what is needed.
+        /// Its fault, and what is needed.
         reason: String,
     },
     /// A law that refuses a run for another reason than numbers that are too large.

@@ -4,7 +4,7 @@
 
 #![expect(clippy::unreadable_literal, reason = "shortest texts of these numbers")]
 
-/// Where the tail begins.
+/// Beginning of the tail.
 pub(super) const TAIL: f64 = 3.654152885361009;
 /// Its inverse.
 pub(super) const PER_TAIL: f64 = 0.2736612373297583;
