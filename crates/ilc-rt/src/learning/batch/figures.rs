@@ -14,7 +14,8 @@ pub(super) fn largest(values: &[f64]) -> f64 {
     for chunk in chunks {
         for (most, value) in most.iter_mut().zip(chunk) {
             let size = value.abs();
-            *most = if size <= *most { *most } else { size };
+            // No number is larger than NaN, which so remains.
+            *most = if size > *most || size.is_nan() { size } else { *most };
         }
     }
     let sizes = most.into_iter().chain(rest.iter().map(|value| value.abs()));
