@@ -55,6 +55,8 @@ class FaultError(CampaignError):
         Number defined by the kind, e.g. an emergency code.
     value, limit, unit : float or None, float or None, str or None
         Value found, and the limit exceeded.
+    late : object or None
+        The cycle that lost its deadline before the stop, an `ilc_rt.events.LateCycle`.
     cycles : object or None
         The last servo cycles before the stop, an `ilc_rt.events.LastCycles`.
 
@@ -77,10 +79,12 @@ class FaultError(CampaignError):
         value: float | None = None,
         limit: float | None = None,
         unit: str | None = None,
+        late: object = None,
         cycles: object = None,
     ) -> None:
         super().__init__(reason, exit_code)
         self.kind, self.axis, self.node, self.code = kind, axis, node, code
+        self.input, self.late = input, late
         self.value, self.limit, self.unit = value, limit, unit
         self.cycles = cycles
 

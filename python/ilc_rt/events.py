@@ -11,6 +11,17 @@ from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any, ClassVar
 
 from ilc_rt.figures import Figures
+from ilc_rt.lateness import (
+    AnswerTimes,
+    LateCounts,
+    LateCycle,
+    StageSpans,
+    parse_answers,
+    parse_both_stages,
+    parse_counts,
+    parse_late_cycle,
+    parse_stages,
+)
 
 
 class EventError(ValueError):
@@ -19,13 +30,17 @@ class EventError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class RealTimeReport:
-    """Real-time settings granted to the servo thread by the operating system."""
+    """Real-time settings granted to the servo thread by the operating system.
+
+    `awake` is True if the processors are kept from sleeping deeply.
+    """
 
     policy: str = ""
     priority: int = 0
     mlock: bool = False
     kernel: str = ""
     notes: tuple[str, ...] = ()
+    awake: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,13 +165,42 @@ class DriftEvent:
     relearned_in: str | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LateEvent(LateCycle):
+    """A servo cycle lost its deadline; `count` is the number of such cycles since the last event.
+
+    There is about one event a second, and one for every cycle that is worse than all before.
+    """
+
+    name: ClassVar[str] = "late"
+    iteration: int
+    count: int
+
+
 @dataclass(frozen=True, slots=True)
 class LatencyEvent:
-    """Wake-up latency and execution time of the servo loop."""
+    """Timing of the servo loop.
+
+    `wake_late_us`, `receive_us`, `control_us` and `send_us` are the stages of its cycles,
+    `execution_us` the last three together. `late` counts cycles that lost their deadline; `worst`
+    is the worst of them, `good` one in the middle of the others, and `file` tells more by
+    ``ilc-rt why``.
+    """
 
     name: ClassVar[str] = "latency"
     wake_late_us: Histogram
     execution_us: Histogram
+    receive_us: Histogram | None = None
+    control_us: Histogram | None = None
+    send_us: Histogram | None = None
+    answers: tuple[AnswerTimes, ...] = ()
+    preemptions: int = 0
+    minor_faults: int = 0
+    major_faults: int = 0
+    late: LateCounts | None = None
+    worst: LateCycle | None = None
+    good: StageSpans | None = None
+    file: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +224,8 @@ class FaultEvent:
 
     `kind` is the cause, e.g. ``"following_error"``; `axis` and `node` give the place, `code` is a
     number defined by the kind, e.g. an emergency code, `value` is the value found and `limit` the
-    allowed one, in `unit`. `input` is the name of a digital input that caused it.
+    allowed one, in `unit`. `input` is the name of a digital input that caused it. `late` is the
+    cycle that lost its deadline before the stop, if one did.
     """
 
     name: ClassVar[str] = "fault"
@@ -193,6 +238,7 @@ class FaultEvent:
     value: float | None = None
     limit: float | None = None
     unit: str | None = None
+    late: LateCycle | None = None
     cycles: LastCycles | None = None
 
 
@@ -217,6 +263,7 @@ Event = (
     | IterationEvent
     | JudgedEvent
     | DriftEvent
+    | LateEvent
     | LatencyEvent
     | FaultEvent
     | EndEvent
@@ -232,6 +279,7 @@ _CLASSES: dict[str, type[Any]] = {
         IterationEvent,
         JudgedEvent,
         DriftEvent,
+        LateEvent,
         LatencyEvent,
         FaultEvent,
         EndEvent,
@@ -318,8 +366,11 @@ def _build(cls: type[Any], data: dict[str, Any]) -> Event:
             )
         elif cls is FaultEvent:
             values["cycles"] = _last_cycles(values.get("cycles"))
+            values["late"] = parse_late_cycle(values.get("late"))
+        elif cls is LateEvent:
+            values |= parse_both_stages(values)
         elif cls is LatencyEvent:
-            values = {key: parse_histogram(value) for key, value in values.items()}
+            values |= _timing(values)
     except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
         message = f'event "{data["event"]}" is malformed ({error}): {data!r}'
         raise EventError(message) from error
@@ -338,11 +389,27 @@ def _last_cycles(data: dict[str, Any] | None) -> LastCycles | None:
     return LastCycles(first_sync=data["first_sync"], missing=missing, **rows)
 
 
+def _timing(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a `LatencyEvent` that are objects; older controllers send two."""
+    found: dict[str, Any] = {
+        key: parse_histogram(data[key])
+        for key in ("wake_late_us", "execution_us", "receive_us", "control_us", "send_us")
+        if data.get(key) is not None
+    }
+    found["late"] = parse_counts(data.get("late"))
+    found["answers"] = parse_answers(data.get("answers", ()))
+    found["worst"] = parse_late_cycle(data.get("worst"))
+    good = data.get("good")
+    found["good"] = None if good is None else parse_stages(good)
+    return found
+
+
 def _real_time_report(data: dict[str, Any]) -> RealTimeReport:
     return RealTimeReport(
         policy=str(data.get("policy", "")),
         priority=int(data.get("priority") or 0),
         mlock=bool(data.get("mlock", False)),
+        awake=bool(data.get("awake", False)),
         kernel=str(data.get("kernel", "")),
         notes=tuple(str(note) for note in data.get("notes", ())),
     )

@@ -128,6 +128,34 @@ def latency(result: CampaignResult) -> Figure | None:
         return figure
 
 
+def late_cycle(result: CampaignResult) -> Figure | None:
+    """Draw the stages of the worst cycle beside a good one; None if no cycle was late."""
+    timing = result.latency
+    if timing is None or timing.worst is None:
+        return None
+    rows = [("worst", timing.worst.stages), ("good", timing.good or timing.worst.usual)]
+    control, wake, send, _, receive, *_ = current().series
+    colours = {"wake": wake, "receive": receive, "control": control, "send": send}
+    with mpl.rc_context(style()):
+        figure = Figure(figsize=(WIDTH_IN, 2.2))
+        axes = figure.subplots()
+        for number, (_, stages) in enumerate(rows):
+            left = 0.0
+            for name, colour in colours.items():
+                span_us = getattr(stages, f"{name}_us")
+                axes.barh(number, span_us, left=left, height=0.6, color=colour,
+                          label=name if number == 0 else None)  # fmt: skip
+                left += span_us
+        axes.axvline(timing.worst.allowed_us, color=current().ink, linewidth=1, linestyle="--",
+                     label="allowed")  # fmt: skip
+        axes.set_yticks(range(len(rows)), [name for name, _ in rows])
+        axes.invert_yaxis()
+        axes.grid(visible=False, axis="y")
+        axes.set_xlabel("time in the cycle in µs")
+        figure.legend(loc="outside upper center", ncols=5)
+        return figure
+
+
 def _over_time(
     axes: Axes, result: CampaignResult, what: str, runs: tuple[int, ...], axis: int
 ) -> None:

@@ -12,6 +12,7 @@ import json
 import platform
 import re
 import warnings
+from dataclasses import asdict
 from datetime import datetime, timezone
 from importlib import resources
 from pathlib import Path
@@ -22,6 +23,7 @@ import matplotlib as mpl
 from ilc_rt import plots
 from ilc_rt.comparison import note
 from ilc_rt.errors import BadInputError
+from ilc_rt.lateness import LateCounts, late_sentence
 from ilc_rt.pictures.themes import style
 from ilc_rt.quantity import digits, in_words, signed, unit_for
 from ilc_rt.result import CampaignResult, write_text
@@ -143,6 +145,7 @@ def _cards(result: CampaignResult) -> Iterator[str]:
          "What learning adds to the set point of each axis: after one run and at the end."),
         ("latency", "Servo loop", plots.latency(result),
          "How late the loop woke and how long it computed, counted on a logarithmic scale."),
+        ("late", "Who was late", plots.late_cycle(result), html.escape(_late(result))),
     )  # fmt: skip
     for name, heading, figure, caption in pictures:
         if figure is not None:
@@ -150,6 +153,19 @@ def _cards(result: CampaignResult) -> Iterator[str]:
                 f'<figure class="card" id="{name}"><h2>{heading}</h2>\n'
                 f"<figcaption>{caption}</figcaption>\n{svg(figure, name)}</figure>\n"
             )
+
+
+def _late(result: CampaignResult) -> str:
+    """Return the number of late cycles, and who was late in the worst one."""
+    timing = result.latency
+    if timing is None or timing.worst is None:
+        return ""
+    counts = timing.late or LateCounts()
+    n_late = sum(asdict(counts).values()) - counts.missed
+    return (
+        f"{n_late} cycles lost their deadline, {counts.missed} were skipped. In the worst one "
+        f"{late_sentence(timing.worst)}. Below it the stages of a cycle as it should be."
+    )
 
 
 def _tiles(result: CampaignResult) -> Iterator[str]:

@@ -136,6 +136,21 @@ def with_drives(text: str, folder: Path) -> None:
         drives.close()
 
 
+def after_a_run(text: str, folder: Path) -> None:
+    """Run a line about the last run in real time, after such a run."""
+    address = free_bus()
+    cell = ROOT / NETWORK_CELL
+    library = next((word for word in text.split() if word.endswith(".db")), "ilc-library.db")
+    drives = Process([program("ilc-sim"), "run", cell, "--bus", address], folder)
+    try:
+        drives.line_with("ready")
+        made = "--iterations 1 --simulated-drives --no-telemetry"
+        run(f"ilc-rt run {cell} --bus {address} --library {library} {made}", folder)
+    finally:
+        drives.close()
+    assert "cycles" in run(text, folder)
+
+
 def with_drives_by_hand(text: str, folder: Path) -> None:
     """Run a line of commissioning with simulated drives of this host on its bus."""
     address = free_bus()
@@ -246,6 +261,8 @@ def test_a_line_that_one_is_told_to_type_works(command: Command, folder: Path) -
         with_hands(text, folder)
     elif text.startswith("ilc-sim run"):
         drives_alone(text, folder)
+    elif text.startswith("ilc-rt why"):
+        after_a_run(text, folder)
     elif re.match(r"ilc-rt (run|identify)", text):
         with_drives(text, folder)
     elif re.match(r"(yes \| )?ilc-rt (scan|sdo|status|reset|enable|home|jog|goto|disable) ", text):

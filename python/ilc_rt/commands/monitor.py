@@ -17,11 +17,13 @@ from ilc_rt.events import (
     FaultEvent,
     IterationEvent,
     JudgedEvent,
+    LateEvent,
     LatencyEvent,
     ProgressEvent,
     StartEvent,
     StateEvent,
 )
+from ilc_rt.lateness import late_sentence
 from ilc_rt.monitor import Message, Monitor
 from ilc_rt.progress import WORDS, describe
 from ilc_rt.quantity import axis_unit
@@ -102,6 +104,9 @@ class _View:
             self._show_run(message.cell, IterationRecord.from_event(event, ""))
         elif isinstance(event, FaultEvent):
             typer.echo(f"{message.cell}: FAULT: {event.reason}")
+        elif isinstance(event, LateEvent):
+            more = "" if event.count == 1 else f"; {event.count} such cycles since the last line"
+            typer.echo(f"{message.cell}: late: {late_sentence(event)}{more}")
         elif isinstance(event, LatencyEvent):
             late = event.wake_late_us
             typer.echo(

@@ -13,6 +13,7 @@ use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{CommandRpdo1, State};
 use ilc_rt::fieldbus::transport::{InProcess, Responder};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
+use ilc_rt::rt::{Clock, Stamps};
 use ilc_rt::servo::{
     Cycle, InputBits, Mailbox, Message, Orders, PhaseName, Sample, StopReason, TickStatus, mailbox,
 };
@@ -209,6 +210,8 @@ pub struct Rig {
     pub samples: Vec<Sample>,
     /// Cycles that came with the stop.
     pub before: Vec<Sample>,
+    /// Cycles that the flight recorder has told.
+    pub recorded: Vec<Stamps>,
     /// Digital inputs as told last.
     pub inputs: InputBits,
     /// Reason of the stop, if the axes were stopped.
@@ -255,6 +258,12 @@ impl Rig {
         Self::on(self.tap.clone(), cell, 1, true)
     }
 
+    /// Returns it with a flight recorder.
+    #[must_use]
+    pub fn with_recorder(self, clock: Arc<dyn Clock>, late_share: f64) -> Self {
+        Self { cycle: self.cycle.recorded(clock, late_share), ..self }
+    }
+
     fn paced(cell: &Cell, runs: u32, lockstep: bool) -> Self {
         Self::on(Tap::new(cell), cell, runs, lockstep)
     }
@@ -297,6 +306,7 @@ impl Rig {
             tap,
             samples: Vec::new(),
             before: Vec::with_capacity(64),
+            recorded: Vec::with_capacity(1024),
             inputs: InputBits::default(),
             reason: None,
             stopping_at: None,
@@ -340,6 +350,7 @@ impl Rig {
                 Message::RunEnded { run, overruns, .. } => self.ended.push((run, overruns)),
                 Message::Inputs(bits) => self.inputs = bits,
                 Message::Before(sample) => self.before.push(sample),
+                Message::Cycle(stamps) => self.recorded.push(stamps),
                 Message::Stopping(reason) => {
                     (self.reason, self.stopping_at) = (Some(reason), Some(n_syncs));
                 }

@@ -1,7 +1,7 @@
 //! A tick neither allocates nor frees memory, whatever happens in it.
 //!
 //! Every tick of whole campaigns is counted, phase by phase, including the simulated machine, which
-//! does not allocate after set-up either.
+//! does not allocate after set-up either, and the flight recorder, to which every cycle is late.
 
 #![allow(
     clippy::unwrap_used,
@@ -10,10 +10,12 @@
 )]
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use ilc_rt::config::{Cell, Direction, Input, InputUse, Level};
 use ilc_rt::fieldbus::canopen::NmtCommand;
 use ilc_rt::fieldbus::transport::Responder;
+use ilc_rt::rt::{Clock, MonotonicClock, Nanos};
 use ilc_rt::servo::{PhaseName, StopReason, TickStatus};
 use ilc_tests::counting::{Counting, allocations, deallocations};
 use ilc_tests::rig::{Rig, node, write_object};
@@ -25,24 +27,40 @@ static ALLOCATOR: Counting = Counting;
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 const MIDDLE: u32 = 150;
 
+/// Share of a cycle that none can keep.
+const NO_TIME: f64 = 1e-9;
+
 /// A rig with counted ticks.
 struct Watched {
     rig: Rig,
+    clock: Arc<MonotonicClock>,
     phases: BTreeSet<&'static str>,
     n_ticks: u32,
 }
 
 impl Watched {
     fn new(cell: &Cell, runs: u32) -> Self {
-        Self { rig: Rig::new(cell, runs), phases: BTreeSet::new(), n_ticks: 0 }
+        Self::of(Rig::new(cell, runs))
+    }
+
+    fn of(rig: Rig) -> Self {
+        let clock = Arc::new(MonotonicClock::new(Nanos(0)));
+        let rig = rig.with_recorder(Arc::clone(&clock) as Arc<dyn Clock>, NO_TIME);
+        Self { rig, clock, phases: BTreeSet::new(), n_ticks: 0 }
     }
 
     fn tick(&mut self, missed: u32) -> TickStatus {
         let n_syncs = self.rig.tap.line().n_syncs();
         let before = (allocations(), deallocations());
+        let due = self.clock.now();
+        self.rig.cycle.begin(due, due, missed);
         let status = self.rig.cycle.tick(missed);
+        let recorded = self.rig.cycle.end();
         let after = (allocations(), deallocations());
+        assert!(recorded.is_some_and(|stamps| stamps.late && stamps.ended > due));
         self.rig.read_mail(n_syncs);
+        assert!(!self.rig.recorded.is_empty());
+        self.rig.recorded.clear();
         let phase = name(self.rig.phase.0);
         assert_eq!(after, before, "allocations and deallocations in {phase}");
         self.phases.insert(phase);
@@ -131,7 +149,7 @@ fn inputs_presses_and_an_open_guard() {
         }
         cell.axes[0].simulation.digital_inputs = 1 << 16;
         let rig = Rig::waiting(&cell, 1);
-        let mut watched = Watched { rig, phases: BTreeSet::new(), n_ticks: 0 };
+        let mut watched = Watched::of(rig);
         while watched.rig.phase.0 != PhaseName::Waiting {
             watched.tick(0);
         }

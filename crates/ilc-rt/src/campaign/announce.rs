@@ -60,7 +60,7 @@ impl<'a> Announcer<'a> {
         let key = match event {
             Event::Iteration { .. } | Event::Judged { .. } | Event::Drift { .. } => "iteration",
             Event::Fault { .. } => "fault",
-            Event::Latency { .. } => "latency",
+            Event::Latency { .. } | Event::Late { .. } => "latency",
             Event::Inputs { .. } => "inputs",
             Event::Start { .. }
             | Event::State { .. }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::control::STOPPED_BY_COMMAND;
 use super::fault::{fault, last_cycles};
 use super::keeper::{StoreEvent, Stored};
+use super::late::{self, Recorded};
 use super::learner::Learner;
 use super::options::{Options, Outcome};
 use super::pace::Pacer;
@@ -13,7 +14,7 @@ use super::running::Running;
 use crate::config::Cell;
 use crate::fieldbus::canopen::emcy;
 use crate::interpolate::MAX_AXES;
-use crate::record::{EndStatus, Event, Fault, FaultKind, IterationRecord, StateName};
+use crate::record::{EndStatus, Event, Fault, FaultKind, FlightRecord, IterationRecord, StateName};
 use crate::servo::StopReason;
 
 impl Running<'_> {
@@ -129,20 +130,22 @@ impl Running<'_> {
             (None, Some(_)) => EndStatus::Interrupted,
             (None, None) => EndStatus::Completed,
         };
+        let is_fault = fault.is_some();
         if let Some(fault) = fault {
             let cycles = last_cycles(&self.before, cell.n_axes());
-            let fault = Fault { cycles, ..fault };
+            let recorded = result.as_ref().and_then(|result| result.recorded.as_ref());
+            let late = recorded.and_then(|recorded| self.late.before_stop(recorded));
+            let fault = Fault { cycles, late, ..fault };
             self.announcer.publish(&Event::Fault { reason: reason.clone(), fault });
         }
         if let Some(result) = result {
             if let Err(error) = result.released {
                 tracing::warn!("nodes could not be taken out of operation: {error}");
             }
-            if let Some(timing) = result.timing {
-                self.announcer.publish(&Event::Latency {
-                    wake_late_us: timing.wake_late.figures(),
-                    execution_us: timing.execution.figures(),
-                });
+            if let Some(recorded) = result.recorded {
+                let why = is_fault.then(|| reason.clone());
+                let event = self.timing(cell, options, &recorded, why);
+                self.announcer.publish(&event);
             }
         }
         let iterations = u32::try_from(self.runs.len()).unwrap_or(u32::MAX);
@@ -163,6 +166,37 @@ impl Running<'_> {
             campaign: self.campaign,
             axis_units,
             runs: self.runs.into_newest(),
+        }
+    }
+}
+
+impl Running<'_> {
+    /// Writes the record of the loop, and returns the event that tells it.
+    fn timing(
+        &self,
+        cell: &Cell,
+        options: &Options,
+        recorded: &Recorded,
+        reason: Option<String>,
+    ) -> Event {
+        let record = self.late.record(cell, &self.campaign, recorded, reason);
+        let file = late::write(&record, &options.session.library);
+        let FlightRecord { stages_us, answers, late, worst, good, .. } = record;
+        let interruptions = recorded.timing.stages.interruptions;
+        Event::Latency {
+            wake_late_us: stages_us.wake,
+            execution_us: recorded.timing.execution.figures(),
+            receive_us: stages_us.receive,
+            control_us: stages_us.control,
+            send_us: stages_us.send,
+            answers,
+            preemptions: interruptions.preemptions,
+            minor_faults: interruptions.minor_faults,
+            major_faults: interruptions.major_faults,
+            late,
+            worst: worst.into_iter().next().map(|case| case.cycle),
+            good,
+            file,
         }
     }
 }

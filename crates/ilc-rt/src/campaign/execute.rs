@@ -190,7 +190,7 @@ fn execute(
     let (mut pacer, granted) = if session.lockstep {
         (Pacer::in_line(cycle), None)
     } else {
-        let (pacer, report) = Pacer::on_clock(cycle)?;
+        let (pacer, report) = Pacer::on_clock(cycle, cell.realtime.late_share)?;
         (pacer, Some(report))
     };
     let ctl = server.as_ref().map(|server| server.path().display().to_string());

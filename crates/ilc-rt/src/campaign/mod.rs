@@ -21,6 +21,7 @@ pub mod input;
 mod inputs;
 mod keep;
 mod keeper;
+mod late;
 mod learner;
 mod nodes;
 mod options;

@@ -1,13 +1,15 @@
 //! Runs the loop: on a real-time thread, or in line in lock-step.
 
+use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use super::error::CampaignError;
+use super::late::Recorded;
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::emcy;
 use crate::interpolate::MAX_AXES;
-use crate::rt::{MonotonicClock, Nanos, RtReport, RtRequest, thread};
+use crate::rt::{Clock, MonotonicClock, Nanos, RtReport, RtRequest, thread};
 use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
@@ -31,7 +33,8 @@ pub(super) struct LoopResult {
     pub(super) released: Result<(), BusError>,
     /// Error code of each axis whose drive is in fault, by its emergency message or asked for; 0 for none.
     pub(super) error_codes: [u16; MAX_AXES],
-    pub(super) timing: Option<Timing>,
+    /// The flight recorder; in real time only.
+    pub(super) recorded: Option<Recorded>,
 }
 
 impl Pacer {
@@ -39,16 +42,23 @@ impl Pacer {
         Self::Answers { cycle: Some(Box::new(cycle)) }
     }
 
-    /// Starts the loop's thread; returns the scheduling that the system granted it.
-    pub(super) fn on_clock(mut cycle: Cycle) -> Result<(Self, RtReport), CampaignError> {
+    /// Starts the loop's thread, with a flight recorder; returns the scheduling that the system granted it.
+    pub(super) fn on_clock(
+        cycle: Cycle,
+        late_share: f64,
+    ) -> Result<(Self, RtReport), CampaignError> {
         let (report, granted) = std::sync::mpsc::sync_channel(1);
+        let clock = Arc::new(MonotonicClock::new(SPIN));
+        let mut cycle = cycle.recorded(Arc::clone(&clock) as Arc<dyn Clock>, late_share);
         let thread = std::thread::Builder::new()
             .name("ilc-servo".to_owned())
             .spawn(move || {
                 let mut timing = Timing::default();
+                let mut granted = thread::enter(RtRequest::default());
+                let _awake = thread::keep_awake(&mut granted);
                 // Set-up of the thread is over before the first tick; no tick waits for the report.
-                let _ = report.send(thread::enter(RtRequest::default()));
-                run_on_clock(&mut cycle, &MonotonicClock::new(SPIN), &mut timing);
+                let _ = report.send(granted);
+                run_on_clock(&mut cycle, clock.as_ref(), &mut timing);
                 // At once, not when the campaign has finished its clean-up: by then the nodes may
                 // have missed their commands, or be in another campaign.
                 release(cycle, Some(timing))
@@ -85,6 +95,7 @@ impl Pacer {
 
 /// Takes the nodes out of operation, once those in fault have said why.
 fn release(cycle: Cycle, timing: Option<Timing>) -> LoopResult {
+    let recorded = timing.map(|timing| Recorded { cycles: cycle.flight().cycles(), timing });
     let faults: [Option<u16>; MAX_AXES] = std::array::from_fn(|axis| cycle.fault(axis));
     let mut network = cycle.into_network();
     let error_codes = std::array::from_fn(|axis| match faults[axis] {
@@ -92,5 +103,5 @@ fn release(cycle: Cycle, timing: Option<Timing>) -> LoopResult {
         Some(code) => code,
         None => emcy::CODE_RESET,
     });
-    LoopResult { released: network.release(), error_codes, timing }
+    LoopResult { released: network.release(), error_codes, recorded }
 }

@@ -9,6 +9,7 @@ use super::disturbance::Disturbance;
 use super::frozen::Frozen;
 use super::inputs;
 use super::keeper::Keeper;
+use super::late::LateLog;
 use super::learner::{Learner, UpdateResult};
 use super::options::Options;
 use super::resume::Resumed;
@@ -50,6 +51,8 @@ pub(super) struct Running<'a> {
     pub(super) stopping: Option<StopReason>,
     /// Last cycles before the stop.
     pub(super) before: Vec<Sample>,
+    /// Cycles of the loop that were late.
+    pub(super) late: LateLog,
     /// Runs that the law was asked about and has not answered yet, oldest first: key and place.
     pub(super) unjudged: VecDeque<(i64, usize)>,
     /// Updates from runs that are not stored yet, oldest first.
@@ -119,6 +122,7 @@ impl<'a> Running<'a> {
             mail: parts.mail,
             stopping: None,
             before: Vec::new(),
+            late: LateLog::new(cell),
             unjudged: VecDeque::new(),
             updates: VecDeque::new(),
             awaited: 0,
@@ -170,6 +174,11 @@ impl Running<'_> {
                     self.announcer.publish(&Event::Inputs { inputs });
                 }
                 Message::Before(sample) => self.before.push(sample),
+                Message::Cycle(stamps) => {
+                    if let Some(event) = self.late.take(stamps, self.phase_iteration) {
+                        self.announcer.publish(&event);
+                    }
+                }
                 Message::Stopping(reason) => self.stopping = Some(reason),
             }
         }

@@ -140,7 +140,11 @@ pub fn travel(
     let (mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
     let network = plan.network(bus, &maps);
     let cycle = Cycle::new(network, plan.servo.clone(), plan.interpolator, loop_side);
-    let pacer = if session.lockstep { Pacer::in_line(cycle) } else { Pacer::on_clock(cycle)?.0 };
+    let pacer = if session.lockstep {
+        Pacer::in_line(cycle)
+    } else {
+        Pacer::on_clock(cycle, cell.realtime.late_share)?.0
+    };
     let every = u64::from(ticks(REPORT_S)).max(1);
     Ok(Journey::new(cell, mail, every).pursue(cell, session, pacer, report))
 }
@@ -276,6 +280,7 @@ impl Journey {
                 Message::RunStarted { .. }
                 | Message::RunEnded { .. }
                 | Message::Before(_)
+                | Message::Cycle(_)
                 | Message::Inputs(_) => {}
             }
         }

@@ -6,6 +6,7 @@ mod check;
 mod completions;
 mod ctl;
 mod dead_man;
+mod doctor;
 mod drive;
 mod enable;
 mod figures;
@@ -15,6 +16,7 @@ mod identify;
 mod init;
 mod input;
 mod jog;
+mod late;
 mod latency;
 mod moving;
 mod option;
@@ -29,6 +31,7 @@ mod sdo;
 mod show;
 mod status;
 mod target;
+mod why;
 
 pub use identify::IdentifyOptions;
 pub use option::{OptionSpec, described, parse};
@@ -95,6 +98,10 @@ enum Verb {
     Goto(goto::GotoArguments),
     /// Switch drives off.
     Disable(reset::DisableArguments),
+    /// Tell who was late when the loop of a cell lost a deadline, from the record of its last run.
+    Why(why::WhyArguments),
+    /// Tell what keeps this computer from being punctual, and the command that mends it; only reads.
+    Doctor(doctor::DoctorArguments),
     /// Measure how late this machine wakes the loop's thread.
     Latency(latency::LatencyArguments),
     /// Print a script that completes this command line in a shell.
@@ -142,6 +149,8 @@ pub fn main() -> ExitCode {
         Verb::Jog(arguments) => jog::jog(&arguments),
         Verb::Goto(arguments) => goto::goto(&arguments),
         Verb::Disable(arguments) => reset::disable(&arguments),
+        Verb::Why(arguments) => why::why(&arguments),
+        Verb::Doctor(arguments) => doctor::doctor(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),
         Verb::Completions(arguments) => completions::completions(&arguments, Arguments::command()),
     };

@@ -1,8 +1,10 @@
 //! Printed text: the table of runs, and lines on standard error.
 
+use std::fmt::Write as _;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::late;
 use super::runs::Runs;
 use crate::record::{Event, StateName, printable_json, printable_lines};
 
@@ -83,16 +85,10 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
         Event::State { state: StateName::Stopping, iteration } => {
             Some(format!("bringing the axes to rest (run {iteration})"))
         }
-        Event::Latency { wake_late_us, execution_us } => Some(format!(
-            "loop: woke late by {:.1} us (median), {:.0} (99 %), {:.0} (most); a tick took {:.1} us \
-             (median), {:.0} (most); {} ticks",
-            wake_late_us.p50,
-            wake_late_us.p99,
-            wake_late_us.max,
-            execution_us.p50,
-            execution_us.max,
-            wake_late_us.count
-        )),
+        Event::Latency { .. } => timing(event),
+        Event::Fault { fault, .. } => {
+            fault.late.as_ref().map(|cycle| format!("before the stop: {}", late::sentence(cycle)))
+        }
         Event::End { reason, .. } => Some(match runs.sentence() {
             Some(sentence) => format!("{sentence}\n{reason}"),
             None => reason.clone(),
@@ -111,6 +107,49 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
         Event::State { .. }
         | Event::Inputs { .. }
         | Event::Progress { .. }
-        | Event::Fault { .. } => None,
+        | Event::Late { .. } => None,
     }
+}
+
+/// Returns the timing of a loop that is over: its stages, and who was late.
+fn timing(event: &Event) -> Option<String> {
+    let Event::Latency {
+        wake_late_us,
+        execution_us,
+        receive_us,
+        control_us,
+        send_us,
+        late: counts,
+        worst,
+        file,
+        ..
+    } = event
+    else {
+        return None;
+    };
+    let stages = [
+        ("wake", wake_late_us),
+        ("receive", receive_us),
+        ("control", control_us),
+        ("send", send_us),
+    ];
+    let n_ticks = wake_late_us.count;
+    let mut text = format!(
+        "loop: woke late by {:.1} us (median), {:.0} (99 %), {:.0} (most); a tick took {:.1} us \
+         (median), {:.0} (most); {n_ticks} ticks\n{}\n{}",
+        wake_late_us.p50,
+        wake_late_us.p99,
+        wake_late_us.max,
+        execution_us.p50,
+        execution_us.max,
+        late::stages_table(stages),
+        late::counts(counts, n_ticks)
+    );
+    if let Some(cycle) = worst {
+        let _ = write!(text, "\nworst, tick {}: {}", cycle.tick, late::sentence(cycle));
+        if let Some(file) = file {
+            let _ = write!(text, "\nmore: ilc-rt why {file}");
+        }
+    }
+    Some(text)
 }

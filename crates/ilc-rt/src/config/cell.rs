@@ -11,6 +11,7 @@ use super::file::{CELL_BYTES_MAX, read_file};
 use super::input::Input;
 use super::learning::Learning;
 use super::library::LibrarySection;
+use super::realtime::Realtime;
 use super::simulation::Simulation;
 use crate::fieldbus::transport::{Format, format_of};
 use crate::schema::field_order;
@@ -52,6 +53,9 @@ pub struct Cell {
     /// `[safety]`
     #[serde(default)]
     pub safety: Safety,
+    /// `[realtime]`
+    #[serde(default)]
+    pub realtime: Realtime,
     /// `[library]`
     #[serde(default)]
     pub library: LibrarySection,

@@ -17,6 +17,7 @@ mod input;
 mod learning;
 mod library;
 pub mod mode;
+mod realtime;
 mod simulation;
 mod torque;
 mod validate;
@@ -31,6 +32,7 @@ pub use homing::{DriveHoming, HOMING_METHODS, Homing, HomingKind};
 pub use input::{Direction, INPUTS_MAX, Input, InputUse, Level};
 pub use learning::{Learning, Measure};
 pub use library::{Keep, LibrarySection};
+pub use realtime::Realtime;
 pub use simulation::{
     AxisSimulation, DeltaSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange,
 };

@@ -21,7 +21,7 @@ use crate::record::figure_fields;
 pub(super) const BUSY_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// The name of a library in memory.
-pub(super) const IN_MEMORY: &str = ":memory:";
+pub(crate) const IN_MEMORY: &str = ":memory:";
 
 /// Target of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,6 +16,7 @@ mod tests;
 mod trim;
 
 pub use error::LibraryError;
+pub(crate) use file::IN_MEMORY;
 pub use recall::{Near, Task};
 pub use row::Row;
 pub use store::Library;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fault::Fault;
 use super::figures::Figures;
+use super::late::{AnswerTimes, LateCounts, LateCycle, StageSpans};
 use crate::rt::{LatencyFigures, RtReport};
 
 /// An event; JSON with the field `event` as its name.
@@ -114,6 +115,41 @@ pub enum Event {
         /// Execution time of a tick.
         #[schemars(with = "serde_json::Value")]
         execution_us: LatencyFigures,
+        /// Taking the messages that had arrived.
+        #[schemars(with = "serde_json::Value")]
+        receive_us: LatencyFigures,
+        /// Computing the commands.
+        #[schemars(with = "serde_json::Value")]
+        control_us: LatencyFigures,
+        /// Passing the commands and SYNC to the bus.
+        #[schemars(with = "serde_json::Value")]
+        send_us: LatencyFigures,
+        /// Answers of each node.
+        answers: Vec<AnswerTimes>,
+        /// Times that another thread took the processor of the loop.
+        preemptions: u32,
+        /// Page faults of the loop that needed no disk.
+        minor_faults: u32,
+        /// Page faults of the loop that waited for a disk.
+        major_faults: u32,
+        /// Late cycles.
+        late: LateCounts,
+        /// The worst of them; absent if no cycle was late.
+        worst: Option<LateCycle>,
+        /// Stages of a cycle in the middle of those that were not late.
+        good: Option<StageSpans>,
+        /// File with the worst cycles, for `ilc-rt why`; absent if it could not be written.
+        file: Option<String>,
+    },
+    /// A cycle of the loop lost its deadline; about one a second, and every one that is worse than all before.
+    Late {
+        /// The run it belongs to.
+        iteration: u32,
+        /// Late cycles since the last event, this one included.
+        count: u64,
+        /// The cycle.
+        #[serde(flatten)]
+        cycle: LateCycle,
     },
     /// A fault stopped the axes.
     Fault {

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::late::LateCycle;
+
 /// The cause of a controlled stop that was not requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -83,6 +85,8 @@ pub struct Fault {
     pub limit: Option<f64>,
     /// Unit of both.
     pub unit: Option<String>,
+    /// Cycle that was late before the stop; absent if no cycle was.
+    pub late: Option<LateCycle>,
     /// Last servo cycles before the stop.
     pub cycles: LastCycles,
 }
@@ -117,6 +121,7 @@ impl Fault {
             value: None,
             limit: None,
             unit: None,
+            late: None,
             cycles,
         }
     }

@@ -8,7 +8,9 @@ mod event;
 mod fault;
 mod fields;
 mod figures;
+mod flight;
 mod iteration;
+mod late;
 mod text;
 
 pub use axes::AxisKinds;
@@ -16,5 +18,9 @@ pub use event::{EndStatus, Event, InputState, StateName};
 pub use fault::{Fault, FaultKind, LastCycles};
 pub use fields::{Field, FieldKind, figure_fields};
 pub use figures::{Figures, distances_m, infinity_norm, rms};
+pub use flight::{CycleRow, FLIGHT_SUFFIX, FlightRecord, LateCase, StageFigures, StopCase};
 pub use iteration::{IterationRecord, Meta, fingerprint};
+pub use late::{
+    AnswerTimes, LateCause, LateCounts, LateCycle, StageSpans, Verdict, judge, judge_stop, spans,
+};
 pub use text::{NAME_MAX, TEXT_MAX, is_hidden, printable, printable_json, printable_lines};

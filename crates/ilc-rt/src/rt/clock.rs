@@ -1,7 +1,8 @@
-//! Integer time, and the monotonic clock of the machine.
+//! Integer time, the clock as the loop sees it, and the monotonic clock of the machine.
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
 /// A time or time span in nanoseconds; integer, so that a grid of ticks never drifts.
@@ -38,6 +39,54 @@ impl From<Duration> for Nanos {
     }
 }
 
+/// Time, and what the host did to the thread that asks: of the machine, or set by a test.
+pub trait Clock: Send + Sync {
+    /// Returns the current time.
+    fn now(&self) -> Nanos;
+
+    /// Waits until `deadline`; returns at once if it has passed.
+    fn sleep_until(&self, deadline: Nanos);
+
+    /// Returns the current time since the epoch, as the system stamps received frames.
+    fn since_epoch(&self) -> Nanos;
+
+    /// Returns the interruptions of the calling thread so far.
+    fn interruptions(&self) -> Interruptions;
+}
+
+/// Counts of what kept a thread from computing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Interruptions {
+    /// Times that another thread took the processor.
+    pub preemptions: u32,
+    /// Page faults that needed no disk.
+    pub minor_faults: u32,
+    /// Page faults that waited for a disk.
+    pub major_faults: u32,
+}
+
+impl Interruptions {
+    /// Returns the counts since earlier ones.
+    #[must_use]
+    pub const fn since(self, earlier: Self) -> Self {
+        Self {
+            preemptions: self.preemptions.wrapping_sub(earlier.preemptions),
+            minor_faults: self.minor_faults.wrapping_sub(earlier.minor_faults),
+            major_faults: self.major_faults.wrapping_sub(earlier.major_faults),
+        }
+    }
+
+    /// Returns both counts together.
+    #[must_use]
+    pub const fn plus(self, other: Self) -> Self {
+        Self {
+            preemptions: self.preemptions.wrapping_add(other.preemptions),
+            minor_faults: self.minor_faults.wrapping_add(other.minor_faults),
+            major_faults: self.major_faults.wrapping_add(other.major_faults),
+        }
+    }
+}
+
 /// `CLOCK_MONOTONIC`: sleeps to an absolute deadline, and busy-waits the last stretch. Passed as an
 /// argument; other code never reads the system clock.
 ///
@@ -54,19 +103,24 @@ impl MonotonicClock {
     pub const fn new(spin: Nanos) -> Self {
         Self { spin }
     }
+}
 
-    /// Returns the current time.
-    #[expect(unsafe_code, reason = "clock_gettime has no safe wrapper in the standard library")]
-    pub fn now(&self) -> Nanos {
-        let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-        // SAFETY: `now` is a valid, exclusively borrowed timespec for the whole call.
-        unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &raw mut now) };
-        Nanos(now.tv_sec.unsigned_abs() * 1_000_000_000 + now.tv_nsec.unsigned_abs())
+/// Returns the time of a clock of the system.
+#[expect(unsafe_code, reason = "clock_gettime has no safe wrapper in the standard library")]
+fn read(clock: libc::clockid_t) -> Nanos {
+    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `now` is a valid, exclusively borrowed timespec for the whole call.
+    unsafe { libc::clock_gettime(clock, &raw mut now) };
+    Nanos(now.tv_sec.unsigned_abs() * 1_000_000_000 + now.tv_nsec.unsigned_abs())
+}
+
+impl Clock for MonotonicClock {
+    fn now(&self) -> Nanos {
+        read(libc::CLOCK_MONOTONIC)
     }
 
-    /// Waits until `deadline`; returns at once if it has passed.
     #[expect(unsafe_code, reason = "clock_nanosleep has no safe wrapper in the standard library")]
-    pub fn sleep_until(&self, deadline: Nanos) {
+    fn sleep_until(&self, deadline: Nanos) {
         let wake = deadline.0.saturating_sub(self.spin.0);
         if wake > self.now().0 {
             let until = libc::timespec {
@@ -88,6 +142,72 @@ impl MonotonicClock {
             std::hint::spin_loop();
         }
     }
+
+    fn since_epoch(&self) -> Nanos {
+        read(libc::CLOCK_REALTIME)
+    }
+
+    #[expect(unsafe_code, reason = "getrusage has no safe wrapper in the standard library")]
+    fn interruptions(&self) -> Interruptions {
+        // SAFETY: zeros are a valid rusage.
+        let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
+        // SAFETY: `usage` is a valid, exclusively borrowed rusage for the whole call.
+        unsafe { libc::getrusage(libc::RUSAGE_THREAD, &raw mut usage) };
+        // Only differences count: they wrap.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wraps")]
+        let count = |value: libc::c_long| value as u32;
+        Interruptions {
+            preemptions: count(usage.ru_nivcsw),
+            minor_faults: count(usage.ru_minflt),
+            major_faults: count(usage.ru_majflt),
+        }
+    }
+}
+
+/// A clock that stands still until it is set: time for tests of what happens when it runs out.
+#[derive(Debug, Default)]
+pub struct ManualClock {
+    now: AtomicU64,
+    /// Further time that passes in the next sleep.
+    oversleep: AtomicU64,
+    preemptions: AtomicU32,
+}
+
+impl ManualClock {
+    /// Lets time pass.
+    pub fn advance(&self, span: Nanos) {
+        self.now.fetch_add(span.0, Ordering::Relaxed);
+    }
+
+    /// Lets the next sleep end late by a span.
+    pub fn oversleep(&self, span: Nanos) {
+        self.oversleep.store(span.0, Ordering::Relaxed);
+    }
+
+    /// Counts one more preemption.
+    pub fn preempt(&self) {
+        self.preemptions.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+impl Clock for ManualClock {
+    fn now(&self) -> Nanos {
+        Nanos(self.now.load(Ordering::Relaxed))
+    }
+
+    fn sleep_until(&self, deadline: Nanos) {
+        let late = self.oversleep.swap(0, Ordering::Relaxed);
+        self.now.fetch_max(deadline.0.saturating_add(late), Ordering::Relaxed);
+    }
+
+    fn since_epoch(&self) -> Nanos {
+        self.now()
+    }
+
+    fn interruptions(&self) -> Interruptions {
+        let preemptions = self.preemptions.load(Ordering::Relaxed);
+        Interruptions { preemptions, ..Interruptions::default() }
+    }
 }
 
 #[cfg(test)]
@@ -100,5 +220,27 @@ mod tests {
         let deadline = clock.now().plus(Nanos::from_micros(2000));
         clock.sleep_until(deadline);
         assert!(clock.now() >= deadline);
+    }
+
+    #[test]
+    fn touching_new_memory_is_a_counted_page_fault() {
+        let clock = MonotonicClock::new(Nanos(0));
+        let before = clock.interruptions();
+        let touched = std::hint::black_box(vec![1_u8; 1 << 24]);
+        let since = clock.interruptions().since(before);
+        assert!(since.minor_faults > 0 && touched[7] == 1, "{since:?}");
+    }
+
+    #[test]
+    fn a_manual_clock_passes_only_when_told() {
+        let clock = ManualClock::default();
+        clock.sleep_until(Nanos(1000));
+        assert_eq!((clock.now(), clock.since_epoch()), (Nanos(1000), Nanos(1000)));
+        clock.oversleep(Nanos(30));
+        clock.sleep_until(Nanos(2000));
+        assert_eq!(clock.now(), Nanos(2030));
+        clock.sleep_until(Nanos(2000));
+        clock.advance(Nanos(5));
+        assert_eq!(clock.now(), Nanos(2035));
     }
 }

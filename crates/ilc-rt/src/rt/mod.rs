@@ -1,12 +1,14 @@
-//! Real-time basics: integer time, clocks, thread set-up and latency histograms.
+//! Real-time basics: integer time, clocks, thread set-up, latency histograms and the flight recorder.
 //!
 //! For code that runs on an absolute time grid (`servo`, the simulator, the latency test). Imports
 //! nothing of the project; every module may import it.
 
 pub mod clock;
+pub mod flight;
 pub mod latency;
 pub mod thread;
 
-pub use clock::{MonotonicClock, Nanos};
+pub use clock::{Clock, Interruptions, ManualClock, MonotonicClock, Nanos};
+pub use flight::{Flight, Stamps};
 pub use latency::{Latency, LatencyFigures};
 pub use thread::{RtReport, RtRequest};

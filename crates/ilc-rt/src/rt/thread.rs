@@ -1,6 +1,17 @@
 //! Requests real-time scheduling of the calling thread and reports what was granted.
 
+use std::fs::{File, OpenOptions};
+use std::io::Write as _;
+
 use serde::Serialize;
+
+/// Device that keeps the processors awake enough for a latency, in microseconds, while it is open.
+const LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
+
+/// More than the usual limit of locked memory, 8 MB.
+const PROBE_MAX: usize = 1 << 26;
+/// A page, or more.
+const PAGE: usize = 1 << 16;
 
 /// Requested scheduling and memory locking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,6 +37,8 @@ pub struct RtReport {
     pub priority: i32,
     /// True if memory is locked.
     pub mlock: bool,
+    /// True if the processors are kept from sleeping deeply.
+    pub awake: bool,
     /// Kernel release, and whether it is a real-time kernel (`PREEMPT_RT`).
     pub kernel: String,
     /// One sentence for each request that was refused and each setting known to add latency.
@@ -72,9 +85,64 @@ pub fn enter(request: RtRequest) -> RtReport {
         policy: policy.to_owned(),
         priority: if fifo { request.priority } else { 0 },
         mlock,
+        awake: false,
         kernel: format!("{release}{}", if realtime { " PREEMPT_RT" } else { "" }),
         notes,
     }
+}
+
+/// Keeps the processors from sleeping deeply while the result is held, where this is permitted, and notes it in
+/// the report.
+pub fn keep_awake(report: &mut RtReport) -> Option<File> {
+    match awake() {
+        Ok(held) => {
+            report.awake = true;
+            Some(held)
+        }
+        // There is none in a container, and on some kernels.
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+        Err(error) => {
+            report.notes.push(format!(
+                "{LATENCY_DEVICE} refused ({error}): the processors sleep deeply and wake slowly; `setfacl -m \
+                 u:$USER:rw {LATENCY_DEVICE}` permits it"
+            ));
+            None
+        }
+    }
+}
+
+/// Keeps the processors from sleeping deeply while the result is held.
+///
+/// # Errors
+/// That of the system.
+pub fn awake() -> std::io::Result<File> {
+    let mut device = OpenOptions::new().write(true).open(LATENCY_DEVICE)?;
+    device.write_all(&0_i32.to_ne_bytes())?;
+    Ok(device)
+}
+
+/// Returns whether this process may lock its memory, without locking it.
+///
+/// # Errors
+/// The reason.
+#[expect(unsafe_code, reason = "mlock and munlock have no safe wrapper")]
+pub fn memory_lockable() -> Result<(), String> {
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: `limit` is a valid, exclusively borrowed rlimit for the whole call.
+    let is_known = unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &raw mut limit) } == 0;
+    if is_known && limit.rlim_cur == libc::RLIM_INFINITY {
+        return Ok(());
+    }
+    let probe = vec![1_u8; usize::try_from(limit.rlim_cur).unwrap_or(0).min(PROBE_MAX) + PAGE];
+    // SAFETY: the range is that of `probe`, which outlives the call.
+    let locked = unsafe { libc::mlock(probe.as_ptr().cast(), probe.len()) } == 0;
+    let error = std::io::Error::last_os_error();
+    if locked {
+        // SAFETY: the same range.
+        unsafe { libc::munlock(probe.as_ptr().cast(), probe.len()) };
+        return Ok(());
+    }
+    Err(error.to_string())
 }
 
 fn first_line(path: &str) -> Option<String> {

@@ -44,14 +44,18 @@ impl Cycle {
             }
             self.drives[axis].sent = sent;
             self.loops[axis] = loops;
-            is_full |= self.network.write(axis, &sent) == Err(BusError::Full);
         }
         self.commanded = [newest, self.commanded[0], self.commanded[1]];
+        self.flight.controlled();
+        for axis in 0..self.n_axes() {
+            is_full |= self.network.write(axis, &self.drives[axis].sent) == Err(BusError::Full);
+        }
         match self.network.exchange() {
             Ok(()) => {}
             Err(BusError::Full) => is_full = true,
             Err(error) => fault = fault.or(Some(StopReason::Bus(error))),
         }
+        self.flight.sent(is_full);
         fault = fault.or(self.congestion(is_full));
         if let Some(reason) = fault {
             self.begin_stop(reason);

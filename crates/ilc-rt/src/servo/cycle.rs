@@ -2,6 +2,8 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use std::sync::Arc;
+
 use super::feed::Feed;
 use super::input::LearnedInput;
 use super::inputs::{self, INPUTS_MAX, InputBits};
@@ -15,7 +17,7 @@ use super::stall::{HOLD_AFTER, Stall};
 use crate::fieldbus::AxisNetwork;
 use crate::fieldbus::canopen::emcy;
 use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Playback, Setpoint};
-use crate::rt::Nanos;
+use crate::rt::{Clock, Flight, Nanos, Stamps};
 
 /// Longest fade-out of the learned input after a run.
 const FADE_MAX_S: f64 = 0.2;
@@ -63,7 +65,8 @@ pub enum TickStatus {
 /// The servo cycle with its state, sized at creation.
 ///
 /// # Real Time
-/// [`Cycle::tick`] does not allocate, take locks, read clocks or panic.
+/// [`Cycle::tick`] does not allocate, take locks or panic. It reads a clock for its flight recorder alone: no value
+/// depends on it.
 pub struct Cycle {
     pub(super) network: Box<dyn AxisNetwork>,
     pub(super) spec: ServoSpec,
@@ -108,6 +111,7 @@ pub struct Cycle {
     pub(super) stopping: Option<StopReason>,
     pub(super) limits: [AxisLimits; MAX_AXES],
     pub(super) start_m: [f64; MAX_AXES],
+    pub(super) flight: Flight,
     table: Table,
 }
 
@@ -190,9 +194,38 @@ impl Cycle {
             stopping: None,
             limits: AxisLimits::padded(&limits),
             start_m,
+            flight: Flight::default(),
             table: Table { number: 0, input: Box::default() },
             spec,
         }
+    }
+
+    /// Returns the cycle with a flight recorder of its stages, which are late after a share of the cycle. Cold.
+    #[must_use]
+    pub fn recorded(self, clock: Arc<dyn Clock>, late_share: f64) -> Self {
+        Self { flight: Flight::new(clock, self.spec.cycle, late_share), ..self }
+    }
+
+    /// Records that the next tick was due at a time and began at another, after skipped cycles.
+    pub fn begin(&mut self, due: Nanos, woke: Nanos, missed: u32) {
+        self.flight.begin(due, woke, missed);
+    }
+
+    /// Ends the record of a tick and returns it, if there is a recorder. One that was late, or began a stop, is
+    /// reported with those before it.
+    pub fn end(&mut self) -> Option<Stamps> {
+        let stamps = self.flight.end()?;
+        if stamps.late || stamps.stopped {
+            for stamps in self.flight.untold() {
+                self.mail.tell(Message::Cycle(stamps));
+            }
+        }
+        Some(stamps)
+    }
+
+    /// Returns the recorder.
+    pub fn flight(&self) -> &Flight {
+        &self.flight
     }
 
     /// Returns the servo cycle time.
@@ -205,6 +238,7 @@ impl Cycle {
         self.stall.note(missed);
         self.run_overruns = self.run_overruns.saturating_add(missed);
         let received = self.receive();
+        self.end_reception();
         let nodes_wait = self.pending.waits(HOLD_AFTER);
         if received.is_ok() && self.stall.holds(nodes_wait, self.spec.hold_cycles_max) {
             self.run_overruns = self.run_overruns.saturating_add(1);

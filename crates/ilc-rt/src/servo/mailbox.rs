@@ -14,6 +14,7 @@ use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::NmtState;
 use crate::fieldbus::network::Stranger;
 use crate::interpolate::MAX_AXES;
+use crate::rt::Stamps;
 
 /// One servo cycle: commands and measurements of the same SYNC.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -230,6 +231,8 @@ pub enum Message {
     Before(Sample),
     /// Digital inputs have changed.
     Inputs(InputBits),
+    /// Stages of a cycle: of one that was late or in which a stop began, and of those before it, oldest first.
+    Cycle(Stamps),
     /// The axes are being stopped.
     Stopping(StopReason),
 }

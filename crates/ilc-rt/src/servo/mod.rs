@@ -31,5 +31,5 @@ pub use inputs::{INPUTS_MAX, InputBits, InputRole, InputSpec};
 pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, mailbox};
 pub use orders::{FEED_WHOLE, Orders};
 pub use phase::PhaseName;
-pub use realtime::{Timing, run_on_clock};
+pub use realtime::{StageTimes, Timing, run_on_clock, run_until};
 pub use spec::{AxisSpec, ForceSpec, Pace, ServoSpec, ToolSpec};

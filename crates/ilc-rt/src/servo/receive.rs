@@ -41,7 +41,10 @@ impl Cycle {
                 _ => Duration::ZERO,
             };
             match self.network.next(timeout) {
-                Ok(Some(arrival)) => left = left.and(self.take(arrival)),
+                Ok(Some(arrival)) => {
+                    self.flight.message(self.network.arrival());
+                    left = left.and(self.take(arrival));
+                }
                 Ok(None) => return left,
                 // Frames are behind it.
                 Err(error @ BusError::Controller(_)) => {
@@ -55,6 +58,18 @@ impl Cycle {
         left
     }
 
+    /// Ends the first stage in the flight recorder.
+    pub(super) fn end_reception(&mut self) {
+        let (n_axes, pending) = (self.n_axes(), &self.pending);
+        self.flight.received(|place| {
+            let lag = |part| pending.lag(part);
+            if place == n_axes {
+                return lag(Part::Tool) == 0;
+            }
+            place < n_axes && lag(Part::Status(place)) == 0 && lag(Part::DriveMotion(place)) == 0
+        });
+    }
+
     fn take(&mut self, arrival: Arrival) -> Result<(), StopReason> {
         match arrival {
             Arrival::Answer { axis, part, reading } => self.take_answer(axis, part, reading),
@@ -62,6 +77,8 @@ impl Cycle {
                 if let Some(tool) = self.spec.tool {
                     let [x_m, y_m] = counts.map(|count| tool.scale.to_si(count));
                     self.tool_m[..2].copy_from_slice(&[x_m, y_m]);
+                    let place = self.n_axes();
+                    self.flight.answered(place, self.pending.lag(Part::Tool));
                     self.pending.answer(Part::Tool, [x_m, y_m]);
                 }
             }
@@ -133,10 +150,12 @@ impl Cycle {
                 drive.following_error_m = spec.scale.to_si(counts);
             }
         }
-        match part {
-            AnswerPart::Status => self.pending.answer(Part::Status(axis), [drive.encoder_m, 0.0]),
-            AnswerPart::Motion => self.pending.answer(Part::DriveMotion(axis), [0.0; 2]),
-        }
+        let (part, value) = match part {
+            AnswerPart::Status => (Part::Status(axis), [drive.encoder_m, 0.0]),
+            AnswerPart::Motion => (Part::DriveMotion(axis), [0.0; 2]),
+        };
+        self.flight.answered(axis, self.pending.lag(part));
+        self.pending.answer(part, value);
         // Without a report it is computed from the command that this position answers.
         if !drive.reports_following_error
             && !drive.faulted()

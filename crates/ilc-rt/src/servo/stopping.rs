@@ -29,6 +29,9 @@ impl Cycle {
             return;
         }
         self.stopping = Some(reason);
+        if !matches!(reason, StopReason::Asked(_) | StopReason::StopButton { .. }) {
+            self.flight.stop();
+        }
         for sample in self.pending.last(CYCLES_TOLD) {
             self.mail.tell(Message::Before(sample));
         }

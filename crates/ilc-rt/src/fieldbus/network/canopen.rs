@@ -210,6 +210,10 @@ impl AxisNetwork for CanopenAxes {
         Ok(frame.map(|frame| self.read(&frame)))
     }
 
+    fn arrival(&self) -> Option<Duration> {
+        self.bus.arrival()
+    }
+
     fn parts(&self, axis: usize) -> [bool; 2] {
         self.stations
             .get(axis)

@@ -6,6 +6,7 @@
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
 pub mod canopen;
+mod still;
 
 use std::time::Duration;
 
@@ -14,6 +15,7 @@ use super::canopen::{NmtCommand, NmtState, NodeId};
 use super::cia402::{CommandRpdo1, Reading};
 
 pub use canopen::{CanopenAxes, SIMULATED_INPUTS, Station};
+pub use still::StillAxes;
 
 /// A network of axes that exchanges commands and answers once per cycle.
 ///
@@ -37,6 +39,12 @@ pub trait AxisNetwork: Send {
     /// # Errors
     /// [`BusError`] if nothing can arrive any more.
     fn next(&mut self, timeout: Duration) -> Result<Option<Arrival>, BusError>;
+
+    /// Returns the time since the epoch at which the system received the message that `next` returned last; `None`
+    /// if the fieldbus does not know it.
+    fn arrival(&self) -> Option<Duration> {
+        None
+    }
 
     /// Returns which parts of an answer an axis sends: status, motion.
     fn parts(&self, axis: usize) -> [bool; 2];
