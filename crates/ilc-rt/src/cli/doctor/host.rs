@@ -28,9 +28,8 @@ fn kernel(root: &Path) -> Finding {
 }
 
 fn governor(root: &Path) -> Finding {
-    let is_processor = |name: &String| {
-        name.strip_prefix("cpu").is_some_and(|rest| rest.parse::<u32>().is_ok())
-    };
+    let is_processor =
+        |name: &String| name.strip_prefix("cpu").is_some_and(|rest| rest.parse::<u32>().is_ok());
     let mut governors: Vec<String> = names(root, PROCESSORS)
         .into_iter()
         .filter(is_processor)
