@@ -84,7 +84,9 @@ impl Bench {
             }
         }
         for (case, law) in group.iter().zip(learners) {
-            law.into_iter().for_each(|law| laws.put(case.plant, law));
+            if let Some(law) = law {
+                laws.put(case.plant, law);
+            }
         }
         Ok(())
     }
@@ -103,7 +105,9 @@ impl Bench {
         if task.noise_std > 0.0 {
             let run = u32::try_from(trial).unwrap_or(u32::MAX);
             let mut noise = WhiteNoise::new(task.seeds[case.plant], &[run, 0]);
-            output.iter_mut().for_each(|y| *y += task.noise_std * noise.draw());
+            for y in output.iter_mut() {
+                *y += task.noise_std * noise.draw();
+            }
         }
         for ((error, reference), y) in error.iter_mut().zip(task.reference).zip(output) {
             *error = reference - *y;
