@@ -135,7 +135,7 @@ impl Running<'_> {
             let cycles = last_cycles(&self.before, cell.n_axes());
             let recorded = result.as_ref().and_then(|result| result.recorded.as_ref());
             let late = recorded.and_then(|recorded| self.late.before_stop(recorded));
-            let fault = Fault { cycles, late, ..fault };
+            let fault = Fault { late, cycles, ..fault };
             self.announcer.publish(&Event::Fault { reason: reason.clone(), fault });
         }
         if let Some(result) = result {

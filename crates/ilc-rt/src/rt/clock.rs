@@ -211,6 +211,7 @@ impl Clock for ManualClock {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_macros, reason = "tests are cold")]
 mod tests {
     use super::*;
 
