@@ -121,7 +121,7 @@ lint: $(VENV)/.test docs underived ## Formatting, lints, types, layers, language
 
 docs: $(VENV)/.docs ## The documentation site in build/docs, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
-	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -d build/doctrees -c docs . build/docs
+	$(BIN)/python -m sphinx --quiet -E --fail-on-warning --keep-going -d build/doctrees -c docs . build/docs
 	rm -rf build/docs/rust
 	cp -r $(TARGET)/doc build/docs/rust
 
