@@ -79,6 +79,9 @@ class Campaign:
         Run of the library that a frozen input is taken from, by its id; None for the best one.
     input_file : path or None
         File of ``ilc-rt input export`` that a frozen input is loaded from.
+    parameters_from : int, {"best", "last"} or None
+        Run of the library, of any program of this cell, whose parameters the law begins with, by
+        its id: for laws with parameters that hold on every program; None to begin with its own.
     relearn_above : float or None
         Learn again, in a new campaign, when the error of a frozen input is above this many times
         that of the run it comes from. None never does; a `DriftEvent` tells the drift all the same.
@@ -154,6 +157,7 @@ class Campaign:
         frozen: bool = False,
         input_from: int | str | None = None,
         input_file: str | Path | None = None,
+        parameters_from: int | str | None = None,
         relearn_above: float | None = None,
         forever: bool = False,
         keep: int | str | None = None,
@@ -194,6 +198,7 @@ class Campaign:
         self.frozen = frozen
         self.input_from = input_from
         self.input_file = input_file
+        self.parameters_from = parameters_from
         self.relearn_above = relearn_above
         self.forever = forever
         self.keep = keep
@@ -283,8 +288,8 @@ class Campaign:
             "iterations": iterations, "learning": self.learning, "resume": self.resume,
             "allow_divergent": self.allow_divergent, "frozen": self.frozen,
             "input_from": self.input_from, "input_file": self.input_file,
-            "relearn_above": self.relearn_above, "forever": self.forever, "keep": self.keep,
-            "ctl": self.ctl, "start": self.start,
+            "parameters_from": self.parameters_from, "relearn_above": self.relearn_above,
+            "forever": self.forever, "keep": self.keep, "ctl": self.ctl, "start": self.start,
         }  # fmt: skip
         return "run", arguments("run", values)
 

@@ -47,10 +47,12 @@ from ilc_rt import (
 )
 from ilc_rt.control import Cascade, CrossCoupled, Pid
 from ilc_rt.laws import (
+    Filtered,
     HigherOrderIlc,
     ModelFreeIlc,
     PointToPointIlc,
     PositionHarmonic,
+    RepetitiveIlc,
     StableInverseIlc,
 )
 
@@ -126,6 +128,11 @@ EXAMPLES = {
         lambda: BasisFunctions(axis(), ERROR, ["velocity", "coulomb"], r=0.1, lead_samples=2),
         updated,
     ),
+    RepetitiveIlc: (
+        lambda: RepetitiveIlc(axis(), ERROR, 0.5, by_direction=True, r=0.1),
+        updated,
+    ),
+    Filtered: (lambda: Filtered(PdIlc(0.4, 0.0), low_pass()), updated),
     HigherOrderIlc: (lambda: HigherOrderIlc(PdIlc(0.4, 0.0), (1.5, -0.5)), updated),
     PointToPointIlc: (lambda: PointToPointIlc(axis(), N, [20, 59], gain=0.5, r=0.1), updated),
     StableInverseIlc: (lambda: StableInverseIlc(axis(), N, q_filter=low_pass()), updated),

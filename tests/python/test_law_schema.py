@@ -15,36 +15,48 @@ from ilc_rt.processes import find_program
 # The class for each table of `[learning]` that describes a law or a wrapper of one.
 CLASSES = {
     "adjoint": laws.AdjointIlc,
+    "basis_functions": laws.BasisFunctions,
     "constrained": laws.ConstrainedIlc,
     "dynamic": laws.NormOptimalIlc.dynamic,
     "error_feedforward": laws.ErrorFeedforwardIlc,
+    "filtered": laws.Filtered,
     "flexible": laws.FlexibleIlc,
     "formation": laws.NormOptimalIlc.formation,
     "gate": laws.Gate,
+    "higher_order": laws.HigherOrderIlc,
     "ladder": laws.Ladder,
     "model_inverse": laws.ModelInverseIlc,
     "norm_optimal": laws.NormOptimalIlc,
     "pd": laws.PdIlc,
+    "point_to_point": laws.PointToPointIlc,
+    "position_domain": laws.RepetitiveIlc,
     "relevance": laws.RelevanceWeights,
+    "stable_inverse": laws.StableInverseIlc,
     "through_jacobian": laws.ThroughJacobian,
 }
 # What a cell says otherwise: its own filter in place of an object, quantities with the unit of
 # the axis, laws by name.
 OTHER_IN_A_CELL = {
     "adjoint": {"order", "cutoff_hz"},
+    "basis_functions": {"functions", "harmonic", "parameters"},
     "constrained": {
         "change_max_m", "change_max_m_s", "step_max_m", "step_max_m_s", "velocity_max_m_s",
         "acceleration_max_m_s2",
     },
     "dynamic": {"order", "cutoff_hz"},
     "error_feedforward": {"order", "cutoff_hz"},
+    "filtered": {"core", "order", "cutoff_hz"},
     "flexible": {"core", "disturbances"},
     "formation": {"agents", "formation", "q"},
     "gate": {"tolerance_m"},
+    "higher_order": {"core", "weights"},
     "model_inverse": {"order", "cutoff_hz"},
     "norm_optimal": {"contour", "phase", "smoothing_hz"},
     "pd": {"order", "cutoff_hz"},
+    "point_to_point": {"points_s"},
+    "position_domain": {"spacing_m", "axes", "functions"},
     "relevance": {"core", "disturbances", "top"},
+    "stable_inverse": {"order", "cutoff_hz"},
     "through_jacobian": {"core", "jacobian"},
 }  # fmt: skip
 # A number of Python that a cell leaves out to mean the same.

@@ -1,4 +1,4 @@
-"""Laws written in Python: against dense computations, and on plants that differ from the model."""
+"""Laws of research: against dense computations, and on plants that differ from the model."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ import scipy.linalg
 
 from ilc_rt import (
     LearningError,
+    ModelError,
+    NormOptimalIlc,
     PdIlc,
+    StateSpace,
     discretize,
     from_transfer_function,
     second_order,
     signal,
     simulate,
 )
-from ilc_rt.laws import HigherOrderIlc, ModelFreeIlc, PointToPointIlc, StableInverseIlc
+from ilc_rt.laws import Filtered, HigherOrderIlc, ModelFreeIlc, PointToPointIlc, StableInverseIlc
 
 N, DT_S = 160, 0.002
 RNG = np.random.default_rng(5)
@@ -118,13 +121,34 @@ def test_points_are_reached_on_another_plant_with_less_effort() -> None:
         ([N], "points = 160"),
         ([], "1 to 2000 different"),
         ([3, 3], "different samples"),
-        ([0], "sample 0 is before the first effect"),
+        ([0], "sample 0: before the first effect"),
         (range(3, N), "too near to each other"),
     ],
 )
 def test_unusable_points_are_named(points, words: str) -> None:
     with pytest.raises(LearningError, match=words):
         PointToPointIlc(NON_MINIMUM if words.startswith("too") else AXIS, N, points)
+
+
+def test_norm_optimal_with_a_q_filter_is_the_filtered_dense_solution() -> None:
+    """A mode that the model omits makes the law diverge; with the filter it converges."""
+    r, low_pass = 0.05, signal.butterworth(2, 25.0, DT_S)
+    u, e = RNG.normal(size=N), RNG.normal(size=N)
+    matrix = AXIS.lifted(N)
+    change = np.linalg.solve(matrix.T @ matrix + r * np.eye(N), matrix.T @ e)
+    law = Filtered(NormOptimalIlc(AXIS, N, r=r), low_pass)
+    expected = signal.zero_phase(low_pass, u + change)
+    np.testing.assert_allclose(law.update(u, e), expected, rtol=0, atol=1e-8)
+    plant = AXIS * discretize(second_order(400.0, 0.04), DT_S)
+    alone, filtered = (
+        simulate(plant, one, REFERENCE, trials=12).figures()["tracking_rms_m"]
+        for one in (
+            NormOptimalIlc(AXIS, N, r=1e-3),
+            Filtered(NormOptimalIlc(AXIS, N, r=1e-3), low_pass),
+        )
+    )
+    assert alone[-1] > alone[3]
+    assert filtered[-1] < 0.1 * filtered[0]
 
 
 def two_sided(model, e: np.ndarray) -> np.ndarray:
@@ -187,15 +211,20 @@ def test_a_non_minimum_phase_plant_is_learned_despite_another_model(method: str)
     assert np.abs(result.input[-1]).max() < 10 * np.abs(reference).max()
 
 
+def coupled() -> StateSpace:
+    none = np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0))
+    return AXIS.append(AXIS).series(StateSpace(*none, [[1.0, 0.1], [0.0, 1.0]], DT_S))
+
+
 def test_what_has_no_inverse_is_refused() -> None:
     on_circle = from_transfer_function(np.poly([-1.0]), np.poly([0.5, 0.2]), DT_S)
     for model, words in (
         (on_circle, "on the unit circle"),
-        (AXIS.append(AXIS), "one input and one output"),
-        (second_order(94.0, 0.7), "discrete-time"),
+        (coupled(), "couples axes"),
+        (second_order(94.0, 0.7), "continuous"),
         (from_transfer_function([0.0], [1.0, -0.5], DT_S), "responds to no input"),
     ):
-        with pytest.raises(LearningError, match=words):
+        with pytest.raises((LearningError, ModelError), match=words):
             StableInverseIlc(model, N)
     with pytest.raises(LearningError, match="zero_radius"):
         StableInverseIlc(AXIS, N, zero_radius=0.5)

@@ -9,7 +9,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::argument::{Signal, give_signal};
-use crate::laws::{PyLaw, legacy};
+use crate::laws::PyLaw;
 use crate::whole::shown;
 
 /// Channels of the signals passed to a Python object.
@@ -189,8 +189,8 @@ impl Law for PythonLaw {
 
     fn earlier_description(&self) -> Option<String> {
         let shown = Python::attach(|py| {
-            let native = self.law.bind(py).cast::<PyLaw>().ok()?;
-            legacy::repr(py, native.get())
+            let earlier = py.import("ilc_rt.laws.earlier").and_then(|m| m.getattr("shown")).ok()?;
+            earlier.call1((self.law.bind(py),)).ok()?.extract::<Option<String>>().ok()?
         })?;
         Some(serde_json::json!({ "law": self.name, "repr": shown }).to_string())
     }

@@ -2,7 +2,6 @@
 //!
 //! Each returns its samples by name; the class that holds them is `ilc_rt.trajectory.Trajectory`.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use ilc_rt::trajectory::curve::{Butterfly, Curve, Run, RunLimits, Spiral, Spline};
@@ -15,7 +14,7 @@ use ilc_rt::trajectory::{
     POINTS_A_PERIOD, PathSegment, PathSpec, SampledMotion, TrackingIndex, TrajectoryError,
     points_program,
 };
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -107,34 +106,6 @@ fn read_place(a: Arguments<'_, '_>, name: &str) -> PyResult<[f64; 2]> {
     Err(PyValueError::new_err(format!("{name} = ({x}, {y}); finite numbers are needed")))
 }
 
-/// Reads the upper bounds of alpha: a number, or one by place.
-fn read_alpha_max(a: Arguments<'_, '_>) -> PyResult<AlphaMax> {
-    let mut alpha_max = AlphaMax::default();
-    let Some(object) = a.given("alpha_max")? else { return Ok(alpha_max) };
-    if let Ok(value) = object.extract::<f64>() {
-        return Ok(AlphaMax { start_up: value, transition: value, end: value });
-    }
-    let Ok(by_place) = object.extract::<BTreeMap<String, f64>>() else {
-        return Err(PyTypeError::new_err(format!(
-            "alpha_max = {}; a number, or a dict of numbers by place, is needed",
-            object.repr()?
-        )));
-    };
-    for (place, value) in by_place {
-        match place.as_str() {
-            "start-up" => alpha_max.start_up = value,
-            "transition" => alpha_max.transition = value,
-            "end" => alpha_max.end = value,
-            other => {
-                return Err(PyValueError::new_err(format!(
-                    "alpha_max: {other:?}; \"start-up\", \"transition\" or \"end\" is needed"
-                )));
-            }
-        }
-    }
-    Ok(alpha_max)
-}
-
 fn sample_linear(
     start_m: &[f64],
     segments: &[PathSegment],
@@ -204,7 +175,11 @@ pub(crate) fn exponential_sigmoid<'py>(keywords: Option<Keywords<'_, 'py>>) -> B
         frequency_hz: frequencies[i],
     };
     let segments: Vec<ModulatedSegment> = (0..n_legs).map(segment).collect();
-    let alpha_max = read_alpha_max(a)?;
+    let alpha_max = a.maybe("alpha_max", |_, bounds| {
+        let [start_up, transition, end] = bounds.extract::<[f64; 3]>()?;
+        Ok(AlphaMax { start_up, transition, end })
+    })?;
+    let alpha_max = alpha_max.unwrap_or_default();
     planned(a.py(), || sample_exponential(&points[0], &segments, &limits, &alpha_max, dt_s))
 }
 

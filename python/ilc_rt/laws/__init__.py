@@ -6,7 +6,7 @@ disturbance=None)``.
 """
 
 from ilc_rt._native import Law as Law
-from ilc_rt.laws.around import Gate, Ladder, ThroughJacobian
+from ilc_rt.laws.around import Filtered, Gate, Ladder, ThroughJacobian
 from ilc_rt.laws.basis import PositionHarmonic, position_harmonics
 from ilc_rt.laws.basis_functions import BasisFunctions
 from ilc_rt.laws.constrained import ConstrainedIlc
@@ -18,6 +18,7 @@ from ilc_rt.laws.norm_optimal import NormOptimalIlc
 from ilc_rt.laws.point_to_point import PointToPointIlc
 from ilc_rt.laws.recalled import FlexibleIlc, RelevanceIlc
 from ilc_rt.laws.relevance_weights import RelevanceWeights
+from ilc_rt.laws.repetitive import RepetitiveIlc
 from ilc_rt.laws.stable_inverse import StableInverseIlc
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "BasisFunctions",
     "ConstrainedIlc",
     "ErrorFeedforwardIlc",
+    "Filtered",
     "FlexibleIlc",
     "Gate",
     "HigherOrderIlc",
@@ -37,6 +39,7 @@ __all__ = [
     "PositionHarmonic",
     "RelevanceIlc",
     "RelevanceWeights",
+    "RepetitiveIlc",
     "StableInverseIlc",
     "ThroughJacobian",
     "position_harmonics",

@@ -1,4 +1,4 @@
-"""Wrappers of any law: `Gate`, `Ladder`, `ThroughJacobian`."""
+"""Wrappers of any law: `Filtered`, `Gate`, `Ladder`, `ThroughJacobian`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Self
 
-    from ilc_rt.laws.arguments import AnyLaw
+    from ilc_rt.laws.arguments import AnyLaw, QFilter
 
 
 class _Around(Law):
@@ -180,6 +180,46 @@ class Ladder(_Around):
     def noise_rms(self) -> float:
         """RMS of the noise left in the mean at the last step."""
         return self._figure("noise_rms")
+
+
+class Filtered(_Around):
+    """A low-pass (Q-filter) after any law, e.g. after `NormOptimalIlc`.
+
+    ``u' = Q law(u, e)``
+
+    Parameters
+    ----------
+    law : Law or object
+        Any law: one of this package, or an object with
+        ``update(u, e, disturbance)``.
+    q_filter : Filter, array_like or None
+        Low-pass Q of `ilc_rt.signal`, zero-phase unless it is causal.
+
+    Raises
+    ------
+    SignalError, TypeError
+        If `q_filter` is not a filter, or `law` is not a law.
+
+    Notes
+    -----
+    The filter takes away what lies above the frequency up to which the model of the law holds; a
+    part of the error remains there.
+
+    References
+    ----------
+    [bristow2006].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import PdIlc
+    >>> from ilc_rt.laws import Filtered
+    >>> Filtered(PdIlc(1.0, 0.0), [0.25, 0.5, 0.25]).update(np.zeros(4), np.array([0.0, 0, 0, 4]))
+    array([0., 1., 3., 4.])
+    """
+
+    def __new__(cls, law: AnyLaw, q_filter: QFilter = None) -> Self:
+        return super().__new__(cls, "filtered", **given(locals()))
 
 
 class ThroughJacobian(_Around):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ilc_rt._native import LearningError, StateSpace
+from ilc_rt._native import Law, LearningError, StateSpace
 from ilc_rt.given import given
 from ilc_rt.laws.basis import basis_signals, named_bases
 from ilc_rt.laws.python_law import PythonLaw, signals, weight, whole
@@ -108,14 +108,9 @@ class BasisFunctions(PythonLaw):
         if not isinstance(learn, (bool, np.bool_)):
             message = f"learn = {learn!r}: True or False is needed"
             raise TypeError(message)
-        self._learn = bool(learn)
         self._r = _reference(reference, model.n_inputs)
         n_samples = len(self._r)
         self._psi = basis_signals(self._bases, self._r, self._dt_s, self._lead)
-        self._q = np.sqrt(weight("q", q, n_samples, model.n_outputs))
-        self._s = np.sqrt(weight("s", s, n_samples, model.n_inputs))
-        self._change = np.sqrt(weight("r", r, n_samples, model.n_inputs))
-        self._matrix = self._stacked()
         self._first = np.zeros(self._psi.shape[:2])
         if parameters is not None:
             start = np.asarray(parameters)
@@ -126,12 +121,21 @@ class BasisFunctions(PythonLaw):
                 message = "parameters: only finite numbers are allowed"
                 raise ValueError(message)
             self._first = start.astype(np.float64)
-        self._theta = self._first.copy()
+        self._law = Law(
+            "parametric",
+            model=model,
+            signals=self._psi.reshape(-1, n_samples).T,
+            q=weight("q", q, n_samples, model.n_outputs),
+            s=weight("s", s, n_samples, model.n_inputs),
+            r=weight("r", r, n_samples, model.n_inputs),
+            parameters=self._first.ravel(),
+            learn=bool(learn),
+        )
 
     @property
     def coefficients(self) -> dict[str, Array]:
         """Learned parameters by the name of their function, each of shape (n_axes,)."""
-        return dict(zip(self._bases, self._theta.T.copy(), strict=True))
+        return dict(zip(self._bases, self._theta().T, strict=True))
 
     def update(
         self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
@@ -158,17 +162,7 @@ class BasisFunctions(PythonLaw):
         del disturbance
         n_inputs, n_outputs = self._model.n_inputs, self._model.n_outputs
         given_u, given_e = signals(u, e, len(self._r), n_inputs, n_outputs)
-        if self._learn:
-            wanted = given_e + _channels(self._model.simulate(given_u))
-            right = np.concatenate(
-                [
-                    (self._q * wanted).ravel(),
-                    np.zeros(given_u.size),
-                    (self._change * given_u).ravel(),
-                ]
-            )
-            self._theta = self._theta + self._step(right)
-        return self._signal(self._psi).reshape(np.shape(u))
+        return self._law.update(given_u, given_e).reshape(np.shape(u))
 
     def input(self, reference: ArrayLike | None = None) -> NDArray[np.float64]:
         """Return the input that the learned parameters give, for this reference or another one.
@@ -213,39 +207,19 @@ class BasisFunctions(PythonLaw):
         LearningError, ValueError, TypeError
             As the law itself.
         """
-        kept = {**self._arguments, "reference": reference, "parameters": self._theta.copy()}
+        kept = {**self._arguments, "reference": reference, "parameters": self._theta()}
         return type(self)(**{**kept, **changes})
 
     def reset(self) -> None:
         """Go back to the parameters that the law began with."""
-        self._theta = self._first.copy()
+        self._law.reset()
 
-    def _stacked(self) -> Array:
-        """Return the matrix of the least squares: one column per parameter, axis by axis."""
-        columns = []
-        n_inputs = self._model.n_inputs
-        for axis, functions in enumerate(self._psi):
-            for signal in functions:
-                u = np.zeros((len(signal), n_inputs))
-                u[:, axis] = signal
-                answer = _channels(self._model.simulate(u))
-                parts = (self._q * answer, self._s * u, self._change * u)
-                columns.append(np.concatenate([part.ravel() for part in parts]))
-        return np.array(columns).T
-
-    def _step(self, right: Array) -> Array:
-        """Return the smallest change of the parameters that solves the least squares."""
-        size = np.linalg.norm(self._matrix, axis=0)
-        excited = size > 0.0
-        scaled = self._matrix[:, excited] / size[excited]
-        theta = self._theta.ravel()
-        change = np.zeros(theta.size)
-        rest = right - self._matrix @ theta
-        change[excited] = np.linalg.lstsq(scaled, rest, rcond=None)[0] / size[excited]
-        return change.reshape(self._theta.shape)
+    def _theta(self) -> Array:
+        """Return the parameters, shape (n_axes, n_functions)."""
+        return np.asarray(self._law._figure("parameters")).reshape(self._first.shape)
 
     def _signal(self, psi: Array) -> Array:
-        return np.einsum("ab,abk->ka", self._theta, psi)
+        return np.einsum("ab,abk->ka", self._theta(), psi)
 
 
 def _reference(reference: ArrayLike, n_inputs: int) -> Array:
@@ -273,7 +247,3 @@ def _lead(model: StateSpace | TimeVarying, lead_samples: int | None) -> int:
         return 0
     known = [delay for row in model.delays() for delay in row if delay is not None]
     return min(known, default=0)
-
-
-def _channels(signal: Array) -> Array:
-    return signal.reshape(len(signal), -1)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ilc_rt import _native
 from ilc_rt.trajectory.sampled import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+PLACES = ("start-up", "transition", "end")
 
 
 def jerk_limited(
@@ -142,7 +146,24 @@ def exponential_sigmoid(
     >>> " ".join(place for _, place, _, _ in move.alphas)
     'start-up transition end'
     """
-    return Trajectory(**_native.exponential_sigmoid(**locals()))
+    given = {**locals(), "alpha_max": _by_place(alpha_max)}
+    return Trajectory(**_native.exponential_sigmoid(**given))
+
+
+def _by_place(alpha_max: object) -> tuple[float, ...] | None:
+    """Return the upper bounds of alpha at start-up, transition and end; None for no bound."""
+    if alpha_max is None:
+        return None
+    if isinstance(alpha_max, (int, float, np.number)):
+        return (float(alpha_max),) * len(PLACES)
+    if not isinstance(alpha_max, dict):
+        message = f"alpha_max = {alpha_max!r}; a number, or a dict of numbers by place, is needed"
+        raise TypeError(message)
+    for place in alpha_max:
+        if place not in PLACES:
+            message = f'alpha_max: "{place}"; "start-up", "transition" or "end" is needed'
+            raise ValueError(message)
+    return tuple(float(alpha_max.get(place, np.inf)) for place in PLACES)
 
 
 def modulated(

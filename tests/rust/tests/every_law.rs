@@ -13,7 +13,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Laws whose update is not linear, or whose adjoint the analysis derives from their cost.
-const WITHOUT: [&str; 7] = [
+const WITHOUT: [&str; 9] = [
     "constrained",
     "norm_optimal",
     "dynamic",
@@ -21,6 +21,8 @@ const WITHOUT: [&str; 7] = [
     "through_jacobian",
     "relevance",
     "flexible",
+    "higher_order",
+    "filtered",
 ];
 
 #[test]

@@ -1,6 +1,6 @@
 //! Builder of constrained norm-optimal ILC: `constrained`.
 
-use ilc_rt::learning::law::constrained::{Bound as Limits, Bounds, Constrained, Limit, Status};
+use ilc_rt::learning::law::constrained::{Bound as Limits, Bounds, Constrained, Limit};
 use ilc_rt::learning::law::norm_optimal::Cost;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -64,23 +64,8 @@ pub(super) fn constrained(call: &Call<'_, '_>) -> PyResult<Built> {
 impl Readable for Constrained {
     fn figure(&self, name: &str) -> Option<Figure> {
         Some(match name {
-            "status" => Figure::Text(
-                match Constrained::status(self) {
-                    Status::Untried => "untried",
-                    Status::Solved => "solved",
-                    Status::Infeasible(_) => "infeasible",
-                    Status::MaxIterations => "max_iterations",
-                }
-                .to_owned(),
-            ),
-            "message" => Figure::Text(match Constrained::status(self) {
-                Status::Untried => "there was no update yet".to_owned(),
-                Status::Solved => "the input is optimal within the bounds".to_owned(),
-                Status::Infeasible(error) => error.to_string(),
-                Status::MaxIterations => {
-                    "no optimum was found: the bounds most likely contradict each other".to_owned()
-                }
-            }),
+            "status" => Figure::Text(Constrained::status(self).name().to_owned()),
+            "message" => Figure::Text(Constrained::status(self).to_string()),
             "iterations" => Figure::Count(self.iterations()),
             "gap" => Figure::Number(self.gap()),
             _ => return None,

@@ -10,9 +10,9 @@ mod bounded;
 mod exchange;
 mod figure;
 mod kinds;
-pub(crate) mod legacy;
 mod optimal;
 pub(crate) mod recalled;
+mod research;
 
 use std::sync::Arc;
 
@@ -41,8 +41,14 @@ type Build = fn(&Call<'_, '_>) -> PyResult<Built>;
 type Builder = (&'static str, Build);
 
 /// The kinds of law with their builders, a list in each file.
-const BUILDERS: [&[Builder]; 5] =
-    [kinds::BUILDERS, optimal::BUILDERS, bounded::BUILDERS, around::BUILDERS, recalled::BUILDERS];
+const BUILDERS: [&[Builder]; 6] = [
+    kinds::BUILDERS,
+    optimal::BUILDERS,
+    bounded::BUILDERS,
+    around::BUILDERS,
+    recalled::BUILDERS,
+    research::BUILDERS,
+];
 
 /// The size of a run, from its signals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,6 +7,7 @@ use super::before_run;
 use super::claim::{Claim, claim};
 use super::control::{Server, Shared};
 use super::error::{CampaignError, ResumeError};
+use super::first_input::first_input;
 use super::frozen::{self, Frozen};
 use super::input::InputError;
 use super::inputs;
@@ -126,6 +127,11 @@ fn execute(
         let frozen = Frozen::new(&library, options, cell, &chosen, learns, &mut campaign.plan)?;
         (campaign.frozen, campaign.input) = (Some(frozen), Some(chosen.input));
     }
+    if !options.frozen && !options.resume {
+        let law = campaign.law.as_deref_mut();
+        let own = first_input(&library, options, (cell, &campaign.plan), law, &policy)?;
+        campaign.input = own.or(campaign.input);
+    }
     let (claim, mut resumed) =
         begin_or_resume(&library, cell, options, &mut campaign, &mut policy)?;
     let Campaign { mut plan, law, input, frozen, .. } = campaign;
@@ -216,7 +222,8 @@ fn open_library(options: &Options) -> Result<Library, CampaignError> {
     if options.resume && !path.exists() {
         return Err(ResumeError::NoLibrary { path: path.clone() }.into());
     }
-    if options.frozen && options.input_file.is_none() && !path.exists() {
+    let reads = options.frozen && options.input_file.is_none() || options.parameters_from.is_some();
+    if reads && !path.exists() {
         return Err(InputError::NoLibrary { path: path.display().to_string() }.into());
     }
     Ok(Library::open(path)?)

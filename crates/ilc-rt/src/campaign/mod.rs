@@ -15,6 +15,7 @@ mod ending;
 mod error;
 mod execute;
 mod fault;
+mod first_input;
 mod frozen;
 mod homing;
 pub mod input;

@@ -97,6 +97,10 @@ pub struct Options {
     /// File that a frozen input is loaded from.
     #[arg(long = "input", value_name = "FILE", requires = "frozen")]
     pub input_file: Option<PathBuf>,
+    /// Run of the library, of any program of this cell, whose parameters the law begins with: for laws with
+    /// parameters that hold on every program.
+    #[arg(long, value_name = "ID|best|last", conflicts_with_all = ["resume", "frozen"])]
+    pub parameters_from: Option<Source>,
     /// Learn again, in a new campaign, when the error of a frozen input is above this many times its
     /// reference.
     #[arg(long, value_name = "RATIO", requires = "frozen", value_parser = relearn_ratio)]

@@ -67,6 +67,23 @@ pub trait Law: Send {
         Ok(false)
     }
 
+    /// Takes over what an earlier run of another program shows about the axes, as parameters to begin with:
+    /// `reference` and `input` are those of that run. Returns true if the law has such parameters.
+    ///
+    /// # Shapes
+    /// - both: samples of that run x `n_inputs`
+    /// # Errors
+    /// - [`LearningError::Length`] or [`LearningError::NotFinite`].
+    fn take_over(&mut self, reference: &[f64], input: &[f64]) -> Result<bool> {
+        let _ = (reference, input);
+        Ok(false)
+    }
+
+    /// Returns the input of the first run of a campaign; `None` for zero, as most laws begin.
+    fn first_input(&self) -> Option<Vec<f64>> {
+        None
+    }
+
     /// Applies the adjoint (transpose) of the update's linear part: `to_input = L_u' dual`,
     /// `to_error = L_e' dual`, where the update is `next = L_u input + L_e error`.
     ///
@@ -162,6 +179,14 @@ impl<L: Law + ?Sized> Law for Box<L> {
 
     fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         (**self).recall(input, error, disturbance)
+    }
+
+    fn take_over(&mut self, reference: &[f64], input: &[f64]) -> Result<bool> {
+        (**self).take_over(reference, input)
+    }
+
+    fn first_input(&self) -> Option<Vec<f64>> {
+        (**self).first_input()
     }
 
     fn apply_adjoint(

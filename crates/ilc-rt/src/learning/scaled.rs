@@ -62,6 +62,19 @@ impl<L: Law> Law for Scaled<L> {
         self.law.recall(&self.own, error, disturbance)
     }
 
+    fn take_over(&mut self, reference: &[f64], input: &[f64]) -> Result<bool> {
+        self.convert(input);
+        self.law.take_over(reference, &self.own)
+    }
+
+    fn first_input(&self) -> Option<Vec<f64>> {
+        let mut input = self.law.first_input()?;
+        for (value, scale) in input.iter_mut().zip(self.scale.iter().cycle()) {
+            *value /= scale;
+        }
+        Some(input)
+    }
+
     fn on_rollback(&mut self) {
         self.law.on_rollback();
     }

@@ -15,7 +15,7 @@ use crate::record::{Figures, fingerprint};
 /// Law in the records of runs with a frozen input: they have no law.
 pub(in crate::campaign) const FROZEN: &str = "frozen";
 /// Law in the records of experiments, whose input is an excitation.
-const EXCITATION: &str = "excitation";
+pub(super) const EXCITATION: &str = "excitation";
 
 /// Run of the library to take an input from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

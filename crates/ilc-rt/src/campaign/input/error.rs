@@ -17,6 +17,27 @@ pub enum InputError {
         /// Difference of the newest run that does not fit, or nothing.
         nearest: String,
     },
+    /// No run of the library shows parameters of the law.
+    #[error(
+        "library {path}: no undisturbed run of this cell with law \"{law}\" to take parameters from{nearest}"
+    )]
+    NoParameters {
+        /// Library.
+        path: String,
+        /// The law of the cell.
+        law: String,
+        /// Difference of the newest run that does not fit, or nothing.
+        nearest: String,
+    },
+    /// The law has no parameters that another program could show.
+    #[error(
+        "--parameters-from: law \"{law}\" has no parameters that hold on another program; allowed: \
+         \"basis_functions\" and \"position_domain\""
+    )]
+    Unparametric {
+        /// The law of the cell.
+        law: String,
+    },
     /// The input was learned for something else.
     #[error("{place}: {key} is {there} there and {here} in this cell; allowed: the same")]
     Different {

@@ -6,11 +6,13 @@
 mod choice;
 mod error;
 mod file;
+mod take_over;
 mod task;
 
 pub use choice::{Chosen, Origin, Source, choose};
 pub use error::InputError;
 pub use file::{load, save};
+pub use take_over::take_over;
 pub use task::Task;
 
 pub(super) use choice::FROZEN;

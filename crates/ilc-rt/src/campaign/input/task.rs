@@ -71,25 +71,35 @@ impl Task {
 
     /// Ensures that a stored run was made for this task, as far as its row tells.
     pub(super) fn require_row(&self, row: &Row, place: &str) -> Result<(), InputError> {
+        let (mut here, mut there) = self.machines(row);
+        (here["n_samples"], here["program"]) = (json!(self.n_samples), self.program.clone());
+        (there["n_samples"], there["program"]) = (json!(row.n_samples), program(&row.meta));
+        differ(&there, &here, place)
+    }
+
+    /// Ensures that a stored run was made on this machine with this measurement, whatever its program.
+    pub(super) fn require_machine(&self, row: &Row, place: &str) -> Result<(), InputError> {
+        let (here, there) = self.machines(row);
+        differ(&there, &here, place)
+    }
+
+    /// Returns machine and measurement of this task, and those of a stored run.
+    fn machines(&self, row: &Row) -> (Value, Value) {
         let here: Vec<_> = self.axis.iter().map(|a| [&a.name, &a.input_unit]).collect();
         let there: Vec<_> = row.meta.axis_names.iter().zip(&row.meta.input_units).collect();
-        let here = json!({
-            "cell": self.cell, "measure": self.measure, "cycle_s": self.cycle_s,
-            "n_samples": self.n_samples, "axis": here, "program": self.program,
-        });
+        let of = |cell: &str, measure: &str, cycle_s: f64, axis: Value| json!({ "cell": cell, "measure": measure, "cycle_s": cycle_s, "axis": axis });
         let meta = &row.meta;
-        let there = json!({
-            "cell": meta.cell, "measure": meta.measure, "cycle_s": meta.cycle_s,
-            "n_samples": row.n_samples, "axis": there, "program": program(meta),
-        });
-        differ(&there, &here, place)
+        (
+            of(&self.cell, &self.measure, self.cycle_s, json!(here)),
+            of(&meta.cell, &meta.measure, meta.cycle_s, json!(there)),
+        )
     }
 
     /// Ensures that an input has one finite number within its bound for each sample and axis.
     ///
     /// # Shapes
     /// - `input`: `n_samples * n_axes`; `bounds`: `n_axes`
-    pub(super) fn require_bounds(
+    pub(in crate::campaign) fn require_bounds(
         &self,
         input: &[f64],
         bounds: &[f64],

@@ -177,6 +177,14 @@ impl<L: Law> Law for Gate<L> {
         self.law.recall(input, error, disturbance)
     }
 
+    fn take_over(&mut self, reference: &[f64], input: &[f64]) -> Result<bool> {
+        self.law.take_over(reference, input)
+    }
+
+    fn first_input(&self) -> Option<Vec<f64>> {
+        self.law.first_input()
+    }
+
     fn linear_surrogate(&mut self) -> Surrogate<'_> {
         Surrogate::Inside(&mut self.law)
     }

@@ -6,19 +6,26 @@
 //! `design` and the Python bindings import this folder.
 
 pub mod adjoint;
+pub mod basis_functions;
 pub mod constrained;
 mod context;
 pub mod dynamic;
 pub mod error_feedforward;
 mod expectation;
+pub mod filtered;
 pub mod flexible;
 pub mod formation;
+pub mod higher_order;
 mod inputs;
 pub mod model_inverse;
 pub mod norm_optimal;
+pub mod parametric;
 pub mod pd;
+pub mod point_to_point;
+pub mod position_domain;
 pub mod q_filter;
 pub mod relevance;
+pub mod stable_inverse;
 pub mod through_jacobian;
 
 pub use context::{
@@ -56,6 +63,22 @@ macro_rules! every_law {
             Relevance relevance crate::learning::law::relevance::RelevanceParameters;
             /// Flexible ILC: one input for each disturbance met, interpolated between the nearest two.
             Flexible flexible crate::learning::law::flexible::FlexibleParameters;
+            /// Basis functions: parameters of a feed-forward, learned on one program for every other one.
+            BasisFunctions basis_functions
+                crate::learning::law::basis_functions::BasisFunctionsParameters;
+            /// Point-to-point ILC: the error at some instants vanishes, the motion between them is free.
+            PointToPoint point_to_point
+                crate::learning::law::point_to_point::PointToPointParameters;
+            /// Inverse-model ILC that also inverts zeros outside the unit circle, by looking ahead.
+            StableInverse stable_inverse
+                crate::learning::law::stable_inverse::StableInverseParameters;
+            /// Higher order: the next input from several past runs, with another law.
+            HigherOrder higher_order crate::learning::law::higher_order::HigherOrderParameters;
+            /// Another law with a low-pass (Q-filter) after it.
+            Filtered filtered crate::learning::law::filtered::FilteredParameters;
+            /// Repetitive learning over the position: a table for each axis, e.g. of cogging.
+            PositionDomain position_domain
+                crate::learning::law::position_domain::PositionDomainParameters;
         }
     };
 }

@@ -46,6 +46,31 @@ pub enum Status {
     MaxIterations,
 }
 
+impl Status {
+    /// Returns the name.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Untried => "untried",
+            Self::Solved => "solved",
+            Self::Infeasible(_) => "infeasible",
+            Self::MaxIterations => "max_iterations",
+        }
+    }
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Untried => out.write_str("there was no update yet"),
+            Self::Solved => out.write_str("the input is optimal within the bounds"),
+            Self::Infeasible(error) => error.fmt(out),
+            Self::MaxIterations => {
+                out.write_str("no optimum was found: the bounds most likely contradict each other")
+            }
+        }
+    }
+}
+
 /// Constrained norm-optimal ILC, in linear time.
 ///
 /// `u_{j+1} = u_j + argmin_v J(v)` over all `v` that satisfy every bound.
