@@ -17,11 +17,15 @@ THEORY = ROOT / "docs" / "theory"
 INDEX = THEORY / "index.md"
 BLOCK = re.compile(r"(<!-- derived: (?:names|laws) -->\n).*?(<!-- end -->)", re.DOTALL)
 
+#: Pages of laws that are called otherwise in Python.
+PAGE_IN_A_CELL = {"repetitive": "position-domain"}
+
 
 def page_of(name: str) -> str:
     """Return the name of a law's page: `PdIlc`, `pd` and `error_feedforward` in words."""
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name.removesuffix("Ilc")).lower()
-    return words.replace("_", "-")
+    words = words.replace("_", "-")
+    return PAGE_IN_A_CELL.get(words, words)
 
 
 def in_python() -> dict[str, str]:
