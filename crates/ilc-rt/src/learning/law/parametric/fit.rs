@@ -96,6 +96,9 @@ mod tests {
         assert!((found[3] - 0.7).abs() < 1e-15, "not excited: it stays");
         // Nothing to change: everything stays.
         let same = &fit.inverse * (&matrix * &start) + fit.left(&start);
-        assert!((same - start).abs().max() < 1e-2, "rounding of a large answer, over a small column");
+        assert!(
+            (same - start).abs().max() < 1e-2,
+            "rounding of a large answer, over a small column"
+        );
     }
 }
