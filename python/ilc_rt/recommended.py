@@ -19,6 +19,8 @@ __all__ = ["Reason", "Recommendation", "Refused"]
 KINDS = {
     "NormOptimalIlc": "norm_optimal", "ConstrainedIlc": "constrained", "PdIlc": "pd",
     "AdjointIlc": "adjoint", "ModelInverseIlc": "model_inverse", "RelevanceIlc": "relevance",
+    "BasisFunctions": "basis_functions", "PointToPointIlc": "point_to_point",
+    "StableInverseIlc": "stable_inverse",
 }  # fmt: skip
 
 
