@@ -20,12 +20,15 @@ from ilc_rt import (
     Gate,
     IterationRecord,
     Ladder,
+    ManyResult,
     ModelInverseIlc,
     NormOptimalIlc,
     PdIlc,
     PlantError,
+    Recommendation,
     RelevanceIlc,
     RelevanceWeights,
+    SimulatedTuning,
     StateSpace,
     SweepResult,
     ThroughJacobian,
@@ -37,13 +40,16 @@ from ilc_rt import (
     grid,
     identify,
     kinematics,
+    recommend,
     repeatability,
     second_order,
     signal,
     simulate,
+    simulate_many,
     sweep,
     trajectory,
     tune,
+    tune_by_simulation,
 )
 from ilc_rt.control import Cascade, CrossCoupled, Pid
 from ilc_rt.laws import (
@@ -232,6 +238,17 @@ EXAMPLES = {
         str,
     ),
     TrialResult: (lambda: simulate(axis(), PdIlc(0.4, 0.0), ERROR, trials=3), None),
+    ManyResult: (
+        lambda: simulate_many([axis(), axis()], PdIlc(0.4, 0.0), ERROR, trials=3),
+        None,
+    ),
+    Recommendation: (lambda: recommend(axis(), reference=ERROR, uncertainty=0.3), str),
+    SimulatedTuning: (
+        lambda: tune_by_simulation(
+            lambda kp: PdIlc(kp, 0.0), grid(kp=[0.2, 0.4]), [axis()], ERROR, trials=3
+        ),
+        None,
+    ),
     FaultError: (lambda: FaultError("node 2 is silent", kind="silent_drive", node=2), None),
     BadInputError: (lambda: BadInputError("no such file"), None),
 }

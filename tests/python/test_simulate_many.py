@@ -18,6 +18,7 @@ from ilc_rt import (
     Ladder,
     LearningError,
     Library,
+    ModelFreeIlc,
     ModelInverseIlc,
     NormOptimalIlc,
     PdIlc,
@@ -102,6 +103,7 @@ def test_a_dense_loop_in_numpy_gives_the_same(law) -> None:
 
 LAWS = {
     "none": None,
+    "higher order": HigherOrderIlc(PdIlc(kp=0.5)),
     "pd": PdIlc(kp=0.5, kd=0.2, q_filter=None),
     "norm-optimal": NormOptimalIlc(MODEL, N, r=0.1),
     "rate": NormOptimalIlc(MODEL, N, rate=0.1),
@@ -297,7 +299,7 @@ def test_laws_in_python_are_refused_with_the_way(tmp_path) -> None:
         (Own(), "law is a Own, which is written in Python.*ilc_rt.sweep"),
         (Derived(kp=0.5), "law is a Derived, which is written in Python"),
         (Gate(Own(), tolerance=1e-5), "law.law is a Own"),
-        (HigherOrderIlc(PdIlc(kp=0.5)), "law is a HigherOrderIlc"),
+        (ModelFreeIlc(), "law is a ModelFreeIlc"),
         ([PdIlc(kp=0.5), Own()], r"law\[1\] is a Own"),
         (
             FlexibleIlc(Library(tmp_path / "runs.db"), PdIlc(kp=0.5), tolerance=0.1),

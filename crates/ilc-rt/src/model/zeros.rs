@@ -83,13 +83,18 @@ impl Pencil {
         for _ in 0..PASSES_MAX {
             let mut settled = true;
             for col in 0..self.b.ncols() {
-                let scale =
-                    power_of_two(size / self.b.column(col).amax().max(self.d.column(col).amax()));
+                let scale = f64::from(power_of_two(
+                    size / self.b.column(col).amax().max(self.d.column(col).amax()),
+                ))
+                .exp2();
                 self.b.column_mut(col).scale_mut(scale);
                 self.d.column_mut(col).scale_mut(scale);
             }
             for row in 0..self.c.nrows() {
-                let scale = power_of_two(size / self.c.row(row).amax().max(self.d.row(row).amax()));
+                let scale = f64::from(power_of_two(
+                    size / self.c.row(row).amax().max(self.d.row(row).amax()),
+                ))
+                .exp2();
                 self.c.row_mut(row).scale_mut(scale);
                 self.d.row_mut(row).scale_mut(scale);
             }
@@ -97,8 +102,9 @@ impl Pencil {
                 let own = self.a[(state, state)].abs();
                 let across = self.a.row(state).lp_norm(1) - own + self.b.row(state).lp_norm(1);
                 let down = self.a.column(state).lp_norm(1) - own + self.c.column(state).lp_norm(1);
-                let scale = power_of_two((across / down).sqrt());
-                settled &= scale == 1.0;
+                let power = power_of_two((across / down).sqrt());
+                let scale = f64::from(power).exp2();
+                settled &= power == 0;
                 self.a.column_mut(state).scale_mut(scale);
                 self.c.column_mut(state).scale_mut(scale);
                 self.a.row_mut(state).unscale_mut(scale);
@@ -162,9 +168,10 @@ impl Pencil {
     }
 }
 
-/// Returns the power of two next to a ratio; 1 for one that is not a positive number.
-fn power_of_two(ratio: f64) -> f64 {
-    if ratio.is_finite() && ratio > 0.0 { ratio.log2().round().exp2() } else { 1.0 }
+/// Returns the exponent of the power of two next to a ratio; 0 for one that is not a positive number.
+#[expect(clippy::cast_possible_truncation, reason = "the exponent of a double has four digits")]
+fn power_of_two(ratio: f64) -> i32 {
+    if ratio.is_finite() && ratio > 0.0 { ratio.log2().round() as i32 } else { 0 }
 }
 
 /// Returns an orthogonal `U` such that `U M` has its nonzero rows first, and their number.

@@ -20,6 +20,8 @@ use nalgebra::{DMatrix, DVector};
 use super::norm_optimal::decouple::parts;
 use super::norm_optimal::plant::OwnPlant;
 use super::norm_optimal::{Plant, Weights};
+#[cfg(doc)]
+use crate::learning::LearningError;
 use crate::learning::error::{check, check_adjoint, check_counts, check_update};
 use crate::learning::{Law, Result};
 

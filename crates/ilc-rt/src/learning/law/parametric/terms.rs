@@ -17,7 +17,7 @@ pub struct Term {
     pub function: Option<(Function, usize)>,
 }
 
-/// Diagonal weights of a [`Parametric`] law, one number per sample and channel.
+/// Diagonal weights of a [`Parametric`](super::Parametric) law, one number per sample and channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagonal {
     /// Of the predicted error, `n_samples` x `n_outputs`.
