@@ -108,6 +108,19 @@ fn every_law_that_a_cell_can_name_learns_on_the_gantry() {
 }
 
 #[test]
+fn point_to_point_removes_the_error_at_its_instant() {
+    let learning = "law = \"point_to_point\"\n[learning.point_to_point]\npoints_s = [0.5]\n\
+                    gain = 0.7\nr = 0.01";
+    let (_, rows) = run(&cell(SERIES, learning), 8);
+    let at: Vec<f64> = rows
+        .iter()
+        .map(|row| row.record.error_m[2 * 250].hypot(row.record.error_m[2 * 250 + 1]))
+        .collect();
+    println!("at 0.5 s: um {}", microns(&at));
+    assert!(at[7] < 0.1 * at[0], "{}", microns(&at));
+}
+
+#[test]
 fn relevance_goes_on_from_the_runs_of_the_library_under_the_disturbance_of_a_file() {
     let scratch = Scratch::new();
     let (library, told) = (scratch.file("library.db"), scratch.file("temperature.txt"));
