@@ -108,15 +108,11 @@ impl<'py> Call<'_, 'py> {
     /// Returns the inner law: the object itself, or an exclusive copy.
     fn inner(&self, name: &str, channels: Channels) -> PyResult<Box<dyn Law>> {
         let object = self.arguments.get(name)?;
-        match self.live {
-            Some(frame) => {
-                Ok(Box::new(PythonLaw::new(name, &object, channels, Arc::clone(frame))?))
-            }
-            None => {
-                let Size { n_samples, n_disturbances, .. } = self.size();
-                apart(name, &object, n_samples, channels, n_disturbances)
-            }
+        if let Some(frame) = self.live {
+            return Ok(Box::new(PythonLaw::new(name, &object, channels, Arc::clone(frame))?));
         }
+        let Size { n_samples, n_disturbances, .. } = self.size();
+        apart(name, &object, n_samples, channels, n_disturbances)
     }
 }
 
