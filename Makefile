@@ -30,14 +30,14 @@ $(BIN)/python:
 	$(BIN)/pip install --quiet --upgrade pip
 
 $(VENV)/.tools: pyproject.toml | $(BIN)/python
-	$(BIN)/pip install --quiet "maturin>=1.9,<2"
+	$(BIN)/pip install --quiet "maturin>=1.16,<2"
 	@touch $@
 
 $(VENV)/.built: $(SOURCES) $(VENV)/.tools
 	cargo build --release --workspace --bins
 	rm -rf build/wheels build/data
 	install -D -m 755 -t build/data/scripts $(TARGET)/release/ilc-rt $(TARGET)/release/ilc-sim
-	$(BIN)/maturin build --quiet --release --out build/wheels
+	$(BIN)/maturin build --quiet --release --compression-level 9 --out build/wheels
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir build/wheels ./papers
 	$(BIN)/pip install --quiet --force-reinstall --no-deps build/wheels/*.whl
 	$(BIN)/pip install --quiet build/wheels/*.whl

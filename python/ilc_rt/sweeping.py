@@ -7,6 +7,7 @@ import inspect
 import json
 import os
 import re
+from collections.abc import Mapping
 from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from ilc_rt.errors import BadInputError, SweepError
 from ilc_rt.sweep_result import SweepResult
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable
     from os import PathLike
 
 __all__ = ["grid", "latin_hypercube", "sweep"]
@@ -159,6 +160,8 @@ def latin_hypercube(
     ------
     ValueError
         If a range is empty, not finite, or not above 0 on a logarithmic scale.
+    TypeError
+        If `ranges` is not a mapping, or a range has no two ends.
 
     References
     ----------
@@ -177,6 +180,9 @@ def latin_hypercube(
     ):
         message = f"n_samples = {n_samples!r}: a whole number from 1 to {CASES_MAX} is needed"
         raise ValueError(message)
+    if not isinstance(ranges, Mapping):
+        message = f"ranges = {ranges!r}: a mapping of names to pairs is needed"
+        raise TypeError(message)
     rng = np.random.default_rng(seed)
     columns = {}
     for name, (low, high, *scale) in ranges.items():

@@ -36,8 +36,9 @@ MEMORY_MAX = 6 << 30
 SILENCE_MAX_S = 60.0
 ALLOWED = (ValueError, TypeError, MemoryError, OSError, CampaignError, SweepError)
 # Runs machines, or writes files to a given place.
-SKIPPED = {"Campaign", "Law", "CampaignResult", "TrialResult", "IterationRecord", "Experiment",
-           "Identification", "to_parquet", "swept_sine", "Library", "Cell"}  # fmt: skip
+SKIPPED = {"Campaign", "Law", "CampaignResult", "TrialResult", "ManyResult", "IterationRecord",
+           "Experiment", "Identification", "to_parquet", "swept_sine", "Library",
+           "Cell"}  # fmt: skip
 # Figures that may be infinite by definition: unbounded growth, no limit, the deviation of a
 # parameter that the measurement does not determine. `parameters` are as given.
 UNBOUNDED = {"bandwidth_deviation_hz", "gain_deviation", "delay_deviation_s", "damping_deviation",

@@ -172,18 +172,15 @@ impl VelocityLoop {
         samples
     }
 
-    /// `Z{a / (s (s + a))} = T / (z - 1) - (1 - E) / (a (z - E))`, `E = exp(-a T)`
+    /// `Z{a / (s (s + a))} = T / (z - 1) - (1 - E) / (a (z - E))`, `E = exp(-a T)`; multiplied by `z - 1`, so
+    /// that frequency zero, where only the position loop remains, is no exception.
     fn at(&self, frequency_hz: f64) -> Complex<f64> {
-        // The open loop integrates: at frequency zero only the position loop remains.
-        if frequency_hz.abs() < f64::MIN_POSITIVE {
-            return Complex::new(self.position_gain_per_s.recip(), 0.0);
-        }
         let (a, w) = (TAU * self.bandwidth_hz, TAU * frequency_hz);
         let z = Complex::new(0.0, w * self.dt_s).exp();
         let decay = (-a * self.dt_s).exp();
-        let held = (z - 1.0).inv() * self.dt_s - (z - decay).inv() * ((1.0 - decay) / a);
+        let held = self.dt_s - (z - 1.0) * (z - decay).inv() * ((1.0 - decay) / a);
         let open = held * self.gain * Complex::new(0.0, -w * self.delay_s).exp();
-        open / (z.inv() * open * self.position_gain_per_s + 1.0)
+        open / (z - 1.0 + z.inv() * open * self.position_gain_per_s)
     }
 }
 
@@ -191,6 +188,18 @@ impl VelocityLoop {
 mod tests {
     use super::*;
     use crate::model::{Method, StateSpace, discretize, from_transfer_function};
+
+    #[test]
+    fn the_response_tends_to_the_position_loop_at_rest() {
+        let model = truth();
+        for hz in [0.0, 2e-200, -2e-200, 1e-300, 1e-12] {
+            let response = model.response(&[hz])[0];
+            assert!(
+                (response - 1.0 / model.position_gain_per_s).norm() < 1e-12,
+                "{hz}: {response}"
+            );
+        }
+    }
 
     fn truth() -> VelocityLoop {
         VelocityLoop {
