@@ -6,6 +6,7 @@ No figure depends on concurrent computations. Only the command imports it.
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -76,7 +77,13 @@ def _start(name: str, load_paper: _Load, *, reduced: bool) -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(name, load_paper, reduced, theirs))
-    process.start()
+    # The terminal interrupts the whole group; this process answers for all. Blocked before it is
+    # born, a worker is not interrupted while it is still importing, either.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     theirs.close()
     return _Worker(name, process, ours)
 
@@ -101,9 +108,6 @@ def _work(name: str, load_paper: _Load, reduced: bool, messages: Connection) -> 
 
     try:
         outcome = compute(load_paper(name), reduced=reduced, tell=tell)
-    except KeyboardInterrupt:
-        # The terminal interrupts the whole group; the parent handles it for all.
-        raise SystemExit(130) from None
     except Exception as error:
         messages.send(("failed", f"{type(error).__name__}: {error}"))
     else:

@@ -141,7 +141,7 @@ def test_the_same_events_are_heard_as_are_printed(watched: Watched) -> None:
     for key, kinds in {
         "state": {"start", "state", "progress", "end"},
         "iteration": {"iteration"},
-        "latency": {"latency"},
+        "latency": {"late", "latency"},
     }.items():
         printed = [event for event in watched.controller.events if event["event"] in kinds]
         assert watched.heard[key] == printed
