@@ -105,6 +105,10 @@ class Experiment:
         if not (isinstance(dt_s, (int, float)) and np.isfinite(dt_s) and dt_s > 0):
             message = f"dt_s = {dt_s}: a sample time must be finite and above 0"
             raise ValueError(message)
+        for key, text in (("name", name), ("unit", unit)):
+            if not isinstance(text, str):
+                message = f"{key} = {text!r}: a text is needed"
+                raise TypeError(message)
         self.law = law
         self._reference = finite("reference", reference)
         self._is_flat = self._reference.ndim == 1

@@ -68,7 +68,7 @@ class LateCounts:
 
 @dataclass(frozen=True, slots=True)
 class AnswerTimes:
-    """Times from SYNC to the answers of a node, in microseconds; `axis` is None for the tool."""
+    """Answer times of a node after SYNC, in microseconds; `axis` is None for the tool encoder."""
 
     node: int
     count: int

@@ -8,7 +8,7 @@ from __future__ import annotations
 import random
 import socket
 
-#: Below the numbers that the system hands out by itself (from 32,768 on Linux).
+#: Below the ephemeral ports, which the system assigns by itself (from 32,768 on Linux).
 PORTS = range(10_240, 32_768)
 GROUP = "239.74.163.2"
 

@@ -165,3 +165,10 @@ def test_the_disturbance_reaches_law_and_library(tmp_path: Path) -> None:
     ]  # fmt: skip
     found = Library(tmp_path / "runs.db").recall(21.9)
     assert found[0]["index"] == 2
+
+
+@pytest.mark.parametrize("wrong", [{"unit": np.zeros(3)}, {"unit": 7}, {"name": 10_000_000_000}])
+def test_a_name_or_a_unit_that_is_no_text_is_refused(wrong: dict[str, object]) -> None:
+    (key,) = wrong
+    with pytest.raises(TypeError, match=rf"^{key} = .*: a text is needed"):
+        Experiment(PdIlc(kp=0.5), np.zeros(5), dt_s=0.01, **wrong)

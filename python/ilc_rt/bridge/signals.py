@@ -1,7 +1,7 @@
 """Time series of a cell, from the batches of servo cycles that its controller publishes.
 
-The batches count cycles from the start of the loop; a reader wants seconds since 1970, axes by
-name, and errors beside what they are made of. No bridge does this by itself.
+A batch counts cycles from the start of the loop. Both bridges show time in seconds since 1970, axes
+by name, and tracking errors beside positions; this module computes them for both.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-//! Lost deadlines: the cycle, its stages, and who was late, as facts. `judge` finds the cause; sentences are made
-//! where they are shown.
+//! Lost deadlines: the cycle, its stages, and who was late, as facts. `judge` finds the cause; the command line and
+//! the report make the sentences.
 
 mod judge;
 

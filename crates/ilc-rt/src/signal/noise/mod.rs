@@ -1,6 +1,6 @@
 //! White noise, the same numbers bit by bit as NumPy draws for the same seed.
 //!
-//! What many plants learn in compiled code can so be repeated, case by case, in Python. Every cold module may import it.
+//! Each plant of a batch can therefore be repeated in Python. Every cold module may import it.
 
 mod ziggurat;
 
