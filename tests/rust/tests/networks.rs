@@ -156,6 +156,27 @@ fn a_drive_killed_between_its_answers_is_silent() {
     }
 }
 
+#[test]
+fn of_drives_that_die_together_the_one_that_answered_in_part_is_silent() {
+    let cell = short(CELLS[0]);
+    for (last, axis) in [(1, 0), (2, 1)] {
+        for phase in [PhaseName::Enabling, PhaseName::Settling, PhaseName::Running] {
+            let mut rig = Rig::new(&cell, 2);
+            rig.tick_until(|rig| rig.phase.0 == phase && rig.tap.line().n_syncs() > 2);
+            let mut are_dead = false;
+            rig.tap.line().distort(Box::new(move |_, frame, out: &mut VecDeque<Frame>| {
+                if !are_dead {
+                    out.push_back(frame);
+                }
+                are_dead |= StatusTpdo1::decode(&frame, node(last)).is_some();
+            }));
+            rig.tick_to_end();
+            let silent = Some(StopReason::SilentAxis { axis, cycles: 1 });
+            assert_eq!(rig.reason, silent, "{phase:?} {last}");
+        }
+    }
+}
+
 /// Two buses between controller and machine: the first drive and the tool on one, the second drive on the
 /// other.
 fn two_buses(mut ends: impl FnMut() -> (Box<dyn Bus>, Box<dyn Bus>)) -> (Group, Group) {

@@ -16,7 +16,8 @@ const OLD_CYCLES: u64 = 2;
 const TOOL_BYTES: u8 = 8;
 
 impl Cycle {
-    /// Returns the first part that has been silent for too long, each one once.
+    /// Returns the first part that has been silent for too long, each one once; during a stop, rather one
+    /// that explains it.
     pub(super) fn find_silence(&mut self) -> Option<StopReason> {
         // Paced by answers, the wait is already over: one unanswered SYNC is silence.
         let max = match self.spec.pace {
@@ -30,7 +31,10 @@ impl Cycle {
                 if silence <= max || self.pending.is_given_up(part) {
                     continue;
                 }
-                found = found.or(Some(self.silent_part(axis, part, silence)));
+                let silent = self.silent_part(axis, part, silence);
+                if found.is_none() || self.better_reason(silent).is_some() {
+                    found = Some(silent);
+                }
                 self.pending.give_up(part);
                 if part == Part::Status(axis) {
                     // Its state is unknown, so it can only be commanded to stop.
