@@ -26,7 +26,8 @@ pub(super) struct ArcLength {
     knots: Vec<(f64, f64)>,
 }
 
-fn length(curve: &impl Curve, from: f64, to: f64) -> f64 {
+/// Returns the length between two parameters within one interval.
+pub(super) fn length(curve: &impl Curve, from: f64, to: f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let speed = |parameter: f64| norm(&curve.at(parameter)[1]);
     GAUSS
@@ -68,6 +69,11 @@ impl ArcLength {
 
     pub(super) fn total_m(&self) -> f64 {
         self.knots.last().map_or(0.0, |last| last.1)
+    }
+
+    /// Returns the intervals between knots, each end as parameter and arc length.
+    pub(super) fn intervals(&self) -> impl Iterator<Item = ((f64, f64), (f64, f64))> + '_ {
+        self.knots.windows(2).map(|pair| (pair[0], pair[1]))
     }
 
     /// Returns the parameter at a distance from the start.

@@ -1,5 +1,7 @@
 //! Excesses of a planned run over its limits, tick by tick, and the slow-down that removes them.
 
+use std::collections::BTreeMap;
+
 use super::frame::{Frame, norm};
 use super::speed::RunLimits;
 use super::time_law::Tick;
@@ -22,19 +24,23 @@ pub(super) struct Excess {
     pub(super) quantity: Quantity,
 }
 
-/// Returns the worst violation at every tick of its share of the limits.
+/// Excesses by tick, in order: few, even in a run of millions of ticks.
+pub(super) type Excesses = BTreeMap<usize, Excess>;
+
+/// Returns the worst violations of a share of the limits; the frames are those of the ticks.
 pub(super) fn of_ticks(
     ticks: &[Tick],
-    frames: &[Frame],
+    frames: impl Iterator<Item = Frame>,
     limits: &RunLimits,
     kept: f64,
-) -> Vec<Option<Excess>> {
+) -> Excesses {
     let mut before_j = 0.0;
     let quantities = [Quantity::Velocity, Quantity::Acceleration, Quantity::Jerk];
     ticks
         .iter()
         .zip(frames)
-        .map(|(tick, frame)| {
+        .enumerate()
+        .filter_map(|(row, (tick, frame))| {
             let mut worst: Option<Excess> = None;
             let mut note = |reached: f64, limit: f64, order: usize, axis: usize| {
                 let ratio = reached / limit;
@@ -55,14 +61,14 @@ pub(super) fn of_ticks(
             let across = tick.v * tick.v * norm(&frame.bend);
             note(across, limits.curvature_acceleration_max_m_s2, 1, 0);
             before_j = tick.j;
-            worst
+            worst.map(|worst| (row, worst))
         })
         .collect()
 }
 
-/// Returns the worst violation of the set points at every tick, by their differences.
-pub(super) fn of_set_points(motion: &SampledMotion, limits: &[AxisLimits]) -> Vec<Option<Excess>> {
-    let mut found: Vec<Option<Excess>> = vec![None; motion.n_samples()];
+/// Returns the worst violations by the set points, from their differences.
+pub(super) fn of_set_points(motion: &SampledMotion, limits: &[AxisLimits]) -> Excesses {
+    let mut found = Excesses::new();
     let last = motion.n_samples() - 1;
     let rows = &motion.position_m;
     Verification::of_motion(rows, limits, motion.dt_s).each_excess(rows, |excess| {
@@ -78,9 +84,9 @@ pub(super) fn of_set_points(motion: &SampledMotion, limits: &[AxisLimits]) -> Ve
             axis: excess.axis,
             quantity: excess.quantity,
         };
-        let here = &mut found[excess.row.min(last)];
-        if here.is_none_or(|here| worst.slower < here.slower) {
-            *here = Some(worst);
+        let here = found.entry(excess.row.min(last)).or_insert(worst);
+        if worst.slower < here.slower {
+            *here = worst;
         }
         true
     });
@@ -91,7 +97,7 @@ pub(super) fn of_set_points(motion: &SampledMotion, limits: &[AxisLimits]) -> Ve
 pub(super) fn slow_down(
     speed: &mut [f64],
     ticks: &[Tick],
-    found: &[Option<Excess>],
+    found: &Excesses,
     step_m: f64,
     window: usize,
 ) {
@@ -102,8 +108,7 @@ pub(super) fn slow_down(
         reason = "places on the curve"
     )]
     let place = |s_m: f64| ((s_m / step_m).max(0.0) as usize).min(speed.len() - 1);
-    for (k, worst) in found.iter().enumerate() {
-        let Some(worst) = worst else { continue };
+    for (&k, worst) in found {
         let from = place(ticks[k.saturating_sub(window)].s);
         let to = place(ticks[(k + window).min(ticks.len() - 1)].s + step_m);
         for factor in &mut factor[from..=to] {

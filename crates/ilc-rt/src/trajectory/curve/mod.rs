@@ -7,6 +7,7 @@ mod arc_length;
 mod butterfly;
 mod excess;
 mod frame;
+mod inverse;
 mod run;
 mod speed;
 mod spiral;

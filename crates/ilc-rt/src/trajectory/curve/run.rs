@@ -4,6 +4,7 @@ use super::Curve;
 use super::arc_length::ArcLength;
 use super::excess::{Excess, KEPT, SOUGHT, of_set_points, of_ticks, slow_down};
 use super::frame::{Frame, norm};
+use super::inverse::Inverse;
 use super::speed::{JERK_SHARE, RunLimits, SHARE, launch_speeds};
 use super::time_law::{Tick, TimeLaw};
 use super::turn::{Piece, pieces};
@@ -124,6 +125,7 @@ fn plan_piece<C: Curve>(
 ) -> Result<(SampledMotion, f64), TrajectoryError> {
     let measured = ArcLength::new(piece)?;
     let length_m = measured.total_m();
+    let table = Inverse::new(piece, &measured);
     let n_places = places(length_m, limits.feed_m_s, dt_s);
     let step_m = length_m / (n_places - 1) as f64;
     // In a turn the direction of the curve is undefined: that of a nearby point is used.
@@ -134,10 +136,10 @@ fn plan_piece<C: Curve>(
             [_, true] if s_m > high_m => high_m,
             _ => s_m,
         };
-        let here = curve_at(piece, &measured, inside_m);
+        let here = piece.at(table.parameter(inside_m));
         let mut frame = Frame::new(here);
         if (inside_m - s_m).abs() > 0.0 {
-            frame.point_m = curve_at(piece, &measured, s_m)[0];
+            frame.point_m = piece.at(table.parameter(s_m))[0];
         }
         frame
     };
@@ -184,26 +186,29 @@ fn plan_piece<C: Curve>(
         };
         n_ticks(law.swept_s() + 2.0 * window as f64 * dt_s, dt_s)?;
         let ticks = law.ticks();
-        let near: Vec<Frame> =
-            ticks.iter().map(|tick| Frame::between(&frames, tick.s / step_m)).collect();
-        let mut found = of_ticks(&ticks, &near, limits, SOUGHT);
-        if found.iter().all(Option::is_none) {
-            let exact: Vec<Frame> =
-                ticks.iter().map(|tick| frame(tick.s, EDGE_SHARE * step_m)).collect();
-            found = of_ticks(&ticks, &exact, limits, KEPT);
-            if found.iter().all(Option::is_none) {
-                let motion = sampled(&ticks, &exact, piece.n_axes(), dt_s);
+        // A frame is large: one at a time, as there may be millions of ticks.
+        let near = ticks.iter().map(|tick| Frame::between(&frames, tick.s / step_m));
+        let mut found = of_ticks(&ticks, near, limits, SOUGHT);
+        if found.is_empty() {
+            let mut motion = SampledMotion { dt_s, n_axes: piece.n_axes(), ..Default::default() };
+            let exact = ticks.iter().map(|tick| {
+                let frame = frame(tick.s, EDGE_SHARE * step_m);
+                push(&mut motion, tick, &frame);
+                frame
+            });
+            found = of_ticks(&ticks, exact, limits, KEPT);
+            if found.is_empty() {
+                motion.programmed_m.clone_from(&motion.position_m);
                 found = of_set_points(&motion, &limits.axes);
-                if found.iter().all(Option::is_none) {
+                if found.is_empty() {
                     return Ok((motion, length_m));
                 }
             }
         }
         worst = None;
-        for (tick, next) in ticks.iter().zip(&found) {
-            let Some(next) = next else { continue };
+        for (&row, next) in &found {
             if worst.is_none_or(|(most, _)| next.slower < most.slower) {
-                worst = Some((*next, before_m + tick.s));
+                worst = Some((*next, before_m + ticks[row].s));
             }
         }
         let Some((most, _)) = worst else { continue };
@@ -226,11 +231,6 @@ fn plan_piece<C: Curve>(
     }))
 }
 
-/// Returns the derivatives at a distance from the start.
-fn curve_at(curve: &impl Curve, measured: &ArcLength, s_m: f64) -> super::Derivatives {
-    curve.at(measured.parameter(curve, s_m))
-}
-
 /// A few points per tick of the feed, within bounds.
 #[expect(
     clippy::cast_possible_truncation,
@@ -250,18 +250,15 @@ fn ticks_at_least(ticks: f64) -> usize {
     ticks.ceil().clamp(1.0, 1e7) as usize
 }
 
-fn sampled(ticks: &[Tick], frames: &[Frame], n_axes: usize, dt_s: f64) -> SampledMotion {
-    let mut motion = SampledMotion { dt_s, n_axes, ..SampledMotion::default() };
-    for (tick, frame) in ticks.iter().zip(frames) {
-        let mut state = MotionState::at_rest(frame.point_m);
-        for axis in 0..n_axes {
-            [state.velocity_m_s[axis], state.acceleration_m_s2[axis], state.jerk_m_s3[axis]] =
-                frame.axis(axis, tick.v, tick.a, tick.j);
-        }
-        motion.position_m.extend_from_slice(&state.position_m[..n_axes]);
-        motion.velocity_m_s.extend_from_slice(&state.velocity_m_s[..n_axes]);
-        motion.acceleration_m_s2.extend_from_slice(&state.acceleration_m_s2[..n_axes]);
+/// Appends the set point of a tick, without its programmed position.
+fn push(motion: &mut SampledMotion, tick: &Tick, frame: &Frame) {
+    let n_axes = motion.n_axes;
+    let mut state = MotionState::at_rest(frame.point_m);
+    for axis in 0..n_axes {
+        [state.velocity_m_s[axis], state.acceleration_m_s2[axis], state.jerk_m_s3[axis]] =
+            frame.axis(axis, tick.v, tick.a, tick.j);
     }
-    motion.programmed_m = motion.position_m.clone();
-    motion
+    motion.position_m.extend_from_slice(&state.position_m[..n_axes]);
+    motion.velocity_m_s.extend_from_slice(&state.velocity_m_s[..n_axes]);
+    motion.acceleration_m_s2.extend_from_slice(&state.acceleration_m_s2[..n_axes]);
 }
