@@ -20,7 +20,7 @@ JOBS    := $(shell expr 2 \* $$(nproc))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build derived underived demo gallery test test-here test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
+.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -71,13 +71,9 @@ gallery: build ## The papers, computed again: docs/gallery, pages and figures
 	mkdir -p docs/gallery
 	$(BIN)/ilc reproduce all --json docs/gallery/figures.json --report docs/gallery
 
-# The emulated machine of `make vcan` has one processor and waits a lot: it runs beside the other tests.
+# Every part waits a lot: they fill each other's gaps.
 test: $(VENV)/.test $(VENV)/.docs ## Everything that can fail, on every transport
-	+$(MAKE) --no-print-directory --jobs 2 test-here vcan
-
-test-here:
-	+$(MAKE) --no-print-directory test-rust
-	+$(MAKE) --no-print-directory test-python
+	+$(MAKE) --no-print-directory --jobs 3 test-rust test-python vcan
 
 test-rust: ## Rust tests
 ifeq ($(NEXTEST),yes)

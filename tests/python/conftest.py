@@ -30,12 +30,26 @@ settings.register_profile("fuzz", deadline=None, database=None, print_blob=True)
 settings.load_profile("fuzz" if "ILC_FUZZ_SEED" in os.environ else "fixed")
 
 
+# The workers and hundreds of processes share the processors: threads of NumPy's library only cost.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 def pytest_sessionstart() -> None:
     """Restore the signal handlers that a background job or nohup inherits as ignored."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Refuse to share costly fixtures out among the workers: each would make its own."""
+    if not getattr(session.config.option, "loadgroup", False):
+        return
+    for item in session.items:
+        if item.get_closest_marker("xdist_group") and "@" not in item.nodeid:
+            message = f"pytest-xdist does not group tests with pytest {pytest.__version__}"
+            raise pytest.UsageError(message)
 
 
 @pytest.fixture(scope="session")
