@@ -6,7 +6,6 @@ No figure depends on concurrent computations. Only the command imports it.
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -15,6 +14,7 @@ from ilc_papers.outcome import Outcome, compute
 from ilc_papers.paper import Paper
 from ilc_papers.papers import load
 from ilc_rt.errors import CampaignError
+from ilc_rt.workers import without_ctrl_c
 
 if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
@@ -48,7 +48,8 @@ def compute_side_by_side(
     try:
         while waiting or running:
             while waiting and len(running) < AT_ONCE:
-                running.append(_start(waiting.pop(0), load_paper, reduced=reduced))
+                with without_ctrl_c():
+                    running.append(_start(waiting.pop(0), load_paper, reduced=reduced))
             ready = cast("list[Connection]", wait([worker.messages for worker in running]))
             for worker in [worker for worker in running if worker.messages in ready]:
                 kind, content = _receive(worker)
@@ -77,13 +78,7 @@ def _start(name: str, load_paper: _Load, *, reduced: bool) -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_work, args=(name, load_paper, reduced, theirs))
-    # The terminal interrupts the whole group; this process answers for all. Blocked before it is
-    # born, a worker is not interrupted while it is still importing, either.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        process.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    process.start()
     theirs.close()
     return _Worker(name, process, ours)
 

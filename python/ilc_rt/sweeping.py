@@ -8,7 +8,8 @@ import json
 import os
 import re
 from collections.abc import Mapping
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from ilc_rt.errors import BadInputError, SweepError
 from ilc_rt.sweep_result import SweepResult
+from ilc_rt.workers import without_ctrl_c
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -352,11 +354,13 @@ def _parallel(
     function: Callable[..., Any], every: list[dict[str, Any]], todo: list[int], executor: Executor,
     seed: int, offered: tuple[str, ...], keep: Callable[[int, object], None],
 ) -> None:  # fmt: skip
-    futures = {
-        executor.submit(_call, function, every[number], number, seed, offered): number
-        for number in todo
-    }
+    futures: dict[Future[object], int] = {}
     try:
+        starting = without_ctrl_c if isinstance(executor, ProcessPoolExecutor) else nullcontext
+        for number in todo:
+            with starting():
+                future = executor.submit(_call, function, every[number], number, seed, offered)
+                futures[future] = number
         for future in as_completed(futures):
             keep(futures[future], future.result())
     finally:

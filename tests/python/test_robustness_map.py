@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
-from typing import TYPE_CHECKING
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ilc_rt import BadInputError, Campaign
 from ilc_rt.cell_sweep import RobustnessMap, Variation, parse_variation, robustness_map
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from ilc_rt.errors import EXIT_INTERRUPTED
 
 pytestmark = pytest.mark.xdist_group("robustness map")
 
@@ -131,3 +133,22 @@ def test_whole_numbers_stay_whole_and_pictures_take_axes(found: RobustnessMap) -
     assert [one.get_xscale() for one in axes] == ["log", "linear", "log"]
     with pytest.raises(ValueError, match="3 are needed"):
         found.plot(axes[:1])
+
+
+def test_ctrl_c_leaves_no_process_and_no_trace(gantry: Path, tmp_path: Path) -> None:
+    """The terminal interrupts the whole group, while the workers are still importing."""
+    command = [
+        sys.executable, "-m", "ilc_rt.cli", "sweep", str(gantry), "--vary", MASS,
+        "--samples", "1000", "--executor", "processes:2", "--file", "kept.jsonl",
+    ]  # fmt: skip
+    process = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    # The two workers, and the tracker of their resources.
+    while len(children.read_text(encoding="utf-8").split()) < 3:
+        assert process.poll() is None
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=60.0)
+    assert (process.returncode, *said) == (EXIT_INTERRUPTED, "", "")

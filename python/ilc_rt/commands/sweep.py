@@ -127,7 +127,9 @@ def _executor(where: str, stack: ExitStack) -> Executor | None:
 
         # A fork would copy threads of this process half-way through their work.
         pool = ProcessPoolExecutor(int(rest) if rest else None, mp_context=get_context("spawn"))
-        return stack.enter_context(pool)
+        # After Ctrl-C the cases that wait are not begun.
+        stack.callback(pool.shutdown, cancel_futures=True)
+        return pool
     if kind == "dask" and rest:
         try:
             from distributed import Client
