@@ -73,7 +73,7 @@ gallery: build ## The papers, computed again: docs/gallery, pages and figures
 
 # Every part waits a lot: they fill each other's gaps.
 test: $(VENV)/.test $(VENV)/.docs ## Everything that can fail, on every transport
-	+$(MAKE) --no-print-directory --jobs 3 test-rust test-python vcan
+	+$(MAKE) --no-print-directory --jobs 3 --keep-going test-rust test-python vcan
 
 test-rust: ## Rust tests
 ifeq ($(NEXTEST),yes)
