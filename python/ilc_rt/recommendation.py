@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ilc_rt.recommended import KINDS, Reason, Recommendation, Refused
 from ilc_rt.signal import butterworth
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
@@ -120,6 +121,9 @@ def recommend(
     if disturbance_std is not None and not 0.0 < disturbance_std < np.inf:
         message = f"disturbance_std = {disturbance_std}: a finite number above 0 is needed"
         raise LearningError(message)
+    if bounds is not None and not isinstance(bounds, Mapping):
+        message = f"bounds = {bounds!r}: a mapping of keywords of ConstrainedIlc is needed"
+        raise TypeError(message)
     if model is None:
         return _without_model(bandwidth_hz, delay_samples, dt_s, n_axes)
     facts = learning_facts(model, uncertainty)

@@ -35,10 +35,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 MEMORY_MAX = 6 << 30
 SILENCE_MAX_S = 60.0
 ALLOWED = (ValueError, TypeError, MemoryError, OSError, CampaignError, SweepError)
-# Runs machines, or writes files to a given place.
+# Runs machines, writes files to a given place, or is a result, which holds what it was given.
 SKIPPED = {"Campaign", "Law", "CampaignResult", "TrialResult", "ManyResult", "IterationRecord",
            "Experiment", "Identification", "to_parquet", "swept_sine", "Library",
-           "Cell"}  # fmt: skip
+           "Cell", "Recommendation"}  # fmt: skip
 # Figures that may be infinite by definition: unbounded growth, no limit, the deviation of a
 # parameter that the measurement does not determine. `parameters` are as given.
 UNBOUNDED = {"bandwidth_deviation_hz", "gain_deviation", "delay_deviation_s", "damping_deviation",

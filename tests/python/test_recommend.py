@@ -273,3 +273,9 @@ def test_what_cannot_be_recommended_is_named(arguments: dict[str, Any], words: s
     given = {"model": axis(), "n_samples": N, **arguments}
     with pytest.raises(LearningError, match=words):
         recommend(given.pop("model"), **given)
+
+
+def test_bounds_that_are_no_mapping_are_refused() -> None:
+    for bounds in (len, [("input_max", 1.0)], 0.5, "input_max"):
+        with pytest.raises(TypeError, match="a mapping of keywords of ConstrainedIlc"):
+            recommend(axis(), N, bounds=bounds)  # type: ignore[arg-type]
