@@ -33,6 +33,7 @@ __all__ = [
     "_made",
     "_made_of_kind",
     "analyze",
+    "band_filter",
     "butterfly",
     "check_options",
     "check_relevance_weights",
@@ -356,6 +357,7 @@ def contour_weights(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
 def coupled_weights(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
 def formation_weights(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
 def formation_errors(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
+def band_filter(**keywords: Any) -> StateSpace: ...  # noqa: ANN401
 def schedule(**keywords: Any) -> NDArray[np.float64]: ...  # noqa: ANN401
 def analyze(**keywords: Any) -> dict[str, Any]: ...  # noqa: ANN401
 def refuse_divergent(**keywords: Any) -> None: ...  # noqa: ANN401

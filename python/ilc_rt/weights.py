@@ -1,4 +1,4 @@
-"""Weights of norm-optimal learning along the run, by their meaning."""
+"""Weights of norm-optimal learning along the run and by frequency, by their meaning."""
 
 from __future__ import annotations
 
@@ -12,7 +12,17 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["contour", "coupled", "formation", "formation_errors", "schedule"]
+    from ilc_rt._native import StateSpace
+
+__all__ = [
+    "contour",
+    "coupled",
+    "formation",
+    "formation_errors",
+    "high_pass",
+    "low_pass",
+    "schedule",
+]
 
 
 def contour(
@@ -273,3 +283,77 @@ def formation_errors(
     [[3.0, 4.0]]
     """
     return _native.formation_errors(e=e, n_agents=n_agents, pairs=pairs, axes=axes)
+
+
+def high_pass(order: int, cutoff_hz: float, dt_s: float, n_channels: int = 1) -> StateSpace:
+    """Return a causal Butterworth high-pass as a model, for weights by frequency.
+
+    Parameters
+    ----------
+    order : int
+        Order, 1 to 12.
+    cutoff_hz : float
+        Cut-off frequency in Hz, where the gain is 1/sqrt(2).
+    dt_s : float
+        Sample time in seconds.
+    n_channels : int
+        Channels, all filtered alike.
+
+    Returns
+    -------
+    StateSpace
+        Filter with n_channels inputs and outputs, for `input_filter` or `change_filter` of
+        `NormOptimalIlc.dynamic`.
+
+    Raises
+    ------
+    SignalError
+        If the design fails for this order, cut-off or sample time.
+    LearningError
+        If n_channels is not 1 to 100.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from ilc_rt import weights
+    >>> high = weights.high_pass(2, 40.0, 0.002)
+    >>> w = 2 * np.pi * np.array([4.0, 40.0, 200.0])
+    >>> np.abs(high.frequency_response(w)).reshape(-1).round(3).tolist()
+    [0.009, 0.707, 0.999]
+    """
+    return _native.band_filter(passes="high", **locals())
+
+
+def low_pass(order: int, cutoff_hz: float, dt_s: float, n_channels: int = 1) -> StateSpace:
+    """Return a causal Butterworth low-pass as a model, for weights by frequency.
+
+    Parameters
+    ----------
+    order : int
+        Order, 1 to 12.
+    cutoff_hz : float
+        Cut-off frequency in Hz, where the gain is 1/sqrt(2).
+    dt_s : float
+        Sample time in seconds.
+    n_channels : int
+        Channels, all filtered alike.
+
+    Returns
+    -------
+    StateSpace
+        Filter with n_channels inputs and outputs, for `filter` of `NormOptimalIlc.dynamic`.
+
+    Raises
+    ------
+    SignalError
+        If the design fails for this order, cut-off or sample time.
+    LearningError
+        If n_channels is not 1 to 100.
+
+    Examples
+    --------
+    >>> from ilc_rt import weights
+    >>> weights.low_pass(3, 40.0, 0.002, n_channels=2)
+    StateSpace(n_states=8, n_inputs=2, n_outputs=2, dt_s=0.002)
+    """
+    return _native.band_filter(passes="low", **locals())

@@ -14,7 +14,7 @@ import pytest
 from classes_fixture import EXAMPLES, MODULES, N, axis, both, line, updated
 
 import ilc_rt
-from ilc_rt import Campaign, Gate, Library, NormOptimalIlc, PdIlc
+from ilc_rt import Campaign, Gate, Library, NormOptimalIlc, PdIlc, weights
 
 # Not values: a connection to a file, an interface, a running controller or experiment.
 OTHERS = {Library, ilc_rt.Law, ilc_rt.signal.Filter, Campaign, ilc_rt.Experiment}
@@ -102,8 +102,11 @@ def test_copies_are_what_they_are_copies_of(kind):
             [axis(), axis()], N, tracking=0.4, r=0.01, leaders=[0], pairs=[(0, 1)]
         ),
         lambda: NormOptimalIlc.dynamic(both(), N, both(), r=0.1),
+        lambda: NormOptimalIlc.dynamic(
+            both(), N, input_filter=weights.high_pass(2, 40.0, 0.002, 2), input_weight=0.5
+        ),
     ],
-    ids=["contour", "formation", "dynamic"],
+    ids=["contour", "formation", "dynamic", "filtered input"],
 )
 def test_laws_made_by_a_builder_are_copied_by_it(law):
     expected = updated(law(), 2)

@@ -21,6 +21,7 @@ from ilc_rt import (
     from_transfer_function,
     second_order,
     simulate,
+    weights,
 )
 from ilc_rt.laws import HigherOrderIlc, ModelFreeIlc, PointToPointIlc, StableInverseIlc
 
@@ -68,6 +69,25 @@ def test_dynamic_weight() -> None:
     expected = np.linalg.solve(P.T @ weight @ P + 0.1 * EYE, 0.1 * EYE + P.T @ weight @ (P - P0))
     law = NormOptimalIlc.dynamic(MODEL, N, low_pass, q=2.0, plain=0.05, r=0.1)
     np.testing.assert_allclose(iteration(law), expected, rtol=0, atol=1e-9)
+
+
+def test_dynamic_weights_of_the_input() -> None:
+    """``T = H^-1 (r + F_v'F_v + P'(P - P0))``, ``H = P'P + F_u'F_u + r + F_v'F_v``."""
+    high, low = weights.high_pass(2, 24.0, DT_S), weights.low_pass(1, 24.0, DT_S)
+    f_u, f_v = 0.5 * high.lifted(N), low.lifted(N)
+    change = 0.01 * EYE + f_v.T @ f_v
+    hessian = P.T @ P + f_u.T @ f_u + change
+    expected = np.linalg.solve(hessian, change + P.T @ (P - P0))
+    law = NormOptimalIlc.dynamic(
+        MODEL, N, r=0.01, input_filter=high, input_weight=0.25, change_filter=low
+    )
+    np.testing.assert_allclose(iteration(law), expected, rtol=0, atol=1e-9)
+    found = analyze(law, PLANT)
+    assert found.spectral_radius == pytest.approx(np.abs(np.linalg.eigvals(expected)).max(), 1e-6)
+    assert found.monotonic_factor == pytest.approx(np.linalg.norm(expected, 2), rel=1e-6)
+    # The exact model: symmetric with respect to H, so that every factor is between 0 and 1.
+    exact = analyze(law, MODEL)
+    assert 0.0 < exact.spectral_radius < 1.0
 
 
 def test_adjoint() -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.linalg
+import scipy.signal
 
 from ilc_rt import (
     LearningError,
@@ -12,9 +14,11 @@ from ilc_rt import (
     NormOptimalIlc,
     SignalError,
     StateSpace,
+    analyze,
     discretize,
     from_transfer_function,
     second_order,
+    simulate,
     weights,
 )
 
@@ -164,6 +168,61 @@ def test_the_dynamic_law_is_the_dense_solution():
     np.testing.assert_allclose(law.update(u, e), expected, atol=1e-10)
 
 
+@pytest.mark.parametrize("n", [1, 2, 17, 60])
+@pytest.mark.parametrize("axes", [1, 2])
+def test_weights_of_filtered_input_and_change_are_the_dense_solution(n, axes):
+    """Filters designed by SciPy, lifted by their impulse responses."""
+    model = two_axes() if axes == 2 else discretize(second_order(157.0, 0.5), DT_S)
+    u, e = RNG.normal(size=(2, n, axes))
+
+    def lifted(order, cutoff_hz, kind):
+        b, a = scipy.signal.butter(order, cutoff_hz, kind, fs=1.0 / DT_S)
+        impulse = scipy.signal.lfilter(b, a, np.eye(1, n)[0])
+        return np.kron(scipy.linalg.toeplitz(impulse, np.zeros(n)), np.eye(axes))
+
+    f_e, f_u, f_v = lifted(2, 60.0, "low"), lifted(3, 80.0, "high"), lifted(2, 30.0, "high")
+    along = RNG.uniform(0.1, 2.0, n)
+    law = NormOptimalIlc.dynamic(
+        model, n, weights.low_pass(2, 60.0, DT_S, axes), q=3.0, plain=0.5, s=1e-3, r=1e-2,
+        input_filter=weights.high_pass(3, 80.0, DT_S, axes), input_weight=along,
+        change_filter=weights.high_pass(2, 30.0, DT_S, axes), change_weight=0.7,
+    )  # fmt: skip
+    p, eye = model.lifted(n), np.eye(n * axes)
+    q = 3.0 * f_e.T @ f_e + 0.5 * eye
+    held = f_u.T @ np.diag(np.repeat(along, axes)) @ f_u + 1e-3 * eye
+    h = p.T @ q @ p + held + 0.7 * f_v.T @ f_v + 1e-2 * eye
+    change = np.linalg.solve(h, p.T @ q @ e.ravel() - held @ u.ravel())
+    shape = (n,) if axes == 1 else (n, axes)
+    found = law.update(u.reshape(shape), e.reshape(shape))
+    np.testing.assert_allclose(found.ravel(), u.ravel() + change, atol=1e-9)
+
+
+def test_a_high_pass_weight_keeps_the_input_free_of_high_frequencies():
+    """The plant has a mode that the model does not: excited by the plain law, left alone."""
+    model = discretize(second_order(2 * np.pi * 25.0, 0.7), DT_S)
+    w = 2 * np.pi * 110.0
+    mode = discretize(from_transfer_function([-0.4 * w**2], [1.0, 0.02 * w, w**2]), DT_S)
+    both = model.append(mode)
+    one = StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.ones((2, 1)), DT_S)
+    total = StateSpace(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.ones((1, 2)), DT_S)
+    plant = one.series(both).series(total)
+    n = 400
+    reference = 0.01 * np.hanning(n)
+    high_pass = weights.high_pass(4, 50.0, DT_S)
+    shaped = NormOptimalIlc.dynamic(model, n, input_filter=high_pass, input_weight=4.0, r=0.01)
+    plain = NormOptimalIlc(model, n, r=0.01)
+    analysed, refused = analyze(shaped, plant), analyze(plain, plant)
+    assert analysed.converges
+    assert analysed.monotonic_factor < refused.monotonic_factor
+    assert not refused.monotonic
+    result = simulate(plant, shaped, reference, trials=12)
+    rms = result.figures()["tracking_rms_m"]
+    assert rms[-1] < 0.02 * rms[0]
+    learned = np.abs(np.fft.rfft(result.input[-1, :, 0]))
+    at_hz = np.fft.rfftfreq(n, DT_S)
+    assert learned[at_hz > 90.0].max() < 1e-3 * learned.max()
+
+
 def test_the_printed_tables_come_out_from_python_too():
     golden = json.loads(GOLDEN.read_text(encoding="utf-8"))
     feedback = StateSpace(
@@ -246,6 +305,24 @@ def test_the_printed_tables_come_out_from_python_too():
             ValueError,
             "coupling has shape",
         ),
+        (
+            lambda: NormOptimalIlc.dynamic(
+                two_axes(), 5, input_filter=weights.high_pass(1, 20.0, DT_S)
+            ),
+            LearningError,
+            "input_weight .* takes 1 signals; 2 are needed",
+        ),
+        (
+            lambda: NormOptimalIlc.dynamic(
+                two_axes(), 5, change_filter=weights.high_pass(1, 20.0, DT_S, 2), change_weight=-1.0
+            ),
+            LearningError,
+            "change_weight",
+        ),
+        (lambda: weights.high_pass(2, 250.0, DT_S), SignalError, "cutoff_hz = 250 Hz"),
+        (lambda: weights.high_pass(2, -1.0, DT_S), SignalError, "cutoff_hz = -1 Hz"),
+        (lambda: weights.low_pass(2, 20.0, DT_S, 0), LearningError, "n_channels = 0"),
+        (lambda: weights.low_pass(13, 20.0, DT_S), SignalError, "order = 13"),
         (lambda: weights.contour(path(5, 2), q=-np.eye(2)), LearningError, "semidefinite"),
         (lambda: weights.contour(path(5, 2), contour=[1, 2, 3, 4, np.inf]), ValueError, "contour"),
     ],

@@ -94,6 +94,7 @@ mod _native {
     use super::transport::transports;
     #[pymodule_export]
     use super::weights::{
-        contour_weights, coupled_weights, formation_errors, formation_weights, schedule,
+        band_filter, contour_weights, coupled_weights, formation_errors, formation_weights,
+        schedule,
     };
 }

@@ -2,7 +2,7 @@
 
 use ilc_rt::learning::LearningError;
 use ilc_rt::learning::weights::{
-    Contour, ContourTerms, Coupled, Formation, Gain, Objective, Schedule, Weight,
+    Contour, ContourTerms, Coupled, Formation, Gain, Objective, Pass, Schedule, Weight, band,
 };
 use numpy::IntoPyArray;
 use numpy::ndarray::Array3;
@@ -13,6 +13,7 @@ use crate::argument::{Matrix, give_signal, misfit, read_array};
 use crate::arguments::{Arguments, Array, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::model::PyStateSpace;
 use crate::whole::{each, number, pair, shown, whole};
 
 /// Reads a number, or one per sample.
@@ -203,4 +204,13 @@ pub(crate) fn formation_errors<'py>(keywords: Option<Keywords<'_, 'py>>) -> Arra
     let rows = formation.shape().nrows();
     let values = detached(a.py(), || formation.errors(&e.values)).or_raise()?;
     give_signal(a.py(), values, rows, false)
+}
+
+#[pyfunction(signature = (**keywords))]
+pub(crate) fn band_filter(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
+    let a = Arguments::of(keywords)?;
+    let pass = a.choice("passes", &[("low", Pass::Low), ("high", Pass::High)])?;
+    let shape = (a.whole("order")?, a.number("cutoff_hz")?);
+    let filter = band(pass, shape, a.number("dt_s")?, a.whole("n_channels")?);
+    filter.or_raise().map(PyStateSpace)
 }

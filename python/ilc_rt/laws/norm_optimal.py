@@ -200,17 +200,22 @@ class NormOptimalIlc(Law):
         cls,
         model: VaryingModel,
         n_samples: int,
-        filter: Model,
+        filter: Model | None = None,
         q: ArrayLike = 1.0,
         plain: ArrayLike | None = None,
         coupling: ArrayLike | None = None,
         s: ArrayLike = 0.0,
         r: ArrayLike = 0.0,
         rate: float = 0.0,
+        input_filter: Model | None = None,
+        input_weight: ArrayLike = 1.0,
+        change_filter: Model | None = None,
+        change_weight: ArrayLike = 1.0,
     ) -> Self:
-        """Return the law with a dynamic (frequency-dependent) weight of the error.
+        """Return the law with dynamic (frequency-dependent) weights of error, input and change.
 
-        ``sum |w|^2_q + |z|^2_plain + s |u'|^2 + r |v|^2 + ..``, ``w = F (G z)``
+        ``sum |w|^2_q + |z|^2_plain + s |u'|^2 + r |v|^2 + ..``, ``w = F (G z)``, and with filters
+        of the input ``+ |F_u u'|^2 + |F_v v|^2``, each with its weight.
 
         Parameters
         ----------
@@ -218,8 +223,9 @@ class NormOptimalIlc(Law):
             Discrete model from the learned input to the measurement.
         n_samples : int
             Samples of a run.
-        filter : StateSpace or compatible
-            Causal, stable filter F: one input per output of the model, or per row of `coupling`.
+        filter : StateSpace or compatible, optional
+            Causal, stable filter F: one input per output of the model, or per row of `coupling`; by
+            default none.
         q : float or array_like, shape (n_samples,), (f, f) or (n_samples, f, f)
             Weight of the filter's outputs.
         plain : float or array_like, optional
@@ -228,23 +234,33 @@ class NormOptimalIlc(Law):
             G: coupling of the channels before the filter at each sample, e.g. contour gains.
         s, r, rate : float or array_like
             Weights of the input, as for the law itself.
+        input_filter, change_filter : StateSpace or compatible, optional
+            Causal, stable filters F_u of the next input and F_v of its change, with one input per
+            input of the model, e.g. `ilc_rt.weights.high_pass`.
+        input_weight, change_weight : float or array_like
+            Weights of their outputs, shaped as `q`.
 
         Returns
         -------
         NormOptimalIlc
-            Law that filters each run's error before learning from it.
+            Law that filters each run's error and input before learning from them.
 
         Raises
         ------
         LearningError
-            If the filter has a pole outside the unit circle, e.g. one meant to run backward, or a
-            weight has the wrong shape.
+            If a filter has a pole outside the unit circle, e.g. one meant to run backward, or does
+            not take the inputs of the model, or a weight has the wrong shape.
         ModelError, ValueError, TypeError
-            If the filter does not match the model, and as the law itself.
+            If a filter does not match the model, and as the law itself.
+
+        Notes
+        -----
+        A high-pass weight of the input keeps it free of high frequencies, where the model is wrong;
+        the error keeps what lies there. The same weight of the change only slows learning there.
 
         References
         ----------
-        [barton2010], Eq. (J.10) to (J.23).
+        [barton2010], Eq. (J.10) to (J.23); [gupta1980]; [vanharen2024].
 
         Examples
         --------
@@ -253,6 +269,11 @@ class NormOptimalIlc(Law):
         >>> axis = discretize(second_order(157.0, 0.5), 0.002)
         >>> low_pass = from_transfer_function([0.33], [1.0, -0.67], 0.002)
         >>> law = NormOptimalIlc.dynamic(axis, 100, low_pass, r=0.01)
+        >>> law.update(np.zeros(100), np.ones(100)).shape
+        (100,)
+        >>> from ilc_rt import weights
+        >>> high_pass = weights.high_pass(2, 40.0, 0.002)
+        >>> law = NormOptimalIlc.dynamic(axis, 100, input_filter=high_pass, input_weight=4.0)
         >>> law.update(np.zeros(100), np.ones(100)).shape
         (100,)
         """

@@ -1,16 +1,16 @@
 //! Builders of norm-optimal ILC: `norm_optimal`, `contour`, `formation`, `dynamic`.
 
 use ilc_rt::learning::LearningError;
-use ilc_rt::learning::law::dynamic::DynamicNormOptimal;
+use ilc_rt::learning::law::dynamic::{DynamicNormOptimal, InputWeights};
 use ilc_rt::learning::law::norm_optimal::{Cost, NormOptimal};
-use ilc_rt::learning::weights::{Dynamic, Weight};
+use ilc_rt::learning::weights::{Dynamic, FilteredInput, Weight};
 use ilc_rt::model::StateSpace;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::figure::Figure;
 use super::{Builder, Built, Call, Fits, Readable};
-use crate::argument::misfit;
+use crate::argument::{Matrix, misfit};
 use crate::arguments::Arguments;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
@@ -56,9 +56,21 @@ pub(super) fn formation(call: &Call<'_, '_>) -> PyResult<Built> {
 pub(super) fn dynamic(call: &Call<'_, '_>) -> PyResult<Built> {
     let model = read_any_model("model", &call.arguments.get("model")?)?;
     let n_samples = call.arguments.whole("n_samples")?;
-    let filter = read_dynamic(call.arguments, n_samples)?;
+    let filter = read_dynamic(call.arguments, &model, n_samples)?;
     let q = call.arguments.weight("q", n_samples, filter.n_filtered())?;
-    build(call, &model, n_samples, q, Some(&filter))
+    let filtered = |filter: &str, weight: &str| -> PyResult<Option<FilteredInput>> {
+        if call.arguments.given(filter)?.is_none() {
+            return Ok(None);
+        }
+        let filter = call.arguments.model(filter)?;
+        let weight = call.arguments.weight(weight, n_samples, filter.n_outputs())?;
+        FilteredInput::new(filter, weight).or_raise().map(Some)
+    };
+    let inputs = InputWeights {
+        input: filtered("input_filter", "input_weight")?,
+        change: filtered("change_filter", "change_weight")?,
+    };
+    build(call, &model, n_samples, q, Some((&filter, &inputs)))
 }
 
 fn build(
@@ -66,7 +78,7 @@ fn build(
     model: &AnyModel,
     n_samples: usize,
     q: Weight,
-    filter: Option<&Dynamic>,
+    filters: Option<(&Dynamic, &InputWeights)>,
 ) -> PyResult<Built> {
     let a = call.arguments;
     let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
@@ -77,9 +89,11 @@ fn build(
     let cost = Cost { q, s, r, rate: a.number("rate")? };
     let law = interruptible(call.py(), || -> Result<Box<dyn Readable>, LearningError> {
         let plant = model.plant();
-        Ok(match filter {
+        Ok(match filters {
             None => Box::new(NormOptimal::new(plant, n_samples, cost)?),
-            Some(filter) => Box::new(DynamicNormOptimal::new(plant, n_samples, filter, cost)?),
+            Some(filters) => {
+                Box::new(DynamicNormOptimal::with_inputs(plant, n_samples, filters, cost)?)
+            }
         })
     })?;
     Ok(Built { law: law.or_raise()?, fits: Fits::Fixed(n_samples, channels) })
@@ -97,10 +111,18 @@ impl Readable for DynamicNormOptimal {
     }
 }
 
-/// Reads the filter of the error, its coupling and the weight of the unfiltered error.
-fn read_dynamic(a: Arguments<'_, '_>, n_samples: usize) -> PyResult<Dynamic> {
-    let mut dynamic = Dynamic::new(a.model("filter")?).or_raise()?;
-    if let Some(matrices) = a.maybe("coupling", read_matrices)? {
+/// Reads the filter of the error, by default none, its coupling and the weight of the unfiltered error.
+fn read_dynamic(a: Arguments<'_, '_>, model: &AnyModel, n_samples: usize) -> PyResult<Dynamic> {
+    let coupling = a.maybe("coupling", read_matrices)?;
+    let filter = if a.given("filter")?.is_some() {
+        a.model("filter")?
+    } else {
+        let size = coupling.as_ref().map_or(model.n_outputs(), |matrices| matrices[0].nrows());
+        let dt_s = model.plant().at(0).dt_s();
+        StateSpace::static_gain(Matrix::identity(size, size), dt_s).or_raise()?
+    };
+    let mut dynamic = Dynamic::new(filter).or_raise()?;
+    if let Some(matrices) = coupling {
         if matrices.len() != n_samples {
             let (rows, cols) = matrices[0].shape();
             let rule = format!("({n_samples}, rows, columns)");

@@ -1,4 +1,4 @@
-//! Design of digital Butterworth low-pass filters.
+//! Design of digital Butterworth low-pass and high-pass filters.
 
 use std::f64::consts::PI;
 
@@ -92,6 +92,37 @@ pub fn butterworth(order: usize, cutoff_hz: f64, dt_s: f64) -> Result<Vec<Sectio
     Ok(sections)
 }
 
+/// Returns a Butterworth high-pass as second-order sections.
+///
+/// The low-pass of the mirrored cut-off `1/(2T) - cutoff_hz` at `-z`: the gain at `cutoff_hz` is exactly
+/// `1/sqrt(2)`, and 1 at the Nyquist frequency.
+///
+/// # Shapes
+/// - as [`butterworth`]
+/// # Units
+/// - `cutoff_hz` in hertz, `dt_s` in seconds
+/// # Errors
+/// - as [`butterworth`], with [`SignalError::Cutoff`] for a cut-off too near the Nyquist frequency.
+/// # Source
+/// - \[oppenheim2009\], Ch. 7: transformation of frequency.
+pub fn butterworth_high_pass(
+    order: usize,
+    cutoff_hz: f64,
+    dt_s: f64,
+) -> Result<Vec<Section>, SignalError> {
+    let nyquist_hz = 0.5 / dt_s;
+    let mirrored =
+        butterworth(order, nyquist_hz - cutoff_hz, dt_s).map_err(|error| match error {
+            SignalError::Cutoff { limit_hz, .. } => SignalError::Cutoff { cutoff_hz, limit_hz },
+            SignalError::CutoffTooLow { lowest_hz, .. } => {
+                SignalError::Cutoff { cutoff_hz, limit_hz: nyquist_hz - lowest_hz }
+            }
+            other => other,
+        })?;
+    let at_minus_z = |Section { b, a }| Section { b: [b[0], -b[1], b[2]], a: [-a[0], a[1]] };
+    Ok(mirrored.into_iter().map(at_minus_z).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,6 +163,26 @@ mod tests {
         }
         for (cutoff_hz, dt_s) in [(1.0, 1e-320), (1e300, 1e-310), (1.0, 1e300), (f64::NAN, 1e-3)] {
             assert!(butterworth(2, cutoff_hz, dt_s).is_err(), "{cutoff_hz} {dt_s}");
+        }
+    }
+
+    #[test]
+    fn a_high_pass_has_the_gains_of_an_analogue_one_at_warped_frequencies() {
+        let dt_s = 2e-3;
+        for order in 1..=MAX_ORDER {
+            for cutoff_hz in [5.0_f64, 50.0, 180.0] {
+                let sections = butterworth_high_pass(order, cutoff_hz, dt_s).unwrap();
+                for frequency_hz in [0.0_f64, 3.0, cutoff_hz, 90.0, 240.0] {
+                    let ratio = (PI * cutoff_hz * dt_s).tan() / (PI * frequency_hz * dt_s).tan();
+                    let expected = (1.0 + ratio.powi(2 * order as i32)).sqrt().recip();
+                    let found = gain_at(&sections, frequency_hz, dt_s);
+                    assert!((found - expected).abs() < 1e-9, "{order} {cutoff_hz} {frequency_hz}");
+                }
+            }
+        }
+        for cutoff_hz in [0.0, -1.0, 250.0, 249.999_999, f64::NAN] {
+            let line = butterworth_high_pass(3, cutoff_hz, dt_s).unwrap_err().to_string();
+            assert!(line.contains(&format!("cutoff_hz = {cutoff_hz} Hz")), "{line}");
         }
     }
 

@@ -1,6 +1,6 @@
 //! Filters, the instantaneous frequency of a signal, and white noise.
 //!
-//! Butterworth low-pass as second-order sections, causal, zero-phase or switched along the run;
+//! Butterworth low-pass and high-pass as second-order sections; low-passes causal, zero-phase or switched along the run;
 //! Gaussian and symmetric FIR smoothers. Filters are designed at set-up and run without allocation.
 //! This folder knows nothing of axes or learning; every other module may import it, hot ones only
 //! [`SosFilter`].
@@ -18,7 +18,7 @@ mod switched;
 mod symmetric;
 mod zero_phase;
 
-pub use butterworth::{MAX_ORDER, butterworth};
+pub use butterworth::{MAX_ORDER, butterworth, butterworth_high_pass};
 pub use error::SignalError;
 pub use fir::FirFilter;
 pub use gaussian::GaussianFilter;

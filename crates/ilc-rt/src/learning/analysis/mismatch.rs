@@ -12,14 +12,14 @@ use crate::learning::gate::{Gate, GateRule};
 use crate::learning::ladder::{Ladder, LadderRule};
 use crate::learning::law::adjoint::Adjoint;
 use crate::learning::law::constrained::{Bound, Bounds, Constrained};
-use crate::learning::law::dynamic::DynamicNormOptimal;
+use crate::learning::law::dynamic::{DynamicNormOptimal, InputWeights};
 use crate::learning::law::error_feedforward::{ErrorFeedforward, Feedforward};
 use crate::learning::law::model_inverse::ModelInverse;
 use crate::learning::law::norm_optimal::{Cost, NormOptimal, Weights};
 use crate::learning::law::pd::{Pd, PdGains};
 use crate::learning::law::q_filter::QFilter;
 use crate::learning::law::through_jacobian::ThroughJacobian;
-use crate::learning::weights::{Dynamic, Weight};
+use crate::learning::weights::{Dynamic, FilteredInput, Pass, Weight, band};
 use crate::learning::{Law, Result, Surrogate};
 use crate::model::{Method as Hold, StateSpace, TimeVarying, discretize, second_order};
 use crate::signal::{FirFilter, GaussianFilter, Segment, SwitchedFilter, butterworth};
@@ -93,6 +93,7 @@ fn laws(model: &StateSpace, n: usize) -> Vec<(&'static str, Box<dyn Law>)> {
             "dynamic",
             Box::new(DynamicNormOptimal::new(model, n, &weighing, w(1.0, 0.02, 0.3, 0.0)).unwrap()),
         ),
+        ("dynamic, of input and change", filtered_inputs(model, n)),
         ("bounded", Box::new(Constrained::new(model, n, w(1.0, 0.02, 0.4, 0.0), bounds).unwrap())),
         (
             "gate and ladder",
@@ -141,6 +142,19 @@ fn laws(model: &StateSpace, n: usize) -> Vec<(&'static str, Box<dyn Law>)> {
         ),
         ("silent", Box::new(Silent(optimal(w(1.0, 0.05, 0.5, 0.0).into())))),
     ]
+}
+
+/// A low-pass weight of the error, a high-pass weight of the input and another one of its change.
+fn filtered_inputs(model: &StateSpace, n: usize) -> Box<dyn Law> {
+    let n_axes = model.n_inputs();
+    let high = |hz: f64, weight: f64| {
+        let filter = band(Pass::High, (2, hz), DT_S, n_axes).unwrap();
+        Some(FilteredInput::new(filter, Weight::Scalar(weight)).unwrap())
+    };
+    let error = Dynamic::new(band(Pass::Low, (1, 120.0), DT_S, n_axes).unwrap()).unwrap();
+    let inputs = InputWeights { input: high(60.0, 0.2), change: high(25.0, 0.7) };
+    let weights = Weights { q: 1.0, s: 0.01, r: 0.05, rate: 0.4 };
+    Box::new(DynamicNormOptimal::with_inputs(model, n, (&error, &inputs), weights).unwrap())
 }
 
 /// Axes that differ from the model: gain, sign, frequency and damping, delay.
@@ -300,8 +314,9 @@ fn coupled_axes_that_the_law_takes_for_separate_ones_are_seen() {
     for n in [90, 330] {
         let w = Weights { q: 1.0, s: 0.02, r: 0.1, rate: 0.5 };
         let coupled = Cost { q: Weight::Block(block.clone()), ..w.into() };
-        let laws: [Box<dyn Law>; 4] = [
+        let laws: [Box<dyn Law>; 5] = [
             Box::new(NormOptimal::new(&model, n, w).unwrap()),
+            filtered_inputs(&model, n),
             Box::new(NormOptimal::new(&model, n, coupled).unwrap()),
             Box::new(Adjoint::new(&model, n, None, QFilter::None).unwrap()),
             Box::new(

@@ -31,6 +31,28 @@ pub struct Dynamic {
     plain: Option<Weight>,
 }
 
+/// Refuses a filter that is continuous, unstable or without signals.
+pub(super) fn check_filter(filter: &StateSpace) -> Result {
+    if filter.n_inputs() == 0 {
+        return Err(LearningError::Empty { what: "inputs of the filter" });
+    }
+    if filter.n_outputs() == 0 {
+        return Err(LearningError::Empty { what: "outputs of the filter" });
+    }
+    filter.markov(1)?;
+    let largest = filter.poles()?.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    if largest > STABLE {
+        return Err(LearningError::Parameter {
+            what: "largest pole of the filter",
+            value: largest,
+            allowed: "a dynamic weight is causal and stable, with all poles within the unit \
+                      circle; for a filter that runs backwards take the causal one of the \
+                      same magnitude",
+        });
+    }
+    Ok(())
+}
+
 impl Dynamic {
     /// Creates a weight of a filter's output.
     ///
@@ -40,23 +62,7 @@ impl Dynamic {
     ///   meant to run backward.
     /// - [`LearningError::Empty`] for a filter without inputs or outputs.
     pub fn new(filter: StateSpace) -> Result<Self> {
-        if filter.n_inputs() == 0 {
-            return Err(LearningError::Empty { what: "inputs of the filter" });
-        }
-        if filter.n_outputs() == 0 {
-            return Err(LearningError::Empty { what: "outputs of the filter" });
-        }
-        filter.markov(1)?;
-        let largest = filter.poles()?.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
-        if largest > STABLE {
-            return Err(LearningError::Parameter {
-                what: "largest pole of the filter",
-                value: largest,
-                allowed: "a dynamic weight is causal and stable, with all poles within the unit \
-                          circle; for a filter that runs backwards take the causal one of the \
-                          same magnitude",
-            });
-        }
+        check_filter(&filter)?;
         Ok(Self { filter, coupling: Vec::new(), plain: None })
     }
 
@@ -182,16 +188,7 @@ impl Dynamic {
             return Ok(q.clone());
         };
         plain.check("plain", n_samples, p)?;
-        let at = |k: usize| {
-            let mut block = DMatrix::zeros(p + f, p + f);
-            block.view_mut((0, 0), (p, p)).copy_from(&plain.at(k, p));
-            block.view_mut((p, p), (f, f)).copy_from(&q.at(k, f));
-            block
-        };
-        if plain.is_constant() && q.is_constant() {
-            return Ok(Weight::Block(at(0)));
-        }
-        Ok(Weight::Blocks((0..n_samples).map(at).collect()))
+        Ok(Weight::beside(&[(plain, p), (q, f)], n_samples))
     }
 
     /// Returns the filter from a run's error to all weighted signals.

@@ -5,9 +5,11 @@
 //!
 //! Family: `formation` and `objective` convert into each other.
 
+mod band;
 mod contour;
 mod coupled;
 mod dynamic;
+mod filtered_input;
 mod formation;
 mod gain;
 mod objective;
@@ -15,9 +17,11 @@ mod schedule;
 mod tangent;
 mod weight;
 
+pub use band::{Pass, band};
 pub use contour::{Contour, ContourTerms};
 pub use coupled::Coupled;
 pub use dynamic::{Dynamic, ErrorFilter};
+pub use filtered_input::FilteredInput;
 pub use formation::Formation;
 pub use gain::Gain;
 pub use objective::Objective;

@@ -54,6 +54,31 @@ impl Weight {
         }
     }
 
+    /// Returns the block-diagonal weight of several signals side by side, each given with its number of channels.
+    ///
+    /// # Panics
+    /// If a weight does not match its signal or the run; [`Weight::check`] rules this out.
+    #[must_use]
+    pub fn beside(parts: &[(&Self, usize)], n_samples: usize) -> Self {
+        if let [(only, _)] = parts {
+            return (*only).clone();
+        }
+        let size = parts.iter().map(|(_, channels)| channels).sum();
+        let at = |k: usize| {
+            let (mut whole, mut place) = (DMatrix::zeros(size, size), 0);
+            for (weight, channels) in parts {
+                let mut block = whole.view_mut((place, place), (*channels, *channels));
+                block.copy_from(&weight.at(k, *channels));
+                place += channels;
+            }
+            whole
+        };
+        if parts.iter().all(|(weight, _)| weight.is_constant()) {
+            return Self::Block(at(0));
+        }
+        Self::Blocks((0..n_samples).map(at).collect())
+    }
+
     /// Returns the weight of a subset of the channels.
     #[must_use]
     pub fn select(&self, channels: &[usize]) -> Self {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::learning::law::norm_optimal::Weights;
-use crate::learning::weights::{Contour, Weight};
+use crate::learning::weights::{Contour, FilteredInput, Pass, Weight, band};
 use crate::model::{StateSpace, from_transfer_function};
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
@@ -17,6 +17,26 @@ fn low_pass(pole: f64) -> StateSpace {
 fn plant() -> StateSpace {
     let fast = from_transfer_function(&[0.5, 0.2], &[1.0, -0.5, 0.1], Some(0.1)).unwrap();
     fast.append(&low_pass(0.9).delayed(1).unwrap()).unwrap()
+}
+
+fn input_weights(input: Option<FilteredInput>, change: Option<FilteredInput>) -> InputWeights {
+    InputWeights { input, change }
+}
+
+/// Solves the lifted problem with filters of error, input and change: `Q`, `F_u' W_u F_u` and `F_v' W_v F_v`
+/// are given as whole matrices.
+fn dense_inputs(
+    lifted: &DMatrix<f64>,
+    [q, input, change]: [&DMatrix<f64>; 3],
+    (s, r): (f64, f64),
+    (u, e): (&[f64], &[f64]),
+) -> DVector<f64> {
+    let size = lifted.ncols();
+    let (u, e) = (DVector::from_row_slice(u), DVector::from_row_slice(e));
+    let held = input + DMatrix::identity(size, size) * s;
+    let h = lifted.transpose() * q * lifted + &held + change + DMatrix::identity(size, size) * r;
+    let right = lifted.transpose() * q * e - held * &u;
+    &u + h.cholesky().unwrap().solve(&right)
 }
 
 /// Solves the normal equations of the lifted problem.
@@ -99,8 +119,127 @@ fn a_filter_that_does_not_fit_the_plant_is_refused() {
     assert!(short.to_string().starts_with("error holds"));
 }
 
+#[test]
+fn input_filters_that_do_not_fit_are_refused() {
+    let one = StateSpace::static_gain(DMatrix::identity(2, 2), Some(0.1)).unwrap();
+    let dynamic = Dynamic::new(one).unwrap();
+    let told = |filter: StateSpace, weight: Weight| {
+        let inputs = input_weights(None, Some(FilteredInput::new(filter, weight).unwrap()));
+        DynamicNormOptimal::with_inputs(&plant(), N, (&dynamic, &inputs), Weights::default())
+            .unwrap_err()
+            .to_string()
+    };
+    let both = low_pass(0.5).append(&low_pass(0.5)).unwrap();
+    for (line, parts) in [
+        (told(low_pass(0.5), Weight::Scalar(1.0)), ["change_weight", "takes 1 signals; 2"]),
+        (told(both.clone(), Weight::Scalar(-1.0)), ["change_weight", "negative"]),
+        (told(both, Weight::PerSample(vec![1.0; N + 1])), ["change_weight", "25 samples given"]),
+    ] {
+        assert!(parts.iter().all(|part| line.contains(part)), "{line}");
+    }
+    let away = from_transfer_function(&[1.0], &[1.0, -1.2], Some(0.1)).unwrap();
+    assert!(FilteredInput::new(away, Weight::Scalar(1.0)).is_err());
+    // An input that is not finite is named as such, not as the signal behind its filter.
+    let both = band(Pass::High, (2, 1.0), 0.1, 2).unwrap();
+    let inputs = input_weights(Some(FilteredInput::new(both, Weight::Scalar(1.0)).unwrap()), None);
+    let mut law =
+        DynamicNormOptimal::with_inputs(&plant(), N, (&dynamic, &inputs), Weights::default())
+            .unwrap();
+    let (mut u, mut next) = (vec![0.0; 2 * N], vec![0.0; 2 * N]);
+    u[7] = f64::NAN;
+    let line = law.update(&u, &[0.0; 2 * N], &mut next).unwrap_err().to_string();
+    assert!(line.contains("input is NaN at sample 3, channel 1"), "{line}");
+}
+
+#[test]
+fn axes_apart_stay_apart_with_filters_of_the_input() {
+    let axis = low_pass(0.6);
+    let both = axis.append(&axis).unwrap();
+    let dynamic = Dynamic::new(band(Pass::Low, (2, 1.0), 0.1, 2).unwrap()).unwrap();
+    let high = band(Pass::High, (3, 2.0), 0.1, 2).unwrap();
+    let weight = FilteredInput::new(high, Weight::Scalar(0.3)).unwrap();
+    let inputs = input_weights(Some(weight.clone()), Some(weight));
+    let all = (&dynamic, &inputs);
+    let law = DynamicNormOptimal::with_inputs(&both, N, all, Weights::default()).unwrap();
+    assert_eq!(law.inner().n_parts(), 2);
+    let told = law.describe();
+    assert!(told.contains(r#""filtered_inputs":2,"filtered_changes":2"#), "{told}");
+}
+
 proptest! {
     #![proptest_config(ilc_cases::cases(40))]
+
+    #[test]
+    fn filters_of_error_input_and_change_are_the_dense_solution(
+        n_samples in 1..70_usize,
+        (order_e, order_u, order_d) in (1..4_usize, 1..4_usize, 1..5_usize),
+        (hz_e, hz_u, hz_d) in (0.3..4.5_f64, 0.3..4.5_f64, 0.3..4.5_f64),
+        (is_high_u, is_high_d) in (any::<bool>(), any::<bool>()),
+        (has_u, has_d, varies) in (any::<bool>(), any::<bool>(), any::<bool>()),
+        (s, r) in (prop::sample::select(vec![0.0, 1e-3, 0.3]), 1e-3..1.0_f64),
+        half in prop::array::uniform4(-1.0..1.0_f64),
+        seed in any::<u32>(),
+    ) {
+        let pass = |is_high| if is_high { Pass::High } else { Pass::Low };
+        // Coupled, and of unlike delay.
+        let skew = DMatrix::from_row_slice(2, 2, &[1.0, 0.3, -0.2, 0.9]);
+        let plant = StateSpace::static_gain(skew, Some(0.1)).unwrap().series(&plant()).unwrap();
+        let error = band(Pass::Low, (order_e, hz_e), 0.1, 2).unwrap();
+        let input = band(pass(is_high_u), (order_u, hz_u), 0.1, 2).unwrap();
+        let change = band(pass(is_high_d), (order_d, hz_d), 0.1, 2).unwrap();
+        let half = DMatrix::from_row_slice(2, 2, &half);
+        let block = half.transpose() * half;
+        let along: Vec<f64> = (0..n_samples).map(|k| 0.1 + (k as f64 * 0.3).sin().abs()).collect();
+        let of_input = if varies {
+            Weight::PerSample(along)
+        } else {
+            Weight::Block(block)
+        };
+        let whole = |filter: &StateSpace, weight: &Weight, is_used: bool| {
+            let lifted = filter.lifted(n_samples).unwrap();
+            let weights = DMatrix::from_fn(2 * n_samples, 2 * n_samples, |i, j| {
+                if i / 2 == j / 2 { weight.entry(i / 2, i % 2, j % 2) } else { 0.0 }
+            });
+            lifted.transpose() * weights * lifted * f64::from(u8::from(is_used))
+        };
+        let q = whole(&error, &Weight::Scalar(2.0), true)
+            + DMatrix::identity(2 * n_samples, 2 * n_samples) * 0.1;
+        let matrices = [
+            &q,
+            &whole(&input, &of_input, has_u),
+            &whole(&change, &Weight::Scalar(0.7), has_d),
+        ];
+        let inputs = input_weights(
+            has_u.then(|| FilteredInput::new(input, of_input).unwrap()),
+            has_d.then(|| FilteredInput::new(change, Weight::Scalar(0.7)).unwrap()),
+        );
+        let noise = |seed: u32| -> Vec<f64> {
+            let mut state = u64::from(seed) << 1 | 1;
+            (0..2 * n_samples).map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (state >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
+            }).collect()
+        };
+        let (u, e) = (noise(seed), noise(seed ^ 7));
+        let dynamic = Dynamic::new(error).unwrap().with_plain(Weight::Scalar(0.1));
+        let weights = Weights { q: 2.0, s, r, rate: 0.0 };
+        let all = (&dynamic, &inputs);
+        let mut law = DynamicNormOptimal::with_inputs(&plant, n_samples, all, weights).unwrap();
+        let mut next = vec![f64::NAN; 2 * n_samples];
+        law.update(&u, &e, &mut next).unwrap();
+        let lifted = plant.lifted(n_samples).unwrap();
+        let expected = dense_inputs(&lifted, matrices, (s, r), (&u, &e));
+        for (found, expected) in next.iter().zip(expected.iter()) {
+            prop_assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+        // The same with a model that is given sample by sample.
+        let varying = crate::model::TimeVarying::new(vec![plant; n_samples]).unwrap();
+        let mut law = DynamicNormOptimal::with_inputs(&varying, n_samples, all, weights).unwrap();
+        law.update(&u, &e, &mut next).unwrap();
+        for (found, expected) in next.iter().zip(expected.iter()) {
+            prop_assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+    }
 
     #[test]
     fn a_filter_is_the_dense_solution(
