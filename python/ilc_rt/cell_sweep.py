@@ -174,12 +174,13 @@ def run_case(
         except CampaignError as error:
             fault = error.reason
         result = campaign.result
-        errors = [result.comparison.compared(record) for record in result.records]
+        comparison = result.comparison
+        errors = [comparison.compared(record) for record in comparison.learned]
         return {
             "first_m": errors[0] if errors else None,
             "best_m": min(errors, default=None),
             "last_m": errors[-1] if errors else None,
-            "runs": len(errors),
+            "runs": len(result.records),
             "learning_off": any(record.learning_off for record in result.records),
             "fault": fault,
         }

@@ -145,8 +145,10 @@ def compare(results: Mapping[str, CampaignResult], figure: str = "tracking_rms_m
         if not hasattr(result, "records"):
             message = f"{name}: a {type(result).__name__}; a result is needed"
             raise TypeError(message)
+        # Runs that only measured something for the law are no results.
+        counted = [r for r in result.records if not r.phase]
         errors = np.array(
-            [np.nan if (v := getattr(r, str(figure), None)) is None else v for r in result.records]
+            [np.nan if (v := getattr(r, str(figure), None)) is None else v for r in counted]
         )
         if not errors.size or errors.dtype.kind not in "iuf" or not np.isfinite(errors).all():
             message = f"{name}: not every run has the figure {figure!r}"
@@ -156,11 +158,11 @@ def compare(results: Mapping[str, CampaignResult], figure: str = "tracking_rms_m
         rows.append(
             {
                 "name": str(name),
-                "runs": len(errors),
+                "runs": len(result.records),
                 "first": float(errors[0]),
                 "best": float(errors.min()),
                 "last": float(errors[-1]),
-                "runs_to_tenth": int(result.records[below[0]].index) if below.size else None,
+                "runs_to_tenth": int(counted[below[0]].index) if below.size else None,
             }
         )
     if len(units) > 1:

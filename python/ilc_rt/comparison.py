@@ -72,6 +72,11 @@ class Comparison:
         there = all(record.contour_inf_m is not None for record in self.records)
         return there and (self.first.contour_inf_m or 0.0) > 0.0
 
+    @property
+    def learned(self) -> Sequence[IterationRecord]:
+        """The runs whose error counts: all but those that only measured something for the law."""
+        return [*self.records[:1], *(record for record in self.records[1:] if not record.phase)]
+
     def compared(self, record: IterationRecord) -> float:
         """Return the error by which a run is compared."""
         contour_m = record.contour_inf_m if self.by_contour else None
@@ -120,7 +125,7 @@ class Comparison:
             return f"Tracking error {self._course(self.tracking(rms=False)[0])}."
         parts = []
         for what, column in zip(("linear", "rotary"), self.tracking(rms=False), strict=True):
-            before, after = column.of(self.records[0]), column.of(self.records[-1])
+            before, after = column.of(self.first), column.of(self.learned[-1])
             said = in_words(before, after)
             parts.append(
                 f"of the {what} axes from {column.unit.text(before)} to {column.unit.text(after)}"
@@ -147,13 +152,14 @@ class Comparison:
         return lines
 
     def _course(self, column: Column) -> str:
-        errors = [column.of(record) or 0.0 for record in self.records]
+        learned = self.learned
+        errors = [column.of(record) or 0.0 for record in learned]
         before, after, unit = errors[0], errors[-1], column.unit
-        if len(errors) == 1:
+        if len(self.records) == 1:
             return f"{unit.text(before)} at most in 1 run"
         said = in_words(before, after)
         best = min(errors)
-        index = self.records[errors.index(best)].index
+        index = learned[errors.index(best)].index
         aside = f"; best {unit.text(best)} in run {index}" if best < BEST_SHARE * after else ""
         change = f" ({said})" if said else ""
         course = f"from {unit.text(before)} to {unit.text(after)}{change}"
@@ -174,7 +180,8 @@ def remark_on(record: IterationRecord) -> str | None:
 def note(record: IterationRecord) -> str:
     """Return the outcome of a run in a few words, for a column of a table."""
     said = ("rolled back", record.rolled_back), ("learning off", record.learning_off)
-    return ", ".join(words for words, holds in said if holds)
+    words = [record.phase] if record.phase else []
+    return ", ".join(words + [outcome for outcome, holds in said if holds])
 
 
 def largest(figures: Sequence[float], axes: Sequence[int]) -> float | None:

@@ -96,8 +96,9 @@ class Task:
         )  # fmt: skip
         refused = Refused("NormOptimalIlc", "the model does not say in which direction to learn")
         return Recommendation(
-            ModelFreeIlc(), "ModelFreeIlc", {}, None, (reason,), (refused,), self.facts
-        )
+            ModelFreeIlc(), "ModelFreeIlc", {}, KINDS["ModelFreeIlc"], (reason,), (refused,),
+            self.facts,
+        )  # fmt: skip
 
     def points(self, points: Sequence[int]) -> Recommendation:
         """Return the law for which some samples count alone."""

@@ -63,10 +63,10 @@ def contour(result: CampaignResult) -> Figure | None:
     if not result.records or len(contour_axes(result)) < 2:
         return None
     shown = contour_axes(result)
-    first, last = result.records[0], result.records[-1]
-    reference = first.reference_m[:, shown]
+    last = _last_learned(result)
+    reference = result.records[0].reference_m[:, shown]
     aspect = float(np.ptp(reference[:, 1]) / np.ptp(reference, axis=0).max())
-    panels = [(0, -1), (-1,)] if first is not last else [(0,)]
+    panels = [(0, last), (last,)] if last else [(0,)]
     height = 0.6 + max(1.6, (WIDTH_IN - 0.8) * 1.15 * min(aspect, 1.0)) + 0.3
     with mpl.rc_context(style()):
         figure = Figure(figsize=(WIDTH_IN, height * len(panels)))
@@ -81,7 +81,11 @@ def contour(result: CampaignResult) -> Figure | None:
 
 def learned_input(result: CampaignResult) -> Figure | None:
     """Draw the learned input of each axis, first and last; None if there is none."""
-    learned = [number for number, record in enumerate(result.records) if np.any(record.input)]
+    learned = [
+        number
+        for number, record in enumerate(result.records)
+        if np.any(record.input) and not record.phase
+    ]
     if not learned:
         return None
     runs = tuple(dict.fromkeys((learned[0], learned[-1])))
@@ -94,11 +98,16 @@ def learned_input(result: CampaignResult) -> Figure | None:
         return _finished(figure, list(grid))
 
 
+def _last_learned(result: CampaignResult) -> int:
+    """Return the place of the last run that was not made to measure something for the law."""
+    return max(n for n, record in enumerate(result.records) if n == 0 or not record.phase)
+
+
 def tracking(result: CampaignResult) -> Figure | None:
     """Draw the tracking error over time: first against last run, then last alone."""
     if not result.records:
         return None
-    runs = tuple(dict.fromkeys((0, len(result.records) - 1)))
+    runs = tuple(dict.fromkeys((0, _last_learned(result))))
     panels = len(runs)
     with mpl.rc_context(style()):
         figure = Figure(figsize=(WIDTH_IN, 0.8 + 1.45 * result.n_axes * panels))
@@ -111,7 +120,7 @@ def tracking(result: CampaignResult) -> Figure | None:
             if panels == 2:
                 lower = grid[number * panels + 1]
                 _over_time(lower, result, "error", runs[-1:], number)
-                index = result.records[-1].index
+                index = result.records[runs[-1]].index
                 lower.set_title(f"{name}, run {index} on a scale of its own")
         return _finished(figure, list(grid))
 
@@ -179,7 +188,11 @@ def _finished(figure: Figure, grid: list[Axes]) -> Figure:
 def _convergence_panel(
     axes: Axes, records: Sequence[IterationRecord], columns: list[Column], base: str
 ) -> None:
-    """Draw the errors of one unit; an error of 0 has no place on a logarithmic scale."""
+    """Draw the errors of one unit, of runs that are learned from.
+
+    An error of 0 has no place on a logarithmic scale.
+    """
+    records = [record for record in records if not record.phase]
     index = [record.index for record in records]
     rows = [(column, [column.of(record) for record in records]) for column in columns]
     known = [value for _, row in rows for value in row if value]

@@ -190,7 +190,9 @@ def _without_model(
         *_need_a_model(),
         Refused("PdIlc", "its gain and its lead need a bandwidth and a dead time"),
     )
-    return Recommendation(ModelFreeIlc(), "ModelFreeIlc", {}, None, reasons, refused)
+    return Recommendation(
+        ModelFreeIlc(), "ModelFreeIlc", {}, KINDS["ModelFreeIlc"], reasons, refused
+    )
 
 
 def _need_a_model() -> tuple[Refused, ...]:

@@ -20,7 +20,7 @@ KINDS = {
     "NormOptimalIlc": "norm_optimal", "ConstrainedIlc": "constrained", "PdIlc": "pd",
     "AdjointIlc": "adjoint", "ModelInverseIlc": "model_inverse", "RelevanceIlc": "relevance",
     "BasisFunctions": "basis_functions", "PointToPointIlc": "point_to_point",
-    "StableInverseIlc": "stable_inverse",
+    "StableInverseIlc": "stable_inverse", "ModelFreeIlc": "model_free",
 }  # fmt: skip
 
 

@@ -170,7 +170,7 @@ def _late(result: CampaignResult) -> str:
 
 def _tiles(result: CampaignResult) -> Iterator[str]:
     comparison = result.comparison
-    first, last = result.records[0], result.records[-1]
+    first, last = result.records[0], comparison.learned[-1]
 
     def tile(value: str, what: str, kind: str = "") -> str:
         return f'<div class="tile {kind}"><b>{html.escape(value)}</b><span>{what}</span></div>'
@@ -234,7 +234,7 @@ def _notes(record: IterationRecord, before: IterationRecord | None) -> str:
 
 def _axes(result: CampaignResult) -> str:
     """Return the table per axis, if there are several axes and their figures are known."""
-    first, last = result.records[0], result.records[-1]
+    first, last = result.records[0], result.comparison.learned[-1]
     figures = [(record.axes_tracking_inf_m, record.axes_tracking_rms_m) for record in (first, last)]
     if result.n_axes < 2 or any(len(row) < result.n_axes for pair in figures for row in pair):
         return ""

@@ -34,7 +34,7 @@ def run_cells(comparison: Comparison, record: IterationRecord) -> tuple[str, ...
     return (
         str(record.index),
         *(column.cell(record) for column in _errors(comparison)),
-        "" if record.index == first.index else signed(*compared),
+        "" if record.index == first.index or record.phase else signed(*compared),
         str(record.overruns),
         "-" if record.update_ms is None else digits(record.update_ms),
         note(record),

@@ -199,7 +199,7 @@ def test_without_a_model_the_error_or_a_measured_gradient_is_taken() -> None:
         assert rms[-1] < 0.3
         assert rms.max() == rms[0]
     gradient = recommend(None, N)
-    assert gradient.name == "ModelFreeIlc"
+    assert (gradient.name, gradient.kind) == ("ModelFreeIlc", "model_free")
     rms = learned(axis(), gradient.law)
     # The runs between are for the measurement.
     assert rms[::3][-1] < 0.3

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ilc_rt import (
+    BasisFunctions,
     ConstrainedIlc,
     FlexibleIlc,
     Gate,
@@ -111,6 +112,7 @@ LAWS = {
     "inverse": ModelInverseIlc(MODEL, N, gain=0.5),
     "gate": Gate(NormOptimalIlc(MODEL, N, r=0.1), tolerance=1e-5),
     "ladder": Ladder(PdIlc(kp=0.5), repeats=2),
+    "model-free": ModelFreeIlc(),
 }
 
 
@@ -299,7 +301,7 @@ def test_laws_in_python_are_refused_with_the_way(tmp_path) -> None:
         (Own(), "law is a Own, which is written in Python.*ilc_rt.sweep"),
         (Derived(kp=0.5), "law is a Derived, which is written in Python"),
         (Gate(Own(), tolerance=1e-5), "law.law is a Own"),
-        (ModelFreeIlc(), "law is a ModelFreeIlc"),
+        (BasisFunctions(MODEL, REFERENCE, ["velocity"]), "law is a BasisFunctions"),
         ([PdIlc(kp=0.5), Own()], r"law\[1\] is a Own"),
         (
             FlexibleIlc(Library(tmp_path / "runs.db"), PdIlc(kp=0.5), tolerance=0.1),

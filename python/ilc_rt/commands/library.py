@@ -201,7 +201,8 @@ def error_text(row: Mapping[str, Any], figure: str) -> str:
 def note(row: Mapping[str, Any]) -> str:
     """Return the outcome of a run in a few words."""
     said = ("rolled back", row["rolled_back"]), ("learning off", row["learning_off"])
-    return ", ".join(words for words, holds in said if holds)
+    words = [str(row["phase"])] if row["phase"] else []
+    return ", ".join(words + [outcome for outcome, holds in said if holds])
 
 
 def _load(library: Path, run_id: int) -> dict[str, Any]:

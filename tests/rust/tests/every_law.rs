@@ -13,7 +13,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Laws whose update is not linear, or whose adjoint the analysis derives from their cost.
-const WITHOUT: [&str; 9] = [
+const WITHOUT: [&str; 10] = [
     "constrained",
     "norm_optimal",
     "dynamic",
@@ -23,6 +23,7 @@ const WITHOUT: [&str; 9] = [
     "flexible",
     "higher_order",
     "filtered",
+    "model_free",
 ];
 
 #[test]

@@ -1,11 +1,13 @@
-//! Builders of laws of research: `parametric`, `point_to_point`, `stable_inverse`, `higher_order`, `filtered`.
+//! Builders of laws of research: `parametric`, `point_to_point`, `stable_inverse`, `model_free`, `higher_order`,
+//! `filtered`.
 
-use ilc_rt::learning::Law;
 use ilc_rt::learning::law::filtered::Filtered;
 use ilc_rt::learning::law::higher_order::HigherOrder;
+use ilc_rt::learning::law::model_free::{ModelFree, ModelFreeRule};
 use ilc_rt::learning::law::parametric::{Diagonal, Parametric, Term};
 use ilc_rt::learning::law::point_to_point::PointToPoint;
 use ilc_rt::learning::law::stable_inverse::{InverseMethod, InverseRule, StableInverse};
+use ilc_rt::learning::{Law, LearningError};
 use pyo3::prelude::*;
 
 use super::figure::Figure;
@@ -23,6 +25,7 @@ pub(super) const BUILDERS: &[Builder] = &[
     ("parametric", parametric),
     ("point_to_point", point_to_point),
     ("stable_inverse", stable_inverse),
+    ("model_free", model_free),
     ("higher_order", higher_order),
     ("filtered", filtered),
 ];
@@ -82,6 +85,24 @@ fn stable_inverse(call: &Call<'_, '_>) -> PyResult<Built> {
 }
 
 impl Readable for StableInverse {}
+
+fn model_free(call: &Call<'_, '_>) -> PyResult<Built> {
+    let (size, a) = (call.size(), call.arguments);
+    if size.channels.n_inputs != 1 {
+        let found = size.channels.n_inputs;
+        let reason = format!("one input and one output are needed; the run has {found} channels");
+        return Err(LearningError::User { law: "ModelFreeIlc".to_owned(), reason }).or_raise();
+    }
+    let rule = ModelFreeRule { gain: a.maybe_number("gain")?, probe: a.number("probe")? };
+    let law = ModelFree::new(rule, size.n_samples, 1).or_raise()?;
+    Ok(Built { law: Box::new(law), fits: Fits::Alike })
+}
+
+impl Readable for ModelFree {
+    fn figure(&self, name: &str) -> Option<Figure> {
+        (name == "phase").then(|| Figure::Text(self.purpose().as_str().to_owned()))
+    }
+}
 
 fn higher_order(call: &Call<'_, '_>) -> PyResult<Built> {
     let (size, weights) = (call.size(), call.arguments.vector("weights")?);

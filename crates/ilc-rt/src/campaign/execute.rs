@@ -24,7 +24,7 @@ use crate::config::{Cell, Keep};
 use crate::design::{DesignError, Plan};
 use crate::fieldbus::Bus;
 use crate::identification::Experiment;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Purpose};
 use crate::library::Library;
 use crate::record::{Event, StateName};
 use crate::rt::RtReport;
@@ -187,8 +187,9 @@ fn execute(
         Keeper::on_thread(library, meta, keep)?
     };
     let (mut mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
-    if let Some((input, update_ms)) = input.map(|input| (input, 0.0)).or(resumed.next.take()) {
-        policy.send(&mut mail, input, update_ms);
+    let own = input.map(|input| (input, 0.0, Purpose::Learning));
+    if let Some((input, update_ms, purpose)) = own.or(resumed.next.take()) {
+        policy.send(&mut mail, input, update_ms, purpose);
     }
     let loop_side = loop_side.following(orders);
     let network = plan.network(bus, &maps);

@@ -5,7 +5,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::error::CampaignError;
-use crate::learning::{Law, LearningError, Standing};
+use crate::learning::{Law, LearningError, Purpose, Standing};
 use crate::record::Figures;
 
 /// Time that the end of a campaign waits for the update from the last run.
@@ -22,6 +22,8 @@ pub(super) struct UpdateResult {
     pub(super) remark: Option<String>,
     /// State of the law: learning, paused, or rolling back.
     pub(super) standing: Standing,
+    /// Purpose of the next run.
+    pub(super) purpose: Purpose,
 }
 
 impl UpdateResult {
@@ -179,6 +181,6 @@ pub(super) fn learn(law: &mut dyn Law, input: &[f64], error: &[f64]) -> UpdateRe
     let mut next = vec![0.0; input.len()];
     let result = law.update(input, error, &mut next);
     let update_ms = began.elapsed().as_secs_f64() * 1e3;
-    let (remark, standing) = (law.status(), law.standing());
-    UpdateResult { input: result.map(|()| next), update_ms, remark, standing }
+    let (remark, standing, purpose) = (law.status(), law.standing(), law.purpose());
+    UpdateResult { input: result.map(|()| next), update_ms, remark, standing, purpose }
 }

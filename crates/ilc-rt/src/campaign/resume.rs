@@ -2,10 +2,10 @@
 
 use super::disturbance::Disturbance;
 use super::error::{CampaignError, ResumeError};
-use super::learner::{learn, set_disturbance};
+use super::learner::{UpdateResult, learn, set_disturbance};
 use super::rollback::{Decision, RollbackPolicy};
 use crate::design::Plan;
-use crate::learning::{Law, LearningError};
+use crate::learning::{Law, LearningError, Purpose};
 use crate::library::{Library, Row, Task};
 use crate::record::{Figures, IterationRecord, Meta};
 
@@ -14,8 +14,8 @@ use crate::record::{Figures, IterationRecord, Meta};
 pub(super) struct Resumed {
     /// Number and figures of the stored runs.
     pub(super) runs: Vec<(u32, Figures)>,
-    /// Input of the next run, and its computing time.
-    pub(super) next: Option<(Vec<f64>, f64)>,
+    /// Input of the next run, its computing time and purpose.
+    pub(super) next: Option<(Vec<f64>, f64, Purpose)>,
     /// Disturbance of the next run.
     pub(super) next_disturbance: Vec<f64>,
 }
@@ -98,12 +98,19 @@ impl RollbackPolicy {
             set_disturbance(law, &next_disturbance);
         }
         let next = match (last, law) {
-            (Some((Decision::RollBack(input), _)), _) => Some(Ok((input, 0.0))),
+            (Some((Decision::RollBack(input), _)), _) => Some(Ok((input, 0.0, Purpose::Learning))),
             (Some((Decision::Learn, record)), Some(law)) => {
                 let update = learn(law, &record.input, &record.error_m);
-                Some(update.input.map(|input| (input, update.update_ms)))
+                let UpdateResult { update_ms, purpose, .. } = update;
+                Some(update.input.map(|input| (input, update_ms, purpose)))
             }
-            (Some((_, record)), _) => Some(Ok((record.input, 0.0))),
+            (Some((_, record)), law) => {
+                // The run is repeated, with the same purpose.
+                let measures = record.figures.only_measures();
+                let purpose =
+                    law.filter(|_| measures).map_or(Purpose::Learning, |law| law.purpose());
+                Some(Ok((record.input, 0.0, purpose)))
+            }
             (None, _) => None,
         };
         let next = next.transpose().map_err(refused)?;

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use crate::learning::Purpose;
 use crate::record::{Figures, IterationRecord};
 use crate::servo::Mailbox;
 
@@ -42,8 +43,8 @@ pub(super) struct RollbackPolicy {
     late_updates: u32,
     /// Tables passed to the loop so far.
     n_sent: u32,
-    /// Number and computing time of the newest of them, oldest first.
-    update_ms: VecDeque<(u32, f64)>,
+    /// Number of the newest of them, with computing time and purpose, oldest first.
+    sent: VecDeque<(u32, f64, Purpose)>,
     table_in_use: u32,
     /// Overruns are not a disturbance, as the plant paused as well.
     forgives_overruns: bool,
@@ -58,7 +59,7 @@ impl RollbackPolicy {
             promised: 0,
             late_updates: 0,
             n_sent: 0,
-            update_ms: VecDeque::new(),
+            sent: VecDeque::new(),
             table_in_use: 0,
             forgives_overruns: false,
         }
@@ -93,8 +94,11 @@ impl RollbackPolicy {
     /// Writes the learning figures of a run into its record.
     pub(super) fn annotate(&self, record: &mut IterationRecord) {
         record.figures.late_updates = self.late_updates;
-        let sent = self.update_ms.iter().find(|(table, _)| *table == self.table_in_use);
-        record.figures.update_ms = sent.map_or(0.0, |(_, update_ms)| *update_ms);
+        let sent = self.sent.iter().find(|(table, ..)| *table == self.table_in_use);
+        let (_, update_ms, purpose) = sent.copied().unwrap_or_default();
+        record.figures.update_ms = update_ms;
+        // By the table that the run had: a late one leaves the run its old purpose as well.
+        record.figures.phase = (purpose != Purpose::Learning).then(|| purpose.as_str().to_owned());
     }
 
     /// Decides on the input after a run, and marks the run if the best input is restored because of
@@ -104,7 +108,8 @@ impl RollbackPolicy {
     /// has failed to converge, and learning stays off. A run that computer or bus disturbed
     /// (overruns, missing samples) is no evidence for or against the law, be it the first or
     /// seemingly the best: its input is repeated. A larger error under another disturbance than the
-    /// best run's is no evidence against the law either: it continues to learn.
+    /// best run's is no evidence against the law either: it continues to learn. A run that only measures
+    /// is passed to the law, and is neither the best one nor held against it.
     pub(super) fn decide(&mut self, record: &mut IterationRecord) -> Decision {
         let rms = record.figures.judged_by();
         let off = self.rollbacks >= ROLLBACKS_MAX;
@@ -117,6 +122,9 @@ impl RollbackPolicy {
                 record.figures.remark = Some(disturbance_remark(&record.figures));
             }
             return Decision::Hold;
+        }
+        if record.figures.only_measures() {
+            return if off { Decision::Hold } else { Decision::Learn };
         }
         match &self.best {
             Some(best)
@@ -147,16 +155,22 @@ impl RollbackPolicy {
     }
 
     /// Passes the input of the next run to the loop.
-    pub(super) fn send(&mut self, mail: &mut Mailbox, input: Vec<f64>, update_ms: f64) {
+    pub(super) fn send(
+        &mut self,
+        mail: &mut Mailbox,
+        input: Vec<f64>,
+        update_ms: f64,
+        purpose: Purpose,
+    ) {
         let number = self.next_number();
         // Refused only if two tables wait already; the run then repeats an input and is counted
         // late.
         self.promised = number;
         if mail.send_table(number, input.into_boxed_slice()).is_ok() {
             self.n_sent = number;
-            self.update_ms.push_back((number, update_ms));
-            if self.update_ms.len() > TABLES_MAX {
-                self.update_ms.pop_front();
+            self.sent.push_back((number, update_ms, purpose));
+            if self.sent.len() > TABLES_MAX {
+                self.sent.pop_front();
             }
         }
     }
@@ -253,6 +267,43 @@ mod tests {
         assert_eq!(policy.decide(&mut disturbed(0.2, 0, 1)), Decision::Hold);
         assert_eq!(policy.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
         assert_eq!(policy.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
+    }
+
+    #[test]
+    fn a_run_that_only_measures_is_neither_the_best_nor_held_against_the_law() {
+        let measuring = |rms, phase: &str| {
+            let mut record = record(rms);
+            record.figures.phase = Some(phase.to_owned());
+            record
+        };
+        let mut policy = RollbackPolicy::new(1.5);
+        assert_eq!(policy.decide(&mut record(1.0)), Decision::Learn);
+        let mut probing = measuring(7.0, "probing");
+        assert_eq!(policy.decide(&mut probing), Decision::Learn);
+        assert!(!probing.figures.rolled_back && probing.figures.remark.is_none());
+        assert_eq!(policy.decide(&mut measuring(0.2, "searching")), Decision::Learn);
+        assert_eq!(policy.decide(&mut record(1.4)), Decision::Learn, "1.0 is still the best");
+        assert_eq!(policy.decide(&mut record(1.6)), Decision::RollBack(vec![1.0]));
+        let mut disturbed = measuring(1.0, "probing");
+        disturbed.figures.missing_samples = 1;
+        assert_eq!(policy.decide(&mut disturbed), Decision::Hold, "its input is repeated");
+    }
+
+    #[test]
+    fn a_run_has_the_purpose_of_its_table_even_if_that_is_an_old_one() {
+        let (mut mail, _loop_side) = crate::servo::mailbox(16, std::sync::Arc::default());
+        let mut policy = RollbackPolicy::new(1.5);
+        policy.send(&mut mail, vec![0.0], 1.0, Purpose::Learning);
+        policy.send(&mut mail, vec![1.0], 2.0, Purpose::Probing);
+        let mut phase_of = |table| {
+            policy.started(table);
+            let mut made = record(1.0);
+            policy.annotate(&mut made);
+            made.figures.phase
+        };
+        assert_eq!(phase_of(1), None);
+        assert_eq!(phase_of(2).as_deref(), Some("probing"));
+        assert_eq!(phase_of(0), None, "the zero input of a first run");
     }
 
     #[test]

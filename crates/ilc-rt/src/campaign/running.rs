@@ -17,6 +17,7 @@ use super::rollback::{Decision, RollbackPolicy};
 use super::runs::Runs;
 use crate::config::Cell;
 use crate::design::Plan;
+use crate::learning::Purpose;
 use crate::record::{AxisKinds, Event, FaultKind, IterationRecord, StateName};
 use crate::servo::{Mailbox, Message, PhaseName, Sample, StopReason};
 
@@ -208,7 +209,9 @@ impl Running<'_> {
             self.remark.clone_from(&update.remark);
         }
         match std::mem::replace(&mut update.input, Ok(Vec::new())) {
-            Ok(input) => self.policy.send(&mut self.mail, input, update.update_ms),
+            Ok(input) => {
+                self.policy.send(&mut self.mail, input, update.update_ms, update.purpose);
+            }
             Err(error) => {
                 self.fail(FaultKind::Law, format!("the law refused the last run: {error}"));
             }
@@ -285,7 +288,7 @@ impl Running<'_> {
             asked = false;
         }
         if let Decision::RollBack(input) = decision {
-            self.policy.send(&mut self.mail, input, 0.0);
+            self.policy.send(&mut self.mail, input, 0.0, Purpose::Learning);
         }
         self.awaited += u32::from(asked);
         self.keep(record, asked);

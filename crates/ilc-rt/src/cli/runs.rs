@@ -51,9 +51,11 @@ impl Runs {
                 write!(text, "{:>14}", value.map_or_else(|| "-".to_owned(), |v| column.unit.of(v)));
         }
         let (first_index, first) = &self.ended[0];
-        let compared = (index != *first_index)
-            .then(|| change(self.compared(first), self.compared(figures)))
-            .flatten();
+        // A run that only measures is not compared: its purpose stands there.
+        let compared = figures.phase.clone().or_else(|| {
+            let (before, after) = (self.compared(first), self.compared(figures));
+            (index != *first_index).then(|| change(before, after)).flatten()
+        });
         let _ = write!(
             text,
             "{:>11}{:>10}{:>10}",
@@ -79,7 +81,7 @@ impl Runs {
 
     /// Returns the result of learning as a sentence.
     pub(super) fn sentence(&self) -> Option<String> {
-        let (first, last) = (&self.ended.front()?.1, &self.ended.back()?.1);
+        let (first, last) = (&self.ended.front()?.1, &self.learned().last()?.1);
         let n = self.n_ended;
         if self.by_contour() {
             return Some(format!(
@@ -110,10 +112,10 @@ impl Runs {
     /// Describes a figure from the first run to the last.
     fn course(&self, of: impl Fn(&Figures) -> Option<f64> + Copy, unit: Unit) -> String {
         let values: Vec<(u32, f64)> =
-            self.ended.iter().map(|(index, f)| (*index, of(f).unwrap_or(0.0))).collect();
+            self.learned().map(|(index, f)| (*index, of(f).unwrap_or(0.0))).collect();
         let (before, after) = (values[0].1, values[values.len() - 1].1);
         let unit = unit.for_size(self.size(of));
-        if values.len() == 1 {
+        if self.n_ended == 1 {
             return format!("{} at most in 1 run", unit.with(before));
         }
         let less = less(before, after).map_or_else(String::new, |less| format!(" ({less})"));
@@ -132,6 +134,14 @@ impl Runs {
             unit.with(after),
             self.n_ended
         )
+    }
+
+    /// Returns the runs whose error counts: all but those that only measured; of several that only measured
+    /// the first one stands for them.
+    fn learned(&self) -> impl Iterator<Item = &(u32, Figures)> {
+        let runs = self.ended.iter().enumerate();
+        runs.filter(|(place, (_, figures))| *place == 0 || !figures.only_measures())
+            .map(|(_, run)| run)
     }
 
     /// Returns the largest value of an error over the runs, which determines its unit.
@@ -253,6 +263,31 @@ mod tests {
         assert_eq!(Runs::default().sentence(), None);
         let (far, rows) = runs(&["m"], &[tracked(1e-9, None), tracked(1e-3, None)]);
         assert!(!rows[1].contains('%') && !far.sentence().unwrap().contains('%'));
+    }
+
+    #[test]
+    fn runs_that_only_measure_are_named_and_not_counted_as_results() {
+        let measuring = |tracking_inf_m, phase: &str| Figures {
+            phase: Some(phase.to_owned()),
+            ..tracked(tracking_inf_m, None)
+        };
+        let (runs, rows) = runs(
+            &["m"],
+            &[
+                tracked(1e-3, None),
+                measuring(2e-3, "probing"),
+                measuring(1e-5, "searching"),
+                tracked(5e-4, None),
+                measuring(9e-4, "probing"),
+            ],
+        );
+        assert!(rows[1].contains("probing") && !rows[1].contains('%'), "{}", rows[1]);
+        assert!(rows[2].contains("searching") && rows[3].contains("-50.0 %"), "{rows:?}");
+        assert!(rows.iter().flat_map(|row| row.lines()).all(|line| line.len() <= 80), "{rows:?}");
+        assert_eq!(
+            runs.sentence().unwrap(),
+            "Tracking error from 1000 um to 500 um (50.0 % less) within 5 runs."
+        );
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod krylov;
 pub mod ladder;
 pub mod law;
 mod operator;
+mod purpose;
 mod repeatability;
 mod scaled;
 mod structure;
@@ -25,6 +26,7 @@ pub mod tune;
 pub mod weights;
 
 pub use error::{LearningError, Result};
+pub use purpose::Purpose;
 pub use repeatability::{Repeatability, repeatability};
 pub use scaled::Scaled;
 pub use structure::{LowPass, Structure, Surrogate};
@@ -138,6 +140,12 @@ pub trait Law: Send {
         Standing::Learns
     }
 
+    /// Returns the purpose of the next run, whose input the last update computed. Runs that only measure are
+    /// never the best ones, and a larger error is not held against them.
+    fn purpose(&self) -> Purpose {
+        Purpose::Learning
+    }
+
     /// Resets the law's memory of earlier runs.
     fn reset(&mut self);
 
@@ -224,6 +232,10 @@ impl<L: Law + ?Sized> Law for Box<L> {
 
     fn standing(&self) -> Standing {
         (**self).standing()
+    }
+
+    fn purpose(&self) -> Purpose {
+        (**self).purpose()
     }
 
     fn reset(&mut self) {

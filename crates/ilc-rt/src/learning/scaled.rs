@@ -1,7 +1,7 @@
 //! A law whose inputs are counted in another unit than those of the axes: torques by the travel that
 //! they hold. For `design`.
 
-use super::{Law, LearningError, Result, Standing};
+use super::{Law, LearningError, Purpose, Result, Standing};
 
 /// A wrapper that converts the inputs of a law: `u = v / scale`, `v` those of the inner law.
 ///
@@ -89,6 +89,10 @@ impl<L: Law> Law for Scaled<L> {
 
     fn standing(&self) -> Standing {
         self.law.standing()
+    }
+
+    fn purpose(&self) -> Purpose {
+        self.law.purpose()
     }
 
     fn reset(&mut self) {

@@ -31,6 +31,11 @@ pub enum Surrogate<'a> {
     Inside(&'a mut (dyn Law + 'a)),
     /// The law without its bounds.
     Unbounded(Box<dyn Law>),
+    /// Gradient descent on the plant itself, whose gradient the law measures.
+    Gradient {
+        /// Its step; `None` for the best one of each iteration.
+        gain: Option<f64>,
+    },
 }
 
 /// The low-pass (Q-filter) of a law, and the law without it.

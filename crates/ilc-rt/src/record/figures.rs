@@ -58,6 +58,9 @@ pub struct Figures {
     /// Computing time of the learning update for this run's input; 0 without one.
     #[serde(default)]
     pub update_ms: f64,
+    /// Purpose of a run that only measures, `probing` or `searching`, so that its error does not count; absent
+    /// for one that is learned from.
+    pub phase: Option<String>,
     /// Error over that of the run a frozen input was taken from; absent when learning.
     pub frozen_ratio: Option<f64>,
     /// True if the best input was restored after this run (rollback), as the error had grown.
@@ -112,6 +115,11 @@ impl Figures {
     /// Returns true if measurements of the run are missing, or it was not made at the whole feed.
     pub fn is_incomplete(&self) -> bool {
         self.missing_samples > 0 || self.scaled_cycles > 0
+    }
+
+    /// Returns true if the run only measured something for the law: its error says nothing about its input.
+    pub fn only_measures(&self) -> bool {
+        self.phase.is_some()
     }
 
     /// Returns the figure by which a run is judged, over all axes: a number to compare runs with,

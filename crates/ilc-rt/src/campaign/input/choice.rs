@@ -23,7 +23,7 @@ pub enum Source {
     /// The run with the smallest error.
     #[default]
     Best,
-    /// The newest run that was not rolled back.
+    /// The newest run that was not rolled back, and did not only measure.
     Last,
     /// The run of this key.
     Id(i64),
@@ -117,6 +117,7 @@ pub fn choose(
         rows.retain(|row| row.meta.cell == plan.meta.cell);
         rows.retain(|row| ![FROZEN, EXCITATION].contains(&row.meta.law.as_str()));
         rows.retain(|row| !is_disturbed(&row.record.figures));
+        rows.retain(|row| !row.record.figures.only_measures());
         let newest = rows.last().map(|row| task.require_row(row, &place(row)));
         rows.retain(|row| task.require_row(row, "").is_ok());
         let same: Vec<Row> = rows.iter().filter(|row| is_same(row)).cloned().collect();

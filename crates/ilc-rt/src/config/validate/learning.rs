@@ -2,7 +2,7 @@
 
 use super::checker::Checker;
 use crate::config::{Cell, ConfigError, LawName, Measure, mode};
-use crate::learning::law::{LawAxis, LawCell, LawTables};
+use crate::learning::law::{LawAxis, LawCell, LawParameters, LawTables};
 
 /// Checks for contradictions, also in the tables of other laws, so that a slip shows at once.
 pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
@@ -27,6 +27,12 @@ pub(super) fn check(cell: &Cell, v: &Checker) -> Result<(), ConfigError> {
             v.allow(core.requires(&for_laws))?;
         }
     }
+    v.that(
+        l.ladder.is_none() || !l.parameters(l.law).is_some_and(LawParameters::measures),
+        "[learning] law",
+        &l.law.as_str(),
+        "a law that learns from every run, as [learning.ladder] scales its inputs; remove the ladder",
+    )?;
     v.that(
         l.law != LawName::None || (l.ladder.is_none() && l.gate.is_none()),
         "[learning] law",

@@ -248,6 +248,7 @@ fn with_stand_in<T>(law: &mut dyn Law, look: &mut dyn FnMut(&mut dyn Law) -> T) 
         Surrogate::Itself => {}
         Surrogate::Inside(inside) => return with_stand_in(inside, look),
         Surrogate::Unbounded(mut other) => return with_stand_in(other.as_mut(), look),
+        Surrogate::Gradient { .. } => panic!("the gradient is that of the plant, not of the law"),
     }
     look(law)
 }

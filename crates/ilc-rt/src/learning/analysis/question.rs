@@ -75,6 +75,12 @@ pub fn analyze(
             analysis.why = verdict::with_bounds(&analysis.why);
             return Ok(analysis);
         }
+        Surrogate::Gradient { gain } => {
+            let mut descent = verdict::descent(model, n_samples, gain)?;
+            let mut analysis = analyze(&mut descent, model, n_samples, question)?;
+            analysis.why = verdict::by_gradient(&analysis.why);
+            return Ok(analysis);
+        }
     }
     let pd_condition = match law.structure() {
         Structure::Pd(gains) => Some(PdCondition::new(gains, model)?),

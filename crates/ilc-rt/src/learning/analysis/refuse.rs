@@ -1,7 +1,7 @@
 //! The quick part of the analysis: refuses a diverging law before the first run.
 
 use super::iteration::Iteration;
-use super::verdict::{GROWTH_MAX, converges, with_bounds};
+use super::verdict::{GROWTH_MAX, by_gradient, converges, descent, with_bounds};
 use crate::learning::krylov::{Estimate, noise, norm, spectral_radius};
 use crate::learning::{Law, LearningError, Result, Structure, Surrogate};
 use crate::model::StateSpace;
@@ -44,6 +44,11 @@ pub fn divergence(
         Surrogate::Unbounded(mut other) => {
             let verdict = divergence(other.as_mut(), model, n_samples)?;
             return Ok(verdict.map(|found| Verdict { why: with_bounds(&found.why), ..found }));
+        }
+        Surrogate::Gradient { gain } => {
+            let mut descent = descent(model, n_samples, gain)?;
+            let verdict = divergence(&mut descent, model, n_samples)?;
+            return Ok(verdict.map(|found| Verdict { why: by_gradient(&found.why), ..found }));
         }
     }
     let is_known = match law.structure() {

@@ -2,7 +2,11 @@
 
 use super::columns::COLUMNS_MAX;
 use super::figures::{Analysis, Method};
+use crate::learning::Result;
 use crate::learning::krylov::Estimate;
+use crate::learning::law::adjoint::Adjoint;
+use crate::learning::law::q_filter::QFilter;
+use crate::model::StateSpace;
 
 /// Largest transient growth that counts as convergence.
 pub(super) const GROWTH_MAX: f64 = 1e3;
@@ -15,6 +19,16 @@ const ROUNDING: f64 = 1e-9;
 /// converges neither on a machine nor in floating-point numbers.
 pub(super) fn converges(radius: Estimate, growth: f64) -> bool {
     radius.value < 1.0 + ROUNDING && growth < GROWTH_MAX
+}
+
+/// Returns gradient descent on a model, as a law measures it on that plant.
+pub(super) fn descent(model: &StateSpace, n_samples: usize, gain: Option<f64>) -> Result<Adjoint> {
+    Adjoint::new(model, n_samples, gain, QFilter::None)
+}
+
+/// Returns the sentence for a law that measures its gradient: one run of the descent takes several.
+pub(super) fn by_gradient(why: &str) -> String {
+    format!("as gradient descent on this model, between learning runs: {why}")
 }
 
 /// Returns the verdict on a law with bounds, from that on the law without them.

@@ -4,7 +4,7 @@ mod rule;
 
 pub use rule::{GateMeasure, GateParameters, GateRule, Measure};
 
-use super::{Law, LearningError, Result, Standing, Surrogate};
+use super::{Law, LearningError, Purpose, Result, Standing, Surrogate};
 
 /// State of a [`Gate`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,8 @@ pub enum GateState {
 /// - *Rolled back*, and for `patience` runs in a row the error exceeds `growth` times its earlier
 ///   value for the same input: the machine has changed, so *learning* again. An error within the
 ///   tolerance makes it *holding*.
+///
+/// Runs that only measure ([`Law::purpose`]) are passed to the law, and not judged.
 ///
 /// When learning resumes, the best run so far is forgotten: it was made on a different machine
 /// state.
@@ -156,6 +158,10 @@ impl<L: Law> Law for Gate<L> {
             // The first run, or runs of another size: there is nothing to compare with.
             self.best_figure = None;
         }
+        if self.state == GateState::Learning && self.law.purpose() != Purpose::Learning {
+            // A run that only measures says nothing about the law or the machine.
+            return self.law.update(input, error, next);
+        }
         self.judge(input, figure);
         match self.state {
             GateState::Learning => return self.law.update(input, error, next),
@@ -218,6 +224,13 @@ impl<L: Law> Law for Gate<L> {
             GateState::Holding => Standing::Holds,
             GateState::RolledBack if self.went_back => Standing::GoesBack,
             GateState::RolledBack => Standing::Rests,
+        }
+    }
+
+    fn purpose(&self) -> Purpose {
+        match self.state {
+            GateState::Learning => self.law.purpose(),
+            GateState::Holding | GateState::RolledBack => Purpose::Learning,
         }
     }
 

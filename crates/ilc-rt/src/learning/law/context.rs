@@ -123,6 +123,12 @@ pub trait LawParameters: Json + Debug {
         None
     }
 
+    /// Returns true if the law makes runs that only measure: their inputs must be applied as they are, so that
+    /// no wrapper but a gate fits.
+    fn measures(&self) -> bool {
+        false
+    }
+
     /// Builds the law.
     ///
     /// # Errors
@@ -205,7 +211,11 @@ pub(super) fn needs_inputs(law: LawName, cell: &LawCell) -> Result<(), Violation
 /// Checks that a law can be the inner law of a wrapper.
 pub(super) fn check_core(key: &str, core: LawName, cell: &LawCell) -> Result<(), Violation> {
     match cell.tables.parameters(core) {
-        Some(parameters) if parameters.core().is_none() => Ok(()),
+        Some(parameters) if parameters.core().is_none() && !parameters.measures() => Ok(()),
+        Some(parameters) if parameters.measures() => {
+            let allowed = "a law that learns from every run; this one makes runs that only measure";
+            Err(violation(key, core.as_str(), allowed))
+        }
         _ => Err(violation(key, core.as_str(), "a law that goes round no other one")),
     }
 }

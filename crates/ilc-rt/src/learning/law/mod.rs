@@ -17,6 +17,7 @@ pub mod flexible;
 pub mod formation;
 pub mod higher_order;
 mod inputs;
+pub mod model_free;
 pub mod model_inverse;
 pub mod norm_optimal;
 pub mod parametric;
@@ -74,6 +75,8 @@ macro_rules! every_law {
                 crate::learning::law::stable_inverse::StableInverseParameters;
             /// Higher order: the next input from several past runs, with another law.
             HigherOrder higher_order crate::learning::law::higher_order::HigherOrderParameters;
+            /// Gradient ILC without a model: runs with the reversed error measure the gradient.
+            ModelFree model_free crate::learning::law::model_free::ModelFreeParameters;
             /// Another law with a low-pass (Q-filter) after it.
             Filtered filtered crate::learning::law::filtered::FilteredParameters;
             /// Repetitive learning over the position: a table for each axis, e.g. of cogging.
