@@ -238,8 +238,8 @@ fn every_law_says_before_the_start_what_it_will_do() {
         let parameters = tables.parameters(*law).unwrap();
         for example in parameters.examples() {
             let cell = if example.is_parallel { PARALLEL } else { SERIES };
-            for around in ["", "[learning.gate]", "[learning.gate]\n[learning.ladder]\nrepeats = 3"]
-            {
+            let both = "[learning.gate]\n[learning.ladder]\nrepeats = 3";
+            for around in ["", "[learning.gate]", "[learning.ladder]", both] {
                 let learning = format!("{}\n{around}", example.learning);
                 let found = prepared(&text(cell, &learning));
                 if parameters.measures() && around.contains("ladder") {
