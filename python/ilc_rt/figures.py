@@ -43,6 +43,9 @@ class Figures:
         Runs so far that repeated the old input because the learning update was late.
     update_ms : float
         Computing time of the learning update for this run's input; 0 without one.
+    phase : str | None
+        Purpose of a run that only measures, `probing` or `searching`, so that its error
+        does not count; absent for one that is learned from.
     frozen_ratio : float | None
         Error over that of the run a frozen input was taken from; absent when learning.
     rolled_back : bool
@@ -69,6 +72,7 @@ class Figures:
     missing_samples: int = 0
     late_updates: int = 0
     update_ms: float = 0.0
+    phase: str | None = None
     frozen_ratio: float | None = None
     rolled_back: bool = False
     learning_off: bool = False
