@@ -44,7 +44,7 @@ class Figures:
     update_ms : float
         Computing time of the learning update for this run's input; 0 without one.
     phase : str | None
-        Purpose of a run that only measures, `probing` or `searching`, so that its error
+        Purpose of a run that only measures, probing or searching, so that its error
         does not count; absent for one that is learned from.
     frozen_ratio : float | None
         Error over that of the run a frozen input was taken from; absent when learning.
