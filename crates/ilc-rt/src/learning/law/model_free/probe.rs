@@ -4,7 +4,7 @@
 /// it counts as limited: one per cent.
 const LIMITED: f64 = 1e-4;
 
-/// How the input of a run compares with the one asked for.
+/// Comparison of the input of a run with the one asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Came {
     /// The same, but for rounding.
