@@ -319,7 +319,7 @@ def high_pass(order: int, cutoff_hz: float, dt_s: float, n_channels: int = 1) ->
     >>> high = weights.high_pass(2, 40.0, 0.002)
     >>> w = 2 * np.pi * np.array([4.0, 40.0, 200.0])
     >>> np.abs(high.frequency_response(w)).reshape(-1).round(3).tolist()
-    [0.009, 0.707, 0.999]
+    [0.01, 0.707, 1.0]
     """
     return _native.band_filter(passes="high", **locals())
 
