@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Law, LearningError, Result, Standing, Surrogate};
+use super::{Law, LearningError, Result, Surrogate};
 use crate::schema::field_order;
 
 /// `[learning.ladder]`: several runs with the same input before each step of learning, with a gain
@@ -207,6 +207,14 @@ impl<L: Law> Ladder<L> {
 }
 
 impl<L: Law> Law for Ladder<L> {
+    fn inner(&self) -> Option<&dyn Law> {
+        Some(&self.law)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Law> {
+        Some(&mut self.law)
+    }
+
     fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let is_finite = input.iter().chain(error).all(|value| value.is_finite());
         if next.len() != input.len() || !is_finite {
@@ -230,14 +238,6 @@ impl<L: Law> Law for Ladder<L> {
         Ok(())
     }
 
-    fn set_disturbance(&mut self, disturbance: &[f64]) {
-        self.law.set_disturbance(disturbance);
-    }
-
-    fn n_disturbances(&self) -> Option<usize> {
-        self.law.n_disturbances()
-    }
-
     fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.law.recall(input, error, disturbance)
     }
@@ -258,18 +258,6 @@ impl<L: Law> Law for Ladder<L> {
         self.gain = (0.5 * self.gain).max(self.rule.lowest);
         self.runs = 0;
         self.law.on_rollback();
-    }
-
-    fn handles_rollback(&self) -> bool {
-        self.law.handles_rollback()
-    }
-
-    fn status(&self) -> Option<String> {
-        self.law.status()
-    }
-
-    fn standing(&self) -> Standing {
-        self.law.standing()
     }
 
     fn reset(&mut self) {

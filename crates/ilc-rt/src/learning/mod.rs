@@ -24,6 +24,8 @@ mod structure;
 pub mod sweep;
 pub mod tune;
 pub mod weights;
+#[cfg(test)]
+mod wrapped;
 
 pub use error::{LearningError, Result};
 pub use purpose::Purpose;
@@ -39,7 +41,20 @@ pub use structure::{LowPass, Structure, Surrogate};
 /// - `error[k] = reference[k] - measured[k]` on the grid of `input`: `input[k]` acts from sample `k`
 ///   on and shows at `k + 1` at the earliest unless the axis has direct feedthrough. Each law pairs
 ///   the samples itself; the caller shifts nothing.
+///
+/// A wrapper names the law that it wraps ([`Law::inner`]): of what carries no signals, and what the
+/// wrapper does not do itself, the defaults are those of the inner law.
 pub trait Law: Send {
+    /// Returns the inner law of a wrapper.
+    fn inner(&self) -> Option<&dyn Law> {
+        None
+    }
+
+    /// Returns the inner law of a wrapper.
+    fn inner_mut(&mut self) -> Option<&mut dyn Law> {
+        None
+    }
+
     /// Computes the input of the next run.
     ///
     /// # Real Time
@@ -52,12 +67,14 @@ pub trait Law: Send {
     /// Passes the measured disturbance of the coming run, e.g. a temperature, before
     /// [`Law::update`] computes its input: one number per disturbance. Most laws ignore it.
     fn set_disturbance(&mut self, disturbance: &[f64]) {
-        let _ = disturbance;
+        if let Some(inner) = self.inner_mut() {
+            inner.set_disturbance(disturbance);
+        }
     }
 
     /// Returns the number of disturbances that the law needs; `None` for a law that ignores them.
     fn n_disturbances(&self) -> Option<usize> {
-        None
+        self.inner()?.n_disturbances()
     }
 
     /// Learns from an earlier run under a disturbance like those set; returns true if the law uses it.
@@ -122,28 +139,32 @@ pub trait Law: Send {
 
     /// Tells the law that its last input is rolled back, as the error grew with it: the run to
     /// come has an earlier input. Most laws look at one run only and have no use for it.
-    fn on_rollback(&mut self) {}
+    fn on_rollback(&mut self) {
+        if let Some(inner) = self.inner_mut() {
+            inner.on_rollback();
+        }
+    }
 
     /// Returns whether the law restores an earlier input where the error grows, so that its caller should
     /// not.
     fn handles_rollback(&self) -> bool {
-        false
+        self.inner().is_some_and(|inner| inner.handles_rollback())
     }
 
     /// Returns a status message about the last update; most laws have none.
     fn status(&self) -> Option<String> {
-        None
+        self.inner()?.status()
     }
 
     /// Returns whether the law keeps learning after the last update.
     fn standing(&self) -> Standing {
-        Standing::Learns
+        self.inner().map_or(Standing::Learns, Law::standing)
     }
 
     /// Returns the purpose of the next run, whose input the last update computed. Runs that only measure are
     /// never the best ones, and a larger error is not held against them.
     fn purpose(&self) -> Purpose {
-        Purpose::Learning
+        self.inner().map_or(Purpose::Learning, Law::purpose)
     }
 
     /// Resets the law's memory of earlier runs.
@@ -173,6 +194,14 @@ pub enum Standing {
 }
 
 impl<L: Law + ?Sized> Law for Box<L> {
+    fn inner(&self) -> Option<&dyn Law> {
+        (**self).inner()
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Law> {
+        (**self).inner_mut()
+    }
+
     fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         (**self).update(input, error, next)
     }

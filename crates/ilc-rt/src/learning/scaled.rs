@@ -1,7 +1,7 @@
 //! A law whose inputs are counted in another unit than those of the axes: torques by the travel that
 //! they hold. For `design`.
 
-use super::{Law, LearningError, Purpose, Result, Standing};
+use super::{Law, LearningError, Result};
 
 /// A wrapper that converts the inputs of a law: `u = v / scale`, `v` those of the inner law.
 ///
@@ -40,6 +40,14 @@ impl<L: Law> Scaled<L> {
 }
 
 impl<L: Law> Law for Scaled<L> {
+    fn inner(&self) -> Option<&dyn Law> {
+        Some(&self.law)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Law> {
+        Some(&mut self.law)
+    }
+
     fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         self.convert(input);
         self.law.update(&self.own, error, next)?;
@@ -47,14 +55,6 @@ impl<L: Law> Law for Scaled<L> {
             *value /= scale;
         }
         Ok(())
-    }
-
-    fn set_disturbance(&mut self, disturbance: &[f64]) {
-        self.law.set_disturbance(disturbance);
-    }
-
-    fn n_disturbances(&self) -> Option<usize> {
-        self.law.n_disturbances()
     }
 
     fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
@@ -73,26 +73,6 @@ impl<L: Law> Law for Scaled<L> {
             *value /= scale;
         }
         Some(input)
-    }
-
-    fn on_rollback(&mut self) {
-        self.law.on_rollback();
-    }
-
-    fn handles_rollback(&self) -> bool {
-        self.law.handles_rollback()
-    }
-
-    fn status(&self) -> Option<String> {
-        self.law.status()
-    }
-
-    fn standing(&self) -> Standing {
-        self.law.standing()
-    }
-
-    fn purpose(&self) -> Purpose {
-        self.law.purpose()
     }
 
     fn reset(&mut self) {

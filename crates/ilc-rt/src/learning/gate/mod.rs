@@ -146,6 +146,14 @@ impl<L: Law> Gate<L> {
 }
 
 impl<L: Law> Law for Gate<L> {
+    fn inner(&self) -> Option<&dyn Law> {
+        Some(&self.law)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Law> {
+        Some(&mut self.law)
+    }
+
     fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let figure = self.rule.measure.of(error);
         if next.len() != input.len() || !figure.is_finite() {
@@ -171,14 +179,6 @@ impl<L: Law> Law for Gate<L> {
         Ok(())
     }
 
-    fn set_disturbance(&mut self, disturbance: &[f64]) {
-        self.law.set_disturbance(disturbance);
-    }
-
-    fn n_disturbances(&self) -> Option<usize> {
-        self.law.n_disturbances()
-    }
-
     fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.law.recall(input, error, disturbance)
     }
@@ -193,10 +193,6 @@ impl<L: Law> Law for Gate<L> {
 
     fn linear_surrogate(&mut self) -> Surrogate<'_> {
         Surrogate::Inside(&mut self.law)
-    }
-
-    fn on_rollback(&mut self) {
-        self.law.on_rollback();
     }
 
     fn handles_rollback(&self) -> bool {

@@ -9,7 +9,7 @@ use super::context::{
 };
 use super::q_filter::{QFilter, QRunner};
 use crate::learning::error::check_length;
-use crate::learning::{Law, LearningError, Result, Standing};
+use crate::learning::{Law, LearningError, Result};
 use crate::schema::{Violation, field_order};
 
 /// `[learning.filtered]`: another law and the low-pass after it.
@@ -100,6 +100,14 @@ impl<L: Law> Filtered<L> {
 }
 
 impl<L: Law> Law for Filtered<L> {
+    fn inner(&self) -> Option<&dyn Law> {
+        Some(&self.law)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Law> {
+        Some(&mut self.law)
+    }
+
     fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         check_length("next", next, self.n_samples, self.n_inputs)?;
         self.law.update(input, error, next)?;
@@ -118,32 +126,8 @@ impl<L: Law> Law for Filtered<L> {
         self.law.apply_adjoint(&self.dual, to_input, to_error)
     }
 
-    fn set_disturbance(&mut self, disturbance: &[f64]) {
-        self.law.set_disturbance(disturbance);
-    }
-
-    fn n_disturbances(&self) -> Option<usize> {
-        self.law.n_disturbances()
-    }
-
     fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.law.recall(input, error, disturbance)
-    }
-
-    fn on_rollback(&mut self) {
-        self.law.on_rollback();
-    }
-
-    fn handles_rollback(&self) -> bool {
-        self.law.handles_rollback()
-    }
-
-    fn status(&self) -> Option<String> {
-        self.law.status()
-    }
-
-    fn standing(&self) -> Standing {
-        self.law.standing()
     }
 
     fn reset(&mut self) {

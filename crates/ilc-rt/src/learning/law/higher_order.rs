@@ -9,7 +9,7 @@ use super::context::{
 };
 use super::inputs::Inputs;
 use crate::learning::error::check_length;
-use crate::learning::{Law, LearningError, Result, Standing, Surrogate};
+use crate::learning::{Law, LearningError, Result, Surrogate};
 use crate::schema::{Violation, field_order};
 
 /// Largest number of runs.
@@ -141,6 +141,14 @@ impl<L: Law> HigherOrder<L> {
 }
 
 impl<L: Law> Law for HigherOrder<L> {
+    fn inner(&self) -> Option<&dyn Law> {
+        Some(&self.law)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Law> {
+        Some(&mut self.law)
+    }
+
     fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         check_length("next", next, self.n_samples, self.n_inputs)?;
         self.law.update(input, error, &mut self.proposal)?;
@@ -152,14 +160,6 @@ impl<L: Law> Law for HigherOrder<L> {
             self.proposals.add(row, *weight, next);
         }
         Ok(())
-    }
-
-    fn set_disturbance(&mut self, disturbance: &[f64]) {
-        self.law.set_disturbance(disturbance);
-    }
-
-    fn n_disturbances(&self) -> Option<usize> {
-        self.law.n_disturbances()
     }
 
     fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
@@ -181,18 +181,6 @@ impl<L: Law> Law for HigherOrder<L> {
     fn on_rollback(&mut self) {
         self.forget();
         self.law.on_rollback();
-    }
-
-    fn handles_rollback(&self) -> bool {
-        self.law.handles_rollback()
-    }
-
-    fn status(&self) -> Option<String> {
-        self.law.status()
-    }
-
-    fn standing(&self) -> Standing {
-        self.law.standing()
     }
 
     fn reset(&mut self) {

@@ -181,6 +181,14 @@ fn pseudo_inverse(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>> {
 }
 
 impl<L: Law> Law for ThroughJacobian<L> {
+    fn inner(&self) -> Option<&dyn Law> {
+        Some(&self.law)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn Law> {
+        Some(&mut self.law)
+    }
+
     fn update(&mut self, input: &[f64], error: &[f64], next: &mut [f64]) -> Result {
         let (p, m) = (self.n_coordinates, self.n_joints);
         let n_samples = self.n_samples(input);
@@ -197,14 +205,6 @@ impl<L: Law> Law for ThroughJacobian<L> {
             }
         }
         self.law.update(input, &self.joint_error, next)
-    }
-
-    fn set_disturbance(&mut self, disturbance: &[f64]) {
-        self.law.set_disturbance(disturbance);
-    }
-
-    fn n_disturbances(&self) -> Option<usize> {
-        self.law.n_disturbances()
     }
 
     fn apply_adjoint(
@@ -232,18 +232,6 @@ impl<L: Law> Law for ThroughJacobian<L> {
             }
         }
         Ok(true)
-    }
-
-    fn on_rollback(&mut self) {
-        self.law.on_rollback();
-    }
-
-    fn handles_rollback(&self) -> bool {
-        self.law.handles_rollback()
-    }
-
-    fn status(&self) -> Option<String> {
-        self.law.status()
     }
 
     fn reset(&mut self) {
