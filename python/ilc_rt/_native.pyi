@@ -23,6 +23,7 @@ __all__ = [
     "LearningError",
     "Library",
     "Line",
+    "Made",
     "ModelError",
     "Pid",
     "SignalError",
@@ -232,8 +233,12 @@ class TrajectoryError(ValueError): ...
 def coupling_gains(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 def projection_across(reference_m: ArrayLike) -> NDArray[np.float64]: ...
 
+# What is shown, copied and pickled as the call that made it.
+@disjoint_base
+class Made: ...
+
 @final
-class Cell:
+class Cell(Made):
     @staticmethod
     def load(path: str | PathLike[str], allow_divergent: bool = False) -> Cell: ...
     @staticmethod
@@ -271,17 +276,7 @@ class Cell:
     @property
     def measure(self) -> Literal["encoder", "tcp"]: ...
     @property
-    def law(
-        self,
-    ) -> Literal[
-        "norm_optimal",
-        "pd",
-        "constrained",
-        "adjoint",
-        "model_inverse",
-        "error_feedforward",
-        "none",
-    ]: ...
+    def law(self) -> str: ...
     @property
     def warnings(self) -> list[str]: ...
     def reference(self) -> NDArray[np.float64]: ...
@@ -292,7 +287,7 @@ class Cell:
     ) -> tuple[StateSpace, NDArray[np.float64]]: ...
 
 @disjoint_base
-class Library:
+class Library(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
     def list(self, cell: str | None) -> list[dict[str, Any]]: ...
     def load(self, id: int) -> dict[str, Any]: ...
@@ -320,7 +315,6 @@ def run_events(
     disturbance: Callable[[int], ArrayLike] | None = None,
 ) -> EventStream: ...
 
-# Make objects again, for copies and pickles.
 # What the typed classes and functions of the package stand on: arguments by name, checked here.
 @disjoint_base
 class Law:
@@ -386,11 +380,13 @@ def velocity_loop_response(
     **model: Any,  # noqa: ANN401
 ) -> NDArray[np.complex128]: ...
 def second_order_model(**model: Any) -> StateSpace: ...  # noqa: ANN401
+
+# Make objects again, for copies and pickles.
 def _made_of_kind(cls: type, native: str, kind: str, arguments: dict[str, Any], /) -> object: ...
 def _made(cls: object, how: str | None, arguments: dict[str, Any]) -> object: ...
 
 @disjoint_base
-class Pid:
+class Pid(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
     def step(self, error: float) -> float: ...
     def run(self, error: ArrayLike) -> NDArray[np.float64]: ...
@@ -398,7 +394,7 @@ class Pid:
     def reset(self) -> None: ...
 
 @disjoint_base
-class Cascade:
+class Cascade(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
     def step(
         self,
@@ -412,7 +408,7 @@ class Cascade:
     def reset(self) -> None: ...
 
 @disjoint_base
-class CrossCoupled:
+class CrossCoupled(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
     def step(
         self, error_m: ArrayLike, gains: ArrayLike, curvature_per_m: float = 0.0
@@ -420,7 +416,7 @@ class CrossCoupled:
     def reset(self) -> None: ...
 
 @disjoint_base
-class Delta:
+class Delta(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
     @property
     def base_m(self) -> float: ...
@@ -435,7 +431,7 @@ class Delta:
     def condition(self, theta_rad: ArrayLike) -> float: ...
 
 @disjoint_base
-class Gantry:
+class Gantry(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
     @property
     def orthogonality_rad(self) -> float: ...
@@ -458,9 +454,9 @@ def contour_error(
 ) -> NDArray[np.float64]: ...
 
 @disjoint_base
-class Line:
+class Line(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401
 
 @disjoint_base
-class Arc:
+class Arc(Made):
     def __new__(cls, **keywords: Any) -> Self: ...  # noqa: ANN401

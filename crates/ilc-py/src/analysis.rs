@@ -14,8 +14,9 @@ use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::argument::{Signal, give_signal, misfit, read_array, read_vector};
-use crate::arguments::{Arguments, ByName, Keywords};
+use crate::answer::{ByName, by_name, give_signal, give_vector};
+use crate::argument::{Signal, misfit, read_array, read_vector};
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::laws;
@@ -56,48 +57,34 @@ pub(crate) fn analyze<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
 
 /// Returns the figures of an analysis by the names of `ilc_rt.Analysis`.
 fn figures<'py>(py: Python<'py>, found: &Analysis, model: &StateSpace) -> ByName<'py> {
-    let array = |values: &[f64]| give_signal(py, values.to_vec(), 1, true);
+    let array = |values: &[f64]| give_vector(py, values.to_vec());
     let signal = |values: &Option<Vec<f64>>, n_channels| {
         let values = values.clone();
         values.map(|values| give_signal(py, values, n_channels, false)).transpose()
     };
-    let figures = PyDict::new(py);
-    figures.set_item("n_samples", found.n_samples)?;
     let method = match found.method {
         Method::Dense => "dense",
         Method::Structured => "structured",
     };
-    figures.set_item("method", method)?;
-    figures.set_item("converges", found.converges)?;
-    figures.set_item("monotonic", found.monotonic)?;
-    figures.set_item("why", &found.why)?;
-    figures.set_item("spectral_radius", found.spectral_radius.value)?;
-    figures.set_item("spectral_radius_error", found.spectral_radius.error)?;
-    let factor = found.monotonic_factor;
-    figures.set_item("monotonic_factor", factor.map(|factor| factor.value))?;
-    figures.set_item("monotonic_factor_error", factor.map(|factor| factor.error))?;
-    figures.set_item("transient_growth", found.transient_growth)?;
-    for (name, value) in [
-        ("critical_frequency_hz", found.critical_frequency_hz),
-        ("learnable_frequency_hz", found.learnable_frequency_hz),
-        ("robust_factor", found.robust_factor),
-        ("robust_lifted", found.robust_lifted),
-        ("uncertainty_allowed", found.uncertainty_allowed),
-        ("initial_error_rms", found.initial_error_rms),
-        ("converged_error_rms", found.converged_error_rms),
-        ("expected_rms_limit", found.expected_rms_limit),
-    ] {
-        figures.set_item(name, value)?;
-    }
-    let condition = found.pd_condition.as_ref();
-    figures.set_item("pd_factor", condition.map(|condition| condition.factor))?;
-    figures.set_item("pd_gain_range", condition.and_then(|condition| condition.gain_range))?;
-    figures.set_item("frequency_hz", array(&found.frequency_hz)?)?;
-    figures.set_item("contraction", array(&found.contraction)?)?;
-    figures.set_item("converged_input", signal(&found.converged_input, model.n_inputs())?)?;
-    figures.set_item("converged_error", signal(&found.converged_error, model.n_outputs())?)?;
-    figures.set_item("expected_rms", array(&found.expected_rms)?)?;
-    Ok(figures)
+    let (factor, condition) = (found.monotonic_factor, found.pd_condition.as_ref());
+    Ok(by_name!(py,
+        [found => n_samples, converges, monotonic, why, transient_growth]
+        [found => critical_frequency_hz, learnable_frequency_hz]
+        [found => robust_factor, robust_lifted, uncertainty_allowed]
+        [found => initial_error_rms, converged_error_rms, expected_rms_limit]
+        method: method,
+        spectral_radius: found.spectral_radius.value,
+        spectral_radius_error: found.spectral_radius.error,
+        monotonic_factor: factor.map(|factor| factor.value),
+        monotonic_factor_error: factor.map(|factor| factor.error),
+        pd_factor: condition.map(|condition| condition.factor),
+        pd_gain_range: condition.and_then(|condition| condition.gain_range),
+        frequency_hz: array(&found.frequency_hz),
+        contraction: array(&found.contraction),
+        converged_input: signal(&found.converged_input, model.n_inputs())?,
+        converged_error: signal(&found.converged_error, model.n_outputs())?,
+        expected_rms: array(&found.expected_rms),
+    ))
 }
 
 #[pyfunction(signature = (**keywords))]
@@ -192,24 +179,13 @@ pub(crate) fn tune<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'py> {
         n_runs: a.whole("n_runs")?,
     };
     let found = interruptible(a.py(), || propose(&model, n_samples, &knowledge))?.or_raise()?;
-    let figures_of_law = figures(a.py(), &found.analysis, &model)?;
-    let step = |step: &TuningStep| {
-        let entry = PyDict::new(a.py());
-        entry.set_item("name", step.name)?;
-        entry.set_item("what", step.what)?;
-        entry.set_item("value", Some(step.value).filter(|value| value.is_finite()))?;
-        entry.set_item("why", &step.why)?;
-        Ok(entry)
+    let analysis = figures(a.py(), &found.analysis, &model)?;
+    let step = |step: &TuningStep| -> ByName<'py> {
+        let value = Some(step.value).filter(|value| value.is_finite());
+        Ok(by_name!(a.py(), [step => name, what, why] value: value))
     };
     let steps: PyResult<Vec<_>> = found.steps.iter().map(step).collect();
-    let figures = PyDict::new(a.py());
-    figures.set_item("q", found.q)?;
-    figures.set_item("s", found.s)?;
-    figures.set_item("r", found.r)?;
-    figures.set_item("smoothing_hz", found.smoothing_hz)?;
-    figures.set_item("steps", steps?)?;
-    figures.set_item("analysis", figures_of_law)?;
-    Ok(figures)
+    Ok(by_name!(a.py(), [found => q, s, r, smoothing_hz] steps: steps?, analysis: analysis))
 }
 
 #[pyfunction]
@@ -228,18 +204,9 @@ pub(crate) fn repeatability<'py>(errors: &Bound<'py, PyAny>) -> ByName<'py> {
     let found =
         interruptible(py, || learning::repeatability(&values, count, n_samples, n_channels))?
             .or_raise()?;
-    let figures = PyDict::new(py);
-    figures.set_item("mean", give_signal(py, found.mean, n_channels, is_flat)?)?;
-    figures.set_item("spread", give_signal(py, found.spread, n_channels, is_flat)?)?;
-    for (name, value) in [
-        ("mean_rms", found.mean_rms),
-        ("spread_rms", found.spread_rms),
-        ("ratio", found.ratio),
-        ("learnable", found.learnable),
-        ("least_rms", found.least_rms),
-        ("largest_rms", found.largest_rms),
-    ] {
-        figures.set_item(name, value)?;
-    }
-    Ok(figures)
+    Ok(by_name!(py,
+        [found => mean_rms, spread_rms, ratio, learnable, least_rms, largest_rms]
+        mean: give_signal(py, found.mean, n_channels, is_flat)?,
+        spread: give_signal(py, found.spread, n_channels, is_flat)?,
+    ))
 }

@@ -1,8 +1,8 @@
-//! Conversion of arrays from and to Python.
+//! Arrays among the arguments: each read, and refused, under its own name.
 
-use ilc_rt::model::StateSpace;
-use numpy::ndarray::{Array1, Array2};
-use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use std::ops::Deref;
+
+use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -31,16 +31,21 @@ impl Layout {
         Ok(Self { n_samples, n_channels, is_flat })
     }
 
-    /// Refuses any other number of samples, then of channels.
-    pub(crate) fn require(self, name: &str, n_samples: usize, n_channels: usize) -> PyResult<()> {
-        if self.n_samples != n_samples {
-            let rule = format!("({n_samples},) or ({n_samples}, n_channels)");
-            return Err(misfit(name, &self.shape(), &rule));
+    /// Refuses any other number of samples.
+    pub(crate) fn require_samples(self, name: &str, n_samples: usize) -> PyResult<()> {
+        if self.n_samples == n_samples {
+            return Ok(());
         }
-        if self.n_channels != n_channels {
-            return Err(misfit(name, &self.shape(), &format!("(n_samples, {n_channels})")));
+        let rule = format!("({n_samples},) or ({n_samples}, n_channels)");
+        Err(misfit(name, &self.shape(), &rule))
+    }
+
+    /// Refuses any other number of channels.
+    pub(crate) fn require_channels(self, name: &str, n_channels: usize) -> PyResult<()> {
+        if self.n_channels == n_channels {
+            return Ok(());
         }
-        Ok(())
+        Err(misfit(name, &self.shape(), &format!("(n_samples, {n_channels})")))
     }
 
     /// Refuses any other size.
@@ -66,39 +71,31 @@ impl Layout {
 #[derive(Debug)]
 pub(crate) struct Signal {
     pub(crate) values: Vec<f64>,
-    pub(crate) n_samples: usize,
-    pub(crate) n_channels: usize,
-    pub(crate) is_flat: bool,
+    pub(crate) layout: Layout,
+}
+
+impl Deref for Signal {
+    type Target = Layout;
+    fn deref(&self) -> &Layout {
+        &self.layout
+    }
 }
 
 impl Signal {
     /// Reads `(n_samples,)` or `(n_samples, n_channels)`.
     pub(crate) fn read(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (values, shape) = read_array(name, object)?;
-        let Layout { n_samples, n_channels, is_flat } = Layout::of(name, &shape)?;
-        Ok(Self { values, n_samples, n_channels, is_flat })
+        Layout::of(name, &shape).map(|layout| Self { values, layout })
     }
 
     /// Refuses any other number of channels.
     pub(crate) fn with_channels(self, name: &str, n_channels: usize) -> PyResult<Self> {
-        if self.n_channels == n_channels {
-            return Ok(self);
-        }
-        Err(misfit(name, &self.shape(), &format!("(n_samples, {n_channels})")))
+        self.require_channels(name, n_channels).map(|()| self)
     }
 
     /// Refuses any other number of samples.
     pub(crate) fn with_samples(self, name: &str, n_samples: usize) -> PyResult<Self> {
-        if self.n_samples == n_samples {
-            return Ok(self);
-        }
-        let rule = format!("({n_samples},) or ({n_samples}, n_channels)");
-        Err(misfit(name, &self.shape(), &rule))
-    }
-
-    /// Returns the original shape.
-    pub(crate) fn shape(&self) -> Vec<usize> {
-        if self.is_flat { vec![self.n_samples] } else { vec![self.n_samples, self.n_channels] }
+        self.require_samples(name, n_samples).map(|()| self)
     }
 }
 
@@ -118,6 +115,14 @@ pub(crate) fn read_vector(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec
     if shape.len() == 1 { Ok(values) } else { Err(misfit(name, &shape, "one axis, (n,)")) }
 }
 
+/// Reads two numbers.
+pub(crate) fn read_pair(name: &str, object: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
+    match read_vector(name, object)?[..] {
+        [first, second] => Ok([first, second]),
+        ref other => Err(misfit(name, &[other.len()], "(2,)")),
+    }
+}
+
 /// Reads a disturbance: a single number or a list of them.
 pub(crate) fn read_disturbance(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let (values, shape) = read_array(name, object)?;
@@ -125,29 +130,6 @@ pub(crate) fn read_disturbance(name: &str, object: &Bound<'_, PyAny>) -> PyResul
         return Ok(values);
     }
     Err(misfit(name, &shape, "a number or (n_disturbances,)"))
-}
-
-/// Returns a time-first signal to Python, without channel axis if `is_flat`.
-pub(crate) fn give_signal(
-    py: Python<'_>,
-    values: Vec<f64>,
-    n_channels: usize,
-    is_flat: bool,
-) -> PyResult<Bound<'_, PyAny>> {
-    if is_flat {
-        return Ok(Array1::from(values).into_pyarray(py).into_any());
-    }
-    let shape = (values.len() / n_channels.max(1), n_channels);
-    Array2::from_shape_vec(shape, values)
-        .map(|array| array.into_pyarray(py).into_any())
-        .map_err(|error| PyValueError::new_err(error.to_string()))
-}
-
-/// Returns a matrix to Python.
-pub(crate) fn give_matrix<'py>(py: Python<'py>, matrix: &Matrix) -> Bound<'py, PyAny> {
-    Array2::from_shape_fn(matrix.shape(), |(row, col)| matrix[(row, col)])
-        .into_pyarray(py)
-        .into_any()
 }
 
 /// Returns the exception for an argument of the wrong shape.
@@ -256,9 +238,4 @@ fn place(index: usize, shape: &[usize]) -> String {
     }
     indices.reverse();
     format!("[{}]", indices.join(", "))
-}
-
-/// Returns true if an output of `model` can be returned without channel axis.
-pub(crate) fn is_flat_output(input: &Signal, model: &StateSpace) -> bool {
-    input.is_flat && model.n_outputs() == 1
 }

@@ -9,16 +9,12 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::argument::{Matrix, Signal, misfit, read_array, read_vector};
+use crate::argument::{Matrix, Signal, misfit, read_array, read_pair, read_vector};
 use crate::model_argument::read_model;
 use crate::whole::{each, number, pair, refused, shown, whole};
 
 /// The keywords of a call from Python.
 pub(crate) type Keywords<'a, 'py> = &'a Bound<'py, PyDict>;
-/// Figures by name, as returned to Python.
-pub(crate) type ByName<'py> = PyResult<Bound<'py, PyDict>>;
-/// An array, as returned to Python.
-pub(crate) type Array<'py> = PyResult<Bound<'py, PyAny>>;
 
 /// The keyword arguments of one call.
 #[derive(Debug, Clone, Copy)]
@@ -142,10 +138,7 @@ impl<'a, 'py> Arguments<'a, 'py> {
 
     /// Reads two numbers.
     pub(crate) fn pair(self, name: &str) -> PyResult<[f64; 2]> {
-        match self.vector(name)?[..] {
-            [first, second] => Ok([first, second]),
-            ref other => Err(misfit(name, &[other.len()], "(2,)")),
-        }
+        read_pair(name, &self.get(name)?)
     }
 
     /// Reads a signal.

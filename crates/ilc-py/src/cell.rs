@@ -7,7 +7,7 @@ use ilc_rt::design::{self, Plan};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::argument::give_signal;
+use crate::answer::{Array, by_name, give_signal, give_vector};
 use crate::error::OrRaise;
 use crate::made::Made;
 use crate::model::PyStateSpace;
@@ -22,13 +22,63 @@ use crate::model::PyStateSpace;
 /// >>> cell = Cell.load("examples/01_gantry.toml")
 /// >>> cell.n_axes
 /// 2
-#[pyclass(name = "Cell", module = "ilc_rt", frozen)]
+#[pyclass(name = "Cell", module = "ilc_rt", extends = Made, frozen)]
 #[derive(Debug)]
 pub(crate) struct PyCell {
-    made: Made,
     pub(crate) cell: Cell,
     reference_m: Vec<f64>,
+    /// Name of the cell.
+    #[pyo3(get)]
+    name: String,
+    /// Path of the file that it was read from.
+    #[pyo3(get)]
+    path: String,
+    /// Servo cycle in seconds.
+    #[pyo3(get)]
+    cycle_s: f64,
+    /// Samples in a run.
+    #[pyo3(get)]
     n_samples: usize,
+    /// Number of axes.
+    #[pyo3(get)]
+    n_axes: usize,
+    /// Names of the axes, in the order of the coordinates.
+    #[pyo3(get)]
+    axis_names: Vec<String>,
+    /// Command interface of each axis: `csp`, `csv` or `cst`.
+    #[pyo3(get)]
+    interfaces: Vec<&'static str>,
+    /// Quantity that the learned input of each axis is added to: `position` (in m), `velocity` (in m/s)
+    /// or `torque` (in N).
+    #[pyo3(get)]
+    inputs: Vec<&'static str>,
+    /// Bound of the learned input of each axis: its key in `[learning]`, and the value.
+    #[pyo3(get)]
+    input_bounds: Vec<(&'static str, f64)>,
+    /// Unit in which the weights of a law count the learned input of each axis, per unit of that input: the
+    /// travel in metres that a newton holds if it learns a torque, 1 otherwise.
+    #[pyo3(get)]
+    input_scales: Vec<f64>,
+    /// Natural frequency of the position loop of each axis in Hz, by its model.
+    #[pyo3(get)]
+    natural_frequencies_hz: Vec<f64>,
+    /// Unit of the position of each axis: `m`, or `rad` for a rotary one.
+    #[pyo3(get)]
+    axis_units: Vec<&'static str>,
+    /// Position gain kv of each axis in 1/s; None if the loop is in the drive.
+    #[pyo3(get)]
+    position_gains_per_s: Vec<Option<f64>>,
+    /// Bus address.
+    #[pyo3(get)]
+    bus: String,
+    /// Measurement to learn from: `encoder` or `tcp`.
+    #[pyo3(get)]
+    measure: &'static str,
+    /// Name of the law, as in `[learning] law`.
+    #[pyo3(get)]
+    law: &'static str,
+    /// Warnings of the analysis of the law, which may start nevertheless.
+    #[pyo3(get)]
     warnings: Vec<String>,
 }
 
@@ -44,23 +94,19 @@ impl PyCell {
     #[staticmethod]
     #[pyo3(signature = (path, allow_divergent=false))]
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
-    fn load(path: std::path::PathBuf, allow_divergent: bool) -> PyResult<Self> {
-        let made = Made::new("load", |call| {
-            call.set_item("path", &path)?;
-            call.set_item("allow_divergent", allow_divergent)
-        })?;
+    fn load(
+        py: Python<'_>,
+        path: std::path::PathBuf,
+        allow_divergent: bool,
+    ) -> PyResult<Bound<'_, Self>> {
+        let arguments = by_name!(py, path: &path, allow_divergent: allow_divergent);
         let mut cell = Cell::load(Path::new(&path)).or_raise()?;
         cell.learning.allow_divergent |= allow_divergent;
         let plan = Plan::new(&cell, None, false).or_raise()?;
         // Refuses a model or weights that cannot learn, before any drive is touched.
         let warnings = plan.law(&cell).or_raise()?.warnings;
-        Ok(Self {
-            made,
-            n_samples: plan.n_samples(),
-            reference_m: plan.reference_m,
-            cell,
-            warnings,
-        })
+        let made = PyClassInitializer::from(Made::by("load", &arguments));
+        Bound::new(py, made.add_subclass(Self::of(cell, plan, warnings)))
     }
 
     /// Refuse a text that `load` would refuse as the contents of this file.
@@ -74,130 +120,11 @@ impl PyCell {
         Plan::new(&cell, None, false).or_raise()?.law(&cell).or_raise().map(drop)
     }
 
-    /// Pickled and copied as the file that it is read from.
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().made.reduce(slf.get_type().as_any())
-    }
-
-    /// Name of the cell.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.cell.cell.name
-    }
-
-    /// Path of the file that it was read from.
-    #[getter]
-    fn path(&self) -> String {
-        self.cell.file.display().to_string()
-    }
-
-    /// Servo cycle in seconds.
-    #[getter]
-    fn cycle_s(&self) -> f64 {
-        self.cell.cycle_s()
-    }
-
-    /// Samples in a run.
-    #[getter]
-    fn n_samples(&self) -> usize {
-        self.n_samples
-    }
-
-    /// Number of axes.
-    #[getter]
-    fn n_axes(&self) -> usize {
-        self.cell.n_axes()
-    }
-
-    /// Names of the axes, in the order of the coordinates.
-    #[getter]
-    fn axis_names(&self) -> Vec<String> {
-        self.cell.axes.iter().map(|axis| axis.name.clone()).collect()
-    }
-
-    /// Command interface of each axis: `csp`, `csv` or `cst`.
-    #[getter]
-    fn interfaces(&self) -> Vec<&'static str> {
-        let name = |axis: &Axis| axis.interface.name();
-        self.cell.axes.iter().map(name).collect()
-    }
-
-    /// Quantity that the learned input of each axis is added to: `position` (in m), `velocity` (in m/s)
-    /// or `torque` (in N).
-    #[getter]
-    fn inputs(&self) -> Vec<&'static str> {
-        self.cell.axes.iter().map(|axis| axis.input_kind().name()).collect()
-    }
-
-    /// Bound of the learned input of each axis: its key in `[learning]`, and the value.
-    #[getter]
-    fn input_bounds(&self) -> Vec<(&'static str, f64)> {
-        let bound = |axis: &Axis| {
-            let input = axis.input_kind();
-            (mode::bound_key(input), mode::bound_of(input, &self.cell.learning))
-        };
-        self.cell.axes.iter().map(bound).collect()
-    }
-
-    /// Unit in which the weights of a law count the learned input of each axis, per unit of that input: the
-    /// travel in metres that a newton holds if it learns a torque, 1 otherwise.
-    #[getter]
-    fn input_scales(&self) -> Vec<f64> {
-        self.cell.axes.iter().map(mode::scale_of).collect()
-    }
-
-    /// Natural frequency of the position loop of each axis in Hz, by its model.
-    #[getter]
-    fn natural_frequencies_hz(&self) -> Vec<f64> {
-        let of = |axis: &Axis| mode::of(axis.interface).natural_frequency_hz(axis);
-        self.cell.axes.iter().map(of).collect()
-    }
-
-    /// Unit of the position of each axis: `m`, or `rad` for a rotary one.
-    #[getter]
-    fn axis_units(&self) -> Vec<&'static str> {
-        self.cell.axes.iter().map(|axis| axis.unit.symbol()).collect()
-    }
-
-    /// Position gain kv of each axis in 1/s; None if the loop is in the drive.
-    #[getter]
-    fn position_gains_per_s(&self) -> Vec<Option<f64>> {
-        let gain = |axis: &Axis| axis.position_loop.map(|position_loop| position_loop.gain_per_s);
-        self.cell.axes.iter().map(gain).collect()
-    }
-
-    /// Bus address.
-    #[getter]
-    fn bus(&self) -> &str {
-        &self.cell.bus.address
-    }
-
-    /// Measurement to learn from: `encoder` or `tcp`.
-    #[getter]
-    fn measure(&self) -> &'static str {
-        match self.cell.learning.measure {
-            Measure::Encoder => "encoder",
-            Measure::Tcp => "tcp",
-        }
-    }
-
-    /// Name of the law, as in `[learning] law`.
-    #[getter]
-    fn law(&self) -> &'static str {
-        self.cell.learning.law.as_str()
-    }
-
-    /// Warnings of the analysis of the law, which may start nevertheless.
-    #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.warnings.clone()
-    }
-
     /// Return the set points of a run, as sent by the loop.
     ///
     /// Returns ndarray of float64, shape (n_samples, n_axes): Positions in metres.
-    fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give_signal(py, self.reference_m.clone(), self.cell.n_axes(), false)
+    fn reference<'py>(&self, py: Python<'py>) -> Array<'py> {
+        give_signal(py, self.reference_m.clone(), self.n_axes, false)
     }
 
     /// Return the model that learning uses, from learned input to position.
@@ -210,9 +137,9 @@ impl PyCell {
     /// Return the error of a run without learning, by the model.
     ///
     /// Returns ndarray of float64, shape (n_samples, n_axes): Set point minus response in metres.
-    fn first_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn first_error<'py>(&self, py: Python<'py>) -> Array<'py> {
         let error = design::first_error(&self.cell, &self.reference_m).or_raise()?;
-        give_signal(py, error, self.cell.n_axes(), false)
+        give_signal(py, error, self.n_axes, false)
     }
 
     /// Return an axis that differs from its model, for trials of weights.
@@ -235,8 +162,8 @@ impl PyCell {
         damping: f64,
         delay: i64,
     ) -> PyResult<(PyStateSpace, Bound<'py, PyAny>)> {
-        if axis >= self.cell.n_axes() {
-            let message = format!("axis = {axis}; 0 to {} is needed", self.cell.n_axes() - 1);
+        if axis >= self.n_axes {
+            let message = format!("axis = {axis}; 0 to {} is needed", self.n_axes - 1);
             return Err(PyValueError::new_err(message));
         }
         let factors = [frequency, damping];
@@ -247,10 +174,50 @@ impl PyCell {
         let (model, way_m) =
             design::perturbed_axis(&self.cell, &self.reference_m, axis, factors, delay)
                 .or_raise()?;
-        Ok((PyStateSpace::from(model), give_signal(py, way_m, 1, true)?))
+        Ok((PyStateSpace::from(model), give_vector(py, way_m)))
     }
 
     fn __repr__(&self) -> String {
-        format!("Cell({:?}, {} axes, {})", self.name(), self.n_axes(), self.bus())
+        format!("Cell({:?}, {} axes, {})", self.name, self.n_axes, self.bus)
+    }
+}
+
+impl PyCell {
+    fn of(cell: Cell, plan: Plan, warnings: Vec<String>) -> Self {
+        fn each<T>(cell: &Cell, of: impl Fn(&Axis) -> T) -> Vec<T> {
+            cell.axes.iter().map(of).collect()
+        }
+        let bound = |axis: &Axis| {
+            let input = axis.input_kind();
+            (mode::bound_key(input), mode::bound_of(input, &cell.learning))
+        };
+        Self {
+            n_samples: plan.n_samples(),
+            reference_m: plan.reference_m,
+            name: cell.cell.name.clone(),
+            path: cell.file.display().to_string(),
+            cycle_s: cell.cycle_s(),
+            n_axes: cell.n_axes(),
+            axis_names: each(&cell, |axis| axis.name.clone()),
+            interfaces: each(&cell, |axis| axis.interface.name()),
+            inputs: each(&cell, |axis| axis.input_kind().name()),
+            input_bounds: each(&cell, bound),
+            input_scales: each(&cell, mode::scale_of),
+            natural_frequencies_hz: each(&cell, |axis| {
+                mode::of(axis.interface).natural_frequency_hz(axis)
+            }),
+            axis_units: each(&cell, |axis| axis.unit.symbol()),
+            position_gains_per_s: each(&cell, |axis| {
+                axis.position_loop.map(|position_loop| position_loop.gain_per_s)
+            }),
+            bus: cell.bus.address.clone(),
+            measure: match cell.learning.measure {
+                Measure::Encoder => "encoder",
+                Measure::Tcp => "tcp",
+            },
+            law: cell.learning.law.as_str(),
+            warnings,
+            cell,
+        }
     }
 }

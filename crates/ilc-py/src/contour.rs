@@ -2,79 +2,62 @@
 
 use ilc_rt::trajectory::contour::{Arc, ContourError, Line, SampledPath, Shape, coupling};
 use ilc_rt::trajectory::{MAX_AXES, contour_error_m};
-use numpy::IntoPyArray;
-use numpy::ndarray::Array3;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
-use crate::argument::{Signal, give_signal, misfit, read_vector};
+use crate::answer::{Array, give_matrices, give_signal, give_vector};
+use crate::argument::{Signal, misfit, read_vector};
 use crate::arguments::{Arguments, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
-use crate::made::Made;
+use crate::made::{Made, New, made};
 use crate::whole::whole;
 
-#[pyclass(name = "Line", module = "ilc_rt._native", subclass, frozen)]
+#[pyclass(name = "Line", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
-pub(crate) struct PyLine(Line, Made);
+pub(crate) struct PyLine(Line);
 
 #[pymethods]
 impl PyLine {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
         let a = Arguments::of(keywords)?;
         let point = |name: &str| read_point(name, &a.get(name)?);
-        Ok(Self(Line { from_m: point("from_m")?, to_m: point("to_m")? }, Made::of(a)?))
-    }
-
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().1.reduce(slf.get_type().as_any())
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.1.shown(py, "Line")
+        made(a, Self(Line { from_m: point("from_m")?, to_m: point("to_m")? }))
     }
 }
 
-#[pyclass(name = "Arc", module = "ilc_rt._native", subclass, frozen)]
+#[pyclass(name = "Arc", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
-pub(crate) struct PyArc(Arc, Made);
+pub(crate) struct PyArc(Arc);
 
 #[pymethods]
 impl PyArc {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
         let a = Arguments::of(keywords)?;
         let point = |name: &str| read_point(name, &a.get(name)?);
         let axis = a.maybe("axis", read_point)?.unwrap_or([0.0, 0.0, 1.0]);
         let arc = Arc::new(point("from_m")?, point("centre_m")?, axis, a.number("sweep_rad")?);
-        Ok(Self(arc.or_raise()?, Made::of(a)?))
-    }
-
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().1.reduce(slf.get_type().as_any())
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.1.shown(py, "Arc")
+        made(a, Self(arc.or_raise()?))
     }
 }
 
 #[pyfunction(signature = (reference_m, actual_m, window=None))]
 pub(crate) fn contour_error<'py>(
-    py: Python<'py>,
     reference_m: &Bound<'py, PyAny>,
     actual_m: &Bound<'py, PyAny>,
     window: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> Array<'py> {
+    let py = reference_m.py();
     let window = window.map(|window| whole("window", window)).transpose()?;
     if let Some(shapes) = read_shapes(reference_m, window)? {
         let points = read_points("actual_m", actual_m)?;
         let errors = detached(py, || Shape::contour_error_m(&shapes, &points));
-        return give_signal(py, errors, 1, true);
+        return Ok(give_vector(py, errors));
     }
     let reference = read_path("reference_m", reference_m)?;
     let n_axes = reference.n_channels;
@@ -91,24 +74,18 @@ pub(crate) fn contour_error<'py>(
         }
         (Some(_), _) => return Err(misfit("reference_m", &reference.shape(), "1 to 12 axes")),
     };
-    give_signal(py, errors, 1, true)
+    Ok(give_vector(py, errors))
 }
 
 #[pyfunction]
-pub(crate) fn coupling_gains<'py>(
-    py: Python<'py>,
-    reference_m: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn coupling_gains<'py>(reference_m: &Bound<'py, PyAny>) -> Array<'py> {
     let reference = read_path("reference_m", reference_m)?.with_channels("reference_m", 2)?;
     let gains = coupling::coupling_gains(reference.values.as_chunks().0);
-    give_signal(py, gains.concat(), 2, false)
+    give_signal(reference_m.py(), gains.concat(), 2, false)
 }
 
 #[pyfunction]
-pub(crate) fn projection_across<'py>(
-    py: Python<'py>,
-    reference_m: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn projection_across<'py>(reference_m: &Bound<'py, PyAny>) -> Array<'py> {
     let reference = read_path("reference_m", reference_m)?;
     let flat: Vec<f64> = match reference.n_channels {
         2 => coupling::across::<2>(reference.values.as_chunks().0).concat().concat(),
@@ -117,10 +94,9 @@ pub(crate) fn projection_across<'py>(
             return Err(misfit("reference_m", &reference.shape(), "(n_samples, 2 or 3)"));
         }
     };
-    let shape = (reference.n_samples, reference.n_channels, reference.n_channels);
-    let blocks = Array3::from_shape_vec(shape, flat)
-        .map_err(|error| PyValueError::new_err(error.to_string()))?;
-    Ok(blocks.into_pyarray(py).into_any())
+    let n = reference.n_channels;
+    let at = |k: usize, row, col| flat[(k * n + row) * n + col];
+    Ok(give_matrices(reference_m.py(), (reference.n_samples, n, n), at))
 }
 
 fn to_sampled<const N: usize>(

@@ -9,18 +9,18 @@ use ilc_rt::model::StateSpace;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::argument::{Matrix, Signal, give_signal, misfit, read_vector};
+use crate::answer::{Array, give_signal, give_vector};
+use crate::argument::{Matrix, Signal, read_pair};
 use crate::arguments::{Arguments, Keywords};
 use crate::error::OrRaise;
 use crate::guard::Guarded;
-use crate::made::Made;
+use crate::made::{Made, New, made};
 use crate::model::PyStateSpace;
 use crate::whole::{Real, number};
 
-#[pyclass(name = "Pid", module = "ilc_rt._native", subclass, frozen)]
+#[pyclass(name = "Pid", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
 pub(crate) struct PyPid {
-    made: Made,
     dt_s: f64,
     pid: Guarded<Pid>,
 }
@@ -29,7 +29,7 @@ pub(crate) struct PyPid {
 impl PyPid {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
         let a = Arguments::of(keywords)?;
         let dt_s = positive("dt_s", a.number("dt_s")?)?;
         let filter_s = positive("filter_s", a.number("filter_s")?)?;
@@ -45,7 +45,7 @@ impl PyPid {
             derivative: a.choice("derivative", &derivatives)?,
             output_max: limit(a, "output_max")?,
         };
-        Ok(Self { made: Made::of(a)?, dt_s, pid: Guarded::new(Pid::new(gains, dt_s)) })
+        made(a, Self { dt_s, pid: Guarded::new(Pid::new(gains, dt_s)) })
     }
 
     /// Return the output for the error of this tick, saturated (anti-windup).
@@ -57,13 +57,14 @@ impl PyPid {
     }
 
     /// Return the outputs for a whole error signal of shape (n_samples,), from the current state.
-    fn run<'py>(&self, py: Python<'py>, error: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    fn run<'py>(&self, error: &Bound<'py, PyAny>) -> Array<'py> {
         let mut signal = Signal::read("error", error)?.with_channels("error", 1)?;
-        let mut pid = self.pid.borrow(py)?;
+        let mut pid = self.pid.borrow(error.py())?;
         for value in &mut signal.values {
             *value = pid.step(*value).value;
         }
-        give_signal(py, signal.values, 1, signal.is_flat)
+        let Signal { values, layout } = signal;
+        give_signal(error.py(), values, 1, layout.is_flat)
     }
 
     /// Return the controller without saturation, as a `StateSpace` from error to output.
@@ -86,25 +87,17 @@ impl PyPid {
         self.pid.borrow(py)?.reset();
         Ok(())
     }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.made.shown(py, "Pid")
-    }
-
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().made.reduce(slf.get_type().as_any())
-    }
 }
 
-#[pyclass(name = "Cascade", module = "ilc_rt._native", subclass, frozen)]
+#[pyclass(name = "Cascade", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
-pub(crate) struct PyCascade(Guarded<Cascade>, Made);
+pub(crate) struct PyCascade(Guarded<Cascade>);
 
 #[pymethods]
 impl PyCascade {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
         let a = Arguments::of(keywords)?;
         let plain = |name| finite(name, a.number(name)?);
         let gains = CascadeGains {
@@ -117,7 +110,7 @@ impl PyCascade {
             force_max_n: limit(a, "force_max_n")?,
         };
         let dt_s = positive("dt_s", a.number("dt_s")?)?;
-        Ok(Self(Guarded::new(Cascade::new(gains, dt_s)), Made::of(a)?))
+        made(a, Self(Guarded::new(Cascade::new(gains, dt_s))))
     }
 
     /// Return the force of this tick in N, saturated.
@@ -152,30 +145,22 @@ impl PyCascade {
         self.0.borrow(py)?.reset();
         Ok(())
     }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.1.shown(py, "Cascade")
-    }
-
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().1.reduce(slf.get_type().as_any())
-    }
 }
 
-#[pyclass(name = "CrossCoupled", module = "ilc_rt._native", subclass, frozen)]
+#[pyclass(name = "CrossCoupled", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
-pub(crate) struct PyCrossCoupled(Guarded<CrossCoupled>, Made);
+pub(crate) struct PyCrossCoupled(Guarded<CrossCoupled>);
 
 #[pymethods]
 impl PyCrossCoupled {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
         let a = Arguments::of(keywords)?;
         let controller = a.get("controller")?;
         let mut pid = *controller.cast::<PyPid>()?.get().pid.borrow(a.py())?;
         pid.reset();
-        Ok(Self(Guarded::new(CrossCoupled::new(pid)), Made::of(a)?))
+        made(a, Self(Guarded::new(CrossCoupled::new(pid))))
     }
 
     /// Return the corrections of the two commands, shape (2,), and the contour error in m.
@@ -195,22 +180,14 @@ impl PyCrossCoupled {
         let curvature_per_m = finite("curvature_per_m", curvature_per_m.0)?;
         let gains = variable_gains([gains[1], -gains[0]], error_m, curvature_per_m);
         let (added, contour_m) = self.0.borrow(py)?.step(error_m, gains);
-        let added = added.iter().map(|part| part.value).collect();
-        Ok((give_signal(py, added, 1, true)?, contour_m))
+        let added: Vec<f64> = added.iter().map(|part| part.value).collect();
+        Ok((give_vector(py, added), contour_m))
     }
 
     /// Reset to rest.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.0.borrow(py)?.reset();
         Ok(())
-    }
-
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        self.1.shown(py, "CrossCoupled")
-    }
-
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().1.reduce(slf.get_type().as_any())
     }
 }
 
@@ -235,11 +212,4 @@ fn positive(name: &str, value: f64) -> PyResult<f64> {
 /// Reads a limit; `None` is infinite.
 fn limit(a: Arguments<'_, '_>, name: &str) -> PyResult<f64> {
     a.maybe_number(name)?.map_or(Ok(f64::INFINITY), |value| positive(name, value))
-}
-
-fn read_pair(name: &str, object: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
-    match read_vector(name, object)?[..] {
-        [first, second] => Ok([first, second]),
-        ref other => Err(misfit(name, &[other.len()], "(2,)")),
-    }
 }

@@ -34,6 +34,7 @@ raise! {
     kinematics::KinematicsError => exceptions::KinematicsError,
     contour::ContourError => exceptions::ContourError,
     library::LibraryError => PyOSError,
+    library::ElsewhereError => PyValueError,
     learning::batch::BatchError => exceptions::LearningError,
     config::ConfigError => PyValueError,
     design::DesignError => PyValueError,

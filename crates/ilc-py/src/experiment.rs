@@ -7,13 +7,11 @@ use ilc_rt::identification::{
     waveform_name,
 };
 use ilc_rt::model::identify::{Doubt, Waveform};
-use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
+use crate::answer::{ByName, by_name, give_vector};
 use crate::argument::read_vector;
-use crate::arguments::ByName;
 use crate::cell::PyCell;
 use crate::detached::interruptible;
 use crate::error::OrRaise;
@@ -128,36 +126,32 @@ pub(crate) fn evaluate_experiment<'py>(
 
 /// Returns the figures of an experiment, as the arguments of `ilc_rt.experiment.Experiment`.
 fn figures<'py>(py: Python<'py>, experiment: &Experiment) -> ByName<'py> {
-    let (figures, excitation) = (PyDict::new(py), &experiment.excitation);
-    figures.set_item("axis", &experiment.axis)?;
-    figures.set_item("waveform", waveform_name(excitation.waveform))?;
-    figures.set_item("from_hz", excitation.from_hz)?;
-    figures.set_item("to_hz", excitation.to_hz)?;
-    figures.set_item("period_s", excitation.period_s)?;
-    figures.set_item("periods", excitation.periods)?;
-    figures.set_item("amplitude", excitation.amplitude)?;
-    figures.set_item("at_m", experiment.at_m)?;
-    Ok(figures)
+    let excitation = &experiment.excitation;
+    Ok(by_name!(py,
+        [experiment => axis, at_m]
+        [excitation => from_hz, to_hz, period_s, periods, amplitude]
+        waveform: waveform_name(excitation.waveform),
+    ))
 }
 
 /// Returns the result of an identification, as arguments of `ilc_rt.identification.Identification`.
 fn describe(py: Python<'_>, found: Identified) -> ByName<'_> {
-    let array = |values: Vec<f64>| PyArray1::from_vec(py, values);
-    let result = PyDict::new(py);
-    result.set_item("axis_model", found.section())?;
+    let array = |values: Vec<f64>| give_vector(py, values);
     let is_lost = matches!(found.doubt, Some(Doubt::Incoherent { .. } | Doubt::Silent));
-    result.set_item("followed", !is_lost)?;
-    result.set_item("doubt", found.doubt.map(|doubt| doubt.to_string()))?;
-    result.set_item("model", give_second_order(py, &found.fit)?)?;
-    match found.described {
-        Described::Position(fit) => result.set_item("described", give_second_order(py, &fit)?)?,
-        Described::Velocity(fit) => result.set_item("described", give_velocity_loop(py, &fit)?)?,
-    }
-    result.set_item("measured", give_measured(py, found.measured)?)?;
-    let bound = (array(found.uncertainty.frequency_hz), array(found.uncertainty.bound));
-    result.set_item("uncertainty", bound)?;
-    result.set_item("period_samples", found.period_samples)?;
-    result.set_item("u", array(found.input))?;
-    result.set_item("y", array(found.output))?;
-    Ok(result)
+    let described = match &found.described {
+        Described::Position(fit) => give_second_order(py, fit)?,
+        Described::Velocity(fit) => give_velocity_loop(py, fit)?,
+    };
+    Ok(by_name!(py,
+        [found => period_samples]
+        axis_model: found.section(),
+        followed: !is_lost,
+        doubt: found.doubt.as_ref().map(ToString::to_string),
+        model: give_second_order(py, &found.fit)?,
+        described: described,
+        measured: give_measured(py, found.measured)?,
+        uncertainty: (array(found.uncertainty.frequency_hz), array(found.uncertainty.bound)),
+        u: array(found.input),
+        y: array(found.output),
+    ))
 }

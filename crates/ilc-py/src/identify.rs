@@ -7,14 +7,12 @@ use ilc_rt::model::identify::{
     VelocityLoop, VelocityLoopFit,
 };
 use nalgebra::Complex;
-use numpy::IntoPyArray;
-use numpy::ndarray::Array1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
+use crate::answer::{Array, ByName, by_name, give_vector};
 use crate::argument::read_vector;
-use crate::arguments::{Arguments, Array, ByName, Keywords};
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::experiment::read_waveform;
@@ -46,12 +44,12 @@ fn read_measured(a: Arguments<'_, '_>) -> PyResult<FrequencyResponse> {
 
 /// Returns a measured response by the names of `ilc_rt.fits.FrequencyResponse`.
 pub(crate) fn give_measured(py: Python<'_>, measured: FrequencyResponse) -> ByName<'_> {
-    let figures = PyDict::new(py);
-    figures.set_item("frequency_hz", give(py, measured.frequency_hz))?;
-    figures.set_item("response", give(py, measured.response))?;
-    figures.set_item("coherence", give(py, measured.coherence))?;
-    figures.set_item("n_averages", measured.n_averages)?;
-    Ok(figures)
+    Ok(by_name!(py,
+        [measured => n_averages]
+        frequency_hz: give_vector(py, measured.frequency_hz),
+        response: give_vector(py, measured.response),
+        coherence: give_vector(py, measured.coherence),
+    ))
 }
 
 #[pyfunction(signature = (**keywords))]
@@ -63,7 +61,7 @@ pub(crate) fn check_response<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName
 #[pyfunction(signature = (**keywords))]
 pub(crate) fn relative_deviation<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
     let a = Arguments::of(keywords)?;
-    Ok(give(a.py(), read_measured(a)?.relative_deviation()))
+    Ok(give_vector(a.py(), read_measured(a)?.relative_deviation()))
 }
 
 #[pyfunction(signature = (**keywords))]
@@ -98,24 +96,12 @@ pub(crate) fn fit_second_order<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByNa
 
 /// Returns a fit by the names of `ilc_rt.fits.SecondOrderFit`.
 pub(crate) fn give_second_order<'py>(py: Python<'py>, fit: &SecondOrderFit) -> ByName<'py> {
-    let model = &fit.model;
-    let figures = PyDict::new(py);
-    for (name, value) in [
-        ("gain", model.gain),
-        ("natural_frequency_hz", model.natural_frequency_hz),
-        ("damping", model.damping),
-        ("delay_s", model.delay_s),
-        ("gain_deviation", fit.gain_deviation),
-        ("natural_frequency_deviation_hz", fit.natural_frequency_deviation_hz),
-        ("damping_deviation", fit.damping_deviation),
-        ("delay_deviation_s", fit.delay_deviation_s),
-        ("residual_rms", fit.residual_rms),
-    ] {
-        figures.set_item(name, value)?;
-    }
-    figures.set_item("dt_s", model.dt_s)?;
-    figures.set_item("delay_samples", model.delay_samples())?;
-    Ok(figures)
+    Ok(by_name!(py,
+        [fit.model => gain, natural_frequency_hz, damping, delay_s, dt_s]
+        [fit => gain_deviation, natural_frequency_deviation_hz, damping_deviation]
+        [fit => delay_deviation_s, residual_rms]
+        delay_samples: fit.model.delay_samples(),
+    ))
 }
 
 fn read_second_order(a: Arguments<'_, '_>) -> PyResult<SecondOrder> {
@@ -135,12 +121,12 @@ pub(crate) fn second_order_response<'py>(
 ) -> Array<'py> {
     let frequency_hz = read_vector("frequency_hz", frequency_hz)?;
     let a = Arguments::of(model)?;
-    Ok(give(a.py(), read_second_order(a)?.response(&frequency_hz)))
+    Ok(give_vector(a.py(), read_second_order(a)?.response(&frequency_hz)))
 }
 
 #[pyfunction(signature = (**model))]
 pub(crate) fn second_order_model(model: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
-    read_second_order(Arguments::of(model)?)?.state_space().or_raise().map(PyStateSpace)
+    read_second_order(Arguments::of(model)?)?.state_space().or_raise().map(PyStateSpace::from)
 }
 
 #[pyfunction(signature = (**keywords))]
@@ -154,23 +140,11 @@ pub(crate) fn fit_velocity_loop<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByN
 
 /// Returns a fit by the names of `ilc_rt.fits.VelocityLoopFit`.
 pub(crate) fn give_velocity_loop<'py>(py: Python<'py>, fit: &VelocityLoopFit) -> ByName<'py> {
-    let model = &fit.model;
-    let figures = PyDict::new(py);
-    for (name, value) in [
-        ("gain", model.gain),
-        ("bandwidth_hz", model.bandwidth_hz),
-        ("delay_s", model.delay_s),
-        ("position_gain_per_s", model.position_gain_per_s),
-        ("dt_s", model.dt_s),
-        ("gain_deviation", fit.gain_deviation),
-        ("bandwidth_deviation_hz", fit.bandwidth_deviation_hz),
-        ("delay_deviation_s", fit.delay_deviation_s),
-        ("residual_rms", fit.residual_rms),
-    ] {
-        figures.set_item(name, value)?;
-    }
-    figures.set_item("delay_samples", model.delay_samples())?;
-    Ok(figures)
+    Ok(by_name!(py,
+        [fit.model => gain, bandwidth_hz, delay_s, position_gain_per_s, dt_s]
+        [fit => gain_deviation, bandwidth_deviation_hz, delay_deviation_s, residual_rms]
+        delay_samples: fit.model.delay_samples(),
+    ))
 }
 
 #[pyfunction(signature = (frequency_hz, /, **model))]
@@ -187,7 +161,7 @@ pub(crate) fn velocity_loop_response<'py>(
         position_gain_per_s: a.number("position_gain_per_s")?,
         dt_s: a.number("dt_s")?,
     };
-    Ok(give(a.py(), model.response(&frequency_hz)))
+    Ok(give_vector(a.py(), model.response(&frequency_hz)))
 }
 
 #[pyfunction(signature = (**keywords))]
@@ -198,12 +172,8 @@ pub(crate) fn fit_rational<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<'
     let delay_s = a.number("delay_s")?;
     let fit = || identify::fit_rational(&measured, n_zeros, n_poles, delay_s, dt_s);
     let fit = interruptible(a.py(), fit)?.or_raise()?;
-    let figures = PyDict::new(a.py());
-    figures.set_item("model", PyStateSpace(fit.model))?;
-    figures.set_item("delay_s", fit.delay_s)?;
-    figures.set_item("reflected_poles", fit.reflected_poles)?;
-    figures.set_item("residual_rms", fit.residual_rms)?;
-    Ok(figures)
+    let model = PyStateSpace::from(fit.model);
+    Ok(by_name!(a.py(), [fit => delay_s, reflected_poles, residual_rms] model: model))
 }
 
 /// Frequencies and bounds.
@@ -214,7 +184,7 @@ pub(crate) fn uncertainty<'py>(keywords: Option<Keywords<'_, 'py>>) -> PyResult<
     let a = Arguments::of(keywords)?;
     let (measured, model) = (read_measured(a)?, read_complex("model", &a.get("model")?)?);
     let found = identify::uncertainty(&measured, &model, a.number("deviations")?).or_raise()?;
-    Ok((give(a.py(), found.frequency_hz), give(a.py(), found.bound)))
+    Ok((give_vector(a.py(), found.frequency_hz), give_vector(a.py(), found.bound)))
 }
 
 #[pyfunction(signature = (**keywords))]
@@ -232,7 +202,7 @@ pub(crate) fn excitation<'py>(
         periods: a.whole("periods")?,
     };
     let signal = interruptible(a.py(), || excitation.signal(dt_s))?.or_raise()?;
-    Ok((give(a.py(), signal.values), signal.first_sample, signal.period_samples))
+    Ok((give_vector(a.py(), signal.values), signal.first_sample, signal.period_samples))
 }
 
 /// Reads a one-dimensional array of complex or real numbers.
@@ -244,8 +214,4 @@ fn read_complex(name: &str, object: &Bound<'_, PyAny>) -> PyResult<Vec<Complex<f
     let real = read_vector(name, &array.getattr("real")?)?;
     let imag = read_vector(name, &array.getattr("imag")?)?;
     Ok(real.into_iter().zip(imag).map(|(re, im)| Complex::new(re, im)).collect())
-}
-
-fn give<T: numpy::Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyAny> {
-    Array1::from(values).into_pyarray(py).into_any()
 }

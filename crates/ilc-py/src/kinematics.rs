@@ -1,96 +1,62 @@
 //! Mechanisms: the native side of `Delta` and `Gantry` of `ilc_rt.kinematics`.
 
 use ilc_rt::kinematics::{Delta, Gantry, KinematicsError};
-use numpy::IntoPyArray;
-use numpy::ndarray::{Array2, Array3};
 use pyo3::prelude::*;
 
-use crate::argument::{Signal, give_signal, misfit};
+use crate::answer::{Array, give_matrices, give_matrix, give_signal};
+use crate::argument::{Matrix, Signal, misfit};
 use crate::arguments::{Arguments, Keywords};
 use crate::error::OrRaise;
 use crate::exceptions;
-use crate::made::Made;
+use crate::made::{Made, New, made};
 
-#[pyclass(name = "Delta", module = "ilc_rt._native", subclass, frozen)]
+#[pyclass(name = "Delta", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
 pub(crate) struct PyDelta {
-    made: Made,
     delta: Delta,
+    /// Base radius in m.
+    #[pyo3(get)]
+    base_m: f64,
+    /// Crank length in m.
+    #[pyo3(get)]
+    crank_m: f64,
+    /// Rod length in m.
+    #[pyo3(get)]
+    rod_m: f64,
 }
 
 #[pymethods]
 impl PyDelta {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
         let a = Arguments::of(keywords)?;
-        let delta = Delta::new(a.number("base_m")?, a.number("crank_m")?, a.number("rod_m")?);
-        Ok(Self { made: Made::of(a)?, delta: delta.or_raise()? })
-    }
-
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().made.reduce(slf.get_type().as_any())
-    }
-
-    /// Base radius in m.
-    #[getter]
-    fn base_m(&self) -> f64 {
-        self.delta.lengths_m()[0]
-    }
-
-    /// Crank length in m.
-    #[getter]
-    fn crank_m(&self) -> f64 {
-        self.delta.lengths_m()[1]
-    }
-
-    /// Rod length in m.
-    #[getter]
-    fn rod_m(&self) -> f64 {
-        self.delta.lengths_m()[2]
+        let (base_m, crank_m, rod_m) =
+            (a.number("base_m")?, a.number("crank_m")?, a.number("rod_m")?);
+        let delta = Delta::new(base_m, crank_m, rod_m).or_raise()?;
+        made(a, Self { delta, base_m, crank_m, rod_m })
     }
 
     /// Return tool positions in m for crank angles in rad: both (3,) or (n_samples, 3).
-    fn forward<'py>(
-        &self,
-        py: Python<'py>,
-        theta_rad: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let mut poses = Poses::read("theta_rad", theta_rad)?;
-        poses.each(|joints| self.delta.forward(joints))?;
-        poses.give(py)
+    fn forward<'py>(&self, theta_rad: &Bound<'py, PyAny>) -> Array<'py> {
+        let poses = Poses::read("theta_rad", theta_rad)?;
+        poses.mapped(theta_rad.py(), |joints| self.delta.forward(joints))
     }
 
     /// Return crank angles in rad, knees outward, for tool positions in m: both (3,) or (n_samples, 3).
-    fn inverse<'py>(
-        &self,
-        py: Python<'py>,
-        p_m: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let mut poses = Poses::read("p_m", p_m)?;
-        poses.each(|pose| self.delta.inverse(pose))?;
-        poses.give(py)
+    fn inverse<'py>(&self, p_m: &Bound<'py, PyAny>) -> Array<'py> {
+        Poses::read("p_m", p_m)?.mapped(p_m.py(), |pose| self.delta.inverse(pose))
     }
 
     /// Return Jacobians ``dp = J dtheta`` in m/rad for crank angles: (3, 3) or (n_samples, 3, 3).
-    fn jacobian<'py>(
-        &self,
-        py: Python<'py>,
-        theta_rad: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn jacobian<'py>(&self, theta_rad: &Bound<'py, PyAny>) -> Array<'py> {
         let poses = Poses::read("theta_rad", theta_rad)?;
-        let mut rows = Vec::with_capacity(poses.values.len());
-        for (sample, joints) in poses.values.iter().enumerate() {
-            let jacobian = self.delta.jacobian(*joints);
-            rows.push(jacobian.map_err(|error| poses.raise(&error, sample))?);
-        }
+        let found = poses.each(|joints| self.delta.jacobian(joints))?;
         if poses.is_single {
-            let jacobian = Array2::from_shape_fn((3, 3), |(row, col)| rows[0][row][col]);
-            return Ok(jacobian.into_pyarray(py).into_any());
+            return Ok(give_matrix(theta_rad.py(), &square(&found[0])));
         }
-        let jacobians =
-            Array3::from_shape_fn((rows.len(), 3, 3), |(k, row, col)| rows[k][row][col]);
-        Ok(jacobians.into_pyarray(py).into_any())
+        let shape = (found.len(), 3, 3);
+        Ok(give_matrices(theta_rad.py(), shape, |k, row, col| found[k][row][col]))
     }
 
     /// Return True if the tool can reach a place in m, shape (3,), and leave it in every direction.
@@ -108,66 +74,41 @@ impl PyDelta {
         }
         self.delta.condition(poses.values[0]).or_raise()
     }
-
-    fn __repr__(&self) -> String {
-        let [base_m, crank_m, rod_m] = self.delta.lengths_m();
-        format!("Delta(base_m={base_m}, crank_m={crank_m}, rod_m={rod_m})")
-    }
 }
 
-#[pyclass(name = "Gantry", module = "ilc_rt._native", subclass, frozen)]
+#[pyclass(name = "Gantry", module = "ilc_rt._native", extends = Made, subclass, frozen)]
 #[derive(Debug)]
 pub(crate) struct PyGantry {
-    made: Made,
     gantry: Gantry,
+    /// Orthogonality error in rad.
+    #[pyo3(get)]
+    orthogonality_rad: f64,
 }
 
 #[pymethods]
 impl PyGantry {
     #[new]
     #[pyo3(signature = (**keywords))]
-    fn new(keywords: Option<Keywords<'_, '_>>) -> PyResult<Self> {
+    fn new(keywords: Option<Keywords<'_, '_>>) -> New<Self> {
         let a = Arguments::of(keywords)?;
-        let gantry = Gantry::new(a.number("orthogonality_rad")?).or_raise()?;
-        Ok(Self { made: Made::of(a)?, gantry })
-    }
-
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
-        slf.get().made.reduce(slf.get_type().as_any())
-    }
-
-    /// Orthogonality error in rad.
-    #[getter]
-    fn orthogonality_rad(&self) -> f64 {
-        self.gantry.orthogonality_rad()
+        let orthogonality_rad = a.number("orthogonality_rad")?;
+        let gantry = Gantry::new(orthogonality_rad).or_raise()?;
+        made(a, Self { gantry, orthogonality_rad })
     }
 
     /// Return tool positions for axis positions in m: both (2,) or (n_samples, 2).
-    fn forward<'py>(
-        &self,
-        py: Python<'py>,
-        axes_m: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        pairs(py, "axes_m", axes_m, |axes| self.gantry.forward(axes))
+    fn forward<'py>(&self, axes_m: &Bound<'py, PyAny>) -> Array<'py> {
+        pairs("axes_m", axes_m, |axes| self.gantry.forward(axes))
     }
 
     /// Return axis positions for tool positions in m: both (2,) or (n_samples, 2).
-    fn inverse<'py>(
-        &self,
-        py: Python<'py>,
-        tool_m: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        pairs(py, "tool_m", tool_m, |tool| self.gantry.inverse(tool))
+    fn inverse<'py>(&self, tool_m: &Bound<'py, PyAny>) -> Array<'py> {
+        pairs("tool_m", tool_m, |tool| self.gantry.inverse(tool))
     }
 
     /// Return the Jacobian, shape (2, 2), the same everywhere.
     fn jacobian<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        let rows = self.gantry.jacobian();
-        Array2::from_shape_fn((2, 2), |(row, col)| rows[row][col]).into_pyarray(py).into_any()
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Gantry(orthogonality_rad={})", self.gantry.orthogonality_rad())
+        give_matrix(py, &square(&self.gantry.jacobian()))
     }
 }
 
@@ -188,38 +129,42 @@ impl Poses {
         Ok(Self { values: signal.values.as_chunks().0.to_vec(), is_single })
     }
 
-    fn each(
-        &mut self,
+    /// Applies a map of one pose to all; an error names the sample.
+    fn each<T>(&self, map: impl Fn([f64; 3]) -> Result<T, KinematicsError>) -> PyResult<Vec<T>> {
+        let mapped = |(sample, pose): (usize, &[f64; 3])| {
+            map(*pose).map_err(|error| {
+                let place =
+                    if self.is_single { String::new() } else { format!("sample {sample}: ") };
+                exceptions::KinematicsError::new_err(format!("{place}{error}"))
+            })
+        };
+        self.values.iter().enumerate().map(mapped).collect()
+    }
+
+    /// Returns the mapped poses to Python, in the same shape.
+    fn mapped(
+        self,
+        py: Python<'_>,
         map: impl Fn([f64; 3]) -> Result<[f64; 3], KinematicsError>,
-    ) -> PyResult<()> {
-        for sample in 0..self.values.len() {
-            let mapped = map(self.values[sample]);
-            self.values[sample] = mapped.map_err(|error| self.raise(&error, sample))?;
-        }
-        Ok(())
-    }
-
-    fn raise(&self, error: &KinematicsError, sample: usize) -> PyErr {
-        let place = if self.is_single { String::new() } else { format!("sample {sample}: ") };
-        exceptions::KinematicsError::new_err(format!("{place}{error}"))
-    }
-
-    fn give(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
-        give_signal(py, self.values.concat(), 3, self.is_single)
+    ) -> Array<'_> {
+        give_signal(py, self.each(map)?.concat(), 3, self.is_single)
     }
 }
 
 fn pairs<'py>(
-    py: Python<'py>,
     name: &str,
     object: &Bound<'py, PyAny>,
     map: impl Fn([f64; 2]) -> [f64; 2],
-) -> PyResult<Bound<'py, PyAny>> {
+) -> Array<'py> {
     let signal = Signal::read(name, object)?;
     let coordinates = if signal.is_flat { signal.n_samples } else { signal.n_channels };
     if coordinates != 2 {
         return Err(misfit(name, &signal.shape(), "(2,) or (n_samples, 2)"));
     }
     let mapped: Vec<f64> = signal.values.as_chunks().0.iter().flat_map(|pair| map(*pair)).collect();
-    give_signal(py, mapped, 2, signal.is_flat)
+    give_signal(object.py(), mapped, 2, signal.is_flat)
+}
+
+fn square<const N: usize>(rows: &[[f64; N]; N]) -> Matrix {
+    Matrix::from_fn(N, N, |row, col| rows[row][col])
 }

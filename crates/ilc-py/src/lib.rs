@@ -1,6 +1,6 @@
 //! Python bindings of `ilc-rt`: conversion, shape checks and error mapping only.
 //!
-//! One file per family of Python names, exported below; `argument` checks input,
+//! One file per family of Python names, exported below; `argument` checks input, `answer` returns values,
 //! `exceptions` and `error` define the exceptions, and `detached` releases the interpreter.
 //!
 //! Family: `laws` and `python_law` call each other: an inner law may be written in Python.
@@ -12,6 +12,7 @@
 #![expect(clippy::doc_markdown, reason = "documentation here is Python's, in numpydoc style")]
 
 mod analysis;
+mod answer;
 mod argument;
 mod arguments;
 mod campaign;
@@ -76,7 +77,7 @@ mod _native {
     #[pymodule_export]
     use super::library::PyLibrary;
     #[pymodule_export]
-    use super::made::{_made, _made_of_kind};
+    use super::made::{_made, _made_of_kind, Made};
     #[pymodule_export]
     use super::many::simulate_many;
     #[pymodule_export]

@@ -4,12 +4,15 @@
 //! arguments by name. So a copy starts from the initial state: it does not contain what a law, a
 //! gate or a controller has learned or integrated since.
 
+use pyo3::PyClass;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::answer::Array;
 use crate::arguments::Arguments;
 
-/// The call that created an object.
+/// Base class of what is shown, copied and pickled as the call that created it.
+#[pyclass(name = "Made", module = "ilc_rt._native", subclass, frozen)]
 #[derive(Debug)]
 pub(crate) struct Made {
     /// The static method called; `None` for the class itself.
@@ -17,36 +20,35 @@ pub(crate) struct Made {
     arguments: Py<PyDict>,
 }
 
+#[pymethods]
 impl Made {
-    /// Records a call of a static method.
-    pub(crate) fn new(
-        how: &'static str,
-        fill: impl FnOnce(&Bound<'_, PyDict>) -> PyResult<()>,
-    ) -> PyResult<Self> {
-        Python::attach(|py| {
-            let arguments = PyDict::new(py);
-            fill(&arguments)?;
-            Ok(Self { how: Some(how), arguments: Arguments::new(&arguments).kept()?.unbind() })
-        })
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let class = slf.get_type().name()?.to_string();
+        Arguments::new(slf.get().arguments.bind(slf.py())).call(&class)
     }
 
-    /// Records a call of the class with these keywords.
-    pub(crate) fn of(arguments: Arguments<'_, '_>) -> PyResult<Self> {
-        Ok(Self { how: None, arguments: arguments.kept()?.unbind() })
-    }
-
-    /// Returns the call in Python's notation, for a class of this name.
-    pub(crate) fn shown(&self, py: Python<'_>, name: &str) -> PyResult<String> {
-        Arguments::new(self.arguments.bind(py)).call(name)
-    }
-
-    /// Returns the result of `__reduce__` for an object of a class.
-    pub(crate) fn reduce(&self, class: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
-        let py = class.py();
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
+        let (py, this) = (slf.py(), slf.get());
         let maker = py.import("ilc_rt._native")?.getattr("_made")?;
-        let parts = (class, self.how, &self.arguments);
-        Ok((maker, parts).into_pyobject(py)?.into_any().unbind())
+        let parts = (slf.get_type(), this.how, &this.arguments);
+        Ok((maker, parts).into_pyobject(py)?.into_any())
     }
+}
+
+impl Made {
+    /// Records a call of a static method with these keywords.
+    pub(crate) fn by(how: &'static str, arguments: &Bound<'_, PyDict>) -> Self {
+        Self { how: Some(how), arguments: arguments.clone().unbind() }
+    }
+}
+
+/// A new object of a class derived from [`Made`].
+pub(crate) type New<T> = PyResult<PyClassInitializer<T>>;
+
+/// Returns a new object, made by a call of its class with these keywords.
+pub(crate) fn made<T: PyClass<BaseType = Made>>(a: Arguments<'_, '_>, object: T) -> New<T> {
+    let made = Made { how: None, arguments: a.kept()?.unbind() };
+    Ok(PyClassInitializer::from(made).add_subclass(object))
 }
 
 /// Creates an object again by its recorded call.

@@ -3,12 +3,11 @@
 //! Its arguments are prepared, and its figures shaped, by `ilc_rt.many`.
 
 use ilc_rt::learning::batch::{self, Laws, Task};
-use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
+use crate::answer::{ByName, by_name, give_vector};
 use crate::argument::{read_disturbance, read_vector};
-use crate::arguments::{Arguments, ByName, Keywords};
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::laws::apart;
@@ -53,11 +52,11 @@ pub(crate) fn simulate_many<'py>(keywords: Option<Keywords<'_, 'py>>) -> ByName<
         kept: [a.whole("kept_errors")?, a.whole("kept_inputs")?],
     };
     let found = interruptible(a.py(), || batch::learn(&task, &laws))?.or_raise()?;
-    let figures = PyDict::new(a.py());
-    for (name, values) in
-        [("rms", found.rms), ("inf", found.inf), ("errors", found.errors), ("inputs", found.inputs)]
-    {
-        figures.set_item(name, PyArray1::from_vec(a.py(), values))?;
-    }
-    Ok(figures)
+    let array = |values: Vec<f64>| give_vector(a.py(), values);
+    Ok(by_name!(a.py(),
+        rms: array(found.rms),
+        inf: array(found.inf),
+        errors: array(found.errors),
+        inputs: array(found.inputs),
+    ))
 }

@@ -1,12 +1,11 @@
 //! Models: `StateSpace`, `from_transfer_function`, `second_order`, `discretize`.
 
-use ilc_rt::model::{self, Method, StateSpace};
-use numpy::IntoPyArray;
-use numpy::ndarray::{Array1, Array3};
+use ilc_rt::model::{self, Method, ModelError, StateSpace};
 use pyo3::prelude::*;
 
-use crate::argument::{Signal, give_matrix, give_signal, is_flat_output, read_matrix, read_vector};
-use crate::arguments::{Arguments, Array, Keywords};
+use crate::answer::{Array, give_matrices, give_matrix, give_signal, give_vector};
+use crate::argument::{Signal, read_matrix, read_vector};
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::{read_model, read_sample_time};
@@ -36,18 +35,40 @@ use crate::whole::{number, whole};
 /// array([0., 2., 1.])
 #[pyclass(name = "StateSpace", module = "ilc_rt", frozen)]
 #[derive(Debug)]
-pub(crate) struct PyStateSpace(pub(crate) StateSpace);
+pub(crate) struct PyStateSpace {
+    pub(crate) model: StateSpace,
+    /// Sample time in seconds; None for a continuous-time model.
+    #[pyo3(get)]
+    dt_s: Option<f64>,
+    /// Number of states.
+    #[pyo3(get)]
+    n_states: usize,
+    /// Number of inputs.
+    #[pyo3(get)]
+    n_inputs: usize,
+    /// Number of outputs.
+    #[pyo3(get)]
+    n_outputs: usize,
+}
 
 impl From<StateSpace> for PyStateSpace {
     fn from(model: StateSpace) -> Self {
-        Self(model)
+        Self {
+            dt_s: model.dt_s(),
+            n_states: model.n_states(),
+            n_inputs: model.n_inputs(),
+            n_outputs: model.n_outputs(),
+            model,
+        }
     }
 }
 
-impl PyStateSpace {
-    pub(crate) fn model(&self) -> &StateSpace {
-        &self.0
-    }
+/// A new model, or the refusal of what it was to be made of.
+type NewModel = Result<StateSpace, ModelError>;
+
+/// Returns a new model to Python.
+fn give(model: NewModel) -> PyResult<PyStateSpace> {
+    model.or_raise().map(PyStateSpace::from)
 }
 
 /// Calls a view of models, which are written in Python.
@@ -78,62 +99,38 @@ impl PyStateSpace {
         let dt_s = dt_s.map_or(Ok(None), |dt_s| read_sample_time("dt_s", dt_s))?;
         let (a, b) = (read_matrix("a", a)?, read_matrix("b", b)?);
         let (c, d) = (read_matrix("c", c)?, read_matrix("d", d)?);
-        StateSpace::new(a, b, c, d, dt_s).or_raise().map(Self)
+        give(StateSpace::new(a, b, c, d, dt_s))
     }
 
     /// Pickled and copied as its matrices.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
-        let parts = (this.a(py), this.b(py), this.c(py), this.d(py), this.0.dt_s());
+        let parts = (this.a(py), this.b(py), this.c(py), this.d(py), this.dt_s);
         Ok((slf.get_type().into_any(), parts.into_pyobject(py)?.into_any()))
     }
 
     /// State matrix, shape (n_states, n_states).
     #[getter]
     fn a<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        give_matrix(py, self.0.a())
+        give_matrix(py, self.model.a())
     }
 
     /// Input matrix, shape (n_states, n_inputs).
     #[getter]
     fn b<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        give_matrix(py, self.0.b())
+        give_matrix(py, self.model.b())
     }
 
     /// Output matrix, shape (n_outputs, n_states).
     #[getter]
     fn c<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        give_matrix(py, self.0.c())
+        give_matrix(py, self.model.c())
     }
 
     /// Feedthrough matrix, shape (n_outputs, n_inputs).
     #[getter]
     fn d<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
-        give_matrix(py, self.0.d())
-    }
-
-    /// Sample time in seconds; None for a continuous-time model.
-    #[getter]
-    fn dt_s(&self) -> Option<f64> {
-        self.0.dt_s()
-    }
-
-    /// Number of states.
-    #[getter]
-    fn n_states(&self) -> usize {
-        self.0.n_states()
-    }
-
-    /// Number of inputs.
-    #[getter]
-    fn n_inputs(&self) -> usize {
-        self.0.n_inputs()
-    }
-
-    /// Number of outputs.
-    #[getter]
-    fn n_outputs(&self) -> usize {
-        self.0.n_outputs()
+        give_matrix(py, self.model.d())
     }
 
     /// Return the output for an input of shape (n_samples,) or (n_samples, n_inputs).
@@ -147,19 +144,18 @@ impl PyStateSpace {
         u: &Bound<'py, PyAny>,
         x0: Option<&Bound<'py, PyAny>>,
     ) -> Array<'py> {
-        let u = Signal::read("u", u)?.with_channels("u", self.0.n_inputs())?;
+        let u = Signal::read("u", u)?.with_channels("u", self.n_inputs)?;
         let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
-        let y = interruptible(py, || self.0.simulate(&u.values, x0.as_deref()))?.or_raise()?;
-        give_signal(py, y, self.0.n_outputs(), is_flat_output(&u, &self.0))
+        let y = interruptible(py, || self.model.simulate(&u.values, x0.as_deref()))?.or_raise()?;
+        give_signal(py, y, self.n_outputs, u.is_flat && self.n_outputs == 1)
     }
 
     /// Return the first `n` Markov parameters D, CB, CAB, ..., shape (n, n_outputs, n_inputs).
     fn markov<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> Array<'py> {
         let n = whole("n", n)?;
-        let parameters = interruptible(py, || self.0.markov(n))?.or_raise()?;
-        let shape = (n, self.0.n_outputs(), self.0.n_inputs());
-        let array = Array3::from_shape_fn(shape, |(k, row, col)| parameters[k][(row, col)]);
-        Ok(array.into_pyarray(py).into_any())
+        let parameters = interruptible(py, || self.model.markov(n))?.or_raise()?;
+        let shape = (n, self.n_outputs, self.n_inputs);
+        Ok(give_matrices(py, shape, |k, row, col| parameters[k][(row, col)]))
     }
 
     /// Return the lifted-system matrix of runs of `n` samples, shape (n * n_outputs, n * n_inputs).
@@ -167,58 +163,52 @@ impl PyStateSpace {
     /// The block lower-triangular Toeplitz matrix of the Markov parameters, sample by sample.
     fn lifted<'py>(&self, py: Python<'py>, n: &Bound<'py, PyAny>) -> Array<'py> {
         let n = whole("n", n)?;
-        let lifted = interruptible(py, || self.0.lifted(n))?.or_raise()?;
+        let lifted = interruptible(py, || self.model.lifted(n))?.or_raise()?;
         Ok(give_matrix(py, &lifted))
     }
 
     /// Return the poles, the eigenvalues of A, in no particular order.
     fn poles<'py>(&self, py: Python<'py>) -> Array<'py> {
-        let poles = self.0.poles().or_raise()?;
-        Ok(Array1::from(poles).into_pyarray(py).into_any())
+        Ok(give_vector(py, self.model.poles().or_raise()?))
     }
 
     /// Return the closed loop with a controller K, P / (1 + P K), from set point to output.
     fn feedback(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let controller = read_model("controller", controller)?;
-        self.0.feedback(&controller).or_raise().map(Self)
+        give(self.model.feedback(&read_model("controller", controller)?))
     }
 
     /// Return the series connection with another model, y = next(self(u)).
     fn series(&self, next: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let next = read_model("next", next)?;
-        self.0.series(&next).or_raise().map(Self)
+        give(self.model.series(&read_model("next", next)?))
     }
 
     /// Return the parallel arrangement with another model: a block-diagonal model.
     fn append(&self, other: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let other = read_model("other", other)?;
-        self.0.append(&other).or_raise().map(Self)
+        give(self.model.append(&read_model("other", other)?))
     }
 
     /// Return the model with a dead time of `n_samples` at every input, e.g. of a bus.
     fn delayed(&self, n_samples: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let n_samples = whole("n_samples", n_samples)?;
-        self.0.delayed(n_samples).or_raise().map(Self)
+        give(self.model.delayed(whole("n_samples", n_samples)?))
     }
 
     /// Return the finite invariant zeros, in no particular order [emami1982].
     fn zeros<'py>(&self, py: Python<'py>) -> Array<'py> {
-        let zeros = interruptible(py, || self.0.zeros())?.or_raise()?;
-        Ok(Array1::from(zeros).into_pyarray(py).into_any())
+        let zeros = interruptible(py, || self.model.zeros())?.or_raise()?;
+        Ok(give_vector(py, zeros))
     }
 
     /// Return the static gain G(0) or G(z = 1), shape (n_outputs, n_inputs).
     fn dc_gain<'py>(&self, py: Python<'py>) -> Array<'py> {
-        Ok(give_matrix(py, &self.0.dc_gain().or_raise()?))
+        Ok(give_matrix(py, &self.model.dc_gain().or_raise()?))
     }
 
     /// Return C (q I - A)^-1 B + D at frequencies in rad/s, shape (n_frequencies, n_outputs, n_inputs).
     fn frequency_response<'py>(&self, py: Python<'py>, w_rad_s: &Bound<'py, PyAny>) -> Array<'py> {
         let w = read_vector("w_rad_s", w_rad_s)?;
-        let response = interruptible(py, || self.0.frequency_response(&w))?.or_raise()?;
-        let shape = (w.len(), self.0.n_outputs(), self.0.n_inputs());
-        let array = Array3::from_shape_fn(shape, |(k, row, col)| response[k][(row, col)]);
-        Ok(array.into_pyarray(py).into_any())
+        let response = interruptible(py, || self.model.frequency_response(&w))?.or_raise()?;
+        let shape = (w.len(), self.n_outputs, self.n_inputs);
+        Ok(give_matrices(py, shape, |k, row, col| response[k][(row, col)]))
     }
 
     /// Return magnitude and unwrapped phase in rad of one channel at frequencies in rad/s.
@@ -233,21 +223,18 @@ impl PyStateSpace {
         let w = read_vector("w_rad_s", w_rad_s)?;
         let output = output.map_or(Ok(0), |output| whole("output", output))?;
         let input = input.map_or(Ok(0), |input| whole("input", input))?;
-        let bode = interruptible(py, || self.0.bode(&w, output, input))?.or_raise()?;
-        let give = |values| Array1::from(values).into_pyarray(py).into_any();
-        Ok((give(bode.magnitude), give(bode.phase_rad)))
+        let bode = interruptible(py, || self.model.bode(&w, output, input))?.or_raise()?;
+        Ok((give_vector(py, bode.magnitude), give_vector(py, bode.phase_rad)))
     }
 
     /// Return the sensitivity S = (I + P K)^-1, from set point to control error.
     fn sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let controller = read_model("controller", controller)?;
-        self.0.sensitivity(&controller).or_raise().map(Self)
+        give(self.model.sensitivity(&read_model("controller", controller)?))
     }
 
     /// Return the complementary sensitivity T = P K (I + P K)^-1, from set point to output.
     fn complementary_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let controller = read_model("controller", controller)?;
-        self.0.complementary_sensitivity(&controller).or_raise().map(Self)
+        give(self.model.complementary_sensitivity(&read_model("controller", controller)?))
     }
 
     /// Return the process sensitivity P (I + K P)^-1, from an input added to the controller's
@@ -255,23 +242,22 @@ impl PyStateSpace {
     ///
     /// The plant of learning in the parallel structure.
     fn process_sensitivity(&self, controller: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let controller = read_model("controller", controller)?;
-        self.0.process_sensitivity(&controller).or_raise().map(Self)
+        give(self.model.process_sensitivity(&read_model("controller", controller)?))
     }
 
     /// Return the relative degree of each output: its first Markov parameter that is not zero, or None.
     fn relative_degrees(&self) -> PyResult<Vec<Option<usize>>> {
-        model::relative_degrees(&self.0).or_raise()
+        model::relative_degrees(&self.model).or_raise()
     }
 
     /// Return the dead time in samples of each output (rows) from each input (columns), or None.
     fn delays(&self) -> PyResult<Vec<Vec<Option<usize>>>> {
-        model::delays(&self.0).or_raise()
+        model::delays(&self.model).or_raise()
     }
 
     /// Return a minimal realisation: the controllable and observable states.
     fn minimal(&self) -> PyResult<Self> {
-        self.0.minimal().or_raise().map(Self)
+        give(self.model.minimal())
     }
 
     /// Return the model as an object of scipy.signal.
@@ -307,32 +293,32 @@ impl PyStateSpace {
     /// Return a model of another library, or this class itself, as this class.
     #[staticmethod]
     fn _of(operand: &Bound<'_, PyAny>) -> PyResult<Self> {
-        read_model("operand", operand).map(Self)
+        read_model("operand", operand).map(Self::from)
     }
 
     fn _gain(&self, gain: &Bound<'_, PyAny>) -> PyResult<Self> {
-        StateSpace::static_gain(read_matrix("gain", gain)?, self.0.dt_s()).or_raise().map(Self)
+        give(StateSpace::static_gain(read_matrix("gain", gain)?, self.dt_s))
     }
 
     fn _scaled(&self, factor: &Bound<'_, PyAny>) -> PyResult<Self> {
-        self.0.scaled(number("factor", factor)?).or_raise().map(Self)
+        give(self.model.scaled(number("factor", factor)?))
     }
 
     fn _sum(&self, other: &Bound<'_, Self>) -> PyResult<Self> {
-        self.0.sum(&other.get().0).or_raise().map(Self)
+        give(self.model.sum(&other.get().model))
     }
 
     fn _inverse(&self) -> PyResult<Self> {
-        self.0.inverse().or_raise().map(Self)
+        give(self.model.inverse())
     }
 
     #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn _select(&self, outputs: Vec<usize>, inputs: Vec<usize>) -> PyResult<Self> {
-        self.0.select(&outputs, &inputs).or_raise().map(Self)
+        give(self.model.select(&outputs, &inputs))
     }
 
     fn __neg__(&self) -> PyResult<Self> {
-        self.0.scaled(-1.0).or_raise().map(Self)
+        give(self.model.scaled(-1.0))
     }
 
     fn __mul__<'py>(slf: &Bound<'py, Self>, other: &Bound<'py, PyAny>) -> Array<'py> {
@@ -384,19 +370,19 @@ impl PyStateSpace {
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| self.0 == other.get().0)
+        other.cast::<Self>().is_ok_and(|other| self.model == other.get().model)
     }
 
     fn __hash__(&self) -> u64 {
-        let numbers = [self.0.a(), self.0.b(), self.0.c(), self.0.d()];
+        let numbers = [self.model.a(), self.model.b(), self.model.c(), self.model.d()];
         let bits =
             numbers.into_iter().flat_map(|matrix| matrix.iter()).map(|x| (x + 0.0).to_bits());
         bits.fold(0, |hash: u64, bits| hash.rotate_left(5).wrapping_add(bits))
     }
 
     fn __repr__(&self) -> String {
-        let (n, m, p) = (self.0.n_states(), self.0.n_inputs(), self.0.n_outputs());
-        let dt_s = self.0.dt_s().map_or_else(|| "None".to_owned(), |dt_s| dt_s.to_string());
+        let Self { n_states: n, n_inputs: m, n_outputs: p, .. } = self;
+        let dt_s = self.dt_s.map_or_else(|| "None".to_owned(), |dt_s| dt_s.to_string());
         format!("StateSpace(n_states={n}, n_inputs={m}, n_outputs={p}, dt_s={dt_s})")
     }
 }
@@ -406,14 +392,14 @@ pub(crate) fn from_transfer_function(keywords: Option<Keywords<'_, '_>>) -> PyRe
     let a = Arguments::of(keywords)?;
     let dt_s = a.maybe("dt_s", read_sample_time)?.flatten();
     let (num, den) = (a.vector("num")?, a.vector("den")?);
-    model::from_transfer_function(&num, &den, dt_s).or_raise().map(PyStateSpace)
+    give(model::from_transfer_function(&num, &den, dt_s))
 }
 
 #[pyfunction(signature = (**keywords))]
 pub(crate) fn second_order(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStateSpace> {
     let a = Arguments::of(keywords)?;
     let (w0, damping) = (a.number("natural_frequency_rad_s")?, a.number("damping")?);
-    model::second_order(w0, damping).or_raise().map(PyStateSpace)
+    give(model::second_order(w0, damping))
 }
 
 #[pyfunction(signature = (**keywords))]
@@ -422,5 +408,5 @@ pub(crate) fn discretize(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyState
     let methods = [("zoh", Method::ZeroOrderHold), ("tustin", Method::Tustin)];
     let (model, dt_s) = (a.model("model")?, a.number("dt_s")?);
     let method = a.choice("method", &methods)?;
-    model::discretize(&model, dt_s, method).or_raise().map(PyStateSpace)
+    give(model::discretize(&model, dt_s, method))
 }

@@ -17,7 +17,7 @@ use crate::whole::number;
 /// python-control's transfer functions nested lists `num` and `den`.
 pub(crate) fn read_model(name: &str, object: &Bound<'_, PyAny>) -> PyResult<StateSpace> {
     if let Ok(own) = object.cast::<PyStateSpace>() {
-        return Ok(own.get().model().clone());
+        return Ok(own.get().model.clone());
     }
     if !object.hasattr("A")? {
         // python-control's have a to_ss as well, but it refuses matrices; `ninputs` distinguishes
@@ -97,7 +97,7 @@ impl AnyModel {
 /// Reads a `TimeVarying`, or any model that [`read_model`] accepts.
 pub(crate) fn read_any_model(name: &str, object: &Bound<'_, PyAny>) -> PyResult<AnyModel> {
     if let Ok(own) = object.cast::<PyTimeVarying>() {
-        return Ok(AnyModel::Varying(own.get().model().clone()));
+        return Ok(AnyModel::Varying(own.get().model.clone()));
     }
     read_model(name, object).map(AnyModel::Invariant)
 }

@@ -8,7 +8,8 @@ use ilc_rt::learning::{Law, LearningError, Standing};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::argument::{Signal, give_signal};
+use crate::answer::{give_signal, give_vector};
+use crate::argument::Signal;
 use crate::laws::PyLaw;
 use crate::whole::shown;
 
@@ -98,9 +99,7 @@ impl PythonLaw {
                 Some(given.into_bound(py))
             }
             (Some(given), None) => Some(given.into_bound(py)),
-            (None, announced) => {
-                announced.map(|values| give_signal(py, values, 1, true)).transpose()?
-            }
+            (None, announced) => announced.map(|values| give_vector(py, values)),
         };
         let u = give_signal(py, input.to_vec(), n_inputs, is_flat && n_inputs == 1)?;
         let e = give_signal(py, error.to_vec(), n_outputs, is_flat && n_outputs == 1)?;
@@ -114,8 +113,7 @@ impl PythonLaw {
     /// Passes the disturbance of a run that the object does not learn from.
     fn announce(&self, py: Python<'_>, disturbance: Vec<f64>) {
         // A law without `expect` ignores it; a failure shows in the update.
-        let _ = give_signal(py, disturbance, 1, true)
-            .and_then(|values| self.law.bind(py).call_method1("expect", (values,)));
+        let _ = self.law.bind(py).call_method1("expect", (give_vector(py, disturbance),));
     }
 
     /// Calls an optional method of the object; a failure has no effect.

@@ -4,14 +4,13 @@ use ilc_rt::learning::law::q_filter::QFilter;
 use ilc_rt::signal::{
     self, FirFilter, GaussianFilter, Section, Segment, SwitchRule, SwitchedFilter,
 };
-use numpy::IntoPyArray;
-use numpy::ndarray::Array2;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-use crate::argument::{Signal, give_signal, read_vector};
-use crate::arguments::{Arguments, Array, ByName, Keywords};
+use crate::answer::{Array, ByName, give_signal, give_vector};
+use crate::argument::{Layout, Signal, read_vector};
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::exceptions;
@@ -83,25 +82,19 @@ impl PyFilter {
     ///     If the signal is too short for the filter.
     /// ValueError, TypeError
     ///     If `x` has the wrong shape, dtype or a number that is not finite.
-    fn zero_phase<'py>(
-        &self,
-        py: Python<'py>,
-        x: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        filtered(py, &without_lag(&self.filter), x)
+    fn zero_phase<'py>(&self, x: &Bound<'py, PyAny>) -> Array<'py> {
+        filtered(&without_lag(&self.filter), x)
     }
 
     /// Return the causally filtered signal, from rest; recursive filters only.
-    fn _forward<'py>(&self, py: Python<'py>, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        filtered(py, &QFilter::Causal(self.sections()?.to_vec()), x)
+    fn _forward<'py>(&self, x: &Bound<'py, PyAny>) -> Array<'py> {
+        filtered(&QFilter::Causal(self.sections()?.to_vec()), x)
     }
 
     /// Sections b0 b1 b2 1 a1 a2 of a recursive filter.
-    fn _sos<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn _sos<'py>(&self, py: Python<'py>) -> Array<'py> {
         let row = |&Section { b, a }: &Section| [b[0], b[1], b[2], 1.0, a[0], a[1]];
-        let rows: Vec<[f64; 6]> = self.sections()?.iter().map(row).collect();
-        let table = Array2::from_shape_fn((rows.len(), 6), |(row, col)| rows[row][col]);
-        Ok(table.into_pyarray(py).into_any())
+        give_signal(py, self.sections()?.iter().flat_map(row).collect(), 6, false)
     }
 
     /// Parameters of the filter by name, in addition to its arguments.
@@ -112,7 +105,7 @@ impl PyFilter {
                 figures.set_item("sigma_samples", filter.sigma_samples())?;
             }
             QFilter::Fir(filter) => {
-                figures.set_item("taps", give_signal(py, filter.taps().to_vec(), 1, true)?)?;
+                figures.set_item("taps", give_vector(py, filter.taps().to_vec()))?;
             }
             QFilter::Switched(filter) => {
                 let segments = filter.segments();
@@ -218,24 +211,17 @@ fn without_lag(filter: &QFilter) -> QFilter {
     }
 }
 
-fn filtered<'py>(
-    py: Python<'py>,
-    filter: &QFilter,
-    x: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let mut x = Signal::read("x", x)?;
-    detached(py, || filter.for_samples(x.n_samples)?.apply(&mut x.values, x.n_channels))
-        .or_raise()?;
-    give_signal(py, x.values, x.n_channels, x.is_flat)
+fn filtered<'py>(filter: &QFilter, x: &Bound<'py, PyAny>) -> Array<'py> {
+    let py = x.py();
+    let Signal { mut values, layout } = Signal::read("x", x)?;
+    let Layout { n_samples, n_channels, is_flat } = layout;
+    detached(py, || filter.for_samples(n_samples)?.apply(&mut values, n_channels)).or_raise()?;
+    give_signal(py, values, n_channels, is_flat)
 }
 
 #[pyfunction]
-pub(crate) fn zero_phase<'py>(
-    py: Python<'py>,
-    filter: &Bound<'py, PyAny>,
-    x: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyAny>> {
-    filtered(py, &without_lag(&read_filter("filter", Some(filter))?), x)
+pub(crate) fn zero_phase<'py>(filter: &Bound<'py, PyAny>, x: &Bound<'py, PyAny>) -> Array<'py> {
+    filtered(&without_lag(&read_filter("filter", Some(filter))?), x)
 }
 
 #[pyfunction(signature = (**keywords))]
@@ -243,5 +229,5 @@ pub(crate) fn instantaneous_frequency<'py>(keywords: Option<Keywords<'_, 'py>>) 
     let a = Arguments::of(keywords)?;
     let (x, dt_s) = (a.vector("x")?, a.number("dt_s")?);
     let found = detached(a.py(), || signal::instantaneous_frequency(&x, dt_s)).or_raise()?;
-    give_signal(a.py(), found, 1, true)
+    Ok(give_vector(a.py(), found))
 }

@@ -1,11 +1,10 @@
 //! `TimeVarying`.
 
 use ilc_rt::model::{StateSpace, TimeVarying};
-use numpy::IntoPyArray;
-use numpy::ndarray::Array3;
 use pyo3::prelude::*;
 
-use crate::argument::{Matrix, Signal, give_signal, misfit, read_array, read_vector};
+use crate::answer::{Array, give_matrices, give_signal};
+use crate::argument::{Matrix, Signal, misfit, read_array, read_vector};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::whole::Real;
@@ -29,24 +28,47 @@ use crate::whole::Real;
 /// array([0., 2., 5.])
 #[pyclass(name = "TimeVarying", module = "ilc_rt", frozen)]
 #[derive(Debug)]
-pub(crate) struct PyTimeVarying(TimeVarying);
+pub(crate) struct PyTimeVarying {
+    pub(crate) model: TimeVarying,
+    /// Sample time in seconds.
+    #[pyo3(get)]
+    dt_s: Option<f64>,
+    /// Number of samples of the run.
+    #[pyo3(get)]
+    n_samples: usize,
+    /// Number of states.
+    #[pyo3(get)]
+    n_states: usize,
+    /// Number of inputs.
+    #[pyo3(get)]
+    n_inputs: usize,
+    /// Number of outputs.
+    #[pyo3(get)]
+    n_outputs: usize,
+}
+
+impl From<TimeVarying> for PyTimeVarying {
+    fn from(model: TimeVarying) -> Self {
+        Self {
+            dt_s: model.dt_s(),
+            n_samples: model.n_samples(),
+            n_states: model.n_states(),
+            n_inputs: model.n_inputs(),
+            n_outputs: model.n_outputs(),
+            model,
+        }
+    }
+}
 
 impl PyTimeVarying {
-    pub(crate) fn model(&self) -> &TimeVarying {
-        &self.0
-    }
-
     fn give<'py>(
         &self,
         py: Python<'py>,
         part: impl Fn(&StateSpace) -> &Matrix,
     ) -> Bound<'py, PyAny> {
-        let (rows, cols) = part(self.0.at(0)).shape();
-        Array3::from_shape_fn((self.0.n_samples(), rows, cols), |(k, row, col)| {
-            part(self.0.at(k))[(row, col)]
-        })
-        .into_pyarray(py)
-        .into_any()
+        let (rows, cols) = part(self.model.at(0)).shape();
+        let at = |k, row, col| part(self.model.at(k))[(row, col)];
+        give_matrices(py, (self.n_samples, rows, cols), at)
     }
 }
 
@@ -90,7 +112,7 @@ impl PyTimeVarying {
         let samples: Result<Vec<_>, _> = (0..n_samples)
             .map(|k| StateSpace::discrete(at(&a, k), at(&b, k), at(&c, k), at(&d, k), dt_s.0))
             .collect();
-        TimeVarying::new(samples.or_raise()?).or_raise().map(Self)
+        TimeVarying::new(samples.or_raise()?).or_raise().map(Self::from)
     }
 
     /// Return the model of deviations from a trajectory of ``x[k+1] = f(x[k], u[k])``, ``y[k] = h(x[k], u[k])``.
@@ -123,7 +145,7 @@ impl PyTimeVarying {
         h: Option<&Bound<'py, PyAny>>,
         jacobian: Option<&Bound<'py, PyAny>>,
         step: f64,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> Array<'py> {
         let linearization = f.py().import("ilc_rt.linearization")?;
         linearization.call_method1("linearize", (f, x, u, dt_s, h, jacobian, step))
     }
@@ -136,7 +158,7 @@ impl PyTimeVarying {
             this.give(py, StateSpace::b),
             this.give(py, StateSpace::c),
             this.give(py, StateSpace::d),
-            this.0.dt_s(),
+            this.dt_s,
         );
         Ok((slf.get_type().into_any(), parts.into_pyobject(py)?.into_any()))
     }
@@ -165,59 +187,24 @@ impl PyTimeVarying {
         self.give(py, StateSpace::d)
     }
 
-    /// Sample time in seconds.
-    #[getter]
-    fn dt_s(&self) -> Option<f64> {
-        self.0.dt_s()
-    }
-
-    /// Number of samples of the run.
-    #[getter]
-    fn n_samples(&self) -> usize {
-        self.0.n_samples()
-    }
-
-    /// Number of states.
-    #[getter]
-    fn n_states(&self) -> usize {
-        self.0.n_states()
-    }
-
-    /// Number of inputs.
-    #[getter]
-    fn n_inputs(&self) -> usize {
-        self.0.n_inputs()
-    }
-
-    /// Number of outputs.
-    #[getter]
-    fn n_outputs(&self) -> usize {
-        self.0.n_outputs()
-    }
-
     /// Return the output for an input of shape (n_samples,) or (n_samples, n_inputs).
     ///
     /// `x0` is the state at the first sample, shape (n_states,), zero if None. The output has the shape
     /// (n_samples, n_outputs), or (n_samples,) if `u` has no channel axis and there is one output.
     #[pyo3(signature = (u, x0=None))]
-    fn simulate<'py>(
-        &self,
-        py: Python<'py>,
-        u: &Bound<'py, PyAny>,
-        x0: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    fn simulate<'py>(&self, u: &Bound<'py, PyAny>, x0: Option<&Bound<'py, PyAny>>) -> Array<'py> {
+        let py = u.py();
         let u = Signal::read("u", u)?
-            .with_samples("u", self.0.n_samples())?
-            .with_channels("u", self.0.n_inputs())?;
+            .with_samples("u", self.n_samples)?
+            .with_channels("u", self.n_inputs)?;
         let x0 = x0.map(|x0| read_vector("x0", x0)).transpose()?;
-        let y = interruptible(py, || self.0.simulate(&u.values, x0.as_deref()))?.or_raise()?;
-        let n_outputs = self.0.n_outputs();
-        give_signal(py, y, n_outputs, u.is_flat && n_outputs == 1)
+        let y = interruptible(py, || self.model.simulate(&u.values, x0.as_deref()))?.or_raise()?;
+        give_signal(py, y, self.n_outputs, u.is_flat && self.n_outputs == 1)
     }
 
     fn __repr__(&self) -> String {
-        let (n, m, p) = (self.0.n_states(), self.0.n_inputs(), self.0.n_outputs());
-        let (n_samples, dt_s) = (self.0.n_samples(), self.0.dt_s().unwrap_or_default());
+        let Self { n_samples, n_states: n, n_inputs: m, n_outputs: p, .. } = self;
+        let dt_s = self.dt_s.unwrap_or_default();
         format!(
             "TimeVarying(n_samples={n_samples}, n_states={n}, n_inputs={m}, n_outputs={p}, dt_s={dt_s})"
         )

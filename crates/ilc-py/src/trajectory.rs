@@ -16,10 +16,10 @@ use ilc_rt::trajectory::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
-use crate::argument::{give_signal, read_vector};
-use crate::arguments::{Arguments, ByName, Keywords};
+use crate::answer::{ByName, by_name, give_signal};
+use crate::argument::read_vector;
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::exceptions;
@@ -37,17 +37,16 @@ fn planned(py: Python<'_>, plan: impl FnOnce() -> Planned + Send) -> ByName<'_> 
     let begun = Instant::now();
     let (motion, alphas) = interruptible(py, plan)?.or_raise()?;
     let computing_s = begun.elapsed().as_secs_f64();
-    let n_axes = motion.n_axes;
-    let samples = PyDict::new(py);
-    samples.set_item("dt_s", motion.dt_s)?;
-    samples.set_item("position_m", give_signal(py, motion.position_m, n_axes, false)?)?;
-    samples.set_item("velocity_m_s", give_signal(py, motion.velocity_m_s, n_axes, false)?)?;
-    let acceleration_m_s2 = give_signal(py, motion.acceleration_m_s2, n_axes, false)?;
-    samples.set_item("acceleration_m_s2", acceleration_m_s2)?;
-    samples.set_item("programmed_m", give_signal(py, motion.programmed_m, n_axes, false)?)?;
-    samples.set_item("alphas", alphas)?;
-    samples.set_item("computing_s", computing_s)?;
-    Ok(samples)
+    let signal = |values| give_signal(py, values, motion.n_axes, false);
+    Ok(by_name!(py,
+        [motion => dt_s]
+        position_m: signal(motion.position_m)?,
+        velocity_m_s: signal(motion.velocity_m_s)?,
+        acceleration_m_s2: signal(motion.acceleration_m_s2)?,
+        programmed_m: signal(motion.programmed_m)?,
+        alphas: alphas,
+        computing_s: computing_s,
+    ))
 }
 
 /// Reads the points of a path, one per row.

@@ -4,13 +4,12 @@ use ilc_rt::learning::LearningError;
 use ilc_rt::learning::weights::{
     Contour, ContourTerms, Coupled, Formation, Gain, Objective, Pass, Schedule, Weight, band,
 };
-use numpy::IntoPyArray;
-use numpy::ndarray::Array3;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::argument::{Matrix, give_signal, misfit, read_array};
-use crate::arguments::{Arguments, Array, Keywords};
+use crate::answer::{Array, give_matrices, give_signal, give_vector};
+use crate::argument::{Matrix, misfit, read_array};
+use crate::arguments::{Arguments, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
 use crate::model::PyStateSpace;
@@ -68,12 +67,7 @@ pub(crate) fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<V
 }
 
 /// Returns a weight to Python as one matrix per sample.
-fn give_blocks<'py>(
-    py: Python<'py>,
-    weight: &Weight,
-    n_samples: usize,
-    p: usize,
-) -> PyResult<Bound<'py, PyAny>> {
+fn give_blocks<'py>(py: Python<'py>, weight: &Weight, n_samples: usize, p: usize) -> Array<'py> {
     let mut values = Vec::with_capacity(n_samples * p * p);
     for k in 0..n_samples {
         // Symmetric: column-major equals row-major.
@@ -84,9 +78,7 @@ fn give_blocks<'py>(
         let reason = "what it is made of is so large that it is not finite".to_owned();
         return Err(LearningError::Weight { what, sample, reason }).or_raise();
     }
-    Array3::from_shape_vec((n_samples, p, p), values)
-        .map(|array| array.into_pyarray(py).into_any())
-        .map_err(|error| PyValueError::new_err(error.to_string()))
+    Ok(give_matrices(py, (n_samples, p, p), |k, row, col| values[(k * p + row) * p + col]))
 }
 
 /// Reads a contour with its weights; also the samples and outputs of its reference.
@@ -164,7 +156,7 @@ pub(crate) fn schedule<'py>(keywords: Option<Keywords<'_, 'py>>) -> Array<'py> {
         _ => return Err(PyValueError::new_err("bandwidth_hz and dt_s belong together: give both")),
     };
     let values = detached(a.py(), || schedule.samples(n_samples)).or_raise()?;
-    give_signal(a.py(), values, 1, true)
+    Ok(give_vector(a.py(), values))
 }
 
 /// Reads segments: the start and the value of each.

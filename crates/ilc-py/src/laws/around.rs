@@ -54,10 +54,6 @@ impl Readable for Gate<Inner> {
             _ => return None,
         })
     }
-
-    fn has_inner(&self) -> bool {
-        true
-    }
 }
 
 pub(super) fn ladder(call: &Call<'_, '_>) -> PyResult<Built> {
@@ -83,10 +79,6 @@ impl Readable for Ladder<Inner> {
             _ => return None,
         })
     }
-
-    fn has_inner(&self) -> bool {
-        true
-    }
 }
 
 pub(super) fn through_jacobian(call: &Call<'_, '_>) -> PyResult<Built> {
@@ -106,9 +98,5 @@ impl Readable for ThroughJacobian<Inner> {
             "n_coordinates" => Some(Figure::Count(n_coordinates)),
             _ => None,
         }
-    }
-
-    fn has_inner(&self) -> bool {
-        true
     }
 }

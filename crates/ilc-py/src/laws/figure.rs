@@ -1,9 +1,10 @@
 //! Figures of a law that Python can read.
 
-use ilc_rt::learning::{Law, LearningError};
+use ilc_rt::learning::Law;
+use ilc_rt::learning::law::relevance::Relevance;
 use pyo3::prelude::*;
 
-use crate::argument::give_signal;
+use crate::answer::{Array, give_signal};
 
 /// A figure of a law: the value of a property of its Python class.
 pub(crate) enum Figure {
@@ -23,12 +24,7 @@ impl From<Option<f64>> for Figure {
 
 impl Figure {
     /// Returns the figure to Python.
-    pub(super) fn give(
-        self,
-        py: Python<'_>,
-        n_inputs: usize,
-        is_flat: bool,
-    ) -> PyResult<Bound<'_, PyAny>> {
+    pub(super) fn give(self, py: Python<'_>, n_inputs: usize, is_flat: bool) -> Array<'_> {
         Ok(match self {
             Self::Absent => py.None().into_bound(py),
             Self::Number(value) => value.into_pyobject(py)?.into_any(),
@@ -49,7 +45,7 @@ pub(crate) trait Readable: Law {
 
     /// Returns true if the law calls an inner law, which may be written in Python.
     fn has_inner(&self) -> bool {
-        false
+        self.inner().is_some()
     }
 
     /// Returns true if an update is slow even for short runs.
@@ -57,26 +53,8 @@ pub(crate) trait Readable: Law {
         false
     }
 
-    /// Returns true if the law uses the measured disturbance of the coming run.
-    fn uses_disturbance(&self) -> bool {
-        false
-    }
-
-    /// Adds a run made elsewhere.
-    fn remember(&mut self, u: &[f64], e: &[f64], disturbance: &[f64]) -> Result<(), LearningError> {
-        let _ = (u, e, disturbance);
-        Err(LearningError::Empty { what: "memory" })
-    }
-
-    /// Returns indices and weights of the stored runs that count under a disturbance.
-    fn relevant(&self, disturbance: &[f64]) -> Result<Vec<(usize, f64)>, LearningError> {
-        let _ = disturbance;
-        Err(LearningError::Empty { what: "memory" })
-    }
-
-    /// Keeps only the most relevant stored runs, and returns their indices.
-    fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>, LearningError> {
-        let _ = (keep, disturbances);
-        Err(LearningError::Empty { what: "memory" })
+    /// Returns the law with a memory of runs by their relevance, if it is one.
+    fn relevance(&mut self) -> Option<&mut Relevance> {
+        None
     }
 }

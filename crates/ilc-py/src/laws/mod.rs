@@ -22,8 +22,9 @@ use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::answer::{Array, ByName};
 use crate::argument::{Layout, read_disturbance};
-use crate::arguments::{Arguments, ByName, Keywords};
+use crate::arguments::{Arguments, Keywords};
 use crate::error::OrRaise;
 use crate::guard::{Borrowed, Guarded};
 use crate::made::reduce_kind;
@@ -200,10 +201,10 @@ impl PyLaw {
         u: &Bound<'py, PyAny>,
         e: &Bound<'py, PyAny>,
         disturbance: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    ) -> Array<'py> {
         let (u, e) = (Given::read("u", u)?, Given::read("e", e)?);
         let mut state = self.state.borrow(py)?;
-        let told = if state.law.uses_disturbance() {
+        let told = if state.law.n_disturbances().is_some() {
             disturbance.map(|given| read_disturbance("disturbance", given)).transpose()?
         } else {
             None
@@ -268,7 +269,7 @@ impl PyLaw {
     }
 
     /// Figure of the law of this name, for the properties of the typed classes.
-    fn _figure<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    fn _figure<'py>(&self, py: Python<'py>, name: &str) -> Array<'py> {
         let state = self.state.borrow(py)?;
         let found = state.law.figure(name);
         let n_inputs = state.size.unwrap_or(Size::ONE).channels.n_inputs;
@@ -292,7 +293,8 @@ impl PyLaw {
         let told = read_told("disturbance", disturbance)?;
         let mut state = self.state.borrow(py)?;
         self.fit(py, &mut state, u.layout(), e.layout(), Some(&told))?;
-        state.law.remember(u.values()?, e.values()?, &told).or_raise()
+        let is_kept = state.law.recall(u.values()?, e.values()?, &told).or_raise()?;
+        is_kept.then_some(()).ok_or_else(no_memory)
     }
 
     /// Return numbers and weights of the runs used under a disturbance.
@@ -302,12 +304,12 @@ impl PyLaw {
         disturbance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(Vec<usize>, Vec<f64>)> {
         let told = read_told("disturbance", disturbance)?;
-        let state = self.state.borrow(py)?;
+        let mut state = self.state.borrow(py)?;
         if state.size.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
-        let found = state.law.relevant(&told).or_raise()?;
-        Ok(found.into_iter().unzip())
+        let law = state.law.relevance().ok_or_else(no_memory)?;
+        Ok(law.relevant(&told).or_raise()?.into_iter().unzip())
     }
 
     /// Forget all but some of the remembered runs, and return the numbers of the remaining ones.
@@ -323,7 +325,7 @@ impl PyLaw {
         if state.size.is_none() {
             return Ok(Vec::new());
         }
-        state.law.trim(keep, &told).or_raise()
+        state.law.relevance().ok_or_else(no_memory)?.trim(keep, &told).or_raise()
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
@@ -338,7 +340,7 @@ impl PyLaw {
     }
 
     /// Pickled and copied as created, without anything learned since.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Array<'py> {
         let this = slf.get();
         reduce_kind(slf.as_any(), "Law", this.kind, &this.arguments)
     }
@@ -370,11 +372,15 @@ impl PyLaw {
                 return e.require_exactly("e", size.n_samples, size.channels.n_outputs);
             }
             (Fits::Channels(needed), _) => {
-                u.require("u", u.n_samples, needed.n_inputs)?;
-                e.require("e", u.n_samples, needed.n_outputs)?;
+                u.require_channels("u", needed.n_inputs)?;
+                e.require_samples("e", u.n_samples)?;
+                e.require_channels("e", needed.n_outputs)?;
             }
-            (Fits::Alike, _) => e.require("e", u.n_samples, u.n_channels)?,
-            (Fits::Any, _) | (Fits::First, None) => e.require("e", u.n_samples, e.n_channels)?,
+            (Fits::Alike, _) => {
+                e.require_samples("e", u.n_samples)?;
+                e.require_channels("e", u.n_channels)?;
+            }
+            (Fits::Any, _) | (Fits::First, None) => e.require_samples("e", u.n_samples)?,
         }
         let told = disturbance.or(state.announced.last().map(Vec::as_slice));
         let n_disturbances = told.map_or(0, <[f64]>::len);
@@ -406,4 +412,8 @@ impl PyLaw {
 /// Reads disturbances; `None` is an empty one.
 fn read_told(name: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<f64>> {
     given.map_or_else(|| Ok(Vec::new()), |given| read_disturbance(name, given))
+}
+
+fn no_memory() -> PyErr {
+    PyAttributeError::new_err("this law has no memory of runs")
 }

@@ -1,6 +1,5 @@
 //! Builders of laws with a memory of runs: `relevance` and `flexible`, filled from a library.
 
-use ilc_rt::learning::LearningError;
 use ilc_rt::learning::law::flexible::{Flexible, TableShape};
 use ilc_rt::learning::law::relevance::{Relevance, RelevanceWeights, RunShape};
 use ilc_rt::library::{LibraryError, Task};
@@ -59,7 +58,10 @@ fn filled<L: Readable + 'static>(
     runs: &[IterationRecord],
 ) -> PyResult<Built> {
     detached(call.py(), || {
-        runs.iter().try_for_each(|run| law.remember(&run.input, &run.error_m, &run.disturbance))
+        let recall = |run: &IterationRecord| {
+            law.recall(&run.input, &run.error_m, &run.disturbance).map(drop)
+        };
+        runs.iter().try_for_each(recall)
     })
     .or_raise()?;
     Ok(Built { law: Box::new(law), fits: Fits::First })
@@ -102,20 +104,8 @@ impl Readable for Relevance {
         true
     }
 
-    fn uses_disturbance(&self) -> bool {
-        true
-    }
-
-    fn remember(&mut self, u: &[f64], e: &[f64], disturbance: &[f64]) -> Result<(), LearningError> {
-        Relevance::remember(self, u, e, disturbance)
-    }
-
-    fn relevant(&self, disturbance: &[f64]) -> Result<Vec<(usize, f64)>, LearningError> {
-        Relevance::relevant(self, disturbance)
-    }
-
-    fn trim(&mut self, keep: usize, disturbances: &[f64]) -> Result<Vec<usize>, LearningError> {
-        Relevance::trim(self, keep, disturbances)
+    fn relevance(&mut self) -> Option<&mut Relevance> {
+        Some(self)
     }
 }
 
@@ -126,14 +116,6 @@ impl Readable for Flexible {
 
     fn has_inner(&self) -> bool {
         true
-    }
-
-    fn uses_disturbance(&self) -> bool {
-        true
-    }
-
-    fn remember(&mut self, u: &[f64], e: &[f64], disturbance: &[f64]) -> Result<(), LearningError> {
-        Flexible::remember(self, u, e, disturbance)
     }
 }
 

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use super::figure::Figure;
 use super::kinds::modelled;
 use super::{Builder, Built, Call, Fits, Readable};
-use crate::argument::Signal;
+use crate::argument::{Layout, Signal};
 use crate::detached::interruptible;
 use crate::error::OrRaise;
 use crate::model_argument::read_any_model;
@@ -34,7 +34,8 @@ pub(super) const BUILDERS: &[Builder] = &[
 fn parametric(call: &Call<'_, '_>) -> PyResult<Built> {
     let a = call.arguments;
     let model = read_any_model("model", &a.get("model")?)?;
-    let Signal { values, n_samples, n_channels, .. } = a.signal("signals")?;
+    let Signal { values, layout } = a.signal("signals")?;
+    let Layout { n_samples, n_channels, .. } = layout;
     let channels = Channels { n_inputs: model.n_inputs(), n_outputs: model.n_outputs() };
     let of_input = (n_channels / channels.n_inputs).max(1);
     let term = |column: usize| Term {
@@ -112,11 +113,7 @@ fn higher_order(call: &Call<'_, '_>) -> PyResult<Built> {
     Ok(Built { law: Box::new(law), fits: Fits::First })
 }
 
-impl Readable for HigherOrder<Box<dyn Law>> {
-    fn has_inner(&self) -> bool {
-        true
-    }
-}
+impl Readable for HigherOrder<Box<dyn Law>> {}
 
 fn filtered(call: &Call<'_, '_>) -> PyResult<Built> {
     let (size, filter) = (call.size(), call.filter("q_filter")?);
@@ -125,8 +122,4 @@ fn filtered(call: &Call<'_, '_>) -> PyResult<Built> {
     Ok(Built { law: Box::new(law), fits: Fits::Any })
 }
 
-impl Readable for Filtered<Box<dyn Law>> {
-    fn has_inner(&self) -> bool {
-        true
-    }
-}
+impl Readable for Filtered<Box<dyn Law>> {}

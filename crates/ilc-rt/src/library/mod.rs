@@ -4,6 +4,7 @@
 //! of several processes may share a file (write-ahead log); a killed process loses nothing it
 //! appended.
 
+mod elsewhere;
 mod error;
 mod figures;
 mod file;
@@ -15,6 +16,7 @@ mod store;
 mod tests;
 mod trim;
 
+pub use elsewhere::{Elsewhere, ElsewhereError};
 pub use error::LibraryError;
 pub(crate) use file::IN_MEMORY;
 pub use recall::{Near, Task};
