@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -52,8 +52,8 @@ class Identification:
         Sample time in seconds.
     experiment : Experiment
         The experiment, with the actual amplitude.
-    interface : {"csp", "csv", "cst"} or None
-        Mode of the axis; None if it is not an axis of a cell.
+    interface : str or None
+        Mode of the axis, e.g. csp; None if it is not an axis of a cell.
     doubt : str or None
         Reason not to use the model, if there is one.
     axis_model : str
@@ -75,7 +75,7 @@ class Identification:
     period_samples: int
     dt_s: float
     experiment: Experiment
-    interface: Literal["csp", "csv", "cst"] | None = None
+    interface: str | None = None
     doubt: str | None = None
     axis_model: str = ""
     followed: bool = True
