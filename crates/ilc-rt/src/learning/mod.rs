@@ -24,8 +24,6 @@ mod structure;
 pub mod sweep;
 pub mod tune;
 pub mod weights;
-#[cfg(test)]
-mod wrapped;
 
 pub use error::{LearningError, Result};
 pub use purpose::Purpose;

@@ -1,14 +1,13 @@
-//! Tests over all wrappers: the inner law hears, and answers, what its wrapper leaves to it.
+//! Wrappers of a law: the inner law hears, and answers, what its wrapper leaves to it.
 
+use ilc_rt::learning::gate::{Gate, GateRule};
+use ilc_rt::learning::ladder::{Ladder, LadderRule};
+use ilc_rt::learning::law::filtered::Filtered;
+use ilc_rt::learning::law::higher_order::HigherOrder;
+use ilc_rt::learning::law::q_filter::QFilter;
+use ilc_rt::learning::law::through_jacobian::ThroughJacobian;
+use ilc_rt::learning::{Law, Result, Scaled, Standing};
 use nalgebra::dmatrix;
-
-use super::gate::{Gate, GateRule};
-use super::ladder::{Ladder, LadderRule};
-use super::law::filtered::Filtered;
-use super::law::higher_order::HigherOrder;
-use super::law::q_filter::QFilter;
-use super::law::through_jacobian::ThroughJacobian;
-use super::{Law, Result, Scaled, Standing};
 
 /// A law that tells what it has heard.
 #[derive(Default)]
