@@ -21,7 +21,7 @@ def without_ctrl_c() -> Iterator[None]:
     """Start processes that are deaf to Ctrl-C, and put off a Ctrl-C that comes meanwhile.
 
     Blocked from its birth, a worker is not interrupted while it is still importing. Interrupted
-    half-way, this process would leave a worker that nobody knows.
+    half-way, this process would leave a worker that it does not know.
     """
     # Started with the first worker, it would lift the block.
     resource_tracker.ensure_running()
