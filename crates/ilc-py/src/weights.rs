@@ -15,6 +15,9 @@ use crate::error::OrRaise;
 use crate::model::PyStateSpace;
 use crate::whole::{each, number, pair, shown, whole};
 
+/// Largest number of entries of all matrices together: 0.8 GB.
+const VALUES_MAX: usize = 100_000_000;
+
 /// Reads a number, or one per sample.
 fn read_gain(a: Arguments<'_, '_>, name: &str, n_samples: usize) -> PyResult<Gain> {
     let (values, shape) = read_array(name, &a.get(name)?)?;
@@ -68,6 +71,11 @@ pub(crate) fn read_matrices(name: &str, object: &Bound<'_, PyAny>) -> PyResult<V
 
 /// Returns a weight to Python as one matrix per sample.
 fn give_blocks<'py>(py: Python<'py>, weight: &Weight, n_samples: usize, p: usize) -> Array<'py> {
+    let allowed = VALUES_MAX / (p * p).max(1);
+    if n_samples > allowed {
+        let (what, value) = ("n_samples", n_samples);
+        return Err(LearningError::TooMany { what, value, allowed }).or_raise();
+    }
     let mut values = Vec::with_capacity(n_samples * p * p);
     for k in 0..n_samples {
         // Symmetric: column-major equals row-major.

@@ -1,6 +1,7 @@
 //! Smooth (bumpless) schedules of a scalar along the run.
 
 use super::Gain;
+use crate::learning::error::check_counts;
 use crate::learning::{LearningError, Result};
 use crate::signal::GaussianFilter;
 
@@ -64,7 +65,9 @@ impl Schedule {
     /// # Errors
     /// - [`LearningError::Weight`] if a segment starts after the end of the run.
     /// - [`LearningError::Signal`] if half the filter is longer than the run.
+    /// - [`LearningError::Empty`] for no samples; [`LearningError::TooMany`] for a run beyond memory.
     pub fn samples(&self, n_samples: usize) -> Result<Vec<f64>> {
+        check_counts(&[("n_samples", n_samples)])?;
         let last = self.segments.len() - 1;
         let (start, _) = self.segments[last];
         if start >= n_samples {
