@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.linalg
 
 from ilc_rt import (
+    Campaign,
     LearningError,
     ModelError,
     NormOptimalIlc,
@@ -20,6 +23,7 @@ from ilc_rt import (
 )
 from ilc_rt.laws import Filtered, HigherOrderIlc, ModelFreeIlc, PointToPointIlc, StableInverseIlc
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 N, DT_S = 160, 0.002
 RNG = np.random.default_rng(5)
 AXIS = discretize(second_order(94.0, 0.7), DT_S)
@@ -268,3 +272,22 @@ def test_the_phase_tells_what_a_run_is_for() -> None:
     law.reset()
     assert law.phase == "learning"
     np.testing.assert_array_equal(law.update(u, np.zeros(N)), u)
+
+
+def test_a_campaign_marks_the_runs_that_only_measure(tmp_path) -> None:
+    """Also of a law that is a Python object: its errors are no reason to roll back."""
+    text = (EXAMPLES / "07_warm_and_cold.toml").read_text(encoding="utf-8")
+    cell = tmp_path / "cell.toml"
+    cell.write_text(text.split("[learning]")[0] + '[learning]\nlaw = "model_free"\n', "utf-8")
+    for number, law in enumerate((None, ModelFreeIlc(probe=1.0))):
+        campaign = Campaign(
+            cell, law=law, library=tmp_path / f"{number}.db", bus="loopback:", drives="simulated",
+            telemetry=False, lockstep=True,
+        )  # fmt: skip
+        records = list(campaign.run(7))
+        assert [record.phase for record in records] == [
+            None, "probing", "searching", None, "probing", "searching", None,
+        ]  # fmt: skip
+        assert not any(record.rolled_back for record in records)
+        learned = [record.tracking_inf_m for record in campaign.result.comparison.learned]
+        assert learned[2] < learned[1] < learned[0]

@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use ilc_rt::learning::{Law, LearningError, Standing};
+use ilc_rt::learning::{Law, LearningError, Purpose, Standing};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -171,6 +171,10 @@ impl Law for PythonLaw {
 
     fn standing(&self) -> Standing {
         self.ask_native(|law| law.standing()).unwrap_or(Standing::Learns)
+    }
+
+    fn purpose(&self) -> Purpose {
+        self.ask_native(|law| law.purpose()).unwrap_or_default()
     }
 
     fn reset(&mut self) {
