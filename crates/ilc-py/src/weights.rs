@@ -212,5 +212,5 @@ pub(crate) fn band_filter(keywords: Option<Keywords<'_, '_>>) -> PyResult<PyStat
     let pass = a.choice("passes", &[("low", Pass::Low), ("high", Pass::High)])?;
     let shape = (a.whole("order")?, a.number("cutoff_hz")?);
     let filter = band(pass, shape, a.number("dt_s")?, a.whole("n_channels")?);
-    filter.or_raise().map(PyStateSpace)
+    filter.or_raise().map(PyStateSpace::from)
 }
