@@ -40,7 +40,7 @@ pub(super) enum StoreRequest {
     /// Append a run; true if the law was asked about it.
     Append(Box<IterationRecord>, bool),
     /// Add the law's decision to a stored run.
-    Amend(i64, Figures),
+    Amend(i64, Box<Figures>),
     /// Store all further runs with another provenance.
     Begin(Arc<Meta>),
 }
@@ -93,7 +93,7 @@ impl Keeper {
 
     /// Begins to add the law's decision to a stored run.
     pub(super) fn amend(&mut self, id: i64, figures: Figures) {
-        self.send(StoreRequest::Amend(id, figures));
+        self.send(StoreRequest::Amend(id, Box::new(figures)));
     }
 
     /// Stores all further runs in another campaign.

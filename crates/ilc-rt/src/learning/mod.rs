@@ -146,7 +146,7 @@ pub trait Law: Send {
     /// Returns whether the law restores an earlier input where the error grows, so that its caller should
     /// not.
     fn handles_rollback(&self) -> bool {
-        self.inner().is_some_and(|inner| inner.handles_rollback())
+        self.inner().is_some_and(Law::handles_rollback)
     }
 
     /// Returns a status message about the last update; most laws have none.

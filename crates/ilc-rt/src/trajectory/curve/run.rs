@@ -5,7 +5,7 @@ use super::arc_length::ArcLength;
 use super::excess::{Excess, KEPT, SOUGHT, of_set_points, of_ticks, slow_down};
 use super::frame::{Frame, norm};
 use super::inverse::Inverse;
-use super::speed::{JERK_SHARE, RunLimits, SHARE, launch_speeds};
+use super::speed::{RunLimits, launch_speeds};
 use super::time_law::{Tick, TimeLaw};
 use super::turn::{Piece, pieces};
 use crate::interpolate::AxisLimits;
@@ -143,12 +143,7 @@ fn plan_piece<C: Curve>(
         }
         frame
     };
-    let lowest =
-        |of: fn(&AxisLimits) -> f64| limits.axes.iter().map(of).fold(f64::INFINITY, f64::min);
-    let jerk = JERK_SHARE * lowest(|axis| axis.jerk_max_m_s3);
-    // Not more than the jerk limit can use within a change of speed by the feed.
-    let mut acceleration =
-        (SHARE * lowest(|axis| axis.acceleration_max_m_s2)).min((jerk * limits.feed_m_s).sqrt());
+    let (mut acceleration, jerk) = limits.along();
     let mut window = ticks_at_least(2.0 * acceleration / (jerk * dt_s));
     let frames: Vec<Frame> =
         (0..n_places).map(|i| frame(i as f64 * step_m, 0.5 * step_m)).collect();

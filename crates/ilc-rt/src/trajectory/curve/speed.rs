@@ -5,8 +5,8 @@ use crate::interpolate::AxisLimits;
 
 /// Shares of the acceleration for the curvature and for speeding up, of the jerk for each of its
 /// three parts.
-pub(super) const SHARE: f64 = 0.7;
-pub(super) const JERK_SHARE: f64 = 0.4;
+const SHARE: f64 = 0.7;
+const JERK_SHARE: f64 = 0.4;
 /// Share of the feed below which coming to rest in a bend is faster than passing through it.
 const CREEP_SHARE: f64 = 0.05;
 
@@ -30,6 +30,16 @@ impl RunLimits {
             by_jerk.max(v * v / (SHARE * axis.acceleration_max_m_s2))
         };
         self.axes.iter().map(tightest).fold(0.0, f64::max)
+    }
+
+    /// Returns the acceleration and the jerk along the path that every axis allows, each its share.
+    pub(super) fn along(&self) -> (f64, f64) {
+        let lowest =
+            |of: fn(&AxisLimits) -> f64| self.axes.iter().map(of).fold(f64::INFINITY, f64::min);
+        let jerk = JERK_SHARE * lowest(|axis| axis.jerk_max_m_s3);
+        let acceleration = SHARE * lowest(|axis| axis.acceleration_max_m_s2);
+        // Not more than the jerk limit can use within a change of speed by the feed.
+        (acceleration.min((jerk * self.feed_m_s).sqrt()), jerk)
     }
 
     /// Returns the speed limit at one point.

@@ -68,10 +68,10 @@ fn channel(signal: &[f64], channel: usize, n: usize) -> DVector<f64> {
 
 #[test]
 fn each_axis_follows_its_own_gradient_by_the_best_step() {
+    use Purpose::{Learning, Probing, Searching};
     let plant = axes();
     let runs = play(&mut law(None, 2), &plant, 13);
     let purposes: Vec<Purpose> = runs.iter().map(|(purpose, ..)| *purpose).collect();
-    use Purpose::{Learning, Probing, Searching};
     assert_eq!(
         purposes[..7],
         [Learning, Probing, Searching, Learning, Probing, Searching, Learning]
