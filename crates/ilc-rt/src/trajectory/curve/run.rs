@@ -8,7 +8,6 @@ use super::inverse::Inverse;
 use super::speed::{RunLimits, launch_speeds};
 use super::time_law::{Tick, TimeLaw};
 use super::turn::{Piece, pieces};
-use crate::interpolate::AxisLimits;
 use crate::interpolate::limits::is_positive;
 use crate::trajectory::error::TrajectoryError;
 use crate::trajectory::grid::{CYCLE_S, check_time, n_ticks};
