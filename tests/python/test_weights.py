@@ -262,7 +262,7 @@ def test_the_printed_tables_come_out_from_python_too():
         (lambda: weights.coupled(np.ones((4, 1, 2)), sigma=np.ones(3)), ValueError, "sigma has"),
         (lambda: weights.coupled(np.ones(4)), ValueError, "coupling has shape"),
         (lambda: weights.schedule([], 5), LearningError, "no segments"),
-        (lambda: weights.schedule([(0, 1.0)], 2**40), LearningError, "at most 10000000"),
+        (lambda: weights.schedule([(0, 1.0)], 2**31), LearningError, "at most 10000000"),
         (lambda: weights.formation(2, 1, 2**31), LearningError, "at most 25000000"),
         (lambda: weights.schedule([(1, 2.0)], 5), LearningError, "starts at 1"),
         (lambda: weights.schedule([(0, 2.0), (9, 1.0)], 5), LearningError, "5 samples"),

@@ -139,12 +139,12 @@ mod tests {
         for i in 0..=20_000 {
             let s_m = measured.total_m() * f64::from(i) / 20_000.0;
             let (found, exact) = (table.parameter(s_m), measured.parameter(curve, s_m));
-            // Where the curve nearly stands still, a parameter is as exact as the length there; the
-            // iteration ends within 1e-13.
+            // Both are as exact as the length, of which the rule leaves 1e-13 of an interval; where the
+            // curve nearly stands still, a parameter is less so.
             let off = (found - exact).abs();
             let off_m = off * norm(&curve.at(exact)[1]);
             let is_same =
-                off <= 4e-13 * exact.abs().max(1.0) || off_m <= 1e-14 * measured.total_m();
+                off <= 4e-13 * exact.abs().max(1.0) || off_m <= 4e-13 * measured.total_m();
             assert!(is_same, "{s_m}: {found} {exact}");
         }
         assert!(table.stretches.len() < 10_000, "{}", table.stretches.len());
