@@ -139,8 +139,8 @@ mod tests {
         for i in 0..=20_000 {
             let s_m = measured.total_m() * f64::from(i) / 20_000.0;
             let (found, exact) = (table.parameter(s_m), measured.parameter(curve, s_m));
-            // Both are as exact as the length, of which the rule leaves 1e-13 of an interval; where the
-            // curve nearly stands still, a parameter is less so.
+            // Both are as exact as the length, known to 1e-13 of an interval; where the curve nearly
+            // stands still, a parameter is less so.
             let off = (found - exact).abs();
             let off_m = off * norm(&curve.at(exact)[1]);
             let is_same =
