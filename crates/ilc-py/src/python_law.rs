@@ -177,6 +177,10 @@ impl Law for PythonLaw {
         self.ask_native(|law| law.purpose()).unwrap_or_default()
     }
 
+    fn measures(&self) -> bool {
+        self.ask_native(|law| law.measures()).unwrap_or(false)
+    }
+
     fn reset(&mut self) {
         self.next_disturbance = None;
         self.call_if_there("reset");

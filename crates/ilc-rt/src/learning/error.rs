@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::learning::Law;
 use crate::learning::law::constrained::BoundsError;
 use crate::model::ModelError;
 use crate::signal::SignalError;
@@ -147,6 +148,16 @@ pub enum LearningError {
     /// Contradictory bounds.
     #[error(transparent)]
     Bounds(#[from] BoundsError),
+    /// A law that makes runs which only measure, in a wrapper that changes their inputs or errors.
+    #[error(
+        "{wrapper} needs a law that learns from every run; this one makes runs that only measure: {law}"
+    )]
+    Measures {
+        /// Name of the wrapper.
+        wrapper: &'static str,
+        /// Description of the law.
+        law: String,
+    },
     /// A law that the analysis predicts to diverge.
     #[error(
         "this law will not converge: {why}; change the law, or allow it with allow_divergent = true"
@@ -249,6 +260,14 @@ pub(crate) fn check_adjoint(
     check("dual", dual, n_samples, n_inputs)?;
     check_length("to_input", to_input, n_samples, n_inputs)?;
     check_length("to_error", to_error, n_samples, n_outputs)
+}
+
+/// Refuses to wrap a law that also makes runs which only measure.
+pub(crate) fn check_learns_from_every_run(wrapper: &'static str, law: &impl Law) -> Result {
+    if law.measures() {
+        return Err(LearningError::Measures { wrapper, law: law.describe() });
+    }
+    Ok(())
 }
 
 /// Checks the length of a signal.

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::error::check_learns_from_every_run;
 use super::{Law, LearningError, Result, Surrogate};
 use crate::schema::field_order;
 
@@ -92,7 +93,9 @@ impl<L: Law> Ladder<L> {
     /// - [`LearningError::Empty`] for 0 repeats.
     /// - [`LearningError::Parameter`] unless `0 < slow <= 1`, `increase >= 1` and
     ///   `0 < lowest <= 1 <= highest`, all finite.
+    /// - [`LearningError::Measures`] for a law that makes runs which only measure.
     pub fn new(law: L, rule: LadderRule) -> Result<Self> {
+        check_learns_from_every_run("ladder", &law)?;
         let LadderRule { repeats, slow, increase, lowest, highest } = rule;
         if repeats == 0 {
             return Err(LearningError::Empty { what: "repeats" });

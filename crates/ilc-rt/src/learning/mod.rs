@@ -165,6 +165,12 @@ pub trait Law: Send {
         self.inner().map_or(Purpose::Learning, Law::purpose)
     }
 
+    /// Returns true if some runs only measure ([`Law::purpose`]): a wrapper that changes their inputs or
+    /// errors refuses such a law.
+    fn measures(&self) -> bool {
+        self.inner().is_some_and(Law::measures)
+    }
+
     /// Resets the law's memory of earlier runs.
     fn reset(&mut self);
 
@@ -263,6 +269,10 @@ impl<L: Law + ?Sized> Law for Box<L> {
 
     fn purpose(&self) -> Purpose {
         (**self).purpose()
+    }
+
+    fn measures(&self) -> bool {
+        (**self).measures()
     }
 
     fn reset(&mut self) {

@@ -8,7 +8,7 @@ use super::context::{
     BuildError, Example, LawCell, LawContext, LawParameters, check_core, check_cutoff,
 };
 use super::q_filter::{QFilter, QRunner};
-use crate::learning::error::check_length;
+use crate::learning::error::{check_learns_from_every_run, check_length};
 use crate::learning::{Law, LearningError, Result};
 use crate::schema::{Violation, field_order};
 
@@ -92,7 +92,9 @@ impl<L: Law> Filtered<L> {
     ///
     /// # Errors
     /// - [`LearningError::Signal`] if the run is too short for the filter.
+    /// - [`LearningError::Measures`] for a law that makes runs which only measure.
     pub fn new(law: L, (n_samples, n_inputs): (usize, usize), q_filter: QFilter) -> Result<Self> {
+        check_learns_from_every_run("filtered", &law)?;
         let runner = q_filter.for_samples(n_samples)?;
         let dual = vec![0.0; n_samples * n_inputs];
         Ok(Self { law, q_filter, runner, n_samples, n_inputs, dual })
@@ -128,6 +130,17 @@ impl<L: Law> Law for Filtered<L> {
 
     fn recall(&mut self, input: &[f64], error: &[f64], disturbance: &[f64]) -> Result<bool> {
         self.law.recall(input, error, disturbance)
+    }
+
+    fn take_over(&mut self, reference: &[f64], input: &[f64]) -> Result<bool> {
+        self.law.take_over(reference, input)
+    }
+
+    fn first_input(&self) -> Option<Vec<f64>> {
+        let mut input = self.law.first_input()?;
+        let mut runner = self.q_filter.for_samples(self.n_samples).ok()?;
+        runner.apply(&mut input, self.n_inputs).ok()?;
+        Some(input)
     }
 
     fn reset(&mut self) {

@@ -9,7 +9,7 @@ use super::LawName;
 use super::context::{BuildError, Example, LawCell, LawContext, LawParameters, check_core};
 use super::expectation::{Expectation, check as check_disturbance};
 use super::inputs::Inputs;
-use crate::learning::error::check;
+use crate::learning::error::{check, check_learns_from_every_run};
 use crate::learning::{Law, LearningError, Result, Surrogate};
 use crate::schema::{Violation, field_order};
 
@@ -117,7 +117,9 @@ impl Flexible {
     /// # Errors
     /// - [`LearningError::Empty`] for 0 samples or channels.
     /// - [`LearningError::Parameter`] for a tolerance that is negative or not finite.
+    /// - [`LearningError::Measures`] for a core law that makes runs which only measure.
     pub fn new(core: Box<dyn Law>, shape: TableShape) -> Result<Self> {
+        check_learns_from_every_run("flexible", &core)?;
         let TableShape { n_samples, n_inputs, n_outputs, n_disturbances, tolerance } = shape;
         for (what, count) in
             [("n_samples", n_samples), ("n_inputs", n_inputs), ("n_outputs", n_outputs)]

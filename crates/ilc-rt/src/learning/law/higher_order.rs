@@ -8,7 +8,7 @@ use super::context::{
     BuildError, Example, LawCell, LawContext, LawParameters, check_core, violation,
 };
 use super::inputs::Inputs;
-use crate::learning::error::check_length;
+use crate::learning::error::{check_learns_from_every_run, check_length};
 use crate::learning::{Law, LearningError, Result, Surrogate};
 use crate::schema::{Violation, field_order};
 
@@ -112,7 +112,9 @@ impl<L: Law> HigherOrder<L> {
     ///
     /// # Errors
     /// - [`LearningError::Parameter`] unless there are 1 to 20 weights that add up to 1.
+    /// - [`LearningError::Measures`] for a law that makes runs which only measure.
     pub fn new(law: L, weights: &[f64], (n_samples, n_inputs): (usize, usize)) -> Result<Self> {
+        check_learns_from_every_run("higher_order", &law)?;
         if !is_sound(weights) {
             let (what, value) = ("the sum of weights", weights.iter().sum());
             return Err(LearningError::Parameter { what, value, allowed: RULE });

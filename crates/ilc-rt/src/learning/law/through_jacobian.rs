@@ -10,7 +10,7 @@ use super::context::{
 };
 use crate::schema::{Violation, field_order};
 
-use crate::learning::error::{check, check_adjoint};
+use crate::learning::error::{check, check_adjoint, check_learns_from_every_run};
 use crate::learning::{Law, LearningError, Result};
 
 /// Largest condition number of a Jacobian that is inverted.
@@ -115,7 +115,9 @@ impl<L: Law> ThroughJacobian<L> {
     /// - [`LearningError::Empty`] without a matrix.
     /// - [`LearningError::Weight`] for matrices of different or empty shape.
     /// - [`LearningError::Parameter`] for a matrix that is singular or not finite.
+    /// - [`LearningError::Measures`] for a law that makes runs which only measure.
     pub fn new(law: L, jacobians: &[DMatrix<f64>]) -> Result<Self> {
+        check_learns_from_every_run("through_jacobian", &law)?;
         let found = jacobians.len();
         let Some(first) = jacobians.first() else {
             return Err(LearningError::Empty { what: "jacobian" });

@@ -94,13 +94,13 @@ impl ArcLength {
             } else {
                 low = parameter;
             }
-            let step = miss / norm(&curve.at(parameter)[1]);
-            let next = parameter - step;
-            let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+            let next = parameter - miss / norm(&curve.at(parameter)[1]);
+            // Before the bisection: an end of the bracket is the parameter itself, which a step of
+            // rounding may well leave.
             if (next - parameter).abs() <= SETTLED * parameter.abs().max(to - from) {
                 return next;
             }
-            parameter = next;
+            parameter = if next > low && next < high { next } else { 0.5 * (low + high) };
         }
         parameter
     }

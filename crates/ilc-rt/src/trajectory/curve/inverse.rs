@@ -138,14 +138,15 @@ mod tests {
         let table = Inverse::new(curve, &measured);
         for i in 0..=20_000 {
             let s_m = measured.total_m() * f64::from(i) / 20_000.0;
-            let found = table.parameter(s_m);
-            let (from, _) =
-                measured.intervals().find(|(from, to)| (from.0..=to.0).contains(&found)).unwrap();
-            let found_m = from.1 + length(curve, from.0, found);
-            assert!(
-                (found_m - s_m).abs() <= 1e-13 * measured.total_m(),
-                "{s_m}: {found} is at {found_m}"
-            );
+            for found in [table.parameter(s_m), measured.parameter(curve, s_m)] {
+                let mut knots = measured.intervals();
+                let (from, _) = knots.find(|(a, b)| (a.0..=b.0).contains(&found)).unwrap();
+                let found_m = from.1 + length(curve, from.0, found);
+                assert!(
+                    (found_m - s_m).abs() <= 1e-13 * measured.total_m(),
+                    "{s_m}: {found} is at {found_m}"
+                );
+            }
         }
         assert!(table.stretches.len() < 10_000, "{}", table.stretches.len());
     }

@@ -44,9 +44,9 @@ impl Default for ModelFreeRule {
 /// P must be linear and time-invariant, and every channel an axis of its own: then P is symmetric
 /// about its antidiagonal. All channels are probed in the same run, each with its own error and step.
 ///
-/// Where the bound of the input leaves no room for a probing input of the asked size it is smaller, or
-/// has the other sign. A run whose input came otherwise than asked, as the rate limit of the loop
-/// changed it, is repeated with half the size; one that repeated an old input as it was.
+/// A probing input that does not fit within the bound of the input is made smaller, or given the other
+/// sign. If the rate limit of the loop changed an input, the run is repeated with half the probing size;
+/// if a run used an older input because its own came too late, it is repeated unchanged.
 ///
 /// # Shapes
 /// - `input`, `next`, `error`: `n_samples` x `n_channels`
@@ -270,6 +270,10 @@ impl Law for ModelFree {
 
     fn purpose(&self) -> Purpose {
         self.purpose
+    }
+
+    fn measures(&self) -> bool {
+        true
     }
 
     fn linear_surrogate(&mut self) -> Surrogate<'_> {

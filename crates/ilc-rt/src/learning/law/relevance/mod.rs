@@ -11,7 +11,7 @@ use std::fmt;
 
 use super::expectation::{Expectation, check as check_disturbance};
 use super::inputs::Inputs;
-use crate::learning::error::check;
+use crate::learning::error::{check, check_learns_from_every_run};
 use crate::learning::{Law, LearningError, Result, Surrogate};
 
 use index::{DISTURBANCES_MAX, Index, index};
@@ -84,12 +84,14 @@ impl Relevance {
     /// - [`LearningError::Empty`] for 0 samples or channels, or `top` = 0.
     /// - [`LearningError::Parameter`] for a weight or a sample time out of its range, or more than 7
     ///   disturbances; [`LearningError::Disturbance`] for the wrong number of disturbance weights.
+    /// - [`LearningError::Measures`] for a core law that makes runs which only measure.
     pub fn new(
         core: Box<dyn Law>,
         shape: RunShape,
         weights: RelevanceWeights,
         top: Option<usize>,
     ) -> Result<Self> {
+        check_learns_from_every_run("relevance", &core)?;
         let RunShape { n_samples, n_inputs, n_outputs, n_disturbances, dt_s } = shape;
         for (what, count) in [
             ("n_samples", n_samples),
