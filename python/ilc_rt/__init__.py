@@ -2,87 +2,35 @@
 
 An array of the wrong shape or dtype, or with a number that is NaN or infinite, is refused under its
 name everywhere, with a `ValueError` or a `TypeError`; other errors are documented where they occur.
+
+The names are those of `ilc_rt.public`, imported at the first use of one: the program `ilc` starts
+without NumPy.
 """
 
-from ilc_rt import control, identify, kinematics, laws, signal, trajectory, weights
-from ilc_rt._native import (
-    Cell,
-    LearningError,
-    ModelError,
-    SignalError,
-    StateSpace,
-    TimeVarying,
-    TrajectoryError,
-    __version__,
-)
-from ilc_rt.analysis import Analysis, Repeatability, Tuning, analyze, repeatability, tune
-from ilc_rt.ask_tell import Experiment
-from ilc_rt.campaign import Campaign, Law
-from ilc_rt.compared import Compared, compare
-from ilc_rt.errors import BadInputError, CampaignError, FaultError, PlantError, SweepError
-from ilc_rt.laws import *  # noqa: F403
-from ilc_rt.library import Library
-from ilc_rt.many import simulate_many
-from ilc_rt.many_result import ManyResult
-from ilc_rt.models import discretize, from_transfer_function, second_order
-from ilc_rt.recommendation import Recommendation, recommend
-from ilc_rt.record import IterationRecord
-from ilc_rt.result import CampaignResult
-from ilc_rt.simulated_tuning import SimulatedTuning, tune_by_simulation
-from ilc_rt.simulation import simulate
-from ilc_rt.sweep_result import SweepResult
-from ilc_rt.sweeping import grid, latin_hypercube, sweep
-from ilc_rt.trial_result import TrialResult
+from __future__ import annotations
 
-__all__ = [
-    "Analysis",
-    "BadInputError",
-    "Campaign",
-    "CampaignError",
-    "CampaignResult",
-    "Cell",
-    "Compared",
-    "Experiment",
-    "FaultError",
-    "IterationRecord",
-    "Law",
-    "LearningError",
-    "Library",
-    "ManyResult",
-    "ModelError",
-    "PlantError",
-    "Recommendation",
-    "Repeatability",
-    "SignalError",
-    "SimulatedTuning",
-    "StateSpace",
-    "SweepError",
-    "SweepResult",
-    "TimeVarying",
-    "TrajectoryError",
-    "TrialResult",
-    "Tuning",
-    "__version__",
-    "analyze",
-    "compare",
-    "control",
-    "discretize",
-    "from_transfer_function",
-    "grid",
-    "identify",
-    "kinematics",
-    "latin_hypercube",
-    "laws",
-    "recommend",
-    "repeatability",
-    "second_order",
-    "signal",
-    "simulate",
-    "simulate_many",
-    "sweep",
-    "trajectory",
-    "tune",
-    "tune_by_simulation",
-    "weights",
-]
-__all__ += laws.__all__
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ilc_rt.public import *  # noqa: F403
+    from ilc_rt.public import __all__ as __all__
+    from ilc_rt.public import __version__ as __version__
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    # A module of the package is imported by itself, so that it may import its neighbours.
+    if find_spec(f"{__name__}.{name}"):
+        return import_module(f"{__name__}.{name}")
+    try:
+        value = getattr(import_module(f"{__name__}.public"), name)
+    except AttributeError:
+        message = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(message) from None
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *import_module(f"{__name__}.public").__all__})

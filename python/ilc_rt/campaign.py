@@ -9,15 +9,12 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol
 
-import numpy as np
-
 from ilc_rt._native import Cell, check_options
-from ilc_rt.analysis import refuse_divergent
 from ilc_rt.controllers import Controller, InProcessController, ProcessController
 from ilc_rt.errors import EXIT_FAULT, BadInputError, CampaignError, FaultError
 from ilc_rt.events import EndEvent, Event, IterationEvent, parse_event
 from ilc_rt.interruption import ControlledStop
-from ilc_rt.options import Verb, arguments, options
+from ilc_rt.options import DEFAULT_LIBRARY, Verb, arguments, options
 from ilc_rt.processes import start_simulated_drives
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
@@ -26,11 +23,11 @@ from ilc_rt.transports import Transport, transport_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
 
+    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from ilc_rt.experiment import Experiment
 
-DEFAULT_LIBRARY = str(options("run")["library"].default)
 DEFAULT_ITERATIONS = int(str(options("run")["iterations"].default))
 Drives = Literal["auto", "simulated", "external"]
 
@@ -360,6 +357,8 @@ def _measure(
     """Return a function that returns the disturbance of each run."""
     if disturbance is None or callable(disturbance):
         return disturbance
+    import numpy as np  # only here: `ilc run` needs no arrays
+
     rows = np.asarray(disturbance)
     iterations = DEFAULT_ITERATIONS if iterations is None else iterations
     if rows.ndim not in {1, 2} or rows.shape[0] < iterations:
@@ -376,6 +375,8 @@ def _measure(
 
 
 def _refuse_divergent(law: Law, cell: Cell) -> None:
+    from ilc_rt.analysis import refuse_divergent
+
     try:
         refuse_divergent(law, cell.model(), cell.n_samples)
     except ValueError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from importlib import import_module
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,19 +13,6 @@ import typer
 from typer import Typer
 
 from ilc_rt._native import __version__
-from ilc_rt.commands import (
-    bridge,
-    demo,
-    identify,
-    library,
-    monitor,
-    plot,
-    repeatability,
-    reproduce,
-    run,
-    sweep,
-    tune,
-)
 from ilc_rt.errors import (
     EXIT_BAD_INPUT,
     EXIT_FAILURE,
@@ -36,13 +24,40 @@ from ilc_rt.text import printable
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-app = Typer(
-    name="ilc",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    help="The motion controller that learns: each run corrects the next.",
-)
+# In the order of the help. A verb of several verbs is a `Typer` named `app` in its module.
+VERBS = (
+    "demo", "run", "identify", "repeatability", "plot", "tune", "sweep", "library", "monitor",
+    "bridge",
+)  # fmt: skip
+
+
+def application(wanted: str | None = None) -> Typer:
+    """Return the program with the wanted verb, whose modules alone are imported; or with all."""
+    app = Typer(
+        name="ilc",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+        help="The motion controller that learns: each run corrects the next.",
+    )
+    app.callback()(_options)
+    verbs = (wanted,) if wanted in VERBS else () if wanted == "--version" else VERBS
+    for name in verbs:
+        module = import_module(f"ilc_rt.commands.{name}")
+        if hasattr(module, "app"):
+            app.add_typer(module.app, name=name)
+        else:
+            app.command(name)(getattr(module, name))
+    if verbs is not VERBS:
+        return app
+    further = {entry.name: entry for entry in entry_points(group="ilc_rt.verbs")}
+    for name, entry in further.items():
+        app.command(name)(entry.load())
+    if "reproduce" not in further:
+        from ilc_rt.commands import reproduce
+
+        app.command("reproduce", context_settings=reproduce.ANY_ARGUMENTS)(reproduce.reproduce)
+    return app
 
 
 def _tell_version(*, wanted: bool) -> None:
@@ -51,8 +66,7 @@ def _tell_version(*, wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
-def options(
+def _options(
     *,
     version: Annotated[
         bool,
@@ -67,23 +81,6 @@ def options(
     """Handle the options before the verb."""
 
 
-app.command("demo")(demo.demo)
-app.command("run")(run.run)
-app.command("identify")(identify.identify)
-app.command("repeatability")(repeatability.repeatability)
-app.command("plot")(plot.plot)
-app.command("tune")(tune.tune)
-app.command("sweep")(sweep.sweep)
-app.add_typer(library.app, name="library")
-app.command("monitor")(monitor.monitor)
-app.add_typer(bridge.app, name="bridge")
-FURTHER = {entry.name: entry for entry in entry_points(group="ilc_rt.verbs")}
-for name, entry in FURTHER.items():
-    app.command(name)(entry.load())
-if "reproduce" not in FURTHER:
-    app.command("reproduce", context_settings=reproduce.ANY_ARGUMENTS)(reproduce.reproduce)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `ilc` and return its exit code; errors are one line.
 
@@ -91,6 +88,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     other failure.
     """
     try:
+        words = sys.argv[1:] if arguments is None else arguments
+        app = application(words[0] if words else None)
         code = app(args=arguments, standalone_mode=False, prog_name="ilc")
     except CampaignError as error:
         _say(error.reason)

@@ -6,8 +6,6 @@ from importlib import import_module
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ilc_rt import _native
 from ilc_rt.errors import BadInputError
 from ilc_rt.given import given
@@ -330,6 +328,8 @@ class Library(_native.Library):
 
 def _is(value: Any, wanted: Any) -> bool:  # noqa: ANN401 (any value of a run)
     """Return whether a value is the wanted one, or within the wanted range."""
+    import numpy as np  # only here: the program `ilc` starts without it
+
     if not isinstance(wanted, tuple) or len(wanted) != 2:
         return np.array_equal(value, wanted)
     if value is None:

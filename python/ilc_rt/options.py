@@ -104,3 +104,6 @@ def arguments(verb: Verb, values: Mapping[str, Any]) -> list[str]:
     """
     known = options(verb)
     return [word for name, value in values.items() for word in known[name].words(value)]
+
+
+DEFAULT_LIBRARY = str(options("run")["library"].default)

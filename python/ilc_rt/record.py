@@ -6,8 +6,6 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ilc_rt.errors import BadInputError
 from ilc_rt.figures import Figures
 from ilc_rt.library import Library
@@ -15,6 +13,7 @@ from ilc_rt.library import Library
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from ilc_rt.events import IterationEvent
@@ -134,7 +133,11 @@ class IterationRecord(Figures):
 
     def _optional(self, name: str) -> NDArray[np.float64] | None:
         value = self.row().get(name)
-        return None if value is None else np.asarray(value, dtype=np.float64)
+        if value is None:
+            return None
+        import numpy as np  # only here: the program `ilc` starts without it
+
+        return np.asarray(value, dtype=np.float64)
 
     def _signal(self, name: str) -> NDArray[np.float64]:
         value = self._optional(name)

@@ -9,8 +9,6 @@ import html
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -106,6 +104,8 @@ class Views:
 
 
 def _column(values: list[Any]) -> NDArray[Any]:
+    import numpy as np  # only here: the program `ilc` starts without it
+
     if any(isinstance(value, str) for value in values):
         return np.array(["" if value is None else value for value in values], dtype=object)
     if any(isinstance(value, (tuple, list)) for value in values):

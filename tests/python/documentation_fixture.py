@@ -18,7 +18,7 @@ from pathlib import Path
 from processes_fixture import program
 from typer.main import get_command
 
-from ilc_rt.cli import app
+from ilc_rt.cli import application
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("docs/theory/*.md")])
@@ -132,7 +132,7 @@ def help_of(name: str, *verb: str) -> str:
     if name != "ilc":
         argv = [*launcher(name), *verb, "--help"]
         return subprocess.run(argv, capture_output=True, text=True, check=True, timeout=60).stdout
-    command = get_command(app)
+    command = get_command(application())
     for word in verb:
         command = getattr(command, "commands")[word]  # noqa: B009
     options = [word for parameter in command.params for word in parameter.opts]
@@ -144,7 +144,7 @@ def verbs_of(name: str) -> list[list[str]]:
     """Return every verb of a program, including nested ones."""
     if name == "ilc":
         found: list[list[str]] = []
-        open_ones = [([], get_command(app))]
+        open_ones = [([], get_command(application()))]
         while open_ones:
             verb, command = open_ones.pop(0)
             found.append(verb)

@@ -36,6 +36,20 @@ def test_every_program_tells_its_version(ilc: Ilc, tmp_path: Path) -> None:
         assert done.stdout.split() == [name, ilc_rt.__version__]
 
 
+@pytest.mark.parametrize(
+    "words", [["--version"], ["library", "list", "none.db"], ["plot", "none.db"],
+              ["run", "none.toml"]],
+)  # fmt: skip
+def test_the_program_starts_without_numerics(words: list[str], tmp_path: Path) -> None:
+    code = (
+        "import sys; from ilc_rt.cli import main; main(sys.argv[1:]);"
+        "print([name for name in ('numpy', 'scipy', 'matplotlib', 'zenoh') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *words], cwd=tmp_path, text=True,
+                          capture_output=True, check=True)  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_complete_both_programs(tmp_path: Path, shell: str) -> None:
     environment = {**os.environ, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}

@@ -12,7 +12,7 @@ from derived_fixture import hold_derived_file
 from documentation_fixture import help_of, verbs_of
 from typer.main import get_command
 
-from ilc_rt.cli import app
+from ilc_rt.cli import application
 
 
 def choices(annotation: Any) -> list[str]:
@@ -41,7 +41,7 @@ def line_of(parameter: Any, annotation: Any) -> str:
 
 def section_of_ilc(verb: list[str]) -> str:
     """Return the section of a verb of `ilc`, from its declaration."""
-    command: Any = get_command(app)
+    command: Any = get_command(application())
     for word in verb:
         command = command.commands[word]
     called = command.callback

@@ -10,6 +10,7 @@ import scipy.linalg
 
 from ilc_rt import (
     Campaign,
+    Ladder,
     LearningError,
     ModelError,
     NormOptimalIlc,
@@ -257,6 +258,17 @@ def test_the_best_step_is_that_of_steepest_descent() -> None:
         gradient = matrix.T @ e
         along = matrix @ gradient
         u = u + (e @ along) / (along @ along) * gradient
+
+
+def test_a_wrapper_that_changes_what_is_measured_refuses_a_law_that_measures() -> None:
+    wrap = (
+        lambda law: Ladder(law, repeats=2),
+        lambda law: Filtered(law, signal.butterworth(2, 60.0, DT_S)),
+        lambda law: HigherOrderIlc(law, [1.5, -0.5]),
+    )
+    for wrapped in wrap:
+        with pytest.raises(ValueError, match="makes runs that only measure"):
+            simulate(PLANT, wrapped(ModelFreeIlc()), REFERENCE, trials=4)
 
 
 def test_the_phase_tells_what_a_run_is_for() -> None:

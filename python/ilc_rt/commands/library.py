@@ -9,7 +9,6 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 from rich import box
 from rich.console import Console
@@ -21,7 +20,6 @@ from ilc_rt.commands.options import (
     LibraryArgument,
 )
 from ilc_rt.errors import BadInputError
-from ilc_rt.export import export_run
 from ilc_rt.library import Library
 from ilc_rt.quantity import axis_unit, unit_for
 from ilc_rt.result import STANDARD_OUTPUT, json_text, library_rows, write_text
@@ -152,6 +150,8 @@ def show(library: LibraryArgument, run_id: RunId) -> None:
 
     Example: ilc library show ilc-library.db 12
     """
+    import numpy as np  # only here: the program starts without it
+
     row = _load(library, run_id)
     for key, value in row.items():
         if key == "disturbance" and value is not None:
@@ -173,6 +173,8 @@ def export(library: LibraryArgument, run_id: RunId, file: ExportFile) -> None:
 
     Example: ilc library export ilc-library.db 12 run12.csv
     """
+    from ilc_rt.export import export_run
+
     export_run(_load(library, run_id), file)
     typer.echo(f"run {run_id} written to {printable(file)}")
 

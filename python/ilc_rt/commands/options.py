@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from ilc_rt.campaign import DEFAULT_LIBRARY
 from ilc_rt.commands.targets import json_target
 from ilc_rt.errors import BadInputError
-from ilc_rt.options import Option, Verb, options
+from ilc_rt.options import DEFAULT_LIBRARY, Option, Verb, options
 from ilc_rt.transports import SYNTAXES
 
 if TYPE_CHECKING:
