@@ -147,7 +147,7 @@ pub(crate) fn run(
     );
     if clock == ClockMode::RealTime {
         // A refusal only makes the drives less punctual; the controller reports its own rights.
-        let _ = thread::enter(RtRequest { priority: PRIORITY, lock_memory: true });
+        let _ = thread::enter(RtRequest { priority: PRIORITY, ..RtRequest::default() });
     }
     let is_orphan = Arc::new(AtomicBool::new(false));
     if habits.with_parent {

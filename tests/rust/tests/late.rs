@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use ilc_rt::campaign;
-use ilc_rt::config::Cell;
+use ilc_rt::config::{Cell, Overrun};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::record::{
     EndStatus, Event, FaultKind, FlightRecord, LateCause, LateCycle, Verdict, judge, judge_stop,
@@ -82,8 +82,14 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        Self::with(Overrun::KeepPhase)
+    }
+
+    fn with(overrun: Overrun) -> Self {
         let clock = Arc::new(Slowed::default());
-        let rig = Rig::on_clock(&short("01_gantry.toml"), 2);
+        let mut cell = short("01_gantry.toml");
+        cell.realtime.overrun = overrun;
+        let rig = Rig::on_clock(&cell, 2);
         let rig = rig.with_recorder(Arc::clone(&clock) as Arc<dyn Clock>, 0.9);
         let mut bench = Self { rig, clock, timing: Timing::default() };
         while bench.rig.phase.0 != PhaseName::Running {
@@ -167,6 +173,46 @@ fn cycles_that_were_slept_through_are_overruns_of_the_host() {
     assert_eq!(bench.n_late(), 1);
     bench.rig.tick_until(|rig| !rig.ended.is_empty());
     assert_eq!(bench.rig.ended[0], (0, 3));
+}
+
+#[test]
+fn missed_cycles_are_made_up_for_at_once_where_the_cell_asks_for_it() {
+    let mut kept = Bench::new();
+    let mut caught_up = Bench::with(Overrun::CatchUp);
+    for bench in [&mut kept, &mut caught_up] {
+        bench.cycles(20);
+        bench.clock.clock.oversleep(Nanos::from_micros(7100));
+        bench.cycles(30);
+    }
+    let n_syncs = |bench: &Bench| bench.rig.tap.line().n_syncs();
+    assert_eq!(n_syncs(&caught_up), n_syncs(&kept) + 3);
+    // Both counted the same cycles, once each, and learn nothing from the run.
+    for bench in [&mut kept, &mut caught_up] {
+        bench.rig.tick_until(|rig| !rig.ended.is_empty());
+        assert_eq!((bench.rig.ended[0], bench.rig.reason), ((0, 3), None));
+    }
+}
+
+#[test]
+fn more_missed_cycles_than_can_be_made_up_for_are_skipped() {
+    let mut bench = Bench::with(Overrun::CatchUp);
+    let before = bench.rig.tap.line().n_syncs();
+    bench.clock.clock.oversleep(Nanos::from_micros(2000 * 11 + 100));
+    bench.cycles(30);
+    assert_eq!(bench.rig.tap.line().n_syncs() - before, 30 - 11);
+    assert_eq!(bench.rig.reason, None);
+}
+
+#[test]
+fn the_first_missed_cycle_stops_where_the_cell_asks_for_it() {
+    let mut bench = Bench::with(Overrun::Stop);
+    bench.clock.clock.oversleep(Nanos::from_micros(2100));
+    bench.cycles(20);
+    assert!(
+        matches!(bench.rig.reason, Some(StopReason::Overrun { cycles: 1 })),
+        "{:?}",
+        bench.rig.reason
+    );
 }
 
 #[test]

@@ -172,6 +172,12 @@ pub enum CampaignError {
         /// Reason.
         reason: String,
     },
+    /// Real-time settings that were required and not granted.
+    #[error("--require-rt: {}; nothing has moved", missing.join("; "))]
+    NotRealtime {
+        /// One sentence for each refused setting.
+        missing: Vec<String>,
+    },
     /// A thread could not be started.
     #[error("the {what} thread could not be started: {source}")]
     Thread {

@@ -15,7 +15,7 @@ use super::keeper::Keeper;
 use super::learner::{Learner, set_disturbance};
 use super::nodes;
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session, StartOn};
-use super::pace::{MAILBOX, Pacer};
+use super::pace::{MAILBOX, Pacer, Settings};
 use super::resume::{Resumed, to_resume};
 use super::rollback::RollbackPolicy;
 use super::running::{Parts, Running};
@@ -140,6 +140,7 @@ fn execute(
         Some(law) => Some(Learner::on_thread(law)?),
         None => None,
     };
+    let settings = if session.lockstep { None } else { Some(Settings::of(cell, session)?) };
     let first = resumed.next_index();
     if first >= options.iterations {
         let (campaign, iterations) = (plan.meta.campaign, options.iterations);
@@ -177,7 +178,7 @@ fn execute(
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
         let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;
         plan.servo.hold_cycles_max = patience;
-        plan.servo.overrun_cycles_max = plan.servo.overrun_cycles_max.max(patience);
+        plan.servo.forgive_overruns(patience);
     }
     let meta = Arc::new(plan.meta.clone());
     let keep = options.keep.unwrap_or(cell.library.keep);
@@ -194,11 +195,12 @@ fn execute(
     let loop_side = loop_side.following(orders);
     let network = plan.network(bus, &maps);
     let cycle = Cycle::new(network, plan.servo.clone(), plan.interpolator.clone(), loop_side);
-    let (mut pacer, granted) = if session.lockstep {
-        (Pacer::in_line(cycle), None)
-    } else {
-        let (pacer, report) = Pacer::on_clock(cycle, cell.realtime.late_share)?;
-        (pacer, Some(report))
+    let (mut pacer, granted) = match settings {
+        None => (Pacer::in_line(cycle), None),
+        Some(settings) => {
+            let (pacer, report) = Pacer::on_clock(cycle, settings)?;
+            (pacer, Some(report))
+        }
     };
     let ctl = server.as_ref().map(|server| server.path().display().to_string());
     let start = start_event(cell, options, &plan, first, (ctl, granted));

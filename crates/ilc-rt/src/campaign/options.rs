@@ -39,6 +39,10 @@ pub struct Session {
     /// The drives are simulated on this computer: forgive a stall of up to 1 s, which stalls them as well.
     #[arg(long = "simulated-drives")]
     pub simulated: bool,
+    /// Refuse to move anything unless the loop's thread gets its priority, locked memory and, if the cell names one, its
+    /// processor.
+    #[arg(long, conflicts_with = "lockstep")]
+    pub require_rt: bool,
     /// Reset faults that the drives have when the program starts, in place of a refusal that names them.
     #[arg(long)]
     pub reset_faults: bool,

@@ -6,18 +6,43 @@ use std::time::Duration;
 
 use super::error::CampaignError;
 use super::late::Recorded;
+use super::options::Session;
+use crate::config::{Cell, Realtime};
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::emcy;
 use crate::interpolate::MAX_AXES;
-use crate::rt::{Clock, MonotonicClock, Nanos, RtReport, RtRequest, thread};
+use crate::rt::{Clock, MonotonicClock, Nanos, Readiness, RtReport, RtRequest, thread};
 use crate::servo::{Cycle, TickStatus, Timing, run_on_clock};
 
 /// Messages that may wait in the loop's mailbox: two seconds at 4 kHz.
 pub(super) const MAILBOX: usize = 8192;
 /// Period at which the mailbox of a loop on its own thread is read.
 const READ_EVERY: Duration = Duration::from_millis(2);
-/// Time before a tick at which the loop's thread stops sleeping and busy-waits.
-const SPIN: Nanos = Nanos::from_micros(100);
+
+/// Real-time settings of a loop: as its cell asks for, and as this machine grants.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Settings {
+    request: RtRequest,
+    spin: Nanos,
+    late_share: f64,
+}
+
+impl Settings {
+    /// Tries the settings of a cell on this machine, before anything moves.
+    ///
+    /// # Errors
+    /// [`CampaignError::NotRealtime`] if they are required and not granted.
+    pub(super) fn of(cell: &Cell, session: &Session) -> Result<Self, CampaignError> {
+        let Realtime { late_share, cpu, spin_us, .. } = cell.realtime;
+        let request = RtRequest { cpu, ..RtRequest::default() };
+        let Readiness { report, spin } = Readiness::probe(request, spin_us);
+        let missing = report.missing(request);
+        if session.require_rt && !missing.is_empty() {
+            return Err(CampaignError::NotRealtime { missing });
+        }
+        Ok(Self { request, spin, late_share })
+    }
+}
 
 /// The loop, on its own thread or in line.
 pub(super) enum Pacer {
@@ -45,16 +70,18 @@ impl Pacer {
     /// Starts the loop's thread, with a flight recorder; returns the scheduling that the system granted it.
     pub(super) fn on_clock(
         cycle: Cycle,
-        late_share: f64,
+        settings: Settings,
     ) -> Result<(Self, RtReport), CampaignError> {
         let (report, granted) = std::sync::mpsc::sync_channel(1);
-        let clock = Arc::new(MonotonicClock::new(SPIN));
+        let Settings { request, spin, late_share } = settings;
+        let clock = Arc::new(MonotonicClock::new(spin));
         let mut cycle = cycle.recorded(Arc::clone(&clock) as Arc<dyn Clock>, late_share);
         let thread = std::thread::Builder::new()
             .name("ilc-servo".to_owned())
             .spawn(move || {
                 let mut timing = Timing::default();
-                let mut granted = thread::enter(RtRequest::default());
+                let mut granted = thread::enter(request);
+                granted.spin_us = spin.0 as f64 * 1e-3;
                 let _awake = thread::keep_awake(&mut granted);
                 // Set-up of the thread is over before the first tick; no tick waits for the report.
                 let _ = report.send(granted);

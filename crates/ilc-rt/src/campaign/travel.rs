@@ -8,7 +8,7 @@ use super::fault::fault;
 use super::inputs;
 use super::nodes;
 use super::options::{SIMULATED_PATIENCE_S, Session};
-use super::pace::{MAILBOX, Pacer};
+use super::pace::{MAILBOX, Pacer, Settings};
 use super::reason::sentence;
 use crate::config::{Axis, Cell};
 use crate::design::{self, Plan};
@@ -134,16 +134,16 @@ pub fn travel(
     if session.forgives_stalls() {
         let patience = ticks(SIMULATED_PATIENCE_S);
         plan.servo.hold_cycles_max = patience;
-        plan.servo.overrun_cycles_max = plan.servo.overrun_cycles_max.max(patience);
+        plan.servo.forgive_overruns(patience);
     }
+    let settings = if session.lockstep { None } else { Some(Settings::of(cell, session)?) };
     nodes::go(cell, bus.as_mut())?;
     let (mail, loop_side) = mailbox(MAILBOX, Arc::clone(&session.stop));
     let network = plan.network(bus, &maps);
     let cycle = Cycle::new(network, plan.servo.clone(), plan.interpolator, loop_side);
-    let pacer = if session.lockstep {
-        Pacer::in_line(cycle)
-    } else {
-        Pacer::on_clock(cycle, cell.realtime.late_share)?.0
+    let pacer = match settings {
+        None => Pacer::in_line(cycle),
+        Some(settings) => Pacer::on_clock(cycle, settings)?.0,
     };
     let every = u64::from(ticks(REPORT_S)).max(1);
     Ok(Journey::new(cell, mail, every).pursue(cell, session, pacer, report))

@@ -29,6 +29,9 @@ pub(super) struct Moving {
     /// The drives are simulated on this computer: forgive a stall of up to 1 s.
     #[arg(long = "simulated-drives")]
     simulated: bool,
+    /// Refuse to move anything unless the loop's thread gets its priority, locked memory and processor.
+    #[arg(long, conflicts_with = "lockstep")]
+    require_rt: bool,
     /// Reset faults that the drives have, in place of a refusal that names them.
     #[arg(long)]
     reset_faults: bool,
@@ -45,6 +48,7 @@ impl Moving {
             measure: None,
             lockstep: self.lockstep,
             simulated: self.simulated,
+            require_rt: self.require_rt,
             reset_faults: self.reset_faults,
             home: false,
             library: PathBuf::new(),

@@ -67,8 +67,12 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
                 let memory = if rt.mlock { "locked" } else { "not locked" };
                 let notes: String = rt.notes.iter().flat_map(|note| ["\n  note: ", note]).collect();
                 format!(
-                    "\nservo thread: {} {}, memory {memory}, kernel {}{notes}",
-                    rt.policy, rt.priority, rt.kernel
+                    "\nservo thread: {} {}{}, memory {memory}, busy-waits {:.0} us, kernel {}{notes}",
+                    rt.policy,
+                    rt.priority,
+                    rt.cpu.map_or_else(String::new, |cpu| format!(", processor {cpu}")),
+                    rt.spin_us,
+                    rt.kernel
                 )
             });
             Some(format!(

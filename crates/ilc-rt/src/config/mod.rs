@@ -32,7 +32,7 @@ pub use homing::{DriveHoming, HOMING_METHODS, Homing, HomingKind};
 pub use input::{Direction, INPUTS_MAX, Input, InputUse, Level};
 pub use learning::{Learning, Measure};
 pub use library::{Keep, LibrarySection};
-pub use realtime::Realtime;
+pub use realtime::{Overrun, Realtime};
 pub use simulation::{
     AxisSimulation, DeltaSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange,
 };

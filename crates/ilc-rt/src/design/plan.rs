@@ -6,7 +6,9 @@ use super::error::DesignError;
 use super::fingerprint;
 use super::law::{self, Prepared};
 use super::traffic::{self, BusTraffic};
-use crate::config::{Axis, Cell, ConfigError, Force, Input, InputUse, Level, Measure, mode};
+use crate::config::{
+    Axis, Cell, ConfigError, Force, Input, InputUse, Level, Measure, Overrun, mode,
+};
 use crate::control::{Feedforward, PositionLoop};
 use crate::fieldbus::canopen::NodeId;
 use crate::fieldbus::cia402::{PdoMap, Scale, Supervision};
@@ -21,6 +23,8 @@ use crate::trajectory::{AxisLimits, Interpolator};
 const BEATS_PER_DEADLINE: u32 = 4;
 /// Timeout for enabling the drives.
 const ENABLE_S: f64 = 3.0;
+/// Missed cycles that are made up for where the cell asks for it; the answers to them may be missing so long.
+const CATCH_UP_CYCLES: u32 = 10;
 
 /// Plan of a cell's runs: none of its parts can fail any more.
 #[derive(Debug)]
@@ -286,7 +290,14 @@ fn servo_spec(cell: &Cell, lockstep: bool) -> Result<ServoSpec, ConfigError> {
         enable_ticks: ticks(ENABLE_S)
             + cell.inputs.iter().map(|input| input.debounce_cycles).max().unwrap_or(0),
         silent_cycles_max: cell.safety.silent_cycles_max,
-        overrun_cycles_max: cell.safety.overrun_cycles_max,
+        overrun_cycles_max: match cell.realtime.overrun {
+            Overrun::Stop => 0,
+            Overrun::KeepPhase | Overrun::CatchUp => cell.safety.overrun_cycles_max,
+        },
+        catch_up_cycles_max: match cell.realtime.overrun {
+            Overrun::CatchUp => CATCH_UP_CYCLES,
+            Overrun::KeepPhase | Overrun::Stop => 0,
+        },
         hold_cycles_max: 0,
     })
 }

@@ -5,6 +5,8 @@ use std::io::Write as _;
 
 use serde::Serialize;
 
+use super::processor;
+
 /// Device that keeps the processors awake enough for a latency, in microseconds, while it is open.
 const LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
 
@@ -12,6 +14,8 @@ const LATENCY_DEVICE: &str = "/dev/cpu_dma_latency";
 const PROBE_MAX: usize = 1 << 26;
 /// A page, or more.
 const PAGE: usize = 1 << 16;
+/// Stack of a tick, several times over; threads have 2 MB.
+const STACK: usize = 1 << 18;
 
 /// Requested scheduling and memory locking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,16 +24,18 @@ pub struct RtRequest {
     pub priority: i32,
     /// Lock all memory of the process (`mlockall`).
     pub lock_memory: bool,
+    /// Processor for this thread alone, of all in the program.
+    pub cpu: Option<usize>,
 }
 
 impl Default for RtRequest {
     fn default() -> Self {
-        Self { priority: 80, lock_memory: true }
+        Self { priority: 80, lock_memory: true, cpu: None }
     }
 }
 
 /// Granted scheduling, and known obstacles to punctuality on this machine.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RtReport {
     /// `SCHED_FIFO` or `SCHED_OTHER`.
     pub policy: String,
@@ -39,10 +45,37 @@ pub struct RtReport {
     pub mlock: bool,
     /// True if the processors are kept from sleeping deeply.
     pub awake: bool,
+    /// Processor that the thread has to itself, of all in the program.
+    pub cpu: Option<usize>,
+    /// Time before a tick for which the thread busy-waits.
+    pub spin_us: f64,
     /// Kernel release, and whether it is a real-time kernel (`PREEMPT_RT`).
     pub kernel: String,
     /// One sentence for each request that was refused and each setting known to add latency.
     pub notes: Vec<String>,
+}
+
+impl RtReport {
+    /// Returns one sentence for each part of a request that was not granted.
+    pub fn missing(&self, request: RtRequest) -> Vec<String> {
+        let refused = |key: &str| {
+            let note = self.notes.iter().find(|note| note.starts_with(key));
+            note.cloned().unwrap_or_else(|| format!("{key} refused"))
+        };
+        let mut missing = Vec::new();
+        if self.priority != request.priority {
+            missing.push(refused(&format!("SCHED_FIFO {}", request.priority)));
+        }
+        if request.lock_memory && !self.mlock {
+            missing.push(refused("mlockall"));
+        }
+        if let Some(cpu) = request.cpu
+            && self.cpu.is_none()
+        {
+            missing.push(refused(&format!("processor {cpu}")));
+        }
+        missing
+    }
 }
 
 /// Applies `request` to the calling thread (priority) and the process (memory).
@@ -70,6 +103,17 @@ pub fn enter(request: RtRequest) -> RtReport {
             std::io::Error::last_os_error()
         ));
     }
+    let cpu = request.cpu.filter(|cpu| match processor::claim(*cpu) {
+        Ok(()) => true,
+        Err(error) => {
+            notes.push(format!(
+                "processor {cpu} refused ({error}); [realtime] cpu names one that this program may use"
+            ));
+            false
+        }
+    });
+    sleep_exactly();
+    touch_stack();
     let release = first_line("/proc/sys/kernel/osrelease").unwrap_or_default();
     let realtime = first_line("/sys/kernel/realtime").as_deref() == Some("1");
     if !realtime {
@@ -86,9 +130,28 @@ pub fn enter(request: RtRequest) -> RtReport {
         priority: if fifo { request.priority } else { 0 },
         mlock,
         awake: false,
+        cpu,
+        spin_us: 0.0,
         kernel: format!("{release}{}", if realtime { " PREEMPT_RT" } else { "" }),
         notes,
     }
+}
+
+/// Lets sleeps of this thread end as asked, and not up to 50 us later; a real-time priority implies it.
+#[expect(unsafe_code, reason = "prctl has no safe wrapper in the standard library")]
+fn sleep_exactly() {
+    // SAFETY: takes a number only.
+    unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64) };
+}
+
+/// Touches the stack that a tick may use, so that no tick waits for its pages.
+#[inline(never)]
+fn touch_stack() {
+    let mut stack = [0_u8; STACK];
+    for page in stack.chunks_mut(4096) {
+        page[0] = 1;
+    }
+    std::hint::black_box(&mut stack);
 }
 
 /// Keeps the processors from sleeping deeply while the result is held, where this is permitted, and notes it in
@@ -157,9 +220,11 @@ mod tests {
     #[test]
     fn a_refused_priority_is_reported_not_hidden() {
         // Runs in its own thread, as the policy would persist in the test runner's.
-        let report = std::thread::spawn(|| enter(RtRequest { priority: 1000, lock_memory: false }))
-            .join()
-            .unwrap();
+        let report = std::thread::spawn(|| {
+            enter(RtRequest { priority: 1000, lock_memory: false, cpu: None })
+        })
+        .join()
+        .unwrap();
         assert_eq!(report.policy, "SCHED_OTHER");
         assert!(report.notes.iter().any(|note| note.contains("1000")), "{:?}", report.notes);
     }

@@ -228,6 +228,11 @@ impl Cycle {
         &self.flight
     }
 
+    /// Returns the number of missed cycles that are made up for.
+    pub(super) fn catch_up_cycles_max(&self) -> u64 {
+        u64::from(self.spec.catch_up_cycles_max)
+    }
+
     /// Returns the servo cycle time.
     pub fn period(&self) -> Nanos {
         self.spec.cycle

@@ -50,7 +50,8 @@ impl StageTimes {
 /// Ticks until the axes are at rest and the drives disabled.
 ///
 /// A tick that begins at least a whole cycle late skips the cycles it missed, so that the loop
-/// keeps its phase and never sends two commands at once.
+/// keeps its phase and never sends two commands at once. As many as
+/// [`ServoSpec::catch_up_cycles_max`](super::ServoSpec::catch_up_cycles_max) are made up for in its place, at once.
 ///
 /// # Real Time
 /// Hot: call it in its own thread, prepared by [`crate::rt::thread::enter`].
@@ -65,13 +66,15 @@ pub fn run_on_clock(cycle: &mut Cycle, clock: &dyn Clock, timing: &mut Timing) {
 pub fn run_until(cycle: &mut Cycle, clock: &dyn Clock, timing: &mut Timing, end: Nanos) {
     let period = cycle.period();
     let mut due = clock.now().plus(period);
+    // Missed cycles that were counted when they were missed, and are still to be made up for.
+    let mut owed = 0;
     while due < end {
         clock.sleep_until(due);
         let began = clock.now();
         let late = began.since(due);
         timing.wake_late.record(late);
         let missed = late.0 / period.0.max(1);
-        let skipped = u32::try_from(missed).unwrap_or(u32::MAX);
+        let skipped = u32::try_from(missed.saturating_sub(owed)).unwrap_or(u32::MAX);
         cycle.begin(due, began, skipped);
         let status = cycle.tick(skipped);
         timing.execution.record(clock.now().since(began));
@@ -81,6 +84,8 @@ pub fn run_until(cycle: &mut Cycle, clock: &dyn Clock, timing: &mut Timing, end:
         if status == TickStatus::Stopped {
             return;
         }
-        due = due.plus(Nanos(period.0 * (missed + 1)));
+        let passed = if missed <= cycle.catch_up_cycles_max() { 0 } else { missed };
+        owed = (missed - passed).saturating_sub(1);
+        due = due.plus(Nanos(period.0 * (passed + 1)));
     }
 }

@@ -180,7 +180,18 @@ pub struct ServoSpec {
     pub silent_cycles_max: u32,
     /// Consecutive overrun cycles at which the axes stop.
     pub overrun_cycles_max: u32,
+    /// Missed cycles that are made up for, one after the other; more of them are skipped.
+    pub catch_up_cycles_max: u32,
     /// Cycles for which the loop pauses, sending nothing, when nodes stop answering; 0 for real
     /// nodes, which would move on.
     pub hold_cycles_max: u32,
+}
+
+impl ServoSpec {
+    /// Forgives overruns of up to so many cycles, unless every one stops the axes. Cold.
+    pub fn forgive_overruns(&mut self, n_cycles: u32) {
+        if self.overrun_cycles_max > 0 {
+            self.overrun_cycles_max = self.overrun_cycles_max.max(n_cycles);
+        }
+    }
 }
