@@ -20,7 +20,7 @@ JOBS    := $(shell expr 2 \* $$(nproc))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt vcan clean
+.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt rt-page vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -130,6 +130,9 @@ bench: $(VENV)/.bench ## Speed, as ratios; writes docs/benchmarks.md
 rt: build ## What is promised of the tick: no allocation, exact repetition; and this machine's punctuality
 	cargo nextest run --release --workspace -E 'binary(no_alloc) | binary(no_alloc_learning) | binary(lockstep)'
 	$(BIN)/ilc-rt latency --seconds 5
+
+rt-page: build ## Measure this computer's punctuality, RT_SECONDS (20) a part, and write its page into docs/machines
+	$(BIN)/python benchmarks/machine_page.py
 
 clean: ## Remove what was built
 	rm -rf build $(VENV)

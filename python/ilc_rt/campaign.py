@@ -101,6 +101,9 @@ class Campaign:
     allow_divergent : bool
         Start the law even if the analysis predicts divergence. A law written in Python is not
         analysed: it always starts. For a `Gate` or a `Ladder` the inner law is analysed.
+    require_rt : bool
+        Refuse to move anything unless the loop's thread gets its priority, locked memory and, if
+        the cell names one, its processor.
     reset_faults : bool
         Reset faults that the drives have when the program starts; otherwise they are named, and
         nothing moves.
@@ -162,6 +165,7 @@ class Campaign:
         start: Literal["at-once", "command", "input"] = "at-once",
         disturbance: Callable[[int], ArrayLike] | ArrayLike | None = None,
         allow_divergent: bool = False,
+        require_rt: bool = False,
         reset_faults: bool = False,
         home: bool = False,
         telemetry: bool = True,
@@ -190,6 +194,7 @@ class Campaign:
         self.simulated = _simulated(self.transport, drives)
         self.resume = resume
         self.learning = learning
+        self.require_rt = require_rt
         self.reset_faults = reset_faults
         self.home = home
         self.frozen = frozen
@@ -277,7 +282,7 @@ class Campaign:
         values: dict[str, object] = {
             "bus": self.bus, "measure": self.measure, "lockstep": self.lockstep,
             "simulated": self.simulated, "library": self.library, "telemetry": self.telemetry,
-            "reset_faults": self.reset_faults, "home": self.home,
+            "require_rt": self.require_rt, "reset_faults": self.reset_faults, "home": self.home,
         }  # fmt: skip
         if self.experiment is not None:
             return "identify", arguments("identify", values) + self.experiment.arguments()

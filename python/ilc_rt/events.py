@@ -32,7 +32,9 @@ class EventError(ValueError):
 class RealTimeReport:
     """Real-time settings granted to the servo thread by the operating system.
 
-    `awake` is True if the processors are kept from sleeping deeply.
+    `awake` is True if the processors are kept from sleeping deeply, `cpu` the processor that the
+    thread has to itself, of all in the program, and `spin_us` the time before a tick for which it
+    busy-waits.
     """
 
     policy: str = ""
@@ -41,6 +43,8 @@ class RealTimeReport:
     kernel: str = ""
     notes: tuple[str, ...] = ()
     awake: bool = False
+    cpu: int | None = None
+    spin_us: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -410,6 +414,8 @@ def _real_time_report(data: dict[str, Any]) -> RealTimeReport:
         priority=int(data.get("priority") or 0),
         mlock=bool(data.get("mlock", False)),
         awake=bool(data.get("awake", False)),
+        cpu=data.get("cpu"),
+        spin_us=float(data.get("spin_us") or 0.0),
         kernel=str(data.get("kernel", "")),
         notes=tuple(str(note) for note in data.get("notes", ())),
     )

@@ -107,6 +107,7 @@ def multisine(
     lockstep: bool | None = None,
     drives: Drives = "auto",
     library: str | Path | None = None,
+    require_rt: bool = False,
     reset_faults: bool = False,
     home: bool = False,
     telemetry: bool = True,
@@ -140,7 +141,7 @@ def multisine(
         Sample time in seconds, for a function; a cell has its own.
     at_m : float or None
         Position that the axis is excited around; the program's start if None.
-    measure, bus, lockstep, drives, reset_faults, home, telemetry
+    measure, bus, lockstep, drives, require_rt, reset_faults, home, telemetry
         As for `Campaign`.
     library : path or None
         Library that the experiment is stored in; None for no library.
@@ -174,8 +175,9 @@ def multisine(
     return identify(
         system, waveform="multisine", axis=axis, amplitude=amplitude, from_hz=from_hz, to_hz=to_hz,
         period_s=period_s, periods=periods, dt_s=dt_s, at_m=at_m, measure=measure, bus=bus,
-        lockstep=lockstep, drives=drives, library=library, reset_faults=reset_faults, home=home,
-        telemetry=telemetry, observe=observe, tell=tell, duration_s=duration_s,
+        lockstep=lockstep, drives=drives, library=library, require_rt=require_rt,
+        reset_faults=reset_faults, home=home, telemetry=telemetry, observe=observe, tell=tell,
+        duration_s=duration_s,
     )  # fmt: skip
 
 

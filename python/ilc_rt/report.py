@@ -287,6 +287,7 @@ def _facts(result: CampaignResult) -> str:
         locked = "memory locked" if report.mlock else "memory not locked"
         facts += [
             ("Scheduling", f"{report.policy} priority {report.priority}, {locked}"),
+            ("Processor", "any" if report.cpu is None else str(report.cpu)),
             ("Kernel", report.kernel),
             ("Notes", "; ".join(report.notes)),
         ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import socket
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -202,3 +203,31 @@ def test_latency_is_measured(bench: Bench) -> None:
     figures = json.loads((bench.folder / "latency.json").read_text())
     assert figures["cycle_us"] == 1000
     assert 0 < figures["wake_late_us"]["count"] <= 1000
+
+
+def test_latency_is_measured_under_load_and_drawn(bench: Bench) -> None:
+    words = ("--seconds", "1", "--load", "--histogram", "--spin-us", "0", "--json", "busy.json")
+    latency = bench.start("ilc-rt", "latency", *words)
+    assert latency.end() == 0
+    said = "\n".join(latency.said)
+    assert "quiet:" in said
+    assert "loaded:" in said
+    assert re.search(r"^ +[0-9.]+ us +[0-9]+ #+$", said, re.MULTILINE)
+    figures = json.loads((bench.folder / "busy.json").read_text())
+    assert figures["rt"]["spin_us"] == 0
+    for part in (figures, figures["loaded"]):
+        assert part["wake_late_us"]["count"] > 0
+        assert part["grade"]
+        if part["cyclictest_us"] is not None:
+            assert part["cyclictest_us"]["count"] > 0
+
+
+def test_required_real_time_is_granted_or_nothing_moves(bench: Bench) -> None:
+    cell = bench.cell(("[[axis]]", "[realtime]\ncpu = 1000\n[[axis]]"))
+    bench.drives(cell, bus=bench.bus)
+    run = bench.start("ilc-rt", "run", cell, "--bus", bench.bus, "--require-rt", "--no-telemetry")
+    assert run.end() == 2
+    (error,) = run.errors
+    assert error.startswith("ilc-rt: --require-rt: ")
+    assert "processor 1000 refused" in error
+    assert error.endswith("; nothing has moved")

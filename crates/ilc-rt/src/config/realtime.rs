@@ -21,7 +21,7 @@ pub struct Realtime {
     /// percentile of the lateness of wake-ups measured at the start, 20 to 100 us.
     #[schemars(range(min = 0, max = 1000))]
     pub spin_us: Option<u32>,
-    /// What happens after a cycle that began at least a whole cycle late.
+    /// Reaction to a cycle that began at least a whole cycle late.
     pub overrun: Overrun,
 }
 

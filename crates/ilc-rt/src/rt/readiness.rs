@@ -1,4 +1,4 @@
-//! What this machine would grant the loop's thread, and how punctually it wakes it, tried before anything moves.
+//! Settings that this machine grants the loop's thread, and how punctually it wakes it, tried before anything moves.
 //!
 //! `campaign` asks before bring-up, `ilc-rt latency` before it measures.
 

@@ -59,7 +59,7 @@ fn isolation(root: &Path) -> Finding {
         Some(_) => Finding::poor(
             "isolation",
             "no processor is kept free of other threads",
-            "isolcpus=managed_irq,domain,N nohz_full=N on the kernel's command line, then taskset -c N ilc-rt …",
+            "isolcpus=managed_irq,domain,N nohz_full=N on the kernel's command line, then [realtime] cpu = N",
         ),
     }
 }
