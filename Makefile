@@ -20,7 +20,7 @@ JOBS    := $(shell expr 2 \* $$(nproc))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
-.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt rt-page vcan clean
+.PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt rt-page deb vcan clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -133,6 +133,9 @@ rt: build ## What is promised of the tick: no allocation, exact repetition; and 
 
 rt-page: build ## Measure this computer's punctuality, RT_SECONDS (20) a part, and write its page into docs/machines
 	$(BIN)/python benchmarks/machine_page.py
+
+deb: build ## The Debian package of the two programs, in build/
+	packaging/deb $(TARGET)/release build
 
 clean: ## Remove what was built
 	rm -rf build $(VENV)

@@ -11,7 +11,17 @@ use crate::record::{Event, StateName, printable_json, printable_lines};
 /// Prints one line on standard error.
 pub(super) fn complain(line: &dyn std::fmt::Display) {
     let line = printable_lines(&line.to_string());
-    let _ = writeln!(std::io::stderr(), "ilc-rt: {line}");
+    let level = if is_journal() { "<3>" } else { "" };
+    let _ = writeln!(std::io::stderr(), "{level}ilc-rt: {line}");
+}
+
+/// Returns true if standard error is the journal, which takes the level of a line from its head.
+fn is_journal() -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let Ok(told) = std::env::var("JOURNAL_STREAM") else { return false };
+    // Inherited by programs whose output goes elsewhere; the journal's file tells.
+    let file = std::fs::metadata("/proc/self/fd/2");
+    file.is_ok_and(|file| told == format!("{}:{}", file.dev(), file.ino()))
 }
 
 /// Prints one line on standard output; returns true on success. A closed output must not end the
