@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
-from ilc_rt import _native
+from ilc_rt import _native, library_file
 from ilc_rt.errors import BadInputError
 from ilc_rt.given import given
+from ilc_rt.retention import kept_by, selected
 
 if TYPE_CHECKING:
     import builtins
@@ -17,6 +19,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
     from typing_extensions import Self
+
+IN_MEMORY = ":memory:"
+#: More runs than any library has.
+ALL = 2**31
 
 
 class Library(_native.Library):
@@ -46,8 +52,17 @@ class Library(_native.Library):
     (0, [])
     """
 
+    _path: str
+
     def __new__(cls, path: str | PathLike[str]) -> Self:
-        return super().__new__(cls, path=fspath(path))
+        library = super().__new__(cls, path=fspath(path))
+        library._path = fspath(path)
+        return library
+
+    @property
+    def path(self) -> str:
+        """Path of the file, or ``:memory:``."""
+        return self._path
 
     def __enter__(self) -> Self:
         """Return itself; a library holds no file open between calls."""
@@ -63,7 +78,10 @@ class Library(_native.Library):
 
     def __len__(self) -> int:
         """Return the number of stored runs."""
-        return len(self.list())
+        if self.path == IN_MEMORY:
+            return len(self.list())
+        with library_file.reading(self.path) as connection:
+            return library_file.count(connection)
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield the stored runs, oldest first, as `list` gives them."""
@@ -90,6 +108,53 @@ class Library(_native.Library):
             If the file cannot be read.
         """
         return super().list(cell)
+
+    def page(
+        self,
+        cell: str | None = None,
+        campaign: str | None = None,
+        limit: int | None = None,
+        offset: int = 0,
+    ) -> builtins.list[dict[str, Any]]:
+        """Return a part of the stored runs, oldest first, without their arrays.
+
+        Only this part of the file is read.
+
+        Parameters
+        ----------
+        cell : str or None
+            Only runs of the cell of this name.
+        campaign : str or None
+            Only runs of campaigns whose names begin like this.
+        limit : int or None
+            Largest number of runs; None: all.
+        offset : int
+            Number of runs to leave out before.
+
+        Returns
+        -------
+        list of dict
+            As `list` gives them.
+
+        Raises
+        ------
+        BadInputError
+            If limit or offset is negative.
+        OSError
+            If the file cannot be read.
+        """
+        for key, value in (("limit", limit), ("offset", offset)):
+            if value is not None and value < 0:
+                message = f"{key} = {value}: a number of runs, 0 or more"
+                raise BadInputError(message)
+        if limit is not None and self.path != IN_MEMORY:
+            with library_file.reading(self.path) as connection:
+                runs = library_file.page(connection, cell, campaign, limit, offset)
+            if runs is not None:
+                return runs
+        begin = campaign or ""
+        runs = [run for run in self.list(cell) if str(run["campaign"]).startswith(begin)]
+        return runs[offset:] if limit is None else runs[offset : offset + limit]
 
     def select(self, **wanted: Any) -> builtins.list[dict[str, Any]]:  # noqa: ANN401 (values of any key)
         """Return the runs whose entries have wanted values, oldest first.
@@ -121,20 +186,10 @@ class Library(_native.Library):
         >>> library.select(cell="gantry", disturbance=(20.0, 25.0), created_utc=("2026-11", None))
         []
         """
-        runs = self.list()
-        unknown = [key for key in wanted if runs and key not in runs[0]]
-        if unknown:
-            message = f"{unknown[0]}: a run has {', '.join(runs[0])}"
-            raise BadInputError(message)
-        return [run for run in runs if all(_is(run[key], value) for key, value in wanted.items())]
+        return selected(self.list(), wanted)
 
     def to_dataframe(self, **wanted: Any) -> Any:  # noqa: ANN401 (pandas is optional)
-        """Return the runs as a table of pandas, one row per run.
-
-        Parameters
-        ----------
-        **wanted
-            As for `select`.
+        """Return the runs as a table of pandas, one row per run; `wanted` as for `select`.
 
         Returns
         -------
@@ -193,9 +248,17 @@ class Library(_native.Library):
         return super().load(id)
 
     def recall(
-        self, disturbance: ArrayLike, top: int = 30, cell: str | None = None
+        self,
+        disturbance: ArrayLike,
+        top: int = 30,
+        cell: str | None = None,
+        *,
+        error: float = 0.0,
     ) -> builtins.list[dict[str, Any]]:
         """Return the runs made under a similar disturbance, nearest first.
+
+        With `error` the most relevant first, as the law `relevance` weighs them: by
+        ``1 / (error rms^2 + |d - d_j|^2)`` ([dimarco2016], Eq. (4.12), without the error's rate).
 
         Parameters
         ----------
@@ -205,6 +268,9 @@ class Library(_native.Library):
             Largest number of runs.
         cell : str or None
             Only runs of the cell of this name.
+        error : float
+            Weight of the square of a run's RMS error in m, against the square of the distance;
+            that of the law is ``error / disturbance`` of its weights. 0: only the distance counts.
 
         Returns
         -------
@@ -214,12 +280,22 @@ class Library(_native.Library):
 
         Raises
         ------
+        BadInputError
+            If the weight is negative or not finite.
         ValueError, TypeError
             If the disturbance is not a number, or not finite.
         OSError
             If the file cannot be read.
         """
-        return super().recall(disturbance, top, cell)
+        if not (math.isfinite(error) and error >= 0.0):
+            message = f"error = {error}: a weight of 0 or more"
+            raise BadInputError(message)
+        if error == 0.0:
+            return super().recall(disturbance, top, cell)
+        # All of them first: a good run may be far away.
+        near = super().recall(disturbance, ALL, cell)
+        near.sort(key=lambda run: error * run["tracking_rms_m"] ** 2 + run["distance"] ** 2)
+        return near[:top]
 
     def append(
         self,
@@ -305,6 +381,54 @@ class Library(_native.Library):
         """
         return super().trim(keep, cell)
 
+    def retain(
+        self,
+        *,
+        newest: int | None = None,
+        days: float | None = None,
+        best: int | None = None,
+        cell: str | None = None,
+    ) -> int:
+        """Delete all runs that no rule keeps, and return how many were deleted.
+
+        The newest run of each campaign always stays: the next number follows from it.
+
+        Parameters
+        ----------
+        newest : int or None
+            Keep this number of newest runs.
+        days : float or None
+            Keep the runs of the last days.
+        best : int or None
+            Keep of each campaign this number of runs with the smallest RMS errors; runs that
+            only measure and rolled back ones are not among them.
+        cell : str or None
+            Only among runs of the cell of this name.
+
+        Returns
+        -------
+        int
+            Number of deleted runs.
+
+        Raises
+        ------
+        BadInputError
+            If there is no rule, or one is negative or not finite.
+        OSError, sqlite3.Error
+            If the file cannot be written; nothing is deleted then.
+        """
+        if self.path == IN_MEMORY:
+            message = f"{IN_MEMORY}: rules are for a library in a file; trim(keep) is for any"
+            raise BadInputError(message)
+        kept = kept_by(self.page(cell), newest=newest, days=days, best=best)
+        gone = [run["id"] for run in self.page(cell) if run["id"] not in kept]
+        # Nothing is trimmed by it: the native library brings an older file up to date.
+        super().trim(ALL, None)
+        with library_file.writing(self.path) as connection:
+            library_file.delete(connection, gone)
+        library_file.shrink(self.path)
+        return len(gone)
+
     def export(self, id: int, path: str | PathLike[str]) -> None:
         """Write a run to a file: ``.npz``, ``.csv`` or ``.json``, by its extension.
 
@@ -324,16 +448,3 @@ class Library(_native.Library):
         """
         # Imported late: `export` imports records, and records import libraries.
         import_module("ilc_rt.export").export_run(self.load(id), path)
-
-
-def _is(value: Any, wanted: Any) -> bool:  # noqa: ANN401 (any value of a run)
-    """Return whether a value is the wanted one, or within the wanted range."""
-    import numpy as np  # only here: the program `ilc` starts without it
-
-    if not isinstance(wanted, tuple) or len(wanted) != 2:
-        return np.array_equal(value, wanted)
-    if value is None:
-        return False
-    low, high = wanted
-    values = np.ravel(value).tolist()
-    return all((low is None or one >= low) and (high is None or one <= high) for one in values)

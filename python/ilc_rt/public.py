@@ -24,6 +24,7 @@ from ilc_rt.library import Library
 from ilc_rt.many import simulate_many
 from ilc_rt.many_result import ManyResult
 from ilc_rt.models import discretize, from_transfer_function, second_order
+from ilc_rt.read_only import ReadOnlyLibrary
 from ilc_rt.recommendation import Recommendation, recommend
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import CampaignResult
@@ -50,6 +51,7 @@ __all__ = [
     "ManyResult",
     "ModelError",
     "PlantError",
+    "ReadOnlyLibrary",
     "Recommendation",
     "Repeatability",
     "SignalError",

@@ -22,6 +22,7 @@ from ilc_rt.events import (
 )
 from ilc_rt.library import Library
 from ilc_rt.quantity import axis_unit, digits
+from ilc_rt.read_only import ReadOnlyLibrary
 from ilc_rt.record import IterationRecord
 from ilc_rt.result_views import Views
 
@@ -269,15 +270,22 @@ def library_rows(library: str | Path, cell: str | None = None) -> list[dict[str,
     BadInputError
         If the file is missing or is not a library.
     """
-    path = Path(library)
-    if not path.exists():
-        message = f"{library}: no such library"
-        raise BadInputError(message)
-    if path.is_file() and path.stat().st_size == 0:
-        message = f"{library}: an empty file, and no library yet"
-        raise BadInputError(message)
     try:
-        return list(Library(str(library)).list(cell))
+        return list(existing(library).list(cell))
+    except (ValueError, OSError, RuntimeError) as error:
+        raise BadInputError(str(error)) from error
+
+
+def existing(library: str | Path) -> ReadOnlyLibrary:
+    """Return an existing library, to be read only.
+
+    Raises
+    ------
+    BadInputError
+        If the file is missing or is not a library.
+    """
+    try:
+        return ReadOnlyLibrary(library)
     except (ValueError, OSError, RuntimeError) as error:
         raise BadInputError(str(error)) from error
 

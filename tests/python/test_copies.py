@@ -17,7 +17,14 @@ import ilc_rt
 from ilc_rt import Campaign, Gate, Library, NormOptimalIlc, PdIlc, weights
 
 # Not values: a connection to a file, an interface, a running controller or experiment.
-OTHERS = {Library, ilc_rt.Law, ilc_rt.signal.Filter, Campaign, ilc_rt.Experiment}
+OTHERS = {
+    Library,
+    ilc_rt.ReadOnlyLibrary,
+    ilc_rt.Law,
+    ilc_rt.signal.Filter,
+    Campaign,
+    ilc_rt.Experiment,
+}
 
 
 def attributes(thing):

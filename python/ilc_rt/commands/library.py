@@ -6,13 +6,13 @@ import csv
 import io
 import json
 import os
+import sqlite3
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich import box
+from rich.cells import cell_len, set_cell_size
 from rich.console import Console
-from rich.table import Table
 from typer import Typer
 
 from ilc_rt.commands.options import (
@@ -22,11 +22,11 @@ from ilc_rt.commands.options import (
 from ilc_rt.errors import BadInputError
 from ilc_rt.library import Library
 from ilc_rt.quantity import axis_unit, unit_for
-from ilc_rt.result import STANDARD_OUTPUT, json_text, library_rows, write_text
+from ilc_rt.result import STANDARD_OUTPUT, existing, json_text, write_text
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
 # The last columns are shown if there is space; the campaign's name is its start time.
 COLUMNS = (
@@ -53,7 +53,29 @@ CampaignOption = Annotated[
     str | None, typer.Option("--campaign", metavar="ID", help="Only this campaign's.")
 ]
 Keep = Annotated[
-    int, typer.Argument(min=0, max=2**63 - 1, metavar="KEEP", help="How many runs stay.")
+    int | None,
+    typer.Argument(min=0, max=2**63 - 1, metavar="[KEEP]", help="How many runs stay."),
+]
+Newest = Annotated[
+    int | None, typer.Option(min=0, metavar="N", help="In place of KEEP: the N newest runs stay.")
+]
+Days = Annotated[
+    float | None,
+    typer.Option(min=0, metavar="DAYS", help="In place of KEEP: runs of the last DAYS stay."),
+]
+Best = Annotated[
+    int | None,
+    typer.Option(
+        min=0, metavar="N", help="In place of KEEP: of each campaign the N best runs stay."
+    ),
+]
+Limit = Annotated[
+    int | None,
+    typer.Option("--limit", min=1, max=2**31, metavar="N", help="List this many runs at most."),
+]
+Offset = Annotated[
+    int,
+    typer.Option("--offset", min=0, max=2**31, metavar="N", help="Leave out the N oldest runs."),
 ]
 JsonRows = Annotated[
     Path | None,
@@ -73,16 +95,20 @@ def list_runs(
     library: LibraryArgument = DEFAULT_LIBRARY_FILE,
     cell: CellName = None,
     campaign: CampaignOption = None,
+    limit: Limit = None,
+    offset: Offset = 0,
     json_file: JsonRows = None,
     csv_file: CsvRows = None,
 ) -> None:
-    """List the runs, one per line.
+    """List the runs, one per line; --limit and --offset list a part of many.
 
-    Example: ilc library list ilc-library.db --cell gantry
+    Example: ilc library list ilc-library.db --cell gantry --limit 50
     """
-    rows = library_rows(library, cell)
-    if campaign is not None:
-        rows = [row for row in rows if str(row["campaign"]).startswith(campaign)]
+    if offset and limit is None:
+        message = f"--offset {offset}: needs --limit, the number of runs to list"
+        raise BadInputError(message)
+    total = len(existing(library))
+    rows = _rows(library, cell, campaign, limit, offset)
     if json_file is not None:
         write_text(json_file, json_text(rows))
     if csv_file is not None:
@@ -90,14 +116,26 @@ def list_runs(
     if STANDARD_OUTPUT in {json_file, csv_file}:
         return
     console = Console(highlight=False, markup=False, emoji=False)
-    if not console.is_terminal and "COLUMNS" not in os.environ:
-        console.width = WIDE
-    console.print(_table(rows, console.width))
-    console.print(f"{len(rows)} run{'' if len(rows) == 1 else 's'} in {library}", soft_wrap=True)
+    width = console.width if console.is_terminal or "COLUMNS" in os.environ else WIDE
+    typer.echo("\n".join(["", *_lines(rows, width), ""]))
+    part = "" if limit is None else f" of {total}"
+    typer.echo(f"{len(rows)}{part} run{'' if len(rows) == 1 else 's'} in {library}")
 
 
-def _table(rows: list[dict[str, Any]], width: int) -> Table:
-    """Return the runs as a table with the columns that `show` and `export` need at any width."""
+def _rows(
+    library: Path, cell: str | None, campaign: str | None, limit: int | None, offset: int
+) -> list[dict[str, Any]]:
+    try:
+        return existing(library).page(cell, campaign, limit, offset)
+    except OSError as error:
+        raise BadInputError(str(error)) from error
+
+
+def _lines(rows: list[dict[str, Any]], width: int) -> list[str]:
+    """Return the runs as lines with the columns that `show` and `export` need at any width.
+
+    Plain text, as a table of rich takes a millisecond for each line.
+    """
     texts = [
         (
             str(row["id"]), printable(row["campaign"]), str(row["index"]), printable(row["cell"]),
@@ -107,28 +145,32 @@ def _table(rows: list[dict[str, Any]], width: int) -> Table:
         )
         for row in rows
     ]  # fmt: skip
-    count = len(COLUMNS) if width >= WIDE else N_NARROW
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 0))
-    names = COLUMNS[:count]
+    names = COLUMNS[: len(COLUMNS) if width >= WIDE else N_NARROW]
     wanted = [
-        max([len(name), *(len(text[column]) for text in texts)])
+        max([len(name), *(cell_len(text[column]) for text in texts)])
         for column, name in enumerate(names)
     ]
-    # Names are shortened, the longest first; a column is followed by two blanks.
-    excess = sum(wanted) + 2 * count - width
+    # Names are shortened, the longest first; columns are a blank apart.
+    excess = sum(wanted) + len(names) + 1 - width
     for column in sorted(SHORTENED, key=lambda column: -wanted[column]):
         cut = max(0, min(excess, wanted[column] - SHORTENED[column]))
         wanted[column] -= cut
         excess -= cut
-    for name, size in zip(names, wanted, strict=True):
-        right = name in RIGHT
-        table.add_column(
-            name, justify="right" if right else "left", no_wrap=True, width=size,
-            overflow="ellipsis",
-        )  # fmt: skip
-    for text in texts:
-        table.add_row(*text[:count])
-    return table
+    is_right = [name in RIGHT for name in names]
+
+    def line(text: Sequence[str]) -> str:
+        return "".join(map(_filled, text, wanted, is_right)).rstrip()
+
+    return [line(names), " " + "─" * (sum(wanted) + len(names) - 1), *map(line, texts)]
+
+
+def _filled(text: str, size: int, is_right: bool) -> str:  # noqa: FBT001 (a column of a map)
+    """Return a text of a given width in a terminal, after a blank."""
+    length = len(text) if text.isascii() else cell_len(text)
+    if length > size:
+        return f" {set_cell_size(text, size - 1)}…"
+    blanks = " " * (size - length)
+    return f" {blanks}{text}" if is_right else f" {text}{blanks}"
 
 
 def _csv(rows: list[dict[str, Any]]) -> str:
@@ -180,15 +222,33 @@ def export(library: LibraryArgument, run_id: RunId, file: ExportFile) -> None:
 
 
 @app.command("trim")
-def trim(library: LibraryArgument, keep: Keep, cell: CellName = None) -> None:
-    """Delete all but the most relevant runs: small errors, spread over disturbances.
+def trim(
+    library: LibraryArgument,
+    keep: Keep = None,
+    cell: CellName = None,
+    newest: Newest = None,
+    days: Days = None,
+    best: Best = None,
+) -> None:
+    """Delete all but the most relevant runs (KEEP), or all that no rule keeps.
+
+    The most relevant have small errors, spread over disturbances. A run that one of --newest,
+    --days and --best keeps stays; so does the newest run of each campaign.
 
     Example: ilc library trim ilc-library.db 500 --cell gantry
     """
-    n_runs = len(library_rows(library))
+    rules = {"newest": newest, "days": days, "best": best}
+    has_rule = any(rule is not None for rule in rules.values())
+    if has_rule == (keep is not None):
+        message = "KEEP or rules: the number of runs that stay, or some of --newest, --days, --best"
+        raise BadInputError(message)
+    n_runs = len(existing(library))
     try:
-        deleted = Library(str(library)).trim(min(keep, n_runs), cell)
-    except OSError as error:
+        if keep is not None:
+            deleted = Library(str(library)).trim(min(keep, n_runs), cell)
+        else:
+            deleted = Library(str(library)).retain(newest=newest, days=days, best=best, cell=cell)
+    except (OSError, sqlite3.Error) as error:
         raise BadInputError(str(error)) from error
     typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")
 
@@ -208,9 +268,13 @@ def note(row: Mapping[str, Any]) -> str:
 
 
 def _load(library: Path, run_id: int) -> dict[str, Any]:
-    known = {int(row["id"]) for row in library_rows(library)}
+    there = existing(library)
+    try:
+        known = [int(row["id"]) for row in there.page()]
+    except OSError as error:
+        raise BadInputError(str(error)) from error
     if run_id not in known:
-        there = f"{min(known)} to {max(known)}" if known else "none"
-        message = f"{library}: no run {run_id}; there are {there}"
+        ids = f"{min(known)} to {max(known)}" if known else "none"
+        message = f"{library}: no run {run_id}; there are {ids}"
         raise BadInputError(message)
-    return dict(Library(str(library)).load(run_id))
+    return dict(there.load(run_id))
