@@ -15,6 +15,7 @@ from rich.cells import cell_len, set_cell_size
 from rich.console import Console
 from typer import Typer
 
+from ilc_rt.commands import fleet
 from ilc_rt.commands.options import (
     DEFAULT_LIBRARY_FILE,
     LibraryArgument,
@@ -43,6 +44,10 @@ app = Typer(
     no_args_is_help=True,
     help="List, show, export and trim the runs in a library.",
 )
+
+app.command("sync")(fleet.sync)
+app.command("collect")(fleet.collect)
+app.command("fetch")(fleet.fetch)
 
 # Displayed characters of a program or of a law's parameters; `export` writes them completely.
 LENGTH_SHOWN = 2000

@@ -1,0 +1,125 @@
+"""`ilc library sync`, `collect` and `fetch`: the libraries of many cells in one database."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ilc_rt.commands.monitor import (  # noqa: TC001 - typer reads them
+    Connect,
+    Scouting,
+    Timeout,
+)
+from ilc_rt.errors import BadInputError
+from ilc_rt.text import printable
+
+FROM = "Library file (sqlite:///cell.db, or its path), or database (postgresql://USER@HOST/NAME)."
+Source = Annotated[str, typer.Argument(metavar="FROM", help=FROM)]
+Target = Annotated[str, typer.Argument(metavar="TO", help="The other of the two.")]
+Database = Annotated[
+    str, typer.Argument(metavar="DATABASE", help="Database, as postgresql://USER@HOST/NAME.")
+]
+CellOption = Annotated[str | None, typer.Option("--cell", metavar="NAME", help="Only this cell's.")]
+CellFile = Annotated[
+    Path, typer.Option("--cell", metavar="FILE", help="Description of the cell (TOML).")
+]
+Into = Annotated[Path, typer.Option("--into", metavar="FILE", help="Library of the cell.")]
+FromCell = Annotated[
+    str | None,
+    typer.Option("--from-cell", metavar="NAME", help="Only campaigns of the cell of this name."),
+]
+OtherDrives = Annotated[
+    bool,
+    typer.Option(
+        "--other-drives",
+        help="Accept a cell with other limits, models or position loops; see docs/fleet.md.",
+    ),
+]
+
+
+def sync(source: Source, target: Target, cell: CellOption = None) -> None:
+    """Store the runs of a library in a database, or the runs of a cell back in a library.
+
+    May be repeated and interrupted: what is there is not stored again.
+
+    Example: ilc library sync sqlite:///ilc-library.db postgresql://ilc@fleet.local/ilc
+    """
+    from ilc_rt.fleet import pull, push
+    from ilc_rt.fleet.database import file_of, is_database
+
+    if is_database(source) == is_database(target):
+        message = f"{source} {target}: one is a library file, the other a database"
+        raise BadInputError(message)
+    if is_database(target):
+        done = push(file_of(source), target, cell)
+    elif cell is None:
+        message = "--cell NAME: the cell whose runs the library is to have"
+        raise BadInputError(message)
+    else:
+        done = pull(source, file_of(target), cell)
+    typer.echo(f"{done.stored} runs stored, {done.renewed} renewed, {done.present} were there")
+    if done.damaged:
+        ids = ", ".join(map(str, done.damaged))
+        message = f"{source}: runs left out, as their arrays do not match their digest: {ids}"
+        raise BadInputError(message)
+
+
+def collect(
+    database: Database,
+    cell: Annotated[str, typer.Option("--cell", metavar="NAME", help="Only this cell's.")] = "*",
+    connect: Connect = None,
+    scouting: Scouting = True,
+    timeout: Timeout = None,
+) -> None:
+    """Store the figures of every run as it ends; the arrays follow by `ilc library sync`.
+
+    Example: ilc library collect postgresql://ilc@fleet.local/ilc --timeout 3600
+    """
+    from ilc_rt.fleet import Collector
+    from ilc_rt.monitor import Monitor
+
+    with Collector(database) as collector, Monitor(cell, connect or (), scouting=scouting) as seen:
+        typer.echo("collecting; Ctrl-C ends this, not the machines", err=True)
+        warned: set[str] = set()
+        was_waiting = False
+        try:
+            for message in seen.messages(timeout):
+                collector.take(message)
+                for name in collector.unknown - warned:
+                    warned.add(name)
+                    typer.echo(
+                        f"{printable(name)}: its campaign began before; sync brings its runs",
+                        err=True,
+                    )
+                if bool(collector.n_waiting) != was_waiting:
+                    was_waiting = not was_waiting
+                    state = "cannot be reached: runs wait" if was_waiting else "is there again"
+                    typer.echo(f"the database {state}", err=True)
+        finally:
+            typer.echo(f"{collector.stored} runs stored")
+
+
+def fetch(
+    database: Database,
+    cell: CellFile,
+    into: Into,
+    from_cell: FromCell = None,
+    other_drives: OtherDrives = False,
+) -> None:
+    """Start a cell from the best campaign that another one learned, if it fits.
+
+    Example: ilc library fetch postgresql://ilc@fleet.local/ilc --cell gantry.toml --into gantry.db
+    """
+    from ilc_rt.fleet import fetch as fetch_campaign
+    from ilc_rt.quantity import unit_for
+
+    got = fetch_campaign(database, cell, str(into), from_cell=from_cell, other_drives=other_drives)
+    error = unit_for("m", got.best_tracking_rms_m).text(got.best_tracking_rms_m)
+    typer.echo(
+        f"{got.stored} of {got.runs} runs of {printable(got.from_cell)} stored as campaign "
+        f"{printable(got.campaign)}; smallest RMS error {error}\n"
+        f"go on: ilc run {printable(cell)} --library {printable(into)} --resume "
+        f"--iterations {got.runs + 5}"
+    )
