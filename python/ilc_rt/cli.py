@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # In the order of the help. A verb of several verbs is a `Typer` named `app` in its module.
 VERBS = (
     "demo", "run", "identify", "repeatability", "plot", "tune", "sweep", "library", "monitor",
-    "bridge",
+    "dashboard", "bridge",
 )  # fmt: skip
 
 

@@ -1,0 +1,95 @@
+"""`ilc dashboard`: a web page that watches cells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ilc_rt.campaign import load_cell
+from ilc_rt.commands.monitor import Connect, Scouting, Timeout  # noqa: TC001 - typer reads them
+from ilc_rt.commands.options import DEFAULT_LIBRARY_FILE
+from ilc_rt.dashboard.archive import Archive
+from ilc_rt.dashboard.feed import Feed
+from ilc_rt.dashboard.model import Fleet
+from ilc_rt.errors import BadInputError
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from ilc_rt import Cell
+
+PORT = 8460
+
+Cells = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[CELL]...", help="Names of cells, or their TOML files; all if none."),
+]
+Libraries = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--library",
+        metavar="FILE",
+        help="Library to browse and to take earlier runs from; repeatable.",
+    ),
+]
+
+
+def dashboard(
+    cells: Cells = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; 0.0.0.0 for every network.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for a free one.")
+    ] = PORT,
+    library: Libraries = None,
+    connect: Connect = None,
+    scouting: Scouting = True,
+    timeout: Timeout = None,
+) -> None:
+    """Serve a web page that watches cells and compares their stored runs; it commands nothing.
+
+    Example: ilc dashboard gantry --library ilc-library.db
+    """
+    server = _server()
+    described = [_described(cell) for cell in cells or () if cell != "*"]
+    archive = Archive(_libraries(library))
+    fleet = Fleet(dict.fromkeys(name for name, _ in described))
+    for name, cell in described:
+        if cell is not None:
+            fleet.cells[name].describe(cell)
+    listener = server.listen(host, port)
+    with listener, Feed(fleet, archive, connect or (), scouting=scouting):
+        shown = f"[{host}]" if ":" in host else host
+        typer.echo(f"dashboard: http://{shown}:{listener.getsockname()[1]}")
+        if not server.is_local(host):
+            typer.echo("anyone on that network can watch; nobody can command", err=True)
+        typer.echo("Ctrl-C ends this, not the machine", err=True)
+        server.serve(fleet, archive, listener, host, timeout)
+
+
+def _server() -> ModuleType:
+    """Return the module of the server, whose framework is optional."""
+    try:
+        from ilc_rt.dashboard import server
+    except ImportError as error:
+        message = "the dashboard needs the package nicegui: pip install ilc-rt[dashboard]"
+        raise BadInputError(message) from error
+    return server
+
+
+def _described(cell: str) -> tuple[str, Cell | None]:
+    """Return the name of a cell, and its description if a file was given."""
+    if Path(cell).suffix != ".toml":
+        return cell, None
+    described = load_cell(cell)
+    return described.name, described
+
+
+def _libraries(given: list[Path] | None) -> list[Path]:
+    """Return the given libraries; else that of this folder, if there is one."""
+    if given:
+        return list(dict.fromkeys(given))
+    return [path] if (path := Path(DEFAULT_LIBRARY_FILE)).is_file() else []

@@ -1,0 +1,230 @@
+"""Libraries as the page reads them: rows, signals, relevance; they are never written.
+
+A run is named by the number of its library and its key there, so that a browser can name no file.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ilc_rt.dashboard.capture import Capture
+from ilc_rt.errors import BadInputError
+from ilc_rt.library import Library
+from ilc_rt.pictures.aligned import SAME_MIN, shift_of
+from ilc_rt.quantity import axis_unit
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+LOADED_MAX = 24
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRun:
+    """A run with its signals, shifted in time onto another one.
+
+    Attributes
+    ----------
+    key : tuple of int
+        Number of the library, key in it.
+    row : dict
+        As `Library.load` gives it.
+    shift_s : float
+        Time to be added to its own.
+    is_same : bool
+        False if its reference is another motion than that of the run it is compared with.
+    """
+
+    key: tuple[int, int]
+    row: dict[str, Any]
+    shift_s: float = 0.0
+    is_same: bool = True
+
+    @property
+    def name(self) -> str:
+        """Short name: campaign and number of the run."""
+        return f"{self.row['campaign']} run {self.row['index']}"
+
+    def time_s(self) -> Array:
+        """Return the common time of each sample."""
+        return np.arange(self.row["n_samples"]) * float(self.row["cycle_s"]) + self.shift_s
+
+    def signal(self, what: str, axis: int) -> Array:
+        """Return "error", "input" or "command" (set point) of an axis; NaN without that axis."""
+        values = self.row[{"error": "error_m", "input": "input", "command": "reference_m"}[what]]
+        if axis >= values.shape[1]:
+            return np.full(len(values), np.nan)
+        column: Array = values[:, axis]
+        return column
+
+    def unit(self, what: str, axis: int) -> str:
+        """Return the unit of a signal."""
+        units = self.row["input_units"]
+        unit = str(units[axis]) if axis < len(units) else "m"
+        return unit if what == "input" else axis_unit(unit)
+
+
+class Archive:
+    """Runs of several libraries.
+
+    Parameters
+    ----------
+    paths : sequence of pathlib.Path
+        The files; one that does not exist yet has no runs.
+
+    Raises
+    ------
+    BadInputError
+        If a file is not a library.
+    """
+
+    def __init__(self, paths: Sequence[Path] = ()) -> None:
+        self.paths = tuple(paths)
+        self._lock = Lock()
+        self._rows: dict[int, tuple[object, list[dict[str, Any]]]] = {}
+        self._loaded: OrderedDict[tuple[int, int, str], dict[str, Any]] = OrderedDict()
+        self.rows()
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return the runs of all libraries, oldest first; ``library`` is the number of the file.
+
+        A file that has not changed is not read again.
+        """
+        with self._lock:
+            return [row for number in range(len(self.paths)) for row in self._rows_of(number)]
+
+    def campaign(self, cell: str, campaign: str | None = None) -> list[dict[str, Any]]:
+        """Return the runs of a campaign of a cell; of its newest one if none is named."""
+        rows = [row for row in self.rows() if row["cell"] == cell]
+        if rows and campaign is None:
+            campaign = max(rows, key=lambda row: str(row["created_utc"]))["campaign"]
+        return [row for row in rows if row["campaign"] == campaign]
+
+    def load(self, key: tuple[int, int]) -> StoredRun:
+        """Return a run with its signals.
+
+        Raises
+        ------
+        BadInputError
+            If there is no such run any more.
+        """
+        number, run = key
+        if not 0 <= number < len(self.paths):
+            message = f"library {number}: there are {len(self.paths)}"
+            raise BadInputError(message)
+        row = next((row for row in self.rows() if (row["library"], row["id"]) == key), None)
+        if row is None:
+            message = f"{self.paths[number]}: no run {run} any more"
+            raise BadInputError(message)
+        cached = (number, run, str(row["digest"]))
+        with self._lock:
+            if cached not in self._loaded:
+                try:
+                    self._loaded[cached] = Library(self.paths[number]).load(run)
+                except OSError as error:
+                    raise BadInputError(str(error)) from error
+                while len(self._loaded) > LOADED_MAX:
+                    self._loaded.popitem(last=False)
+            self._loaded.move_to_end(cached)
+            return StoredRun(key, self._loaded[cached])
+
+    def capture(self, cell: str, campaign: str | None) -> Capture | None:
+        """Return the signals of the newest stored run of a campaign, as if they had been heard."""
+        try:
+            rows = self.campaign(cell, campaign)
+            if not rows:
+                return None
+            run = self.load((rows[-1]["library"], rows[-1]["id"])).row
+        except BadInputError:
+            # Deleted or replaced meanwhile: the next run brings another one.
+            return None
+        captured = Capture(int(run["index"]), int(run["n_axes"]))
+        # The error is that of the measurement that is learned from.
+        measured = run["reference_m"] - run["error_m"]
+        values = np.stack((run["reference_m"], measured, run["input"]), axis=1)
+        captured.put(np.arange(len(values)), values)
+        return captured
+
+    def aligned(self, keys: Sequence[tuple[int, int]], axis: int) -> list[StoredRun]:
+        """Return runs on the time of the first one, shifted until their references agree."""
+        runs = [self.load(key) for key in keys]
+        aligned = runs[:1]
+        for run in runs[1:]:
+            first = runs[0]
+            shift_s, same = shift_of(
+                first.signal("command", axis), float(first.row["cycle_s"]),
+                run.signal("command", axis), float(run.row["cycle_s"]),
+            )  # fmt: skip
+            is_same = bool(same >= SAME_MIN)
+            aligned.append(StoredRun(run.key, run.row, shift_s if is_same else 0.0, is_same))
+        return aligned
+
+    def _rows_of(self, number: int) -> list[dict[str, Any]]:
+        path = self.paths[number]
+        stamp = _stamp(path)
+        if stamp is None:
+            return []
+        kept = self._rows.get(number)
+        if kept is None or kept[0] != stamp:
+            try:
+                rows = Library(path).list()
+            except OSError as error:
+                raise BadInputError(str(error)) from error
+            kept = stamp, [{**row, "library": number} for row in rows]
+            self._rows[number] = kept
+        return kept[1]
+
+
+def distance(row: dict[str, Any], current: dict[str, Any]) -> float | None:
+    """Return the distance of two runs in their measured disturbances; None without them."""
+    a, b = row.get("disturbance"), current.get("disturbance")
+    if a is None or b is None or len(np.ravel(a)) != len(np.ravel(b)):
+        return None
+    return float(np.linalg.norm(np.ravel(a) - np.ravel(b)))
+
+
+def relevance(rows: Sequence[dict[str, Any]], current: dict[str, Any]) -> list[float]:
+    """Return the share of each run in what the current run would be told, as DPW-ILC weighs.
+
+    ``N_j = 1 / (E_j + |d - d_j|^2 + 1e-6)``, with the square of the RMS error in units of its mean
+    over these runs and each disturbance in units of its standard deviation; normalised to a sum of
+    1. `Library.trim` keeps runs by the same measure.
+    """
+    squares = np.array([float(row["tracking_rms_m"]) ** 2 for row in rows])
+    mean = float(squares.mean()) if len(squares) else 0.0
+    sums = squares / mean if mean > 0.0 else np.zeros(len(rows))
+    there = [row for row in (*rows, current) if row.get("disturbance") is not None]
+    widths = {len(np.ravel(row["disturbance"])) for row in there}
+    if len(there) == len(rows) + 1 and len(widths) == 1:
+        places = np.array([np.ravel(row["disturbance"]) for row in rows], dtype=float)
+        spread = places.std(axis=0)
+        spread[spread == 0.0] = 1.0
+        away = (places - np.ravel(current["disturbance"])) / spread
+        sums = sums + (away**2).sum(axis=1)
+    weights = 1.0 / (sums + 1e-6)
+    shares: list[float] = (weights / weights.sum()).tolist() if len(rows) else []
+    return shares
+
+
+def _stamp(path: Path) -> object:
+    """Return what changes with a library: size and time of its file and of its log."""
+    stamps = [_file_stamp(file) for file in (path, Path(f"{path}-wal"))]
+    return None if stamps[0] is None else tuple(stamps)
+
+
+def _file_stamp(file: Path) -> tuple[int, int, int] | None:
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino

@@ -1,0 +1,151 @@
+"""Tables of the page of a cell: axes, log, timing."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from ilc_rt.dashboard import charts
+from ilc_rt.dashboard.frame import chart, draw, level, say, tag, text
+from ilc_rt.dashboard.status import SYMBOLS, axis_words
+from ilc_rt.lateness import late_sentence
+from ilc_rt.quantity import unit_for
+
+if TYPE_CHECKING:
+    from nicegui import Client, ui
+
+    from ilc_rt.dashboard.model import CellModel
+
+COLUMNS = (
+    "axis", "state", "set point", "position", "error", "learned input", "max error of the run",
+    "RMS error of the run",
+)  # fmt: skip
+SIGNS = {"info": "·", "warn": SYMBOLS["warn"], "fault": SYMBOLS["fault"]}
+LOG_SHOWN = 40
+
+
+class AxisTable:
+    """State and figures of each axis."""
+
+    def __init__(self) -> None:
+        with tag("div", "scroll"), tag("table", "plain-table"):
+            with tag("thead"), tag("tr"):
+                for column in COLUMNS:
+                    with tag("th", "text" if column == "state" else "", scope="col"):
+                        text(column)
+            self._body = tag("tbody")
+        self._names: tuple[str, ...] = ()
+        self._rows: list[list[ui.label]] = []
+
+    def show(self, cell: CellModel, now_s: float) -> None:
+        """Show the present figures."""
+        if cell.axis_names != self._names:
+            self._make(cell.axis_names)
+        last = cell.last
+        for axis, row in enumerate(self._rows):
+            status = axis_words(cell, axis, now_s)
+            say(row[1], f"{status.symbol} {status.words}")
+            level(row[1], status.level)
+            base = cell.units[axis]
+            now = None if cell.now is None else cell.now[:, axis].tolist()
+            if now is not None:
+                for column, value in ((2, now[0]), (3, now[1])):
+                    say(row[column], _steady(value, base))
+                say(row[4], _small(now[3], base))
+                say(row[5], _small(now[2], cell.input_units[axis]))
+            for column, name in ((6, "axes_tracking_inf_m"), (7, "axes_tracking_rms_m")):
+                figures = getattr(last, name, ())
+                value = figures[axis] if axis < len(figures) else None
+                say(row[column], unit_for(base, value).text(value))
+
+    def _make(self, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._body.clear()
+        self._rows = []
+        with self._body:
+            for name in names:
+                with tag("tr", data_axis=name):
+                    labels = []
+                    for column in COLUMNS:
+                        with tag("td", "text" if column == "state" else ""):
+                            classes = "level-mark" if column == "state" else ""
+                            labels.append(text("-", classes, column.replace(" ", "-")))
+                    labels[0].set_text(name)
+                    self._rows.append(labels)
+
+
+class Log:
+    """What happened, newest first."""
+
+    def __init__(self) -> None:
+        self._list = tag("ul", "log", aria_label="Events, newest first", tabindex="0")
+        self._shown: object = None
+
+    def show(self, cell: CellModel) -> None:
+        """Show the newest notices, if there are new ones."""
+        notices = list(cell.notices)[-LOG_SHOWN:][::-1]
+        if notices == self._shown:
+            return
+        self._shown = notices
+        self._list.clear()
+        with self._list:
+            if not notices:
+                with tag("li"):
+                    text("")
+                    text("")
+                    text("nothing yet", "quiet")
+            for notice in notices:
+                with tag("li"):
+                    text(time.strftime("%H:%M:%S", time.localtime(notice.at_s)), "quiet")
+                    text(SIGNS[notice.level], f"level-mark level-{notice.level}")
+                    text(notice.text)
+
+
+class Timing:
+    """Timing of the loop, and the worst cycle with its cause."""
+
+    def __init__(self) -> None:
+        self._words = text("", "", "timing")
+        self._place = chart("timing", "Histograms of wake-up and execution time", "low")
+        self._cause = text("", "", "cause")
+        self._late = chart("late-cycle", "Stages of the worst cycle beside usual ones", "low")
+
+    def show(self, cell: CellModel, client: Client) -> None:
+        """Show what the loop has reported."""
+        found = cell.latency
+        if found is None:
+            say(self._words, "Times of the loop come at the end of a campaign in real time.")
+        else:
+            parts = [
+                f"{name} {one.p50:.3g} µs (median), {one.p99:.3g} (99 %), {one.max:.3g} at most"
+                for name, one in (
+                    ("wake-up late by", found.wake_late_us),
+                    ("execution", found.execution_us),
+                )
+            ]
+            say(self._words, "; ".join(parts))
+            draw(client, "timing", charts.timing(cell))
+        self._place.set_visibility(found is not None)
+        say(
+            self._cause,
+            "No cycle was late."
+            if cell.late is None
+            else f"Worst cycle ({cell.late.tick}): {late_sentence(cell.late)}",
+        )
+        self._late.set_visibility(cell.late is not None)
+        if cell.late is not None:
+            draw(client, "late-cycle", charts.late_cycle(cell))
+
+
+def _steady(value: float, base: str) -> str:
+    """Return a position in a unit that does not change as it moves."""
+    if value != value:
+        return "-"
+    return f"{1e3 * value:.3f} m{base}" if base in {"m", "rad"} else f"{value:.4g} {base}"
+
+
+def _small(value: float, base: str) -> str:
+    """Return an error or an input in millionths, which change in size as they move."""
+    if value != value:
+        return "-"
+    return f"{1e6 * value:.1f} µ{base}" if base[0] in "mr" else f"{value:.4g} {base}"

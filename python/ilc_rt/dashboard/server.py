@@ -1,0 +1,126 @@
+"""The web server of the dashboard: pages, files, hosts that are served."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import socket
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import nicegui
+import uvicorn
+from fastapi import FastAPI, Response
+from fastapi.staticfiles import StaticFiles
+from nicegui import ui
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+
+from ilc_rt.dashboard.cell_page import build_cell
+from ilc_rt.dashboard.library_page import build_library
+from ilc_rt.dashboard.look import colours, text_of
+from ilc_rt.dashboard.overview import build_overview
+from ilc_rt.errors import BadInputError
+
+if TYPE_CHECKING:
+    from ilc_rt.dashboard.archive import Archive
+    from ilc_rt.dashboard.model import Fleet
+
+KINDS = {"dashboard.js": "text/javascript", "dashboard.css": "text/css"}
+#: Seconds for which a browser that has lost its connection may come back to its page.
+RECONNECT_S = 15.0
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Return a listening socket.
+
+    Raises
+    ------
+    BadInputError
+        If the address is not one of this computer, or is in use.
+    """
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+    except OSError as error:
+        reason = error.strerror or error
+        message = (
+            f"--host {host} --port {port}: {reason}; an own address and a free port are needed"
+        )
+        raise BadInputError(message) from error
+    return listener
+
+
+def is_local(host: str) -> bool:
+    """Return whether only this computer reaches a server at this address.
+
+    Examples
+    --------
+    >>> is_local("127.0.0.1"), is_local("localhost"), is_local("0.0.0.0")
+    (True, True, False)
+    """
+    if host == "localhost":
+        return True
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host).is_loopback
+    return False
+
+
+def serve(
+    fleet: Fleet, archive: Archive, listener: socket.socket, host: str, end_s: float | None = None
+) -> None:
+    """Serve the pages until interrupted, or for `end_s` seconds.
+
+    Notes on runs can be written from this computer alone. A page of a stranger in the same browser
+    reaches nothing here: other names of this host are refused.
+    """
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    local = is_local(host)
+    if local:
+        names = ["127.0.0.1", "localhost", "[::1]", host]
+        app.add_middleware(TrustedHostMiddleware, allowed_hosts=names)
+    _files(app)
+    _pages(fleet, archive, with_notes=local)
+    ui.run_with(
+        app, title="ilc-rt", dark=None, tailwind=False, reconnect_timeout=RECONNECT_S,
+        show_welcome_message=False,
+    )  # fmt: skip
+    server = uvicorn.Server(
+        uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, ws="wsproto")
+    )
+    if end_s is not None:
+        timer = threading.Timer(end_s, lambda: setattr(server, "should_exit", True))
+        timer.daemon = True
+        timer.start()
+    server.run(sockets=[listener])
+
+
+def _files(app: FastAPI) -> None:
+    charts = Path(nicegui.__file__).parent / "elements" / "echart" / "dist"
+    app.mount("/echarts", StaticFiles(directory=charts))
+
+    @app.get("/dashboard/colours.css")
+    def _colours() -> Response:
+        return Response(colours(), media_type="text/css")
+
+    @app.get("/dashboard/{name}")
+    def _file(name: str) -> Response:
+        if name not in KINDS:
+            return Response(status_code=404)
+        return Response(text_of(name), media_type=KINDS[name])
+
+
+def _pages(fleet: Fleet, archive: Archive, *, with_notes: bool) -> None:
+    @ui.page("/")
+    def _overview() -> None:
+        build_overview(fleet)
+
+    @ui.page("/cell/{name}")
+    def _cell(name: str) -> None:
+        build_cell(fleet, archive, name)
+
+    @ui.page("/library")
+    def _library() -> None:
+        build_library(fleet, archive, with_notes=with_notes)
