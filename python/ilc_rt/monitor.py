@@ -229,6 +229,9 @@ def _message(sample: zenoh.Sample) -> Message | None:
         return None
     if not isinstance(payload, dict):
         return None
+    if topic == "servo":
+        # Servo cycles are no event, and much data: they are not written and read again.
+        return Message(cell, topic, payload)
     try:
         event = parse_event(json.dumps({"event": topic, **payload}))
     except EventError as error:

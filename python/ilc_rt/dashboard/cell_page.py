@@ -66,7 +66,7 @@ class CellView:
         self._fleet, self._archive, self._cell, self._client = fleet, archive, cell, client
         self._epoch = self._mark = -1
         self._live_frame: tuple[Any, ...] = ()
-        self._version = -1
+        self._version = self._runs_version = -1
         self._drawn: object = None
         self._factor = 0
         self._head()
@@ -110,7 +110,9 @@ class CellView:
             self._version = cell.version
             self._log.show(cell)
             self._timing.show(cell, self._client)
-            draw(self._client, "runs", charts.runs(cell))
+            if cell.runs_version != self._runs_version:
+                self._runs_version = cell.runs_version
+                draw(self._client, "runs", charts.runs(cell))
             last = cell.last
             stored = last.index if last is not None else None
             captured = cell.last_run
@@ -154,8 +156,9 @@ class CellView:
                 await asyncio.to_thread(self._archive.capture, cell.name, cell.campaign) or captured
             )
         option, factor = await asyncio.to_thread(charts.contour, cell, shown, self._factor)
+        inputs = await asyncio.to_thread(charts.inputs, cell, shown)
         draw(self._client, "contour", option)
-        draw(self._client, "inputs", charts.inputs(cell, shown))
+        draw(self._client, "inputs", inputs)
         whose = "" if shown is None else f"run {shown.iteration}"
         say(
             self._contour_run,

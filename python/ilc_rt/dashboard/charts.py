@@ -31,7 +31,9 @@ N_COLOURS = 7
 TIMES = "\N{MULTIPLICATION SIGN}"
 #: A second sign of each line besides its colour.
 DASHES = ("solid", "dashed", "dotted")
-POINTS_MAX = 2_000
+POINTS_MAX = 4_000
+#: Of each axis in a chart of the last run.
+RUN_POINTS_MAX = 800
 #: Factors of the deviation that the page offers; 0 is a suitable one.
 FACTORS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 GRID = {"left": 58, "right": 14, "top": 30, "bottom": 34}
@@ -109,7 +111,7 @@ def contour(cell: CellModel, run: Capture | None, factor: int = 0) -> tuple[Opti
         return option, factor
     good = np.isfinite(run.reference_m[:, linear]).all(axis=1)
     good &= np.isfinite(run.measured_m[:, linear]).all(axis=1)
-    stride = max(1, int(good.sum()) // (2 * POINTS_MAX))
+    stride = max(1, int(good.sum()) // POINTS_MAX)
     reference = run.reference_m[good][::stride][:, linear]
     if len(reference) < 2:
         return option, factor
@@ -136,14 +138,14 @@ def inputs(cell: CellModel, run: Capture | None) -> Option:
     option = frame("s", "")
     if run is None or not cell.cycle_s or run.n_axes != cell.n_axes:
         return option
-    time_s = np.arange(run.n_samples) * cell.cycle_s
+    time_s: Array = np.arange(run.n_samples, dtype=np.float64) * cell.cycle_s
     sizes = [_largest(run.input[:, axis]) for axis in range(run.n_axes)]
     units = live_units(cell, "input", sizes)
     option["series"] = [
         line(
             f"{name} {unit.symbol}",
             axis,
-            thinned(time_s, run.input[:, axis], unit.scale),
+            thinned(time_s, run.input[:, axis], unit.scale, RUN_POINTS_MAX),
         )
         for axis, (name, unit) in enumerate(zip(cell.axis_names, units, strict=True))
     ]
@@ -218,7 +220,7 @@ def frame(x_name: str, y_name: str) -> Option:
         "aria": {"enabled": False},
         "grid": dict(GRID),
         "legend": {
-            "type": "scroll", "top": 0, "left": 52, "right": 8, "itemWidth": 18, "itemHeight": 8,
+            "type": "scroll", "top": 0, "left": 66, "right": 8, "itemWidth": 18, "itemHeight": 8,
             "textStyle": {"color": "$ink", "fontSize": 11}, "pageTextStyle": {"color": "$ink"},
             "pageIconColor": "$ink",
         },
@@ -244,30 +246,26 @@ def line(name: str, number: int, data: list[Any], *, symbol: bool = False) -> Op
     }  # fmt: skip
 
 
-def thinned(time_s: Array, values: Array, scale: float = 1.0) -> list[list[float | None]]:
-    """Return points of a line, at most `POINTS_MAX`: minimum and maximum of each span if more.
-
-    Values are multiplied by `scale`.
-    """
-    if len(values) <= POINTS_MAX:
+def thinned(
+    time_s: Array, values: Array, scale: float = 1.0, n_max: int = POINTS_MAX
+) -> list[list[float | None]]:
+    """Return points of a line, values times `scale`: minimum and maximum of each span if many."""
+    if len(values) <= n_max:
         return _pairs(np.column_stack((time_s, values * scale)))
-    starts = np.linspace(0, len(values), POINTS_MAX // 2, endpoint=False).astype(int)
-    chosen: list[int] = []
-    for start, end in zip(starts, [*starts[1:], len(values)], strict=True):
-        part = values[start:end]
-        if np.isfinite(part).any():
-            places = {start + int(np.nanargmin(part)), start + int(np.nanargmax(part))}
-            chosen += sorted(places)
-        else:
-            chosen.append(int(start))
-    return _pairs(np.column_stack((time_s[chosen], values[chosen] * scale)))
+    starts = np.linspace(0, len(values), n_max // 2, endpoint=False).astype(np.intp)
+    middles = (starts + np.append(starts[1:], len(values))) // 2
+    points = np.empty((2 * len(starts), 2))
+    points[0::2, 0], points[1::2, 0] = time_s[starts], time_s[middles]
+    points[0::2, 1] = np.fmin.reduceat(values, starts) * scale
+    points[1::2, 1] = np.fmax.reduceat(values, starts) * scale
+    return _pairs(points)
 
 
 def _axis(name: str) -> Option:
     return {
         "type": "value", "name": name,
         "nameTextStyle": {"color": "$ticks", "fontSize": 11, "align": "right"},
-        "axisLine": {"show": True, "lineStyle": {"color": "$edge"}},
+        "axisLine": {"show": True, "onZero": False, "lineStyle": {"color": "$edge"}},
         "axisLabel": {"color": "$ticks", "fontSize": 11, "hideOverlap": True},
         "splitLine": {"lineStyle": {"color": "$grid"}},
     }  # fmt: skip
@@ -284,6 +282,7 @@ def _largest(values: Array) -> float:
 
 
 def _pairs(points: Array) -> list[list[float | None]]:
-    return [
-        [None if value != value else value for value in row] for row in np.round(points, 5).tolist()
-    ]
+    rows: list[list[float | None]] = np.round(points, 5).tolist()
+    if np.isnan(points).any():
+        return [[None if value != value else value for value in row] for row in rows]
+    return rows

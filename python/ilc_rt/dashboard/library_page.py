@@ -7,33 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from ilc_rt.comparison import note
 from ilc_rt.dashboard import charts
 from ilc_rt.dashboard.archive import distance, relevance
 from ilc_rt.dashboard.frame import chart, draw, page_frame, panel, say, tag, text
+from ilc_rt.dashboard.library_table import RunLine, key_of, runs_table
 from ilc_rt.dashboard.notes import name_of, read_notes, write_note
 from ilc_rt.errors import BadInputError
-from ilc_rt.quantity import axis_unit, unit_for
-from ilc_rt.record import IterationRecord
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
     from nicegui import Client
-    from nicegui.element import Element
 
     from ilc_rt.dashboard.archive import Archive
+    from ilc_rt.dashboard.library_table import Key
     from ilc_rt.dashboard.model import Fleet
-
-    Key = tuple[int, int]
 
 SHOWN_MAX = 300
 CHOSEN_MAX = 8
 REFRESH_S = 2.0
-COLUMNS = (
-    "", "run", "campaign", "cell", "law", "max tracking", "max contour", "distance", "relevance",
-    "outcome", "note",
-)  # fmt: skip
-TEXTS = ("campaign", "cell", "law", "outcome", "note")
 SIGNALS = {"error": "Tracking error", "command": "Set point", "input": "Learned input"}
 
 
@@ -61,6 +52,7 @@ class LibraryView:
         self._rows: list[dict[str, Any]] = []
         self._notes: dict[int, dict[str, str]] = {}
         self._state: object = None
+        self._lines: dict[Key, RunLine] = {}
         with tag("div", "grid"):
             self._build()
 
@@ -91,13 +83,7 @@ class LibraryView:
                     "input", self._search, js_handler="(e) => emit(e.target.value)", throttle=0.3
                 )
             self._told = text("", "quiet", "told")
-            with tag("div", "runs-table", tabindex="0"), tag("table", "plain-table"):
-                with tag("thead"), tag("tr"):
-                    for column in COLUMNS:
-                        kind = "text" if column in TEXTS else ""
-                        with tag("th", kind, scope="col"):
-                            text(column or "compare")
-                self._body = tag("tbody")
+            self._body = runs_table()
         with panel("Comparison", "full") as head:
             self._which = text("Choose runs above: they are laid over each other here.", "quiet")
             with head, tag("div", "controls end"):
@@ -106,6 +92,8 @@ class LibraryView:
                 self._axes = tag("select", aria_label="Axis that is compared")
                 self._axes.on("change", self._choose_axis, js_handler="(e) => emit(e.target.value)")
             for what, title in SIGNALS.items():
+                with tag("h3", "quiet"):
+                    text(title)
                 chart(f"compare-{what}", f"{title} of the chosen runs over a common time")
         with panel("Note", "full"):
             self._note_of = text("Choose one run to read or write its note.", "quiet")
@@ -119,56 +107,34 @@ class LibraryView:
                 self._note.props["readonly"] = True
 
     def _show(self) -> None:
-        wanted = [row for row in self._rows if self._matches(row)]
-        newest = self._rows[-1] if self._rows else {}
-        shares = dict(
-            zip(map(_key, wanted), relevance(wanted, newest), strict=True) if wanted else ()
-        )
-        shown = wanted[-SHOWN_MAX:][::-1]
+        """Show the wanted runs, newest first; lines that are there stay: no click is lost."""
+        wanted = sorted((row for row in self._rows if self._matches(row)), key=_made)
+        newest = max(self._rows, key=_made, default={})
+        shares = relevance(wanted, newest)
         told = f"{len(wanted)} of {len(self._rows)} runs"
         told += f", the newest {SHOWN_MAX} shown" if len(wanted) > SHOWN_MAX else ""
         say(self._told, told if self._rows else "The library has no runs yet.")
-        self._body.clear()
-        with self._body:
-            for row in shown:
-                self._line(row, newest, shares[_key(row)])
+        shown = {key_of(row): (row, share) for row, share in zip(wanted, shares, strict=True)}
+        shown = dict(list(shown.items())[-SHOWN_MAX:])
+        for key in [key for key in self._lines if key not in shown]:
+            self._lines.pop(key).line.delete()
+        for place, (key, (row, share)) in enumerate(reversed(shown.items())):
+            if key not in self._lines:
+                with self._body:
+                    self._lines[key] = RunLine(row, self._choose, key, chosen=key in self._chosen)
+                self._lines[key].line.move(self._body, target_index=place)
+            self._lines[key].show(distance(row, newest), share, self._note_on(row))
 
-    def _line(self, row: dict[str, Any], newest: dict[str, Any], share: float) -> None:
-        key = _key(row)
-        record = IterationRecord.from_row(row, "")
-        base = axis_unit(str(row["input_units"][0])) if row["input_units"] else "m"
-        away = distance(row, newest)
-        cells = (
-            str(row["index"]), str(row["campaign"]), str(row["cell"]), str(row["law"]),
-            unit_for(base, row["tracking_inf_m"]).text(row["tracking_inf_m"]),
-            unit_for("m", row["contour_inf_m"]).text(row["contour_inf_m"]),
-            "-" if away is None else f"{away:.3g}",
-            f"{100.0 * share:.2g} %",
-            note(record), self._note_on(row),
-        )  # fmt: skip
-        with tag("tr", aria_selected="true" if key in self._chosen else "false") as line:
-            with tag("td"):
-                box = tag("input", type="checkbox")
-                box.props["aria-label"] = f"Compare run {row['index']} of {row['campaign']}"
-                box.props["data-run"] = f"{key[0]}-{key[1]}"
-                box.props["checked"] = key in self._chosen
-                box.on(
-                    "change",
-                    lambda event, key=key, line=line: self._choose(key, line, bool(event.args)),
-                    js_handler="(e) => emit(e.target.checked)",
-                )
-            for column, cell in zip(COLUMNS[1:], cells, strict=True):
-                with tag("td", "text" if column in TEXTS else ""):
-                    text(printable(cell, 60))
-
-    async def _choose(self, key: Key, line: Element, chosen: bool) -> None:  # noqa: FBT001
+    async def _choose(self, key: Key, *, chosen: bool) -> None:
+        before = list(self._chosen)
+        self._chosen.pop(key, None)
         if chosen:
             self._chosen[key] = None
             while len(self._chosen) > CHOSEN_MAX:
                 del self._chosen[next(iter(self._chosen))]
-        else:
-            self._chosen.pop(key, None)
-        line.props["aria-selected"] = "true" if chosen else "false"
+        for changed in {*before, key}:
+            if changed in self._lines:
+                self._lines[changed].mark(chosen=changed in self._chosen)
         self._show_note()
         await self._compare()
 
@@ -213,7 +179,7 @@ class LibraryView:
     def _one(self) -> dict[str, Any] | None:
         """Return the run whose note is shown: the one that was chosen last."""
         key = next(reversed(self._chosen), None)
-        return next((row for row in self._rows if _key(row) == key), None)
+        return next((row for row in self._rows if key_of(row) == key), None)
 
     def _show_note(self) -> None:
         row = self._one()
@@ -240,5 +206,5 @@ class LibraryView:
         await self.refresh()
 
 
-def _key(row: dict[str, Any]) -> Key:
-    return int(row["library"]), int(row["id"])
+def _made(row: dict[str, Any]) -> tuple[str, int]:
+    return str(row["created_utc"]), int(row["id"])

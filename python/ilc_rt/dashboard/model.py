@@ -14,7 +14,7 @@ import numpy as np
 
 from ilc_rt.dashboard.capture import Capture
 from ilc_rt.dashboard.status import Status, status_of
-from ilc_rt.dashboard.window import WINDOW_S, Window
+from ilc_rt.dashboard.window import N_BUCKETS, WINDOW_S, Window
 from ilc_rt.events import (
     DriftEvent,
     EndEvent,
@@ -88,8 +88,8 @@ class CellModel:
         Counts the windows: a page that holds an older one begins again.
     last_run : Capture or None
         Signals of the newest run that was heard to its end.
-    version : int
-        Changes with everything but the window.
+    version, runs_version : int
+        Change with everything but the window, the state and the progress; with the runs.
     """
 
     def __init__(self, name: str) -> None:
@@ -119,7 +119,7 @@ class CellModel:
         self.epoch = 0
         self.last_run: Capture | None = None
         self.now: Array | None = None
-        self.version = 0
+        self.version = self.runs_version = 0
         self.is_alive = False
         self.seen_s: float | None = None
         self.gone_s: float | None = None
@@ -149,6 +149,7 @@ class CellModel:
             self.campaign = str(newest["campaign"])
         known = {int(row["index"]): IterationRecord.from_row(row, library) for row in rows}
         self.runs = dict(sorted({**known, **self.runs}.items())[-RUNS_MAX:])
+        self.runs_version += 1
         self.version += 1
 
     def apply(self, message: Message, now_s: float, clock_s: float) -> None:
@@ -165,7 +166,8 @@ class CellModel:
         elif message.warning is not None:
             self._say(clock_s, "warn", message.warning)
         self._event(message.event, clock_s)
-        self.version += 1
+        if not isinstance(message.event, (ProgressEvent, StateEvent)):
+            self.version += 1
 
     def status(self, now_s: float) -> Status:
         """Return the state in words, with its level."""
@@ -253,6 +255,7 @@ class CellModel:
     def _begin(self, event: StartEvent, clock_s: float) -> None:
         if event.campaign != self.campaign:
             self.runs.clear()
+            self.runs_version += 1
         self.start = event
         self.axis_names = tuple(printable(name, 40) for name in event.axis_names[:AXES_MAX])
         self.input_units = event.input_units[:AXES_MAX] or ("m",) * len(self.axis_names)
@@ -262,7 +265,7 @@ class CellModel:
         self.iterations = event.iterations
         self.state = self.iteration = self.progress = None
         self.fault = self.end = self.latency = self.late = self.window = None
-        self._capture = None
+        self._capture = self.last_run = None
         self.n_late = 0
         self._say(clock_s, "info", f"campaign {event.campaign} begins")
 
@@ -272,6 +275,7 @@ class CellModel:
             # Another campaign, whose start was missed.
             self.runs.clear()
         self.runs[event.index] = IterationRecord.from_event(event, "")
+        self.runs_version += 1
         while len(self.runs) > RUNS_MAX:
             del self.runs[next(iter(self.runs))]
         self._end_capture()
@@ -287,6 +291,7 @@ class CellModel:
                 "remark": event.remark,
             }
             self.runs[event.index] = IterationRecord(library="", **values)
+            self.runs_version += 1
         if event.remark:
             self._say(clock_s, "warn", f"run {event.index}: {event.remark}")
 
@@ -314,7 +319,7 @@ class CellModel:
             measured = np.where(np.isfinite(tool), tool, encoder)
         error = reference - measured
         if self.window is None or first < self._next or self.window.n_signals != 3 * shape[1]:
-            span = round(WINDOW_S / 400 / self.cycle_s)
+            span = round(WINDOW_S / N_BUCKETS / self.cycle_s)
             self.window, self.epoch = Window(3 * shape[1], span), self.epoch + 1
         self._next = first + len(places)
         self.window.extend(first, np.hstack((error, reference, applied)))
@@ -329,12 +334,19 @@ class CellModel:
             if isinstance(place, list) and len(place) == 2 and all(type(n) is int for n in place)
         ]
         for iteration in dict.fromkeys(row[1] for row in rows):
-            if self._capture is None or self._capture.iteration != iteration:
-                self._end_capture()
-                self._capture = Capture(iteration, values.shape[2])
             chosen = [(row, sample) for row, run, sample in rows if run == iteration]
             index = np.array(chosen, dtype=np.intp)
-            self._capture.put(index[:, 1], values[index[:, 0]])
+            self._captured(iteration, values.shape[2]).put(index[:, 1], values[index[:, 0]])
+
+    def _captured(self, iteration: int, n_axes: int) -> Capture:
+        """Return the capture of a run; the last samples may come after the end of the run."""
+        last = self.last_run
+        if self._capture is None and last is not None and last.iteration == iteration:
+            return last
+        if self._capture is None or self._capture.iteration != iteration:
+            self._end_capture()
+            self._capture = Capture(iteration, n_axes)
+        return self._capture
 
     def _end_capture(self) -> None:
         if self._capture is not None and self._capture.is_complete(self.n_samples):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-N_BUCKETS = 400
+N_BUCKETS = 250
 WINDOW_S = 10.0
 
 

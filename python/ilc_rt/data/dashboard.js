@@ -91,6 +91,9 @@ function draw(name, option, attempts = 100) {
 
 // ---- live charts
 
+let pushes = 0;
+let waiting = false;
+const dirty = new Set();
 let ring = null; // {epoch, seconds, length, first, low: [row], high: [row]}
 
 function live(message) {
@@ -112,14 +115,25 @@ function live(message) {
     ring.high.splice(0, excess);
     ring.first += excess;
   }
-  if (document.hidden) return;
+  // Painting waits for the browser: what is out of sight is painted about once a second.
+  pushes += 1;
   for (const [name, part] of Object.entries(message.charts)) {
     const entry = entryOf(name);
     if (!entry || !entry.option) continue;
     entry.live = part;
     const box = entry.element.getBoundingClientRect();
-    if (box.bottom > 0 && box.top < window.innerHeight) paintLive(entry);
+    if (pushes % 20 === 1 || (box.bottom > 0 && box.top < window.innerHeight)) dirty.add(entry);
   }
+  if (dirty.size && !waiting) {
+    waiting = true;
+    requestAnimationFrame(paintDirty);
+  }
+}
+
+function paintDirty() {
+  waiting = false;
+  for (const entry of dirty) paintLive(entry);
+  dirty.clear();
 }
 
 function paintLive(entry) {
@@ -138,7 +152,7 @@ function paintLive(entry) {
     return { data };
   });
   const yAxis = [...new Set(units)].slice(0, 2).map((unit) => ({ name: unit }));
-  entry.chart.setOption({ series, yAxis, xAxis: { min: -ring.length * ring.seconds, max: 0 } }, { lazyUpdate: true });
+  entry.chart.setOption({ series, yAxis, xAxis: { min: -ring.length * ring.seconds, max: 0, axisLabel: { showMinLabel: false } } }, { lazyUpdate: true });
 }
 
 // ---- theme, and loss of the connection
@@ -179,6 +193,7 @@ Object.assign(window.ilc, {
   theme,
   // For tests: what is drawn.
   option: (name) => charts.get(name)?.chart.getOption(),
+  pushes: () => pushes,
 });
 for (const [method, ...values] of queued.splice(0)) window.ilc[method](...values);
 ready();
