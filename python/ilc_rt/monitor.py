@@ -186,6 +186,9 @@ def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
         config.insert_json5("connect/endpoints", json.dumps(list(connect)))
         config.insert_json5("scouting/multicast/enabled", json.dumps(scouting))
         config.insert_json5("listen/endpoints", "[]")
+        # A controller that starts again is heard from its start on, or nearly.
+        retry = {"period_init_ms": 200, "period_max_ms": 1000}
+        config.insert_json5("connect/retry", json.dumps(retry))
         # By default Zenoh skips the loopback interface, which controllers use.
         interfaces = ",".join(name for _, name in socket.if_nameindex())
         config.insert_json5("scouting/multicast/interface", json.dumps(interfaces))

@@ -79,7 +79,7 @@ class Archive:
 
     Parameters
     ----------
-    paths : sequence of pathlib.Path
+    paths : sequence of str or pathlib.Path
         The files; one that does not exist yet has no runs.
 
     Raises
@@ -88,8 +88,8 @@ class Archive:
         If a file is not a library.
     """
 
-    def __init__(self, paths: Sequence[Path] = ()) -> None:
-        self.paths = tuple(paths)
+    def __init__(self, paths: Sequence[str | Path] = ()) -> None:
+        self.paths = tuple(map(Path, paths))
         self._lock = Lock()
         self._rows: dict[int, tuple[object, list[dict[str, Any]]]] = {}
         self._loaded: OrderedDict[tuple[int, int, str], dict[str, Any]] = OrderedDict()

@@ -157,13 +157,16 @@ class CellModel:
         if message.topic == "gone":
             self._leave(now_s, clock_s)
             return
-        self.seen_s, self.gone_s = now_s, None
         if message.topic == "alive":
             self._appear(clock_s)
-        elif message.topic == "servo":
+        self.seen_s, self.gone_s = now_s, None
+        if message.topic == "alive":
+            self.version += 1
+            return
+        if message.topic == "servo":
             self._cycles(message.payload)
             return
-        elif message.warning is not None:
+        if message.warning is not None:
             self._say(clock_s, "warn", message.warning)
         self._event(message.event, clock_s)
         if not isinstance(message.event, (ProgressEvent, StateEvent)):
@@ -197,7 +200,12 @@ class CellModel:
     def _appear(self, clock_s: float) -> None:
         if not self.is_alive and self.gone_s is not None:
             self._say(clock_s, "info", "the controller is back")
+            self._forget()
         self.is_alive = True
+
+    def _forget(self) -> None:
+        """Forget what is of one campaign only; another one has begun, or may have."""
+        self.start = self.campaign = self.iterations = None
 
     def _leave(self, now_s: float, clock_s: float) -> None:
         self.is_alive, self.gone_s = False, now_s
@@ -271,9 +279,10 @@ class CellModel:
 
     def _run(self, event: IterationEvent, clock_s: float) -> None:
         newest = self.last
-        if newest is not None and event.index < newest.index and self.start is None:
+        if newest is not None and event.index <= newest.index and event.digest != newest.digest:
             # Another campaign, whose start was missed.
             self.runs.clear()
+            self._forget()
         self.runs[event.index] = IterationRecord.from_event(event, "")
         self.runs_version += 1
         while len(self.runs) > RUNS_MAX:

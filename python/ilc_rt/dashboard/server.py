@@ -44,6 +44,8 @@ def listen(host: str, port: int) -> socket.socket:
         listener = socket.socket(family, socket.SOCK_STREAM)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
+        # From now on a browser waits for the server instead of being refused.
+        listener.listen(128)
     except OSError as error:
         reason = error.strerror or error
         message = (

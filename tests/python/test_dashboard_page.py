@@ -1,0 +1,240 @@
+"""The dashboard in a headless browser, beside a real controller with simulated drives."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+import socket
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from ports_fixture import free_port
+from processes_fixture import PATIENT, Bench, Process
+
+from ilc_rt import Campaign
+from ilc_rt.dashboard.notes import read_notes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from playwright.sync_api import Browser, Page
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytest.importorskip("nicegui", reason="nicegui is not installed")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this computer"),
+    # One browser, one server and one cell for all of them.
+    pytest.mark.xdist_group("dashboard"),
+    pytest.mark.timeout(300),
+]
+
+#: For a loaded machine; what is waited for comes within a second on an idle one.
+WAIT_MS = 60_000
+TELEMETRY = '\n[telemetry]\nlisten = ["{}"]\nscouting = false\n'
+
+
+class Watched:
+    """A cell, its dashboard, and a browser."""
+
+    def __init__(self, bench: Bench, browser: Browser) -> None:
+        self.bench, self.browser = bench, browser
+        self.endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+        self.port = free_port(socket.SOCK_STREAM)
+        more = PATIENT + TELEMETRY.format(self.endpoint)
+        self.cell = bench.cell(short=True, more=more)
+        # The earlier campaign, of which a late joiner learns from the library.
+        assert len(list(Campaign(self.cell, library=bench.library, bus="loopback:").run(2))) == 2
+        self.dashboard = self.serve()
+
+    def serve(self) -> Process:
+        """Start the dashboard, and wait for its address."""
+        argv = [
+            sys.executable, "-m", "ilc_rt.cli", "dashboard", "gantry", "--port", str(self.port),
+            "--no-scouting", "--connect", self.endpoint, "--library", self.bench.library,
+        ]  # fmt: skip
+        process = Process(argv, self.bench.folder)
+        process.line_with(f"dashboard: http://127.0.0.1:{self.port}")
+        return process
+
+    def run(self, runs: int) -> Process:
+        """Start the controller on the drives, in real time."""
+        argv = ["ilc-rt", "run", self.cell, "--bus", self.bench.bus, "--iterations", str(runs),
+                "--library", self.bench.library, "--events"]  # fmt: skip
+        return self.bench.start(*argv)
+
+    def page(self, path: str, scheme: str = "light", width: int = 1400) -> Page:
+        """Open a page in a browser profile of its own."""
+        context = self.browser.new_context(
+            color_scheme=scheme,  # type: ignore[arg-type]
+            viewport={"width": width, "height": 900},
+        )
+        context.set_default_timeout(WAIT_MS)
+        page = context.new_page()
+        page.goto(f"http://127.0.0.1:{self.port}{path}")
+        return page
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
+    with Bench(tmp_path_factory.mktemp("dashboard")) as bench, sync_api.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        watched = Watched(bench, browser)
+        try:
+            yield watched
+        finally:
+            browser.close()
+            watched.dashboard.signal(signal.SIGTERM)
+            watched.dashboard.end()
+            watched.dashboard.close()
+
+
+def wait(page: Page, name: str, part: str) -> str:
+    """Wait until a named text of the page contains a part, and return it."""
+    label = page.locator(f'[data-name="{name}"]').first
+    sync_api.expect(label).to_contain_text(part, timeout=WAIT_MS)
+    return label.inner_text()
+
+
+def wait_for(page: Page, expression: str) -> None:
+    """Wait until a JavaScript expression of the page is true."""
+    page.wait_for_function(expression, timeout=WAIT_MS)
+
+
+def test_a_card_leads_to_a_cell_that_has_its_history(watched: Watched) -> None:
+    page = watched.page("/")
+    wait(page, "state", "not heard yet")
+    page.click('[data-cell="gantry"]')
+    page.wait_for_url("**/cell/gantry")
+    # Two runs of the library, though no controller has been heard.
+    wait(page, "run", "2 runs")
+    wait_for(page, "ilc.option?.('runs')?.series[0].data.length === 2")
+    wait_for(page, "ilc.option('contour')?.series.length === 2")
+    names = [chart.get_attribute("aria-label") for chart in page.locator("[data-chart]").all()]
+    assert len(names) == 8
+    assert all(names)
+    page.context.close()
+
+
+def test_numbers_change_while_the_cell_runs_and_it_comes_back(watched: Watched) -> None:
+    page = watched.page("/cell/gantry")
+    wait(page, "state", "not heard yet")
+    drives = watched.bench.drives(watched.cell)
+    controller = watched.run(6)
+    wait(page, "state", "▶ running")
+    wait(page, "run", "run ")
+    wait_for(page, "ilc.pushes() > 20")
+    seen = page.evaluate("ilc.option('live-error').series.map(s => s.data.length)")
+    assert len(seen) == 2
+    assert min(seen) > 0
+    position = page.locator('[data-axis="x"] [data-name="position"]')
+    before = position.inner_text()
+    wait_for(
+        page,
+        f"""document.querySelector('[data-axis="x"] [data-name="position"]')
+        .innerText !== {before!r}""",
+    )
+    wait(page, "state", "completed")
+    assert controller.end() == 0
+    wait_for(page, "ilc.option('runs').series[0].data.length === 6")
+    assert "%" in wait(page, "timing", "execution")
+    wait(page, "contour-run", "run 5")
+    # The same page follows the next campaign, and tells when its controller is gone.
+    controller = watched.run(1000)
+    wait(page, "state", "▶ running")
+    wait_for(page, "ilc.option('runs').series[0].data.length < 5")
+    controller.signal(signal.SIGKILL)
+    wait(page, "state", "silent since")
+    controller.close()
+    drives.close()
+    page.context.close()
+
+
+def test_runs_of_two_campaigns_are_compared_on_one_cursor(watched: Watched) -> None:
+    page = watched.page("/library")
+    for key in ("0-1", "0-2"):
+        page.check(f'[data-run="{key}"]')
+    wait_for(page, "ilc.option('compare-error')?.series.length === 2")
+    legend = page.evaluate("ilc.option('compare-input').series.map(s => s.name)")
+    assert legend[0].endswith("run 0")
+    assert legend[1].endswith("run 1")
+    page.fill("textarea.note", "<i>oiled</i>")
+    page.press("textarea.note", "Tab")
+    sync_api.expect(page.locator('tr[aria-selected="true"]').first).to_contain_text("<i>oiled</i>")
+    assert list(read_notes(watched.bench.library).values()) == ["<i>oiled</i>"]
+    page.fill('input[type="search"]', "oiled")
+    sync_api.expect(page.locator("[data-run]")).to_have_count(1)
+    page.context.close()
+
+
+def test_a_phone_has_one_column_and_the_theme_of_its_system(watched: Watched) -> None:
+    page = watched.page("/cell/gantry", scheme="dark", width=390)
+    wait_for(page, "document.body.classList.contains('body--dark')")
+    wait_for(page, "ilc.option?.('runs')?.xAxis[0].axisLabel.color === '#AEB6C2'")
+    lefts = page.evaluate(
+        "[...document.querySelectorAll('.panel')].map(p => p.getBoundingClientRect().left)"
+    )
+    assert len(set(lefts)) == 1
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    # By keyboard alone: the switch follows the ways to the pages.
+    for _ in range(3):
+        page.keyboard.press("Tab")
+    sync_api.expect(page.locator("[data-theme-switch]")).to_be_focused()
+    page.keyboard.press("Enter")
+    wait_for(page, "document.body.classList.contains('body--light')")
+    wait_for(page, "ilc.option('runs').xAxis[0].axisLabel.color === '#5A6068'")
+    page.context.close()
+
+
+def test_a_lost_connection_is_told_and_mended(watched: Watched) -> None:
+    page = watched.page("/cell/gantry")
+    wait(page, "run", "run")
+    watched.dashboard.signal(signal.SIGTERM)
+    assert watched.dashboard.end() == 0, watched.dashboard.errors
+    watched.dashboard.close()
+    sync_api.expect(page.locator("#popup")).to_be_visible(timeout=WAIT_MS)
+    watched.dashboard = watched.serve()
+    sync_api.expect(page.locator("#popup")).to_be_hidden(timeout=WAIT_MS)
+    wait(page, "run", "run")
+    page.context.close()
+
+
+def test_other_names_of_this_host_are_refused(watched: Watched) -> None:
+    """A page of a stranger, whose name resolves to this computer, reaches nothing."""
+    with socket.create_connection(("127.0.0.1", watched.port), timeout=60.0) as client:
+        client.sendall(b"GET / HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n")
+        assert client.recv(64).startswith(b"HTTP/1.1 400 ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--host", "203.0.113.7"], "an own address and a free port are needed"),
+        (["--library", "cell.toml"], "cell.toml"),
+        (["missing.toml"], "missing.toml"),
+    ],
+)
+def test_what_cannot_be_served_is_one_line(arguments: list[str], told: str, tmp_path: Path) -> None:
+    (tmp_path / "cell.toml").write_text("[cell]\n")
+    argv = [sys.executable, "-m", "ilc_rt.cli", "dashboard", "--no-scouting", *arguments]
+    process = Process(argv, tmp_path)
+    try:
+        assert process.end() == 2
+    finally:
+        process.close()
+    assert len(process.errors) == 1
+    assert told in process.errors[0]
+
+
+def test_another_network_is_served_with_a_warning(tmp_path: Path) -> None:
+    argv = [sys.executable, "-m", "ilc_rt.cli", "dashboard", "--no-scouting", "--host", "0.0.0.0",
+            "--port", "0", "--timeout", "0.1"]  # fmt: skip
+    process = Process(argv, tmp_path)
+    try:
+        assert process.end() == 0, process.errors
+    finally:
+        process.close()
+    assert process.errors[0].startswith("anyone on that network can watch")
