@@ -13,7 +13,9 @@ from ilc_rt import BadInputError, Cell, Library
 from ilc_rt.dashboard import charts
 from ilc_rt.dashboard.archive import Archive, distance, relevance
 from ilc_rt.dashboard.capture import Capture
-from ilc_rt.dashboard.model import CellModel, Fleet
+from ilc_rt.dashboard.fleet import Fleet
+from ilc_rt.dashboard.flight import read_flight
+from ilc_rt.dashboard.model import CellModel
 from ilc_rt.dashboard.notes import NOTE_MAX, notes_file, read_notes, write_note
 from ilc_rt.dashboard.status import SILENT_S, SYMBOLS, axis_words, run_words
 from ilc_rt.dashboard.window import Window
@@ -362,3 +364,28 @@ def test_notes_are_kept_beside_the_library(tmp_path: Path) -> None:
     with pytest.raises(BadInputError):
         write_note(library, "c1/3", "not lost")
     assert notes_file(library).read_text() == "[1]"
+
+
+def test_a_flight_record_beside_the_library_tells_who_was_late(tmp_path: Path) -> None:
+    histogram = {"p50": 1.0, "p99": 2.0, "p999": 3.0, "max": 4.0, "bins": [[1.0, 5]]}
+    late = {"tick": 7, "cause": "wake_up", "stages": STAGES, "usual": STAGES | {"wake_us": 12.0}}
+    record = {
+        "cell": "gantry", "campaign": "c1", "stages_us": {"wake": histogram, "send": histogram},
+        "late": {"wake_up": 2, "receive": 1, "missed": 4}, "worst": [late],
+    }  # fmt: skip
+    file = tmp_path / "l.gantry.late.json"
+    file.write_text(json.dumps(record))
+    found = read_flight(tmp_path / "l.db", "gantry")
+    assert found is not None
+    assert (found.n_late, list(found.timing)) == (3, ["wake-up late", "send"])
+    model = CellModel("gantry")
+    model.remember_flight(found)
+    assert model.late is not None
+    assert charts.late_cycle(model)["series"][0]["data"] == [12.0, 2000.0]
+    fed(said(START), model=model)
+    model.remember_flight(found)
+    assert model.late is None, "the record of an earlier run is not that of this one"
+    for text in ("", "[]", '{"late": 3}', json.dumps(record | {"worst": [{}]})):
+        file.write_text(text)
+        assert read_flight(tmp_path / "l.db", "gantry") is None
+    assert read_flight(tmp_path / "l.db", "nobody") is None

@@ -62,6 +62,10 @@ SHORTER = (
     # Long enough for a cell to be missed.
     (r"^ilc bridge (plotjuggler|foxglove)(.*)$", r"ilc bridge \1\2 --timeout 0.2 --no-scouting"),
     (r"^ilc bridge foxglove(.*)$", r"ilc bridge foxglove\1 --port 0"),
+    (
+        r"^ilc dashboard(.*?)(?: --port \d+)?$",
+        r"ilc dashboard\1 --timeout 0.2 --no-scouting --port 0",
+    ),
     (r"--samples \d+", "--samples 2"),
     (r"^ilc sweep(?!.* --iterations)(.*)$", r"ilc sweep\1 --iterations 2"),
     (r"^(ilc library (?:show|export) \S+) \d+", r"\1 1"),

@@ -12,7 +12,7 @@ from ilc_rt.commands.monitor import Connect, Scouting, Timeout  # noqa: TC001 - 
 from ilc_rt.commands.options import DEFAULT_LIBRARY_FILE
 from ilc_rt.dashboard.archive import Archive
 from ilc_rt.dashboard.feed import Feed
-from ilc_rt.dashboard.model import Fleet
+from ilc_rt.dashboard.fleet import Fleet
 from ilc_rt.errors import BadInputError
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ilc_rt.dashboard.capture import Capture
+from ilc_rt.dashboard.flight import FlightRecord, read_flight
 from ilc_rt.errors import BadInputError
 from ilc_rt.library import Library
 from ilc_rt.pictures.aligned import SAME_MIN, shift_of
@@ -154,6 +155,14 @@ class Archive:
         values = np.stack((run["reference_m"], measured, run["input"]), axis=1)
         captured.put(np.arange(len(values)), values)
         return captured
+
+    def flight(self, cell: str, rows: Sequence[dict[str, Any]]) -> FlightRecord | None:
+        """Return the flight record of the campaign of some rows, from beside their library."""
+        for number in {row["library"] for row in rows}:
+            record = read_flight(self.paths[number], cell)
+            if record is not None and record.campaign == rows[-1]["campaign"]:
+                return record
+        return None
 
     def aligned(self, keys: Sequence[tuple[int, int]], axis: int) -> list[StoredRun]:
         """Return runs on the time of the first one, shifted until their references agree."""

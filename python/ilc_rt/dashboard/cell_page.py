@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
     from ilc_rt.dashboard.archive import Archive
     from ilc_rt.dashboard.capture import Capture
-    from ilc_rt.dashboard.model import CellModel, Fleet
+    from ilc_rt.dashboard.fleet import Fleet
+    from ilc_rt.dashboard.model import CellModel
 
 #: 20 updates a second of the signals; texts are read by people.
 LIVE_S = 0.05
@@ -98,7 +99,7 @@ class CellView:
         )  # fmt: skip
 
     async def refresh(self) -> None:
-        """Show texts and tables anew, and the charts if their data has changed."""
+        """Show texts and tables again, and the charts if their data has changed."""
         with self._fleet.lock:
             cell = self._cell
             now_s = time.monotonic()

@@ -9,7 +9,7 @@ from ilc_rt.dashboard import charts
 from ilc_rt.dashboard.frame import chart, draw, level, say, tag, text
 from ilc_rt.dashboard.status import SYMBOLS, axis_words
 from ilc_rt.lateness import late_sentence
-from ilc_rt.quantity import unit_for
+from ilc_rt.quantity import digits, unit_for
 
 if TYPE_CHECKING:
     from nicegui import Client, ui
@@ -75,7 +75,7 @@ class AxisTable:
 
 
 class Log:
-    """What happened, newest first."""
+    """Events of a cell, newest first."""
 
     def __init__(self) -> None:
         self._list = tag("ul", "log", aria_label="Events, newest first", tabindex="0")
@@ -112,20 +112,17 @@ class Timing:
 
     def show(self, cell: CellModel, client: Client) -> None:
         """Show what the loop has reported."""
-        found = cell.latency
-        if found is None:
+        if not cell.timing:
             say(self._words, "Times of the loop come at the end of a campaign in real time.")
         else:
             parts = [
-                f"{name} {one.p50:.3g} µs (median), {one.p99:.3g} (99 %), {one.max:.3g} at most"
-                for name, one in (
-                    ("wake-up late by", found.wake_late_us),
-                    ("execution", found.execution_us),
-                )
+                f"{name} {digits(one.p50)} µs (median), {digits(one.p99)} (99 %), "
+                f"{digits(one.max)} at most"
+                for name, one in cell.timing.items()
             ]
             say(self._words, "; ".join(parts))
             draw(client, "timing", charts.timing(cell))
-        self._place.set_visibility(found is not None)
+        self._place.set_visibility(bool(cell.timing))
         say(
             self._cause,
             "No cycle was late."

@@ -154,17 +154,12 @@ def inputs(cell: CellModel, run: Capture | None) -> Option:
 
 
 def timing(cell: CellModel) -> Option:
-    """Return the histograms of wake-up and execution times of the loop."""
+    """Return the histograms of the times of the loop."""
     option = frame("µs", "cycles")
-    if cell.latency is None:
+    if not cell.timing:
         return option
     option["xAxis"]["type"] = option["yAxis"]["type"] = "log"
-    for number, (name, histogram) in enumerate(
-        (
-            ("wake-up late", cell.latency.wake_late_us),
-            ("execution", cell.latency.execution_us),
-        )
-    ):
+    for number, (name, histogram) in enumerate(cell.timing.items()):
         data = [[max(upper, 0.1), count] for upper, count in histogram.bins if count > 0]
         option["series"].append(
             line(name, number, data, symbol=True)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from ilc_rt.dashboard.archive import Archive
-    from ilc_rt.dashboard.model import Fleet
+    from ilc_rt.dashboard.fleet import Fleet
     from ilc_rt.monitor import Message
 
 TURN_S = 0.5
@@ -79,8 +79,11 @@ class Feed:
         except (BadInputError, OSError):
             # A library that is being made or replaced; the page of the library tells why.
             return
+        flight = self._archive.flight(name, rows)
         with self._fleet.lock:
             cell.remember(rows, "")
+            if flight is not None:
+                cell.remember_flight(flight)
 
 
 def _needs_history(message: Message) -> bool:

@@ -1,4 +1,4 @@
-"""What all pages have: head, way between pages, panels, charts."""
+"""Parts that all pages have: head, way between pages, panels, charts."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def page_frame(here: str) -> Iterator[None]:
             switch = button("Theme: auto", "")
             switch.props["data-theme-switch"] = ""
             switch.on("click", js_handler="() => window.ilc.theme()")
-    with tag("main"):
+    with tag("div", "body"):
         yield
 
 

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from nicegui import Client
 
     from ilc_rt.dashboard.archive import Archive
+    from ilc_rt.dashboard.fleet import Fleet
     from ilc_rt.dashboard.library_table import Key
-    from ilc_rt.dashboard.model import Fleet
 
 SHOWN_MAX = 300
 CHOSEN_MAX = 8

@@ -77,7 +77,7 @@ class RunLine:
     def show(self, away: float | None, share: float, written: str) -> None:
         """Show what changes: distance and relevance to the newest run, and the note."""
         say(self._labels["distance"], "-" if away is None else f"{away:.3g}")
-        say(self._labels["relevance"], f"{100.0 * share:.2g} %")
+        say(self._labels["relevance"], f"{100.0 * share:.1f} %" if share >= 1e-3 else "< 0.1 %")
         say(self._labels["note"], printable(written, NOTE_SHOWN))
 
     def mark(self, *, chosen: bool) -> None:

@@ -1,11 +1,11 @@
-"""State of the cells that are watched, fed with the messages of the monitor.
+"""State of a cell that is watched, fed with the messages of the monitor.
 
-Pure: it knows neither network nor page, and time is an argument. Imported by the feed and the page.
+Pure: it knows neither network nor page, and time is an argument. Imported by the
+fleet of all cells and by the page.
 """
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ilc_rt.dashboard.capture import Capture
+from ilc_rt.dashboard.cycles import AXES_MAX, read_cycles
 from ilc_rt.dashboard.status import Status, status_of
 from ilc_rt.dashboard.window import N_BUCKETS, WINDOW_S, Window
 from ilc_rt.events import (
@@ -40,7 +41,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ilc_rt import Cell
-    from ilc_rt.events import InputState
+    from ilc_rt.dashboard.flight import FlightRecord
+    from ilc_rt.events import Histogram, InputState
     from ilc_rt.lateness import LateCycle
     from ilc_rt.monitor import Message
 
@@ -48,9 +50,6 @@ if TYPE_CHECKING:
 
 RUNS_MAX = 5_000
 NOTICES_MAX = 100
-AXES_MAX = 64
-CYCLES_MAX = 10_000
-CELLS_MAX = 200
 #: Duration of a batch, by which a late joiner knows the cycle.
 BATCH_S = 0.05
 #: Signals of the window, one column per axis each.
@@ -111,7 +110,7 @@ class CellModel:
         self.runs: dict[int, IterationRecord] = {}
         self.fault: FaultEvent | None = None
         self.end: EndEvent | None = None
-        self.latency: LatencyEvent | None = None
+        self.timing: dict[str, Histogram] = {}
         self.late: LateCycle | None = None
         self.n_late = 0
         self.notices: deque[Notice] = deque(maxlen=NOTICES_MAX)
@@ -151,6 +150,12 @@ class CellModel:
         self.runs = dict(sorted({**known, **self.runs}.items())[-RUNS_MAX:])
         self.runs_version += 1
         self.version += 1
+
+    def remember_flight(self, record: FlightRecord) -> None:
+        """Take the timing of the last run in real time, if this campaign has not told its own."""
+        if not self.timing and self.start is None:
+            self.timing, self.late, self.n_late = record.timing, record.worst, record.n_late
+            self.version += 1
 
     def apply(self, message: Message, now_s: float, clock_s: float) -> None:
         """Follow a message; `now_s` is monotonic, `clock_s` the time in seconds since 1970."""
@@ -257,7 +262,10 @@ class CellModel:
             self.late, self.n_late = event, self.n_late + max(1, event.count)
             self._say(clock_s, "warn", f"late: {late_sentence(event)}")
         elif isinstance(event, LatencyEvent):
-            self.latency = event
+            self.timing = {
+                "wake-up late": event.wake_late_us,
+                "execution": event.execution_us,
+            }
             self.late = event.worst or self.late
 
     def _begin(self, event: StartEvent, clock_s: float) -> None:
@@ -272,7 +280,8 @@ class CellModel:
         self.measure, self.law, self.campaign = event.measure, event.law, event.campaign
         self.iterations = event.iterations
         self.state = self.iteration = self.progress = None
-        self.fault = self.end = self.latency = self.late = self.window = None
+        self.fault = self.end = self.late = self.window = None
+        self.timing = {}
         self._capture = self.last_run = None
         self.n_late = 0
         self._say(clock_s, "info", f"campaign {event.campaign} begins")
@@ -306,46 +315,28 @@ class CellModel:
 
     def _cycles(self, batch: dict[str, Any]) -> None:
         """Take a batch of servo cycles; a malformed one is left out."""
-        first, places = batch.get("first_sync"), batch.get("iteration_and_sample")
-        if not isinstance(first, int) or isinstance(first, bool) or not 0 <= first < 2**53:
+        cycles = read_cycles(batch, self.n_axes, self.measure)
+        if cycles is None:
             return
-        if not isinstance(places, list) or not 0 < len(places) <= CYCLES_MAX:
-            return
-        shape = (len(places), self.n_axes or _width(batch.get("reference_m")))
-        if not 0 < shape[1] <= AXES_MAX:
-            return
-        reference, applied = _table(batch, "reference_m", shape), _table(batch, "input", shape)
-        encoder, tool = _table(batch, "encoder_m", shape), _table(batch, "tool_m", shape)
-        if reference is None or encoder is None or applied is None:
-            return
+        n_cycles, n_axes = cycles.reference_m.shape
         if not self.axis_names:
-            self.axis_names = tuple(map(str, range(shape[1])))
-            self.units = self.input_units = ("m",) * shape[1]
+            self.axis_names = tuple(map(str, range(n_axes)))
+            self.units = self.input_units = ("m",) * n_axes
             self.version += 1
-        self.cycle_s = self.cycle_s or BATCH_S / len(places)
-        measured = encoder
-        if tool is not None and self.measure != "encoder":
-            measured = np.where(np.isfinite(tool), tool, encoder)
-        error = reference - measured
-        if self.window is None or first < self._next or self.window.n_signals != 3 * shape[1]:
+        self.cycle_s = self.cycle_s or BATCH_S / n_cycles
+        n_signals = len(SIGNALS) * n_axes
+        window = self.window
+        if window is None or cycles.first < self._next or window.n_signals != n_signals:
             span = round(WINDOW_S / N_BUCKETS / self.cycle_s)
-            self.window, self.epoch = Window(3 * shape[1], span), self.epoch + 1
-        self._next = first + len(places)
-        self.window.extend(first, np.hstack((error, reference, applied)))
-        self.now = np.stack((reference[-1], measured[-1], applied[-1], error[-1]))
-        self._keep(places, np.stack((reference, measured, applied), axis=1))
-
-    def _keep(self, places: list[Any], values: Array) -> None:
-        """Sort the cycles of runs into the captured run."""
-        rows = [
-            (row, place[0], place[1])
-            for row, place in enumerate(places)
-            if isinstance(place, list) and len(place) == 2 and all(type(n) is int for n in place)
-        ]
-        for iteration in dict.fromkeys(row[1] for row in rows):
-            chosen = [(row, sample) for row, run, sample in rows if run == iteration]
-            index = np.array(chosen, dtype=np.intp)
-            self._captured(iteration, values.shape[2]).put(index[:, 1], values[index[:, 0]])
+            window, self.epoch = Window(n_signals, span), self.epoch + 1
+            self.window = window
+        self._next = cycles.first + n_cycles
+        error = cycles.error_m
+        window.extend(cycles.first, np.hstack((error, cycles.reference_m, cycles.input)))
+        values = np.stack((cycles.reference_m, cycles.measured_m, cycles.input), axis=1)
+        self.now = np.vstack((values[-1], error[-1:]))
+        for iteration, found in cycles.samples().items():
+            self._captured(iteration, n_axes).put(found[:, 1], values[found[:, 0]])
 
     def _captured(self, iteration: int, n_axes: int) -> Capture:
         """Return the capture of a run; the last samples may come after the end of the run."""
@@ -362,46 +353,3 @@ class CellModel:
             self.last_run = self._capture
             self._capture = None
             self.version += 1
-
-
-class Fleet:
-    """All cells that are watched; hold `lock` while reading.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names of the cells; none for every cell that is heard.
-    """
-
-    def __init__(self, names: Iterable[str] = ()) -> None:
-        self.lock = threading.Lock()
-        self.wanted = tuple(names)
-        self.cells: dict[str, CellModel] = {name: CellModel(name) for name in self.wanted}
-        #: Messages that the feed has dropped, as they came too fast.
-        self.lost = 0
-
-    def apply(self, message: Message, now_s: float, clock_s: float) -> None:
-        """Follow a message of any cell."""
-        with self.lock:
-            cell = self.cells.get(message.cell)
-            if cell is None:
-                if self.wanted or len(self.cells) >= CELLS_MAX:
-                    return
-                cell = self.cells[message.cell] = CellModel(message.cell)
-            cell.apply(message, now_s, clock_s)
-
-
-def _width(rows: object) -> int:
-    return len(rows[0]) if isinstance(rows, list) and rows and isinstance(rows[0], list) else 0
-
-
-def _table(batch: dict[str, Any], key: str, shape: tuple[int, int]) -> Array | None:
-    """Return a published table, with NaN for a missing value; None if it is none of this shape."""
-    try:
-        table = np.array(batch.get(key), dtype=np.float64)
-    except (OverflowError, TypeError, ValueError):
-        return None
-    if table.shape != shape:
-        return None
-    table[~np.isfinite(table)] = np.nan
-    return table

@@ -15,7 +15,8 @@ from ilc_rt.quantity import signed
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
-    from ilc_rt.dashboard.model import CellModel, Fleet
+    from ilc_rt.dashboard.fleet import Fleet
+    from ilc_rt.dashboard.model import CellModel
 
 REFRESH_S = 0.25
 

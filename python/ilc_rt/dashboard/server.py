@@ -24,7 +24,7 @@ from ilc_rt.errors import BadInputError
 
 if TYPE_CHECKING:
     from ilc_rt.dashboard.archive import Archive
-    from ilc_rt.dashboard.model import Fleet
+    from ilc_rt.dashboard.fleet import Fleet
 
 KINDS = {"dashboard.js": "text/javascript", "dashboard.css": "text/css"}
 #: Seconds for which a browser that has lost its connection may come back to its page.
