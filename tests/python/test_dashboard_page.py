@@ -87,8 +87,6 @@ def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watched]:
             yield watched
         finally:
             browser.close()
-            watched.dashboard.signal(signal.SIGTERM)
-            watched.dashboard.end()
             watched.dashboard.close()
 
 
@@ -193,7 +191,7 @@ def test_a_lost_connection_is_told_and_mended(watched: Watched) -> None:
     page = watched.page("/cell/gantry")
     wait(page, "run", "run")
     watched.dashboard.signal(signal.SIGTERM)
-    assert watched.dashboard.end() == 0, watched.dashboard.errors
+    assert watched.dashboard.end() == 128 + signal.SIGTERM, watched.dashboard.errors
     watched.dashboard.close()
     sync_api.expect(page.locator("#popup")).to_be_visible(timeout=WAIT_MS)
     watched.dashboard = watched.serve()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ipaddress
+import signal
 import socket
 import threading
 from pathlib import Path
@@ -23,6 +24,9 @@ from ilc_rt.dashboard.overview import build_overview
 from ilc_rt.errors import BadInputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
     from ilc_rt.dashboard.archive import Archive
     from ilc_rt.dashboard.fleet import Fleet
 
@@ -89,7 +93,7 @@ def serve(
         app, title="ilc-rt", dark=None, tailwind=False, reconnect_timeout=RECONNECT_S,
         show_welcome_message=False,
     )  # fmt: skip
-    server = uvicorn.Server(
+    server = _Server(
         uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1, ws="wsproto")
     )
     if end_s is not None:
@@ -97,6 +101,34 @@ def serve(
         timer.daemon = True
         timer.start()
     server.run(sockets=[listener])
+    if server.stopped_by == signal.SIGINT:
+        raise KeyboardInterrupt
+    if server.stopped_by is not None:
+        raise SystemExit(128 + server.stopped_by)
+
+
+class _Server(uvicorn.Server):
+    """A server that ends at a signal and leaves the rest to its caller.
+
+    That of uvicorn raises the signal again, which would end the process before it has left the
+    network of the cells.
+    """
+
+    stopped_by: int | None = None
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Take signals while serving."""
+        before = {n: signal.signal(n, self._stop) for n in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _stop(self, number: int, frame: FrameType | None) -> None:
+        self.stopped_by = number
+        self.handle_exit(number, frame)
 
 
 def _files(app: FastAPI) -> None:
