@@ -5,24 +5,22 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from rich.console import Console, Group
+from rich.console import Console
 from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn
 from rich.text import Text
 
 from ilc_rt.events import (
     DriftEvent,
     EndEvent,
-    FaultEvent,
     IterationEvent,
     JudgedEvent,
-    ProgressEvent,
     StartEvent,
-    StateEvent,
 )
-from ilc_rt.result import UNTIL_STOPPED
 from ilc_rt.table import headings, plain_line, run_cells, runs_table
+from ilc_rt.terminal import CellView
 from ilc_rt.text import printable
+from ilc_rt.watched import WatchedCell
+from ilc_rt.wording import WORDS, describe, drift
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -33,79 +31,38 @@ if TYPE_CHECKING:
     from ilc_rt.events import Event
     from ilc_rt.result import CampaignResult
 
+__all__ = ["WORDS", "CampaignView", "describe", "drift", "is_live"]
+
 # Number of remarks below the table in a terminal: the newest ones.
 REMARKS_SHOWN = 8
-WORDS = {
-    "bringing_up": "bringing the drives up",
-    "homing": "homing",
-    "enabling": "switching the drives on",
-    "returning": "returning to the start",
-    "settling": "settling at the start",
-    "waiting": "waiting for its start",
-    "running": "running",
-    "paused": "held on the path",
-    "stopping": "stopping the axes",
-    "stopped": "at rest",
-}
+DRAWN_PER_SECOND = 10
 
 
-def describe(start: StartEvent) -> str:
-    """Return one line on the coming campaign and its bus."""
-    clock = "real time" if start.mode == "realtime" else "lock-step"
-    seconds = start.n_samples * start.cycle_s
-    axes = f"{start.n_axes} {'axis' if start.n_axes == 1 else 'axes'}"
-    learns = {
-        "none": "nothing is learned",
-        "frozen": f"frozen input, watched at the {start.measure}",
-    }.get(start.law, f"{start.law} learns from {start.measure}")
-    return printable(
-        f"{start.cell}: {axes}, {seconds:.2f} s a run at {start.cycle_s * 1e3:g} ms, "
-        f"{learns}, {start.bus}, {clock}"
-    )
-
-
-def drift(event: DriftEvent) -> str:
-    """Return one line on a frozen input that does not fit any more.
-
-    Examples
-    --------
-    >>> drift(DriftEvent(7, 1.5, "run 3 of campaign c", 2.0))
-    'drift: the error of run 7 is 2.00 times that of run 3 of campaign c, 1.5 is allowed'
-    """
-    times = "beyond" if event.ratio is None else f"{event.ratio:.2f} times"
-    line = f"drift: the error of run {event.index} is {times} that of {event.origin}"
-    again = (
-        f"; learning starts again from its input, in campaign {event.relearned_in}"
-        if event.relearned_in
-        else ""
-    )
-    return f"{line}, {event.allowed:g} is allowed{again}"
+def is_live(console: Console) -> bool:
+    """Return whether a console can be drawn over: a terminal that moves its cursor."""
+    return console.is_terminal and not console.is_dumb_terminal
 
 
 class CampaignView:
-    """A growing table and a progress bar; plain lines if not a terminal."""
+    """The view of the monitor while it runs, then the table; plain lines if not a terminal."""
 
     def __init__(self, console: Console | None = None) -> None:
         # Names may contain brackets and colons: nothing printed is markup.
         self._console = console or Console(highlight=False, markup=False, emoji=False)
         self._live: Live | None = None
-        self._bar = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(bar_width=36),
-            TextColumn("{task.percentage:3.0f} %"),
-            console=self._console,
-        )
-        self._task = self._bar.add_task("starting", total=1.0)
-        self._runs = 0
+        self._cell = WatchedCell("cell")
         self._names: tuple[str, ...] = ()
         # Number of the newest run whose remark was printed.
         self._remarked = -1
 
     def __enter__(self) -> Self:
         """Start drawing."""
-        if self._console.is_terminal:
-            self._live = Live(console=self._console, refresh_per_second=10, transient=True)
-            self._live.start()
+        if is_live(self._console):
+            # Drawn on demand, as events arrive ten times a second; nothing else reads the state.
+            self._live = Live(
+                Text("starting"), console=self._console, auto_refresh=False, transient=True
+            )
+            self._live.start(refresh=True)
         return self
 
     def __exit__(
@@ -121,36 +78,32 @@ class CampaignView:
     def show(self, event: Event, result: CampaignResult) -> None:
         """Show one event; `result` has handled it already."""
         if isinstance(event, StartEvent):
-            self._runs = 0 if event.iterations == UNTIL_STOPPED else event.iterations
-            self._console.print(describe(event), soft_wrap=True)
-            if event.ctl:
-                self._console.print(f"control: {printable(event.ctl)}", soft_wrap=True)
-            for note in event.rt.notes if event.rt else ():
-                said = f"note: {printable(note)}"
-                self._console.print(said, style="yellow", soft_wrap=True)
-        elif isinstance(event, StateEvent):
-            words = WORDS.get(event.state, printable(event.state.replace("_", " ")))
-            index = event.iteration
-            if index is None or index >= self._runs > 0:
-                run = ""  # the return after the last run
-            else:
-                run = f"run {index}" + (f" ({index + 1} of {self._runs}): " if self._runs else ": ")
-            self._bar.reset(self._task, description=run + words)
-        elif isinstance(event, ProgressEvent):
-            self._bar.update(self._task, completed=event.sample / max(1, event.n_samples))
-        elif isinstance(event, DriftEvent):
+            self._begin(event, result)
+        else:
+            self._cell.see(event)
+        if isinstance(event, DriftEvent) and self._live is None:
             self._console.print(printable(drift(event)), style="yellow", soft_wrap=True)
-        elif isinstance(event, FaultEvent):
-            self._bar.update(self._task, description="fault: stopping the axes")
         elif isinstance(event, EndEvent):
             self._finish(result)
-            return
-        if self._live is not None:
-            self._live.update(Group(*_table(result), self._bar))
+        elif self._live is not None:
+            self._live.update(CellView(self._cell), refresh=True)
         elif isinstance(event, IterationEvent):
             self._print_plain(result)
         elif isinstance(event, JudgedEvent):
             self._print_remarks(result)
+
+    def _begin(self, event: StartEvent, result: CampaignResult) -> None:
+        self._console.print(describe(event), soft_wrap=True)
+        if event.ctl:
+            self._console.print(f"control: {printable(event.ctl)}", soft_wrap=True)
+        for note in event.rt.notes if event.rt else ():
+            said = f"note: {printable(note)}"
+            self._console.print(said, style="yellow", soft_wrap=True)
+        self._cell.name = event.cell
+        self._cell.see(event)
+        # Printed above already, and they stay there.
+        self._cell.notes.clear()
+        self._cell.recall(result.records)
 
     def _print_plain(self, result: CampaignResult) -> None:
         comparison = result.comparison
@@ -178,6 +131,9 @@ class CampaignView:
             self._live = None
             for part in _table(result):
                 self._console.print(part)
+            for note in self._cell.notes:
+                if note.text.startswith("drift:"):
+                    self._console.print(Text(note.text, style="yellow"), soft_wrap=True)
 
 
 def _table(result: CampaignResult) -> list[RenderableType]:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 # Minimum widths of columns, so that the layout stays fixed while runs arrive.
 WIDTHS = {"run": 3, "change": 8, "overruns": 8, "learning ms": 8}
 ERROR_WIDTH = 8
+# Widths of a terminal below which columns are left out.
+WIDE, NARROW = 104, 60
 
 
 def headings(comparison: Comparison) -> tuple[str, ...]:
@@ -41,19 +43,43 @@ def run_cells(comparison: Comparison, record: IterationRecord) -> tuple[str, ...
     )
 
 
-def runs_table(comparison: Comparison) -> Table:
-    """Return a table with one row per run."""
+def runs_table(
+    comparison: Comparison, *, newest: int | None = None, width: int | None = None
+) -> Table:
+    """Return a table with one row per run.
+
+    `newest` limits it to the first run and the last ones, `width` to the columns that fit so many
+    characters: always the compared error, its change and the outcome.
+    """
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in headings(comparison):
+    names = headings(comparison)
+    kept = _fitting(comparison, names, width)
+    for name in (names[k] for k in kept):
         if name:
-            table.add_column(name, justify="right", min_width=WIDTHS.get(name, ERROR_WIDTH))
-        elif any(map(note, comparison.records)):
-            table.add_column(name)
-    width = len(table.columns)
-    for record in comparison.records:
+            least = WIDTHS.get(name, ERROR_WIDTH) if width is None or width >= WIDE else None
+            table.add_column(name, justify="right", min_width=least)
+        else:
+            table.add_column(name, no_wrap=width is not None)
+    records = comparison.records
+    if newest is not None and len(records) > newest:
+        records = [records[0], *records[len(records) - newest + 1 :]]
+    for record in records:
         style = "yellow" if record.rolled_back else ""
-        table.add_row(*run_cells(comparison, record)[:width], style=style)
+        cells = run_cells(comparison, record)
+        table.add_row(*(cells[k] for k in kept), style=style)
     return table
+
+
+def _fitting(comparison: Comparison, names: Sequence[str], width: int | None) -> list[int]:
+    """Return the columns that are shown at a width."""
+    kept = [k for k, name in enumerate(names) if name or any(map(note, comparison.records))]
+    if width is not None and width < WIDE:
+        kept = [k for k in kept if not names[k].startswith(("RMS", "learning"))]
+    if width is not None and width < NARROW:
+        what = "max contour" if comparison.by_contour else "max tracking"
+        error = next(k for k, name in enumerate(names) if name.startswith(what))
+        kept = [k for k in kept if k == error or names[k] in {"run", "change", ""}]
+    return kept
 
 
 def plain_line(cells: Sequence[str], names: Sequence[str]) -> str:

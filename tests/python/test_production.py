@@ -9,7 +9,7 @@ import pytest
 
 from ilc_rt import BadInputError, Campaign, CampaignError, Library
 from ilc_rt.events import DriftEvent, StartEvent, parse_event
-from ilc_rt.progress import describe
+from ilc_rt.wording import describe
 
 if TYPE_CHECKING:
     from pathlib import Path

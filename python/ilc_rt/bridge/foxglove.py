@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ilc_rt.bridge.signals import Cells
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import EndEvent, FaultEvent, IterationEvent, StartEvent, StateEvent
-from ilc_rt.progress import WORDS, describe
+from ilc_rt.wording import WORDS, describe
 
 if TYPE_CHECKING:
     from types import TracebackType

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.live import Live
 
 from ilc_rt.campaign import load_cell
 from ilc_rt.comparison import Comparison
@@ -23,15 +26,22 @@ from ilc_rt.events import (
     StartEvent,
     StateEvent,
 )
+from ilc_rt.interruption import ControlledStop
 from ilc_rt.lateness import late_sentence
 from ilc_rt.monitor import Message, Monitor
-from ilc_rt.progress import WORDS, describe
+from ilc_rt.progress import is_live
 from ilc_rt.quantity import axis_unit
 from ilc_rt.record import IterationRecord
 from ilc_rt.table import headings, plain_line, run_cells
+from ilc_rt.terminal import CellsView
 from ilc_rt.text import printable
+from ilc_rt.watched import WatchedCell
+from ilc_rt.wording import WORDS, describe
 
 WARNINGS_MAX = 100
+# Any program on the network can publish under any name.
+CELLS_MAX = 16
+REDRAWN_S = 0.25
 
 CellName = Annotated[
     str, typer.Argument(metavar="[CELL]", help="Name of a cell, or its TOML file; * for all.")
@@ -50,7 +60,11 @@ Timeout = Annotated[
     float | None, typer.Option("--timeout", metavar="SECONDS", help="End after this time.")
 ]
 Raw = Annotated[
-    bool, typer.Option("--events", help="Print the JSON objects as they come, one per line.")
+    bool,
+    typer.Option("--events", "--json", help="Print the JSON objects as they come, one per line."),
+]
+Plain = Annotated[
+    bool, typer.Option("--plain", help="Print lines, as into a pipe, instead of a live view.")
 ]
 
 
@@ -60,23 +74,82 @@ def monitor(
     scouting: Scouting = True,
     iterations: Runs = None,
     timeout: Timeout = None,
+    plain: Plain = False,
     events: Raw = False,
 ) -> None:
     """Watch a controller: its state, each run's error, and faults.
 
+    In a terminal a live view: progress and time left, axes, errors, roll-backs, faults, late
+    cycles. Into a pipe, or with --plain, one line for each.
+
     Example: ilc monitor gantry --connect tcp/192.168.1.5:7447
     """
     name = load_cell(cell).name if Path(cell).suffix == ".toml" else cell
-    view = _View(events=events)
+    # Names may contain brackets and colons: nothing printed is markup.
+    console = Console(highlight=False, markup=False, emoji=False)
+    draws = is_live(console) and not plain and not events
+    view: _View | _Screen = _Screen(console) if draws else _View(events=events)
     with Monitor(name, connect or (), scouting=scouting) as watching:
-        whom = "every cell" if name == "*" else name
-        typer.echo(f"watching {whom}; Ctrl-C ends this, not the machine", err=True)
-        for message in watching.messages(timeout):
-            view.show(message)
-            if iterations is not None and view.runs >= iterations:
-                break
+        if isinstance(view, _Screen):
+            view.watch(watching, iterations, timeout)
+        else:
+            whom = "every cell" if name == "*" else name
+            typer.echo(f"watching {whom}; Ctrl-C ends this, not the machine", err=True)
+            for message in watching.messages(timeout):
+                view.show(message)
+                if iterations is not None and view.runs >= iterations:
+                    break
     if view.faults:
         raise SystemExit(EXIT_FAULT)
+
+
+class _Screen:
+    """Draws all cells that are heard on a screen of its own, and counts runs and faults."""
+
+    def __init__(self, console: Console) -> None:
+        self.runs = 0
+        self.faults = 0
+        self._console = console
+        self._cells: dict[str, WatchedCell] = {}
+
+    def watch(self, watching: Monitor, iterations: int | None, timeout_s: float | None) -> None:
+        """Draw until enough runs were seen, the time is over, or a signal asks to end.
+
+        The terminal gets its former content back, and the last state below it.
+        """
+        until = None if timeout_s is None else time.monotonic() + timeout_s
+        # What ends the program would otherwise leave the terminal without cursor.
+        with ControlledStop(lambda _: None) as stop:
+            with Live(
+                CellsView(()), console=self._console, screen=True, auto_refresh=False
+            ) as live:
+                while stop.received is None and (until is None or time.monotonic() < until):
+                    live.update(CellsView([*self._cells.values()]), refresh=True)
+                    for message in watching.messages(REDRAWN_S):
+                        self.show(message)
+                        if iterations is not None and self.runs >= iterations:
+                            break
+                    if iterations is not None and self.runs >= iterations:
+                        break
+            if self._cells:
+                self._console.print(CellsView([*self._cells.values()]))
+            stop.raise_received()
+
+    def show(self, message: Message) -> None:
+        """Take in a message; of at most so many cells."""
+        if message.cell not in self._cells and len(self._cells) >= CELLS_MAX:
+            return
+        cell = self._cells.setdefault(message.cell, WatchedCell(message.cell))
+        self.runs += isinstance(message.event, IterationEvent)
+        self.faults += isinstance(message.event, FaultEvent)
+        if message.warning is not None:
+            cell.note("warning", f"{message.topic}: {message.warning}")
+        elif message.event is not None:
+            cell.see(message.event)
+        elif message.topic == "servo":
+            cell.see_servo(message.payload)
+        elif message.topic in {"alive", "gone"}:
+            cell.see_presence(is_present=message.topic == "alive")
 
 
 class _View:
