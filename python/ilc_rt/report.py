@@ -1,38 +1,32 @@
 """Report of a campaign: a single self-contained HTML file.
 
-The figures are embedded and nothing is fetched, so the page can be mailed, archived, printed and
-read on a phone.
+Figures and script are embedded and nothing is fetched, so the page can be mailed, archived, printed
+and read on a phone. Without its script it is complete; with it, figures are read and enlarged.
 """
 
 from __future__ import annotations
 
 import html
-import io
 import json
 import platform
-import re
-import warnings
 from dataclasses import asdict
 from datetime import datetime, timezone
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
-
 from ilc_rt import plots
 from ilc_rt.comparison import note
 from ilc_rt.errors import BadInputError
 from ilc_rt.lateness import LateCounts, late_sentence
-from ilc_rt.pictures.themes import style
 from ilc_rt.quantity import digits, in_words, signed, unit_for
+from ilc_rt.report_figures import plot_card, theme_css
+from ilc_rt.report_guide import FIGURES, guide
 from ilc_rt.result import CampaignResult, write_text
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
-
-    from matplotlib.figure import Figure
 
     from ilc_rt.record import IterationRecord
 
@@ -78,10 +72,14 @@ def write_report(result: CampaignResult, path: str | Path) -> Path:
 
 def render(result: CampaignResult) -> str:
     """Return the report as HTML text."""
-    style = resources.files("ilc_rt").joinpath("data/report.css").read_text(encoding="utf-8")
+    style, script = (
+        resources.files("ilc_rt").joinpath(f"data/report.{kind}").read_text(encoding="utf-8")
+        for kind in ("css", "js")
+    )
     count = len(result.records)
     title = f"{printable(result.cell)}: {count} run{'s' if count > 1 else ''}"
-    cards = "".join(_cards(result))
+    cards = dict(_cards(result))
+    notes = " ".join(map(note, result.records))
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -89,70 +87,57 @@ def render(result: CampaignResult) -> str:
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{html.escape(title)}</title>
 <style>
-{style}</style>
+{theme_css()}{style}</style>
 </head>
 <body>
 <main>
-<h1>{html.escape(title)}</h1>
+<header><h1>{html.escape(title)}</h1>
+<button type="button" id="theme" hidden>Colours</button></header>
 <p class="lead">{html.escape(result.sentence())}</p>
 {_warning(result)}{_remarks(result)}<div class="tiles">{"".join(_tiles(result))}</div>
-<div class="cards">
-{cards}</div>
-<section class="card"><h2>Every run</h2>
-<div class="scroll">{_table(result)}</div></section>
-{_axes(result)}<section class="card"><h2>What ran where</h2>
+{_contents(cards)}<div class="cards">
+{"".join(cards.values())}</div>
+<section class="card" id="runs"><h2>Every run</h2>
+{_scrolled("Table of every run", _table(result))}</section>
+{_axes(result)}{guide(cards, notes=notes)}<section class="card" id="facts"><h2>What ran where</h2>
 {_facts(result)}</section>
 </main>
+<script>
+{script}</script>
 </body>
 </html>
 """
 
 
-def svg(figure: Figure, name: str) -> str:
-    """Return a figure as inline SVG, without links and with unique ids.
-
-    `name` begins the ids, and is unique to each figure of a page.
-    """
-    buffer = io.StringIO()
-    with mpl.rc_context({**style(), "svg.hashsalt": name}), warnings.catch_warnings():
-        # A name may contain glyphs that the font lacks; the reader's browser has them.
-        warnings.filterwarnings("ignore", message="Glyph .* missing")
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    text = buffer.getvalue()
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r"\sxmlns(:xlink)?=\"[^\"]*\"", "", text)
-    text = re.sub(r'\bid="', f'id="{name}-', text)
-    text = re.sub(r'(xlink:href="#|url\(#)', rf"\g<1>{name}-", text)
-    text = re.sub(r'<svg (height|width)="[^"]*"', "<svg", text, count=1)
-    text = re.sub(r'(<svg[^>]*?) (?:width|height)="[^"]*"', r"\1", text, count=2)
-    text = text.replace("xlink:href", "href")
-    return re.sub(r"\n\s*", "\n", text).strip()
-
-
-def _cards(result: CampaignResult) -> Iterator[str]:
+def _cards(result: CampaignResult) -> Iterator[tuple[str, str]]:
+    """Yield the figures by name."""
     pictures = (
-        ("convergence", "Error against run", plots.convergence(result),
+        ("convergence", plots.convergence(result),
          "Largest and root-mean-square value of each run, on a logarithmic scale. "
          + ("After the run at the dashed line the best input so far was restored."
             if any(record.rolled_back for record in result.records) else "")),
-        ("contour", "The contour", plots.contour(result),
+        ("contour", plots.contour(result),
          "What is drawn beside the path is the distance from it, magnified; lag along the path "
          "does not show. The lower picture has the last run alone, magnified further."),
-        ("tracking", "Tracking error over time", plots.tracking(result),
+        ("tracking", plots.tracking(result),
          "Programmed less measured position, of the measurement that was learned from."),
-        ("input", "Learned input", plots.learned_input(result),
+        ("input", plots.learned_input(result),
          "What learning adds to the set point of each axis: after one run and at the end."),
-        ("latency", "Servo loop", plots.latency(result),
+        ("latency", plots.latency(result),
          "How late the loop woke and how long it computed, counted on a logarithmic scale."),
-        ("late", "Who was late", plots.late_cycle(result), html.escape(_late(result))),
+        ("late", plots.late_cycle(result), html.escape(_late(result))),
     )  # fmt: skip
-    for name, heading, figure, caption in pictures:
+    for name, figure, caption in pictures:
         if figure is not None:
-            yield (
-                f'<figure class="card" id="{name}"><h2>{heading}</h2>\n'
-                f"<figcaption>{caption}</figcaption>\n{svg(figure, name)}</figure>\n"
-            )
+            yield name, plot_card(figure, name, html.escape(FIGURES[name][0]), caption)
+
+
+def _contents(names: Iterable[str]) -> str:
+    """Return links to the parts of the page."""
+    parts = {name: FIGURES[name][0] for name in names}
+    parts |= {"runs": "Every run", "read": "How to read this report", "facts": "What ran where"}
+    links = " ".join(f'<a href="#{name}">{html.escape(text)}</a>' for name, text in parts.items())
+    return f'<nav aria-label="Contents">{links}</nav>\n'
 
 
 def _late(result: CampaignResult) -> str:
@@ -248,15 +233,22 @@ def _axes(result: CampaignResult) -> str:
         rows.append(_cells(*cells))
     head = ("axis", "max tracking", "", "RMS tracking", "")
     runs = "in its only run" if first is last else "from the first run to the last"
-    return (
-        f'<section class="card"><h2>Every axis, {runs}</h2>\n<div class="scroll">'
+    table = (
         f"<table><thead><tr>{_headings(head)}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
-        "</div></section>\n"
+    )
+    return (
+        f'<section class="card"><h2>Every axis, {runs}</h2>\n'
+        f"{_scrolled('Table of every axis', table)}</section>\n"
     )
 
 
+def _scrolled(name: str, table: str) -> str:
+    """Return a table that a keyboard, too, can move where it is wider than the screen."""
+    return f'<div class="scroll" tabindex="0" role="region" aria-label="{name}">{table}</div>'
+
+
 def _headings(names: Iterable[str]) -> str:
-    return "".join(f"<th>{name}</th>" for name in names)
+    return "".join(f'<th scope="col">{name}</th>' for name in names)
 
 
 def _cells(*values: str) -> str:
@@ -295,7 +287,7 @@ def _facts(result: CampaignResult) -> str:
         facts.append(("Host", f"{platform.node()}, {platform.system()} {platform.machine()}"))
     facts.append(("Written", datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")))
     rows = "".join(
-        f"<tr><th>{name}</th><td>{html.escape(printable(value, FACT_MAX))}</td></tr>"
+        f'<tr><th scope="row">{name}</th><td>{html.escape(printable(value, FACT_MAX))}</td></tr>'
         for name, value in facts
         if value
     )

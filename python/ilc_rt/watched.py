@@ -1,4 +1,4 @@
-"""What is known of a cell that is watched: events in, state out, nothing drawn.
+"""State of a cell that is watched: events in, state out, nothing drawn.
 
 Imported by the views in the terminal. The input may come from a network and is bounded.
 """

@@ -134,7 +134,7 @@ def test_the_error_is_seen_to_fall(events: list[Event]) -> None:
 
 
 def test_what_went_wrong_is_told_in_words_and_signs(events: list[Event]) -> None:
-    """Without colours: fault, refusal, roll-back and late cycle are words; a fault comes first."""
+    """Without colours: fault, roll-back and late cycle are words; a fault comes first."""
     stages = StageSpans(900.0, 1.0, 1.0, 1.0)
     late = LateEvent(tick=7, cause="wake_up", stages=stages, usual=stages, iteration=1, count=3)
     so_far = until(events, IterationEvent, 1)
@@ -173,7 +173,7 @@ def test_colour_is_left_out_where_it_is_not_wanted(
 
 
 def test_the_time_left_follows_the_speed_so_far(events: list[Event]) -> None:
-    """A quarter of the runs in 10 s leaves 30 s; nothing is told at once, or until stopped."""
+    """A quarter of the runs in 10 s leaves 30 s; at first, and until stopped, nothing is shown."""
     start = started(events)
     now = [0.0]
     cell = WatchedCell("gantry", lambda: now[0])
@@ -198,7 +198,7 @@ def test_a_cell_that_goes_on_counts_from_its_first_run(events: list[Event]) -> N
 
 
 def test_the_live_error_of_each_axis_is_the_largest_of_a_batch() -> None:
-    """In a run only; a measurement that is missing is told; strangers' batches change nothing."""
+    """In a run only; a missing measurement is shown; strangers' batches change nothing."""
     cell = watched([StateEvent("running", 0)])
     batch = {
         "reference_m": [[1.0, 0.0], [1.0, 0.0]],
