@@ -1,6 +1,6 @@
 """A start from what another cell has learned: its best campaign becomes one of this cell.
 
-The campaign is written to the library of this cell, where `ilc run --resume` goes on with it, a law
+The campaign is written to the library of this cell, where `ilc run --resume` continues it, a law
 that recalls runs recalls it, and `--frozen` finds its best input. Whatever a stored run tells must
 agree with a run that this cell makes on simulated drives; the first difference is named.
 """
