@@ -13,6 +13,7 @@ from ports_fixture import free_port
 from processes_fixture import PATIENT, Bench, Process
 
 from ilc_rt import Campaign
+from ilc_rt.cli import main
 from ilc_rt.dashboard.notes import read_notes
 
 if TYPE_CHECKING:
@@ -215,16 +216,19 @@ def test_other_names_of_this_host_are_refused(watched: Watched) -> None:
         (["missing.toml"], "missing.toml"),
     ],
 )
-def test_what_cannot_be_served_is_one_line(arguments: list[str], told: str, tmp_path: Path) -> None:
+def test_what_cannot_be_served_is_one_line(
+    arguments: list[str],
+    told: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     (tmp_path / "cell.toml").write_text("[cell]\n")
-    argv = [sys.executable, "-m", "ilc_rt.cli", "dashboard", "--no-scouting", *arguments]
-    process = Process(argv, tmp_path)
-    try:
-        assert process.end() == 2
-    finally:
-        process.close()
-    assert len(process.errors) == 1
-    assert told in process.errors[0]
+    monkeypatch.chdir(tmp_path)
+    assert main(["dashboard", "--no-scouting", *arguments]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert told in said[0]
 
 
 def test_another_network_is_served_with_a_warning(tmp_path: Path) -> None:

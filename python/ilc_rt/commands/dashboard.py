@@ -10,9 +10,6 @@ import typer
 from ilc_rt.campaign import load_cell
 from ilc_rt.commands.monitor import Connect, Scouting, Timeout  # noqa: TC001 - typer reads them
 from ilc_rt.commands.options import DEFAULT_LIBRARY_FILE
-from ilc_rt.dashboard.archive import Archive
-from ilc_rt.dashboard.feed import Feed
-from ilc_rt.dashboard.fleet import Fleet
 from ilc_rt.errors import BadInputError
 
 if TYPE_CHECKING:
@@ -53,6 +50,10 @@ def dashboard(
 
     Example: ilc dashboard gantry --library ilc-library.db
     """
+    from ilc_rt.dashboard.archive import Archive
+    from ilc_rt.dashboard.feed import Feed
+    from ilc_rt.dashboard.fleet import Fleet
+
     server = _server()
     described = [_described(cell) for cell in cells or () if cell != "*"]
     archive = Archive(_libraries(library))

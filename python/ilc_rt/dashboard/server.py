@@ -46,10 +46,14 @@ def listen(host: str, port: int) -> socket.socket:
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         listener = socket.socket(family, socket.SOCK_STREAM)
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind((host, port))
-        # From now on a browser waits for the server instead of being refused.
-        listener.listen(128)
+        try:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.bind((host, port))
+            # From now on a browser waits for the server instead of being refused.
+            listener.listen(128)
+        except OSError:
+            listener.close()
+            raise
     except OSError as error:
         reason = error.strerror or error
         message = (
