@@ -110,7 +110,7 @@ def test_a_card_leads_to_a_cell_that_has_its_history(watched: Watched) -> None:
     page.wait_for_url("**/cell/gantry")
     # Two runs of the library, though no controller has been heard.
     wait(page, "run", "2 runs")
-    wait_for(page, "ilc.option?.('runs')?.series[0].data.length === 2")
+    wait_for(page, "ilc.option?.('runs')?.series[0]?.data.length === 2")
     wait_for(page, "ilc.option('contour')?.series.length === 2")
     names = [chart.get_attribute("aria-label") for chart in page.locator("[data-chart]").all()]
     assert len(names) == 8
@@ -138,13 +138,13 @@ def test_numbers_change_while_the_cell_runs_and_it_comes_back(watched: Watched) 
     )
     wait(page, "state", "completed")
     assert controller.end() == 0
-    wait_for(page, "ilc.option('runs').series[0].data.length === 6")
+    wait_for(page, "ilc.option('runs').series[0]?.data.length === 6")
     assert "%" in wait(page, "timing", "execution")
     wait(page, "contour-run", "run 5")
     # The same page follows the next campaign, and tells when its controller is gone.
     controller = watched.run(1000)
     wait(page, "state", "▶ running")
-    wait_for(page, "ilc.option('runs').series[0].data.length < 5")
+    wait_for(page, "(ilc.option('runs').series[0]?.data.length ?? 0) < 5")
     controller.signal(signal.SIGKILL)
     wait(page, "state", "silent since")
     controller.close()
