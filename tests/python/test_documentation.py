@@ -33,9 +33,14 @@ from documentation_fixture import (
     verbs_of,
 )
 from ports_fixture import free_bus, free_port
+from postgres_fixture import server
 from processes_fixture import Process, program
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from postgres_fixture import Server
+
     from ilc_rt import CampaignResult
 
 pytestmark = pytest.mark.timeout(300)
@@ -68,6 +73,7 @@ SHORTER = (
     ),
     (r"--samples \d+", "--samples 2"),
     (r"^ilc sweep(?!.* --iterations)(.*)$", r"ilc sweep\1 --iterations 2"),
+    (r"^ilc library collect( \S+).*$", r"ilc library collect\1 --timeout 0.2 --no-scouting"),
     (r"^(ilc library (?:show|export) \S+) \d+", r"\1 1"),
     # These run this very test, or its prerequisites.
     (r"^make ([a-z-]+)", r"make --dry-run --directory {root} \1"),
@@ -255,11 +261,32 @@ def watched(text: str, folder: Path) -> None:
     assert any(re.search(r"\d", line) for line in watcher.said)
 
 
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[Server]:
+    with server() as running:
+        yield running
+
+
+def with_database(text: str, folder: Path, postgres: Server) -> None:
+    """Run a line of the fleet with a database that has a campaign, and a second cell."""
+    address = postgres.database()
+    run(f"ilc library sync ilc-library.db '{address}'", folder)
+    cell = (folder / "gantry.toml").read_text(encoding="utf-8")
+    second = cell.replace('name = "gantry"', 'name = "gantry-2"', 1)
+    (folder / "gantry-2.toml").write_text(second, encoding="utf-8")
+    said = run(re.sub(r"postgresql://\S+", lambda _: f"'{address}'", text), folder)
+    assert re.search(r"\d( of \d+)? runs .*stored", said)
+
+
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda one: f"{one.where}: {one.text}")
-def test_a_line_that_one_is_told_to_type_works(command: Command, folder: Path) -> None:
+def test_a_line_that_one_is_told_to_type_works(
+    command: Command, folder: Path, request: pytest.FixtureRequest
+) -> None:
     """As documented, or shortened."""
     text = shorter(command.text)
-    if re.match(r"ilc monitor|python examples/02_monitor", text):
+    if "postgresql://" in text:
+        with_database(text, folder, request.getfixturevalue("postgres"))
+    elif re.match(r"ilc monitor|python examples/02_monitor", text):
         watched(text, folder)
     elif text.startswith("ilc-sim input"):
         with_hands(text, folder)

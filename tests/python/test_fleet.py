@@ -191,7 +191,8 @@ def test_what_is_no_fleet_is_refused_in_a_line(
         assert "secret" not in refused.stderr
     with pytest.raises(BadInputError, match="no tables of a fleet; version 1 is needed"):
         FleetLibrary(address)
-    connect(address).execute("INSERT INTO fleet_version (version) VALUES (99)")
+    with connect(address) as newer:
+        newer.execute("INSERT INTO fleet_version (version) VALUES (99)")
     for refused in (lambda: FleetLibrary(address), lambda: push(library, address)):
         with pytest.raises(BadInputError, match=f"version 99; version {newest()} is needed"):
             refused()
@@ -219,7 +220,7 @@ def test_a_cell_starts_from_what_another_learned(
     assert [(run["cell"], run["index"]) for run in runs] == [("gantry-2", k) for k in range(4)]
     assert runs[3]["tracking_rms_m"] < runs[0]["tracking_rms_m"] / 5
     assert ilc(*run, "--frozen", "--iterations", 1).returncode == 0
-    # What it learned goes to the database under its own name; a fetched campaign is not fetched on.
+    # What it learned goes to the database under its own name; a fetched one is not fetched on.
     assert push(str(tmp_path / "two.db"), filled).stored == 5
     with pytest.raises(BadInputError, match="no campaign of gantry-2 fits"):
         fetch(filled, gantry, library, from_cell="gantry-2")

@@ -110,7 +110,7 @@ def fetch(
 ) -> None:
     """Start a cell from the best campaign that another one learned, if it fits.
 
-    Example: ilc library fetch postgresql://ilc@fleet.local/ilc --cell gantry.toml --into gantry.db
+    Example: ilc library fetch postgresql://ilc@fleet.local/ilc --cell gantry-2.toml --into two.db
     """
     from ilc_rt.fleet import fetch as fetch_campaign
     from ilc_rt.quantity import unit_for
