@@ -51,9 +51,10 @@ class FleetLibrary:
 
     Examples
     --------
-    >>> with FleetLibrary("postgresql://reader@fleet.local/ilc") as fleet:  # doctest: +SKIP
-    ...     for cell in fleet.cells():
-    ...         print(cell, len(fleet.page(cell)))
+    >>> FleetLibrary("fleet.db")
+    Traceback (most recent call last):
+      ...
+    ilc_rt.errors.BadInputError: fleet.db: postgresql://USER@HOST/NAME is the address of a database
     """
 
     def __init__(self, address: str) -> None:
