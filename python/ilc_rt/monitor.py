@@ -80,6 +80,9 @@ class Monitor:
         Zenoh endpoints to connect to, e.g. ``tcp/192.168.1.5:7447``.
     scouting : bool
         Discover controllers on the network by multicast.
+    router : bool
+        Hear everything through a router, the first endpoint that answers. Without it a router
+        passes nothing on, as it expects a monitor to reach the controllers directly.
 
     Raises
     ------
@@ -96,7 +99,12 @@ class Monitor:
     """
 
     def __init__(
-        self, cell: str = "*", connect: Sequence[str] = (), *, scouting: bool = True
+        self,
+        cell: str = "*",
+        connect: Sequence[str] = (),
+        *,
+        scouting: bool = True,
+        router: bool = False,
     ) -> None:
         if not cell or any(sign in cell for sign in "/#?$ "):
             message = f"cell = {cell!r}: a name without / # ? $, or * for every cell"
@@ -104,7 +112,10 @@ class Monitor:
         self._cell = cell
         self._queue: queue.Queue[Message] = queue.Queue(QUEUE_MAX)
         self._lost = 0
-        self._session = _open(connect, scouting=scouting)
+        if router and not connect:
+            message = "router = True: connect has to name its endpoint, as tls/host:7447"
+            raise BadInputError(message)
+        self._session = _open(connect, scouting=scouting, router=router)
         # The token first: the state of a live controller is queried at once.
         self._tokens = self._session.liveliness().declare_subscriber(
             f"ilc/{cell}/alive", _direct(self._on_token), history=True
@@ -175,7 +186,7 @@ class Monitor:
             self._lost += 1
 
 
-def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
+def _open(connect: Sequence[str], *, scouting: bool, router: bool) -> zenoh.Session:
     try:
         import zenoh
     except ImportError as error:
@@ -183,6 +194,7 @@ def _open(connect: Sequence[str], *, scouting: bool) -> zenoh.Session:
         raise CampaignError(message) from error
     config = zenoh.Config()
     try:
+        config.insert_json5("mode", json.dumps("client" if router else "peer"))
         config.insert_json5("connect/endpoints", json.dumps(list(connect)))
         config.insert_json5("scouting/multicast/enabled", json.dumps(scouting))
         config.insert_json5("listen/endpoints", "[]")

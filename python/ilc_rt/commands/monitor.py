@@ -53,6 +53,9 @@ Connect = Annotated[
 Scouting = Annotated[
     bool, typer.Option("--scouting/--no-scouting", help="Look for controllers by multicast.")
 ]
+Router = Annotated[
+    bool, typer.Option("--router", help="Hear through a router, which --connect names.")
+]
 Runs = Annotated[
     int | None, typer.Option("--iterations", "-n", help="End after this many runs were seen.")
 ]
@@ -72,6 +75,7 @@ def monitor(
     cell: CellName = "*",
     connect: Connect = None,
     scouting: Scouting = True,
+    router: Router = False,
     iterations: Runs = None,
     timeout: Timeout = None,
     plain: Plain = False,
@@ -89,7 +93,7 @@ def monitor(
     console = Console(highlight=False, markup=False, emoji=False)
     draws = is_live(console) and not plain and not events
     view: _View | _Screen = _Screen(console) if draws else _View(events=events)
-    with Monitor(name, connect or (), scouting=scouting) as watching:
+    with Monitor(name, connect or (), scouting=scouting, router=router) as watching:
         if isinstance(view, _Screen):
             view.watch(watching, iterations, timeout)
         else:
