@@ -317,3 +317,74 @@ def test_an_endpoint_that_is_not_there_is_waited_for_by_nobody(bench: Bench) -> 
     controller = start(bench, cell, "--lockstep", runs=2)
     assert controller.end(20.0) == 0
     assert len(bench.kept()) == 2
+
+
+HOSTILE = """
+import json, os, sys, time, zenoh
+os.nice(19)
+config = zenoh.Config()
+config.insert_json5("listen/endpoints", json.dumps([sys.argv[1]]))
+config.insert_json5("scouting/multicast/enabled", "false")
+session = zenoh.open(config)
+# Its channels take one message, and it never reads: neither events, nor answers, nor queries.
+deaf = session.declare_subscriber("ilc/**", zenoh.handlers.RingChannel(1))
+mute = session.declare_queryable("ilc/gantry/heard", zenoh.handlers.RingChannel(1))
+garbage = [b"", b"\\xff" * 60_000, b"[" * 60_000, b'{"event": "end", "status": "fault", "iterations": 0}']
+asked = []
+told = False
+print("ready", flush=True)
+while not session.is_closed():
+    for key in ("state", "iteration", "fault", "servo", "heard", "alive", "stop"):
+        for payload in garbage:
+            session.put(f"ilc/gantry/{key}", payload)
+    asked.append(session.get("ilc/gantry/state", payload=garbage[1], timeout=60.0))
+    asked.append(session.get("ilc/**", payload=garbage[2], timeout=60.0))
+    if not told and session.info.peers_zid():
+        told = True
+        print("attacks", flush=True)
+    time.sleep(0.02)
+"""
+
+
+@pytest.mark.parametrize("pace", ["--lockstep", "--realtime"])
+def test_a_hostile_neighbour_changes_nothing_in_the_loop(bench: Bench, pace: str) -> None:
+    """Huge queries, answers never read, garbage under the cell's keys; in lock-step bit for bit.
+
+    By the clock the attacker shares the processors: a tenth of the cycles may be late by it.
+    """
+    runs = 12 if pace == "--lockstep" else 2
+    ours = endpoint()
+    more = "" if pace == "--lockstep" else PATIENT
+    options = [pace] if pace == "--lockstep" else []
+    figures = []
+    for name, section in (("quiet.toml", ""), ("cell.toml", telemetry(connect=[ours]))):
+        cell = bench.cell(short=True, more=more + section, name=name)
+        drives = bench.drives(cell, *options)
+        attacker = None
+        try:
+            if section:
+                attacker = subprocess.Popen(
+                    [sys.executable, "-c", HOSTILE, ours], stdout=subprocess.PIPE, text=True
+                )
+                assert attacker.stdout is not None
+                assert attacker.stdout.readline() == "ready\n"
+                controller = start(bench, cell, *options, runs=runs)
+                assert attacker.stdout.readline() == "attacks\n"
+            else:
+                controller = bench.controller(cell, *options, runs=runs)
+            assert controller.end() == 0, controller.errors
+        finally:
+            if attacker is not None and attacker.stdout is not None:
+                attacker.kill()
+                attacker.wait()
+                attacker.stdout.close()
+        goodbye(drives)
+        figures.append([e for e in controller.events if e["event"] in {"start", "iteration"}])
+    quiet, attacked = ([e for e in one if e["event"] == "iteration"] for one in figures)
+    assert [run["index"] for run in attacked] == list(range(runs))
+    if pace == "--lockstep":
+        assert [run["digest"] for run in attacked] == [run["digest"] for run in quiet]
+    else:
+        n_cycles = runs * next(e["n_samples"] for e in figures[1] if e["event"] == "start")
+        overruns = [sum(run["overruns"] for run in one) for one in (quiet, attacked)]
+        assert overruns[1] <= overruns[0] + n_cycles // 10

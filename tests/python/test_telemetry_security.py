@@ -168,7 +168,8 @@ def test_the_command_of_the_document_watches_through_the_router(router: Router) 
         zenoh.open(config) as cell,
         cell.liveliness().declare_token("ilc/gantry/alive"),
         subprocess.Popen(
-            [sys.executable, "-m", "ilc_rt.cli", "monitor", "gantry", "--no-scouting", "--router", "--connect",
+            [sys.executable, "-m", "ilc_rt.cli", "monitor", "gantry", "--no-scouting",
+             "--router", "--connect",
              router.endpoint("monitor"), "--timeout", "60", "--iterations", "1"],
             stdout=subprocess.PIPE, text=True,
         ) as process,
