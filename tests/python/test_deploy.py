@@ -86,7 +86,8 @@ def test_the_command_of_the_service_waits_for_its_start_or_says_what_is_missing(
     unpacked: Path, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cell = bench.cell(short=True, name="etc.toml")
-    (unpacked / "etc" / "ilc-rt" / "gantry.toml").write_bytes(cell.read_bytes())
+    etc = unpacked / "etc" / "ilc-rt" / "gantry.toml"
+    etc.write_bytes(cell.read_bytes())
     (unpacked / "var" / "lib" / "ilc-rt").mkdir(parents=True)
     runtime = unpacked / "run"
     runtime.mkdir(mode=0o700)
@@ -110,7 +111,7 @@ def test_the_command_of_the_service_waits_for_its_start_or_says_what_is_missing(
         return
     service.line_with("control: ")
     until = time.monotonic() + 60.0
-    while "waiting" not in (told := output(argv[0], "ctl", "gantry", "status")):
+    while "waiting" not in (told := output(argv[0], "ctl", etc, "status")):
         assert time.monotonic() < until, told
         time.sleep(0.1)
     service.signal(signal.SIGTERM)
