@@ -329,7 +329,8 @@ session = zenoh.open(config)
 # Its channels take one message, and it never reads: neither events, nor answers, nor queries.
 deaf = session.declare_subscriber("ilc/**", zenoh.handlers.RingChannel(1))
 mute = session.declare_queryable("ilc/gantry/heard", zenoh.handlers.RingChannel(1))
-garbage = [b"", b"\\xff" * 60_000, b"[" * 60_000, b'{"event": "end", "status": "fault", "iterations": 0}']
+end = b'{"event": "end", "status": "fault", "iterations": 0}'
+garbage = [b"", b"\\xff" * 60_000, b"[" * 60_000, end]
 asked = []
 told = False
 print("ready", flush=True)
