@@ -214,6 +214,7 @@ def test_other_names_of_this_host_are_refused(watched: Watched) -> None:
         (["--host", "203.0.113.7"], "an own address and a free port are needed"),
         (["--library", "cell.toml"], "cell.toml"),
         (["missing.toml"], "missing.toml"),
+        (["--port", "0", "--router"], "connect has to name its endpoint"),
     ],
 )
 def test_what_cannot_be_served_is_one_line(

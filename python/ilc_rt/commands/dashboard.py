@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ilc_rt.campaign import load_cell
-from ilc_rt.commands.monitor import Connect, Scouting, Timeout  # noqa: TC001 - typer reads them
+from ilc_rt.commands.monitor import (  # noqa: TC001 - typer reads them
+    Connect,
+    Router,
+    Scouting,
+    Timeout,
+)
 from ilc_rt.commands.options import DEFAULT_LIBRARY_FILE
 from ilc_rt.errors import BadInputError
 
@@ -44,6 +49,7 @@ def dashboard(
     library: Libraries = None,
     connect: Connect = None,
     scouting: Scouting = True,
+    router: Router = False,
     timeout: Timeout = None,
 ) -> None:
     """Serve a web page that watches cells and compares their stored runs; it commands nothing.
@@ -62,7 +68,7 @@ def dashboard(
         if cell is not None:
             fleet.cells[name].describe(cell)
     listener = server.listen(host, port)
-    with listener, Feed(fleet, archive, connect or (), scouting=scouting):
+    with listener, Feed(fleet, archive, connect or (), scouting=scouting, router=router):
         shown = f"[{host}]" if ":" in host else host
         typer.echo(f"dashboard: http://{shown}:{listener.getsockname()[1]}")
         if not server.is_local(host):

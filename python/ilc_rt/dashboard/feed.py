@@ -35,14 +35,22 @@ class Feed:
         Zenoh endpoints, as for `Monitor`.
     scouting : bool
         Discover controllers by multicast.
+    router : bool
+        Hear everything through a router, the first endpoint that answers.
     """
 
     def __init__(
-        self, fleet: Fleet, archive: Archive, connect: Sequence[str] = (), *, scouting: bool = True
+        self,
+        fleet: Fleet,
+        archive: Archive,
+        connect: Sequence[str] = (),
+        *,
+        scouting: bool = True,
+        router: bool = False,
     ) -> None:
         self._fleet, self._archive = fleet, archive
         name = fleet.wanted[0] if len(fleet.wanted) == 1 else "*"
-        self._monitor = Monitor(name, connect, scouting=scouting)
+        self._monitor = Monitor(name, connect, scouting=scouting, router=router)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._follow, name="feed", daemon=True)
 
