@@ -67,7 +67,7 @@ def router(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Router]:
 
 
 class Heard:
-    """What a monitor hears, collected beside the test until the controller has gone."""
+    """Messages that a monitor hears, collected beside the test until the controller has gone."""
 
     def __init__(self, monitor: Monitor) -> None:
         self.topics: list[str] = []
@@ -118,7 +118,7 @@ def test_only_who_has_the_right_hears_a_cell(router: Router, tmp_path: Path) -> 
 
 
 def test_a_monitor_cannot_pass_itself_off_as_a_cell(router: Router) -> None:
-    """What it publishes reaches no other monitor; what a cell publishes does."""
+    """Its own messages reach no other monitor; those of a cell do."""
     config = zenoh.Config()
     config.insert_json5("connect/endpoints", json.dumps([router.within]))
     config.insert_json5("scouting/multicast/enabled", "false")
