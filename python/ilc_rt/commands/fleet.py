@@ -12,7 +12,9 @@ from ilc_rt.commands.monitor import (  # noqa: TC001 - typer reads them
     Scouting,
     Timeout,
 )
+from ilc_rt.commands.options import JsonFile  # noqa: TC001 - typer reads it
 from ilc_rt.errors import BadInputError
+from ilc_rt.result import json_text, write_text
 from ilc_rt.text import printable
 
 FROM = "Library file (sqlite:///cell.db, or its path), or database (postgresql://USER@HOST/NAME)."
@@ -39,7 +41,9 @@ OtherDrives = Annotated[
 ]
 
 
-def sync(source: Source, target: Target, cell: CellOption = None) -> None:
+def sync(
+    source: Source, target: Target, cell: CellOption = None, json_file: JsonFile = None
+) -> None:
     """Store the runs of a library in a database, or the runs of a cell back in a library.
 
     May be repeated and interrupted: what is there is not stored again.
@@ -59,6 +63,9 @@ def sync(source: Source, target: Target, cell: CellOption = None) -> None:
         raise BadInputError(message)
     else:
         done = pull(source, file_of(target), cell)
+    if json_file is not None:
+        counts = {"stored": done.stored, "renewed": done.renewed, "present": done.present}
+        write_text(json_file, json_text({**counts, "damaged": list(done.damaged)}))
     typer.echo(f"{done.stored} runs stored, {done.renewed} renewed, {done.present} were there")
     if done.damaged:
         ids = ", ".join(map(str, done.damaged))
@@ -72,6 +79,7 @@ def collect(
     connect: Connect = None,
     scouting: Scouting = True,
     timeout: Timeout = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Store the figures of every run as it ends; the arrays follow by `ilc library sync`.
 
@@ -99,6 +107,8 @@ def collect(
                     typer.echo(f"the database {state}", err=True)
         finally:
             typer.echo(f"{collector.stored} runs stored")
+            if json_file is not None:
+                write_text(json_file, json_text({"stored": collector.stored}))
 
 
 def fetch(
@@ -107,6 +117,7 @@ def fetch(
     into: Into,
     from_cell: FromCell = None,
     other_drives: OtherDrives = False,
+    json_file: JsonFile = None,
 ) -> None:
     """Start a cell from the best campaign that another one learned, if it fits.
 
@@ -116,6 +127,9 @@ def fetch(
     from ilc_rt.quantity import unit_for
 
     got = fetch_campaign(database, cell, str(into), from_cell=from_cell, other_drives=other_drives)
+    if json_file is not None:
+        told = ("from_cell", "campaign", "runs", "stored", "best_tracking_rms_m")
+        write_text(json_file, json_text({name: getattr(got, name) for name in told}))
     error = unit_for("m", got.best_tracking_rms_m).text(got.best_tracking_rms_m)
     typer.echo(
         f"{got.stored} of {got.runs} runs of {printable(got.from_cell)} stored as campaign "

@@ -18,6 +18,7 @@ from typer import Typer
 from ilc_rt.commands import fleet
 from ilc_rt.commands.options import (
     DEFAULT_LIBRARY_FILE,
+    JsonFile,
     LibraryArgument,
 )
 from ilc_rt.errors import BadInputError
@@ -192,14 +193,22 @@ def _csv(rows: list[dict[str, Any]]) -> str:
 
 
 @app.command("show")
-def show(library: LibraryArgument, run_id: RunId) -> None:
-    """Show everything that is kept of one run.
+def show(library: LibraryArgument, run_id: RunId, json_file: JsonFile = None) -> None:
+    """Show everything that is kept of one run; of its signals the size and the largest value.
 
     Example: ilc library show ilc-library.db 12
     """
     import numpy as np  # only here: the program starts without it
 
     row = _load(library, run_id)
+    if json_file is not None:
+        kept = {
+            key: {"shape": value.shape, "largest": float(np.abs(value).max(initial=0.0))}
+            if isinstance(value, np.ndarray)
+            else value
+            for key, value in row.items()
+        }
+        write_text(json_file, json_text(kept))
     for key, value in row.items():
         if key == "disturbance" and value is not None:
             typer.echo(f"{key:22} {', '.join(f'{number:g}' for number in value)}")
@@ -234,6 +243,7 @@ def trim(
     newest: Newest = None,
     days: Days = None,
     best: Best = None,
+    json_file: JsonFile = None,
 ) -> None:
     """Delete all but the most relevant runs (KEEP), or all that no rule keeps.
 
@@ -255,6 +265,8 @@ def trim(
             deleted = Library(str(library)).retain(newest=newest, days=days, best=best, cell=cell)
     except (OSError, sqlite3.Error) as error:
         raise BadInputError(str(error)) from error
+    if json_file is not None:
+        write_text(json_file, json_text({"deleted": deleted}))
     typer.echo(f"{deleted} run{'' if deleted == 1 else 's'} deleted from {library}")
 
 

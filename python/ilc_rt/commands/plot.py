@@ -10,6 +10,7 @@ import typer
 from ilc_rt.commands.options import (
     DEFAULT_LIBRARY_FILE,
     REPORT_NAME,
+    JsonFile,
     LibraryArgument,
 )
 from ilc_rt.commands.targets import check_report, make_folder
@@ -30,6 +31,7 @@ def plot(
     library: LibraryArgument = DEFAULT_LIBRARY_FILE,
     campaign: CampaignOption = None,
     out: Out = Path(REPORT_NAME),
+    json_file: JsonFile = None,
 ) -> None:
     """Draw a campaign from the library: a report, or one picture a file.
 
@@ -41,6 +43,8 @@ def plot(
     from ilc_rt.report import write_report
 
     typer.echo(result.sentence())
+    if json_file is not None:
+        result.write_json(json_file)
     if out.suffix == ".html":
         typer.echo(f"report: {printable(write_report(result, out))}")
         return
