@@ -19,6 +19,7 @@ use crate::servo::PhaseName;
 
 /// Options of a move by hand.
 #[derive(Args, Clone)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct Moving {
     /// Bus address in place of the cell's.
     #[arg(long, value_name = "ADDRESS")]

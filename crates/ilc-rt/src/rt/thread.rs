@@ -146,6 +146,7 @@ fn sleep_exactly() {
 
 /// Touches the stack that a tick may use, so that no tick waits for its pages.
 #[inline(never)]
+#[expect(clippy::large_stack_arrays, reason = "its purpose")]
 fn touch_stack() {
     let mut stack = [0_u8; STACK];
     for page in stack.chunks_mut(4096) {

@@ -104,7 +104,7 @@ pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
                     tell_settings(&report, arguments.seconds);
                 }
                 let (timing, peer) =
-                    measure(&mut cycle, &clock, cycle_us, arguments.seconds, request);
+                    measure(&mut cycle, *clock, cycle_us, arguments.seconds, request);
                 (report, timing, peer)
             });
             measuring.join()
@@ -131,7 +131,7 @@ pub(super) fn latency(arguments: &LatencyArguments) -> u8 {
 /// Lets the loop and `cyclictest` take turns.
 fn measure(
     cycle: &mut Cycle,
-    clock: &MonotonicClock,
+    clock: MonotonicClock,
     cycle_us: u32,
     seconds: u32,
     request: RtRequest,
@@ -141,7 +141,7 @@ fn measure(
     for turn in 0..n_turns {
         let turn_s = seconds / n_turns + u32::from(turn < seconds % n_turns);
         let end = clock.now().plus(Nanos(u64::from(turn_s) * 1_000_000_000));
-        run_until(cycle, clock, &mut timing, end);
+        run_until(cycle, &clock, &mut timing, end);
         is_there = is_there && peer.measure(cycle_us, turn_s, request.priority);
     }
     (timing, is_there.then(|| peer.figures()))
