@@ -23,6 +23,9 @@ from ilc_rt.lateness import (
     parse_stages,
 )
 
+#: Version of the events that this package knows: within one, fields are only added.
+SCHEMA = 1
+
 
 class EventError(ValueError):
     """A line that is not an event of the controller."""
@@ -66,7 +69,7 @@ class StartEvent:
     """Start of a campaign, with everything that is constant during it.
 
     `iterations` counts all runs of the campaign, including those before `first_index` of a resumed
-    one.
+    one; `schema` is the version of the events.
     """
 
     name: ClassVar[str] = "start"
@@ -85,6 +88,7 @@ class StartEvent:
     input_units: tuple[str, ...] = ()
     ctl: str | None = None
     rt: RealTimeReport | None = None
+    schema: int = SCHEMA
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ilc_rt.errors import BadInputError, CampaignError
-from ilc_rt.events import EventError, parse_event
+from ilc_rt.events import SCHEMA, EventError, StartEvent, parse_event
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -254,7 +254,13 @@ def _message(sample: zenoh.Sample) -> Message | None:
     misfit = None if event is None else _misfit(event)
     if misfit is not None:
         return Message(cell, topic, payload, warning=f"a message left out: {misfit}")
-    return Message(cell, topic, payload, event)
+    warning = None
+    if isinstance(event, StartEvent) and event.schema > SCHEMA:
+        warning = (
+            f"schema {event.schema} of a newer version; {SCHEMA} is known here, and shown as far "
+            "as it is understood: pip install --upgrade ilc-rt"
+        )
+    return Message(cell, topic, payload, event, warning)
 
 
 def _clean(text: str) -> str:

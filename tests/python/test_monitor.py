@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 from ports_fixture import free_bus, free_port
 
-from ilc_rt.events import EndEvent, IterationEvent, StateEvent
+from ilc_rt.events import EndEvent, IterationEvent, StateEvent, parse_event
 from ilc_rt.monitor import Message, Monitor
 from ilc_rt.result import micrometres
 
@@ -207,6 +207,22 @@ def test_what_a_stranger_publishes_is_one_warning(
     view = commands_monitor._View(events=False)
     view.show(message)
     assert (view.runs, view.faults) == (0, 0)
+
+
+def test_a_newer_version_of_events_is_told_and_shown(publisher: Publisher) -> None:
+    start = {
+        "event": "start", "schema": 2, "cell": "gantry", "campaign": "c", "n_samples": 10,
+        "n_axes": 1, "axis_names": ["x"], "cycle_s": 0.002, "first_index": 0, "iterations": 3,
+        "measure": "encoder", "law": "pd", "bus": "udp:", "mode": "realtime", "a_new_field": 1,
+    }  # fmt: skip
+    with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
+        messages = monitor.messages(30.0)
+        assert next(messages).topic == "alive"
+        assert next(messages).topic == "state"
+        publisher.put("state", start)
+        message = next(messages)
+    assert "schema 2 of a newer version; 1 is known here" in str(message.warning)
+    assert message.event == parse_event(json.dumps(start))
 
 
 def test_control_characters_of_strangers_do_not_reach_the_terminal(

@@ -148,7 +148,7 @@ class _Screen:
         self.faults += isinstance(message.event, FaultEvent)
         if message.warning is not None:
             cell.note("warning", f"{message.topic}: {message.warning}")
-        elif message.event is not None:
+        if message.event is not None:
             cell.see(message.event)
         elif message.topic == "servo":
             cell.see_servo(message.payload)

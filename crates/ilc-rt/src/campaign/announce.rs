@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::control::{Shared, Status};
 use super::telemetry::Telemetry;
-use crate::record::Event;
+use crate::record::{Event, SCHEMA};
 use crate::servo::Sample;
 
 /// Duration of a batch on the network.
@@ -86,6 +86,7 @@ impl<'a> Announcer<'a> {
         let at: Vec<_> = self.batch.iter().map(|sample| sample.at).collect();
         let text = json!({
             "event": "servo",
+            "schema": SCHEMA,
             "first_sync": self.batch.first().map(|sample| sample.sync),
             "iteration_and_sample": at,
             "reference_m": rows(|sample| &sample.reference_m),

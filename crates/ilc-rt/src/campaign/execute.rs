@@ -26,7 +26,7 @@ use crate::fieldbus::Bus;
 use crate::identification::Experiment;
 use crate::learning::{Law, LearningError, Purpose};
 use crate::library::Library;
-use crate::record::{Event, StateName};
+use crate::record::{Event, SCHEMA, StateName};
 use crate::rt::RtReport;
 use crate::servo::{Cycle, Orders, mailbox};
 
@@ -279,6 +279,7 @@ fn start_event(
     (ctl, granted): (Option<String>, Option<RtReport>),
 ) -> Event {
     Event::Start {
+        schema: SCHEMA,
         cell: cell.cell.name.clone(),
         campaign: plan.meta.campaign.clone(),
         n_samples: plan.n_samples(),

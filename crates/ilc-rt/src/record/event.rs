@@ -10,12 +10,18 @@ use super::figures::Figures;
 use super::late::{AnswerTimes, LateCounts, LateCycle, StageSpans};
 use crate::rt::{LatencyFigures, RtReport};
 
+/// Version of the events and of all that a cell publishes. Within a version fields are only added, and none changes
+/// its type or its unit.
+pub const SCHEMA: u32 = 1;
+
 /// An event; JSON with the field `event` as its name.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
     /// A campaign begins.
     Start {
+        /// Version of the events; within one, fields are only added.
+        schema: u32,
         /// Name of the cell.
         cell: String,
         /// Identifier of the campaign in the library.
