@@ -172,7 +172,8 @@ def test_servo_batches_are_the_samples_of_the_runs(watched: Watched) -> None:
     signals = ("reference_m", "input", "encoder_m", "tool_m")
     n_seen = 0
     for batch in batches:
-        assert set(batch) == {"event", "first_sync", "iteration_and_sample", *signals}
+        assert set(batch) == {"event", "schema", "first_sync", "iteration_and_sample", *signals}
+        assert batch["schema"] == 1
         assert len(batch["iteration_and_sample"]) == 25
         arrays = [np.array(batch[name]) for name in signals]
         assert all(array.shape == (25, 2) for array in arrays)
