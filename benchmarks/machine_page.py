@@ -54,6 +54,11 @@ def main() -> None:
     examined = figures("doctor")
     wake = figures("latency", "--seconds", SECONDS, "--load")
     lines = [
+        # A page of its own: the site lists no machines.
+        "---",
+        "orphan: true",
+        "---",
+        "",
         f"# {platform.node()}",
         "",
         f"Written by `make rt-page` on {datetime.now(timezone.utc):%Y-%m-%d}. {processor()}, "

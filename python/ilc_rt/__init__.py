@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401
-    # A module of the package is imported by itself, so that it may import its neighbours.
+    # A submodule is imported directly: loading `public` here would be a circular import.
     if find_spec(f"{__name__}.{name}"):
         return import_module(f"{__name__}.{name}")
     try:

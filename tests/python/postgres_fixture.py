@@ -55,7 +55,7 @@ class Server:
 
 @contextlib.contextmanager
 def server() -> Iterator[Server]:
-    """Start a server, and end it; skip the test where there is none."""
+    """Start a server, and end it; skip the test where PostgreSQL is not installed."""
     pytest.importorskip("psycopg", reason="psycopg, the extra fleet, is not installed")
     bin_folder = programs()
     if bin_folder is None:

@@ -39,7 +39,7 @@ class FlightRecord:
 
 
 def read_flight(library: Path, cell: str) -> FlightRecord | None:
-    """Return the flight record of a cell beside a library; None if there is none to be read."""
+    """Return the flight record of a cell beside a library; None if it cannot be read."""
     file = library.with_name(f"{library.stem}.{cell}.late.json")
     try:
         if file.stat().st_size > FILE_MAX_BYTES:

@@ -142,7 +142,7 @@ def newest() -> int:
 
 
 def version(connection: psycopg.Connection[Any]) -> int:
-    """Return the version of the tables; 0 if there are none."""
+    """Return the version of the tables; 0 for an empty database."""
     query = "SELECT to_regclass('fleet_version') IS NOT NULL"
     if not _one(connection, query):
         return 0

@@ -42,7 +42,7 @@ impl Peer {
         }
     }
 
-    /// Adds the histogram of one measurement; false if there is none.
+    /// Adds the histogram of one measurement; returns false if the output has no counts.
     fn add(&mut self, printed: &str) -> bool {
         self.counts.resize(BUCKETS, 0);
         let before: u64 = self.counts.iter().sum();
