@@ -6,6 +6,8 @@ import json
 import shutil
 import sqlite3
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +17,7 @@ from postgres_fixture import server
 
 from ilc_rt import BadInputError, Library, ReadOnlyLibrary
 from ilc_rt.fleet import FleetLibrary, Synced, fetch, pull, push
-from ilc_rt.fleet.database import connect, newest
+from ilc_rt.fleet.database import connect, migrate, newest, version
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -196,6 +198,27 @@ def test_what_is_no_fleet_is_refused_in_a_line(
     for refused in (lambda: FleetLibrary(address), lambda: push(library, address)):
         with pytest.raises(BadInputError, match=f"version 99; version {newest()} is needed"):
             refused()
+
+
+def test_the_tables_are_made_once_by_who_comes_first(address: str) -> None:
+    """Who waited for the other's lock has seen an empty database, and looks again."""
+    psycopg = pytest.importorskip("psycopg")
+    waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
+    with (
+        psycopg.connect(address, autocommit=True) as first,
+        psycopg.connect(address, autocommit=True) as second,
+        ThreadPoolExecutor() as pool,
+    ):
+        assert version(second) == 0
+        with first.transaction():
+            migrate(first, address)
+            late = pool.submit(migrate, second, address)
+            until = time.monotonic() + 60
+            while first.execute(waiting).fetchone() != (1,):
+                assert time.monotonic() < until
+                assert not late.done()
+        late.result(60)
+        assert version(second) == newest()
 
 
 def test_without_psycopg_the_extra_is_named(library: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -116,16 +116,21 @@ def test_a_hundred_cells_by_processes_that_are_killed(
     n_killed = 0
     running = {number: start(PUSHER, address, kills[number].pop(), *shares[number])
                for number in range(N_PROCESSES)}  # fmt: skip
-    while running:
-        for number, process in list(running.items()):
-            code = process.wait(100)
-            if code == 0:
-                del running[number]
-                continue
-            assert code == -signal.SIGKILL
-            n_killed += 1
-            kill_at = kills[number].pop() if kills[number] else 0
-            running[number] = start(PUSHER, address, kill_at, *shares[number])
+    try:
+        while running:
+            for number, process in list(running.items()):
+                code = process.wait(100)
+                if code == 0:
+                    del running[number]
+                    continue
+                assert code == -signal.SIGKILL
+                n_killed += 1
+                kill_at = kills[number].pop() if kills[number] else 0
+                running[number] = start(PUSHER, address, kill_at, *shares[number])
+    finally:
+        for process in running.values():
+            process.kill()
+            process.wait()
     assert n_killed == N_KILLS
 
     expected = []
