@@ -225,12 +225,30 @@ def test_latency_is_measured_under_load_and_drawn(bench: Bench) -> None:
             assert part["cyclictest_us"]["count"] > 0
 
 
-def test_required_real_time_is_granted_or_nothing_moves(bench: Bench) -> None:
-    cell = bench.cell(("[[axis]]", "[realtime]\ncpu = 1000\n[[axis]]"))
-    bench.drives(cell, bus=bench.bus)
-    run = bench.start("ilc-rt", "run", cell, "--bus", bench.bus, "--require-rt", "--no-telemetry")
+@pytest.mark.parametrize(
+    ("verb", "options"),
+    [
+        ("run", ["--no-telemetry"]),
+        ("run", ["--no-telemetry", "--home"]),
+        ("identify", ["--axis", "x"]),
+        ("goto", ["x=0.05"]),
+        ("home", []),
+    ],
+)
+def test_required_real_time_is_granted_or_nothing_moves(
+    bench: Bench, verb: str, options: list[str]
+) -> None:
+    homing = '[axis.homing]\nkind = "drive"\nmethod = 33\nspeed_zero_m_s = 0.01\n'
+    homed = ("[axis.model]", f"{homing}\n[axis.model]")
+    cell = bench.cell(
+        ("[[axis]]", "[realtime]\ncpu = 1000\n[[axis]]"),
+        *([homed] if verb == "home" or "--home" in options else []),
+    )
+    drives = bench.drives(cell, bus=bench.bus)
+    run = bench.start("ilc-rt", verb, cell, *options, "--bus", bench.bus, "--require-rt")
     assert run.end() == 2
     (error,) = run.errors
     assert error.startswith("ilc-rt: --require-rt: ")
     assert "processor 1000 refused" in error
     assert error.endswith("; nothing has moved")
+    assert "homed" not in goodbye(drives)

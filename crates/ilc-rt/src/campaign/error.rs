@@ -12,6 +12,7 @@ use crate::fieldbus::transport::{OpenError, syntaxes};
 use crate::identification::IdentificationError;
 use crate::learning::LearningError;
 use crate::library::LibraryError;
+use crate::rt::Refused;
 
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
@@ -173,10 +174,10 @@ pub enum CampaignError {
         reason: String,
     },
     /// Real-time settings that were required and not granted.
-    #[error("--require-rt: {}; nothing has moved", missing.join("; "))]
+    #[error("--require-rt: {}; nothing has moved", all(refused))]
     NotRealtime {
-        /// One sentence for each refused setting.
-        missing: Vec<String>,
+        /// Refused settings.
+        refused: Vec<Refused>,
     },
     /// A thread could not be started.
     #[error("the {what} thread could not be started: {source}")]
@@ -229,4 +230,10 @@ pub enum ResumeError {
     /// The law refused a run of the campaign.
     #[error("the law refused a run: {0}")]
     Refused(LearningError),
+}
+
+/// Returns every refusal, in one line.
+fn all(refused: &[Refused]) -> String {
+    let each: Vec<String> = refused.iter().map(Refused::to_string).collect();
+    each.join("; ")
 }

@@ -25,6 +25,8 @@ pub(super) struct Settings {
     request: RtRequest,
     spin: Nanos,
     late_share: f64,
+    /// Refuse to run without every requested setting.
+    is_required: bool,
 }
 
 impl Settings {
@@ -35,12 +37,26 @@ impl Settings {
     pub(super) fn of(cell: &Cell, session: &Session) -> Result<Self, CampaignError> {
         let Realtime { late_share, cpu, spin_us, .. } = cell.realtime;
         let request = RtRequest { cpu, ..RtRequest::default() };
+        let is_required = session.require_rt;
         let Readiness { report, spin } = Readiness::probe(request, spin_us);
-        let missing = report.missing(request);
-        if session.require_rt && !missing.is_empty() {
-            return Err(CampaignError::NotRealtime { missing });
+        let settings = Self { request, spin, late_share, is_required };
+        settings.accept(report)?;
+        Ok(settings)
+    }
+
+    /// Refuses a machine without the settings that are required, before anything moves.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(super) fn require(cell: &Cell, session: &Session) -> Result<(), CampaignError> {
+        if session.require_rt { Self::of(cell, session).map(drop) } else { Ok(()) }
+    }
+
+    fn accept(&self, report: RtReport) -> Result<RtReport, CampaignError> {
+        if self.is_required && !report.refused.is_empty() {
+            return Err(CampaignError::NotRealtime { refused: report.refused });
         }
-        Ok(Self { request, spin, late_share })
+        Ok(report)
     }
 }
 
@@ -68,12 +84,16 @@ impl Pacer {
     }
 
     /// Starts the loop's thread, with a flight recorder; returns the scheduling that the system granted it.
+    ///
+    /// # Errors
+    /// [`CampaignError::NotRealtime`] if a required setting was refused, [`CampaignError::Thread`] if there is no
+    /// thread; the nodes are out of operation then.
     pub(super) fn on_clock(
         cycle: Cycle,
         settings: Settings,
     ) -> Result<(Self, RtReport), CampaignError> {
         let (report, granted) = std::sync::mpsc::sync_channel(1);
-        let Settings { request, spin, late_share } = settings;
+        let Settings { request, spin, late_share, is_required } = settings;
         let clock = Arc::new(MonotonicClock::new(spin));
         let mut cycle = cycle.recorded(Arc::clone(&clock) as Arc<dyn Clock>, late_share);
         let thread = std::thread::Builder::new()
@@ -83,16 +103,25 @@ impl Pacer {
                 let mut granted = thread::enter(request);
                 granted.spin_us = spin.0 as f64 * 1e-3;
                 let _awake = thread::keep_awake(&mut granted);
+                let may_run = !is_required || granted.refused.is_empty();
                 // Set-up of the thread is over before the first tick; no tick waits for the report.
                 let _ = report.send(granted);
-                run_on_clock(&mut cycle, clock.as_ref(), &mut timing);
+                if may_run {
+                    run_on_clock(&mut cycle, clock.as_ref(), &mut timing);
+                }
                 // At once, not when the campaign has finished its clean-up: by then the nodes may
                 // have missed their commands, or be in another campaign.
                 release(cycle, Some(timing))
             })
             .map_err(|source| CampaignError::Thread { what: "servo", source })?;
-        let report = granted.recv().unwrap_or_default();
-        Ok((Self::Clock { thread: Some(thread) }, report))
+        let dead = || RtReport::refusing(request, "the loop's thread has died");
+        match settings.accept(granted.recv().unwrap_or_else(|_| dead())) {
+            Ok(report) => Ok((Self::Clock { thread: Some(thread) }, report)),
+            Err(refused) => {
+                let _ = thread.join();
+                Err(refused)
+            }
+        }
     }
 
     /// Runs one tick in lock-step, or waits a while for the loop's thread; returns whether the loop has ended.

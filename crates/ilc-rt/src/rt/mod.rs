@@ -14,4 +14,4 @@ pub use clock::{Clock, Interruptions, ManualClock, MonotonicClock, Nanos};
 pub use flight::{Flight, Stamps};
 pub use latency::{Latency, LatencyFigures};
 pub use readiness::Readiness;
-pub use thread::{RtReport, RtRequest};
+pub use thread::{Refused, RtReport, RtRequest};

@@ -12,7 +12,7 @@ const EVERY: Nanos = Nanos::from_micros(200);
 const SPIN_US: (u32, u32) = (20, 100);
 
 /// Settings that a thread was granted, and the busy-waiting that it needs.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Readiness {
     /// Granted settings.
     pub report: RtReport,
@@ -28,7 +28,10 @@ impl Readiness {
             let spin = spin_us.map_or_else(measure_spin, Nanos::from_micros);
             Self { report, spin }
         });
-        tried.join().unwrap_or_default()
+        tried.join().unwrap_or_else(|_| Self {
+            report: RtReport::refusing(request, "the thread that tried it has died"),
+            spin: Nanos::from_micros(SPIN_US.1),
+        })
     }
 }
 
@@ -48,6 +51,7 @@ fn measure_spin() -> Nanos {
 
 #[cfg(test)]
 mod tests {
+    use super::super::thread::Refused;
     use super::*;
 
     #[test]
@@ -60,10 +64,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_named() {
+    fn what_was_refused_is_named() {
         let request = RtRequest { priority: 1000, lock_memory: false, cpu: Some(100_000) };
-        let missing = Readiness::probe(request, Some(0)).report.missing(request);
-        assert_eq!(missing.len(), 2, "{missing:?}");
-        assert!(missing[0].contains("SCHED_FIFO 1000") && missing[1].contains("processor 100000"));
+        let refused = Readiness::probe(request, Some(0)).report.refused;
+        assert!(
+            matches!(refused[..], [Refused::Priority(1000, _), Refused::Processor(100_000, _)]),
+            "{refused:?}"
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! Requests real-time scheduling of the calling thread and reports what was granted.
 
+use std::fmt;
 use std::fs::{File, OpenOptions};
 use std::io::Write as _;
 
@@ -51,30 +52,53 @@ pub struct RtReport {
     pub spin_us: f64,
     /// Kernel release, and whether it is a real-time kernel (`PREEMPT_RT`).
     pub kernel: String,
+    /// Parts of the request that were refused.
+    #[serde(skip)]
+    pub refused: Vec<Refused>,
     /// One sentence for each request that was refused and each setting known to add latency.
     pub notes: Vec<String>,
 }
 
+/// Part of a request that was refused, and the system's reason.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// `SCHED_FIFO` priority.
+    Priority(i32, String),
+    /// Locked memory.
+    Memory(String),
+    /// A processor of its own.
+    Processor(usize, String),
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Priority(priority, reason) => {
+                let hint = "give the program CAP_SYS_NICE or an rtprio limit";
+                write!(f, "SCHED_FIFO {priority} refused ({reason}); {hint}")
+            }
+            Self::Memory(reason) => {
+                let hint = "give the program CAP_IPC_LOCK or a memlock limit";
+                write!(f, "mlockall refused ({reason}); {hint}")
+            }
+            Self::Processor(cpu, reason) => {
+                let hint = "[realtime] cpu names one that this program may use";
+                write!(f, "processor {cpu} refused ({reason}); {hint}")
+            }
+        }
+    }
+}
+
 impl RtReport {
-    /// Returns one sentence for each part of a request that was not granted.
-    pub fn missing(&self, request: RtRequest) -> Vec<String> {
-        let refused = |key: &str| {
-            let note = self.notes.iter().find(|note| note.starts_with(key));
-            note.cloned().unwrap_or_else(|| format!("{key} refused"))
-        };
-        let mut missing = Vec::new();
-        if self.priority != request.priority {
-            missing.push(refused(&format!("SCHED_FIFO {}", request.priority)));
+    /// Returns the report of a thread that was granted nothing of a request.
+    pub fn refusing(request: RtRequest, reason: &str) -> Self {
+        let mut refused = vec![Refused::Priority(request.priority, reason.to_owned())];
+        if request.lock_memory {
+            refused.push(Refused::Memory(reason.to_owned()));
         }
-        if request.lock_memory && !self.mlock {
-            missing.push(refused("mlockall"));
-        }
-        if let Some(cpu) = request.cpu
-            && self.cpu.is_none()
-        {
-            missing.push(refused(&format!("processor {cpu}")));
-        }
-        missing
+        refused.extend(request.cpu.map(|cpu| Refused::Processor(cpu, reason.to_owned())));
+        let notes = refused.iter().map(Refused::to_string).collect();
+        Self { refused, notes, ..Self::default() }
     }
 }
 
@@ -83,35 +107,28 @@ impl RtReport {
 /// Never fails: refusals are reported, and the loop runs with what it has.
 #[expect(unsafe_code, reason = "the scheduler and mlockall have no safe wrapper")]
 pub fn enter(request: RtRequest) -> RtReport {
-    let mut notes = Vec::new();
+    let mut refused = Vec::new();
     let parameters = libc::sched_param { sched_priority: request.priority };
     // SAFETY: `parameters` is valid for the call; thread 0 means the caller.
     let fifo = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } == 0;
     if !fifo {
-        notes.push(format!(
-            "SCHED_FIFO {} refused ({}); give the program CAP_SYS_NICE or an rtprio limit",
-            request.priority,
-            std::io::Error::last_os_error()
-        ));
+        let reason = std::io::Error::last_os_error().to_string();
+        refused.push(Refused::Priority(request.priority, reason));
     }
     // SAFETY: mlockall takes flags only.
     let mlock =
         request.lock_memory && unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0;
     if request.lock_memory && !mlock {
-        notes.push(format!(
-            "mlockall refused ({}); give the program CAP_IPC_LOCK or a memlock limit",
-            std::io::Error::last_os_error()
-        ));
+        refused.push(Refused::Memory(std::io::Error::last_os_error().to_string()));
     }
-    let cpu = request.cpu.filter(|cpu| match processor::claim(*cpu) {
-        Ok(()) => true,
-        Err(error) => {
-            notes.push(format!(
-                "processor {cpu} refused ({error}); [realtime] cpu names one that this program may use"
-            ));
-            false
-        }
-    });
+    let mut cpu = request.cpu;
+    if let Some(asked) = cpu
+        && let Err(error) = processor::claim(asked)
+    {
+        refused.push(Refused::Processor(asked, error.to_string()));
+        cpu = None;
+    }
+    let mut notes: Vec<String> = refused.iter().map(Refused::to_string).collect();
     sleep_exactly();
     touch_stack();
     let release = first_line("/proc/sys/kernel/osrelease").unwrap_or_default();
@@ -133,6 +150,7 @@ pub fn enter(request: RtRequest) -> RtReport {
         cpu,
         spin_us: 0.0,
         kernel: format!("{release}{}", if realtime { " PREEMPT_RT" } else { "" }),
+        refused,
         notes,
     }
 }
@@ -221,12 +239,17 @@ mod tests {
     #[test]
     fn a_refused_priority_is_reported_not_hidden() {
         // Runs in its own thread, as the policy would persist in the test runner's.
-        let report = std::thread::spawn(|| {
-            enter(RtRequest { priority: 1000, lock_memory: false, cpu: None })
-        })
-        .join()
-        .unwrap();
+        let request = RtRequest { priority: 1000, lock_memory: false, cpu: None };
+        let report = std::thread::spawn(move || enter(request)).join().unwrap();
         assert_eq!(report.policy, "SCHED_OTHER");
-        assert!(report.notes.iter().any(|note| note.contains("1000")), "{:?}", report.notes);
+        assert!(matches!(report.refused[..], [Refused::Priority(1000, _)]), "{report:?}");
+        assert_eq!(report.notes[0], report.refused[0].to_string());
+    }
+
+    #[test]
+    fn a_thread_that_died_was_granted_nothing() {
+        let request = RtRequest { cpu: Some(1), ..RtRequest::default() };
+        let refused = RtReport::refusing(request, "its thread ended").refused;
+        assert_eq!(refused.len(), 3, "{refused:?}");
     }
 }

@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::error::CampaignError;
 use super::nodes;
 use super::options::Session;
+use super::pace::Settings;
 use crate::config::{Axis, Cell, DriveHoming, HomingKind};
 use crate::fieldbus::Bus;
 use crate::record::EndStatus;
@@ -110,6 +111,7 @@ pub(super) fn home_on(
     mut bus: Box<dyn Bus>,
     report: &mut Report<'_>,
 ) -> Result<(Homed, Box<dyn Bus>), CampaignError> {
+    Settings::require(cell, session)?;
     let mut tasks = tasks(cell, axes);
     let chosen: Vec<&Axis> = tasks.iter().map(|task| task.axis).collect();
     let are_homed = nodes::prepare_homing(cell, bus.as_mut(), session, &chosen, again)?;
