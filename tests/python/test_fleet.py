@@ -6,8 +6,8 @@ import json
 import shutil
 import sqlite3
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,7 @@ from postgres_fixture import server
 
 from ilc_rt import BadInputError, Library, ReadOnlyLibrary
 from ilc_rt.fleet import FleetLibrary, Synced, fetch, pull, push
-from ilc_rt.fleet.database import connect, migrate, newest, version
+from ilc_rt.fleet.database import connect, newest, version
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -200,25 +200,20 @@ def test_what_is_no_fleet_is_refused_in_a_line(
             refused()
 
 
-def test_the_tables_are_made_once_by_who_comes_first(address: str) -> None:
-    """Who waited for the other's lock has seen an empty database, and looks again."""
-    psycopg = pytest.importorskip("psycopg")
-    waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
-    with (
-        psycopg.connect(address, autocommit=True) as first,
-        psycopg.connect(address, autocommit=True) as second,
-        ThreadPoolExecutor() as pool,
-    ):
-        assert version(second) == 0
-        with first.transaction():
-            migrate(first, address)
-            late = pool.submit(migrate, second, address)
-            until = time.monotonic() + 60
-            while first.execute(waiting).fetchone() != (1,):
-                assert time.monotonic() < until
-                assert not late.done()
-        late.result(60)
-        assert version(second) == newest()
+def test_programs_that_begin_together_make_the_tables_once(postgres: Server) -> None:
+    """Each has seen an empty database before it waited for the others."""
+    n_programs = 4
+    for _ in range(5):
+        address = postgres.database()
+        together = Barrier(n_programs)
+
+        def begin(_: int, address: str = address, together: Barrier = together) -> int:
+            together.wait(60)
+            with connect(address) as connection:
+                return version(connection)
+
+        with ThreadPoolExecutor(n_programs) as pool:
+            assert list(pool.map(begin, range(n_programs))) == [newest()] * n_programs
 
 
 def test_without_psycopg_the_extra_is_named(library: str, monkeypatch: pytest.MonkeyPatch) -> None:
