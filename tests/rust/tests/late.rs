@@ -285,6 +285,15 @@ fn a_thread_that_loses_the_processor_is_told_from_a_slow_computation() {
 }
 
 #[test]
+fn what_interrupted_the_thread_between_two_measurements_is_not_counted() {
+    let mut bench = Bench::new();
+    bench.cycles(5);
+    bench.clock.clock.preempt();
+    bench.cycles(5);
+    assert_eq!(bench.timing.stages.interruptions, Interruptions::default());
+}
+
+#[test]
 fn a_bus_that_blocks_is_told_from_a_slow_computation() {
     let mut bench = Bench::new();
     let clock = Arc::clone(&bench.clock);

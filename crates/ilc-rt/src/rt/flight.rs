@@ -139,11 +139,18 @@ impl Flight {
         }
     }
 
+    /// Counts interruptions from now on: those of the thread before its first tick, or between two measurements, are
+    /// none of the loop's.
+    pub fn start(&mut self) {
+        if let Some(clock) = &self.clock {
+            self.before = clock.interruptions();
+        }
+    }
+
     /// Begins a cycle that was due at a time and began at another.
     pub fn begin(&mut self, due: Nanos, woke: Nanos, missed: u32) {
-        let Some(clock) = &self.clock else { return };
-        if self.n_ticks == 0 {
-            self.before = clock.interruptions();
+        if self.clock.is_none() {
+            return;
         }
         self.now = Stamps { tick: self.n_ticks, due, woke, missed, ..Stamps::default() };
         self.taken = woke;

@@ -206,6 +206,11 @@ impl Cycle {
         Self { flight: Flight::new(clock, self.spec.cycle, late_share), ..self }
     }
 
+    /// Counts interruptions of the thread from now on.
+    pub fn start(&mut self) {
+        self.flight.start();
+    }
+
     /// Records that the next tick was due at a time and began at another, after skipped cycles.
     pub fn begin(&mut self, due: Nanos, woke: Nanos, missed: u32) {
         self.flight.begin(due, woke, missed);

@@ -68,6 +68,7 @@ pub fn run_until(cycle: &mut Cycle, clock: &dyn Clock, timing: &mut Timing, end:
     let mut due = clock.now().plus(period);
     // Missed cycles that were counted when they were missed, and are still to be made up for.
     let mut owed = 0;
+    cycle.start();
     while due < end {
         clock.sleep_until(due);
         let began = clock.now();
