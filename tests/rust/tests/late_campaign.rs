@@ -1,4 +1,4 @@
-//! What a campaign in real time tells of its late cycles: events, the fault, the record beside the library.
+//! Events, faults and flight records of campaigns in real time with late cycles.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
