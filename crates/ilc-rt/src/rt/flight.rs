@@ -139,8 +139,8 @@ impl Flight {
         }
     }
 
-    /// Counts interruptions from now on: those of the thread before its first tick, or between two measurements, are
-    /// none of the loop's.
+    /// Counts interruptions from now on, without those of the thread before its first tick or between two
+    /// measurements.
     pub fn start(&mut self) {
         if let Some(clock) = &self.clock {
             self.before = clock.interruptions();
