@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 from importlib import import_module
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -24,32 +23,42 @@ from ilc_rt.text import printable
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-# In the order of the help. A verb of several verbs is a `Typer` named `app` in its module.
-VERBS = (
-    "demo", "run", "identify", "repeatability", "plot", "tune", "sweep", "library", "monitor",
-    "dashboard", "bridge",
-)  # fmt: skip
+#: Set by a shell that asks for completions.
+COMPLETION = "_ILC_COMPLETE"
+
+# The summary of each verb, in the order of the help, which imports no verb for it. A verb of
+# several verbs is a `Typer` named `app` in its module.
+VERBS = {
+    "demo": "Let a simulated two-axis gantry learn its contour, and write a report.",
+    "run": "Run a cell's program again and again, each run better than the last.",
+    "identify": "Excite one axis while the others hold still, and fit a model to its response.",
+    "repeatability": "Run a program without learning and tell what of its error repeats.",
+    "plot": "Draw a campaign from the library: a report, or one picture a file.",
+    "tune": "Propose weights of norm-optimal learning for a cell, with the reasons.",
+    "sweep": "Let a cell learn in simulation with varied parameters: the map of its robustness.",
+    "library": "List, show, export and trim the runs in a library.",
+    "monitor": "Watch a controller: its state, each run's error, and faults.",
+    "dashboard": "Serve a web page that watches cells and compares their stored runs; it commands nothing.",
+    "bridge": "Show a running controller in PlotJuggler or Foxglove.",
+    "reproduce": "Compute a paper's figures again, and set them beside the printed ones.",
+}
 
 
 def application(wanted: str | None = None) -> Typer:
     """Return the program with the wanted verb, whose modules alone are imported; or with all."""
-    app = Typer(
-        name="ilc",
-        no_args_is_help=True,
-        pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
-        help="The motion controller that learns: each run corrects the next.",
-    )
-    app.callback()(_options)
-    verbs = (wanted,) if wanted in VERBS else () if wanted == "--version" else VERBS
+    app = _empty()
+    own = [name for name in VERBS if name != "reproduce"]
+    verbs = [wanted] if wanted in own else own
     for name in verbs:
         module = import_module(f"ilc_rt.commands.{name}")
         if hasattr(module, "app"):
             app.add_typer(module.app, name=name)
         else:
             app.command(name)(getattr(module, name))
-    if verbs is not VERBS:
+    if verbs is not own:
         return app
+    from importlib.metadata import entry_points
+
     further = {entry.name: entry for entry in entry_points(group="ilc_rt.verbs")}
     for name, entry in further.items():
         app.command(name)(entry.load())
@@ -58,6 +67,31 @@ def application(wanted: str | None = None) -> Typer:
 
         app.command("reproduce", context_settings=reproduce.ANY_ARGUMENTS)(reproduce.reproduce)
     return app
+
+
+def outline() -> Typer:
+    """Return the program with the summaries of its verbs alone: for its help and its options."""
+    app = _empty()
+    for name, summary in VERBS.items():
+        app.command(name, short_help=summary)(_nothing)
+    return app
+
+
+def _empty() -> Typer:
+    # Help in plain text, as that of `ilc-rt`: in boxes it takes three times as long to appear.
+    app = Typer(
+        name="ilc",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        help="The motion controller that learns: each run corrects the next.",
+    )
+    app.callback()(_options)
+    return app
+
+
+def _nothing() -> None:
+    """Stand for a verb in the outline."""
 
 
 def _tell_version(*, wanted: bool) -> None:
@@ -89,7 +123,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         words = sys.argv[1:] if arguments is None else arguments
-        app = application(words[0] if words else None)
+        first = words[0] if words else "--help"
+        is_outline = first.startswith("-") and COMPLETION not in os.environ
+        app = outline() if is_outline else application(first)
         code = app(args=arguments, standalone_mode=False, prog_name="ilc")
     except CampaignError as error:
         _say(error.reason)
@@ -116,7 +152,10 @@ def _unexpected(error: Exception) -> int:
         context = getattr(error, "ctx", None)
         hint = f" (see `{context.command_path} --help`)" if context is not None else ""
         text = str(format_message()).rstrip(".")
-        if text:
+        if text.startswith("Usage:"):
+            # No verb was named: its message is the help.
+            typer.echo(text, err=True)
+        elif text:
             _say(text + hint)
         return int(getattr(error, "exit_code", EXIT_BAD_INPUT))
     if isinstance(error, OverflowError):

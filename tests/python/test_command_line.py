@@ -11,9 +11,11 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from typer.main import get_command
 
 import ilc_rt
 from ilc_rt import processes
+from ilc_rt.cli import VERBS, application
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,6 +50,31 @@ def test_the_program_starts_without_numerics(words: list[str], tmp_path: Path) -
     done = subprocess.run([sys.executable, "-c", code, *words], cwd=tmp_path, text=True,
                           capture_output=True, check=True)  # fmt: skip
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_help_of_the_program_is_that_of_its_verbs() -> None:
+    """Without their modules, of which none is imported for it."""
+    complete: Any = get_command(application())
+    assert sorted(complete.commands) == sorted(VERBS)
+    for name, summary in VERBS.items():
+        first, *_ = complete.commands[name].help.split("\n\n")
+        assert " ".join(first.split()) == summary
+    code = (
+        "import sys; from ilc_rt.cli import main; main(['--help']);"
+        "late = ('ilc_rt.commands', 'rich', 'numpy');"
+        "print([name for name in sys.modules if name.startswith(late)])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], text=True, capture_output=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert all(name in done.stdout for name in VERBS)
+
+
+@pytest.mark.parametrize("words", [[], ["library"], ["bridge"]])
+def test_without_a_verb_the_help_is_shown(ilc: Ilc, words: list[str]) -> None:
+    told = ilc(*words)
+    assert (told.returncode, told.stdout) == (2, "")
+    assert told.stderr.startswith("Usage: ilc")
+    assert len(told.stderr.splitlines()) > 5
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

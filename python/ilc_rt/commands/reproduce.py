@@ -11,9 +11,9 @@ ANY_ARGUMENTS = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 
 def reproduce(_: typer.Context) -> None:
-    """Compute a paper's figures again; needs the package ilc-papers.
+    """Compute a paper's figures again, and set them beside the printed ones.
 
-    Install it with pip install 'ilc-rt[papers]'.
+    It needs the package ilc-papers: pip install 'ilc-rt[papers]'.
     """
     message = (
         "reproduce: the package ilc-papers is not installed; allowed after "
