@@ -201,7 +201,7 @@ def test_what_is_no_fleet_is_refused_in_a_line(
 
 
 def test_the_tables_are_made_once_by_who_comes_first(address: str) -> None:
-    """Who waited for the other's lock has seen an empty database, and looks again."""
+    """The one that waited for the lock has seen an empty database, and looks again."""
     psycopg = pytest.importorskip("psycopg")
     waiting = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND NOT granted"
     with (

@@ -146,14 +146,7 @@ class _Screen:
         cell = self._cells.setdefault(message.cell, WatchedCell(message.cell))
         self.runs += isinstance(message.event, IterationEvent)
         self.faults += isinstance(message.event, FaultEvent)
-        if message.warning is not None:
-            cell.note("warning", f"{message.topic}: {message.warning}")
-        if message.event is not None:
-            cell.see(message.event)
-        elif message.topic == "servo":
-            cell.see_servo(message.payload)
-        elif message.topic in {"alive", "gone"}:
-            cell.see_presence(is_present=message.topic == "alive")
+        cell.take(message)
 
 
 class _View:

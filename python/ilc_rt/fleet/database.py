@@ -153,8 +153,8 @@ def migrate(connection: psycopg.Connection[Any], address: str) -> None:
     """Make or change the tables, all steps or none; other programs that would do the same wait."""
     with connection.transaction():
         connection.execute("SELECT pg_advisory_xact_lock(%s)", [LOCK])
-        # Before the version is read: whoever waited for the lock still remembers that there was no
-        # such table, and only this makes PostgreSQL look again.
+        # Before the version is read: a program that waited for the lock still remembers that there
+        # was no such table, and only this makes PostgreSQL look again.
         connection.execute(
             "CREATE TABLE IF NOT EXISTS fleet_version "
             "(version integer PRIMARY KEY, applied_at timestamptz NOT NULL DEFAULT now())"
