@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.fleet.database import connect, told
 from ilc_rt.library_file import ARRAYS, FIGURES
@@ -16,9 +17,7 @@ from ilc_rt.retention import selected
 if TYPE_CHECKING:
     import builtins
     from collections.abc import Iterator
-    from types import TracebackType
 
-    from typing_extensions import Self
 
 LISTED = """
 SELECT id, created_utc, cell, campaign, iteration, law, measure, n_samples, n_axes, cycle_s,
@@ -36,7 +35,7 @@ ORDER BY max(created_utc), cell, campaign
 """
 
 
-class FleetLibrary:
+class FleetLibrary(Closing):
     """The runs of many cells in one PostgreSQL database, read as a library is.
 
     Parameters
@@ -60,19 +59,6 @@ class FleetLibrary:
     def __init__(self, address: str) -> None:
         self.address = address
         self._connection = connect(address, read_only=True)
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the connection."""
-        self.close()
 
     def close(self) -> None:
         """Close the connection."""
