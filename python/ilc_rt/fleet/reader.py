@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import MISSING, fields
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
+from ilc_rt.figures import Figures
 from ilc_rt.fleet.database import connect, told
-from ilc_rt.library_file import ARRAYS, FIGURES
+from ilc_rt.library_file import ARRAYS
 from ilc_rt.retention import selected
 
 if TYPE_CHECKING:
@@ -63,6 +65,16 @@ class FleetLibrary(Closing):
     def close(self) -> None:
         """Close the connection."""
         self._connection.close()
+
+    @property
+    def is_open(self) -> bool:
+        """False after `close`, or when the connection was lost."""
+        return not (self._connection.closed or self._connection.broken)
+
+    def stamp(self) -> tuple[int, int]:
+        """Return two numbers, one of which changes with each run that is stored or changed."""
+        runs, changes = self._rows("SELECT count(*), sum(xmin::text::bigint) FROM run")[0]
+        return int(runs), int(changes or 0)
 
     def __len__(self) -> int:
         """Return the number of stored runs."""
@@ -191,5 +203,9 @@ def _described(row: Any) -> dict[str, Any]:  # noqa: ANN401 (a row of any column
     run |= {"axis_names": json.loads(axis_names), "input_units": json.loads(input_units)}
     run["disturbance"] = None if disturbance is None else json.loads(disturbance)
     stored = json.loads(figures)
-    run |= {name: stored.get(name) for name in FIGURES}
+    for figure in fields(Figures):
+        value = stored.get(figure.name)
+        if value is None and figure.default is not MISSING:
+            value = list(figure.default) if figure.default == () else figure.default
+        run[figure.name] = value
     return run | {"digest": digest, "has_signals": has_signals}
