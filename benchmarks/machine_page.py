@@ -1,4 +1,7 @@
-"""Measure how punctual this computer is, and write docs/machines/NAME.md: bad figures, too."""
+"""Measure how punctual this computer is, and write docs/machines/NAME.md: bad figures, too.
+
+An argument names another folder for the page.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,8 @@ from report import processor
 
 ROOT = Path(__file__).resolve().parent.parent
 SECONDS = os.environ.get("RT_SECONDS") or "20"
+#: Of each cell whose tick is measured.
+TICK_S = str(min(5, int(SECONDS)))
 QUANTILES = {"p50": "median", "p99": "99 %", "p999": "99.9 %", "max": "longest"}
 #: Cells whose tick is measured, with their cycles; None is one axis.
 TICKS = (
@@ -51,6 +56,7 @@ def lateness(measured: dict[str, Any], title: str) -> list[str]:
 
 def main() -> None:
     """Measure, and write the page."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs" / "machines"
     examined = figures("doctor")
     wake = figures("latency", "--seconds", SECONDS, "--load")
     lines = [
@@ -78,7 +84,7 @@ def main() -> None:
     ]
     for cell, cycle_us, title in TICKS:
         where = [str(ROOT / cell)] if cell else []
-        measured = figures("latency", *where, "--cycle-us", str(cycle_us), "--seconds", "5")
+        measured = figures("latency", *where, "--cycle-us", str(cycle_us), "--seconds", TICK_S)
         tick = measured["execution_us"]
         values = " | ".join(f"{tick[key]:.1f}" for key in QUANTILES)
         lines.append(f"| {title} | {cycle_us} | {values} | {tick['count']} |")
@@ -87,12 +93,10 @@ def main() -> None:
     for one in examined["findings"]:
         words = [one["what"], one["verdict"], one["found"], one["mend"] or ""]
         lines.append("| " + " | ".join(word.replace("|", "\\|") for word in words) + " |")
-    page = (
-        ROOT / "docs" / "machines" / (re.sub(r"[^a-z0-9]+", "-", platform.node().lower()) + ".md")
-    )
-    page.parent.mkdir(exist_ok=True)
+    page = folder / (re.sub(r"[^a-z0-9]+", "-", platform.node().lower()) + ".md")
+    folder.mkdir(exist_ok=True)
     page.write_text("\n".join(lines) + "\n")
-    sys.stderr.write(f"{page.relative_to(ROOT)} written\n")
+    sys.stderr.write(f"{page} written\n")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from ilc_rt import _native, library_file
+from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.given import given
 from ilc_rt.retention import kept_by, selected
@@ -15,7 +16,6 @@ from ilc_rt.retention import kept_by, selected
 if TYPE_CHECKING:
     import builtins
     from collections.abc import Iterator
-    from types import TracebackType
 
     from numpy.typing import ArrayLike
     from typing_extensions import Self
@@ -25,7 +25,7 @@ IN_MEMORY = ":memory:"
 ALL = 2**31
 
 
-class Library(_native.Library):
+class Library(Closing, _native.Library):
     """Every run of every campaign, in one SQLite file.
 
     Parameters
@@ -64,16 +64,7 @@ class Library(_native.Library):
         """Path of the file, or ``:memory:``."""
         return self._path
 
-    def __enter__(self) -> Self:
-        """Return itself; a library holds no file open between calls."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """Leave the file as it is: every call has written what it stored."""
 
     def __len__(self) -> int:

@@ -21,15 +21,14 @@ import typing
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import SCHEMA, EventError, StartEvent, parse_event
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from types import TracebackType
 
     import zenoh
-    from typing_extensions import Self
     from zenoh import handlers
 
     from ilc_rt.events import Event
@@ -69,7 +68,7 @@ class Message:
     warning: str | None = None
 
 
-class Monitor:
+class Monitor(Closing):
     """A subscriber to one cell, or to all of them.
 
     Parameters
@@ -122,19 +121,6 @@ class Monitor:
         )
         self._values = self._session.declare_subscriber(f"ilc/{cell}/*", _direct(self._on_value))
         self._heard = self._session.declare_queryable(f"ilc/{cell}/heard", _direct(_answer))
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave the network."""
-        self.close()
 
     @property
     def lost(self) -> int:

@@ -21,13 +21,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ilc_rt.closing import Closing
 from ilc_rt.errors import EXIT_BAD_INPUT, EXIT_FAILURE, CampaignError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import TracebackType
 
-    from typing_extensions import Self
 
 READY_DEADLINE_S = 60.0
 END_DEADLINE_S = 5.0
@@ -57,7 +56,7 @@ def find_program(name: str) -> Path:
     raise CampaignError(message)
 
 
-class Program:
+class Program(Closing):
     """A running program whose lines are read as they arrive.
 
     Notes
@@ -85,19 +84,6 @@ class Program:
             self._errors.close()
             message = f"cannot start {argv[0]}: {error.strerror}"
             raise CampaignError(message) from error
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """End the program and reap it."""
-        self.close()
 
     @property
     def pid(self) -> int:

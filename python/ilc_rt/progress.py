@@ -102,7 +102,7 @@ class CampaignView:
         self._cell.name = event.cell
         self._cell.see(event)
         # Printed above already, and they stay there.
-        self._cell.notes.clear()
+        self._cell.log.clear()
         self._cell.recall(result.records)
 
     def _print_plain(self, result: CampaignResult) -> None:

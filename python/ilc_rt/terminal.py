@@ -47,6 +47,8 @@ AXIS_WORDS = {
     "stopped": "at rest",
 }
 
+INPUT_WORDS = {None: "unknown", True: "on", False: "off"}
+
 
 def spark(values: Sequence[float], width: int, *, ascii_only: bool = False) -> str:
     """Return the newest values as a line of bars on a logarithmic scale.
@@ -166,7 +168,9 @@ class CellView:
         cell = self._cell
         length = min(BAR_MAX, width - 16)
         if cell.end is None and cell.state is not None and length > 0:
-            yield Text(f"run       {bar(cell.share, length, ascii_only=ascii_only)}"[:width])
+            yield Text(
+                f"run       {bar(cell.progress or 0.0, length, ascii_only=ascii_only)}"[:width]
+            )
         if cell.done is not None and length > 0:
             yield Text(f"campaign  {bar(cell.done, length, ascii_only=ascii_only)}"[:width])
 
@@ -241,7 +245,8 @@ class CellView:
         if parts:
             yield Text(f"loop      {', '.join(parts)}")
         if cell.inputs:
-            yield Text(f"inputs    {cell.inputs}")
+            told = (f"{printable(one.name)} {INPUT_WORDS[one.on]}" for one in cell.inputs)
+            yield Text(f"inputs    {', '.join(told)}")
 
     def _notes(self, notes: Iterable[Note]) -> Iterable[RenderableType]:
         faults = [note for note in notes if note.kind == "fault"][-NOTES_SHOWN:]

@@ -2,6 +2,8 @@
 
 import importlib.util
 import json
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -76,3 +78,46 @@ def test_many_plants_are_compared_bit_by_bit(report, tmp_path):
     section = report.many_plants_section(rows)
     assert section[0] == "## Thousands of plants"
     assert sum(line.startswith("| s") for line in section) == 5
+
+
+def test_the_page_of_a_machine_has_every_section_with_its_figures(tmp_path):
+    """The script of `make rt-page`, a second a part: figures of this computer, good or bad."""
+    done = subprocess.run(
+        [sys.executable, str(FOLDER / "machine_page.py"), str(tmp_path)],
+        capture_output=True, text=True, check=False, timeout=240,
+        env={**os.environ, "RT_SECONDS": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    (page,) = tmp_path.iterdir()
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("---\norphan: true\n---\n\n# ")
+    assert "Written by `make rt-page` on " in text
+    head, *sections = text.split("\n## ")
+    assert " processors, kernel " in head
+    titles = ["Wake-ups at 1 kHz", "Ticks", "Findings of `ilc-rt doctor`"]
+    assert [section.partition("\n")[0] for section in sections] == titles
+    wake, ticks, findings = map(rows_of, sections)
+    # Idle, then loaded.
+    assert [row[0] for row in wake] == ["median", "99 %", "99.9 %", "longest"] * 2
+    for table in (wake[:4], wake[4:]):
+        late_us = [float(row[1]) for row in table]
+        assert late_us == sorted(late_us)
+    assert "\nIdle: " in sections[0]
+    assert "\nEvery processor, memory and disk busy: " in sections[0]
+    assert [row[:2] for row in ticks] == [
+        ["one axis, 20 kHz", "50"], ["two axes, csp", "1000"], ["three axes, csp", "1000"],
+    ]  # fmt: skip
+    for row in ticks:
+        tick_us = [float(value) for value in row[2:6]]
+        assert tick_us == sorted(tick_us)
+        assert tick_us[0] > 0.0
+        assert int(row[6]) > 0
+    assert {row[0] for row in findings} >= {"kernel", "priority", "memory", "clock"}
+    assert {row[1] for row in findings} <= {"good", "poor", "unknown"}
+
+
+def rows_of(section):
+    """Return the cells of the tables of a section, without their headings."""
+    lines = [line for line in section.splitlines() if line.startswith("| ")]
+    rows = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
+    return [row for row in rows if row[0] not in {"us", "cell", "what"}]

@@ -120,7 +120,7 @@ def test_a_campaign_is_followed_from_its_start_to_its_end() -> None:
     fed(said({"event": "progress", "iteration": 1, "sample": 25, "n_samples": 50}), model=model)
     assert run_words(model) == "run 1 (2 of 4), 50 %"
     fed(ended(0, 1e-3), ended(1, 1e-4), model=model)
-    assert [record.index for record in model.runs.values()] == [0, 1]
+    assert [record.index for record in model.records] == [0, 1]
     assert model.overruns == 2
     fed(said({"event": "end", "status": "completed", "iterations": 2}), model=model)
     status = model.status(1e6)
@@ -163,7 +163,7 @@ def test_a_fault_names_its_axis_in_words() -> None:
     assert model.status(0.2).level == "fault"
     assert axis_words(model, 1, 0.2).words == f"fault: {reason}"
     assert axis_words(model, 0, 0.2).words == "stopped with the others"
-    assert model.notices[-1].level == "fault"
+    assert model.log[-1].kind == "fault"
     fed(said({"event": "state", "state": "bringing_up"}), model=model)
     assert model.fault is None
 
@@ -189,18 +189,68 @@ def test_silence_is_told_and_ends_by_itself() -> None:
     assert (status.words, status.level) == ("silent since 12 s", "silent")
     model.apply(Message("gantry", "gone", {}), 13.0, 1e9)
     assert model.status(13.0).level == "silent"
-    assert "gone without an end" in model.notices[-1].text
+    assert "gone without an end" in model.log[-1].text
     model.apply(Message("gantry", "alive", {}), 20.0, 1e9)
     model.apply(said({"event": "state", "state": "running", "iteration": 0}), 20.1, 1e9)
     assert model.status(20.2).words == "running"
-    assert any("is back" in notice.text for notice in model.notices)
+    assert any("is back" in note.text for note in model.log)
 
 
 def test_another_campaign_whose_start_was_missed_begins_its_runs_anew() -> None:
     model = fed(said(START), ended(0, 1e-3), ended(1, 1e-4), ended(2, 1e-5))
     fed(ended(1, 2e-3, digest="another"), model=model)
-    assert list(model.runs) == [1]
+    assert [run.index for run in model.records] == [1]
     assert model.campaign is None
+
+
+def test_a_state_after_the_end_belongs_to_the_next_campaign() -> None:
+    reason = "node 2 is silent"
+    end = said({"event": "end", "status": "fault", "iterations": 1, "reason": reason})
+    fault = said({"event": "fault", "reason": reason, "axis": "y"}, "fault")
+    model = fed(said(START), ended(0, 1e-3), fault, end)
+    assert [note.kind for note in model.notes] == ["fault"], "the reason is said once"
+    assert [note.text for note in model.log][-2:] == [reason, "fault after 1 run"]
+    fed(said({"event": "state", "state": "bringing_up"}), model=model)
+    assert (model.records, model.campaign, model.fault, model.notes) == ([], None, None, [])
+    assert not any(axis.is_faulty for axis in model.axes)
+    assert model.axis_names == ("x", "y"), "the axes are those of the cell"
+    assert reason in [note.text for note in model.log], "the log goes on"
+
+
+def test_a_run_that_the_library_had_already_is_the_same_run(finished: CampaignResult) -> None:
+    archive = Archive([finished.library])
+    rows = archive.campaign("gantry")
+    model = fed(said({"event": "state", "state": "running", "iteration": 2}))
+    model.remember(rows, "")
+    fed(ended(2, 2e-3, digest=rows[2]["digest"]), model=model)
+    assert [run.index for run in model.records] == [0, 1, 2]
+    assert model.records[2].tracking_inf_m == 2e-3
+    assert model.campaign == rows[0]["campaign"]
+
+
+def test_a_first_run_like_that_of_the_library_begins_another_campaign(
+    finished: CampaignResult,
+) -> None:
+    """Simulated cells make the same first run each time."""
+    archive = Archive([finished.library])
+    rows = archive.campaign("gantry")
+    model = fed()
+    model.remember(rows, "")
+    fed(ended(0, 1e-3, digest=rows[0]["digest"]), ended(1, 1e-4, digest="new"), model=model)
+    assert [run.index for run in model.records] == [0, 1]
+    assert model.campaign is None
+    model.remember(rows, "")
+    fed(said({"event": "state", "state": "running", "iteration": 1}), model=model)
+    assert model.records == [], "two runs were made, the library has three"
+
+
+def test_an_older_campaign_of_the_library_tells_the_axes_alone(finished: CampaignResult) -> None:
+    """The first run of a campaign that has stored nothing yet is not the fourth of another."""
+    archive = Archive([finished.library])
+    model = fed(said({"event": "state", "state": "running", "iteration": 0}))
+    model.remember(archive.campaign("gantry"), "")
+    assert (model.axis_names, model.law) == (("x", "y"), archive.rows()[0]["law"])
+    assert (model.records, model.campaign) == ([], None)
 
 
 def test_drives_that_are_brought_up_are_not_silent() -> None:
@@ -212,10 +262,10 @@ def test_a_late_joiner_takes_its_history_from_the_library(finished: CampaignResu
     archive = Archive([finished.library])
     model = fed(said({"event": "state", "state": "running", "iteration": 3}))
     model.remember(archive.campaign("gantry"), "")
-    assert list(model.runs) == [0, 1, 2]
+    assert [run.index for run in model.records] == [0, 1, 2]
     assert (model.axis_names, model.units) == (("x", "y"), ("m", "m"))
     fed(ended(3, 1e-5), model=model)
-    assert [record.index for record in model.runs.values()] == [0, 1, 2, 3]
+    assert [record.index for record in model.records] == [0, 1, 2, 3]
     captured = archive.capture("gantry", model.campaign)
     assert captured is not None
     option, factor = charts.contour(model, captured)
@@ -274,7 +324,7 @@ def test_timing_is_told_with_its_cause() -> None:
     latency = {"event": "latency", "wake_late_us": histogram, "execution_us": histogram}
     model = fed(said(START), said(late, "latency"), said(latency, "latency"))
     assert model.n_late == 3
-    assert "the host woke the loop 2000 µs late (usually 12)" in model.notices[-1].text
+    assert "the host woke the loop 2000 µs late (usually 12)" in model.log[-1].text
     assert charts.late_cycle(model)["series"][0]["data"] == [12.0, 2000.0]
     assert charts.timing(model)["series"][0]["data"] == [[1.0, 5], [4.0, 1]]
 

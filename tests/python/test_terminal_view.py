@@ -201,6 +201,9 @@ def test_the_live_error_of_each_axis_is_the_largest_of_a_batch() -> None:
     """In a run only; a missing measurement is shown; strangers' batches change nothing."""
     cell = watched([StateEvent("running", 0)])
     batch = {
+        "first_sync": 0,
+        "iteration_and_sample": [[0, 0], [0, 1]],
+        "input": [[0.0, 0.0]] * 2,
         "reference_m": [[1.0, 0.0], [1.0, 0.0]],
         "encoder_m": [[0.997, 0.0], [0.999, None]],
         "tool_m": None,

@@ -12,15 +12,12 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from ilc_rt.bridge.signals import Cells
+from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.events import EndEvent, FaultEvent, IterationEvent, StartEvent, StateEvent
 from ilc_rt.wording import WORDS, describe
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
-    from typing_extensions import Self
-
     from ilc_rt import Cell
     from ilc_rt.monitor import Message
 
@@ -29,7 +26,7 @@ PORT = 8765
 NUMBER = {"type": "number"}
 
 
-class Foxglove:
+class Foxglove(Closing):
     """Server of the signals of cells for Foxglove.
 
     Parameters
@@ -68,16 +65,7 @@ class Foxglove:
         self._channels: dict[str, foxglove.Channel] = {}
         self._cells = Cells(described)
 
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """End the server."""
         self._server.stop()
 

@@ -14,14 +14,11 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from ilc_rt.bridge.signals import Cells
+from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.events import IterationEvent
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
-    from typing_extensions import Self
-
     from ilc_rt import Cell
     from ilc_rt.monitor import Message
 
@@ -30,7 +27,7 @@ PORT = 9870
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
-class PlotJuggler:
+class PlotJuggler(Closing):
     """Sender of a cell's signals to a PlotJuggler.
 
     Parameters
@@ -59,16 +56,7 @@ class PlotJuggler:
         self._socket = socket.socket(family, kind, protocol)
         self._cells = Cells(described)
 
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """Close the socket."""
         self._socket.close()
 

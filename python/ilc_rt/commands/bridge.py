@@ -9,21 +9,23 @@ import typer
 
 from ilc_rt.bridge import foxglove as foxglove_bridge
 from ilc_rt.bridge import plotjuggler as plotjuggler_bridge
-from ilc_rt.campaign import load_cell
-from ilc_rt.commands.monitor import (  # noqa: TC001 - typer reads them
+from ilc_rt.commands.network import (
     CellName,
     Connect,
+    Router,
     Scouting,
     Timeout,
+    described,
+    listen,
+    whom,
 )
 from ilc_rt.errors import BadInputError
-from ilc_rt.monitor import Monitor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ilc_rt import Cell
-    from ilc_rt.monitor import Message
+    from ilc_rt.monitor import Message, Monitor
 
 app = typer.Typer(
     no_args_is_help=True, help="Show a running controller in PlotJuggler or Foxglove."
@@ -44,6 +46,7 @@ def plotjuggler(
     layout: Layout = None,
     connect: Connect = None,
     scouting: Scouting = True,
+    router: Router = False,
     timeout: Timeout = None,
 ) -> None:
     """Send every servo cycle to PlotJuggler, as JSON over UDP.
@@ -52,11 +55,14 @@ def plotjuggler(
 
     Example: ilc bridge plotjuggler gantry.toml --layout gantry-plotjuggler.xml
     """
-    name, described = _described(cell)
-    _write(layout, described, plotjuggler_bridge.layout)
+    name, known = described(cell)
+    _write(layout, known, plotjuggler_bridge.layout)
     host, port = _address(to)
-    with plotjuggler_bridge.PlotJuggler(host, port, described) as bridge:
-        _follow(name, f"{host}:{port}", bridge.show, connect, timeout, scouting=scouting)
+    with (
+        plotjuggler_bridge.PlotJuggler(host, port, known) as bridge,
+        listen(name, connect, scouting=scouting, router=router) as watching,
+    ):
+        _follow(name, f"{host}:{port}", bridge.show, watching, timeout)
 
 
 @app.command("foxglove")
@@ -71,6 +77,7 @@ def foxglove(
     layout: Layout = None,
     connect: Connect = None,
     scouting: Scouting = True,
+    router: Router = False,
     timeout: Timeout = None,
 ) -> None:
     """Serve every servo cycle to Foxglove, over its WebSocket.
@@ -79,18 +86,13 @@ def foxglove(
 
     Example: ilc bridge foxglove gantry.toml --layout gantry-foxglove.json
     """
-    name, described = _described(cell)
-    _write(layout, described, foxglove_bridge.layout)
-    with foxglove_bridge.Foxglove(host, port, described) as bridge:
-        _follow(name, bridge.address, bridge.show, connect, timeout, scouting=scouting)
-
-
-def _described(cell: str) -> tuple[str, Cell | None]:
-    """Return the name of a cell, and its description if a file was given."""
-    if Path(cell).suffix != ".toml":
-        return cell, None
-    described = load_cell(cell)
-    return described.name, described
+    name, known = described(cell)
+    _write(layout, known, foxglove_bridge.layout)
+    with (
+        foxglove_bridge.Foxglove(host, port, known) as bridge,
+        listen(name, connect, scouting=scouting, router=router) as watching,
+    ):
+        _follow(name, bridge.address, bridge.show, watching, timeout)
 
 
 def _write(layout: Path | None, cell: Cell | None, text: Callable[[Cell], str]) -> None:
@@ -115,15 +117,11 @@ def _follow(
     cell: str,
     address: str,
     show: Callable[[Message], object],
-    connect: list[str] | None,
+    watching: Monitor,
     timeout: float | None,
-    *,
-    scouting: bool,
 ) -> None:
-    with Monitor(cell, connect or (), scouting=scouting) as watching:
-        whom = "every cell" if cell == "*" else cell
-        typer.echo(f"{whom} to {address}; Ctrl-C ends this, not the machine", err=True)
-        for message in watching.messages(timeout):
-            show(message)
-        if watching.lost:
-            typer.echo(f"{watching.lost} messages came too fast and were left out", err=True)
+    typer.echo(f"{whom(cell)} to {address}; Ctrl-C ends this, not the machine", err=True)
+    for message in watching.messages(timeout):
+        show(message)
+    if watching.lost:
+        typer.echo(f"{watching.lost} messages came too fast and were left out", err=True)

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ilc_rt.campaign import load_cell
-from ilc_rt.commands.monitor import (  # noqa: TC001 - typer reads them
-    Connect,
-    Router,
-    Scouting,
-    Timeout,
-)
+from ilc_rt.commands.network import Connect, Router, Scouting, Timeout, described
 from ilc_rt.commands.options import DEFAULT_LIBRARY_FILE
 from ilc_rt.errors import BadInputError
 
 if TYPE_CHECKING:
     from types import ModuleType
-
-    from ilc_rt import Cell
 
 PORT = 8460
 
@@ -29,11 +20,12 @@ Cells = Annotated[
     typer.Argument(metavar="[CELL]...", help="Names of cells, or their TOML files; all if none."),
 ]
 Libraries = Annotated[
-    list[Path] | None,
+    list[str] | None,
     typer.Option(
         "--library",
         metavar="FILE",
-        help="Library to browse and to take earlier runs from; repeatable.",
+        help="Library to browse and to take earlier runs from, a file or "
+        "postgresql://USER@HOST/NAME; repeatable.",
     ),
 ]
 
@@ -61,14 +53,16 @@ def dashboard(
     from ilc_rt.dashboard.fleet import Fleet
 
     server = _server()
-    described = [_described(cell) for cell in cells or () if cell != "*"]
-    archive = Archive(_libraries(library))
-    fleet = Fleet(dict.fromkeys(name for name, _ in described))
-    for name, cell in described:
+    known = [described(cell) for cell in cells or () if cell != "*"]
+    fleet = Fleet(dict.fromkeys(name for name, _ in known))
+    for name, cell in known:
         if cell is not None:
             fleet.cells[name].describe(cell)
-    listener = server.listen(host, port)
-    with listener, Feed(fleet, archive, connect or (), scouting=scouting, router=router):
+    with (
+        Archive(_libraries(library)) as archive,
+        server.listen(host, port) as listener,
+        Feed(fleet, archive, connect or (), scouting=scouting, router=router),
+    ):
         shown = f"[{host}]" if ":" in host else host
         typer.echo(f"dashboard: http://{shown}:{listener.getsockname()[1]}")
         if not server.is_local(host):
@@ -87,16 +81,8 @@ def _server() -> ModuleType:
     return server
 
 
-def _described(cell: str) -> tuple[str, Cell | None]:
-    """Return the name of a cell, and its description if a file was given."""
-    if Path(cell).suffix != ".toml":
-        return cell, None
-    described = load_cell(cell)
-    return described.name, described
-
-
-def _libraries(given: list[Path] | None) -> list[Path]:
+def _libraries(given: list[str] | None) -> list[str]:
     """Return the given libraries; else that of this folder, if there is one."""
     if given:
         return list(dict.fromkeys(given))
-    return [path] if (path := Path(DEFAULT_LIBRARY_FILE)).is_file() else []
+    return [str(DEFAULT_LIBRARY_FILE)] if DEFAULT_LIBRARY_FILE.is_file() else []

@@ -7,11 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ilc_rt.commands.monitor import (  # noqa: TC001 - typer reads them
-    Connect,
-    Scouting,
-    Timeout,
-)
+from ilc_rt.commands.network import Connect, Router, Scouting, Timeout, listen
 from ilc_rt.commands.options import JsonFile  # noqa: TC001 - typer reads it
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import json_text, write_text
@@ -78,6 +74,7 @@ def collect(
     cell: Annotated[str, typer.Option("--cell", metavar="NAME", help="Only this cell's.")] = "*",
     connect: Connect = None,
     scouting: Scouting = True,
+    router: Router = False,
     timeout: Timeout = None,
     json_file: JsonFile = None,
 ) -> None:
@@ -86,9 +83,11 @@ def collect(
     Example: ilc library collect postgresql://ilc@fleet.local/ilc --timeout 3600
     """
     from ilc_rt.fleet import Collector
-    from ilc_rt.monitor import Monitor
 
-    with Collector(database) as collector, Monitor(cell, connect or (), scouting=scouting) as seen:
+    with (
+        Collector(database) as collector,
+        listen(cell, connect, scouting=scouting, router=router) as seen,
+    ):
         typer.echo("collecting; Ctrl-C ends this, not the machines", err=True)
         warned: set[str] = set()
         was_waiting = False

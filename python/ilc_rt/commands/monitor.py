@@ -5,14 +5,22 @@ from __future__ import annotations
 import json
 import sys
 import time
-from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.live import Live
 
-from ilc_rt.campaign import load_cell
+from ilc_rt.commands.network import (
+    CellName,
+    Connect,
+    Router,
+    Scouting,
+    Timeout,
+    described,
+    listen,
+    whom,
+)
 from ilc_rt.comparison import Comparison
 from ilc_rt.errors import EXIT_FAULT
 from ilc_rt.events import (
@@ -28,7 +36,6 @@ from ilc_rt.events import (
 )
 from ilc_rt.interruption import ControlledStop
 from ilc_rt.lateness import late_sentence
-from ilc_rt.monitor import Message, Monitor
 from ilc_rt.progress import is_live
 from ilc_rt.quantity import axis_unit
 from ilc_rt.record import IterationRecord
@@ -38,29 +45,16 @@ from ilc_rt.text import printable
 from ilc_rt.watched import WatchedCell
 from ilc_rt.wording import WORDS, describe
 
+if TYPE_CHECKING:
+    from ilc_rt.monitor import Message, Monitor
+
 WARNINGS_MAX = 100
 # Any program on the network can publish under any name.
 CELLS_MAX = 16
 REDRAWN_S = 0.25
 
-CellName = Annotated[
-    str, typer.Argument(metavar="[CELL]", help="Name of a cell, or its TOML file; * for all.")
-]
-Connect = Annotated[
-    list[str] | None,
-    typer.Option(metavar="ENDPOINT", help="Zenoh endpoint, as tcp/192.168.1.5:7447; repeatable."),
-]
-Scouting = Annotated[
-    bool, typer.Option("--scouting/--no-scouting", help="Look for controllers by multicast.")
-]
-Router = Annotated[
-    bool, typer.Option("--router", help="Hear through a router, which --connect names.")
-]
 Runs = Annotated[
     int | None, typer.Option("--iterations", "-n", help="End after this many runs were seen.")
-]
-Timeout = Annotated[
-    float | None, typer.Option("--timeout", metavar="SECONDS", help="End after this time.")
 ]
 Raw = Annotated[
     bool,
@@ -88,17 +82,16 @@ def monitor(
 
     Example: ilc monitor gantry --connect tcp/192.168.1.5:7447
     """
-    name = load_cell(cell).name if Path(cell).suffix == ".toml" else cell
+    name, _ = described(cell)
     # Names may contain brackets and colons: nothing printed is markup.
     console = Console(highlight=False, markup=False, emoji=False)
     draws = is_live(console) and not plain and not events
     view: _View | _Screen = _Screen(console) if draws else _View(events=events)
-    with Monitor(name, connect or (), scouting=scouting, router=router) as watching:
+    with listen(name, connect, scouting=scouting, router=router) as watching:
         if isinstance(view, _Screen):
             view.watch(watching, iterations, timeout)
         else:
-            whom = "every cell" if name == "*" else name
-            typer.echo(f"watching {whom}; Ctrl-C ends this, not the machine", err=True)
+            typer.echo(f"watching {whom(name)}; Ctrl-C ends this, not the machine", err=True)
             for message in watching.messages(timeout):
                 view.show(message)
                 if iterations is not None and view.runs >= iterations:
@@ -146,14 +139,7 @@ class _Screen:
         cell = self._cells.setdefault(message.cell, WatchedCell(message.cell))
         self.runs += isinstance(message.event, IterationEvent)
         self.faults += isinstance(message.event, FaultEvent)
-        if message.warning is not None:
-            cell.note("warning", f"{message.topic}: {message.warning}")
-        if message.event is not None:
-            cell.see(message.event)
-        elif message.topic == "servo":
-            cell.see_servo(message.payload)
-        elif message.topic in {"alive", "gone"}:
-            cell.see_presence(is_present=message.topic == "alive")
+        cell.take(message)
 
 
 class _View:

@@ -7,21 +7,22 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import dataclass
-from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ilc_rt.closing import Closing
 from ilc_rt.dashboard.capture import Capture
 from ilc_rt.dashboard.flight import FlightRecord, read_flight
 from ilc_rt.errors import BadInputError
-from ilc_rt.library import Library
 from ilc_rt.pictures.aligned import SAME_MIN, shift_of
 from ilc_rt.quantity import axis_unit
+from ilc_rt.sources import campaign_of, source
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -75,41 +76,52 @@ class StoredRun:
         return unit if what == "input" else axis_unit(unit)
 
 
-class Archive:
-    """Runs of several libraries.
+class Archive(Closing):
+    """Runs of several libraries, files or fleet databases.
 
     Parameters
     ----------
-    paths : sequence of str or pathlib.Path
-        The files; one that does not exist yet has no runs.
+    addresses : sequence of str or pathlib.Path
+        The files, and ``postgresql://USER@HOST/NAME``; a file that does not exist yet has no runs.
 
     Raises
     ------
     BadInputError
-        If a file is not a library.
+        If a file is not a library, or a database cannot be read.
     """
 
-    def __init__(self, paths: Sequence[str | Path] = ()) -> None:
-        self.paths = tuple(map(Path, paths))
+    def __init__(self, addresses: Sequence[str | Path] = ()) -> None:
+        self.sources = tuple(map(source, addresses))
         self._lock = Lock()
         self._rows: dict[int, tuple[object, list[dict[str, Any]]]] = {}
         self._loaded: OrderedDict[tuple[int, int, str], dict[str, Any]] = OrderedDict()
-        self.rows()
+        try:
+            self.rows()
+        except BadInputError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close the connections to databases."""
+        for one in self.sources:
+            one.close()
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return the runs of all libraries, oldest first; ``library`` is the number of the file.
+        """Return the runs of all libraries, oldest first; ``library`` is the number of the source.
 
-        A file that has not changed is not read again.
+        One that has not changed is not read again.
         """
         with self._lock:
-            return [row for number in range(len(self.paths)) for row in self._rows_of(number)]
+            return [row for number in range(len(self.sources)) for row in self._rows_of(number)]
 
     def campaign(self, cell: str, campaign: str | None = None) -> list[dict[str, Any]]:
         """Return the runs of a campaign of a cell; of its newest one if none is named."""
-        rows = [row for row in self.rows() if row["cell"] == cell]
-        if rows and campaign is None:
-            campaign = max(rows, key=lambda row: str(row["created_utc"]))["campaign"]
-        return [row for row in rows if row["campaign"] == campaign]
+        found: dict[int, dict[str, Any]] = {}
+        for row in campaign_of(self.rows(), cell, campaign):
+            # A library and the database that it was synced with have the same run.
+            if row.get("has_signals", True) or row["index"] not in found:
+                found[row["index"]] = row
+        return list(found.values())
 
     def load(self, key: tuple[int, int]) -> StoredRun:
         """Return a run with its signals.
@@ -120,20 +132,17 @@ class Archive:
             If there is no such run any more.
         """
         number, run = key
-        if not 0 <= number < len(self.paths):
-            message = f"library {number}: there are {len(self.paths)}"
+        if not 0 <= number < len(self.sources):
+            message = f"library {number}: there are {len(self.sources)}"
             raise BadInputError(message)
         row = next((row for row in self.rows() if (row["library"], row["id"]) == key), None)
         if row is None:
-            message = f"{self.paths[number]}: no run {run} any more"
+            message = f"{self.sources[number].name}: no run {run} any more"
             raise BadInputError(message)
         cached = (number, run, str(row["digest"]))
         with self._lock:
             if cached not in self._loaded:
-                try:
-                    self._loaded[cached] = Library(self.paths[number]).load(run)
-                except OSError as error:
-                    raise BadInputError(str(error)) from error
+                self._loaded[cached] = self.sources[number].load(run)
                 while len(self._loaded) > LOADED_MAX:
                     self._loaded.popitem(last=False)
             self._loaded.move_to_end(cached)
@@ -159,7 +168,8 @@ class Archive:
     def flight(self, cell: str, rows: Sequence[dict[str, Any]]) -> FlightRecord | None:
         """Return the flight record of the campaign of some rows, from beside their library."""
         for number in {row["library"] for row in rows}:
-            record = read_flight(self.paths[number], cell)
+            path = self.sources[number].path
+            record = None if path is None else read_flight(path, cell)
             if record is not None and record.campaign == rows[-1]["campaign"]:
                 return record
         return None
@@ -179,16 +189,12 @@ class Archive:
         return aligned
 
     def _rows_of(self, number: int) -> list[dict[str, Any]]:
-        path = self.paths[number]
-        stamp = _stamp(path)
+        stamp = self.sources[number].stamp()
         if stamp is None:
             return []
         kept = self._rows.get(number)
         if kept is None or kept[0] != stamp:
-            try:
-                rows = Library(path).list()
-            except OSError as error:
-                raise BadInputError(str(error)) from error
+            rows = self.sources[number].rows()
             kept = stamp, [{**row, "library": number} for row in rows]
             self._rows[number] = kept
         return kept[1]
@@ -223,17 +229,3 @@ def relevance(rows: Sequence[dict[str, Any]], current: dict[str, Any]) -> list[f
     weights = 1.0 / (sums + 1e-6)
     shares: list[float] = (weights / weights.sum()).tolist() if len(rows) else []
     return shares
-
-
-def _stamp(path: Path) -> object:
-    """Return what changes with a library: size and time of its file and of its log."""
-    stamps = [_file_stamp(file) for file in (path, Path(f"{path}-wal"))]
-    return None if stamps[0] is None else tuple(stamps)
-
-
-def _file_stamp(file: Path) -> tuple[int, int, int] | None:
-    try:
-        found = file.stat()
-    except OSError:
-        return None
-    return found.st_mtime_ns, found.st_size, found.st_ino

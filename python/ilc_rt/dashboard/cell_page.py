@@ -276,7 +276,7 @@ def _learning(cell: CellModel) -> str:
         return "-"
     if last.learning_off:
         return "learning is off"
-    n_back = sum(run.rolled_back for run in cell.runs.values())
+    n_back = sum(run.rolled_back for run in cell.records)
     return "on" if not n_back else f"on, {n_back} rolled back"
 
 

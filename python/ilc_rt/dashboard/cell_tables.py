@@ -21,6 +21,8 @@ COLUMNS = (
     "RMS error of the run",
 )  # fmt: skip
 SIGNS = {"info": "·", "warn": SYMBOLS["warn"], "fault": SYMBOLS["fault"]}
+#: Levels of the kinds of notes.
+LEVELS = {"fault": "fault", "warning": "warn", "note": "info", "log": "info"}
 LOG_SHOWN = 40
 
 
@@ -47,12 +49,11 @@ class AxisTable:
             say(row[1], f"{status.symbol} {status.words}")
             level(row[1], status.level)
             base = cell.units[axis]
-            now = None if cell.now is None else cell.now[:, axis].tolist()
-            if now is not None:
-                for column, value in ((2, now[0]), (3, now[1])):
-                    say(row[column], _steady(value, base))
-                say(row[4], _small(now[3], base))
-                say(row[5], _small(now[2], cell.input_units[axis]))
+            now = cell.axes[axis]
+            for column, value in ((2, now.reference_m), (3, now.measured_m)):
+                say(row[column], _steady(value, base))
+            say(row[4], _small(now.error_m, base))
+            say(row[5], _small(now.input, cell.input_units[axis]))
             for column, name in ((6, "axes_tracking_inf_m"), (7, "axes_tracking_rms_m")):
                 figures = getattr(last, name, ())
                 value = figures[axis] if axis < len(figures) else None
@@ -82,23 +83,24 @@ class Log:
         self._shown: object = None
 
     def show(self, cell: CellModel) -> None:
-        """Show the newest notices, if there are new ones."""
-        notices = list(cell.notices)[-LOG_SHOWN:][::-1]
-        if notices == self._shown:
+        """Show the newest notes, if there are new ones."""
+        notes = list(cell.log)[-LOG_SHOWN:][::-1]
+        if notes == self._shown:
             return
-        self._shown = notices
+        self._shown = notes
         self._list.clear()
         with self._list:
-            if not notices:
+            if not notes:
                 with tag("li"):
                     text("")
                     text("")
                     text("nothing yet", "quiet")
-            for notice in notices:
+            for note in notes:
+                shown = LEVELS[note.kind]
                 with tag("li"):
-                    text(time.strftime("%H:%M:%S", time.localtime(notice.at_s)), "quiet")
-                    text(SIGNS[notice.level], f"level-mark level-{notice.level}")
-                    text(notice.text)
+                    text(time.strftime("%H:%M:%S", time.localtime(note.at_s)), "quiet")
+                    text(SIGNS[shown], f"level-mark level-{shown}")
+                    text(note.text)
 
 
 class Timing:
@@ -134,15 +136,15 @@ class Timing:
             draw(client, "late-cycle", charts.late_cycle(cell))
 
 
-def _steady(value: float, base: str) -> str:
+def _steady(value: float | None, base: str) -> str:
     """Return a position in a unit that does not change as it moves."""
-    if value != value:
+    if value is None:
         return "-"
     return f"{1e3 * value:.3f} m{base}" if base in {"m", "rad"} else f"{value:.4g} {base}"
 
 
-def _small(value: float, base: str) -> str:
+def _small(value: float | None, base: str) -> str:
     """Return an error or an input in millionths, which change in size as they move."""
-    if value != value:
+    if value is None:
         return "-"
     return f"{1e6 * value:.1f} µ{base}" if base[0] in "mr" else f"{value:.4g} {base}"

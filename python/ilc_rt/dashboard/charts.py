@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ilc_rt.comparison import Comparison
 from ilc_rt.deviation import magnification, path_deviation
 from ilc_rt.quantity import unit_for
 
@@ -41,11 +40,10 @@ GRID = {"left": 58, "right": 14, "top": 30, "bottom": 34}
 
 def runs(cell: CellModel) -> Option:
     """Return the errors of the runs over their numbers, on a logarithmic scale."""
-    records = list(cell.runs.values())
     option = frame("run", "")
-    if not records:
+    comparison, records = cell.comparison, cell.records
+    if comparison is None:
         return option
-    comparison = Comparison(records, cell.units)
     series, units = [], []
     for number, column in enumerate(comparison.errors()):
         units.append(column.unit.symbol)

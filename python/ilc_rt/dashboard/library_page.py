@@ -16,6 +16,8 @@ from ilc_rt.errors import BadInputError
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from nicegui import Client
 
     from ilc_rt.dashboard.archive import Archive
@@ -31,9 +33,12 @@ SIGNALS = {"error": "Tracking error", "command": "Set point", "input": "Learned 
 def build_library(fleet: Fleet, archive: Archive, *, with_notes: bool) -> None:
     """Build the page of the libraries."""
     with page_frame("/library"):
-        if not archive.paths:
+        if not archive.sources:
             with tag("p", "empty"):
-                text("No library is given: ilc dashboard --library FILE shows its runs here.")
+                text(
+                    "No library is given: ilc dashboard --library FILE shows its runs here."
+                    " FILE may be postgresql://USER@HOST/NAME."
+                )
             return
         view = LibraryView(fleet, archive, ui.context.client, with_notes=with_notes)
     ui.timer(0.0, view.refresh, once=True)
@@ -60,7 +65,11 @@ class LibraryView:
         """Read the libraries again, and show the runs if they have changed."""
         try:
             rows = await asyncio.to_thread(self._archive.rows)
-            self._notes = {n: read_notes(path) for n, path in enumerate(self._archive.paths)}
+            self._notes = {
+                number: read_notes(one.path)
+                for number, one in enumerate(self._archive.sources)
+                if one.path is not None
+            }
         except BadInputError as error:
             say(self._told, f"▲ {printable(error)}")
             return
@@ -173,6 +182,9 @@ class LibraryView:
         where = f"{row['cell']} {row['campaign']} {row['law']} {self._note_on(row)}".lower()
         return all(word in where for word in self._filter.split())
 
+    def _notes_path(self, row: dict[str, Any]) -> Path | None:
+        return self._archive.sources[int(row["library"])].path
+
     def _note_on(self, row: dict[str, Any]) -> str:
         return self._notes.get(row["library"], {}).get(name_of(row), "")
 
@@ -188,17 +200,19 @@ class LibraryView:
             say(self._note_of, "Choose one run to read or write its note.")
             return
         where = "" if self._with_notes else "; notes are written on the computer of the dashboard"
+        if self._notes_path(row) is None:
+            where = "; notes belong to library files, and this run is read from a database"
+            self._note.set_visibility(False)
         say(self._note_of, f"Run {row['index']} of campaign {row['campaign']}{where}")
         self._note.props["value"] = self._note_on(row)
 
     async def _write(self, event: Any) -> None:  # noqa: ANN401
         row = self._one()
-        if row is None or not self._with_notes:
+        path = None if row is None else self._notes_path(row)
+        if row is None or path is None or not self._with_notes:
             return
         try:
-            await asyncio.to_thread(
-                write_note, self._archive.paths[row["library"]], name_of(row), str(event.args)
-            )
+            await asyncio.to_thread(write_note, path, name_of(row), str(event.args))
         except BadInputError as error:
             say(self._note_of, f"▲ {printable(error)}")
             return

@@ -8,7 +8,6 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from ilc_rt.comparison import Comparison
 from ilc_rt.dashboard.frame import fact, level, page_frame, say, tag, text
 from ilc_rt.dashboard.status import run_words
 from ilc_rt.quantity import signed
@@ -74,10 +73,9 @@ class _Card:
 
 def error_words(cell: CellModel) -> tuple[str, str]:
     """Return the error of the last run, and its change since the first one."""
-    records = list(cell.runs.values())
-    if not records:
+    comparison, records = cell.comparison, cell.records
+    if comparison is None:
         return "-", "-"
-    comparison = Comparison(records, cell.units)
     column = comparison.errors(rms=False)[-1 if comparison.by_contour else 0]
     before, after = column.of(records[0]), column.of(records[-1])
     said = column.unit.text(after)

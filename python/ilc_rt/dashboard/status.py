@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ilc_rt.progress import WORDS
 from ilc_rt.result import UNTIL_STOPPED
 from ilc_rt.text import printable
+from ilc_rt.wording import state_words
 
 if TYPE_CHECKING:
     from ilc_rt.dashboard.model import CellModel
@@ -48,15 +48,14 @@ def status_of(cell: CellModel, now_s: float) -> Status:
         return Status("fault", "fault")
     if cell.state is None:
         return Status("busy", "controller is there")
-    words = WORDS.get(cell.state, printable(cell.state.replace("_", " ")))
-    return Status("run" if cell.state == "running" else "busy", words)
+    return Status("run" if cell.state == "running" else "busy", state_words(cell.state))
 
 
 def run_words(cell: CellModel) -> str:
     """Return the number of the run, of how many, and how far it is."""
     index, total = cell.iteration, cell.iterations
     if index is None or cell.end is not None:
-        n_runs = len(cell.runs)
+        n_runs = len(cell.records)
         return "no run yet" if not n_runs else f"{n_runs} run{'' if n_runs == 1 else 's'}"
     if not total or total == UNTIL_STOPPED:
         of = ""
@@ -70,9 +69,8 @@ def run_words(cell: CellModel) -> str:
 
 def axis_words(cell: CellModel, axis: int, now_s: float) -> Status:
     """Return the state of an axis: that of its cell, or its own fault."""
-    fault = cell.fault
-    if fault is not None and fault.axis == cell.axis_names[axis]:
-        return Status("fault", f"fault: {printable(fault.reason)}")
+    if cell.fault is not None and cell.axes[axis].is_faulty:
+        return Status("fault", f"fault: {printable(cell.fault.reason)}")
     status = status_of(cell, now_s)
     if status.level == "fault":
         return Status("idle", "stopped with the others")

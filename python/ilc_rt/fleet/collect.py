@@ -13,15 +13,13 @@ from dataclasses import asdict
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any
 
+from ilc_rt.closing import Closing
 from ilc_rt.events import IterationEvent, JudgedEvent, StartEvent
 from ilc_rt.fleet.database import connect, driver
 from ilc_rt.library_file import FIGURES
 
 if TYPE_CHECKING:
-    from types import TracebackType
-
     import psycopg
-    from typing_extensions import Self
 
     from ilc_rt.monitor import Message
 
@@ -43,7 +41,7 @@ WHERE cell = %(cell)s AND campaign = %(campaign)s AND iteration = %(iteration)s
 """
 
 
-class Collector:
+class Collector(Closing):
     """Stores the runs of messages in a fleet database.
 
     Parameters
@@ -72,16 +70,7 @@ class Collector:
         self._started: dict[str, StartEvent] = {}
         self._waiting: deque[tuple[str, dict[str, Any]]] = deque(maxlen=WAITING_MAX)
 
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """Store what waits, and close the connection."""
         self.flush()
         self._connection.close()

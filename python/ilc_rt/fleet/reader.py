@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import json
+from dataclasses import MISSING, fields
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
+from ilc_rt.figures import Figures
 from ilc_rt.fleet.database import connect, told
-from ilc_rt.library_file import ARRAYS, FIGURES
+from ilc_rt.library_file import ARRAYS
 from ilc_rt.retention import selected
 
 if TYPE_CHECKING:
     import builtins
     from collections.abc import Iterator
-    from types import TracebackType
 
-    from typing_extensions import Self
 
 LISTED = """
 SELECT id, created_utc, cell, campaign, iteration, law, measure, n_samples, n_axes, cycle_s,
@@ -36,7 +37,7 @@ ORDER BY max(created_utc), cell, campaign
 """
 
 
-class FleetLibrary:
+class FleetLibrary(Closing):
     """The runs of many cells in one PostgreSQL database, read as a library is.
 
     Parameters
@@ -61,22 +62,19 @@ class FleetLibrary:
         self.address = address
         self._connection = connect(address, read_only=True)
 
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the connection."""
-        self.close()
-
     def close(self) -> None:
         """Close the connection."""
         self._connection.close()
+
+    @property
+    def is_open(self) -> bool:
+        """False after `close`, or when the connection was lost."""
+        return not (self._connection.closed or self._connection.broken)
+
+    def stamp(self) -> tuple[int, int]:
+        """Return two numbers, one of which changes with each run that is stored or changed."""
+        runs, changes = self._rows("SELECT count(*), sum(xmin::text::bigint) FROM run")[0]
+        return int(runs), int(changes or 0)
 
     def __len__(self) -> int:
         """Return the number of stored runs."""
@@ -205,5 +203,9 @@ def _described(row: Any) -> dict[str, Any]:  # noqa: ANN401 (a row of any column
     run |= {"axis_names": json.loads(axis_names), "input_units": json.loads(input_units)}
     run["disturbance"] = None if disturbance is None else json.loads(disturbance)
     stored = json.loads(figures)
-    run |= {name: stored.get(name) for name in FIGURES}
+    for figure in fields(Figures):
+        value = stored.get(figure.name)
+        if value is None and figure.default is not MISSING:
+            value = list(figure.default) if figure.default == () else figure.default
+        run[figure.name] = value
     return run | {"digest": digest, "has_signals": has_signals}

@@ -1,4 +1,7 @@
-"""Batches of servo cycles as arrays; whatever a stranger publishes is left out."""
+"""Batches of servo cycles as arrays; whatever a stranger publishes is left out.
+
+Imported by `watched`, when the first batch comes.
+"""
 
 from __future__ import annotations
 
@@ -40,6 +43,22 @@ class Cycles:
     def error_m(self) -> Array:
         """Set points minus measurement."""
         return self.reference_m - self.measured_m
+
+    @property
+    def n_axes(self) -> int:
+        """Number of axes."""
+        return int(self.reference_m.shape[1])
+
+    def newest(self) -> list[list[float | None]]:
+        """Return set point, measurement, input and error of each axis in the last cycle."""
+        tables = (self.reference_m, self.measured_m, self.input, self.error_m)
+        rows = np.column_stack([table[-1] for table in tables]).tolist()
+        return [[None if value != value else value for value in row] for row in rows]
+
+    def largest_errors_m(self) -> list[float | None]:
+        """Return the largest absolute error of each axis; None where nothing was measured."""
+        largest = np.fmax.reduce(np.abs(self.error_m), axis=0).tolist()
+        return [None if value != value else value for value in largest]
 
     def samples(self) -> dict[int, NDArray[np.intp]]:
         """Return rows of cycles and numbers of samples, shape (n, 2), by run."""
