@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::json;
 
 use super::control::{Shared, Status};
-use super::telemetry::Telemetry;
+use super::telemetry::{Kept, Telemetry};
 use crate::record::{Event, SCHEMA};
 use crate::servo::Sample;
 
@@ -67,9 +67,20 @@ impl<'a> Announcer<'a> {
             | Event::Progress { .. }
             | Event::End { .. } => "state",
         };
+        let kept = match event {
+            Event::Start { .. } => Kept::Start,
+            Event::State { .. } | Event::End { .. } => Kept::State,
+            Event::Iteration { .. }
+            | Event::Judged { .. }
+            | Event::Drift { .. }
+            | Event::Fault { .. } => Kept::Past,
+            Event::Progress { .. }
+            | Event::Inputs { .. }
+            | Event::Latency { .. }
+            | Event::Late { .. } => Kept::No,
+        };
         if let Ok(text) = serde_json::to_string(event) {
-            // Progress is short-lived; a late joiner wants the state.
-            telemetry.send(key, text, key == "state" && !matches!(event, Event::Progress { .. }));
+            telemetry.send(key, text, kept);
         }
     }
 
@@ -95,7 +106,7 @@ impl<'a> Announcer<'a> {
             "tool_m": rows(|sample| &sample.tool_m),
         })
         .to_string();
-        telemetry.send("servo", text, false);
+        telemetry.send("servo", text, Kept::No);
         self.batch.clear();
     }
 }

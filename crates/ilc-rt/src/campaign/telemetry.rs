@@ -3,6 +3,7 @@
 //! It has its own thread and session; the campaign passes formatted text through a bounded queue
 //! and drops what does not fit. It can neither delay nor command the loop.
 
+use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -18,6 +19,8 @@ use crate::fieldbus::transport::opening::zenoh_reach::{self, Reach};
 
 /// Messages that may wait for the network.
 const QUEUE: usize = 1024;
+/// Runs, decisions and faults of the campaign that a late joiner can ask for.
+const HISTORY_MAX: usize = 1000;
 /// Time that the end of a campaign waits for the queue and for the subscribers. One that no longer reads
 /// is left after a second.
 const CLOSE_MAX: Duration = Duration::from_secs(6);
@@ -28,12 +31,62 @@ const HEARD_MAX: Duration = Duration::from_secs(3);
 /// a subscriber leaves when the token disappears.
 const LINGER: Duration = Duration::from_millis(250);
 
+/// What a late joiner gets of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kept {
+    /// Nothing: it is of the moment.
+    No,
+    /// The start of the campaign.
+    Start,
+    /// The state, until the next one.
+    State,
+    /// A run, a decision or a fault.
+    Past,
+}
+
 /// A message to publish.
 struct Message {
     key: &'static str,
     json: String,
-    /// A late subscriber gets it as the state.
-    is_state: bool,
+    kept: Kept,
+}
+
+/// The campaign so far, for late joiners.
+#[derive(Default)]
+struct History {
+    start: Option<String>,
+    past: VecDeque<String>,
+    /// Events before the oldest one in `past`.
+    n_left_out: usize,
+    state: Option<String>,
+}
+
+impl History {
+    fn keep(&mut self, json: &str, kept: Kept) {
+        match kept {
+            Kept::No => {}
+            Kept::Start => {
+                *self = Self { start: Some(json.to_owned()), ..Self::default() };
+                self.state.clone_from(&self.start);
+            }
+            Kept::State => self.state = Some(json.to_owned()),
+            Kept::Past => {
+                if self.past.len() == HISTORY_MAX {
+                    self.past.pop_front();
+                    self.n_left_out += 1;
+                }
+                self.past.push_back(json.to_owned());
+            }
+        }
+    }
+
+    /// Returns the events in order, each with the end of its key.
+    fn events(&self) -> impl Iterator<Item = (String, &String)> {
+        let start = self.start.iter().map(|json| ("start".to_owned(), json));
+        let past = self.past.iter().enumerate();
+        let past = past.map(|(number, json)| ((self.n_left_out + number).to_string(), json));
+        start.chain(past)
+    }
 }
 
 /// A running publisher.
@@ -65,11 +118,10 @@ impl Telemetry {
         Ok(Self { queue: Some(queue), thread: Some(thread), ended, dropped: 0 })
     }
 
-    /// Publishes under `ilc/<cell>/<key>`, unless the queue is full; `is_state` marks what a late subscriber
-    /// gets.
-    pub(super) fn send(&mut self, key: &'static str, json: String, is_state: bool) {
+    /// Publishes under `ilc/<cell>/<key>`, unless the queue is full.
+    pub(super) fn send(&mut self, key: &'static str, json: String, kept: Kept) {
         let Some(queue) = &self.queue else { return };
-        match queue.try_send(Message { key, json, is_state }) {
+        match queue.try_send(Message { key, json, kept }) {
             Ok(()) => {}
             Err(TrySendError::Full(_)) => self.dropped += 1,
             // The thread has ended, and has logged the reason.
@@ -104,22 +156,31 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
     };
     let session = zenoh::open(reach.configuration()?).wait()?;
     let alive = session.liveliness().declare_token(format!("{prefix}/alive")).wait()?;
-    let latest: Arc<Mutex<Option<String>>> = Arc::default();
-    let state_key = format!("{prefix}/state");
-    // A late joiner queries the state and receives the latest.
-    let answer = {
-        let (latest, state_key) = (Arc::clone(&latest), state_key.clone());
+    let history: Arc<Mutex<History>> = Arc::default();
+    let (state_key, past_key) = (format!("{prefix}/state"), format!("{prefix}/history"));
+    let state = {
+        let (history, key) = (Arc::clone(&history), state_key.clone());
         move |query: zenoh::query::Query| {
-            let state = latest.lock().ok().and_then(|state| state.clone());
+            let state = history.lock().ok().and_then(|history| history.state.clone());
             if let Some(state) = state {
-                let _ = query.reply(&state_key, state).wait();
+                let _ = query.reply(&key, state).wait();
             }
         }
     };
-    let queryable = session.declare_queryable(&state_key).callback(answer).wait()?;
-    for Message { key, json, is_state } in messages {
-        if is_state && let Ok(mut state) = latest.lock() {
-            *state = Some(json.clone());
+    let past = {
+        let (history, key) = (Arc::clone(&history), past_key.clone());
+        move |query: zenoh::query::Query| {
+            let Ok(history) = history.lock() else { return };
+            for (end, json) in history.events() {
+                let _ = query.reply(format!("{key}/{end}"), json.as_str()).wait();
+            }
+        }
+    };
+    let state = session.declare_queryable(&state_key).callback(state).wait()?;
+    let past = session.declare_queryable(format!("{past_key}/*")).callback(past).wait()?;
+    for Message { key, json, kept } in messages {
+        if let Ok(mut history) = history.lock() {
+            history.keep(&json, kept);
         }
         session
             .put(format!("{prefix}/{key}"), json)
@@ -133,7 +194,8 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
             .wait()?;
     }
     await_readers(&session, prefix)?;
-    queryable.undeclare().wait()?;
+    state.undeclare().wait()?;
+    past.undeclare().wait()?;
     alive.undeclare().wait()?;
     session.close().wait()
 }
@@ -152,4 +214,38 @@ fn await_readers(session: &zenoh::Session, prefix: &str) -> zenoh::Result<()> {
     while answers.recv().is_ok() {}
     std::thread::sleep(LINGER.saturating_sub(asked.elapsed()));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ends(history: &History) -> Vec<String> {
+        history.events().map(|(end, json)| format!("{end} {json}")).collect()
+    }
+
+    #[test]
+    fn a_late_joiner_gets_the_start_and_what_came_after_it() {
+        let mut history = History::default();
+        history.keep("bringing up", Kept::State);
+        history.keep("start", Kept::Start);
+        history.keep("progress", Kept::No);
+        history.keep("run 0", Kept::Past);
+        assert_eq!(ends(&history), ["start start", "0 run 0"]);
+        assert_eq!(history.state.as_deref(), Some("start"));
+        history.keep("running", Kept::State);
+        assert_eq!(history.state.as_deref(), Some("running"));
+        history.keep("another start", Kept::Start);
+        assert_eq!(ends(&history), ["start another start"]);
+    }
+
+    #[test]
+    fn the_history_is_bounded_and_keeps_its_numbers() {
+        let mut history = History::default();
+        for number in 0..HISTORY_MAX + 2 {
+            history.keep(&number.to_string(), Kept::Past);
+        }
+        let ends = ends(&history);
+        assert_eq!((ends.len(), ends[0].as_str()), (HISTORY_MAX, "2 2"));
+    }
 }
