@@ -61,7 +61,7 @@ def source(address: str | Path) -> Source:
     Raises
     ------
     BadInputError
-        If it is none of these.
+        If it has another scheme.
 
     Examples
     --------

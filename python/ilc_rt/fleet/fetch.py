@@ -24,7 +24,7 @@ from ilc_rt.fleet.database import connect, told
 from ilc_rt.fleet.sync import is_intact, prepare, store, stored_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     import psycopg
 
@@ -69,6 +69,7 @@ def fetch(
     *,
     from_cell: str | None = None,
     other_drives: bool = False,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Fetched:
     """Write the best fitting campaign of a fleet to the library of a cell.
 
@@ -84,6 +85,8 @@ def fetch(
         Only campaigns of the cell of this name.
     other_drives : bool
         Accept a campaign whose cell has other limits, models or position loops.
+    progress : callable or None
+        Called with the number of campaigns that were compared and of all, before each.
 
     Raises
     ------
@@ -97,9 +100,10 @@ def fetch(
     refusal = ""
     with told(address), contextlib.closing(connect(address, read_only=True)) as connection:
         values = {"mark": MARK, "from_cell": from_cell}
-        for owner, campaign, ids, is_complete, best in connection.execute(
-            CANDIDATES.encode(), values
-        ).fetchall():
+        candidates = connection.execute(CANDIDATES.encode(), values).fetchall()
+        for number, (owner, campaign, ids, is_complete, best) in enumerate(candidates):
+            if progress is not None:
+                progress(number, len(candidates))
             if owner == name or best is None:
                 continue
             place = f"campaign {campaign} of {owner}"
