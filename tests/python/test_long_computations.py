@@ -187,7 +187,7 @@ def test_ctrl_c_in_tune_leaves_the_cell_as_it_was(gantry: Path, tmp_path: Path) 
 
 
 def test_ctrl_c_in_a_sweep_keeps_every_finished_case(gantry: Path, tmp_path: Path) -> None:
-    """And the same command goes on with the others."""
+    """And the same command continues with the others."""
     words = ["sweep", gantry, "--vary", "axis.y.simulation.mass_kg=15:25", "--samples", "3",
              "--iterations", "2", "--file", "kept.jsonl", "--json", "found.json"]  # fmt: skip
     process = ilc(tmp_path, *words, before=slow("ilc_rt.cell_sweep", "Campaign.run", 3))

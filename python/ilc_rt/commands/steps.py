@@ -73,7 +73,7 @@ class Steps(Closing):
             self._console.print(f"  {said}", soft_wrap=True)
 
     def begin(self) -> None:
-        """Count anew, from now on."""
+        """Count again, from now on."""
         self.close()
         self._since_s, self._told_s = self._clock(), None
 
