@@ -15,7 +15,7 @@ from ilc_rt.retention import kept_by, selected
 
 if TYPE_CHECKING:
     import builtins
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import ArrayLike
     from typing_extensions import Self
@@ -379,6 +379,7 @@ class Library(Closing, _native.Library):
         days: float | None = None,
         best: int | None = None,
         cell: str | None = None,
+        progress: Callable[[int, int], object] | None = None,
     ) -> int:
         """Delete all runs that no rule keeps, and return how many were deleted.
 
@@ -395,6 +396,9 @@ class Library(Closing, _native.Library):
             only measure and rolled back ones are not among them.
         cell : str or None
             Only among runs of the cell of this name.
+        progress : callable or None
+            Called, while the file shrinks, with the number of its pages that were given back and of
+            all that are to be.
 
         Returns
         -------
@@ -417,7 +421,7 @@ class Library(Closing, _native.Library):
         super().trim(ALL, None)
         with library_file.writing(self.path) as connection:
             library_file.delete(connection, gone)
-        library_file.shrink(self.path)
+        library_file.shrink(self.path, progress)
         return len(gone)
 
     def export(self, id: int, path: str | PathLike[str]) -> None:

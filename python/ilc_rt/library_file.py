@@ -20,7 +20,7 @@ from urllib.parse import quote
 from ilc_rt.figures import Figures
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 #: Columns of a run beside its figures and arrays.
 COLUMNS = (
@@ -187,18 +187,34 @@ def delete(connection: sqlite3.Connection, ids: Iterable[int]) -> None:
     connection.executemany("DELETE FROM iteration WHERE id = ?", [(id_,) for id_ in ids])
 
 
-def shrink(path: str | Path) -> None:
-    """Return the space of deleted runs to the system, in small steps."""
+def shrink(
+    path: str | Path,
+    progress: Callable[[int, int], object] | None = None,
+    *,
+    step_pages: int = STEP_PAGES,
+) -> int:
+    """Return the space of deleted runs to the system, in small steps, and return their number.
+
+    `progress` is called with the number of pages that were returned and of all. May be interrupted
+    between two steps: the next one goes on.
+    """
+    n_steps = 0
     address = f"file://{quote(str(Path(path).absolute()))}?mode=rw"
     with contextlib.closing(
         sqlite3.connect(address, uri=True, timeout=BUSY_S, isolation_level=None)
     ) as connection:
-        while (
-            connection.execute("PRAGMA freelist_count").fetchone()[0]
-            and (connection.execute("PRAGMA auto_vacuum").fetchone()[0])
-        ):
-            connection.execute(f"PRAGMA incremental_vacuum({STEP_PAGES})").fetchall()
+        has_vacuum = bool(connection.execute("PRAGMA auto_vacuum").fetchone()[0])
+        total = left = connection.execute("PRAGMA freelist_count").fetchone()[0]
+        while left and has_vacuum:
+            if progress is not None:
+                progress(total - left, total)
+            # The pragma has a row without columns for each page, after the first of which `execute`
+            # would stop.
+            connection.executescript(f"PRAGMA incremental_vacuum({step_pages})")
+            left = connection.execute("PRAGMA freelist_count").fetchone()[0]
+            n_steps += 1
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+    return n_steps
 
 
 def digest(row: Mapping[str, Any]) -> str:

@@ -26,7 +26,7 @@ from ilc_rt.result import CampaignResult, write_text
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from ilc_rt.record import IterationRecord
 
@@ -35,7 +35,11 @@ REMARKS_SHOWN = 12
 FACT_MAX = 4000
 
 
-def write_report(result: CampaignResult, path: str | Path) -> Path:
+def write_report(
+    result: CampaignResult,
+    path: str | Path,
+    progress: Callable[[int, int], object] | None = None,
+) -> Path:
     """Write the report of a campaign.
 
     Parameters
@@ -44,6 +48,8 @@ def write_report(result: CampaignResult, path: str | Path) -> Path:
         At least one run.
     path : path
         The file, or a folder, in which ``ilc-report.html`` is written.
+    progress : callable or None
+        Called with the number of figures that are drawn and of all, before each.
 
     Returns
     -------
@@ -66,19 +72,19 @@ def write_report(result: CampaignResult, path: str | Path) -> Path:
     except OSError as error:
         message = f"{target}: cannot be written: {error.strerror}"
         raise BadInputError(message) from error
-    write_text(target, render(result))
+    write_text(target, render(result, progress))
     return target
 
 
-def render(result: CampaignResult) -> str:
-    """Return the report as HTML text."""
+def render(result: CampaignResult, progress: Callable[[int, int], object] | None = None) -> str:
+    """Return the report as HTML text; `progress` as for `write_report`."""
     style, script = (
         resources.files("ilc_rt").joinpath(f"data/report.{kind}").read_text(encoding="utf-8")
         for kind in ("css", "js")
     )
     count = len(result.records)
     title = f"{printable(result.cell)}: {count} run{'s' if count > 1 else ''}"
-    cards = dict(_cards(result))
+    cards = dict(_cards(result, progress or (lambda _done, _total: None)))
     notes = " ".join(map(note, result.records))
     return f"""<!DOCTYPE html>
 <html lang="en">
@@ -109,25 +115,29 @@ def render(result: CampaignResult) -> str:
 """
 
 
-def _cards(result: CampaignResult) -> Iterator[tuple[str, str]]:
+def _cards(
+    result: CampaignResult, progress: Callable[[int, int], object]
+) -> Iterator[tuple[str, str]]:
     """Yield the figures by name."""
     pictures = (
-        ("convergence", plots.convergence(result),
+        ("convergence", plots.convergence,
          "Largest and root-mean-square value of each run, on a logarithmic scale. "
          + ("After the run at the dashed line the best input so far was restored."
             if any(record.rolled_back for record in result.records) else "")),
-        ("contour", plots.contour(result),
+        ("contour", plots.contour,
          "What is drawn beside the path is the distance from it, magnified; lag along the path "
          "does not show. The lower picture has the last run alone, magnified further."),
-        ("tracking", plots.tracking(result),
+        ("tracking", plots.tracking,
          "Programmed less measured position, of the measurement that was learned from."),
-        ("input", plots.learned_input(result),
+        ("input", plots.learned_input,
          "What learning adds to the set point of each axis: after one run and at the end."),
-        ("latency", plots.latency(result),
+        ("latency", plots.latency,
          "How late the loop woke and how long it computed, counted on a logarithmic scale."),
-        ("late", plots.late_cycle(result), html.escape(_late(result))),
+        ("late", plots.late_cycle, html.escape(_late(result))),
     )  # fmt: skip
-    for name, figure, caption in pictures:
+    for number, (name, draw, caption) in enumerate(pictures):
+        progress(number, len(pictures))
+        figure = draw(result)
         if figure is not None:
             yield name, plot_card(figure, name, html.escape(FIGURES[name][0]), caption)
 

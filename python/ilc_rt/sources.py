@@ -6,16 +6,18 @@ it has not heard (`ilc_rt.watched`).
 
 from __future__ import annotations
 
+import contextlib
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.fleet.database import SQLITE, file_of, is_database, shown
 from ilc_rt.library import Library
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping
     from typing import TypeVar
 
     from ilc_rt.fleet.reader import FleetLibrary
@@ -61,7 +63,7 @@ def source(address: str | Path) -> Source:
     Raises
     ------
     BadInputError
-        For any other address.
+        If it has another scheme.
 
     Examples
     --------
@@ -75,13 +77,56 @@ def source(address: str | Path) -> Source:
 
 
 def campaign_of(
-    rows: Iterable[Mapping[str, Any]], cell: str, campaign: str | None = None
+    rows: Iterable[Mapping[str, Any]],
+    cell: str,
+    campaign: str | None = None,
+    digest: str | None = None,
 ) -> list[Any]:
-    """Return the runs of a campaign of a cell; of its newest one if none is named."""
+    """Return the runs of a campaign of a cell, each once, in their order.
+
+    It is the named one, else the newest one with a run of this digest, else the newest one.
+    """
     rows = [row for row in rows if row["cell"] == cell]
-    if rows and campaign is None:
-        campaign = max(rows, key=lambda row: str(row["created_utc"]))["campaign"]
-    return sorted((r for r in rows if r["campaign"] == campaign), key=lambda row: row["index"])
+    if campaign is None:
+        chosen = [row for row in rows if not digest or row["digest"] == digest]
+        newest = max(chosen, key=lambda row: str(row["created_utc"]), default=None)
+        campaign = None if newest is None else newest["campaign"]
+    found: dict[int, Any] = {}
+    for row in rows:
+        # A library and the database that it was synced with have the same run.
+        is_better = row.get("has_signals", True) or row["index"] not in found
+        if row["campaign"] == campaign and is_better:
+            found[row["index"]] = row
+    return [found[index] for index in sorted(found)]
+
+
+class Memory(Closing):
+    """Stored runs, for a program that watches and has not heard the start of a campaign.
+
+    Parameters
+    ----------
+    addresses : iterable of str or pathlib.Path
+        Files and databases, as for `source`; none for no memory.
+    """
+
+    def __init__(self, addresses: Iterable[str | Path] = ()) -> None:
+        self._sources = tuple(map(source, addresses))
+
+    def campaign(self, cell: str, digest: str | None = None) -> list[Any]:
+        """Return the runs of the newest campaign of a cell that has a run of this digest.
+
+        Empty if there is none, or if nothing can be read now: to watch is what matters.
+        """
+        rows: list[Any] = []
+        for one in self._sources:
+            with contextlib.suppress(BadInputError):
+                rows += one.rows() if one.stamp() is not None else []
+        return campaign_of(rows, cell, None, digest)
+
+    def close(self) -> None:
+        """Close the connections to databases."""
+        for one in self._sources:
+            one.close()
 
 
 class FileSource:
@@ -208,16 +253,6 @@ class FleetSource:
             raise
         self._lost = None
         return answer
-
-
-def rows_of(sources: Sequence[Source]) -> list[dict[str, Any]]:
-    """Return the runs of several sources, each with ``library``: the number of its source."""
-    return [
-        {**row, "library": number}
-        for number, one in enumerate(sources)
-        if one.stamp() is not None
-        for row in one.rows()
-    ]
 
 
 def _file_stamp(file: Path) -> tuple[int, int, int] | None:

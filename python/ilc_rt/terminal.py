@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 
-    from ilc_rt.watched import Note, WatchedAxis, WatchedCell
+    from ilc_rt.watched import Note, WatchedCell
+    from ilc_rt.watched_axis import WatchedAxis
 
 BAR_MAX = 50
 SPARK_MAX = 40

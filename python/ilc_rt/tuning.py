@@ -14,7 +14,7 @@ from ilc_rt.trials import KNOWN_SHARE, BelievedAxis, Bench, Trial, Weights, beli
 from ilc_rt.weight_search import WeightSearch, rounded
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -143,6 +143,7 @@ def propose_weights(
     known_hz: float | None = None,
     noise_m: float = 0.0,
     n_runs: int = 10,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Proposal:
     """Propose the learning weights of a cell.
 
@@ -166,6 +167,8 @@ def propose_weights(
         Standard deviation of white measurement noise.
     n_runs : int
         Runs by which learning should be complete, at most 10 000; a trial has 100 at most.
+    progress : callable or None
+        Called with the number of rates that were tried and of all, before each.
 
     Raises
     ------
@@ -203,7 +206,7 @@ def propose_weights(
     varies = bool(table.get("contour") or table.get("phase")) and law not in {"constrained"}
     q = float(table.get("q", 1.0)) if varies else 1.0
     levels = _error_weights(table) if varies else [q]
-    search = WeightSearch(benches, q, levels, _growth_max(written), n_runs)
+    search = WeightSearch(benches, q, levels, _growth_max(written), n_runs, progress)
     weights, trials = search.weights()
     return Proposal(
         cell=described.name, law=law, section=section, weights=weights,

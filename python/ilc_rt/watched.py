@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ilc_rt.comparison import Comparison, remark_on
@@ -31,6 +31,7 @@ from ilc_rt.quantity import axis_unit
 from ilc_rt.record import IterationRecord
 from ilc_rt.result import UNTIL_STOPPED
 from ilc_rt.text import printable
+from ilc_rt.watched_axis import WatchedAxis
 from ilc_rt.wording import drift
 
 if TYPE_CHECKING:
@@ -42,10 +43,9 @@ if TYPE_CHECKING:
     from ilc_rt.lateness import LateCycle
     from ilc_rt.monitor import Message
 
-#: What is kept of a cell at most: of runs, of notes, and of the batches of an error over time.
+#: What is kept of a cell at most: of runs, of notes.
 RUNS_MAX = 5000
 NOTES_MAX = 100
-TRAIL_MAX = 120
 AXES_MAX = 64
 NAME_MAX = 40
 #: Elapsed time from which the time left can be told.
@@ -72,33 +72,6 @@ class Note:
     text: str
     at_s: float = 0.0
     campaign: int = 0
-
-
-@dataclass(slots=True)
-class WatchedAxis:
-    """An axis, as its last batch of servo cycles showed it; positions in its own unit.
-
-    Attributes
-    ----------
-    name, unit : str
-        Its name; "m" or "rad".
-    reference_m, measured_m, input, error_m : float or None
-        Set point, measured position and learned input of the newest cycle, and set point less
-        measured position there.
-    trail_m : deque of float
-        Largest absolute tracking error of each batch within a run, oldest first.
-    is_faulty : bool
-        True if a fault has named this axis.
-    """
-
-    name: str
-    unit: str = "m"
-    reference_m: float | None = None
-    measured_m: float | None = None
-    input: float | None = None
-    error_m: float | None = None
-    trail_m: deque[float] = field(default_factory=lambda: deque(maxlen=TRAIL_MAX))
-    is_faulty: bool = False
 
 
 class WatchedCell:
@@ -297,6 +270,14 @@ class WatchedCell:
                 return
             self.campaign = str(newest["campaign"])
         self.recall(IterationRecord.from_row(row, library) for row in rows)
+
+    def lacks(self, message: Message) -> bool:
+        """Return whether a library may have what was not heard before this message."""
+        event = message.event
+        if isinstance(event, StartEvent):
+            return event.first_index > 0
+        is_unknown = self.start is None and self.campaign is None
+        return message.topic == "alive" or (isinstance(event, IterationEvent) and is_unknown)
 
     def recall(self, records: Iterable[IterationRecord]) -> None:
         """Take over the earlier runs of a campaign that goes on; those that were heard stay."""

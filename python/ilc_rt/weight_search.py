@@ -10,6 +10,8 @@ import numpy as np
 from ilc_rt.trials import Bench, Trial, Weights
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     _Found = tuple[float, Weights, list[Trial]]
 
 STEPS_PER_OCTAVE = 2
@@ -23,12 +25,20 @@ class WeightSearch:
     """Search for the weight `rate` with the smallest error among those with which no trial grows.
 
     One bench for each moving axis; `q` is the weight of the error, `levels` its extremes along the
-    run; `growth_max` the allowed growth of an error over the smallest one in a trial of `n_runs`.
+    run; `growth_max` the allowed growth of an error over the smallest one in a trial of `n_runs`;
+    `progress` is called with the number of rates that were tried and of all.
     """
 
     def __init__(
-        self, benches: list[Bench], q: float, levels: list[float], growth_max: float, n_runs: int
+        self,
+        benches: list[Bench],
+        q: float,
+        levels: list[float],
+        growth_max: float,
+        n_runs: int,
+        progress: Callable[[int, int], object] | None = None,
     ) -> None:
+        self.progress = progress
         self.q = q
         self.benches, self.levels = benches, levels
         self.growth_max, self.n_runs = growth_max, n_runs
@@ -42,10 +52,16 @@ class WeightSearch:
         count = int(np.ceil(STEPS_PER_OCTAVE * np.log2(high / low))) + 1
         self.rates = [rounded(rate) for rate in np.geomspace(high, low, count)]
 
+    def tell(self, done: int) -> None:
+        """Tell that so many of the rates have been tried."""
+        if self.progress is not None:
+            self.progress(done, len(self.rates))
+
     def weights(self) -> tuple[Weights, list[Trial]]:
         """Return the best weights, with their trials."""
         best: _Found | None = None
-        for rate in self.rates:
+        for number, rate in enumerate(self.rates):
+            self.tell(number)
             weights = Weights(self.q, 0.0, 0.0, rate)
             trials = self._trials(weights, self.growth_max)
             if trials is None:
@@ -53,6 +69,7 @@ class WeightSearch:
                 self.refused = rate
                 break
             best = self._better(best, weights, trials)
+        self.tell(len(self.rates))
         for _ in range(BISECTIONS if best is not None and self.refused is not None else 0):
             assert best is not None
             assert self.refused is not None

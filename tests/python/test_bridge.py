@@ -22,10 +22,13 @@ from ilc_rt.bridge import foxglove, plotjuggler
 from ilc_rt.bridge.signals import Cells, Signals
 from ilc_rt.events import FaultEvent, parse_event
 from ilc_rt.monitor import Message
+from ilc_rt.sources import Memory
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from ilc_rt import CampaignResult
 
 CYCLE_S = 0.002
 N = 25
@@ -99,6 +102,16 @@ def test_who_missed_the_start_sees_axes_by_number() -> None:
     rows = list(Cells().rows(batch()))
     assert list(rows[0].axes) == ["0", "1"]
     assert rows[1].time_s - rows[0].time_s == pytest.approx(CYCLE_S, abs=1e-6)
+
+
+def test_a_library_names_the_axes_for_who_missed_the_start(finished: CampaignResult) -> None:
+    with Memory([finished.library]) as memory:
+        cells = Cells(recall=memory.campaign)
+        rows = list(cells.rows(batch()))
+        assert list(rows[0].axes) == ["x", "y"]
+        assert memory.campaign("press") == []
+        other = Message("press", "servo", batch().payload)
+        assert list(next(iter(cells.rows(other))).axes) == ["0", "1"]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -242,6 +243,28 @@ def test_a_first_run_like_that_of_the_library_begins_another_campaign(
     model.remember(rows, "")
     fed(said({"event": "state", "state": "running", "iteration": 1}), model=model)
     assert model.records == [], "two runs were made, the library has three"
+
+
+def test_a_run_tells_the_campaign_whose_start_was_not_heard(
+    finished: CampaignResult, tmp_path: Path
+) -> None:
+    """By its digest, though the library has a newer campaign of the cell."""
+    library = Library(tmp_path / "l.db")
+    shutil.copy(finished.library, library.path)
+    zeros = np.zeros((4, 2))
+    library.append(zeros, zeros + 1.0, 0.002, cell="gantry", campaign="newer")
+    archive = Archive([library.path])
+    last = archive.campaign("gantry", finished.campaign)[-1]
+    model = fed(said({"event": "state", "state": "returning", "iteration": 3}))
+    event = ended(2, 1e-5, digest=last["digest"])
+    fed(event, model=model)
+    assert model.lacks(event)
+    assert archive.campaign("gantry")[0]["campaign"] == "newer"
+    model.remember(archive.campaign("gantry", None, last["digest"]), "")
+    assert (model.campaign, [run.index for run in model.records]) == (finished.campaign, [0, 1, 2])
+    assert not model.lacks(event)
+    assert not model.lacks(said(START))
+    assert model.lacks(said(START | {"first_index": 3}))
 
 
 def test_an_older_campaign_of_the_library_tells_the_axes_alone(finished: CampaignResult) -> None:

@@ -15,7 +15,7 @@ import pytest
 from fleet_fixture import content, make_cell, template
 from postgres_fixture import server
 
-from ilc_rt import BadInputError, Library, ReadOnlyLibrary
+from ilc_rt import BadInputError, Campaign, Library, ReadOnlyLibrary
 from ilc_rt.fleet import FleetLibrary, Synced, fetch, pull, push
 from ilc_rt.fleet.database import connect, newest, version
 
@@ -242,6 +242,35 @@ def test_a_cell_starts_from_what_another_learned(
     assert push(str(tmp_path / "two.db"), filled).stored == 5
     with pytest.raises(BadInputError, match="no campaign of gantry-2 fits"):
         fetch(filled, gantry, library, from_cell="gantry-2")
+
+
+@pytest.mark.parametrize("disturbances", [0, 1, 2])
+def test_a_fresh_campaign_recalls_what_was_fetched(
+    address: str, gantry: Path, tmp_path: Path, disturbances: int
+) -> None:
+    """A law that weighs runs uses those of the other cell after its own first run."""
+    example = gantry.with_name("07_warm_and_cold.toml").read_text(encoding="utf-8")
+    example = example.replace("disturbances = 1", f"disturbances = {disturbances}")
+    if disturbances == 0:
+        example = example.replace("disturbance = [0.5]", "")
+    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
+    first.write_text(example, encoding="utf-8")
+    second.write_text(example.replace('"warm-and-cold"', '"second"', 1), encoding="utf-8")
+    measured = np.full((5, disturbances), 293.15) if disturbances else None
+    told = {}
+    for cell, library in ((first, "first.db"), (second, "second.db"), (second, "alone.db")):
+        if library == "second.db":
+            push(str(tmp_path / "first.db"), address)
+            got = fetch(address, second, str(tmp_path / library))
+            assert (got.from_cell, got.stored) == ("warm-and-cold", 5)
+        n_runs = 5 if cell == first else 2
+        campaign = Campaign(cell, library=tmp_path / library, disturbance=measured)
+        told[library] = [record.tracking_rms_m for record in campaign.run(n_runs)]
+    taught, alone, learned = told["second.db"], told["alone.db"], told["first.db"]
+    assert taught[0] == alone[0] == learned[0], "the first run of a campaign has no input"
+    assert alone[1] == learned[1]
+    # As good as the fifth run of the other cell, in the second.
+    assert taught[1] < 1.1 * learned[4] < 0.9 * alone[1]
 
 
 @pytest.mark.parametrize(

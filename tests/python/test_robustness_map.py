@@ -151,4 +151,5 @@ def test_ctrl_c_leaves_no_process_and_no_trace(gantry: Path, tmp_path: Path) -> 
         assert process.poll() is None
     os.killpg(process.pid, signal.SIGINT)
     said = process.communicate(timeout=60.0)
-    assert (process.returncode, *said) == (EXIT_INTERRUPTED, "", "")
+    told = "ilc: kept.jsonl has every finished case; go on with it\n"
+    assert (process.returncode, *said) == (EXIT_INTERRUPTED, "", told)

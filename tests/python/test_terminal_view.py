@@ -22,7 +22,7 @@ import pytest
 from ports_fixture import free_port
 from rich.console import Console
 
-from ilc_rt import Campaign
+from ilc_rt import Campaign, Library
 from ilc_rt.events import (
     EndEvent,
     FaultEvent,
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
     from rich.console import ConsoleOptions, RenderResult
 
+    from ilc_rt import CampaignResult
     from ilc_rt.events import Event
 
 pytestmark = pytest.mark.xdist_group("terminal")
@@ -369,6 +370,38 @@ def test_a_signal_leaves_the_terminal_as_it_was(
     assert CURSOR_ON in terminal.said.rpartition("\x1b[?25l")[2]
     assert "FAULT: a guard is open" in after
     assert "Traceback" not in after
+
+
+def test_a_late_joiner_takes_from_a_library_what_it_has_not_heard(
+    controller: Controller, finished: CampaignResult, tmp_path: Path
+) -> None:
+    """Axes, units and earlier runs; the change of a run is that since the first of its campaign."""
+    library = ("--library", str(finished.library))
+    terminal = Terminal(controller.monitor(*library), tmp_path, columns=100)
+    try:
+        terminal.wait_for("run 3: running")
+        # The axes by their names, and the runs before this one.
+        seen = terminal.wait_for(r"x +following")
+        terminal.wait_for(r"max tracking")
+        assert terminal.end(signal.SIGINT) == 130
+    finally:
+        terminal.close()
+    shown = terminal.said[seen:].rpartition(SCREEN_OFF)[2]
+    assert re.findall(r"^ +([0-9]) +[0-9]", shown, re.MULTILINE) == ["0", "1", "2"], shown
+    first, _, last = Library(finished.library).list()
+    terminal = Terminal(controller.monitor("--plain", "-n", "1", *library), tmp_path, columns=100)
+    try:
+        terminal.wait_for(r"gantry: running \(run 3\)")
+        controller.put("iteration", {
+            "event": "iteration", "id": 3, "index": 2, "digest": last["digest"],
+            "tracking_inf_m": 0.1 * first["tracking_inf_m"],
+            "tracking_rms_m": 0.1 * first["tracking_rms_m"],
+            "contour_inf_m": 0.1 * first["contour_inf_m"], "contour_rms_m": 1e-6,
+        })  # fmt: skip
+        assert terminal.end() == 0
+    finally:
+        terminal.close()
+    assert re.search(r"^gantry +2 .*-90\.0 %", terminal.said, re.MULTILINE), terminal.said
 
 
 def test_plain_lines_are_printed_where_they_are_wanted(

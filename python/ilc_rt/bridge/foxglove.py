@@ -19,6 +19,7 @@ from ilc_rt.wording import WORDS, describe
 
 if TYPE_CHECKING:
     from ilc_rt import Cell
+    from ilc_rt.bridge.signals import Recall
     from ilc_rt.monitor import Message
 
 PORT = 8765
@@ -36,6 +37,8 @@ class Foxglove(Closing):
         one.
     described : Cell, optional
         Description of the cell, for the names of its axes before it starts.
+    recall : callable, optional
+        Returns the stored runs of a cell, which name its axes after its start.
 
     Raises
     ------
@@ -46,7 +49,11 @@ class Foxglove(Closing):
     """
 
     def __init__(
-        self, host: str = "127.0.0.1", port: int = PORT, described: Cell | None = None
+        self,
+        host: str = "127.0.0.1",
+        port: int = PORT,
+        described: Cell | None = None,
+        recall: Recall | None = None,
     ) -> None:
         try:
             import foxglove
@@ -63,7 +70,7 @@ class Foxglove(Closing):
             message = f"{host}:{port}: {error}"
             raise BadInputError(message) from error
         self._channels: dict[str, foxglove.Channel] = {}
-        self._cells = Cells(described)
+        self._cells = Cells(described, recall)
 
     def close(self) -> None:
         """End the server."""

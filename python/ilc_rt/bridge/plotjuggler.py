@@ -20,6 +20,7 @@ from ilc_rt.events import IterationEvent
 
 if TYPE_CHECKING:
     from ilc_rt import Cell
+    from ilc_rt.bridge.signals import Recall
     from ilc_rt.monitor import Message
 
 PORT = 9870
@@ -36,6 +37,8 @@ class PlotJuggler(Closing):
         Address of the computer that runs PlotJuggler, and the port of its UDP server.
     described : Cell, optional
         Description of the cell, for the names of its axes before it starts.
+    recall : callable, optional
+        Returns the stored runs of a cell, which name its axes after its start.
 
     Raises
     ------
@@ -44,7 +47,11 @@ class PlotJuggler(Closing):
     """
 
     def __init__(
-        self, host: str = "127.0.0.1", port: int = PORT, described: Cell | None = None
+        self,
+        host: str = "127.0.0.1",
+        port: int = PORT,
+        described: Cell | None = None,
+        recall: Recall | None = None,
     ) -> None:
         try:
             found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
@@ -54,7 +61,7 @@ class PlotJuggler(Closing):
         family, kind, protocol, _, address = found[0]
         self._address: tuple[object, ...] = address
         self._socket = socket.socket(family, kind, protocol)
-        self._cells = Cells(described)
+        self._cells = Cells(described, recall)
 
     def close(self) -> None:
         """Close the socket."""

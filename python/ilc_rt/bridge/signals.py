@@ -12,12 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from ilc_rt.events import StartEvent
 from ilc_rt.quantity import axis_unit
+from ilc_rt.text import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from ilc_rt import Cell
     from ilc_rt.monitor import Message
+
+    Recall = Callable[[str], Sequence[Mapping[str, Any]]]
 
 #: Duration of a batch, by which a reader who has missed the start knows the cycle.
 BATCH_S = 0.05
@@ -77,6 +80,12 @@ class Signals:
     def of_cell(cls, cell: Cell) -> Signals:
         """Return the signals of a described cell."""
         return cls(cell.axis_names, cell.axis_units, cell.cycle_s)
+
+    @classmethod
+    def of_run(cls, row: Mapping[str, Any]) -> Signals:
+        """Return the signals of the cell of a stored run."""
+        units = tuple(map(axis_unit, map(str, row["input_units"])))
+        return cls(tuple(map(printable, row["axis_names"])), units, float(row["cycle_s"]))
 
     def rows(self, message: Message) -> Iterator[Row]:
         """Yield the cycles of a message; none if it has no batch."""
@@ -140,13 +149,23 @@ class Cells:
     ----------
     described : Cell, optional
         The cell whose description is at hand; the others tell theirs when they start.
+    recall : callable, optional
+        Called with the name of a cell that is heard for the first time; returns its stored runs.
     """
 
-    def __init__(self, described: Cell | None = None) -> None:
+    def __init__(
+        self,
+        described: Cell | None = None,
+        recall: Recall | None = None,
+    ) -> None:
+        self._recall = recall
         self._signals: dict[str, Signals] = {}
         if described is not None:
             self._signals[described.name] = Signals.of_cell(described)
 
     def rows(self, message: Message) -> Iterator[Row]:
         """Yield the servo cycles of a message."""
-        return self._signals.setdefault(message.cell, Signals()).rows(message)
+        if message.cell not in self._signals:
+            runs = [] if self._recall is None else self._recall(message.cell)
+            self._signals[message.cell] = Signals.of_run(runs[-1]) if runs else Signals()
+        return self._signals[message.cell].rows(message)

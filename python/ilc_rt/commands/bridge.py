@@ -12,6 +12,7 @@ from ilc_rt.bridge import plotjuggler as plotjuggler_bridge
 from ilc_rt.commands.network import (
     CellName,
     Connect,
+    Libraries,
     Router,
     Scouting,
     Timeout,
@@ -20,6 +21,7 @@ from ilc_rt.commands.network import (
     whom,
 )
 from ilc_rt.errors import BadInputError
+from ilc_rt.sources import Memory
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,6 +49,7 @@ def plotjuggler(
     connect: Connect = None,
     scouting: Scouting = True,
     router: Router = False,
+    library: Libraries = None,
     timeout: Timeout = None,
 ) -> None:
     """Send every servo cycle to PlotJuggler, as JSON over UDP.
@@ -59,7 +62,8 @@ def plotjuggler(
     _write(layout, known, plotjuggler_bridge.layout)
     host, port = _address(to)
     with (
-        plotjuggler_bridge.PlotJuggler(host, port, known) as bridge,
+        Memory(library or ()) as memory,
+        plotjuggler_bridge.PlotJuggler(host, port, known, memory.campaign) as bridge,
         listen(name, connect, scouting=scouting, router=router) as watching,
     ):
         _follow(name, f"{host}:{port}", bridge.show, watching, timeout)
@@ -78,6 +82,7 @@ def foxglove(
     connect: Connect = None,
     scouting: Scouting = True,
     router: Router = False,
+    library: Libraries = None,
     timeout: Timeout = None,
 ) -> None:
     """Serve every servo cycle to Foxglove, over its WebSocket.
@@ -89,7 +94,8 @@ def foxglove(
     name, known = described(cell)
     _write(layout, known, foxglove_bridge.layout)
     with (
-        foxglove_bridge.Foxglove(host, port, known) as bridge,
+        Memory(library or ()) as memory,
+        foxglove_bridge.Foxglove(host, port, known, memory.campaign) as bridge,
         listen(name, connect, scouting=scouting, router=router) as watching,
     ):
         _follow(name, bridge.address, bridge.show, watching, timeout)

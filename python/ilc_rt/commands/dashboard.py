@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ilc_rt.commands.network import Connect, Router, Scouting, Timeout, described
+from ilc_rt.commands.network import Connect, Libraries, Router, Scouting, Timeout, described
 from ilc_rt.commands.options import DEFAULT_LIBRARY_FILE
 from ilc_rt.errors import BadInputError
 
@@ -18,15 +18,6 @@ PORT = 8460
 Cells = Annotated[
     list[str] | None,
     typer.Argument(metavar="[CELL]...", help="Names of cells, or their TOML files; all if none."),
-]
-Libraries = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--library",
-        metavar="FILE",
-        help="Library to browse and to take earlier runs from, a file or "
-        "postgresql://USER@HOST/NAME; repeatable.",
-    ),
 ]
 
 
@@ -44,7 +35,7 @@ def dashboard(
     router: Router = False,
     timeout: Timeout = None,
 ) -> None:
-    """Serve a web page that watches cells and compares their stored runs; it commands nothing.
+    """Serve a web page that watches cells and compares the runs of libraries; it commands nothing.
 
     Example: ilc dashboard gantry --library ilc-library.db
     """

@@ -9,6 +9,7 @@ import typer
 
 from ilc_rt.commands.network import Connect, Router, Scouting, Timeout, listen
 from ilc_rt.commands.options import JsonFile  # noqa: TC001 - typer reads it
+from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import json_text, write_text
 from ilc_rt.text import printable
@@ -52,13 +53,18 @@ def sync(
     if is_database(source) == is_database(target):
         message = f"{source} {target}: one is a library file, the other a database"
         raise BadInputError(message)
-    if is_database(target):
-        done = push(file_of(source), target, cell)
-    elif cell is None:
+    if cell is None and not is_database(target):
         message = "--cell NAME: the cell whose runs the library is to have"
         raise BadInputError(message)
-    else:
-        done = pull(source, file_of(target), cell)
+    try:
+        with Steps("new runs") as steps:
+            if is_database(target):
+                done = push(file_of(source), target, cell, steps.tell)
+            else:
+                done = pull(source, file_of(target), cell or "", steps.tell)
+    except KeyboardInterrupt:
+        typer.echo("ilc: stopped; what was stored stays, and the next sync goes on", err=True)
+        raise
     if json_file is not None:
         counts = {"stored": done.stored, "renewed": done.renewed, "present": done.present}
         write_text(json_file, json_text({**counts, "damaged": list(done.damaged)}))
@@ -125,7 +131,11 @@ def fetch(
     from ilc_rt.fleet import fetch as fetch_campaign
     from ilc_rt.quantity import unit_for
 
-    got = fetch_campaign(database, cell, str(into), from_cell=from_cell, other_drives=other_drives)
+    with Steps("campaigns compared") as steps:
+        got = fetch_campaign(
+            database, cell, str(into), from_cell=from_cell, other_drives=other_drives,
+            progress=steps.tell,
+        )  # fmt: skip
     if json_file is not None:
         told = ("from_cell", "campaign", "runs", "stored", "best_tracking_rms_m")
         write_text(json_file, json_text({name: getattr(got, name) for name in told}))

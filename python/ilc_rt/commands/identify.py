@@ -17,9 +17,10 @@ from ilc_rt.commands.options import (
     declared,
     given,
 )
-from ilc_rt.commands.targets import make_folder, report_target
+from ilc_rt.commands.steps import Steps
+from ilc_rt.commands.targets import make_folder, report_target, write_picture
 from ilc_rt.errors import BadInputError, CampaignError
-from ilc_rt.events import Event, StartEvent
+from ilc_rt.events import Event, ProgressEvent, StartEvent
 from ilc_rt.text import file_name, printable
 
 PICTURE = "identify-{axis}.png"
@@ -44,21 +45,34 @@ def identify(
 
     Example: ilc identify examples/01_gantry.toml --axis y --report pictures/
     """
-    from ilc_rt import identify as steps
+    from ilc_rt.identify import identify as identify_axis
 
+    steps = Steps("samples")
     asked = {name: value for name, value in given(options).items() if value is not None}
 
     def tell(event: Event) -> None:
-        if isinstance(event, StartEvent):
+        if isinstance(event, ProgressEvent):
+            steps.tell(event.sample, event.n_samples)
+        elif isinstance(event, StartEvent):
+            steps.begin()
             seconds = event.n_samples * event.cycle_s
             axis = f"axis {printable(asked['axis'])}" if "axis" in asked else "the axis"
             typer.echo(f"exciting {axis} of {event.cell} for {seconds:.1f} s, {event.bus}")
 
+    def say(sentence: str) -> None:
+        steps.close()
+        typer.echo(sentence)
+
     try:
-        found = steps.identify(
-            cell, lockstep=lockstep, library=library, drives=drives.value, observe=tell,
-            tell=typer.echo, **asked,
-        )  # fmt: skip
+        with steps:
+            found = identify_axis(
+                cell, lockstep=lockstep, library=library, drives=drives.value, observe=tell,
+                tell=say, **asked,
+            )  # fmt: skip
+    except (KeyboardInterrupt, SystemExit):
+        kept = "" if library is None else f"; {printable(library)} has what was measured before"
+        typer.echo(f"ilc: stopped on request; the axes are at rest{kept}", err=True)
+        raise
     except ValueError as error:
         raise BadInputError(str(error)) from error
     name = found.experiment.axis
@@ -93,17 +107,9 @@ def _tell(found: object) -> None:
 
 def _draw(found: object, folder: Path, name: str) -> Path:
     # Imported here, as matplotlib is slow to import, and bad input should be reported before.
-    import io
-
     from ilc_rt.identify import Identification
 
     assert isinstance(found, Identification)
-    picture = io.BytesIO()
-    found.figure().savefig(picture, format="png")
     make_folder(folder)
-    try:
-        (folder / name).write_bytes(picture.getvalue())
-    except OSError as error:
-        message = f"{folder}: cannot be written: {error.strerror}"
-        raise BadInputError(message) from error
+    write_picture(folder / name, found.figure())
     return folder / name

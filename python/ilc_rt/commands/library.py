@@ -21,6 +21,7 @@ from ilc_rt.commands.options import (
     JsonFile,
     LibraryArgument,
 )
+from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
 from ilc_rt.library import Library
 from ilc_rt.quantity import axis_unit, unit_for
@@ -262,7 +263,10 @@ def trim(
         if keep is not None:
             deleted = Library(str(library)).trim(min(keep, n_runs), cell)
         else:
-            deleted = Library(str(library)).retain(newest=newest, days=days, best=best, cell=cell)
+            with Steps("pages given back") as steps:
+                deleted = Library(str(library)).retain(
+                    newest=newest, days=days, best=best, cell=cell, progress=steps.tell
+                )
     except (OSError, sqlite3.Error) as error:
         raise BadInputError(str(error)) from error
     if json_file is not None:

@@ -14,6 +14,7 @@ from rich.live import Live
 from ilc_rt.commands.network import (
     CellName,
     Connect,
+    Libraries,
     Router,
     Scouting,
     Timeout,
@@ -39,6 +40,7 @@ from ilc_rt.lateness import late_sentence
 from ilc_rt.progress import is_live
 from ilc_rt.quantity import axis_unit
 from ilc_rt.record import IterationRecord
+from ilc_rt.sources import Memory
 from ilc_rt.table import headings, plain_line, run_cells
 from ilc_rt.terminal import CellsView
 from ilc_rt.text import printable
@@ -46,6 +48,7 @@ from ilc_rt.watched import WatchedCell
 from ilc_rt.wording import WORDS, describe
 
 if TYPE_CHECKING:
+    from ilc_rt import Cell
     from ilc_rt.monitor import Message, Monitor
 
 WARNINGS_MAX = 100
@@ -70,6 +73,7 @@ def monitor(
     connect: Connect = None,
     scouting: Scouting = True,
     router: Router = False,
+    library: Libraries = None,
     iterations: Runs = None,
     timeout: Timeout = None,
     plain: Plain = False,
@@ -82,12 +86,16 @@ def monitor(
 
     Example: ilc monitor gantry --connect tcp/192.168.1.5:7447
     """
-    name, _ = described(cell)
+    name, known = described(cell)
     # Names may contain brackets and colons: nothing printed is markup.
     console = Console(highlight=False, markup=False, emoji=False)
     draws = is_live(console) and not plain and not events
-    view: _View | _Screen = _Screen(console) if draws else _View(events=events)
-    with listen(name, connect, scouting=scouting, router=router) as watching:
+    with (
+        Memory(library or ()) as memory,
+        listen(name, connect, scouting=scouting, router=router) as watching,
+    ):
+        view: _View | _Screen
+        view = _Screen(console, memory, known) if draws else _View(memory, known, events=events)
         if isinstance(view, _Screen):
             view.watch(watching, iterations, timeout)
         else:
@@ -103,11 +111,15 @@ def monitor(
 class _Screen:
     """Draws all cells that are heard on a screen of its own, and counts runs and faults."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, memory: Memory, known: Cell | None) -> None:
         self.runs = 0
         self.faults = 0
         self._console = console
+        self._memory = memory
         self._cells: dict[str, WatchedCell] = {}
+        if known is not None:
+            self._cells[known.name] = WatchedCell(known.name)
+            self._cells[known.name].describe(known)
 
     def watch(self, watching: Monitor, iterations: int | None, timeout_s: float | None) -> None:
         """Draw until enough runs were seen, the time is over, or a signal asks to end.
@@ -136,16 +148,23 @@ class _Screen:
         """Take in a message; of at most so many cells."""
         if message.cell not in self._cells and len(self._cells) >= CELLS_MAX:
             return
+        is_new = message.cell not in self._cells
         cell = self._cells.setdefault(message.cell, WatchedCell(message.cell))
         self.runs += isinstance(message.event, IterationEvent)
         self.faults += isinstance(message.event, FaultEvent)
         cell.take(message)
+        if is_new or cell.lacks(message):
+            digest = getattr(message.event, "digest", None)
+            cell.remember(self._memory.campaign(cell.name, digest), "")
 
 
 class _View:
     """Prints messages as lines, and counts them."""
 
-    def __init__(self, *, events: bool) -> None:
+    def __init__(
+        self, memory: Memory | None = None, known: Cell | None = None, *, events: bool
+    ) -> None:
+        self._memory = memory or Memory()
         self.runs = 0
         self.faults = 0
         self._events = events
@@ -153,6 +172,8 @@ class _View:
         self._warned: set[tuple[str, str]] = set()
         self._first: dict[str, IterationRecord] = {}
         self._units: dict[str, tuple[str, ...]] = {}
+        if known is not None:
+            self._units[known.name] = tuple(known.axis_units)
 
     def show(self, message: Message) -> None:
         event = message.event
@@ -199,6 +220,14 @@ class _View:
             self._present.add(message.cell)
         sys.stdout.flush()
 
+    def _earlier(self, cell: str, record: IterationRecord) -> IterationRecord | None:
+        """Return the first run of the campaign that this one was made in, from a library."""
+        rows = self._memory.campaign(cell, record.digest) if record.index and record.digest else []
+        if not any(row["digest"] == record.digest for row in rows):
+            return None
+        self._units.setdefault(cell, tuple(map(axis_unit, rows[0]["input_units"])))
+        return IterationRecord.from_row(rows[0], "")
+
     def _warn(self, message: Message) -> None:
         """Report the defect of a message, once for each cell and topic."""
         whose = (message.cell, message.topic)
@@ -207,12 +236,13 @@ class _View:
             typer.echo(f"{message.cell}: {message.topic}: {message.warning}", err=True)
 
     def _show_run(self, cell: str, record: IterationRecord) -> None:
-        if cell not in self._first or record.index == 0:
-            self._first[cell] = record
+        begins = cell not in self._first or record.index == 0
+        if begins:
+            self._first[cell] = self._earlier(cell, record) or record
         first = self._first[cell]
         comparison = Comparison((first, record), self._units.get(cell, ()))
         names = headings(comparison)
-        if record is first:
+        if begins:
             typer.echo(" " * len(cell) + "  " + plain_line(names, names))
         typer.echo(f"{cell}  {plain_line(run_cells(comparison, record), names)}")
         if record.remark:

@@ -32,6 +32,15 @@ Router = Annotated[
 Timeout = Annotated[
     float | None, typer.Option("--timeout", metavar="SECONDS", help="End after this time.")
 ]
+Libraries = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--library",
+        metavar="FILE",
+        help="Library, a file or postgresql://USER@HOST/NAME, with what a late joiner has not "
+        "heard: earlier runs, axes and units; repeatable.",
+    ),
+]
 
 
 def listen(cell: str, connect: list[str] | None, *, scouting: bool, router: bool) -> Monitor:

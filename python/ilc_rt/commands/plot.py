@@ -13,7 +13,8 @@ from ilc_rt.commands.options import (
     JsonFile,
     LibraryArgument,
 )
-from ilc_rt.commands.targets import check_report, make_folder
+from ilc_rt.commands.steps import Steps
+from ilc_rt.commands.targets import check_report, make_folder, write_picture
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import CampaignResult
 from ilc_rt.text import printable
@@ -46,24 +47,26 @@ def plot(
     if json_file is not None:
         result.write_json(json_file)
     if out.suffix == ".html":
-        typer.echo(f"report: {printable(write_report(result, out))}")
+        with Steps("figures") as steps:
+            written = write_report(result, out, steps.tell)
+        typer.echo(f"report: {printable(written)}")
         return
     if out.suffix:
         message = f"{out}: must be a .html file or a folder"
         raise BadInputError(message)
-    figures = {
-        "convergence": plots.convergence(result),
-        "contour": plots.contour(result),
-        "tracking": plots.tracking(result),
-        "input": plots.learned_input(result),
+    pictures = {
+        "convergence": plots.convergence,
+        "contour": plots.contour,
+        "tracking": plots.tracking,
+        "input": plots.learned_input,
     }
     check_report("--out", out)
     make_folder(out)
-    try:
-        for name, figure in figures.items():
+    with Steps("pictures") as steps:
+        for number, (name, draw) in enumerate(pictures.items()):
+            steps.tell(number, len(pictures))
+            figure = draw(result)
             if figure is not None:
-                figure.savefig(out / f"{name}.png")
+                write_picture(out / f"{name}.png", figure)
+                steps.close()
                 typer.echo(f"picture: {printable(out / name)}.png")
-    except OSError as error:
-        message = f"{out}: cannot be written: {error.strerror}"
-        raise BadInputError(message) from error

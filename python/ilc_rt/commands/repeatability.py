@@ -16,8 +16,9 @@ from ilc_rt.commands.options import (
     declared,
     given,
 )
+from ilc_rt.commands.steps import Steps
 from ilc_rt.comparison import Comparison
-from ilc_rt.events import Event, IterationEvent, StartEvent
+from ilc_rt.events import Event, IterationEvent, ProgressEvent, StartEvent
 from ilc_rt.quantity import axis_unit, digits, unit_for
 from ilc_rt.record import IterationRecord
 from ilc_rt.repeatable import check_repeatability
@@ -39,20 +40,25 @@ def repeatability(
     Example: ilc repeatability examples/01_gantry.toml --runs 10
     """
     units: list[str] = []
+    steps = Steps("runs")
 
     def tell(event: Event) -> None:
         if isinstance(event, StartEvent):
             units[:] = map(axis_unit, event.input_units)
+        elif isinstance(event, ProgressEvent):
+            steps.tell(round(event.iteration + event.sample / max(1, event.n_samples), 1), runs)
         elif isinstance(event, IterationEvent):
+            steps.close()
             comparison = Comparison([IterationRecord.from_event(event, "")], units)
             errors = [c for c in comparison.tracking() if c.name.startswith("RMS")]
             said = ", ".join(column.unit.text(column.of(comparison.first)) for column in errors)
             typer.echo(f"run {event.index}: RMS error {said}")
 
-    found = check_repeatability(
-        cell, runs, lockstep=lockstep, drives=drives.value, library=library, observe=tell,
-        **given(options),
-    )  # fmt: skip
+    with steps:
+        found = check_repeatability(
+            cell, runs, lockstep=lockstep, drives=drives.value, library=library, observe=tell,
+            **given(options),
+        )  # fmt: skip
     names = [printable(axis.axis, NAME_MAX) for axis in found.axes]
     width = max(8, *map(len, names))
     typer.echo(f"{'axis':<{width}} {'repeats':>12} {'does not':>12} {'ratio':>8}  learning applies")

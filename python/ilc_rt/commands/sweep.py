@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from ilc_rt.commands.options import CellFile, JsonFile  # noqa: TC001 - typer reads them
-from ilc_rt.commands.targets import check_file
+from ilc_rt.commands.steps import Steps
+from ilc_rt.commands.targets import check_file, write_picture
 from ilc_rt.errors import BadInputError
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+
+    from matplotlib.figure import Figure
 
 Vary = Annotated[
     list[str],
@@ -87,11 +90,17 @@ def sweep(
             message = f"--picture {picture}: allowed {', '.join(PICTURES)}"
             raise BadInputError(message)
         check_file("--picture", picture)
-    with ExitStack() as stack:
-        found = robustness_map(
-            cell, vary, samples, iterations, converged_below=converged_below, seed=seed, file=file,
-            executor=_executor(executor, stack), progress=_progress,
-        )  # fmt: skip
+    try:
+        with ExitStack() as stack:
+            steps = stack.enter_context(Steps("cases"))
+            found = robustness_map(
+                cell, vary, samples, iterations, converged_below=converged_below, seed=seed,
+                file=file, executor=_executor(executor, stack), progress=steps.tell,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        if file is not None:
+            typer.echo(f"ilc: {printable(file)} has every finished case; go on with it", err=True)
+        raise
     typer.echo(found.sentence())
     for row in found.by_parameter():
         typer.echo(f"{printable(row['key'])}:")
@@ -107,13 +116,8 @@ def sweep(
         write_text(json_file, json_text(found.to_json()))
         typer.echo(f"figures: {printable(json_file)}")
     if picture is not None:
-        found.plot()[0].figure.savefig(picture)
+        write_picture(picture, cast("Figure", found.plot()[0].figure))
         typer.echo(f"picture: {printable(picture)}")
-
-
-def _progress(done: int, total: int) -> None:
-    if done == total or done % max(1, total // 20) == 0:
-        typer.echo(f"  {done} of {total} cases", err=True)
 
 
 def _executor(where: str, stack: ExitStack) -> Executor | None:

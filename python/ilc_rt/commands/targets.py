@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path  # noqa: TC003 - typer reads it
+from typing import TYPE_CHECKING
 
 import typer
 
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import STANDARD_OUTPUT
 from ilc_rt.text import printable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def json_target(context: typer.Context, path: Path | None) -> Path | None:
@@ -92,3 +97,18 @@ def make_folder(folder: Path) -> None:
         message = f"{folder}: cannot be made: {reason}"
         raise BadInputError(message) from error
     typer.echo(f"folder:  {printable(folder)} is new")
+
+
+def write_picture(path: Path, figure: Figure) -> None:
+    """Write a figure of matplotlib; the format is that of the extension.
+
+    It is drawn before the file is opened: after Ctrl-C the former picture is still there.
+    """
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=path.suffix.removeprefix("."))
+    try:
+        path.write_bytes(drawn.getvalue())
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        message = f"{path}: cannot be written: {reason}"
+        raise BadInputError(message) from error

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ilc_rt.commands.options import CellFile, JsonFile  # noqa: TC001 - typer reads them
+from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
 from ilc_rt.result import write_text
 
@@ -59,13 +60,15 @@ def tune(
     """
     from ilc_rt.tuning import TUNED_LAWS, UNCERTAINTY, propose_weights
 
-    found = propose_weights(
-        cell,
-        uncertainty=UNCERTAINTY if uncertainty is None else uncertainty,
-        known_hz=known_hz,
-        noise_m=0.0 if noise_m is None else noise_m,
-        n_runs=runs,
-    )
+    with Steps("rates tried") as steps:
+        found = propose_weights(
+            cell,
+            uncertainty=UNCERTAINTY if uncertainty is None else uncertainty,
+            known_hz=known_hz,
+            noise_m=0.0 if noise_m is None else noise_m,
+            n_runs=runs,
+            progress=steps.tell,
+        )
     _show(found)
     if json_file is not None:
         write_text(json_file, json.dumps(found.to_json(), indent=2) + "\n")

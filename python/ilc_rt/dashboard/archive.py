@@ -114,14 +114,11 @@ class Archive(Closing):
         with self._lock:
             return [row for number in range(len(self.sources)) for row in self._rows_of(number)]
 
-    def campaign(self, cell: str, campaign: str | None = None) -> list[dict[str, Any]]:
-        """Return the runs of a campaign of a cell; of its newest one if none is named."""
-        found: dict[int, dict[str, Any]] = {}
-        for row in campaign_of(self.rows(), cell, campaign):
-            # A library and the database that it was synced with have the same run.
-            if row.get("has_signals", True) or row["index"] not in found:
-                found[row["index"]] = row
-        return list(found.values())
+    def campaign(
+        self, cell: str, campaign: str | None = None, digest: str | None = None
+    ) -> list[dict[str, Any]]:
+        """Return the runs of a campaign of a cell, chosen as by `campaign_of`."""
+        return campaign_of(self.rows(), cell, campaign, digest)
 
     def load(self, key: tuple[int, int]) -> StoredRun:
         """Return a run with its signals.

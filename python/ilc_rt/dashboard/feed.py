@@ -7,7 +7,6 @@ import time
 from typing import TYPE_CHECKING
 
 from ilc_rt.errors import BadInputError
-from ilc_rt.events import StartEvent
 from ilc_rt.monitor import Monitor
 
 if TYPE_CHECKING:
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
 
     from ilc_rt.dashboard.archive import Archive
     from ilc_rt.dashboard.fleet import Fleet
-    from ilc_rt.monitor import Message
 
 TURN_S = 0.5
 
@@ -72,18 +70,22 @@ class Feed:
             for message in self._monitor.messages(TURN_S):
                 known = message.cell in self._fleet.cells
                 self._fleet.apply(message, time.monotonic(), time.time())
-                if _needs_history(message) or not known:
-                    self._recall(message.cell)
+                cell = self._fleet.cells.get(message.cell)
+                if cell is not None and (not known or cell.lacks(message)):
+                    self._recall(message.cell, getattr(message.event, "digest", None))
             self._fleet.lost = self._monitor.lost
 
-    def _recall(self, name: str) -> None:
-        """Give a cell the earlier runs of its campaign, as far as libraries have them."""
+    def _recall(self, name: str, digest: str | None = None) -> None:
+        """Give a cell the earlier runs of its campaign, as far as libraries have them.
+
+        A campaign whose start was not heard is known by the digest of one of its runs.
+        """
         cell = self._fleet.cells.get(name)
         if cell is None:
             return
         campaign = cell.campaign if cell.start is not None else None
         try:
-            rows = self._archive.campaign(name, campaign)
+            rows = self._archive.campaign(name, campaign, digest)
         except (BadInputError, OSError):
             # A library that is being made or replaced; the page of the library tells why.
             return
@@ -92,9 +94,3 @@ class Feed:
             cell.remember(rows, "")
             if flight is not None:
                 cell.remember_flight(flight)
-
-
-def _needs_history(message: Message) -> bool:
-    """Return whether runs were made before this message that were not heard."""
-    event = message.event
-    return message.topic == "alive" or (isinstance(event, StartEvent) and event.first_index > 0)

@@ -19,12 +19,12 @@ import numpy as np
 
 from ilc_rt import library_file
 from ilc_rt.campaign import Campaign, load_cell
-from ilc_rt.errors import BadInputError
+from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.fleet.database import connect, told
 from ilc_rt.fleet.sync import is_intact, prepare, store, stored_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     import psycopg
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 MARK = "@"
 #: The name of a cell in its description.
 NAME = re.compile(r"""(^\s*\[cell\][^\[]*?^\s*name\s*=\s*)(?:"[^"\n]*"|'[^'\n]*')""", re.MULTILINE)
+#: Largest number of disturbances that a law weighs runs by.
+DISTURBANCES_MAX = 7
 #: Longest value in a refusal.
 VALUE_MAX = 60
 # In this order, so that the nearest campaign is refused with the difference that says most.
@@ -69,6 +71,7 @@ def fetch(
     *,
     from_cell: str | None = None,
     other_drives: bool = False,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Fetched:
     """Write the best fitting campaign of a fleet to the library of a cell.
 
@@ -84,6 +87,8 @@ def fetch(
         Only campaigns of the cell of this name.
     other_drives : bool
         Accept a campaign whose cell has other limits, models or position loops.
+    progress : callable or None
+        Called with the number of campaigns that were compared and of all, before each.
 
     Raises
     ------
@@ -97,9 +102,10 @@ def fetch(
     refusal = ""
     with told(address), contextlib.closing(connect(address, read_only=True)) as connection:
         values = {"mark": MARK, "from_cell": from_cell}
-        for owner, campaign, ids, is_complete, best in connection.execute(
-            CANDIDATES.encode(), values
-        ).fetchall():
+        candidates = connection.execute(CANDIDATES.encode(), values).fetchall()
+        for number, (owner, campaign, ids, is_complete, best) in enumerate(candidates):
+            if progress is not None:
+                progress(number, len(candidates))
             if owner == name or best is None:
                 continue
             place = f"campaign {campaign} of {owner}"
@@ -132,9 +138,7 @@ def rehearsed(cell: Path, name: str) -> dict[str, Any]:
         draft = cell.with_name(f".{cell.stem}-{Path(folder).name}.toml")
         try:
             draft.write_text(renamed, encoding="utf-8")
-            campaign = Campaign(draft, library=library, bus="loopback:", allow_divergent=True)
-            for _ in campaign.run(1):
-                pass
+            _run_once(draft, library)
         except OSError as error:
             message = f"{draft}: cannot be written: {error.strerror}"
             raise BadInputError(message) from error
@@ -143,6 +147,27 @@ def rehearsed(cell: Path, name: str) -> dict[str, Any]:
         with library_file.reading(library) as file:
             (row,) = library_file.rows(file, [1])
     return row
+
+
+def _run_once(cell: Path, library: str) -> None:
+    """Make a run on simulated drives, with as many disturbances as the law weighs runs by.
+
+    Their values do not matter: what is compared is that of a first run, which they do not change.
+    """
+    for count in range(DISTURBANCES_MAX + 1):
+        measured = np.zeros((1, count)) if count else None
+        campaign = Campaign(
+            cell, library=library, bus="loopback:", allow_divergent=True, disturbance=measured
+        )
+        try:
+            for _ in campaign.run(1):
+                pass
+        except CampaignError as error:
+            # Refused before anything has moved: another number, or a sensor of another computer.
+            if "the disturbance of " not in error.reason or count == DISTURBANCES_MAX:
+                raise
+        else:
+            return
 
 
 def difference(here: Mapping[str, Any], there: Mapping[str, Any]) -> str | None:

@@ -22,7 +22,7 @@ from ilc_rt.library_file import ARRAYS, FIGURES
 from ilc_rt.read_only import ReadOnlyLibrary
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     import psycopg
 
@@ -68,10 +68,16 @@ class Synced:
     damaged: tuple[int, ...] = ()
 
 
-def push(library: str, address: str, cell: str | None = None) -> Synced:
+def push(
+    library: str,
+    address: str,
+    cell: str | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Synced:
     """Store the runs of a library file in a database; the file is only read.
 
-    Figures that the controller changed later, as a law decided on a run, are renewed.
+    Figures that the controller changed later, as a law decided on a run, are renewed. `progress` is
+    called with the number of new runs that are stored, and of all new ones.
 
     Raises
     ------
@@ -82,6 +88,7 @@ def push(library: str, address: str, cell: str | None = None) -> Synced:
         runs = ReadOnlyLibrary(library).list(cell)
     except OSError as error:
         raise BadInputError(str(error)) from error
+    tell = progress or (lambda _done, _total: None)
     with told(address), contextlib.closing(connect(address)) as connection:
         there = _there(connection, sorted({run["campaign"] for run in runs}))
         new = [run for run in runs if not there.get(_key(run), (False, ""))[0]]
@@ -90,9 +97,11 @@ def push(library: str, address: str, cell: str | None = None) -> Synced:
             if there.get(_key(run), (False, ""))[0] and there[_key(run)][1] != _sum(run)
         ]  # fmt: skip
         damaged: list[int] = []
-        for batch in _batches(new):
+        for number, batch in enumerate(_batches(new)):
+            tell(BATCH * number, len(new))
             damaged += _push(connection, library, {run["id"]: _figures(run) for run in batch})
-        for run in differ:
+        for number, run in enumerate(differ):
+            tell(number, len(differ))
             key = [*_key(run), _figures(run)]
             connection.execute(
                 "UPDATE run SET figures = %s WHERE (cell, campaign, iteration, digest) "
@@ -103,8 +112,15 @@ def push(library: str, address: str, cell: str | None = None) -> Synced:
     return Synced(len(new) - len(damaged), len(differ), present, tuple(damaged))
 
 
-def pull(address: str, library: str, cell: str) -> Synced:
+def pull(
+    address: str,
+    library: str,
+    cell: str,
+    progress: Callable[[int, int], object] | None = None,
+) -> Synced:
     """Store the runs of a cell that a database has with their arrays in a library file.
+
+    `progress` is called with the number of runs that are stored, and of all that are missing.
 
     Raises
     ------
@@ -128,7 +144,9 @@ def pull(address: str, library: str, cell: str) -> Synced:
             }
         wanted = [row[0] for row in found if tuple(row[1:]) not in local]
         stored, damaged = 0, []
-        for batch in _batches(wanted):
+        for number, batch in enumerate(_batches(wanted)):
+            if progress is not None:
+                progress(BATCH * number, len(wanted))
             rows = stored_rows(connection, batch)
             damaged += [row["id"] for row in rows if not is_intact(row)]
             stored += store(library, [row for row in rows if is_intact(row)])
