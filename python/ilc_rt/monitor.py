@@ -18,7 +18,7 @@ import socket
 import time
 import types
 import typing
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ilc_rt.closing import Closing
@@ -38,6 +38,11 @@ _T = TypeVar("_T")
 POLL_S = 0.2
 QUEUE_MAX = 10_000
 PAYLOAD_MAX_BYTES = 1 << 20
+# Topic under which an event of the history was published.
+PAST_TOPICS = {
+    "start": "state", "iteration": "iteration", "judged": "iteration", "drift": "iteration",
+    "fault": "fault",
+}  # fmt: skip
 TEXT_MAX = 2_000
 
 
@@ -59,6 +64,8 @@ class Message:
         The same as a typed event, if it is one.
     warning : str or None
         Defect of the message, if it is invalid.
+    is_past : bool
+        True if it was published before the monitor listened.
     """
 
     cell: str
@@ -66,6 +73,7 @@ class Message:
     payload: dict[str, Any]
     event: Event | None = None
     warning: str | None = None
+    is_past: bool = False
 
 
 class Monitor(Closing):
@@ -111,6 +119,8 @@ class Monitor(Closing):
         self._cell = cell
         self._queue: queue.Queue[Message] = queue.Queue(QUEUE_MAX)
         self._lost = 0
+        # Messages of the past that may still arrive once more.
+        self._past: list[Message] = []
         if router and not connect:
             message = "router = True: connect has to name its endpoint, as tls/host:7447"
             raise BadInputError(message)
@@ -138,9 +148,33 @@ class Monitor(Closing):
                 message = self._queue.get(timeout=POLL_S)
             except queue.Empty:
                 continue
+            if replace(message, is_past=True) in self._past:
+                # Published between the question for the past and its answer.
+                self._past.remove(replace(message, is_past=True))
+                continue
             yield message
             if message.topic == "alive":
+                self._past = self.ask_history(message.cell)
+                yield from self._past
                 yield from self.ask_state(message.cell)
+
+    def ask_history(self, cell: str | None = None) -> list[Message]:
+        """Query the start of the campaign that is running, its runs and faults, oldest first."""
+        from zenoh import ConsolidationMode
+
+        replies = self._session.get(
+            f"ilc/{cell or self._cell}/history/*",
+            timeout=2.0,
+            consolidation=ConsolidationMode.NONE,
+        )
+        found: list[tuple[int, Message]] = []
+        for reply in replies:
+            message = None if reply.ok is None else _message(reply.ok)
+            if reply.ok is not None and message is not None:
+                number = str(reply.ok.key_expr).rpartition("/")[2]
+                place = int(number) if number.isdecimal() else -1
+                found.append((place, replace(message, is_past=True)))
+        return [message for _, message in sorted(found, key=lambda pair: pair[0])]
 
     def ask_state(self, cell: str | None = None) -> list[Message]:
         """Query the current state, for late joiners.
@@ -230,6 +264,10 @@ def _message(sample: zenoh.Sample) -> Message | None:
         return None
     if not isinstance(payload, dict):
         return None
+    if topic.startswith("history/"):
+        topic = PAST_TOPICS.get(str(payload.get("event")), "")
+        if not topic:
+            return None
     if topic == "servo":
         # Servo cycles are no event, and much data: they are not written and read again.
         return Message(cell, topic, payload)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 from ports_fixture import free_bus, free_port
 
-from ilc_rt.events import EndEvent, IterationEvent, StateEvent, parse_event
+from ilc_rt.events import EndEvent, IterationEvent, StartEvent, StateEvent, parse_event
 from ilc_rt.monitor import Message, Monitor
 from ilc_rt.result import micrometres
 
@@ -49,7 +49,15 @@ class Publisher:
             "ilc/gantry/state",
             lambda query: query.reply("ilc/gantry/state", json.dumps(STATE)),
         )
+        self.history: list[dict[str, object]] = []
+        self.session.declare_queryable("ilc/gantry/history/*", self._tell)
         self.token = self.session.liveliness().declare_token("ilc/gantry/alive")
+
+    def _tell(self, query: zenoh.Query) -> None:
+        # In any order: the names of the replies have it.
+        for number, event in reversed([*enumerate(self.history, -1)]):
+            end = "start" if number < 0 else str(number)
+            query.reply(f"ilc/gantry/history/{end}", json.dumps(event))
 
     def put(self, topic: str, payload: object) -> None:
         """Publish one object."""
@@ -79,6 +87,29 @@ def test_a_late_joiner_sees_the_present_state(publisher: Publisher) -> None:
         assert next(messages) == Message("gantry", "servo", {"sample": 17})
         publisher.token.undeclare()
         assert next(messages).topic == "gone"
+
+
+def test_a_late_joiner_hears_what_it_has_missed_once(publisher: Publisher) -> None:
+    """Start and runs in order; one that was published at that moment comes once."""
+    start = {
+        "event": "start", "schema": 1, "cell": "gantry", "campaign": "c", "law": "pd",
+        "axis_names": ["x"], "input_units": ["m"], "n_axes": 1, "iterations": 20, "first_index": 0,
+        "n_samples": 100, "cycle_s": 2e-3, "mode": "csp", "measure": "tcp", "bus": "loopback:",
+    }  # fmt: skip
+    runs = [{"event": "iteration", **iteration(index, 2e-3)} for index in range(12)]
+    publisher.history = [start, *runs]
+    with Monitor("gantry", [publisher.endpoint], scouting=False) as monitor:
+        messages = monitor.messages(30.0)
+        assert next(messages).topic == "alive"
+        past = [next(messages) for _ in range(13)]
+        assert all(message.is_past for message in past)
+        assert isinstance(past[0].event, StartEvent)
+        assert [message.payload["index"] for message in past[1:]] == list(range(12))
+        assert next(messages).topic == "state"
+        publisher.put("iteration", runs[-1])
+        publisher.put("iteration", iteration(12, 2e-5))
+        seen = next(messages)
+        assert (seen.payload["index"], seen.is_past) == (12, False)
 
 
 def test_garbage_on_the_network_is_passed_over(publisher: Publisher) -> None:

@@ -72,6 +72,15 @@ class Watcher:
         with self._news:
             assert self._news.wait_for(lambda: self.tokens == list(tokens), DEADLINE_S), self.tokens
 
+    def history_asked(self) -> list[dict[str, Any]]:
+        """Query the campaign so far."""
+        replies = self.session.get(
+            "ilc/gantry/history/*",
+            timeout=DEADLINE_S,
+            consolidation=zenoh.ConsolidationMode.NONE,
+        )
+        return [json.loads(reply.ok.payload.to_bytes()) for reply in replies if reply.ok]
+
     def states_asked(self) -> list[dict[str, Any]]:
         """Query the state, as a late joiner does."""
         replies = self.session.get("ilc/gantry/state", timeout=DEADLINE_S)
@@ -96,6 +105,7 @@ class Watched:
                 try:
                     late.wait_for_tokens("alive")
                     self.states_asked = late.states_asked()
+                    self.history_asked = late.history_asked()
                 finally:
                     late.session.close()
                 self.status = self.controller.end()
@@ -192,6 +202,14 @@ def test_a_late_joiner_gets_the_state(watched: Watched) -> None:
     states = [event for event in watched.controller.events if event["event"] == "state"]
     running = [event["state"] for event in states].index("running")
     assert state in states[running:]
+
+
+def test_a_late_joiner_gets_the_campaign_so_far(watched: Watched) -> None:
+    """The start first, then the runs, if one has ended by then."""
+    start, *runs = watched.history_asked
+    printed = watched.controller.events
+    assert start == next(event for event in printed if event["event"] == "start")
+    assert runs == [event for event in printed if event["event"] == "iteration"][: len(runs)]
 
 
 def test_a_fault_is_heard(bench: Bench) -> None:

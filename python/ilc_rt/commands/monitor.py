@@ -150,8 +150,8 @@ class _Screen:
             return
         is_new = message.cell not in self._cells
         cell = self._cells.setdefault(message.cell, WatchedCell(message.cell))
-        self.runs += isinstance(message.event, IterationEvent)
-        self.faults += isinstance(message.event, FaultEvent)
+        self.runs += not message.is_past and isinstance(message.event, IterationEvent)
+        self.faults += not message.is_past and isinstance(message.event, FaultEvent)
         cell.take(message)
         if is_new or cell.lacks(message):
             digest = getattr(message.event, "digest", None)
@@ -177,8 +177,8 @@ class _View:
 
     def show(self, message: Message) -> None:
         event = message.event
-        self.runs += isinstance(event, IterationEvent)
-        self.faults += isinstance(event, FaultEvent)
+        self.runs += not message.is_past and isinstance(event, IterationEvent)
+        self.faults += not message.is_past and isinstance(event, FaultEvent)
         if message.warning is not None:
             self._warn(message)
         if self._events:

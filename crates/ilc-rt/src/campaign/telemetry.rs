@@ -31,7 +31,7 @@ const HEARD_MAX: Duration = Duration::from_secs(3);
 /// a subscriber leaves when the token disappears.
 const LINGER: Duration = Duration::from_millis(250);
 
-/// What a late joiner gets of a message.
+/// Use of a message for a late joiner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kept {
     /// Nothing: it is of the moment.
