@@ -12,10 +12,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NoReturn
 
+import border
 import bounded
+import prediction
 import update
 
 ROOT = Path(__file__).resolve().parent.parent
+BORDER = (1300, 30_000, 100_000)
 PEERS = ("numpy", "scipy", "osqp", "clarabel", "piqp")
 
 
@@ -39,6 +42,24 @@ def main() -> None:
     ]
     lengths = (400, 1300, 4000)
     lines += table({n: progress(f"N = {n}", update.compare, n) for n in lengths})
+    lines += [
+        "",
+        "## The way from Python and back",
+        "",
+        "The same update beside copies of its three arrays, which no update from Python can fall below.",
+        "",
+    ]
+    lines += table({n: progress(f"border, N = {n}", border.compare, n) for n in BORDER})
+    lines += [
+        "",
+        "## Prediction of convergence, from Python",
+        "",
+        "The factor by which the error of one axis falls from run to run, `r = 0.1`; equal to 1e-8.",
+        "",
+    ]
+    lines += table({n: progress(f"predicted, N = {n}", prediction.compare, n) for n in (400, 1300)})
+    lines += ["", "Three axes; `ilc-rt` is `analyze` with `r = 0.1`.", ""]
+    lines += table({4000: progress("three axes, N = 4000", prediction.three_axes, 4000)})
     lines += [
         "",
         "## One update within bounds, from Python",

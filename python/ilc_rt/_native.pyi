@@ -322,7 +322,12 @@ class Law:
     @property
     def parameters(self) -> dict[str, Any]: ...
     def update(
-        self, u: ArrayLike, e: ArrayLike, disturbance: ArrayLike | None = None
+        self,
+        u: ArrayLike,
+        e: ArrayLike,
+        disturbance: ArrayLike | None = None,
+        *,
+        out: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]: ...
     def expect(self, disturbance: ArrayLike) -> None: ...
     def taken_back(self) -> None: ...

@@ -46,7 +46,7 @@ const fn r(r: f64) -> Weights {
 fn invariant(criterion: &mut Criterion) -> Outcome {
     let model = axis()?;
     let mut group = criterion.benchmark_group("one axis");
-    for n_samples in [1300, 10_000, 100_000, 1_000_000] {
+    for n_samples in [1000, 1300, 10_000, 100_000, 1_000_000] {
         group.throughput(Throughput::Elements(n_samples as u64));
         let (input, error) = (wave(n_samples), wave(n_samples));
         let mut next = input.clone();

@@ -32,7 +32,7 @@ use crate::python_law::{Channels, Frame, PythonLaw};
 use crate::signal::read_filter;
 use crate::whole::whole;
 pub(crate) use apart::{apart, is_python, samples_of};
-use exchange::{Given, exchange};
+use exchange::{Copies, Given, Signals};
 pub(crate) use figure::Readable;
 
 /// A function that builds a law from its arguments.
@@ -142,6 +142,7 @@ struct State {
     size: Option<Size>,
     /// Disturbances set before the first run.
     announced: Vec<Vec<f64>>,
+    copies: Copies,
 }
 
 #[pymethods]
@@ -166,7 +167,8 @@ impl PyLaw {
             }
             _ => None,
         };
-        let state = Guarded::new(State { law, size, announced: Vec::new() });
+        let state =
+            Guarded::new(State { law, size, announced: Vec::new(), copies: Copies::default() });
         Ok(Self { kind, build, arguments: kept.unbind(), fits, frame, state })
     }
 
@@ -182,11 +184,15 @@ impl PyLaw {
     ///     Measured disturbance of the coming run, e.g. a temperature; only
     ///     `RelevanceIlc` and `FlexibleIlc` use it, and any law inside another one
     ///     gets it as it is.
+    /// out : ndarray of float64 or None, shape of `u`
+    ///     Array for the next input, in C order, instead of a new one: `u` itself, or one that shares no
+    ///     memory with `u` and `e`. No other thread may use it meanwhile. If the law raises an
+    ///     exception, its values are undefined, or those of `u` if it is `u`.
     ///
     /// Returns
     /// -------
     /// ndarray of float64, same shape as `u`
-    ///     Input of the next run.
+    ///     Input of the next run: `out` itself if it is given.
     ///
     /// Raises
     /// ------
@@ -194,22 +200,28 @@ impl PyLaw {
     ///     If an array has the wrong shape, dtype or a number that is not finite.
     /// LearningError, SignalError
     ///     If the run does not suit the law, e.g. it is too short for its filter.
-    #[pyo3(signature = (u, e, disturbance=None))]
+    ///
+    /// Notes
+    /// -----
+    /// A law keeps copies of `u` and `e` for its next update if they have more than 2048 numbers.
+    #[pyo3(signature = (u, e, disturbance=None, *, out=None))]
     fn update<'py>(
         &self,
         py: Python<'py>,
         u: &Bound<'py, PyAny>,
         e: &Bound<'py, PyAny>,
         disturbance: Option<&Bound<'py, PyAny>>,
+        out: Option<&Bound<'py, PyAny>>,
     ) -> Array<'py> {
-        let (u, e) = (Given::read("u", u)?, Given::read("e", e)?);
         let mut state = self.state.borrow(py)?;
+        let signals = Signals::read(u, e, out, &mut state.copies)?;
+        let (u, e) = signals.layouts();
         let told = if state.law.n_disturbances().is_some() {
             disturbance.map(|given| read_disturbance("disturbance", given)).transpose()?
         } else {
             None
         };
-        self.fit(py, &mut state, u.layout(), e.layout(), told.as_deref())?;
+        self.fit(py, &mut state, u, e, told.as_deref())?;
         if let Some(told) = &told {
             state.law.set_disturbance(told);
         }
@@ -217,9 +229,10 @@ impl PyLaw {
         if has_inner {
             let handed_on = disturbance.map(|given| given.clone().unbind());
             let handed_on = handed_on.filter(|_| told.is_none());
-            self.frame.prepare(u.layout().is_flat, handed_on);
+            self.frame.prepare(u.is_flat, handed_on);
         }
-        let learned = exchange(py, &u, &e, state.law.as_mut(), has_inner)?;
+        let State { law, copies, .. } = &mut *state;
+        let learned = signals.exchange(py, law.as_mut(), copies, has_inner)?;
         drop(state);
         match learned {
             Ok(next) => Ok(next),

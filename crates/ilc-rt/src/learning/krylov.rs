@@ -6,6 +6,7 @@
 use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use super::span::{combine, product, products};
 use crate::learning::{LearningError, Result};
 
 /// A value with an error estimate.
@@ -37,9 +38,21 @@ pub(in crate::learning) fn largest_symmetric(
     n_products_max: usize,
     tolerance: f64,
 ) -> Result<Estimate> {
+    let enough = |value: f64, residual: f64| residual <= tolerance * value.abs();
+    largest_until(n, map, (n_basis, n_products_max), noise(n, 5), &enough)
+}
+
+/// [`largest_symmetric`] from a given start, until `enough` accepts the value with its residual.
+pub(in crate::learning) fn largest_until(
+    n: usize,
+    map: &mut Map,
+    (n_basis, n_products_max): (usize, usize),
+    start: Vec<f64>,
+    enough: &dyn Fn(f64, f64) -> bool,
+) -> Result<Estimate> {
     let n_basis = n_basis.min(n).max(1);
     let n_kept = n_basis / 3;
-    let mut basis: Vec<Vec<f64>> = vec![unit(noise(n, 5))];
+    let mut basis: Vec<Vec<f64>> = vec![unit(start)];
     let mut small = DMatrix::<f64>::zeros(n_basis, n_basis);
     let mut n_products = 0;
     let mut at = 0;
@@ -66,7 +79,7 @@ pub(in crate::learning) fn largest_symmetric(
         order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
         let value = eigen.eigenvalues[order[0]];
         let residual = left * eigen.eigenvectors[(at - 1, order[0])].abs();
-        let done = residual <= tolerance * value.abs() || at == n || basis.len() <= at;
+        let done = enough(value, residual) || at == n || basis.len() <= at;
         if done || n_products >= n_products_max || n_kept == 0 {
             let error = residual.min(value.abs()).max(1e-14 * value.abs());
             return Ok(Estimate { value, error });
@@ -74,7 +87,11 @@ pub(in crate::learning) fn largest_symmetric(
         let Some(last) = basis.pop() else { return Ok(Estimate { value, error: residual }) };
         let kept: Vec<Vec<f64>> = order[..n_kept]
             .iter()
-            .map(|column| combine(&basis, eigen.eigenvectors.column(*column).iter()))
+            .map(|column| {
+                let mut sum = vec![0.0; n];
+                combine(&basis, eigen.eigenvectors.column(*column).as_slice(), &mut sum);
+                sum
+            })
             .collect();
         basis = kept;
         small.fill(0.0);
@@ -181,11 +198,7 @@ pub(in crate::learning) fn fixed_point(
         target[0] = start;
         let system = small.view((0, 0), (size + 1, size)).into_owned();
         let Ok(weights) = system.svd(true, true).solve(&target, 1e-14) else { break };
-        for (weight, vector) in weights.iter().zip(&basis) {
-            for (value, part) in x.iter_mut().zip(vector) {
-                *value += weight * part;
-            }
-        }
+        combine(&basis, weights.as_slice(), &mut x);
         map(&x, &mut image)?;
         for i in 0..n {
             residual[i] = right[i] - (x[i] - image[i]);
@@ -212,25 +225,14 @@ fn orthogonalise(basis: &[Vec<f64>], next: &mut [f64]) -> Vec<f64> {
     crate::interrupt::point();
     let mut parts = vec![0.0; basis.len()];
     for _ in 0..2 {
-        for (vector, part) in basis.iter().zip(&mut parts) {
-            let share: f64 = vector.iter().zip(&*next).map(|(v, x)| v * x).sum();
-            for (value, v) in next.iter_mut().zip(vector) {
-                *value -= share * v;
-            }
-            *part += share;
+        let mut shares = products(basis, next);
+        for (part, share) in parts.iter_mut().zip(&mut shares) {
+            *part += *share;
+            *share = -*share;
         }
+        combine(basis, &shares, next);
     }
     parts
-}
-
-fn combine<'a>(basis: &[Vec<f64>], weights: impl Iterator<Item = &'a f64>) -> Vec<f64> {
-    let mut sum = vec![0.0; basis[0].len()];
-    for (vector, weight) in basis.iter().zip(weights) {
-        for (value, part) in sum.iter_mut().zip(vector) {
-            *value += weight * part;
-        }
-    }
-    sum
 }
 
 fn unit(mut vector: Vec<f64>) -> Vec<f64> {
@@ -245,7 +247,7 @@ fn unit(mut vector: Vec<f64>) -> Vec<f64> {
 
 /// Returns the Euclidean norm.
 pub(in crate::learning) fn norm(x: &[f64]) -> f64 {
-    x.iter().map(|value| value * value).sum::<f64>().sqrt()
+    product(x, x).sqrt()
 }
 
 /// Returns pseudo-random numbers between -1 and 1, reproducible.

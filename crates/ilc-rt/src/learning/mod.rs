@@ -20,6 +20,7 @@ mod operator;
 mod purpose;
 mod repeatability;
 mod scaled;
+mod span;
 mod structure;
 pub mod sweep;
 pub mod tune;

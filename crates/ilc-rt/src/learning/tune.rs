@@ -223,7 +223,7 @@ fn change_weight(
         let r = square * 10.0_f64.powf(f64::from(exponent) / 2.0);
         let Ok(mut law) = NormOptimal::new(model, n_samples, weights(r)) else { continue };
         tried += 1;
-        let spectrum = Spectrum::optimal(model, weights(r))?;
+        let spectrum = plant.with(model, weights(r));
         let (shares, limit) = spectrum.noise(knowledge.n_runs + 1);
         if let Some(reference) = &knowledge.reference {
             let repeated = repeated_rms(&mut law, model, reference, n_samples, knowledge.n_runs)?;

@@ -61,11 +61,14 @@ impl Dense {
     ///
     /// A law without look-ahead has a block lower-triangular `T`: its eigenvalues are those of the
     /// diagonal blocks, whereas a general eigenvalue solver would return the spectrum of the
-    /// rounding errors (`T` is far from normal).
-    pub(super) fn spectral_radius(&self) -> Result<Estimate> {
+    /// rounding errors (`T` is far from normal). The radius of a symmetric `T` is its norm, the factor.
+    pub(super) fn spectral_radius(&self, factor: Estimate) -> Result<Estimate> {
         let n = self.t.nrows();
         if n == 0 {
             return Ok(Estimate::exact(0.0));
+        }
+        if self.is_symmetric() {
+            return Ok(factor);
         }
         let m = self.n_inputs;
         let sample = |i: usize| self.kept[i] / m;
@@ -107,9 +110,21 @@ impl Dense {
         largest_singular_value(&(&self.learn * &self.plant))
     }
 
-    /// Returns the largest norm among `T, T^2, T^4, ...`: the transient growth of the error.
-    pub(super) fn transient_growth(&self) -> Result<f64> {
+    /// Returns true if `T = T'` up to rounding.
+    fn is_symmetric(&self) -> bool {
+        let (n, largest) = (self.t.nrows(), self.t.norm_max());
+        (0..n).all(|col| {
+            (0..col).all(|row| (self.t[(row, col)] - self.t[(col, row)]).abs() <= 1e-13 * largest)
+        })
+    }
+
+    /// Returns the largest norm among `T, T^2, T^4, ...`: the transient growth of the error; `factor` is the
+    /// norm of `T`.
+    pub(super) fn transient_growth(&self, factor: Estimate) -> Result<f64> {
         const DOUBLINGS: usize = 10;
+        if factor.value <= 1.0 {
+            return Ok(1.0);
+        }
         let mut power = self.t.clone();
         let mut largest: f64 = 1.0;
         for _ in 0..DOUBLINGS {
@@ -121,7 +136,9 @@ impl Dense {
             if size < 1e-3 {
                 break;
             }
-            largest = largest.max(largest_singular_value(&power)?);
+            if bound_of_norm(&power) > largest {
+                largest = largest.max(largest_singular_value(&power)?);
+            }
             power = &power * &power;
         }
         Ok(largest)
@@ -187,6 +204,21 @@ impl Dense {
         }
         (shares, None)
     }
+}
+
+/// Returns a bound of the largest singular value, of little work: the Frobenius norm or `sqrt(|M|_1 |M|_inf)`.
+fn bound_of_norm(matrix: &Mat<f64>) -> f64 {
+    let (mut columns, mut rows) = (0.0_f64, vec![0.0; matrix.nrows()]);
+    for j in 0..matrix.ncols() {
+        let mut sum = 0.0;
+        for (i, row) in rows.iter_mut().enumerate() {
+            let size = matrix[(i, j)].abs();
+            sum += size;
+            *row += size;
+        }
+        columns = columns.max(sum);
+    }
+    matrix.norm_l2().min((columns * rows.into_iter().fold(0.0, f64::max)).sqrt())
 }
 
 fn largest_singular_value(matrix: &Mat<f64>) -> Result<f64> {

@@ -20,6 +20,8 @@ const CUT_OFF: f64 = 1e-4;
 const VARYING: f64 = 1e-4;
 /// A filter counts as blocking below this gain.
 const SILENT: f64 = 1e-6;
+/// Remainder of the past whose square is lost in rounding.
+const VANISHED: f64 = 1e-12;
 /// A frequency counts as growing above this contraction.
 const GROWING: f64 = 1.0 + 1e-9;
 
@@ -108,15 +110,32 @@ impl Spectrum {
         let Some(dt_s) = model.dt_s() else {
             return Err(ModelError::Continuous { action: "tuning" });
         };
-        let m = model.n_inputs();
-        let eye = Matrix::identity(m, m);
-        let real = |value: f64| Complex::new(value, 0.0);
         let n_bins = n_bins(model);
-        let mut bins = Vec::new();
-        for at in 0..=n_bins {
+        let responses = (0..=n_bins).filter_map(|at| {
             crate::interrupt::point();
             let omega_rad = std::f64::consts::PI * at as f64 / n_bins as f64;
-            let Some(plant) = response(model, omega_rad) else { continue };
+            Some((omega_rad / (std::f64::consts::TAU * dt_s), response(model, omega_rad)?))
+        });
+        Ok(Self::weighed(responses, dt_s, weights))
+    }
+
+    /// Returns the spectrum of the law with other weights on the same model, from [`Spectrum::optimal`].
+    pub(in crate::learning) fn with(&self, model: &StateSpace, weights: Weights) -> Self {
+        let responses = self.bins.iter().map(|bin| (bin.frequency_hz, bin.plant.clone()));
+        Self::weighed(responses, model.dt_s().unwrap_or(1.0), weights)
+    }
+
+    fn weighed(
+        responses: impl Iterator<Item = (f64, Matrix)>,
+        dt_s: f64,
+        weights: Weights,
+    ) -> Self {
+        let real = |value: f64| Complex::new(value, 0.0);
+        let mut bins = Vec::new();
+        for (frequency_hz, plant) in responses {
+            crate::interrupt::point();
+            let omega_rad = frequency_hz * (std::f64::consts::TAU * dt_s);
+            let eye = Matrix::identity(plant.ncols(), plant.ncols());
             let square = plant.adjoint() * &plant * real(weights.q);
             let hold = weights.r + (2.0 * weights.rate * (0.5 * omega_rad).sin()).powi(2);
             let cost = &square + &eye * real(weights.s + hold);
@@ -124,10 +143,9 @@ impl Spectrum {
             let learn = &inverse * plant.adjoint() * real(weights.q);
             let keep = &inverse * (square + &eye * real(hold));
             let t = &inverse * real(hold);
-            let frequency_hz = omega_rad / (std::f64::consts::TAU * dt_s);
             bins.push(Bin { frequency_hz, keep, learn, plant, t });
         }
-        Ok(Self { bins })
+        Self { bins }
     }
 
     /// Returns the largest singular value of the plant at each frequency.
@@ -198,6 +216,10 @@ impl Spectrum {
             for _ in 0..DOUBLINGS {
                 sigma = &sigma + &power * &sigma * power.adjoint();
                 power = &power * &power;
+                // What is left of the sum is far below its rounding.
+                if power.norm() < VANISHED {
+                    break;
+                }
             }
             let last = share(&sigma);
             settles &= last.is_finite() && gain(&power) < 0.5;

@@ -227,7 +227,8 @@ impl<'a> Iteration<'a> {
         Ok(())
     }
 
-    fn clear(&self, signal: &mut [f64]) {
+    /// Sets the omitted inputs to zero.
+    pub(super) fn clear(&self, signal: &mut [f64]) {
         for index in &self.free {
             signal[*index] = 0.0;
         }

@@ -19,6 +19,7 @@ mod question;
 mod refuse;
 mod uncertainty;
 mod verdict;
+mod weakest;
 
 #[cfg(test)]
 mod mismatch;

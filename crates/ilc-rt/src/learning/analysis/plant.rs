@@ -71,8 +71,8 @@ impl Plant {
     pub(super) fn apply(&self, input: &[f64], out: &mut [f64]) {
         let [a, b, c, d] = &self.direct;
         let (mut x, mut next) = (vec![0.0; self.n_states], vec![0.0; self.n_states]);
+        crate::interrupt::point();
         for (u, y) in input.chunks_exact(self.n_inputs).zip(out.chunks_exact_mut(self.n_outputs)) {
-            crate::interrupt::point();
             y.fill(0.0);
             c.add(&x, y);
             d.add(u, y);
@@ -88,8 +88,8 @@ impl Plant {
         let [a, b, c, d] = &self.transposed;
         let (mut x, mut next) = (vec![0.0; self.n_states], vec![0.0; self.n_states]);
         let samples = output.chunks_exact(self.n_outputs).zip(out.chunks_exact_mut(self.n_inputs));
+        crate::interrupt::point();
         for (y, u) in samples.rev() {
-            crate::interrupt::point();
             u.fill(0.0);
             b.add(&x, u);
             d.add(y, u);

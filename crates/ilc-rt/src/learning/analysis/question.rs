@@ -9,6 +9,7 @@ use super::iteration::Iteration;
 use super::refuse::transient_growth;
 use super::uncertainty::Uncertainty;
 use super::verdict;
+use super::weakest;
 use crate::learning::error::check;
 use crate::learning::krylov::{Estimate, fixed_point, largest_symmetric, norm, spectral_radius};
 use crate::learning::law::norm_optimal::{NormOptimal, Weights};
@@ -98,11 +99,19 @@ pub fn analyze(
     let n_largest = iteration.n_u().max(iteration.n_e());
     let dense = if n_largest <= DENSE_MAX { Some(Dense::new(&mut iteration)?) } else { None };
     let method = if dense.is_some() { Method::Dense } else { Method::Structured };
-    let (radius, factor, growth) = match &dense {
-        Some(dense) => {
-            (dense.spectral_radius()?, Some(dense.monotonic_factor()?), dense.transient_growth()?)
+    let own = match optimal {
+        Some((true, Some(weights))) if dense.is_none() => {
+            weakest::factor(&iteration, model, weights)?
         }
-        None => structured(&mut iteration)?,
+        _ => None,
+    };
+    let (radius, factor, growth) = match (&dense, own) {
+        (Some(dense), _) => {
+            let factor = dense.monotonic_factor()?;
+            (dense.spectral_radius(factor)?, Some(factor), dense.transient_growth(factor)?)
+        }
+        (None, Some(factor)) => (factor, Some(factor), factor.value.max(1.0)),
+        (None, None) => structured(&mut iteration)?,
     };
     let factor = factor.map(|factor| above_radius(factor, radius)).transpose()?;
     let certain = optimal.is_some_and(|(own, _)| own);

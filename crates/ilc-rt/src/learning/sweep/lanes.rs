@@ -4,8 +4,10 @@
 //! samples far enough away have no influence within double precision, so the run may be cut
 //! anywhere if each segment begins with a warm-up over its neighbour's samples. [`LANES`] segments
 //! side by side keep the processor busy, and the run is processed in blocks so that the backward
-//! sweep's results stay in the cache for the forward one. The cuts depend on the gains and the
-//! length of the run alone, never on the processor.
+//! sweep's results stay in the cache for the forward one. In a run too short for that, each segment
+//! sweeps over the whole of its neighbour from zero, and what the neighbour's own start adds, which
+//! is a power of the transition, is added at the cut. The cuts depend on the gains and the length of
+//! the run alone, never on the processor.
 
 #![expect(
     clippy::inline_always,
@@ -21,6 +23,8 @@ use super::wide::{LANES, Lanes, Wide};
 const TILE: usize = LANES;
 /// Remainder of a state after the warm-up.
 const FORGOTTEN: f64 = 1e-18;
+/// Largest remainder of a state after a whole segment: rounding errors must fade from cut to cut.
+const FADED: f64 = 0.1;
 /// Samples per segment: with its `LANES` neighbours it fits the second-level cache.
 const STRETCH: usize = 2048;
 
@@ -34,24 +38,43 @@ pub(super) struct Place {
 
 /// The constant part of a run, cut into segments.
 #[derive(Debug)]
-pub(super) struct Cut {
+pub(super) struct Cut<const N: usize> {
     /// Both in tiles.
     warm_up: usize,
     stretch: usize,
+    /// Transition over a whole segment, if a state is not forgotten within one.
+    across: Option<Across<N>>,
     /// `kappa` of one block, sample by sample, lane by lane, after one unused row.
     kappa: Vec<Lanes>,
 }
 
-impl Cut {
+impl<const N: usize> Cut<N> {
     /// Returns the cut of `n_samples` samples, or `None` if it does not pay.
-    pub(super) fn new<const N: usize>(gains: &Fixed<N>, n_samples: usize) -> Option<Self> {
+    pub(super) fn new(gains: &Fixed<N>, n_samples: usize) -> Option<Self> {
+        let shortest = n_samples / (LANES * TILE);
+        if shortest == 0 {
+            return None;
+        }
         // Eight segments at a time are worth a warm-up of up to their own length.
-        let warm_up = gains.memory(n_samples / LANES)?.max(1).div_ceil(TILE);
+        let warm_up = match gains.fade(shortest * TILE) {
+            Fade::Forgotten(k) => k.max(1).div_ceil(TILE),
+            Fade::To(across) => return Some(Self::with(shortest, shortest, Some(Across(across)))),
+            Fade::Never => return None,
+        };
         // As few blocks as possible, of about equal size.
         let n_blocks = n_samples.div_ceil(LANES * STRETCH.max(4 * warm_up * TILE));
         let stretch = n_samples / (LANES * TILE * n_blocks);
-        let kappa = vec![Lanes::default(); 1 + stretch * TILE];
-        (stretch >= warm_up).then_some(Self { warm_up, stretch, kappa })
+        (stretch >= warm_up).then(|| Self::with(warm_up, stretch, None))
+    }
+
+    fn with(warm_up: usize, stretch: usize, across: Option<Across<N>>) -> Self {
+        Self { warm_up, stretch, across, kappa: vec![Lanes::default(); 1 + stretch * TILE] }
+    }
+
+    /// Returns true if a state outlives its segment.
+    #[cfg(test)]
+    pub(super) fn carries(&self) -> bool {
+        self.across.is_some()
     }
 
     /// Returns the number of samples per block.
@@ -64,7 +87,7 @@ impl Cut {
     /// `last` is the costate after the last block; `meanwhile` receives the costate at the start of
     /// this one and returns the state there.
     #[inline(always)]
-    pub(super) fn solve<const HELD: bool, const N: usize>(
+    pub(super) fn solve<const HELD: bool>(
         &mut self,
         wide: impl Wide,
         gains: &Fixed<N>,
@@ -73,13 +96,13 @@ impl Cut {
         last: Option<[f64; N]>,
         meanwhile: impl FnOnce(&mut Run, [f64; N]) -> [f64; N],
     ) -> [f64; N] {
-        let Self { warm_up, stretch, kappa } = self;
+        let Self { warm_up, stretch, across, kappa } = self;
         let length = *stretch * TILE;
-        let starts: [usize; LANES] = std::array::from_fn(|lane| first + lane * length);
+        let firsts: [usize; LANES] = std::array::from_fn(|lane| first + lane * length);
         // Start of the warm-up segment of each lane; the very last one has none.
-        let mut beyond = starts.map(|start| start + length);
+        let mut beyond = firsts.map(|first| first + length);
         if last.is_some() {
-            beyond[LANES - 1] = starts[LANES - 1];
+            beyond[LANES - 1] = firsts[LANES - 1];
         }
         let errors = Channel { offset: place.output, stride: run.n_outputs };
         let inputs = Channel { offset: place.input, stride: run.n_inputs };
@@ -93,11 +116,16 @@ impl Cut {
                 backward::<HELD, N, _>(wide, gains, &mut costate, input[i], error[i]);
             }
         }
+        let mut ends = values(wide, &costate);
         if let Some(exact) = last {
-            replace(wide, &mut costate, LANES - 1, exact);
+            replace(&mut ends, LANES - 1, exact);
         }
+        if let Some(across) = across {
+            across.costates(&mut ends);
+        }
+        let mut costate = rows(wide, &ends);
         for (tile, kappa) in kappa[1..].chunks_exact_mut(TILE).enumerate().rev() {
-            let (error, input) = fetch.tile(wide, run, &starts, tile);
+            let (error, input) = fetch.tile(wide, run, &firsts, tile);
             for i in (0..TILE).rev() {
                 let row = backward::<HELD, N, _>(wide, gains, &mut costate, input[i], error[i]);
                 kappa[i] = Lanes(wide.values(row));
@@ -115,16 +143,71 @@ impl Cut {
             kappa[1..].copy_from_slice(&now.0[..LANES - 1]);
             forward(wide, gains, &mut state, wide.row(&kappa));
         }
-        replace(wide, &mut state, 0, exact);
+        let mut starts = values(wide, &state);
+        replace(&mut starts, 0, exact);
+        if let Some(across) = across {
+            across.states(&mut starts);
+        }
+        let mut state = rows(wide, &starts);
         for (tile, kappa) in kappa[1..].chunks_exact(TILE).enumerate() {
             let mut change = [zero; TILE];
             for i in 0..TILE {
                 change[i] = forward(wide, gains, &mut state, wide.row(&kappa[i].0));
             }
-            inputs.store(wide, run, &starts, tile, change);
+            inputs.store(wide, run, &firsts, tile, change);
         }
         lane(wide, &state, LANES - 1)
     }
+}
+
+/// Transition over a whole segment, column by column.
+#[derive(Debug)]
+struct Across<const N: usize>([[f64; N]; N]);
+
+impl<const N: usize> Across<N> {
+    /// Adds to the costate at the end of each segment what comes from beyond the next one.
+    #[inline(never)]
+    fn costates(&self, costates: &mut [[f64; LANES]; N]) {
+        for lane in (0..LANES - 1).rev() {
+            for i in 0..N {
+                for j in 0..N {
+                    costates[i][lane] += self.0[i][j] * costates[j][lane + 1];
+                }
+            }
+        }
+    }
+
+    /// Adds to the state at the start of each segment what comes from before the last one.
+    #[inline(never)]
+    fn states(&self, states: &mut [[f64; LANES]; N]) {
+        for lane in 1..LANES {
+            for j in 0..N {
+                for i in 0..N {
+                    states[i][lane] += self.0[j][i] * states[j][lane - 1];
+                }
+            }
+        }
+    }
+}
+
+/// Returns the values of some rows.
+#[inline(always)]
+fn values<W: Wide, const N: usize>(wide: W, rows: &[W::Row; N]) -> [[f64; LANES]; N] {
+    let mut found = [[0.0; LANES]; N];
+    for i in 0..N {
+        found[i] = wide.values(rows[i]);
+    }
+    found
+}
+
+/// Returns rows of these values.
+#[inline(always)]
+fn rows<W: Wide, const N: usize>(wide: W, values: &[[f64; LANES]; N]) -> [W::Row; N] {
+    let mut rows = [wide.row(&[0.0; LANES]); N];
+    for i in 0..N {
+        rows[i] = wide.row(&values[i]);
+    }
+    rows
 }
 
 /// Returns the values of one lane.
@@ -138,12 +221,9 @@ fn lane<W: Wide, const N: usize>(wide: W, rows: &[W::Row; N], lane: usize) -> [f
 }
 
 /// Replaces the values of one lane.
-#[inline(always)]
-fn replace<W: Wide, const N: usize>(wide: W, rows: &mut [W::Row; N], lane: usize, exact: [f64; N]) {
+fn replace<const N: usize>(values: &mut [[f64; LANES]; N], lane: usize, exact: [f64; N]) {
     for i in 0..N {
-        let mut values = wide.values(rows[i]);
-        values[lane] = exact[i];
-        rows[i] = wide.row(&values);
+        values[i][lane] = exact[i];
     }
 }
 
@@ -293,9 +373,19 @@ fn forward<const N: usize, W: Wide>(
     change
 }
 
+/// Remainder of a state after some time.
+enum Fade<const N: usize> {
+    /// Nothing in double precision, after so many samples.
+    Forgotten(usize),
+    /// This transition after the whole time.
+    To([[f64; N]; N]),
+    /// Too much of it.
+    Never,
+}
+
 impl<const N: usize> Fixed<N> {
-    /// Returns the number of samples after which a state is forgotten, if at most `longest`.
-    fn memory(&self, longest: usize) -> Option<usize> {
+    /// Returns the remainder of a state after `longest` samples.
+    fn fade(&self, longest: usize) -> Fade<N> {
         let mut power: [[f64; N]; N] =
             std::array::from_fn(|col| std::array::from_fn(|row| f64::from(u8::from(row == col))));
         // Relative to the largest so far, as the states may have different units.
@@ -304,7 +394,10 @@ impl<const N: usize> Fixed<N> {
             let size = power.iter().flatten().fold(0.0_f64, |size, value| size.max(value.abs()));
             largest = largest.max(size);
             if size < FORGOTTEN * largest {
-                return Some(k);
+                return Fade::Forgotten(k);
+            }
+            if k == longest {
+                return if size <= FADED * largest { Fade::To(power) } else { Fade::Never };
             }
             power = std::array::from_fn(|col| {
                 std::array::from_fn(|row| {
@@ -312,6 +405,6 @@ impl<const N: usize> Fixed<N> {
                 })
             });
         }
-        None
+        Fade::Never
     }
 }

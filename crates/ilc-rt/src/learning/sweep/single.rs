@@ -113,7 +113,7 @@ type Sets<const N: usize> = Vec<(usize, Fixed<N>)>;
 struct Single<const N: usize> {
     /// The samples before and after the segments.
     before: Sets<N>,
-    cut: Option<(Fixed<N>, Cut, usize)>,
+    cut: Option<(Fixed<N>, Cut<N>, usize)>,
     after: Sets<N>,
     n_before: usize,
     n_samples: usize,
@@ -161,7 +161,7 @@ impl<const N: usize> Single<N> {
                 let first = *n_before + block * cut.block();
                 let exact = (block + 1 == *n_blocks).then_some(costate);
                 let at = (*place, first);
-                state = cut.solve::<HELD, N>(wide, gains, at, run, exact, |run, costate| {
+                state = cut.solve::<HELD>(wide, gains, at, run, exact, |run, costate| {
                     if block > 0 {
                         return state;
                     }
@@ -303,6 +303,29 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_state_that_outlives_its_segment_is_carried_across_the_cuts() {
+        let mut carried = 0;
+        for (r, s) in [(1e-3, 0.0), (0.1, 1e-4), (1.0, 0.0), (10.0, 1e-3)] {
+            for n_samples in [200, 333, 700, 1300] {
+                let mut axis = axis(2, s, n_samples);
+                axis.stage.a = DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.0, 0.9]);
+                axis.stage.b = DMatrix::from_row_slice(2, 1, &[0.005, 0.1]);
+                axis.stage.c = DMatrix::from_row_slice(1, 2, &[1.0, 0.0]);
+                (axis.stage.d[0], axis.stage.r[0]) = (0.0, r);
+                let gains = Gains::new(&axis, 0).unwrap();
+                let at = Place { input: 0, output: 0, shift: 1 };
+                let Single { cut, .. } = Single::<2>::new(&gains, at, Instructions::best());
+                let is_carried = cut.is_some_and(|(_, cut, _)| cut.carries());
+                for width in [1, 2] {
+                    agree(&gains, n_samples, width);
+                }
+                carried += usize::from(is_carried);
+            }
+        }
+        assert!(carried >= 6, "{carried} runs of 16");
     }
 
     /// Solves the same problem by every method, with the axis' signals among those of `width` axes.
