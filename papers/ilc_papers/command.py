@@ -77,7 +77,14 @@ def reproduce(
     if from_file is not None:
         outcomes = read_json(from_file, names)
     else:
-        outcomes = _compute(names, console, reduced=reduced)
+        done: dict[str, Outcome] = {}
+        try:
+            outcomes = _compute(names, console, done, reduced=reduced)
+        except KeyboardInterrupt:
+            if json_file is not None and done:
+                write_json([*done.values()], json_file)
+                typer.echo(f"ilc: {json_file} has the figures of {', '.join(done)}", err=True)
+            raise
     for outcome in outcomes:
         _print(outcome, console)
     if json_file is not None:
@@ -91,10 +98,13 @@ def reproduce(
         typer.echo(f"report:  {write_gallery(outcomes, report)[0]}")
 
 
-def _compute(names: Sequence[str], console: Console, *, reduced: bool) -> list[Outcome]:
-    with ReproductionView(console) as view:
+def _compute(
+    names: Sequence[str], console: Console, done: dict[str, Outcome], *, reduced: bool
+) -> list[Outcome]:
+    parts = {name: load(name).parts[reduced] for name in names}
+    with ReproductionView(console, parts) as view:
         if len(names) > 1:
-            return compute_side_by_side(names, reduced=reduced, tell=view.tell)
+            return compute_side_by_side(names, reduced=reduced, tell=view.tell, done=done)
         name = names[0]
         paper = load(name)
         return [compute(paper, reduced=reduced, tell=lambda what: view.tell(name, what))]

@@ -97,6 +97,9 @@ class Paper:
         `claims(figures)` compares the printed figures with ours.
     pictures : sequence of Picture
         In the order of the page.
+    parts : tuple of int
+        Number of parts that `compute` tells, in full and reduced, for the time left; 0 if it is not
+        known.
     """
 
     name: str
@@ -105,3 +108,4 @@ class Paper:
     compute: Callable[[bool, Tell], Figures]
     claims: Callable[[Figures], list[Claim]]
     pictures: Sequence[Picture]
+    parts: tuple[int, int] = (0, 0)

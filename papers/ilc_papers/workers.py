@@ -37,14 +37,16 @@ def compute_side_by_side(
     reduced: bool,
     tell: Callable[[str, str | None], None],
     load_paper: _Load = load,
+    done: dict[str, Outcome] | None = None,
 ) -> list[Outcome]:
     """Compute several papers, and return them in the order of their names.
 
     `tell` is called with the name of a paper and the part being computed, None when it is done. If
-    a paper cannot be computed, the others are stopped.
+    a paper cannot be computed, the others are stopped. `done` has the finished papers by their
+    names, also after Ctrl-C.
     """
     waiting, running = list(names), list[_Worker]()
-    done: dict[str, Outcome] = {}
+    done = {} if done is None else done
     try:
         while waiting or running:
             while waiting and len(running) < AT_ONCE:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
@@ -11,10 +12,12 @@ from typing import TYPE_CHECKING
 
 import papers_fixture
 import pytest
+from rich.console import Console
 
 from ilc_papers import command as reproduce
 from ilc_papers import outcome, papers, workers
 from ilc_papers.paper import Claim, Paper
+from ilc_papers.progress import ReproductionView
 from ilc_papers.quantity import pair
 from ilc_rt.cli import main
 from ilc_rt.errors import EXIT_INTERRUPTED, CampaignError
@@ -191,6 +194,44 @@ def test_quantities_share_a_unit_and_ratios_need_both() -> None:
     assert Claim("", 1.0, None).ratio is None
     assert Claim("", 1.0, 0.0).ratio is None
     assert Claim("", 1.0, 4.0).ratio == 0.25
+
+
+@pytest.mark.usefixtures("two_papers")
+def test_ctrl_c_keeps_the_papers_that_are_done(
+    capsys, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """In the file of --json; another one is computed again."""
+    tell = ReproductionView.tell
+
+    def interrupted(view: ReproductionView, name: str, what: str | None) -> None:
+        tell(view, name, what)
+        if what is None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(ReproductionView, "tell", interrupted)
+    file = tmp_path / "f.json"
+    assert main(["reproduce", "all", "--json", str(file)]) == EXIT_INTERRUPTED
+    (name,) = json.loads(file.read_text())
+    assert capsys.readouterr().err == f"ilc: {file} has the figures of {name}\n"
+    assert main(["reproduce", name, "--from", str(file)]) == 0
+
+
+def test_the_time_left_is_told_where_the_number_of_steps_is_known() -> None:
+    """A line for each step: its number, and the time of as many steps as are left."""
+    now = [0.0]
+    console = Console(file=io.StringIO(), width=100)
+    with ReproductionView(console, {"one": 3}, lambda: now[0]) as view:
+        view.tell("one", "first")
+        now[0] = 10.0
+        view.tell("one", "second")
+        view.tell("two", "uncounted")
+        now[0] = 30.0
+        for what in ("third", "fourth", None):
+            view.tell("one", what)
+    assert console.file.getvalue().splitlines() == [
+        "one: first (1 of 3)", "one: second (2 of 3, about 0:20 left)", "two: uncounted",
+        "one: third (3 of 3, about 0:15 left)", "one: fourth", "one: done",
+    ]  # fmt: skip
 
 
 def test_ctrl_c_ends_every_process_with_one_code(tmp_path: Path) -> None:

@@ -356,6 +356,28 @@ def test_every_level_has_a_sign_of_its_own() -> None:
     assert len(set(SYMBOLS.values())) == len(SYMBOLS)
 
 
+def test_the_time_left_follows_the_clock_of_the_messages() -> None:
+    """Half of a run of four in 10 s leaves 70 s."""
+    model = fed(said(START))
+    model.apply(said({"event": "state", "state": "running", "iteration": 0}), 0.0, 1e9)
+    assert model.left_s is None
+    half = said({"event": "progress", "iteration": 0, "sample": 25, "n_samples": 50})
+    model.apply(half, 10.0, 1e9 + 10.0)
+    assert model.left_s == pytest.approx(70.0)
+
+
+def test_a_comparison_ends_where_its_runs_end(finished: CampaignResult) -> None:
+    archive = Archive([finished.library])
+    runs = archive.aligned([(0, 1), (0, 3)], axis=0)
+    command, error = (charts.compared(runs, what, 0) for what in ("command", "error"))
+    assert command["xAxis"]["max"] == error["xAxis"]["max"] == "dataMax"
+    assert (command["yAxis"]["scale"], error["yAxis"]["scale"]) == (True, False)
+    captured = archive.capture("gantry", finished.campaign)
+    model = CellModel("gantry")
+    model.remember(archive.campaign("gantry"), "")
+    assert charts.inputs(model, captured)["xAxis"]["max"] == "dataMax"
+
+
 def test_runs_are_drawn_in_one_unit_and_without_zeros() -> None:
     model = fed(said(START), ended(0, 1e-3), ended(1, 0.0))
     option = charts.runs(model)

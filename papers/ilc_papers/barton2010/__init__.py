@@ -70,6 +70,7 @@ PAPER = Paper(
     "iterative learning control, dissertation, University of Illinois, 2010",
     about=ABOUT,
     compute=compute,
+    parts=(27, 27),
     claims=claims,
     pictures=[picture for section in SECTIONS for picture in section.PICTURES],
 )

@@ -69,6 +69,7 @@ PAPER = Paper(
     "tool path planning. Thesis, 2016",
     about=_ABOUT,
     compute=_compute,
+    parts=(45, 11),
     claims=_claims,
     pictures=[
         *settings.PICTURES,

@@ -40,6 +40,7 @@ PAPER = Paper(
     title="Filter-based open-loop iterative learning control of a machine tool's axis",
     about=_ABOUT,
     compute=_compute,
+    parts=(26, 16),
     claims=_claims,
     pictures=[picture for section in (filters, convergence, mechanisms, disturbance)
               for picture in section.PICTURES],

@@ -43,6 +43,7 @@ PAPER = Paper(
     "tools using a convex optimisation approach. Procedia CIRP 46 (2016)",
     about=_ABOUT,
     compute=_compute,
+    parts=(15, 15),
     claims=_claims,
     pictures=[*positioning.PICTURES, *gantry.PICTURES, *constrained.PICTURES],
 )

@@ -27,6 +27,7 @@ from ilc_rt.dashboard.frame import (
 from ilc_rt.dashboard.model import SIGNALS
 from ilc_rt.dashboard.overview import error_words
 from ilc_rt.dashboard.status import run_words
+from ilc_rt.terminal import duration
 from ilc_rt.text import printable
 
 if TYPE_CHECKING:
@@ -178,6 +179,7 @@ class CellView:
                 self._task = text("", "quiet end", "task")
             with tag("div", "facts"):
                 self._run = fact("run", "run")
+                self._left = fact("time left", "left")
                 self._error = fact("error of the last run", "error")
                 self._change = fact("since the first", "change")
                 self._learning = fact("learning", "learning")
@@ -235,6 +237,8 @@ class CellView:
         level(self._panel, status.level)
         say(self._task, _task(cell))
         say(self._run, run_words(cell))
+        left_s = cell.left_s
+        say(self._left, "-" if left_s is None else duration(left_s))
         error, change = error_words(cell)
         say(self._error, error)
         say(self._change, change)

@@ -140,11 +140,22 @@ def _steady(value: float | None, base: str) -> str:
     """Return a position in a unit that does not change as it moves."""
     if value is None:
         return "-"
-    return f"{1e3 * value:.3f} m{base}" if base in {"m", "rad"} else f"{value:.4g} {base}"
+    return f"{_plain(1e3 * value, 3)} m{base}" if base in {"m", "rad"} else f"{value:.4g} {base}"
 
 
 def _small(value: float | None, base: str) -> str:
     """Return an error or an input in millionths, which change in size as they move."""
     if value is None:
         return "-"
-    return f"{1e6 * value:.1f} µ{base}" if base[0] in "mr" else f"{value:.4g} {base}"
+    return f"{_plain(1e6 * value, 1)} µ{base}" if base[0] in "mr" else f"{value:.4g} {base}"
+
+
+def _plain(value: float, digits: int) -> str:
+    """Return a number with fixed digits; zero has no sign.
+
+    Examples
+    --------
+    >>> _plain(-0.04, 1), _plain(-0.05001, 1), _plain(2.0, 3)
+    ('0.0', '-0.1', '2.000')
+    """
+    return f"{round(value, digits) + 0.0:.{digits}f}"

@@ -148,6 +148,7 @@ def inputs(cell: CellModel, run: Capture | None) -> Option:
         for axis, (name, unit) in enumerate(zip(cell.axis_names, units, strict=True))
     ]
     option["yAxis"]["name"] = " / ".join(dict.fromkeys(unit.symbol for unit in units))
+    _end_with_data(option)
     return option
 
 
@@ -201,6 +202,9 @@ def compared(stored: Sequence[StoredRun], what: str, axis: int) -> Option:
         data = thinned(run.time_s(), run.signal(what, axis), unit.scale)
         option["series"].append(line(run.name + told, number, data))
     option["yAxis"]["name"] = unit.symbol
+    # A motion far from zero is more than a line at the edge.
+    option["yAxis"]["scale"] = what == "command"
+    _end_with_data(option)
     option["ilc"] = {"group": "compare"}
     option["dataZoom"] = [{"type": "inside", "filterMode": "none"}]
     return option
@@ -262,6 +266,12 @@ def _axis(name: str) -> Option:
         "axisLabel": {"color": "$ticks", "fontSize": 11, "hideOverlap": True},
         "splitLine": {"lineStyle": {"color": "$grid"}},
     }  # fmt: skip
+
+
+def _end_with_data(option: Option) -> None:
+    """Let the time axis end where the data end, whatever number that is."""
+    option["xAxis"] |= {"max": "dataMax"}
+    option["xAxis"]["axisLabel"] = option["xAxis"]["axisLabel"] | {"showMaxLabel": False}
 
 
 def _above_zero(value: float | None, scale: float) -> float | None:
