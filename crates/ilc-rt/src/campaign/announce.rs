@@ -7,6 +7,7 @@ use serde_json::json;
 use super::control::{Shared, Status};
 use super::telemetry::Telemetry;
 use crate::record::{Event, SCHEMA};
+use crate::recording::Notes;
 use crate::servo::Sample;
 
 /// Duration of a batch on the network.
@@ -21,6 +22,12 @@ pub(super) struct Announcer<'a> {
     batch: Vec<Sample>,
     batch_size: usize,
     n_axes: usize,
+    notes: Notes,
+}
+
+/// Returns whether a late joiner does without an event.
+fn is_passing(event: &Event) -> bool {
+    matches!(event, Event::Progress { .. } | Event::Recording { .. })
 }
 
 impl<'a> Announcer<'a> {
@@ -28,8 +35,8 @@ impl<'a> Announcer<'a> {
         observe: &'a mut dyn FnMut(&Event),
         telemetry: Option<Telemetry>,
         shared: Arc<Shared>,
-        cycle_s: f64,
-        n_axes: usize,
+        notes: Notes,
+        (cycle_s, n_axes): (f64, usize),
     ) -> Self {
         #[expect(
             clippy::cast_possible_truncation,
@@ -44,6 +51,7 @@ impl<'a> Announcer<'a> {
             batch: Vec::with_capacity(batch_size),
             batch_size,
             n_axes,
+            notes,
         }
     }
 
@@ -56,6 +64,7 @@ impl<'a> Announcer<'a> {
     pub(super) fn publish(&mut self, event: &Event) {
         self.shared.update(|status: &mut Status| status.follow(event));
         (self.observe)(event);
+        self.notes.event(event);
         let Some(telemetry) = &mut self.telemetry else { return };
         let key = match event {
             Event::Iteration { .. } | Event::Judged { .. } | Event::Drift { .. } => "iteration",
@@ -65,11 +74,12 @@ impl<'a> Announcer<'a> {
             Event::Start { .. }
             | Event::State { .. }
             | Event::Progress { .. }
+            | Event::Recording { .. }
             | Event::End { .. } => "state",
         };
         if let Ok(text) = serde_json::to_string(event) {
             // Progress is short-lived; a late joiner wants the state.
-            telemetry.send(key, text, key == "state" && !matches!(event, Event::Progress { .. }));
+            telemetry.send(key, text, key == "state" && !is_passing(event));
         }
     }
 

@@ -12,6 +12,7 @@ use crate::fieldbus::transport::{OpenError, syntaxes};
 use crate::identification::IdentificationError;
 use crate::learning::LearningError;
 use crate::library::LibraryError;
+use crate::recording::RecordingError;
 
 /// A refusal, in one line.
 #[derive(Debug, thiserror::Error)]
@@ -177,6 +178,17 @@ pub enum CampaignError {
     NotRealtime {
         /// One sentence for each refused setting.
         missing: Vec<String>,
+    },
+    /// A recording could not be begun.
+    #[error("{0}; nothing has moved")]
+    Recording(#[from] RecordingError),
+    /// The cell description as it is applied has no text.
+    #[error("{file}: the recording cannot hold this cell description: {reason}; nothing has moved")]
+    NotDescribed {
+        /// Cell description.
+        file: String,
+        /// Reason.
+        reason: String,
     },
     /// A thread could not be started.
     #[error("the {what} thread could not be started: {source}")]

@@ -29,12 +29,16 @@ mod options;
 mod own;
 mod pace;
 mod reason;
+mod recording;
 mod relearn;
+pub mod replay;
 mod resume;
 mod rollback;
 mod running;
 mod runs;
+pub mod summary;
 mod telemetry;
+pub mod traffic;
 mod travel;
 
 pub use buses::open_buses;
