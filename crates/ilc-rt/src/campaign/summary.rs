@@ -48,7 +48,7 @@ pub struct Summary {
 /// Reads a recording through.
 ///
 /// # Errors
-/// [`RecordingError`] if it is none.
+/// [`RecordingError`] if it is not a recording.
 pub fn summarize(path: &Path) -> Result<Summary, RecordingError> {
     let mut reader = Reader::open(path)?;
     let mut summary = Summary::default();

@@ -139,7 +139,8 @@ fn line(
         }
         TrafficFormat::Candump => {
             // The digit after ## holds the flags of the frame: bit rate switch.
-            let (mark, direction) = (if is_fd { "##1" } else { "#" }, if is_sent { "T" } else { "R" });
+            let (mark, direction) =
+                (if is_fd { "##1" } else { "#" }, if is_sent { "T" } else { "R" });
             let data = hex.concat();
             writeln!(out, "({seconds}.{micros:06}) {interface} {id:03X}{mark}{data} {direction}")
         }

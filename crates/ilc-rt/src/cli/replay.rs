@@ -41,9 +41,8 @@ pub(super) fn replay(arguments: &ReplayArguments) -> u8 {
     for line in lines(&replayed) {
         show::say(&line);
     }
-    let is_written = file.is_none_or(|file| {
-        file.write(&serde_json::to_value(&replayed).unwrap_or_default())
-    });
+    let is_written =
+        file.is_none_or(|file| file.write(&serde_json::to_value(&replayed).unwrap_or_default()));
     if replayed.difference.is_none() && is_written { 0 } else { EXIT_FAILURE }
 }
 

@@ -17,6 +17,6 @@ pub use error::DesignError;
 pub use forecast::{first_error, learning_model, perturbed_axis};
 pub use law::Prepared;
 pub use plan::Plan;
-pub(crate) use program::text as program_text;
 pub(crate) use plan::{axis_scale, input_unit, node};
+pub(crate) use program::text as program_text;
 pub use traffic::{BusTraffic, pdo_map};

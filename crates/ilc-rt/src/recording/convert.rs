@@ -7,7 +7,6 @@ use crate::rt::flight::PLACES_MAX;
 use crate::rt::{Interruptions, Nanos, Stamps};
 use crate::servo::{AxisRow, LoopRow};
 
-
 impl From<&LoopRow> for CycleMessage {
     fn from(row: &LoopRow) -> Self {
         Self {

@@ -26,7 +26,7 @@ pub enum RecordingError {
     NotARecording {
         /// File.
         path: PathBuf,
-        /// What is missing or damaged.
+        /// Missing or damaged part.
         what: String,
     },
 }

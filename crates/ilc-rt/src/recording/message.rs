@@ -6,7 +6,7 @@ use super::exact;
 use crate::record::fingerprint;
 use crate::servo::PhaseName;
 
-/// `/cycle`: the loop in one tick; what it read of other threads, and what came of it.
+/// `/cycle`: the loop in one tick: its state, and all that it read of other threads.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CycleMessage {
     /// Number of the tick since the loop began.

@@ -27,7 +27,8 @@ pub fn frame_text(frame: &Frame) -> String {
 
 /// Returns an event as text.
 pub(super) fn event_text(event: &BusEvent) -> (Traffic, String) {
-    let failure = |error: &BusError| format!("!{}", serde_json::to_string(error).unwrap_or_default());
+    let failure =
+        |error: &BusError| format!("!{}", serde_json::to_string(error).unwrap_or_default());
     match event {
         BusEvent::Received(frame) => (Traffic::Received, frame_text(frame)),
         BusEvent::Failed(error) => (Traffic::Received, failure(error)),
@@ -38,7 +39,7 @@ pub(super) fn event_text(event: &BusEvent) -> (Traffic, String) {
     }
 }
 
-/// Returns the event of a text, or `None` if it is none.
+/// Returns the event of a text, or `None` for any other text.
 pub fn read_event(traffic: Traffic, text: &str) -> Option<BusEvent> {
     let (frame, failure) = match text.split_once('!') {
         Some((frame, error)) => (frame, Some(serde_json::from_str(error).ok()?)),
@@ -78,11 +79,8 @@ mod tests {
             BusError::Os(105),
             BusError::Controller(CanFact::ErrorPassive { transmit: 128, receive: 3 }),
         ];
-        let mut events = vec![
-            BusEvent::Received(frame),
-            BusEvent::Sent(long),
-            BusEvent::Sent(Frame::default()),
-        ];
+        let mut events =
+            vec![BusEvent::Received(frame), BusEvent::Sent(long), BusEvent::Sent(Frame::default())];
         for error in errors {
             events.extend([BusEvent::Failed(error), BusEvent::Refused(frame, error)]);
         }

@@ -159,12 +159,7 @@ impl<R: Read> Reader<R> {
         Ok(Item::Loop(Box::new((setup, cell))))
     }
 
-    fn message(
-        &self,
-        channel: u16,
-        at: u64,
-        data: &[u8],
-    ) -> Result<Option<Item>, RecordingError> {
+    fn message(&self, channel: u16, at: u64, data: &[u8]) -> Result<Option<Item>, RecordingError> {
         let Some(topic) = self.channels.get(&channel) else {
             return Err(self.damaged(format!("a message of channel {channel}, which is unknown")));
         };

@@ -61,7 +61,7 @@ enum Note {
     Table(u32, Vec<f64>),
 }
 
-/// What a campaign notes in a recording; nothing without one.
+/// Notes of a campaign for its recording; without a recording they are dropped.
 #[derive(Clone, Default)]
 pub struct Notes(Option<Sender<Note>>);
 
@@ -130,17 +130,13 @@ impl Recorder {
         (cycle_s, lockstep): (f64, bool),
     ) -> Result<Self, RecordingError> {
         let (file, path) = folder::create(&place.path, &format!("{cell}@{campaign}"))?;
-        let refused =
-            |reason: String| RecordingError::Create { path: path.clone(), reason };
+        let refused = |reason: String| RecordingError::Create { path: path.clone(), reason };
         if folder::is_folder(&place.path) {
             folder::thin(&path, cell, place.files, place.bytes);
         }
-        let file =
-            RecordFile::begin(file, axes).map_err(|error| refused(error.to_string()))?;
+        let file = RecordFile::begin(file, axes).map_err(|error| refused(error.to_string()))?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded")]
-        let room = |per_tick: usize| {
-            ((ROOM_S / cycle_s) as usize * per_tick).clamp(ROOM.0, ROOM.1)
-        };
+        let room = |per_tick: usize| ((ROOM_S / cycle_s) as usize * per_tick).clamp(ROOM.0, ROOM.1);
         let (records, rows) = RingBuffer::new(room(axes.len() + 2));
         // Two frames to and from each axis, a tool, SYNC.
         let (traffic, frames) = RingBuffer::new(room(4 * axes.len() + 3));
@@ -163,6 +159,7 @@ impl Recorder {
             axis: 0,
             flushed: Instant::now(),
             has_lost: false,
+            has_loop: false,
         };
         let writing = if lockstep {
             Pace::InLine(Box::new(writing))
@@ -253,6 +250,8 @@ struct Writing {
     axis: usize,
     flushed: Instant,
     has_lost: bool,
+    /// True once it holds a loop. Without one, as nothing has moved, there is nothing to keep.
+    has_loop: bool,
 }
 
 impl Writing {
@@ -294,6 +293,7 @@ impl Writing {
         for note in notes {
             match note {
                 Note::Setup(parts) => {
+                    self.has_loop = true;
                     let (setup, cell, program) = &**parts;
                     file.attach(CELL, "application/toml", cell.as_bytes())?;
                     file.attach(PROGRAM, "application/octet-stream", program)?;
@@ -371,6 +371,10 @@ impl Writing {
     /// Writes the rest, and the end.
     fn end(&mut self) {
         self.look_at_rest();
+        if !self.has_loop && self.file.take().is_some() {
+            // A failure is harmless: a short file remains.
+            let _ = std::fs::remove_file(&self.path);
+        }
         if let Some(mut file) = self.file.take() {
             let lost = self.count.lost();
             let ended = self.write_frames(&mut file, u64::MAX).and_then(|()| file.end(lost));

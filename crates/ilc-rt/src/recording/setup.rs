@@ -70,9 +70,8 @@ pub struct MapText {
 impl From<&PdoMap> for MapText {
     fn from(map: &PdoMap) -> Self {
         let objects = |layout: &PdoLayout| {
-            let object = |object: &MappedObject| {
-                (object.address.index, object.address.sub, object.bits)
-            };
+            let object =
+                |object: &MappedObject| (object.address.index, object.address.sub, object.bits);
             layout.objects().iter().map(object).collect()
         };
         Self {

@@ -44,7 +44,8 @@ pub(super) fn frame(
     (recorded, replayed): Unlike,
     (plan, maps, names): (&Plan, &[PdoMap], &[String]),
 ) -> Difference {
-    let shown = |frame: Option<Frame>| frame.map_or("no frame".to_owned(), |frame| frame_text(&frame));
+    let shown =
+        |frame: Option<Frame>| frame.map_or("no frame".to_owned(), |frame| frame_text(&frame));
     let mut difference = Difference {
         cycle,
         axes: names.to_vec(),

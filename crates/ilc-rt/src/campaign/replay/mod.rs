@@ -10,6 +10,7 @@ mod line;
 mod player;
 mod relearned;
 
+use std::io::Read;
 use std::path::Path;
 
 use serde::Serialize;
@@ -99,13 +100,19 @@ struct Tick {
 /// # Errors
 /// [`ReplayError`] for one that cannot be replayed. A difference is no error.
 pub fn replay(path: &Path) -> Result<Replayed, ReplayError> {
-    let mut reader = Reader::open(path)?;
+    replay_read(Reader::open(path)?, path)
+}
+
+/// Replays a recording that is read from anywhere; `path` names it in errors.
+///
+/// # Errors
+/// As [`replay`].
+pub fn replay_read<R: Read>(mut reader: Reader<R>, path: &Path) -> Result<Replayed, ReplayError> {
     let mut player: Option<Player> = None;
     let mut tick = Tick::default();
     let mut lost_at = None;
-    let contradiction = |what: String| ReplayError::Contradiction {
-        what: format!("{}: {what}", path.display()),
-    };
+    let contradiction =
+        |what: String| ReplayError::Contradiction { what: format!("{}: {what}", path.display()) };
     while let Some(item) = reader.next_item()? {
         match item {
             Item::Loop(parts) => {

@@ -14,16 +14,17 @@ use crate::campaign::recording::digest;
 use crate::config::{Cell, Measure};
 use crate::design::{DesignError, Plan};
 use crate::fieldbus::cia402::PdoMap;
+use crate::fieldbus::frame::FD_PAYLOAD_MAX;
 use crate::fieldbus::transport::{BusEvent, TapCount};
 use crate::interpolate::MAX_AXES;
 use crate::recording::{
     AxisMessage, CycleMessage, LoopSetup, TableMessage, Traffic, column_digest, read_event,
 };
-use crate::servo::{
-    Cycle, LoopRecord, Mailbox, Message, Orders, OrdersSeen, Tap, mailbox,
-};
+use crate::servo::{Cycle, LoopRecord, Mailbox, Message, Orders, OrdersSeen, Tap, mailbox};
 use crate::trajectory::Interpolator;
 
+/// Largest number of samples of an experiment.
+const SAMPLES_MAX: usize = 100_000_000;
 /// Messages of one tick, with those of a stop.
 const MESSAGES: usize = 4096;
 
@@ -48,8 +49,17 @@ pub(super) struct Player {
 
 impl Player {
     pub(super) fn new(setup: LoopSetup, cell: &Cell) -> Result<Self, ReplayError> {
-        let measure =
-            if setup.measure == "tcp" { Measure::Tcp } else { Measure::Encoder };
+        if setup.axes.len() != cell.n_axes() || setup.hold_samples > Some(SAMPLES_MAX) {
+            let (axes, samples) = (setup.axes.len(), setup.hold_samples.unwrap_or_default());
+            return Err(ReplayError::Contradiction {
+                what: format!(
+                    "the recording has {axes} axes and {samples} samples at rest; its cell has {} axes, and at \
+                     most {SAMPLES_MAX} samples are replayed",
+                    cell.n_axes()
+                ),
+            });
+        }
+        let measure = if setup.measure == "tcp" { Measure::Tcp } else { Measure::Encoder };
         let plan = planned(&setup, cell, measure)?;
         if digest(&plan.reference_m) != setup.set_points_digest {
             return Err(ReplayError::OtherSetPoints {
@@ -67,6 +77,9 @@ impl Player {
                     cell.n_axes()
                 ),
             });
+        }
+        for (axis, map) in cell.axes.iter().zip(&maps) {
+            map.check(axis.interface, FD_PAYLOAD_MAX)?;
         }
         let relearned = Relearned::new(&setup, cell, &plan)?;
         let stop = Arc::new(AtomicI32::new(0));
@@ -171,7 +184,8 @@ impl Player {
         let number = recorded.cycle;
         let events = |traffic, texts: &[String]| -> Result<Vec<BusEvent>, String> {
             let event = |text: &String| {
-                read_event(traffic, text).ok_or_else(|| format!("cycle {number}: `{text}` is no frame"))
+                read_event(traffic, text)
+                    .ok_or_else(|| format!("cycle {number}: `{text}` is no frame"))
             };
             texts.iter().map(event).collect()
         };
@@ -212,7 +226,13 @@ impl Player {
         }
         for ((name, then), now) in self.names.iter().zip(axes).zip(&rows) {
             if let Some((field, recorded, replayed)) = compare::field(then, now) {
-                return Some(Difference { cycle, axes: vec![name.clone()], field, recorded, replayed });
+                return Some(Difference {
+                    cycle,
+                    axes: vec![name.clone()],
+                    field,
+                    recorded,
+                    replayed,
+                });
             }
         }
         let (field, recorded, replayed) = match own {

@@ -122,14 +122,12 @@ impl Relearned {
                 recorded.get(*at).map(|x| x.to_bits()) != own.get(*at).map(|x| x.to_bits())
             };
             if let Some(at) = (0..recorded.len().max(own.len())).find(differs) {
-                let shown = |values: &[f64]| values.get(at).map_or("none".to_owned(), f64::to_string);
+                let shown =
+                    |values: &[f64]| values.get(at).map_or("none".to_owned(), f64::to_string);
                 return Some(Difference {
                     cycle,
                     axes: vec![names[at % self.n_axes].clone()],
-                    field: format!(
-                        "learned input in table {table}, sample {}",
-                        at / self.n_axes
-                    ),
+                    field: format!("learned input in table {table}, sample {}", at / self.n_axes),
                     recorded: shown(&recorded),
                     replayed: shown(&own),
                 });

@@ -22,14 +22,7 @@ pub(in crate::recording) struct Records<R> {
 
 impl<R: Read> Records<R> {
     pub(in crate::recording) fn new(source: R) -> Self {
-        Self {
-            source,
-            chunk: Vec::new(),
-            at: 0,
-            has_begun: false,
-            is_over: false,
-            was_cut: false,
-        }
+        Self { source, chunk: Vec::new(), at: 0, has_begun: false, is_over: false, was_cut: false }
     }
 
     /// Returns whether the file ended in the middle.
@@ -80,7 +73,9 @@ impl<R: Read> Records<R> {
         let crc = rest.u32()?;
         let compression = rest.text()?;
         if !compression.is_empty() {
-            return Err(format!("a chunk compressed by {compression}, which ilc-rt does not write"));
+            return Err(format!(
+                "a chunk compressed by {compression}, which ilc-rt does not write"
+            ));
         }
         let records = rest.bytes(8).map(|_| rest.0)?;
         if records.len() as u64 != n_bytes {
@@ -107,7 +102,9 @@ impl<R: Read> Records<R> {
         let kind = rest.bytes(1)?[0];
         let n_bytes = rest.u64()?;
         if n_bytes > RECORD_BYTES_MAX {
-            return Err(format!("a record of {n_bytes} bytes; at most {RECORD_BYTES_MAX} are read"));
+            return Err(format!(
+                "a record of {n_bytes} bytes; at most {RECORD_BYTES_MAX} are read"
+            ));
         }
         Ok(self.fill(n_bytes)?.map(|content| (kind, content)))
     }
