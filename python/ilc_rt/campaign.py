@@ -110,6 +110,10 @@ class Campaign:
     home : bool
         Home the axes that are not homed before anything else; otherwise they are named, and nothing
         moves.
+    record : path or None
+        Record every tick, all frames and events into a new file, or into a folder under a name of
+        its own; ``ilc-rt replay`` repeats it. None is what the cell description says in
+        ``[recording]``.
     telemetry : bool
         Publish on Zenoh; never with ``loopback:``.
 
@@ -168,6 +172,7 @@ class Campaign:
         require_rt: bool = False,
         reset_faults: bool = False,
         home: bool = False,
+        record: str | Path | None = None,
         telemetry: bool = True,
     ) -> None:
         if isinstance(cell, Cell):
@@ -206,6 +211,7 @@ class Campaign:
         self.keep = keep
         self.ctl = ctl
         self.start = start
+        self.record = record
         self.telemetry = telemetry
         # Excitation in place of the program, for an identification.
         self.experiment: Experiment | None = None
@@ -283,6 +289,7 @@ class Campaign:
             "bus": self.bus, "measure": self.measure, "lockstep": self.lockstep,
             "simulated": self.simulated, "library": self.library, "telemetry": self.telemetry,
             "require_rt": self.require_rt, "reset_faults": self.reset_faults, "home": self.home,
+            "record": self.record,
         }  # fmt: skip
         if self.experiment is not None:
             return "identify", arguments("identify", values) + self.experiment.arguments()

@@ -173,6 +173,19 @@ class DriftEvent:
     relearned_in: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class RecordingEvent:
+    """A recording begins in `file`; with a `reason`, it has lost records or ends early.
+
+    `lost` counts the records lost so far. The runs go on in any case.
+    """
+
+    name: ClassVar[str] = "recording"
+    file: str
+    lost: int
+    reason: str | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LateEvent(LateCycle):
     """A servo cycle lost its deadline; `count` is the number of such cycles since the last event.
@@ -273,6 +286,7 @@ Event = (
     | DriftEvent
     | LateEvent
     | LatencyEvent
+    | RecordingEvent
     | FaultEvent
     | EndEvent
 )
@@ -289,6 +303,7 @@ _CLASSES: dict[str, type[Any]] = {
         DriftEvent,
         LateEvent,
         LatencyEvent,
+        RecordingEvent,
         FaultEvent,
         EndEvent,
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from contextlib import ExitStack, closing
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -110,6 +111,7 @@ def multisine(
     require_rt: bool = False,
     reset_faults: bool = False,
     home: bool = False,
+    record: str | Path | None = None,
     telemetry: bool = True,
     observe: Observer | None = None,
     tell: Callable[[str], None] | None = None,
@@ -141,8 +143,8 @@ def multisine(
         Sample time in seconds, for a function; a cell has its own.
     at_m : float or None
         Position that the axis is excited around; the program's start if None.
-    measure, bus, lockstep, drives, require_rt, reset_faults, home, telemetry
-        As for `Campaign`.
+    measure, bus, lockstep, drives, require_rt, reset_faults, home, record, telemetry
+        As for `Campaign`; a second experiment has a file of its own, NAME-2.mcap.
     library : path or None
         Library that the experiment is stored in; None for no library.
     observe : callable or None
@@ -176,8 +178,8 @@ def multisine(
         system, waveform="multisine", axis=axis, amplitude=amplitude, from_hz=from_hz, to_hz=to_hz,
         period_s=period_s, periods=periods, dt_s=dt_s, at_m=at_m, measure=measure, bus=bus,
         lockstep=lockstep, drives=drives, library=library, require_rt=require_rt,
-        reset_faults=reset_faults, home=home, telemetry=telemetry, observe=observe, tell=tell,
-        duration_s=duration_s,
+        reset_faults=reset_faults, home=home, record=record, telemetry=telemetry, observe=observe,
+        tell=tell, duration_s=duration_s,
     )  # fmt: skip
 
 
@@ -243,9 +245,11 @@ def identify(
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="ilc-identify-"))
             library = Path(folder) / "experiment.db"
         campaign = Campaign(cell, library=library, **session)
+        recording, numbers = campaign.record, count(1)
 
         def excite(figures: dict[str, Any]) -> tuple[Array, Array]:
             campaign.experiment = Experiment(**figures)
+            campaign.record = _numbered(recording, next(numbers))
             with closing(campaign.events(1)) as events:
                 for event in events:
                     if observe is not None:
@@ -321,3 +325,11 @@ __all__ = [
     "swept_sine",
     "uncertainty",
 ]
+
+
+def _numbered(path: str | Path | None, number: int) -> str | Path | None:
+    """Return the file of the experiment of a number; a folder names its files itself."""
+    if path is None or number == 1 or Path(path).is_dir() or str(path).endswith("/"):
+        return path
+    path = Path(path)
+    return path.with_name(f"{path.stem}-{number}{path.suffix}")

@@ -20,6 +20,7 @@ pub mod learning;
 pub mod library;
 pub mod model;
 pub mod record;
+pub mod recording;
 pub mod rt;
 pub mod schema;
 pub mod servo;

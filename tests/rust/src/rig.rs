@@ -11,13 +11,15 @@ use ilc_rt::design::Plan;
 use ilc_rt::fieldbus::bring_up::{bring_up, bring_up_encoder};
 use ilc_rt::fieldbus::canopen::{NmtCommand, NodeId, sync};
 use ilc_rt::fieldbus::cia402::{CommandRpdo1, State};
-use ilc_rt::fieldbus::transport::{InProcess, Responder};
+use ilc_rt::fieldbus::transport::{InProcess, Responder, TapCount, TappedBus};
 use ilc_rt::fieldbus::{Bus, BusError, Frame};
-use ilc_rt::rt::{Clock, Stamps};
+use ilc_rt::rt::{Clock, MonotonicClock, Stamps};
 use ilc_rt::servo::{
-    Cycle, InputBits, Mailbox, Message, Orders, PhaseName, Sample, StopReason, TickStatus, mailbox,
+    Cycle, InputBits, Mailbox, Message, Orders, PhaseName, Sample, StopReason, Tap as LoopTap,
+    TickStatus, mailbox,
 };
 use ilc_sim::Machine;
+use rtrb::RingBuffer;
 
 use crate::campaign::machine;
 
@@ -229,6 +231,7 @@ pub struct Rig {
     /// Samples in a run.
     pub n_samples: usize,
     stop: Arc<AtomicI32>,
+    count: Arc<TapCount>,
 }
 
 impl Rig {
@@ -262,6 +265,16 @@ impl Rig {
     #[must_use]
     pub fn with_recorder(self, clock: Arc<dyn Clock>, late_share: f64) -> Self {
         Self { cycle: self.cycle.recorded(clock, late_share), ..self }
+    }
+
+    /// Returns it with the taps of a recording that is not read: their ring is full soon.
+    #[must_use]
+    pub fn tapped(self, clock: &Arc<MonotonicClock>) -> Self {
+        let (records, _rest) = RingBuffer::new(1024);
+        let clock: Arc<dyn Clock> = Arc::<MonotonicClock>::clone(clock);
+        let period = self.cycle.period();
+        let tap = LoopTap::new(records, Arc::clone(&self.count), Some(clock), period);
+        Self { cycle: self.cycle.tapped(tap), ..self }
     }
 
     fn paced(cell: &Cell, runs: u32, lockstep: bool) -> Self {
@@ -298,7 +311,10 @@ impl Rig {
         let stop = Arc::new(AtomicI32::new(0));
         let (mail, loop_side) = mailbox(4096, Arc::clone(&stop));
         let loop_side = loop_side.following(Arc::new(Orders::new(!on_input)));
-        let network = plan.network(Box::new(tap.clone()), &maps);
+        let count = Arc::new(TapCount::default());
+        let (traffic, _rest) = RingBuffer::new(1024);
+        let bus = TappedBus::new(Box::new(tap.clone()), traffic, Arc::clone(&count), None);
+        let network = plan.network(Box::new(bus), &maps);
         let cycle = Cycle::new(network, plan.servo, plan.interpolator, loop_side);
         Self {
             cycle,
@@ -316,6 +332,7 @@ impl Rig {
             rest_m_s: Vec::new(),
             n_samples,
             stop,
+            count,
         }
     }
 

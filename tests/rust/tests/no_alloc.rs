@@ -1,7 +1,8 @@
 //! A tick neither allocates nor frees memory, whatever happens in it.
 //!
 //! Every tick of whole campaigns is counted, phase by phase, including the simulated machine, which
-//! does not allocate after set-up either, and the flight recorder, to which every cycle is late.
+//! does not allocate after set-up either, the flight recorder, to which every cycle is late, and the taps of a
+//! recording, whose rings are too small for it.
 
 #![allow(
     clippy::unwrap_used,
@@ -45,7 +46,7 @@ impl Watched {
 
     fn of(rig: Rig) -> Self {
         let clock = Arc::new(MonotonicClock::new(Nanos(0)));
-        let rig = rig.with_recorder(Arc::clone(&clock) as Arc<dyn Clock>, NO_TIME);
+        let rig = rig.with_recorder(Arc::clone(&clock) as Arc<dyn Clock>, NO_TIME).tapped(&clock);
         Self { rig, clock, phases: BTreeSet::new(), n_ticks: 0 }
     }
 

@@ -7,6 +7,7 @@ use serde_json::json;
 use super::control::{Shared, Status};
 use super::telemetry::{Kept, Telemetry};
 use crate::record::{Event, SCHEMA};
+use crate::recording::Notes;
 use crate::servo::Sample;
 
 /// Duration of a batch on the network.
@@ -21,6 +22,7 @@ pub(super) struct Announcer<'a> {
     batch: Vec<Sample>,
     batch_size: usize,
     n_axes: usize,
+    notes: Notes,
 }
 
 impl<'a> Announcer<'a> {
@@ -28,8 +30,8 @@ impl<'a> Announcer<'a> {
         observe: &'a mut dyn FnMut(&Event),
         telemetry: Option<Telemetry>,
         shared: Arc<Shared>,
-        cycle_s: f64,
-        n_axes: usize,
+        notes: Notes,
+        (cycle_s, n_axes): (f64, usize),
     ) -> Self {
         #[expect(
             clippy::cast_possible_truncation,
@@ -44,6 +46,7 @@ impl<'a> Announcer<'a> {
             batch: Vec::with_capacity(batch_size),
             batch_size,
             n_axes,
+            notes,
         }
     }
 
@@ -56,6 +59,7 @@ impl<'a> Announcer<'a> {
     pub(super) fn publish(&mut self, event: &Event) {
         self.shared.update(|status: &mut Status| status.follow(event));
         (self.observe)(event);
+        self.notes.event(event);
         let Some(telemetry) = &mut self.telemetry else { return };
         let key = match event {
             Event::Iteration { .. } | Event::Judged { .. } | Event::Drift { .. } => "iteration",
@@ -65,6 +69,7 @@ impl<'a> Announcer<'a> {
             Event::Start { .. }
             | Event::State { .. }
             | Event::Progress { .. }
+            | Event::Recording { .. }
             | Event::End { .. } => "state",
         };
         let kept = match event {
@@ -75,6 +80,7 @@ impl<'a> Announcer<'a> {
             | Event::Drift { .. }
             | Event::Fault { .. } => Kept::Past,
             Event::Progress { .. }
+            | Event::Recording { .. }
             | Event::Inputs { .. }
             | Event::Latency { .. }
             | Event::Late { .. } => Kept::No,

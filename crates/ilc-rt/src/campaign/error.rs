@@ -12,6 +12,7 @@ use crate::fieldbus::transport::{OpenError, syntaxes};
 use crate::identification::IdentificationError;
 use crate::learning::LearningError;
 use crate::library::LibraryError;
+use crate::recording::RecordingError;
 use crate::rt::Refused;
 
 /// A refusal, in one line.
@@ -178,6 +179,17 @@ pub enum CampaignError {
     NotRealtime {
         /// Refused settings.
         refused: Vec<Refused>,
+    },
+    /// A recording could not be begun.
+    #[error("{0}; nothing has moved")]
+    Recording(#[from] RecordingError),
+    /// The cell description as it is applied has no text.
+    #[error("{file}: the recording cannot hold this cell description: {reason}; nothing has moved")]
+    NotDescribed {
+        /// Cell description.
+        file: String,
+        /// Reason.
+        reason: String,
     },
     /// A thread could not be started.
     #[error("the {what} thread could not be started: {source}")]

@@ -16,6 +16,7 @@ use super::learner::{Learner, set_disturbance};
 use super::nodes;
 use super::options::{Options, Outcome, SIMULATED_PATIENCE_S, Session, StartOn};
 use super::pace::{MAILBOX, Pacer, Settings};
+use super::recording;
 use super::resume::{Resumed, to_resume};
 use super::rollback::RollbackPolicy;
 use super::running::{Parts, Running};
@@ -27,6 +28,7 @@ use crate::identification::Experiment;
 use crate::learning::{Law, LearningError, Purpose};
 use crate::library::Library;
 use crate::record::{Event, SCHEMA, StateName};
+use crate::recording::Recorder;
 use crate::rt::RtReport;
 use crate::servo::{Cycle, Orders, mailbox};
 
@@ -67,7 +69,16 @@ pub fn run(
     let parameters = law.as_ref().map_or_else(|| "{}".to_owned(), Law::describe);
     let earlier = law.as_ref().and_then(Law::earlier_description);
     plan.name_law(cell, name, &parameters, earlier.as_ref().unwrap_or(&parameters));
-    let campaign = Campaign { plan, law, input: None, growth_allowed, frozen: None };
+    let law_is_not_run = recording::law_is_not_run(law.as_deref(), name, options);
+    let campaign = Campaign {
+        plan,
+        law,
+        input: None,
+        growth_allowed,
+        frozen: None,
+        law_is_not_run,
+        holds: false,
+    };
     execute(cell, options, bus, campaign, observe)
 }
 
@@ -92,6 +103,8 @@ pub fn identify(
         // Nothing is learned, so there is nothing to roll back.
         growth_allowed: f64::INFINITY,
         frozen: None,
+        law_is_not_run: Some("there is no law".to_owned()),
+        holds: true,
     };
     let once = Options { iterations: 1, learning: false, ..Options::default() };
     let options = Options { session: session.clone(), keep: Some(Keep::All), ..once };
@@ -108,6 +121,10 @@ struct Campaign {
     growth_allowed: f64,
     /// Drift of a frozen input.
     frozen: Option<Frozen>,
+    /// Reason why a replay of its recording cannot run the law again.
+    law_is_not_run: Option<String>,
+    /// True if its set points rest.
+    holds: bool,
 }
 
 fn execute(
@@ -134,7 +151,10 @@ fn execute(
     }
     let (claim, mut resumed) =
         begin_or_resume(&library, cell, options, &mut campaign, &mut policy)?;
-    let Campaign { mut plan, law, input, frozen, .. } = campaign;
+    let Campaign { mut plan, law, input, frozen, growth_allowed, law_is_not_run, holds } = campaign;
+    let mut recorder = recording::begin(cell, session, &plan.meta.campaign)?;
+    let notes = recorder.as_ref().map(Recorder::notes).unwrap_or_default();
+    policy = policy.noting(notes.clone());
     let learner = match law {
         Some(law) if session.lockstep => Some(Learner::in_line(law)),
         Some(law) => Some(Learner::on_thread(law)?),
@@ -157,7 +177,12 @@ fn execute(
     // Before anything moves: a cell that cannot be commanded as asked is not started.
     let server =
         if options.ctl { Some(Server::open(&cell.cell.name, Arc::clone(&shared))?) } else { None };
-    let mut announcer = Announcer::new(observe, telemetry, shared, cell.cycle_s(), cell.n_axes());
+    let size = (cell.cycle_s(), cell.n_axes());
+    let mut announcer = Announcer::new(observe, telemetry, shared, notes, size);
+    if let Some(recorder) = &recorder {
+        let file = recorder.path().display().to_string();
+        announcer.publish(&Event::Recording { file, lost: 0, reason: None });
+    }
     announcer.publish(&Event::State { state: StateName::BringingUp, iteration: first });
     if session.home {
         bus = match before_run::home(cell, session, bus, &mut announcer, first)? {
@@ -180,6 +205,8 @@ fn execute(
         plan.servo.hold_cycles_max = patience;
         plan.servo.forgive_overruns(patience);
     }
+    let facts = recording::Facts { first, holds, growth_allowed, law_is_not_run };
+    recording::describe(recorder.as_ref(), cell, session, (&plan, &maps), facts)?;
     let meta = Arc::new(plan.meta.clone());
     let keep = options.keep.unwrap_or(cell.library.keep);
     let keeper = if session.lockstep {
@@ -193,8 +220,10 @@ fn execute(
         policy.send(&mut mail, input, update_ms, purpose);
     }
     let loop_side = loop_side.following(orders);
+    let (bus, tap) = recording::tap(recorder.as_mut(), cell, session, bus);
     let network = plan.network(bus, &maps);
     let cycle = Cycle::new(network, plan.servo.clone(), plan.interpolator.clone(), loop_side);
+    let cycle = recording::tapped(cycle, tap);
     let (mut pacer, granted) = match settings {
         None => (Pacer::in_line(cycle), None),
         Some(settings) => {
@@ -213,11 +242,22 @@ fn execute(
     loop {
         let has_ended = pacer.poll();
         running.read_mail();
+        if let Some(recorder) = &mut recorder
+            && let Some(why) = recorder.poll()
+        {
+            running.recording(recorder, why);
+        }
         if has_ended {
             break;
         }
     }
-    Ok(running.end(pacer, cell, options))
+    let outcome = running.end(pacer, cell, options);
+    if let Some(recorder) = &mut recorder
+        && let Some(why) = recorder.end()
+    {
+        tracing::warn!("{why}");
+    }
+    Ok(outcome)
 }
 
 fn open_library(options: &Options) -> Result<Library, CampaignError> {

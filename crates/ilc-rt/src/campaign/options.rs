@@ -6,7 +6,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicI32;
+use std::sync::atomic::{AtomicI32, AtomicU32};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args, Command, FromArgMatches};
@@ -52,9 +52,16 @@ pub struct Session {
     /// Library file that every run is stored in.
     #[arg(long, value_name = "FILE", default_value = "ilc-library.db")]
     pub library: PathBuf,
+    /// Record every tick, all frames and events into a new file, or into a folder under a name of its own; `ilc-rt replay`
+    /// repeats it.
+    #[arg(long, value_name = "FILE|DIR")]
+    pub record: Option<PathBuf>,
     /// Do not publish on Zenoh.
     #[arg(long = "no-telemetry", action = ArgAction::SetFalse)]
     pub telemetry: bool,
+    /// Recordings made so far: an identification makes several experiments.
+    #[arg(skip)]
+    pub recordings: Arc<AtomicU32>,
     /// Number of a signal, set to bring the axes to rest.
     #[arg(skip)]
     pub stop: Arc<AtomicI32>,

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use crate::learning::Purpose;
 use crate::record::{Figures, IterationRecord};
+use crate::recording::Notes;
 use crate::servo::Mailbox;
 
 /// Number of rollbacks after which learning is switched off.
@@ -48,6 +49,7 @@ pub(super) struct RollbackPolicy {
     table_in_use: u32,
     /// Overruns are not a disturbance, as the plant paused as well.
     forgives_overruns: bool,
+    notes: Notes,
 }
 
 impl RollbackPolicy {
@@ -62,7 +64,13 @@ impl RollbackPolicy {
             sent: VecDeque::new(),
             table_in_use: 0,
             forgives_overruns: false,
+            notes: Notes::default(),
         }
+    }
+
+    /// Notes every table in a recording.
+    pub(super) fn noting(self, notes: Notes) -> Self {
+        Self { notes, ..self }
     }
 
     /// Sets whether overruns are forgiven: true if a stall of the computer also stalls the plant,
@@ -154,6 +162,16 @@ impl RollbackPolicy {
         }
     }
 
+    /// Counts an input that a campaign would pass to the loop, in a replay.
+    pub(super) fn would_send(&mut self, purpose: Purpose) {
+        self.n_sent = self.next_number();
+        self.promised = self.n_sent;
+        self.sent.push_back((self.n_sent, 0.0, purpose));
+        if self.sent.len() > TABLES_MAX {
+            self.sent.pop_front();
+        }
+    }
+
     /// Passes the input of the next run to the loop.
     pub(super) fn send(
         &mut self,
@@ -166,6 +184,7 @@ impl RollbackPolicy {
         // Refused only if two tables wait already; the run then repeats an input and is counted
         // late.
         self.promised = number;
+        self.notes.table(number, &input);
         if mail.send_table(number, input.into_boxed_slice()).is_ok() {
             self.n_sent = number;
             self.sent.push_back((number, update_ms, purpose));

@@ -12,6 +12,7 @@ use super::keeper::Keeper;
 use super::late::LateLog;
 use super::learner::{Learner, UpdateResult};
 use super::options::Options;
+use super::recording;
 use super::resume::Resumed;
 use super::rollback::{Decision, RollbackPolicy};
 use super::runs::Runs;
@@ -19,6 +20,7 @@ use crate::config::Cell;
 use crate::design::Plan;
 use crate::learning::Purpose;
 use crate::record::{AxisKinds, Event, FaultKind, IterationRecord, StateName};
+use crate::recording::Recorder;
 use crate::servo::{Mailbox, Message, PhaseName, Sample, StopReason};
 
 /// Time between two progress events.
@@ -136,6 +138,11 @@ impl<'a> Running<'a> {
 }
 
 impl Running<'_> {
+    /// Tells the losses or the early end of the recording.
+    pub(super) fn recording(&mut self, recorder: &Recorder, reason: String) {
+        self.announcer.publish(&recording::event(recorder, reason));
+    }
+
     /// Handles the messages of the loop, the outcomes of storing and the updates of the law.
     pub(super) fn read_mail(&mut self) {
         while let Some(message) = self.mail.read() {

@@ -22,6 +22,8 @@ mod moving;
 mod option;
 mod parent;
 mod quantity;
+mod record;
+mod replay;
 mod reset;
 mod run;
 mod runs;
@@ -98,6 +100,10 @@ enum Verb {
     Goto(goto::GotoArguments),
     /// Switch drives off.
     Disable(reset::DisableArguments),
+    /// Tell what a recording holds, or export its frames.
+    Record(record::RecordArguments),
+    /// Run the loop of a recording again, and name the first value that differs.
+    Replay(replay::ReplayArguments),
     /// Tell who was late when the loop of a cell lost a deadline, from the record of its last run.
     Why(why::WhyArguments),
     /// Tell what keeps this computer from being punctual, and the command that mends it; only reads.
@@ -149,6 +155,8 @@ pub fn main() -> ExitCode {
         Verb::Jog(arguments) => jog::jog(&arguments),
         Verb::Goto(arguments) => goto::goto(&arguments),
         Verb::Disable(arguments) => reset::disable(&arguments),
+        Verb::Record(arguments) => record::record(&arguments),
+        Verb::Replay(arguments) => replay::replay(&arguments),
         Verb::Why(arguments) => why::why(&arguments),
         Verb::Doctor(arguments) => doctor::doctor(&arguments),
         Verb::Latency(arguments) => latency::latency(&arguments),

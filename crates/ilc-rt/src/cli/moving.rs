@@ -53,6 +53,8 @@ impl Moving {
             reset_faults: self.reset_faults,
             home: false,
             library: PathBuf::new(),
+            record: None,
+            recordings: Arc::default(),
             telemetry: false,
             stop,
         }

@@ -117,9 +117,11 @@ pub(super) fn sentence(event: &Event, runs: &mut Runs) -> Option<String> {
                 )
             )
         )),
+        Event::Recording { file, reason: None, .. } => Some(format!("recording: {file}")),
         Event::Judged { index, remark, .. } => runs.judged(*index, remark.as_deref()),
         Event::State { .. }
         | Event::Inputs { .. }
+        | Event::Recording { .. }
         | Event::Progress { .. }
         | Event::Late { .. } => None,
     }

@@ -7,8 +7,10 @@ use clap::Args;
 use super::figures::FiguresFile;
 use super::late::{counts, node_in_words, sentence, stage_row, stages_table};
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
+use crate::campaign::late_of;
 use crate::config::{Cell, read_file};
 use crate::record::{FLIGHT_SUFFIX, FlightRecord, LateCase, TEXT_MAX, printable};
+use crate::recording::SUFFIX;
 
 /// Longest record that is read.
 const BYTES_MAX: u64 = 1 << 24;
@@ -16,9 +18,10 @@ const BYTES_MAX: u64 = 1 << 24;
 #[derive(Args)]
 #[command(after_help = "Examples:
   ilc-rt why gantry.toml
-  ilc-rt why /var/lib/ilc/gantry.db --json late.json")]
+  ilc-rt why /var/lib/ilc/gantry.db --json late.json
+  ilc-rt why gantry.mcap")]
 pub(super) struct WhyArguments {
-    /// Cell description, library, or a record beside one (NAME.CELL.late.json).
+    /// Cell description, library, a record beside one (NAME.CELL.late.json), or a recording (NAME.mcap).
     #[arg(value_name = "FILE|CELL")]
     target: PathBuf,
     /// Library that the runs of the cell are stored in.
@@ -31,7 +34,13 @@ pub(super) struct WhyArguments {
 
 /// Prints the worst cycles; returns the exit status.
 pub(super) fn why(arguments: &WhyArguments) -> u8 {
-    let record = match find(arguments).and_then(|path| read(&path)) {
+    let is_recording = arguments.target.to_string_lossy().ends_with(SUFFIX);
+    let record = if is_recording {
+        late_of(&arguments.target).map_err(|error| error.to_string())
+    } else {
+        find(arguments).and_then(|path| read(&path))
+    };
+    let record = match record {
         Ok(record) => record,
         Err(refusal) => {
             show::complain(&refusal);

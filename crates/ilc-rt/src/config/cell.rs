@@ -12,6 +12,7 @@ use super::input::Input;
 use super::learning::Learning;
 use super::library::LibrarySection;
 use super::realtime::Realtime;
+use super::recording::Recording;
 use super::simulation::Simulation;
 use crate::fieldbus::transport::{Format, format_of};
 use crate::schema::field_order;
@@ -30,6 +31,9 @@ pub struct Cell {
     /// File it was read from; empty for a text.
     #[serde(skip)]
     pub file: PathBuf,
+    /// Content of the file of its program, where that is carried along; otherwise it is read from beside `file`.
+    #[serde(skip)]
+    pub program_text: Option<Vec<u8>>,
     /// `[cell]`
     pub cell: CellSection,
     /// `[bus]`
@@ -59,6 +63,9 @@ pub struct Cell {
     /// `[library]`
     #[serde(default)]
     pub library: LibrarySection,
+    /// `[recording]`
+    #[serde(default)]
+    pub recording: Recording,
     /// `[telemetry]`
     #[serde(default)]
     pub telemetry: Telemetry,

@@ -18,6 +18,7 @@ mod learning;
 mod library;
 pub mod mode;
 mod realtime;
+mod recording;
 mod simulation;
 mod torque;
 mod validate;
@@ -33,6 +34,7 @@ pub use input::{Direction, INPUTS_MAX, Input, InputUse, Level};
 pub use learning::{Learning, Measure};
 pub use library::{Keep, LibrarySection};
 pub use realtime::{Overrun, Realtime};
+pub use recording::Recording;
 pub use simulation::{
     AxisSimulation, DeltaSimulation, NOMINAL_TEMPERATURE_K, Quirks, Simulation, SimulationChange,
 };

@@ -18,4 +18,5 @@ pub use forecast::{first_error, learning_model, perturbed_axis};
 pub use law::Prepared;
 pub use plan::Plan;
 pub(crate) use plan::{axis_scale, input_unit, node};
+pub(crate) use program::text as program_text;
 pub use traffic::{BusTraffic, pdo_map};

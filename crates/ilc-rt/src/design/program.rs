@@ -26,17 +26,28 @@ pub(super) fn interpolator(
     planned(cell, limits)?.verified(limits).map_err(|source| refused(cell, source))
 }
 
+/// Returns the content of the file of a cell's program; empty for kinds without a file.
+///
+/// # Errors
+/// [`DesignError::ProgramFile`] for a file that cannot be read.
+pub(crate) fn text(cell: &Cell) -> Result<Vec<u8>, DesignError> {
+    let Some(wanted) = cell.program.kind.entry().file else { return Ok(Vec::new()) };
+    if let Some(text) = &cell.program_text {
+        return Ok(text.clone());
+    }
+    let name = cell.program.file_name();
+    read_beside(&cell.file, name, wanted.bytes_max).map_err(|reason| DesignError::ProgramFile {
+        file: cell.file.with_file_name(name).display().to_string(),
+        reason,
+        what: wanted.content,
+    })
+}
+
 fn planned(cell: &Cell, limits: &[AxisLimits]) -> Result<Interpolator, DesignError> {
     let program = &cell.program;
     let kind = program.kind.entry();
-    let name = program.file_name();
-    let file = cell.file.with_file_name(name).display().to_string();
-    let text = match kind.file {
-        None => Vec::new(),
-        Some(wanted) => read_beside(&cell.file, name, wanted.bytes_max).map_err(|reason| {
-            DesignError::ProgramFile { file: file.clone(), reason, what: wanted.content }
-        })?,
-    };
+    let file = cell.file.with_file_name(program.file_name()).display().to_string();
+    let text = text(cell)?;
     let axis_names: Vec<&str> = cell.axes.iter().map(|axis| axis.name.as_str()).collect();
     let job = Job {
         program,

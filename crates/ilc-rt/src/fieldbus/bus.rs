@@ -4,6 +4,8 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::can_fact::CanFact;
 use super::frame::Frame;
 
@@ -67,7 +69,8 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 }
 
 /// Reason that a frame was not sent or received. `Copy`, so that the tick can carry it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum BusError {
     /// The transmit queue is full.
     #[error(

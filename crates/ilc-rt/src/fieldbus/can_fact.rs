@@ -4,6 +4,8 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use serde::{Deserialize, Serialize};
+
 /// Classes of an error frame: bits of its identifier.
 mod class {
     pub(super) const TRANSMIT_TIMEOUT: u32 = 0x001;
@@ -34,7 +36,8 @@ pub const CLASSES: u32 = class::TRANSMIT_TIMEOUT
     | class::RESTARTED;
 
 /// A fact about the bus. Its sentence says what to check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum CanFact {
     /// The controller has switched itself off.
     #[error(

@@ -157,6 +157,15 @@ pub enum Event {
         #[serde(flatten)]
         cycle: LateCycle,
     },
+    /// A recording begins, loses records, or ends early; the runs go on in any case.
+    Recording {
+        /// File.
+        file: String,
+        /// Records lost so far, as this computer wrote too slowly.
+        lost: u64,
+        /// Reason of a loss or an early end; one sentence.
+        reason: Option<String>,
+    },
     /// A fault stopped the axes.
     Fault {
         /// One sentence.

@@ -123,7 +123,7 @@ impl Cycle {
     fn start_run(&mut self) -> Option<(u32, u32)> {
         self.take_table();
         self.path.restart();
-        self.feed.reset(self.mail.orders.scale());
+        self.feed.reset(self.mail.seen.scale());
         (self.run_overruns, self.run_scaled) = (0, 0);
         self.running(0)
     }
@@ -133,7 +133,7 @@ impl Cycle {
     fn running(&mut self, next: u32) -> Option<(u32, u32)> {
         let mut scale = self.feed.scale();
         if next > 0 {
-            scale = self.feed.next(self.mail.orders.scale());
+            scale = self.feed.next(self.mail.seen.scale());
             self.path.advance(scale);
         }
         self.run_scaled = self.run_scaled.saturating_add(u32::from(scale < 1.0));

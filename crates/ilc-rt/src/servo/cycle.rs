@@ -14,6 +14,7 @@ use super::pending::PendingCycles;
 use super::phase::{Phase, PhaseName};
 use super::spec::{AxisSpec, ServoSpec};
 use super::stall::{HOLD_AFTER, Stall};
+use super::tap::Tap;
 use crate::fieldbus::AxisNetwork;
 use crate::fieldbus::canopen::emcy;
 use crate::interpolate::{AxisLimits, Interpolator, MAX_AXES, Playback, Setpoint};
@@ -112,7 +113,8 @@ pub struct Cycle {
     pub(super) limits: [AxisLimits; MAX_AXES],
     pub(super) start_m: [f64; MAX_AXES],
     pub(super) flight: Flight,
-    table: Table,
+    tap: Option<Tap>,
+    pub(super) table: Table,
 }
 
 impl std::fmt::Debug for Cycle {
@@ -195,6 +197,7 @@ impl Cycle {
             limits: AxisLimits::padded(&limits),
             start_m,
             flight: Flight::default(),
+            tap: None,
             table: Table { number: 0, input: Box::default() },
             spec,
         }
@@ -211,6 +214,12 @@ impl Cycle {
         self.flight.start();
     }
 
+    /// Returns the cycle with a tap for its recording. Cold.
+    #[must_use]
+    pub fn tapped(self, tap: Tap) -> Self {
+        Self { tap: Some(tap), ..self }
+    }
+
     /// Records that the next tick was due at a time and began at another, after skipped cycles.
     pub fn begin(&mut self, due: Nanos, woke: Nanos, missed: u32) {
         self.flight.begin(due, woke, missed);
@@ -220,6 +229,9 @@ impl Cycle {
     /// reported with those before it.
     pub fn end(&mut self) -> Option<Stamps> {
         let stamps = self.flight.end()?;
+        if let Some(tap) = &mut self.tap {
+            tap.stamps(&stamps);
+        }
         if stamps.late || stamps.stopped {
             for stamps in self.flight.untold() {
                 self.mail.tell(Message::Cycle(stamps));
@@ -245,6 +257,16 @@ impl Cycle {
 
     /// Runs one servo cycle; `missed` cycles before it were skipped because it started too late.
     pub fn tick(&mut self, missed: u32) -> TickStatus {
+        let Some(mut tap) = self.tap.take() else { return self.step(missed) };
+        tap.begin(missed);
+        let status = self.step(missed);
+        tap.end(self);
+        self.tap = Some(tap);
+        status
+    }
+
+    fn step(&mut self, missed: u32) -> TickStatus {
+        self.mail.look();
         self.stall.note(missed);
         self.run_overruns = self.run_overruns.saturating_add(missed);
         let received = self.receive();
@@ -312,7 +334,7 @@ impl Cycle {
     }
 
     /// Returns the name of the phase for messages.
-    fn phase_name(&self) -> PhaseName {
+    pub(super) fn phase_name(&self) -> PhaseName {
         match self.phase.name() {
             PhaseName::Settling if self.waits => PhaseName::Waiting,
             PhaseName::Running if self.feed.is_paused() => PhaseName::Paused,

@@ -50,16 +50,15 @@ impl Cycle {
     }
 
     /// Returns true if the run that waits may start; a press releases it, unless the path is held.
-    pub(super) fn may_start(&self) -> bool {
-        let orders = &self.mail.orders;
+    pub(super) fn may_start(&mut self) -> bool {
         if self.is_pressed
             && self.spec.starts_on_input
-            && !orders.is_paused()
+            && !self.mail.seen.is_paused
             && self.inputs_permit()
         {
-            orders.release(self.run);
+            self.mail.release(self.run);
         }
-        orders.may_start(self.run)
+        self.mail.seen.may_start(self.run)
     }
 
     /// Returns the first reason of an input to stop.

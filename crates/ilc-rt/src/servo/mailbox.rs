@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicI32, Ordering};
 use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::inputs::InputBits;
-use super::orders::Orders;
+use super::orders::{Orders, OrdersSeen};
 use super::phase::PhaseName;
 use crate::fieldbus::BusError;
 use crate::fieldbus::canopen::NmtState;
@@ -260,7 +260,10 @@ pub struct LoopSide {
     pub(super) tables: Consumer<Table>,
     spent: Producer<Table>,
     stop: Arc<AtomicI32>,
-    pub(super) orders: Arc<Orders>,
+    orders: Arc<Orders>,
+    /// Orders, and the signal that requested a stop or 0, as this tick reads them.
+    pub(super) seen: OrdersSeen,
+    pub(super) asked: i32,
     dropped: u64,
 }
 
@@ -284,6 +287,8 @@ pub fn mailbox(capacity: usize, stop: Arc<AtomicI32>) -> (Mailbox, LoopSide) {
             spent: spent_in,
             stop,
             orders: Arc::default(),
+            seen: OrdersSeen::default(),
+            asked: 0,
             dropped: 0,
         },
     )
@@ -342,8 +347,14 @@ impl LoopSide {
         changed
     }
 
-    /// Returns the signal that requested a stop, or 0.
-    pub(super) fn asked_to_stop(&self) -> i32 {
-        self.stop.load(Ordering::Relaxed)
+    /// Reads what the other threads ask of this tick: once, so that the tick is a function of what it read.
+    pub(super) fn look(&mut self) {
+        (self.seen, self.asked) = (self.orders.seen(), self.stop.load(Ordering::Relaxed));
+    }
+
+    /// Lets a run start, from this tick on.
+    pub(super) fn release(&mut self, run: u32) {
+        self.orders.release(run);
+        self.seen.released = self.seen.released.max(run.saturating_add(1));
     }
 }

@@ -24,12 +24,14 @@ mod spec;
 mod stall;
 mod stopping;
 mod strangers;
+mod tap;
 
 pub use crate::fieldbus::network::Stranger;
 pub use cycle::{Cycle, TickStatus};
 pub use inputs::{INPUTS_MAX, InputBits, InputRole, InputSpec};
 pub use mailbox::{LoopSide, Mailbox, Message, Sample, StopReason, mailbox};
-pub use orders::{FEED_WHOLE, Orders};
+pub use orders::{FEED_WHOLE, Orders, OrdersSeen};
 pub use phase::PhaseName;
 pub use realtime::{StageTimes, Timing, run_on_clock, run_until};
 pub use spec::{AxisSpec, ForceSpec, Pace, ServoSpec, ToolSpec};
+pub use tap::{AxisRow, LoopRecord, LoopRow, Tap};

@@ -38,6 +38,9 @@ pub(super) struct Drive {
     /// Last digital inputs, and the part of the answer that has them.
     pub(super) inputs: Option<u32>,
     pub(super) inputs_part: AnswerPart,
+    /// Last velocity, in counts/s, and torque, in thousandths of the rated one, where they are mapped.
+    pub(super) velocity_counts_s: Option<i32>,
+    pub(super) torque: Option<i16>,
     /// Last command sent.
     pub(super) sent: CommandRpdo1,
 }
@@ -60,6 +63,8 @@ impl Default for Drive {
             unreadable: [None; 2],
             inputs: None,
             inputs_part: AnswerPart::Motion,
+            velocity_counts_s: None,
+            torque: None,
             sent: CommandRpdo1 {
                 controlword: Controlword::DISABLE_VOLTAGE,
                 target_counts: 0,

@@ -60,13 +60,42 @@ impl Orders {
         self.paused.load(Ordering::Relaxed)
     }
 
+    /// Returns the orders of now: a tick reads them once, so that it follows one state.
+    pub(super) fn seen(&self) -> OrdersSeen {
+        OrdersSeen {
+            released: self.released.load(Ordering::Relaxed),
+            feed_percent: self.feed_percent(),
+            is_paused: self.is_paused(),
+        }
+    }
+
+    /// Takes the orders of a recorded tick over.
+    pub fn restore(&self, seen: OrdersSeen) {
+        self.released.store(seen.released, Ordering::Relaxed);
+        self.feed_percent.store(seen.feed_percent, Ordering::Relaxed);
+        self.pause(seen.is_paused);
+    }
+}
+
+/// The orders as a tick read them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OrdersSeen {
+    /// Runs of lower numbers may start.
+    pub released: u32,
+    /// Feed override in percent.
+    pub feed_percent: u32,
+    /// True if the path is held.
+    pub is_paused: bool,
+}
+
+impl OrdersSeen {
     /// Returns true if a run may start now.
-    pub(super) fn may_start(&self, run: u32) -> bool {
-        !self.is_paused() && run < self.released.load(Ordering::Relaxed)
+    pub(super) fn may_start(self, run: u32) -> bool {
+        !self.is_paused && run < self.released
     }
 
     /// Returns the wanted scale of time along the path, 0 to 1.
-    pub(super) fn scale(&self) -> f64 {
-        if self.is_paused() { 0.0 } else { f64::from(self.feed_percent()) / f64::from(FEED_WHOLE) }
+    pub(super) fn scale(self) -> f64 {
+        if self.is_paused { 0.0 } else { f64::from(self.feed_percent) / f64::from(FEED_WHOLE) }
     }
 }

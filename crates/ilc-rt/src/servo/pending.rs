@@ -156,6 +156,13 @@ impl PendingCycles {
         Some(self.ring[index(sync)].commanded_m[axis])
     }
 
+    /// Returns the set point of an axis at the SYNC of its newest answer, m.
+    pub(super) fn answered_reference_m(&self, axis: usize) -> Option<f64> {
+        let number = self.number(Part::Status(axis))?;
+        let sync = self.lags[number].answers.checked_sub(1)?;
+        Some(self.ring[index(sync)].sample.reference_m[axis])
+    }
+
     /// Returns the number of SYNCs that a part has not answered.
     pub(super) fn lag(&self, part: Part) -> u64 {
         self.number(part).map_or(0, |number| self.sent - self.lags[number].answers)

@@ -2,6 +2,8 @@
 
 #![deny(clippy::disallowed_methods, clippy::disallowed_types, clippy::disallowed_macros)]
 
+use serde::{Deserialize, Serialize};
+
 use crate::interpolate::{ControlledStop, PointToPoint};
 
 /// The phase of the cell, with its state.
@@ -25,7 +27,8 @@ pub(super) enum Phase {
 }
 
 /// The name of a phase.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PhaseName {
     /// Drives are enabled, holding their position.
     Enabling,
@@ -48,6 +51,14 @@ pub enum PhaseName {
 }
 
 impl Phase {
+    /// Returns the next sample of the run in progress.
+    pub(super) fn sample(&self) -> Option<u32> {
+        match self {
+            Self::Running { sample } => Some(*sample),
+            _ => None,
+        }
+    }
+
     pub(super) fn name(&self) -> PhaseName {
         match self {
             Self::Enabling { .. } => PhaseName::Enabling,

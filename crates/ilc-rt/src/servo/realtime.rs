@@ -33,7 +33,8 @@ pub struct StageTimes {
 }
 
 impl StageTimes {
-    fn record(&mut self, stamps: &Stamps) {
+    /// Adds the stages of a tick.
+    pub fn record(&mut self, stamps: &Stamps) {
         self.receive.record(stamps.received.since(stamps.woke));
         let computing = stamps.controlled.since(stamps.received);
         self.control.record(computing.plus(stamps.ended.since(stamps.sent)));

@@ -140,6 +140,8 @@ impl Cycle {
             }
             drive.status(statusword, encoder_m);
         }
+        drive.velocity_counts_s = reading.velocity_counts_s.or(drive.velocity_counts_s);
+        drive.torque = reading.torque.or(drive.torque);
         if let Some(word) = reading.digital_inputs {
             (drive.inputs, drive.inputs_part) = (Some(word), part);
         }
@@ -172,7 +174,7 @@ impl Cycle {
         if matches!(self.phase, Phase::Disabling { .. } | Phase::Stopped) {
             return silence.filter(|silence| self.better_reason(*silence).is_some());
         }
-        let asked = self.mail.asked_to_stop();
+        let asked = self.mail.asked;
         if asked != 0 {
             return Some(StopReason::Asked(asked));
         }

@@ -2,10 +2,13 @@
 
 use std::fmt::Write as _;
 
+use ilc_rt::campaign;
+use ilc_rt::campaign::replay::replay_read;
 use ilc_rt::config::data_sheet::{DataSheet, import, section};
 use ilc_rt::config::{Cell, Mode};
 use ilc_rt::design::Plan;
 use ilc_rt::library::Library;
+use ilc_rt::recording::Reader;
 use ilc_tests::campaign::{in_process, options};
 use ilc_tests::{Scratch, example_path, example_text, short};
 
@@ -145,5 +148,42 @@ fn a_data_sheet_is_read_or_refused_in_one_line() {
                 Err(error) => is_one_line(&error.to_string()),
             }
         }
+    });
+}
+
+/// A short recording without checksums, so that what is changed in it is read.
+fn recording() -> Vec<u8> {
+    let cell = short("01_gantry.toml");
+    let scratch = Scratch::new();
+    let path = scratch.file("short.mcap");
+    let mut options = options(scratch.file("library.db"), 1);
+    options.session.record = Some(path.clone());
+    // Stopped at once: a few ticks.
+    options.session.stop.store(2, std::sync::atomic::Ordering::Relaxed);
+    campaign::run(&cell, &options, in_process(&cell), None, &mut |_| {}).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let mut at = 8;
+    while at + 9 < bytes.len() - 8 {
+        let n_bytes = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        let end = at + 9 + usize::try_from(n_bytes).unwrap();
+        match bytes[at] {
+            0x06 => bytes[at + 9 + 24..at + 9 + 28].fill(0),
+            0x09 => bytes[end - 4..end].fill(0),
+            _ => {}
+        }
+        at = end;
+    }
+    bytes
+}
+
+#[test]
+fn a_recording_is_replayed_or_refused_in_one_line() {
+    let seed = recording();
+    let path = std::path::Path::new("fuzzed.mcap");
+    let whole = replay_read(Reader::new(&seed[..], path), path).unwrap();
+    assert!(whole.difference.is_none() && whole.cycles > 1, "{whole:?}");
+    fuzz("recording", &[seed], 500, |input| match replay_read(Reader::new(input, path), path) {
+        Ok(replayed) => assert!(replayed.cycles <= whole.cycles + 1000),
+        Err(error) => is_one_line(&error.to_string()),
     });
 }

@@ -13,6 +13,7 @@ pub mod loopback;
 pub(crate) mod opening;
 mod queue;
 pub mod socketcan;
+mod tapped;
 pub mod timed;
 pub mod udp_codec;
 pub mod udp_multicast;
@@ -26,6 +27,7 @@ pub use opening::{
     syntaxes,
 };
 pub use socketcan::SocketCan;
+pub use tapped::{BusEvent, BusRecord, TapCount, TappedBus};
 pub use timed::{Timed, in_process};
 pub use udp_multicast::UdpMulticast;
 pub use zenoh::ZenohBus;

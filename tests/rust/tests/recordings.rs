@@ -1,0 +1,444 @@
+//! Recordings replay: every value of the loop again, from lock-step and from real time, in every mode; what was changed
+//! in one is found and named; one that is cut off opens.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use ilc_rt::campaign::replay::{Replayed, replay};
+use ilc_rt::campaign::summary::summarize;
+use ilc_rt::campaign::{self, Outcome};
+use ilc_rt::cli::{IdentifyOptions, parse};
+use ilc_rt::config::Cell;
+use ilc_rt::fieldbus::transport::loopback;
+use ilc_rt::record::{EndStatus, Event};
+use ilc_rt::recording::{Item, Reader};
+use ilc_tests::campaign::{in_process, machine, options};
+use ilc_tests::far_side::FarSide;
+use ilc_tests::{Scratch, example, example_path, short};
+use serde_json::Value;
+
+/// Cells of every mode and architecture: positions, velocities, torque, offsets, a tool, two arms, a delta mechanism.
+const CELLS: [&str; 8] = [
+    "01_gantry.toml",
+    "02_parallel.toml",
+    "08_inputs.toml",
+    "09_delta.toml",
+    "10_cst.toml",
+    "11_csp_torque.toml",
+    "12_csp_velocity.toml",
+    "13_csv_torque.toml",
+];
+
+/// Records a campaign in lock-step.
+fn record(cell: &Cell, runs: u32, folder: &Scratch, name: &str) -> (PathBuf, Outcome) {
+    let path = folder.file(name);
+    let mut options = options(folder.file(&format!("{name}.db")), runs);
+    options.session.record = Some(path.clone());
+    let outcome = campaign::run(cell, &options, in_process(cell), None, &mut |_| {}).unwrap();
+    (path, outcome)
+}
+
+fn the_same(path: &Path) -> Replayed {
+    let replayed = replay(path).unwrap();
+    assert_eq!(replayed.difference, None, "{replayed:?}");
+    assert_eq!((replayed.lost_at, replayed.cut), (None, false));
+    replayed
+}
+
+/// Returns the messages of the loop, as text, in their order.
+fn loop_of(path: &Path) -> Vec<String> {
+    let mut reader = Reader::open(path).unwrap();
+    let mut all = Vec::new();
+    while let Some(item) = reader.next_item().unwrap() {
+        match item {
+            Item::Cycle(at, cycle) => all.push(format!("{at} {cycle:?}")),
+            Item::Axis(name, axis) => all.push(format!("{name} {axis:?}")),
+            Item::Frames(at, frames) => all.push(format!("{at} {frames:?}")),
+            Item::Table(table) => all.push(format!("{table:?}")),
+            Item::Loop(_) | Item::Timing(_) | Item::Event(_) => {}
+        }
+    }
+    all
+}
+
+#[test]
+fn two_recordings_of_a_campaign_in_lock_step_are_the_same_and_so_is_their_replay() {
+    for name in CELLS {
+        let cell = example(name);
+        let folder = Scratch::new();
+        let (first, outcome) = record(&cell, 2, &folder, "first.mcap");
+        assert_eq!(outcome.status, EndStatus::Completed, "{name}: {}", outcome.reason);
+        let replayed = the_same(&first);
+        assert_eq!(replayed.runs, 2, "{name}");
+        assert!(replayed.cycles > 100 && replayed.frames > replayed.cycles, "{name} {replayed:?}");
+        if replayed.law_is_not_run.is_none() {
+            assert!(replayed.learned >= 1, "{name}: {replayed:?}");
+        }
+        let (second, _) = record(&cell, 2, &folder, "second.mcap");
+        assert!(loop_of(&first) == loop_of(&second), "{name}");
+    }
+}
+
+#[test]
+fn a_part_program_is_carried_along() {
+    let folder = Scratch::new();
+    let cell = Cell::load(&example_path("04_gcode.toml")).unwrap();
+    let (path, outcome) = record(&cell, 1, &folder, "gcode.mcap");
+    assert_eq!(outcome.status, EndStatus::Completed, "{}", outcome.reason);
+    assert_eq!(the_same(&path).runs, 1);
+}
+
+#[test]
+fn a_recording_in_real_time_replays() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let path = folder.file("realtime.mcap");
+    let mut options = options(folder.file("library.db"), 3);
+    options.session.lockstep = false;
+    options.session.simulated = true;
+    options.session.record = Some(path.clone());
+    let (near, far) = loopback::pair(1024).unwrap();
+    let far_side = FarSide::serve(Box::new(far), machine(&cell));
+    let outcome = campaign::run(&cell, &options, Box::new(near), None, &mut |_| {}).unwrap();
+    drop(far_side);
+    let replayed = the_same(&path);
+    assert!(replayed.cycles > 100, "{replayed:?} {}", outcome.reason);
+    let summary = summarize(&path).unwrap();
+    assert_eq!((summary.lost, summary.cut, summary.lockstep), (0, false, false));
+    assert_eq!(summary.cycles, replayed.cycles);
+}
+
+#[test]
+fn a_recording_of_a_stop_in_real_time_replays() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let path = folder.file("stopped.mcap");
+    let mut options = options(folder.file("library.db"), 100);
+    options.session.lockstep = false;
+    options.session.simulated = true;
+    options.session.record = Some(path.clone());
+    let stop = Arc::clone(&options.session.stop);
+    let (near, far) = loopback::pair(1024).unwrap();
+    let far_side = FarSide::serve(Box::new(far), machine(&cell));
+    let mut observe = |event: &Event| {
+        if matches!(event, Event::Progress { iteration: 1, .. }) {
+            stop.store(15, Ordering::Relaxed);
+        }
+    };
+    let outcome = campaign::run(&cell, &options, Box::new(near), None, &mut observe).unwrap();
+    drop(far_side);
+    assert_eq!(outcome.status, EndStatus::Interrupted, "{}", outcome.reason);
+    assert_eq!(the_same(&path).runs, 1);
+    assert_eq!(summarize(&path).unwrap().stopped.as_deref(), Some("Asked(15)"));
+}
+
+#[test]
+fn an_experiment_replays() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let words =
+        ["--axis", "y", "--periods", "2", "--period-s", "0.5", "--from-hz", "4", "--to-hz", "20"];
+    let mut asked: IdentifyOptions = parse(&words.map(str::to_owned)).unwrap();
+    asked.session = options(folder.file("library.db"), 1).session;
+    asked.session.record = Some(folder.file("experiment.mcap"));
+    let experiment = asked.experiment.experiment(&cell, None).unwrap();
+    for _ in 0..2 {
+        let bus = in_process(&cell);
+        campaign::identify(&cell, &experiment, &asked.session, bus, &mut |_| {}).unwrap();
+    }
+    // The second experiment of a session has a file of its own.
+    for name in ["experiment.mcap", "experiment-2.mcap"] {
+        let replayed = the_same(&folder.file(name));
+        assert_eq!(replayed.runs, 1, "{name}");
+        assert_eq!(replayed.law_is_not_run.as_deref(), Some("there is no law"));
+    }
+}
+
+/// Kinds of records of the format that the tests change.
+const CHUNK: u8 = 0x06;
+const MESSAGE: u8 = 0x05;
+const ATTACHMENT: u8 = 0x09;
+
+/// Copies a recording with changes, and without the checksums that would tell them at once. `change` gets the content
+/// of each message and attachment, until it returns true.
+fn changed(path: &Path, mut change: impl FnMut(&mut Vec<u8>) -> bool) -> PathBuf {
+    let bytes = std::fs::read(path).unwrap();
+    let mut out = bytes[..8].to_vec();
+    let mut is_done = false;
+    let put = |out: &mut Vec<u8>, kind: u8, content: &[u8]| {
+        out.push(kind);
+        out.extend_from_slice(&(content.len() as u64).to_le_bytes());
+        out.extend_from_slice(content);
+    };
+    for (kind, content) in records(&bytes[8..bytes.len() - 8]) {
+        match kind {
+            CHUNK => {
+                let mut inside = Vec::new();
+                for (kind, content) in records(&content[40..]) {
+                    let mut content = content.to_vec();
+                    if kind == MESSAGE && !is_done {
+                        let mut data = content.split_off(22);
+                        is_done = change(&mut data);
+                        content.extend_from_slice(&data);
+                    }
+                    put(&mut inside, kind, &content);
+                }
+                let n_bytes = (inside.len() as u64).to_le_bytes();
+                let mut head = content[..16].to_vec();
+                head.extend_from_slice(&n_bytes);
+                // No checksum, no compression.
+                head.extend_from_slice(&[0; 8]);
+                head.extend_from_slice(&n_bytes);
+                head.extend_from_slice(&inside);
+                put(&mut out, kind, &head);
+            }
+            ATTACHMENT => {
+                let mut content = content[..content.len() - 4].to_vec();
+                if !is_done {
+                    is_done = change(&mut content);
+                }
+                content.extend_from_slice(&[0; 4]);
+                put(&mut out, kind, &content);
+            }
+            _ => put(&mut out, kind, content),
+        }
+    }
+    assert!(is_done, "nothing was changed");
+    let to = path.with_extension("changed.mcap");
+    std::fs::write(&to, out).unwrap();
+    to
+}
+
+fn records(mut bytes: &[u8]) -> Vec<(u8, &[u8])> {
+    let mut found = Vec::new();
+    while !bytes.is_empty() {
+        let n_bytes = usize::try_from(u64::from_le_bytes(bytes[1..9].try_into().unwrap())).unwrap();
+        found.push((bytes[0], &bytes[9..9 + n_bytes]));
+        bytes = &bytes[9 + n_bytes..];
+    }
+    found
+}
+
+/// Changes the message with these keys in a cycle.
+fn in_cycle(
+    cycle: u64,
+    key: &'static str,
+    mut change: impl FnMut(&mut Value),
+) -> impl FnMut(&mut Vec<u8>) -> bool {
+    move |data| {
+        let Ok(mut message) = serde_json::from_slice::<Value>(data) else { return false };
+        if message["cycle"] != cycle || message.get(key).is_none() {
+            return false;
+        }
+        change(&mut message[key]);
+        *data = serde_json::to_vec(&message).unwrap();
+        true
+    }
+}
+
+/// Flips the lowest bit of a byte of a frame as noted.
+fn flip(frames: &mut Value, id: &str, byte: usize) {
+    let place =
+        frames.as_array().unwrap().iter().position(|text| text.as_str().unwrap().starts_with(id));
+    let text = frames[place.unwrap()].as_str().unwrap().to_owned();
+    let (head, data) = text.split_once('#').unwrap();
+    let mut data: Vec<char> = data.chars().collect();
+    let digit = data[2 * byte + 1].to_digit(16).unwrap() ^ 1;
+    data[2 * byte + 1] = char::from_digit(digit, 16).unwrap().to_ascii_uppercase();
+    frames[place.unwrap()] = format!("{head}#{}", data.iter().collect::<String>()).into();
+}
+
+/// The first difference: cycle, axes, field.
+fn found(path: &Path) -> (u64, Vec<String>, String) {
+    let difference = replay(path).unwrap().difference.expect("a difference");
+    assert_ne!(difference.recorded, difference.replayed);
+    (difference.cycle, difference.axes, difference.field)
+}
+
+#[test]
+fn one_bit_that_was_changed_is_found_and_named() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let (path, _) = record(&cell, 3, &folder, "whole.mcap");
+    let (x, y, both) =
+        (vec!["x".to_owned()], vec!["y".to_owned()], vec!["x".to_owned(), "y".to_owned()]);
+
+    // The lowest bit of the position that the drive of y reports.
+    let planted = changed(&path, in_cycle(300, "received", |frames| flip(frames, "182#", 2)));
+    assert_eq!(found(&planted), (300, y.clone(), "position_m".to_owned()));
+    // The lowest bit of the torque that it reports, which the loop does not use.
+    let planted = changed(&path, in_cycle(301, "received", |frames| flip(frames, "182#", 6)));
+    assert_eq!(found(&planted), (301, y.clone(), "drive_torque".to_owned()));
+    // The target that the loop sent to x.
+    let planted = changed(&path, in_cycle(302, "sent", |frames| flip(frames, "201#", 2)));
+    assert_eq!(found(&planted), (302, x.clone(), "RPDO1, target position 0x607A:00".to_owned()));
+    // A frame of the loop that is not there.
+    let planted = changed(
+        &path,
+        in_cycle(303, "sent", |frames| {
+            frames.as_array_mut().unwrap().remove(0);
+        }),
+    );
+    assert_eq!(found(&planted), (303, x.clone(), "RPDO1".to_owned()));
+    // An answer twice.
+    let planted = changed(
+        &path,
+        in_cycle(304, "received", |frames| {
+            let first = frames[0].clone();
+            frames.as_array_mut().unwrap().insert(0, first);
+        }),
+    );
+    assert_eq!(found(&planted).0, 304);
+    // Number of missed cycles: a value of the whole loop.
+    let planted = changed(&path, in_cycle(305, "missed", |missed| *missed = 1.into()));
+    assert_eq!(found(&planted), (305, both.clone(), "overruns".to_owned()));
+    // A request to stop.
+    let planted = changed(&path, in_cycle(306, "asked", |asked| *asked = 2.into()));
+    assert_eq!(found(&planted).0, 306);
+    // The feed override.
+    let planted = changed(&path, in_cycle(700, "feed_percent", |feed| *feed = 99.into()));
+    assert!(found(&planted).0 >= 700);
+    // The lowest bit of what was recorded to be plotted.
+    let planted = changed(
+        &path,
+        in_cycle(307, "correction", |value| {
+            *value = f64::from_bits(value.as_f64().unwrap().to_bits() ^ 1).into();
+        }),
+    );
+    assert_eq!(found(&planted), (307, x, "correction".to_owned()));
+    // The lowest bit of one sample of the learned input of y.
+    let planted = changed(&path, |data| {
+        let Ok(mut message) = serde_json::from_slice::<Value>(data) else { return false };
+        let Some(entry) = message.get_mut("input").and_then(|input| input.get_mut(401)) else {
+            return false;
+        };
+        *entry = f64::from_bits(entry.as_f64().unwrap().to_bits() ^ 1).into();
+        *data = serde_json::to_vec(&message).unwrap();
+        true
+    });
+    let (_, axes, field) = found(&planted);
+    assert_eq!((axes, field.as_str()), (y, "learned input in table 1, sample 200"));
+}
+
+#[test]
+fn without_its_law_a_changed_input_is_found_where_it_is_applied() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let (path, _) = record(&cell, 2, &folder, "whole.mcap");
+    // As a recording of a law written in Python.
+    let foreign = changed(&path, |data| {
+        let text = String::from_utf8_lossy(data).into_owned();
+        let (own, other) = ("\"law_is_not_run\":null", "\"law_is_not_run\":\"it\"");
+        *data = text.replace(own, other).into_bytes();
+        text.contains(own)
+    });
+    assert_eq!(the_same(&foreign).learned, 0);
+    let planted = changed(&foreign, |data| {
+        let Ok(mut message) = serde_json::from_slice::<Value>(data) else { return false };
+        let Some(entry) = message.get_mut("input").and_then(|input| input.get_mut(400)) else {
+            return false;
+        };
+        *entry = f64::from_bits(entry.as_f64().unwrap().to_bits() ^ 1).into();
+        *data = serde_json::to_vec(&message).unwrap();
+        true
+    });
+    let (_, axes, field) = found(&planted);
+    assert_eq!((axes, field.as_str()), (vec!["x".to_owned()], "correction"));
+}
+
+#[test]
+fn a_recording_that_is_cut_off_opens_up_to_there() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let (path, _) = record(&cell, 2, &folder, "whole.mcap");
+    let bytes = std::fs::read(&path).unwrap();
+    let whole = the_same(&path);
+    let mut last = 0;
+    for share in [0.6, 0.8, 0.9, 0.99] {
+        let cut = folder.file("cut.mcap");
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share")]
+        let n_bytes = (bytes.len() as f64 * share) as usize;
+        std::fs::write(&cut, &bytes[..n_bytes]).unwrap();
+        let replayed = replay(&cut).unwrap();
+        assert_eq!(replayed.difference, None, "{share}");
+        assert!(replayed.cut && replayed.cycles >= last && replayed.cycles <= whole.cycles);
+        last = replayed.cycles;
+        assert!(summarize(&cut).unwrap().cut);
+    }
+    assert!(last > whole.cycles / 2, "{last} of {}", whole.cycles);
+}
+
+#[test]
+fn what_was_changed_by_hand_is_refused() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let (path, _) = record(&cell, 1, &folder, "whole.mcap");
+    let said = |path: &Path| replay(path).unwrap_err().to_string();
+
+    // The cell description, with its checksum and without.
+    let edited = changed(&path, |data| {
+        let text = String::from_utf8_lossy(data).into_owned();
+        let is_there = text.contains("position_max_m = ");
+        *data = text.replace("position_max_m = 0", "position_max_m = 1").into_bytes();
+        is_there
+    });
+    assert!(said(&edited).contains("its cell description was changed"), "{}", said(&edited));
+    // A byte in a chunk, with its checksum.
+    let mut bytes = std::fs::read(&path).unwrap();
+    let place = bytes.windows(8).position(|part| part == b"\"cycle\":").unwrap();
+    bytes[place + 1] = b'C';
+    let damaged = folder.file("damaged.mcap");
+    std::fs::write(&damaged, bytes).unwrap();
+    assert!(said(&damaged).contains("checksum differs"), "{}", said(&damaged));
+    // No recording at all.
+    std::fs::write(&damaged, "cycle,x,y\n").unwrap();
+    assert!(said(&damaged).contains("not a recording"), "{}", said(&damaged));
+}
+
+#[test]
+fn the_oldest_recordings_of_a_cell_are_deleted_and_none_that_is_written() {
+    let folder = Scratch::new();
+    let place = folder.file("recordings");
+    std::fs::create_dir(&place).unwrap();
+    let mut cell = short("01_gantry.toml");
+    cell.recording.folder = Some(place.clone());
+    cell.recording.keep = 2;
+    let other = place.join("press@1.mcap");
+    std::fs::write(&other, "of another cell").unwrap();
+    let held = place.join("gantry@0.mcap");
+    let writer = std::fs::File::create(&held).unwrap();
+    writer.lock().unwrap();
+    let mut made = Vec::new();
+    for run in 0..3 {
+        let mut options = options(folder.file(&format!("{run}.db")), 1);
+        options.session.record = None;
+        let mut observe = |event: &Event| {
+            if let Event::Recording { file, .. } = event {
+                made.push(PathBuf::from(file));
+            }
+        };
+        campaign::run(&cell, &options, in_process(&cell), None, &mut observe).unwrap();
+    }
+    assert_eq!(made.len(), 3);
+    let left: Vec<bool> = made.iter().map(|path| path.exists()).collect();
+    assert!(other.exists() && held.exists());
+    // With the one that is being written they are two.
+    assert_eq!(left, [false, false, true], "{made:?}");
+    the_same(&made[2]);
+}
+
+#[test]
+fn a_recording_does_not_replace_a_file() {
+    let cell = example("01_gantry.toml");
+    let folder = Scratch::new();
+    let path = folder.file("mine.mcap");
+    std::fs::write(&path, "mine").unwrap();
+    let mut options = options(folder.file("library.db"), 1);
+    options.session.record = Some(path.clone());
+    let refusal = campaign::run(&cell, &options, in_process(&cell), None, &mut |_| {}).unwrap_err();
+    assert!(refusal.to_string().contains("nothing has moved"), "{refusal}");
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+}
