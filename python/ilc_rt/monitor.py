@@ -179,9 +179,17 @@ class Monitor(Closing):
     def ask_state(self, cell: str | None = None) -> list[Message]:
         """Query the current state, for late joiners.
 
-        One message per controller that replied.
+        Every reply of a controller is a message, in their order: the newest event of the topic
+        ``state``, after the start of the campaign if the controller also answers with that.
         """
-        replies = self._session.get(f"ilc/{cell or self._cell}/state", timeout=2.0)
+        import zenoh
+
+        replies = self._session.get(
+            f"ilc/{cell or self._cell}/state",
+            timeout=2.0,
+            # Otherwise one reply for each key is left.
+            consolidation=zenoh.ConsolidationMode.NONE,
+        )
         messages = [_message(reply.ok) for reply in replies if reply.ok is not None]
         return [message for message in messages if message is not None]
 

@@ -112,8 +112,10 @@ class Memory(Closing):
     def __init__(self, addresses: Iterable[str | Path] = ()) -> None:
         self._sources = tuple(map(source, addresses))
 
-    def campaign(self, cell: str, digest: str | None = None) -> list[Any]:
-        """Return the runs of the newest campaign of a cell that has a run of this digest.
+    def campaign(
+        self, cell: str, campaign: str | None = None, digest: str | None = None
+    ) -> list[Any]:
+        """Return the runs of a campaign of a cell, chosen as by `campaign_of`.
 
         Empty if there is none, or if nothing can be read now: to watch is what matters.
         """
@@ -121,7 +123,7 @@ class Memory(Closing):
         for one in self._sources:
             with contextlib.suppress(BadInputError):
                 rows += one.rows() if one.stamp() is not None else []
-        return campaign_of(rows, cell, None, digest)
+        return campaign_of(rows, cell, campaign, digest)
 
     def close(self) -> None:
         """Close the connections to databases."""

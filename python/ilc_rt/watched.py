@@ -273,11 +273,10 @@ class WatchedCell:
 
     def lacks(self, message: Message) -> bool:
         """Return whether a library may have what was not heard before this message."""
-        event = message.event
-        if isinstance(event, StartEvent):
-            return event.first_index > 0
+        if message.topic == "alive" or isinstance(message.event, StartEvent):
+            return True
         is_unknown = self.start is None and self.campaign is None
-        return message.topic == "alive" or (isinstance(event, IterationEvent) and is_unknown)
+        return isinstance(message.event, IterationEvent) and is_unknown
 
     def recall(self, records: Iterable[IterationRecord]) -> None:
         """Take over the earlier runs of a campaign that goes on; those that were heard stay."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import shutil
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from watched_fixture import STAGES, START, batch, ended, fed, said
 
-from ilc_rt import BadInputError, Cell, Library
+from ilc_rt import BadInputError, Library
 from ilc_rt.dashboard import charts
 from ilc_rt.dashboard.archive import Archive, distance, relevance
 from ilc_rt.dashboard.capture import Capture
@@ -20,62 +20,12 @@ from ilc_rt.dashboard.model import CellModel
 from ilc_rt.dashboard.notes import NOTE_MAX, notes_file, read_notes, write_note
 from ilc_rt.dashboard.status import SILENT_S, SYMBOLS, axis_words, run_words
 from ilc_rt.dashboard.window import Window
-from ilc_rt.events import parse_event
 from ilc_rt.monitor import Message
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from ilc_rt import CampaignResult
-
-START = {
-    "event": "start", "cell": "gantry", "campaign": "c1", "n_samples": 50, "n_axes": 2,
-    "axis_names": ["x", "y"], "cycle_s": 0.002, "first_index": 0, "iterations": 4,
-    "measure": "encoder", "law": "pd", "bus": "loopback:", "mode": "realtime",
-    "input_units": ["m", "m"],
-}  # fmt: skip
-STAGES = {"wake_us": 2000.0, "receive_us": 9.0, "control_us": 8.0, "send_us": 7.0, "slack_us": 0.0}
-
-
-def said(payload: dict[str, Any], topic: str = "state") -> Message:
-    """Return a message as the monitor reads it."""
-    return Message("gantry", topic, payload, parse_event(json.dumps(payload)))
-
-
-def ended(index: int, error_m: float, **more: object) -> Message:
-    """Return the end of a run."""
-    return said(
-        {
-            "event": "iteration", "id": index + 1, "index": index, "tracking_inf_m": error_m,
-            "tracking_rms_m": error_m / 2, "contour_inf_m": error_m / 4,
-            "contour_rms_m": error_m / 8, "axes_tracking_inf_m": [error_m, error_m / 3],
-            "axes_tracking_rms_m": [error_m / 2, error_m / 6], "overruns": 1, "update_ms": 0.3,
-            **more,
-        },
-        "iteration",
-    )  # fmt: skip
-
-
-def batch(first: int, iteration: int | None = 0, sample: int = 0, n: int = 25) -> Message:
-    """Return a batch of cycles: x lags 10 um behind, once 500 um; y is at rest."""
-    rows = [[0.001 * (first + k), 0.5] for k in range(n)]
-    encoder = [[x - (5e-4 if first + k == 40 else 1e-5), y] for k, (x, y) in enumerate(rows)]
-    return Message("gantry", "servo", {
-        "event": "servo", "first_sync": first,
-        "iteration_and_sample": [
-            None if iteration is None else [iteration, sample + k] for k in range(n)
-        ],
-        "reference_m": rows, "input": [[1e-4, 0.0]] * n, "encoder_m": encoder,
-        "tool_m": [[None, None]] * n,
-    })  # fmt: skip
-
-
-def fed(*messages: Message, model: CellModel | None = None) -> CellModel:
-    """Return a model after messages, a tenth of a second apart."""
-    model = model or CellModel("gantry")
-    for number, message in enumerate(messages):
-        model.apply(message, 0.1 * number, 1e9 + 0.1 * number)
-    return model
 
 
 def test_a_peak_of_one_cycle_survives_thinning() -> None:
@@ -197,113 +147,9 @@ def test_silence_is_told_and_ends_by_itself() -> None:
     assert any("is back" in note.text for note in model.log)
 
 
-def test_another_campaign_whose_start_was_missed_begins_its_runs_anew() -> None:
-    model = fed(said(START), ended(0, 1e-3), ended(1, 1e-4), ended(2, 1e-5))
-    fed(ended(1, 2e-3, digest="another"), model=model)
-    assert [run.index for run in model.records] == [1]
-    assert model.campaign is None
-
-
-def test_a_state_after_the_end_belongs_to_the_next_campaign() -> None:
-    reason = "node 2 is silent"
-    end = said({"event": "end", "status": "fault", "iterations": 1, "reason": reason})
-    fault = said({"event": "fault", "reason": reason, "axis": "y"}, "fault")
-    model = fed(said(START), ended(0, 1e-3), fault, end)
-    assert [note.kind for note in model.notes] == ["fault"], "the reason is said once"
-    assert [note.text for note in model.log][-2:] == [reason, "fault after 1 run"]
-    fed(said({"event": "state", "state": "bringing_up"}), model=model)
-    assert (model.records, model.campaign, model.fault, model.notes) == ([], None, None, [])
-    assert not any(axis.is_faulty for axis in model.axes)
-    assert model.axis_names == ("x", "y"), "the axes are those of the cell"
-    assert reason in [note.text for note in model.log], "the log goes on"
-
-
-def test_a_run_that_the_library_had_already_is_the_same_run(finished: CampaignResult) -> None:
-    archive = Archive([finished.library])
-    rows = archive.campaign("gantry")
-    model = fed(said({"event": "state", "state": "running", "iteration": 2}))
-    model.remember(rows, "")
-    fed(ended(2, 2e-3, digest=rows[2]["digest"]), model=model)
-    assert [run.index for run in model.records] == [0, 1, 2]
-    assert model.records[2].tracking_inf_m == 2e-3
-    assert model.campaign == rows[0]["campaign"]
-
-
-def test_a_first_run_like_that_of_the_library_begins_another_campaign(
-    finished: CampaignResult,
-) -> None:
-    """Simulated cells make the same first run each time."""
-    archive = Archive([finished.library])
-    rows = archive.campaign("gantry")
-    model = fed()
-    model.remember(rows, "")
-    fed(ended(0, 1e-3, digest=rows[0]["digest"]), ended(1, 1e-4, digest="new"), model=model)
-    assert [run.index for run in model.records] == [0, 1]
-    assert model.campaign is None
-    model.remember(rows, "")
-    fed(said({"event": "state", "state": "running", "iteration": 1}), model=model)
-    assert model.records == [], "two runs were made, the library has three"
-
-
-def test_a_run_tells_the_campaign_whose_start_was_not_heard(
-    finished: CampaignResult, tmp_path: Path
-) -> None:
-    """By its digest, though the library has a newer campaign of the cell."""
-    library = Library(tmp_path / "l.db")
-    shutil.copy(finished.library, library.path)
-    zeros = np.zeros((4, 2))
-    library.append(zeros, zeros + 1.0, 0.002, cell="gantry", campaign="newer")
-    archive = Archive([library.path])
-    last = archive.campaign("gantry", finished.campaign)[-1]
-    model = fed(said({"event": "state", "state": "returning", "iteration": 3}))
-    event = ended(2, 1e-5, digest=last["digest"])
-    fed(event, model=model)
-    assert model.lacks(event)
-    assert archive.campaign("gantry")[0]["campaign"] == "newer"
-    model.remember(archive.campaign("gantry", None, last["digest"]), "")
-    assert (model.campaign, [run.index for run in model.records]) == (finished.campaign, [0, 1, 2])
-    assert not model.lacks(event)
-    assert not model.lacks(said(START))
-    assert model.lacks(said(START | {"first_index": 3}))
-
-
-def test_an_older_campaign_of_the_library_tells_the_axes_alone(finished: CampaignResult) -> None:
-    """The first run of a campaign that has stored nothing yet is not the fourth of another."""
-    archive = Archive([finished.library])
-    model = fed(said({"event": "state", "state": "running", "iteration": 0}))
-    model.remember(archive.campaign("gantry"), "")
-    assert (model.axis_names, model.law) == (("x", "y"), archive.rows()[0]["law"])
-    assert (model.records, model.campaign) == ([], None)
-
-
 def test_drives_that_are_brought_up_are_not_silent() -> None:
     model = fed(said({"event": "state", "state": "bringing_up"}))
     assert model.status(60.0).words == "bringing the drives up"
-
-
-def test_a_late_joiner_takes_its_history_from_the_library(finished: CampaignResult) -> None:
-    archive = Archive([finished.library])
-    model = fed(said({"event": "state", "state": "running", "iteration": 3}))
-    model.remember(archive.campaign("gantry"), "")
-    assert [run.index for run in model.records] == [0, 1, 2]
-    assert (model.axis_names, model.units) == (("x", "y"), ("m", "m"))
-    fed(ended(3, 1e-5), model=model)
-    assert [record.index for record in model.records] == [0, 1, 2, 3]
-    captured = archive.capture("gantry", model.campaign)
-    assert captured is not None
-    option, factor = charts.contour(model, captured)
-    assert factor > 1
-    assert option["series"][0]["name"] == "programmed"
-    assert archive.capture("nobody", None) is None
-
-
-def test_a_description_names_the_axes_until_the_controller_does(gantry: Path) -> None:
-    model = CellModel("gantry")
-    model.describe(Cell.load(gantry))
-    assert model.axis_names == ("x", "y")
-    fed(said(START | {"axis_names": ["u", "v"]}), model=model)
-    model.describe(Cell.load(gantry))
-    assert model.axis_names == ("u", "v")
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 from ports_fixture import free_bus, free_port
+from rich.console import Console
 
+from ilc_rt import Cell
 from ilc_rt.events import EndEvent, IterationEvent, StartEvent, StateEvent, parse_event
 from ilc_rt.monitor import Message, Monitor
 from ilc_rt.result import micrometres
+from ilc_rt.sources import Memory
+from ilc_rt.watched import WatchedCell
 
 zenoh = pytest.importorskip("zenoh")
 
@@ -110,6 +114,48 @@ def test_a_late_joiner_hears_what_it_has_missed_once(publisher: Publisher) -> No
         publisher.put("iteration", iteration(12, 2e-5))
         seen = next(messages)
         assert (seen.payload["index"], seen.is_past) == (12, False)
+
+
+def test_every_answer_of_a_controller_is_heard() -> None:
+    """Also the start of a campaign before its state, should a controller answer with both."""
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    config = zenoh.Config()
+    config.insert_json5("listen/endpoints", json.dumps([endpoint]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    session = zenoh.open(config)
+    start = {
+        "event": "start", "cell": "gantry", "campaign": "c1", "n_samples": 50, "n_axes": 1,
+        "axis_names": ["x"], "cycle_s": 0.002, "first_index": 0, "iterations": 9, "measure": "tcp",
+        "law": "pd", "bus": "loopback:", "mode": "realtime", "input_units": ["m"],
+    }  # fmt: skip
+
+    def answer(query: zenoh.Query) -> None:
+        for event in (start, STATE):
+            query.reply("ilc/gantry/state", json.dumps(event))
+
+    session.declare_queryable("ilc/gantry/state", answer)
+    token = session.liveliness().declare_token("ilc/gantry/alive")
+    try:
+        with Monitor("gantry", [endpoint], scouting=False) as monitor:
+            messages = monitor.messages(30.0)
+            cell = WatchedCell("gantry")
+            for _ in range(3):
+                cell.take(next(messages))
+    finally:
+        token.undeclare()
+        session.close()
+    assert (cell.campaign, cell.axis_names, cell.state, cell.iteration) == (
+        "c1", ("x",), "running", 3
+    )  # fmt: skip
+    assert cell.done == pytest.approx(3 / 9)
+
+
+def test_a_description_names_axes_and_units_before_the_start(gantry: Path) -> None:
+    known = Cell.load(gantry)
+    screen = commands_monitor._Screen(Console(), Memory(), known)
+    screen.show(Message("gantry", "state", dict(STATE), StateEvent("running", 3)))
+    cell = screen._cells["gantry"]
+    assert (cell.axis_names, cell.units, cell.state) == (("x", "y"), ("m", "m"), "running")
 
 
 def test_garbage_on_the_network_is_passed_over(publisher: Publisher) -> None:

@@ -155,7 +155,8 @@ class _Screen:
         cell.take(message)
         if is_new or cell.lacks(message):
             digest = getattr(message.event, "digest", None)
-            cell.remember(self._memory.campaign(cell.name, digest), "")
+            campaign = cell.campaign if cell.start is not None else None
+            cell.remember(self._memory.campaign(cell.name, campaign, digest), "")
 
 
 class _View:
@@ -222,7 +223,11 @@ class _View:
 
     def _earlier(self, cell: str, record: IterationRecord) -> IterationRecord | None:
         """Return the first run of the campaign that this one was made in, from a library."""
-        rows = self._memory.campaign(cell, record.digest) if record.index and record.digest else []
+        rows = (
+            self._memory.campaign(cell, None, record.digest)
+            if record.index and record.digest
+            else []
+        )
         if not any(row["digest"] == record.digest for row in rows):
             return None
         self._units.setdefault(cell, tuple(map(axis_unit, rows[0]["input_units"])))
