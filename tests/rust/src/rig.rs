@@ -277,6 +277,11 @@ impl Rig {
         Self { cycle: self.cycle.tapped(tap), ..self }
     }
 
+    /// Returns the number of records that the taps have lost.
+    pub fn n_lost(&self) -> u64 {
+        self.count.lost()
+    }
+
     fn paced(cell: &Cell, runs: u32, lockstep: bool) -> Self {
         Self::on(Tap::new(cell), cell, runs, lockstep)
     }

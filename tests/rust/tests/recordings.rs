@@ -140,7 +140,7 @@ fn an_experiment_replays() {
     let cell = short("01_gantry.toml");
     let folder = Scratch::new();
     let words =
-        ["--axis", "y", "--periods", "2", "--period-s", "0.5", "--from-hz", "4", "--to-hz", "20"];
+        ["--axis", "y", "--periods", "2", "--period-s", "0.5", "--from-hz", "10", "--to-hz", "20"];
     let mut asked: IdentifyOptions = parse(&words.map(str::to_owned)).unwrap();
     asked.session = options(folder.file("library.db"), 1).session;
     asked.session.record = Some(folder.file("experiment.mcap"));
@@ -222,6 +222,13 @@ fn records(mut bytes: &[u8]) -> Vec<(u8, &[u8])> {
     found
 }
 
+/// Replaces the first place of some bytes by others of the same length.
+fn swap(data: &mut [u8], from: &[u8], to: &[u8]) -> bool {
+    let Some(at) = data.windows(from.len()).position(|part| part == from) else { return false };
+    data[at..at + to.len()].copy_from_slice(to);
+    true
+}
+
 /// Changes the message with these keys in a cycle.
 fn in_cycle(
     cycle: u64,
@@ -282,7 +289,7 @@ fn one_bit_that_was_changed_is_found_and_named() {
             frames.as_array_mut().unwrap().remove(0);
         }),
     );
-    assert_eq!(found(&planted), (303, x.clone(), "RPDO1".to_owned()));
+    assert_eq!(found(&planted), (303, both.clone(), "frame sent".to_owned()));
     // An answer twice.
     let planted = changed(
         &path,
@@ -329,12 +336,8 @@ fn without_its_law_a_changed_input_is_found_where_it_is_applied() {
     let folder = Scratch::new();
     let (path, _) = record(&cell, 2, &folder, "whole.mcap");
     // As a recording of a law written in Python.
-    let foreign = changed(&path, |data| {
-        let text = String::from_utf8_lossy(data).into_owned();
-        let (own, other) = ("\"law_is_not_run\":null", "\"law_is_not_run\":\"it\"");
-        *data = text.replace(own, other).into_bytes();
-        text.contains(own)
-    });
+    let foreign =
+        changed(&path, |data| swap(data, b"\"law_is_not_run\":null", b"\"law_is_not_run\":\"it\""));
     assert_eq!(the_same(&foreign).learned, 0);
     let planted = changed(&foreign, |data| {
         let Ok(mut message) = serde_json::from_slice::<Value>(data) else { return false };
@@ -379,12 +382,7 @@ fn what_was_changed_by_hand_is_refused() {
     let said = |path: &Path| replay(path).unwrap_err().to_string();
 
     // The cell description, with its checksum and without.
-    let edited = changed(&path, |data| {
-        let text = String::from_utf8_lossy(data).into_owned();
-        let is_there = text.contains("position_max_m = ");
-        *data = text.replace("position_max_m = 0", "position_max_m = 1").into_bytes();
-        is_there
-    });
+    let edited = changed(&path, |data| swap(data, b"position_max_m = 0", b"position_max_m = 1"));
     assert!(said(&edited).contains("its cell description was changed"), "{}", said(&edited));
     // A byte in a chunk, with its checksum.
     let mut bytes = std::fs::read(&path).unwrap();
@@ -441,4 +439,63 @@ fn a_recording_does_not_replace_a_file() {
     let refusal = campaign::run(&cell, &options, in_process(&cell), None, &mut |_| {}).unwrap_err();
     assert!(refusal.to_string().contains("nothing has moved"), "{refusal}");
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+}
+
+#[test]
+fn behind_lost_records_nothing_is_compared() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let (path, _) = record(&cell, 1, &folder, "whole.mcap");
+    let lossy = changed(&path, in_cycle(400, "lost", |lost| *lost = 3.into()));
+    let replayed = replay(&lossy).unwrap();
+    assert_eq!((replayed.lost_at, replayed.cycles), (Some(400), 400));
+    assert_eq!(replayed.difference, None);
+}
+
+#[test]
+fn a_recording_that_grows_too_large_ends_and_the_runs_go_on() {
+    let folder = Scratch::new();
+    let place = folder.file("recordings");
+    let mut cell = short("01_gantry.toml");
+    (cell.recording.folder, cell.recording.keep_mb) = (Some(place), Some(1));
+    let mut told = Vec::new();
+    let mut observe = |event: &Event| {
+        if let Event::Recording { file, reason, .. } = event {
+            told.push((PathBuf::from(file), reason.clone()));
+        }
+    };
+    let options = options(folder.file("library.db"), 6);
+    let outcome = campaign::run(&cell, &options, in_process(&cell), None, &mut observe).unwrap();
+    assert_eq!((outcome.status, outcome.runs.len()), (EndStatus::Completed, 6));
+    let reason = told[1].1.as_deref().unwrap();
+    assert!(reason.contains("ends early") && reason.contains("1000000"), "{told:?}");
+    let size = std::fs::metadata(&told[0].0).unwrap().len();
+    assert!((1_000_000..2_500_000).contains(&size), "{size}");
+    assert!(the_same(&told[0].0).cycles > 200);
+}
+
+#[test]
+fn the_late_cycles_of_a_recording_are_those_of_the_flight_recorder() {
+    let cell = short("01_gantry.toml");
+    let folder = Scratch::new();
+    let path = folder.file("realtime.mcap");
+    let mut options = options(folder.file("library.db"), 1);
+    options.session.lockstep = false;
+    options.session.simulated = true;
+    options.session.record = Some(path.clone());
+    let (near, far) = loopback::pair(1024).unwrap();
+    let far_side = FarSide::serve(Box::new(far), machine(&cell));
+    let mut told = None;
+    let mut observe = |event: &Event| {
+        if let Event::Latency { late, wake_late_us, .. } = event {
+            told = Some((*late, wake_late_us.count));
+        }
+    };
+    campaign::run(&cell, &options, Box::new(near), None, &mut observe).unwrap();
+    drop(far_side);
+    let record = campaign::late_of(&path).unwrap();
+    assert_eq!((record.late, record.stages_us.wake.count), told.unwrap());
+    assert_eq!(record.cell, "gantry");
+    let (lockstep, _) = crate::record(&cell, 1, &folder, "lockstep.mcap");
+    assert!(campaign::late_of(&lockstep).unwrap_err().to_string().contains("lock-step"));
 }

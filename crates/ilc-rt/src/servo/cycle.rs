@@ -260,7 +260,7 @@ impl Cycle {
         let Some(mut tap) = self.tap.take() else { return self.step(missed) };
         tap.begin(missed);
         let status = self.step(missed);
-        tap.end(self);
+        self.record(&mut tap);
         self.tap = Some(tap);
         status
     }

@@ -19,6 +19,7 @@ mod pending;
 mod phase;
 mod realtime;
 mod receive;
+mod rows;
 mod silence;
 mod spec;
 mod stall;

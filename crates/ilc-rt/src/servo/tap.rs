@@ -11,7 +11,6 @@ use std::sync::Arc;
 
 use rtrb::Producer;
 
-use super::cycle::Cycle;
 use super::inputs::InputBits;
 use super::mailbox::StopReason;
 use super::orders::OrdersSeen;
@@ -143,62 +142,24 @@ impl Tap {
         }
     }
 
-    /// Ends a tick: records the loop and its axes, all of them or none.
-    pub(super) fn end(&mut self, cycle: &Cycle) {
-        let tick = self.tick;
+    /// Ends a tick of so many axes; returns whether there is room for its rows, all of them or none.
+    pub(super) fn has_room(&mut self, n_axes: usize) -> bool {
         self.tick += 1;
         self.count.set_tick(self.tick);
-        if self.records.slots() <= cycle.n_axes() {
+        let has_room = self.records.slots() > n_axes;
+        if !has_room {
             self.count.lose(1);
-            return;
         }
-        let row = cycle.row(tick, self.at, self.missed, self.count.lost());
-        // There is room, checked above.
-        let _ = self.records.push(LoopRecord::Loop(row));
-        for axis in 0..cycle.n_axes() {
-            let _ = self.records.push(LoopRecord::Axis(cycle.axis_row(axis)));
-        }
-    }
-}
-
-impl Cycle {
-    fn row(&self, tick: u64, at: Nanos, missed: u32, lost: u64) -> LoopRow {
-        LoopRow {
-            tick,
-            at,
-            missed,
-            asked: self.mail.asked,
-            orders: self.mail.seen,
-            table: self.table.number,
-            phase: self.phase_name(),
-            run: self.run,
-            sample: self.phase.sample(),
-            overruns: self.run_overruns,
-            scaled: self.run_scaled,
-            scale: self.feed.scale(),
-            tool_m: [self.tool_m[0], self.tool_m[1]],
-            inputs: self.input_bits,
-            stopping: self.stopping,
-            lost,
-        }
+        has_room
     }
 
-    fn axis_row(&self, axis: usize) -> AxisRow {
-        let drive = &self.drives[axis];
-        let answered_m = self.pending.answered_reference_m(axis);
-        AxisRow {
-            reference_m: self.reference.position_m[axis],
-            reference_m_s: self.reference.velocity_m_s[axis],
-            correction: self.input.value()[axis],
-            position_m: drive.encoder_m,
-            velocity_m_s: drive.encoder_m_s,
-            error_m: answered_m.map_or(0.0, |reference_m| reference_m - drive.encoder_m),
-            following_error_m: drive.following_error_m,
-            command: self.commanded[0][axis],
-            sent: drive.sent,
-            statusword: drive.statusword,
-            drive_counts_s: drive.velocity_counts_s,
-            torque: drive.torque,
-        }
+    /// Records a row, for which there is room.
+    pub(super) fn record(&mut self, record: LoopRecord) {
+        let _ = self.records.push(record);
+    }
+
+    /// Returns number and time of the tick, the cycles missed before it, and the records lost so far.
+    pub(super) fn now(&self) -> (u64, Nanos, u32, u64) {
+        (self.tick, self.at, self.missed, self.count.lost())
     }
 }

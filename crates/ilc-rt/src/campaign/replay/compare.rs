@@ -7,7 +7,6 @@ use super::Difference;
 use super::line::Unlike;
 use crate::design::Plan;
 use crate::fieldbus::Frame;
-use crate::fieldbus::canopen::sync;
 use crate::fieldbus::cia402::pdo_map::{COMMAND_PDO, OFFSET_PDO};
 use crate::fieldbus::cia402::{PdoLayout, PdoMap, objects};
 use crate::recording::frame_text;
@@ -53,25 +52,27 @@ pub(super) fn frame(
         recorded: shown(recorded),
         replayed: shown(replayed),
     };
-    let Some(either) = recorded.or(replayed) else { return difference };
-    if sync::is_sync(&either) {
-        "SYNC".clone_into(&mut difference.field);
-    }
+    let ids = [recorded, replayed].map(|frame| frame.map(|frame| frame.id()));
+    let mut axes = Vec::new();
     for ((axis, spec), map) in plan.servo.axes.iter().enumerate().zip(maps) {
         for (pdo, layout, what) in
             [(COMMAND_PDO, &map.command, "RPDO1"), (OFFSET_PDO, &map.offset, "RPDO2")]
         {
-            if either.id() != pdo.default_cob_id(spec.node) {
+            if !ids.contains(&Some(pdo.default_cob_id(spec.node))) {
                 continue;
             }
-            difference.axes = vec![names[axis].clone()];
-            difference.field = match (recorded, replayed) {
-                (Some(then), Some(now)) if then.id() == now.id() => {
-                    format!("{what}, {}", object(layout, &then, &now))
-                }
-                _ => what.to_owned(),
-            };
+            axes.push(names[axis].clone());
+            if let (Some(then), Some(now)) = (recorded, replayed)
+                && then.id() == now.id()
+            {
+                difference.field = format!("{what}, {}", object(layout, &then, &now));
+            }
         }
+    }
+    // Without a command among them it concerns all.
+    if !axes.is_empty() {
+        axes.dedup();
+        difference.axes = axes;
     }
     difference
 }
