@@ -9,7 +9,7 @@ from ilc_rt import NormOptimalIlc
 
 
 def compare(n_samples: int) -> dict[str, float]:
-    """Return the median seconds of an update, of one in place, and of NumPy's copies of its three arrays."""
+    """Return the median seconds of an update, one with `out`, and copies of its three arrays."""
     law = NormOptimalIlc(axis(), n_samples, r=R)
     u, e = np.zeros(n_samples), np.sin(0.01 * np.arange(n_samples))
     given, copies = u.copy(), [np.empty(n_samples) for _ in range(3)]

@@ -46,7 +46,7 @@ def main() -> None:
         "",
         "## The way from Python and back",
         "",
-        "The same update beside copies of its three arrays, which no update from Python can fall below.",
+        "The same update beside copies of its three arrays, below which none can fall.",
         "",
     ]
     lines += table({n: progress(f"border, N = {n}", border.compare, n) for n in BORDER})
@@ -54,7 +54,7 @@ def main() -> None:
         "",
         "## Prediction of convergence, from Python",
         "",
-        "The factor by which the error of one axis falls from run to run, `r = 0.1`; equal to 1e-8.",
+        "The factor by which the error of one axis falls in a run, `r = 0.1`; equal to 1e-8.",
         "",
     ]
     lines += table({n: progress(f"predicted, N = {n}", prediction.compare, n) for n in (400, 1300)})

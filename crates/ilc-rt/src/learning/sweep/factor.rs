@@ -5,6 +5,7 @@ use thiserror::Error;
 use super::cholesky::Pivots;
 use super::record::{Record, Sizes};
 use super::recursion::Recursion;
+use super::wide::LANES;
 use super::{Stage, Stages};
 
 /// The recursion has reached steady state once the closed-loop transition over the samples passed
@@ -72,6 +73,9 @@ pub struct Gains {
     product: Vec<f64>,
 }
 
+/// Numbers after the last gains, so that whole rows of them can be read from every place.
+pub(super) const BEYOND: usize = 4 * LANES;
+
 impl Gains {
     /// Runs the recursion from the end of the run to its start, in Joseph form.
     ///
@@ -121,8 +125,8 @@ impl Gains {
             product: room(),
         };
         if stages.constant().is_empty() {
-            gains.back.reserve_exact(n_samples * sizes.back());
-            gains.fore.reserve_exact(n_samples * sizes.fore());
+            gains.back.reserve_exact(n_samples * sizes.back() + BEYOND);
+            gains.fore.reserve_exact(n_samples * sizes.fore() + BEYOND);
         }
         gains.refactor(stages)?;
         Ok(gains)
@@ -154,8 +158,10 @@ impl Gains {
         let has_constant_plant = stages.has_constant_plant();
         let mut k = n_samples;
         while k > 0 {
-            crate::interrupt::point();
             k -= 1;
+            if k.is_multiple_of(64) {
+                crate::interrupt::point();
+            }
             // The stages of the constant range are read once, and so is a constant plant.
             if !constant.contains(&k) || k + 1 == constant.end {
                 if has_constant_plant && k + 1 < n_samples {
@@ -190,6 +196,9 @@ impl Gains {
                 self.n_settled = k - constant.start + 1;
                 k = constant.start;
             }
+        }
+        for gains in [&mut self.back, &mut self.fore] {
+            gains.resize(gains.len() + BEYOND, 0.0);
         }
         Ok(())
     }
@@ -238,6 +247,13 @@ impl Gains {
             fore: &self.fore[place * fore..(place + 1) * fore],
         };
         (count, record)
+    }
+
+    /// Returns a set as [`Gains::set`] does, each matrix with what follows it in memory: at least [`BEYOND`] numbers.
+    pub(super) fn open_set(&self, place: usize) -> (usize, Record<'_>) {
+        let (count, _) = self.set(place);
+        let (back, fore) = (place * self.sizes.back(), place * self.sizes.fore());
+        (count, Record { back: &self.back[back..], fore: &self.fore[fore..] })
     }
 
     /// Goes back one sample, with the stage last read.

@@ -3,12 +3,15 @@
 #![expect(
     clippy::needless_range_loop,
     clippy::needless_pass_by_value,
-    reason = "the indices are those of the equations; room is lent and given back"
+    clippy::inline_always,
+    reason = "the indices are those of the equations; room is lent and given back; compiled anew for the \
+              instructions of each processor"
 )]
 
 use super::Stage;
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
+use super::wide::{Instructions, Wide, Work};
 
 /// Workspace of a step besides the gains; column-major.
 pub(super) struct Room<'a> {
@@ -24,6 +27,7 @@ pub(super) struct Room<'a> {
 
 /// Takes the step if the sizes are supported; otherwise leaves everything unchanged.
 pub(super) fn step(
+    how: Instructions,
     sizes: Sizes,
     stage: &Stage,
     room: Room,
@@ -33,7 +37,7 @@ pub(super) fn step(
     macro_rules! choose {
         ($(($n:literal, $m:literal, $p:literal))*) => {
             match (sizes.n, sizes.m, sizes.p) {
-                $(($n, $m, $p) => Some(sized::<$n, $m, $p>(sizes, stage, room, back, fore)),)*
+                $(($n, $m, $p) => Some(widest($m, how).run(Step::<$n, $m, $p> { sizes, stage, room, back, fore })),)*
                 _ => None,
             }
         };
@@ -46,6 +50,30 @@ pub(super) fn step(
 /// A column-major matrix.
 type Columns<const R: usize, const C: usize> = [[f64; R]; C];
 
+/// Returns the instructions for a number of inputs: with one, entering wider ones takes longer than they save.
+fn widest(n_inputs: usize, best: Instructions) -> Instructions {
+    if n_inputs > 1 { best } else { Instructions::Portable }
+}
+
+/// A step of fixed size.
+struct Step<'a, const N: usize, const M: usize, const P: usize> {
+    sizes: Sizes,
+    stage: &'a Stage,
+    room: Room<'a>,
+    back: &'a mut [f64],
+    fore: &'a mut [f64],
+}
+
+impl<const N: usize, const M: usize, const P: usize> Work for Step<'_, N, M, P> {
+    type Output = Pivots;
+
+    #[inline(always)]
+    fn with(self, _: impl Wide) -> Pivots {
+        sized::<N, M, P>(self.sizes, self.stage, self.room, self.back, self.fore)
+    }
+}
+
+#[inline(always)]
 fn sized<const N: usize, const M: usize, const P: usize>(
     Sizes { targets, held, .. }: Sizes,
     stage: &Stage,
@@ -130,7 +158,7 @@ fn sized<const N: usize, const M: usize, const P: usize>(
     pivots
 }
 
-#[inline]
+#[inline(always)]
 fn read<const R: usize, const C: usize>(values: &[f64]) -> Columns<R, C> {
     let mut matrix = [[0.0; R]; C];
     for (column, values) in matrix.iter_mut().zip(values.chunks_exact(R)) {
@@ -139,12 +167,12 @@ fn read<const R: usize, const C: usize>(values: &[f64]) -> Columns<R, C> {
     matrix
 }
 
-#[inline]
+#[inline(always)]
 fn transposed<const R: usize, const C: usize>(matrix: &Columns<R, C>) -> Columns<C, R> {
     std::array::from_fn(|col| std::array::from_fn(|row| matrix[row][col]))
 }
 
-#[inline]
+#[inline(always)]
 fn product<const R: usize, const K: usize, const C: usize>(
     left: &Columns<R, K>,
     right: &Columns<K, C>,
@@ -155,7 +183,7 @@ fn product<const R: usize, const K: usize, const C: usize>(
 }
 
 /// `sum += left right`.
-#[inline]
+#[inline(always)]
 fn add_product<const R: usize, const K: usize, const C: usize>(
     sum: &mut Columns<R, C>,
     left: &Columns<R, K>,

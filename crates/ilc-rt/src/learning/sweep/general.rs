@@ -1,7 +1,14 @@
 //! The two sweeps for any number of states, inputs and outputs.
+//!
+//! Each sample is a product of a matrix with a vector. Eight rows after the other stay in registers
+//! while all columns are added to them, in the order of [`fixed`] and with the widest instructions of
+//! the processor, so that the numbers are the same.
+
+#![expect(clippy::inline_always, reason = "compiled anew for the instructions of each processor")]
 
 use super::factor::Gains;
 use super::record::Sizes;
+use super::wide::{Instructions, LANES, Wide, Work};
 use super::{Channels, Run, Sweep, fixed};
 
 /// The solver for coupled axes, and for time-varying gains.
@@ -22,8 +29,8 @@ impl General {
     /// Creates the solver for the given channels.
     pub fn new(gains: Gains, channels: Channels) -> Self {
         let Sizes { n, m, targets, .. } = gains.sizes();
-        let (kappa, work) =
-            (vec![0.0; gains.n_samples() * m], vec![0.0; 2 * (n + m) + targets + m]);
+        let kappa = vec![0.0; gains.n_samples() * m];
+        let work = vec![0.0; padded(n + m) + n + targets + m];
         Self { gains, channels, kappa, work }
     }
 
@@ -49,13 +56,14 @@ impl General {
     }
 
     /// [`Sweep::solve`] for any sizes.
-    fn any(&mut self, run: &mut Run) {
+    #[inline(always)]
+    fn any(&mut self, wide: impl Wide, run: &mut Run) {
         let Self { gains, channels, kappa, work } = self;
         let Sizes { n, m, targets: p, held, .. } = gains.sizes();
         let rows = n + m;
         let last = gains.n_samples().saturating_sub(1);
         let (state, rest) = work.split_at_mut(n);
-        let (sum, rest) = rest.split_at_mut(rows);
+        let (sum, rest) = rest.split_at_mut(padded(rows));
         let (error, rest) = rest.split_at_mut(p);
         let input = &mut rest[..m];
         let (inputs, outputs) = (&channels.inputs[..m], &channels.outputs[..p]);
@@ -64,7 +72,7 @@ impl General {
         state.fill(0.0);
         let mut k = gains.n_samples();
         for place in 0..gains.n_stored() {
-            let (count, at) = gains.set(place);
+            let (count, at) = gains.open_set(place);
             for _ in 0..count {
                 k -= 1;
                 for i in 0..p {
@@ -73,30 +81,31 @@ impl General {
                     error[i] = run.error[sample * run.n_outputs + outputs[i]];
                 }
                 sum.fill(0.0);
-                let mut columns = at.back[n * rows..].chunks_exact(rows);
-                add(sum, &mut columns, error);
+                let fresh = &at.back[n * rows..];
+                add(wide, sum, fresh, rows, error);
                 if held > 0 {
                     let values = &run.input[k * run.n_inputs..(k + 1) * run.n_inputs];
                     for i in 0..m {
                         input[i] = values[inputs[i]];
                     }
-                    add(sum, &mut columns, input);
+                    add(wide, sum, &fresh[p * rows..], rows, input);
                 }
-                add(sum, &mut at.back[..n * rows].chunks_exact(rows), state);
+                add(wide, sum, at.back, rows, state);
                 state.copy_from_slice(&sum[..n]);
-                kappa[k * m..(k + 1) * m].copy_from_slice(&sum[n..]);
+                kappa[k * m..(k + 1) * m].copy_from_slice(&sum[n..rows]);
             }
         }
 
         state.fill(0.0);
         for place in (0..gains.n_stored()).rev() {
-            let (count, at) = gains.set(place);
+            let (count, at) = gains.open_set(place);
             for _ in 0..count {
                 let kappa = &kappa[k * m..(k + 1) * m];
-                sum[..n].fill(0.0);
-                sum[n..].copy_from_slice(kappa);
-                add(&mut sum[..n], &mut at.fore[n * rows..].chunks_exact(n.max(1)), kappa);
-                add(sum, &mut at.fore[..n * rows].chunks_exact(rows), state);
+                let from_drive = &at.fore[n * rows..];
+                sum.fill(0.0);
+                add(wide, &mut sum[..padded(n)], from_drive, n, kappa);
+                sum[n..rows].copy_from_slice(kappa);
+                add(wide, sum, at.fore, rows, state);
                 state.copy_from_slice(&sum[..n]);
                 for i in 0..m {
                     let index = k * run.n_inputs + inputs[i];
@@ -108,20 +117,69 @@ impl General {
     }
 }
 
-/// Adds multiples of the columns.
-#[inline]
-fn add(sum: &mut [f64], columns: &mut std::slice::ChunksExact<f64>, factors: &[f64]) {
-    for (factor, column) in factors.iter().zip(columns) {
-        for (value, entry) in sum.iter_mut().zip(column) {
-            *value += entry * factor;
+/// Returns the length of whole rows of eight numbers that hold `count` of them.
+fn padded(count: usize) -> usize {
+    count.next_multiple_of(LANES)
+}
+
+/// Adds multiples of the columns of a matrix, which is followed by [`BEYOND`](super::factor::BEYOND) numbers, to
+/// a vector that is [`padded`]; its end holds any numbers afterwards.
+#[inline(always)]
+fn add(wide: impl Wide, sum: &mut [f64], matrix: &[f64], n_rows: usize, factors: &[f64]) {
+    let mut first = 0;
+    while sum.len() - first >= 4 * LANES {
+        block::<4>(wide, &mut sum[first..], (matrix, n_rows, first), factors);
+        first += 4 * LANES;
+    }
+    match (sum.len() - first) / LANES {
+        3 => block::<3>(wide, &mut sum[first..], (matrix, n_rows, first), factors),
+        2 => block::<2>(wide, &mut sum[first..], (matrix, n_rows, first), factors),
+        1 => block::<1>(wide, &mut sum[first..], (matrix, n_rows, first), factors),
+        _ => {}
+    }
+}
+
+/// Adds the part of the columns from row `first` on to `8 G` numbers.
+#[inline(always)]
+fn block<const G: usize>(
+    wide: impl Wide,
+    sum: &mut [f64],
+    (matrix, n_rows, first): (&[f64], usize, usize),
+    factors: &[f64],
+) {
+    let mut rows = [wide.row(&[0.0; LANES]); G];
+    for (row, values) in rows.iter_mut().zip(sum.as_chunks::<LANES>().0) {
+        *row = wide.row(values);
+    }
+    // What is read beyond the end of a column adds to numbers that nothing reads.
+    for (col, factor) in factors.iter().enumerate() {
+        let column = &matrix[col * n_rows + first..][..G * LANES];
+        for (row, values) in rows.iter_mut().zip(column.as_chunks::<LANES>().0) {
+            *row = wide.add(*row, wide.scale(*factor, wide.row(values)));
         }
+    }
+    for (row, values) in rows.iter().zip(sum.as_chunks_mut::<LANES>().0) {
+        *values = wide.values(*row);
+    }
+}
+
+/// The general solver with the run to solve.
+struct Solve<'a, 'r>(&'a mut General, &'a mut Run<'r>);
+
+impl Work for Solve<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with(self, wide: impl Wide) {
+        let Self(general, run) = self;
+        general.any(wide, run);
     }
 }
 
 impl Sweep for General {
     fn solve(&mut self, run: &mut Run) {
         if !fixed::solve(&self.gains, &self.channels, &mut self.kappa, run) {
-            self.any(run);
+            Instructions::best().run(Solve(self, run));
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::cholesky::{self, Pivots};
 use super::record::Sizes;
 use super::square_root::SquareRoot;
+use super::wide::Instructions;
 use super::{Form, Stage, fixed_step};
 
 /// The cost-to-go, and the workspace of one step.
@@ -12,6 +13,7 @@ use super::{Form, Stage, fixed_step};
 pub(super) struct Recursion {
     form: Form,
     sizes: Sizes,
+    instructions: Instructions,
     /// `Pi` (n x n); in the square-root forms an upper triangular `U` with `Pi = U'U`.
     pub(super) cost: Vec<f64>,
     /// The same one sample later.
@@ -43,6 +45,7 @@ impl Recursion {
         Self {
             form,
             sizes,
+            instructions: Instructions::best(),
             cost: room(n * n),
             later: room(n * n),
             cost_b: room(n * m),
@@ -71,7 +74,8 @@ impl Recursion {
     pub(super) fn step(&mut self, stage: &Stage, back: &mut [f64], fore: &mut [f64]) -> Pivots {
         std::mem::swap(&mut self.cost, &mut self.later);
         if self.form == Form::Joseph
-            && let Some(pivots) = fixed_step::step(self.sizes, stage, self.room(), back, fore)
+            && let Some(pivots) =
+                fixed_step::step(self.instructions, self.sizes, stage, self.room(), back, fore)
         {
             return pivots;
         }
