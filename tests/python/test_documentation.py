@@ -147,7 +147,7 @@ def with_drives(text: str, folder: Path) -> None:
 
 
 def after_a_run(text: str, folder: Path) -> None:
-    """Run a line about the last run in real time, after such a run."""
+    """Run a line about the last run in real time, or about its recording, after such a run."""
     address = free_bus()
     cell = ROOT / NETWORK_CELL
     library = next((word for word in text.split() if word.endswith(".db")), "ilc-library.db")
@@ -155,10 +155,11 @@ def after_a_run(text: str, folder: Path) -> None:
     try:
         drives.line_with("ready")
         made = "--iterations 1 --simulated-drives --no-telemetry"
+        made += " --record gantry.mcap" if "gantry.mcap" in text else ""
         run(f"ilc-rt run {cell} --bus {address} --library {library} {made}", folder)
     finally:
         drives.close()
-    assert "cycles" in run(text, folder)
+    assert re.search("cycles|frames", run(text, folder))
 
 
 def with_drives_by_hand(text: str, folder: Path) -> None:
@@ -293,7 +294,7 @@ def test_a_line_that_one_is_told_to_type_works(
         with_hands(text, folder)
     elif text.startswith("ilc-sim run"):
         drives_alone(text, folder)
-    elif text.startswith("ilc-rt why"):
+    elif re.match(r"ilc-rt (why|replay|record) ", text):
         after_a_run(text, folder)
     elif re.match(r"ilc-rt (run|identify)", text):
         with_drives(text, folder)

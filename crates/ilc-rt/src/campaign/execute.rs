@@ -1,5 +1,6 @@
 //! Course of a campaign: bring-up, loop, end.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::announce::Announcer;
@@ -195,16 +196,8 @@ fn execute(
     // After being switched off, drives start elsewhere than the last run left them. One run with
     // the next input brings them there; it is not stored, as it says nothing about the law.
     let warm_up = u32::from(!resumed.runs.is_empty());
-    plan.servo.runs = first - warm_up..options.iterations;
-    plan.servo.resets_faults |= session.reset_faults;
-    plan.simulated = session.simulated;
-    plan.servo.starts_on_input = options.start == StartOn::Input;
-    if session.forgives_stalls() {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
-        let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;
-        plan.servo.hold_cycles_max = patience;
-        plan.servo.forgive_overruns(patience);
-    }
+    let runs = first - warm_up..options.iterations;
+    complete(&mut plan, cell, options, runs);
     let facts = recording::Facts { first, holds, growth_allowed, law_is_not_run };
     recording::describe(recorder.as_ref(), cell, session, (&plan, &maps), facts)?;
     let meta = Arc::new(plan.meta.clone());
@@ -239,6 +232,31 @@ fn execute(
 
     let parts = Parts { announcer, keeper, claim, policy, learner, mail, frozen, start };
     let mut running = Running::new(cell, options, plan, parts, resumed);
+    follow(&mut pacer, &mut running, recorder.as_mut());
+    let outcome = running.end(pacer, cell, options);
+    if let Some(why) = recorder.as_mut().and_then(Recorder::end) {
+        tracing::warn!("{why}");
+    }
+    Ok(outcome)
+}
+
+/// Completes the plan of the loop with the runs and the options of a campaign.
+fn complete(plan: &mut Plan, cell: &Cell, options: &Options, runs: Range<u32>) {
+    let session = &options.session;
+    plan.servo.runs = runs;
+    plan.servo.resets_faults |= session.reset_faults;
+    plan.simulated = session.simulated;
+    plan.servo.starts_on_input = options.start == StartOn::Input;
+    if session.forgives_stalls() {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 s")]
+        let patience = (SIMULATED_PATIENCE_S / cell.cycle_s()) as u32;
+        plan.servo.hold_cycles_max = patience;
+        plan.servo.forgive_overruns(patience);
+    }
+}
+
+/// Follows the loop until it has ended.
+fn follow(pacer: &mut Pacer, running: &mut Running<'_>, mut recorder: Option<&mut Recorder>) {
     loop {
         let has_ended = pacer.poll();
         running.read_mail();
@@ -248,16 +266,9 @@ fn execute(
             running.recording(recorder, why);
         }
         if has_ended {
-            break;
+            return;
         }
     }
-    let outcome = running.end(pacer, cell, options);
-    if let Some(recorder) = &mut recorder
-        && let Some(why) = recorder.end()
-    {
-        tracing::warn!("{why}");
-    }
-    Ok(outcome)
 }
 
 fn open_library(options: &Options) -> Result<Library, CampaignError> {

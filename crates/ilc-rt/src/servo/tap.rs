@@ -88,7 +88,6 @@ pub struct AxisRow {
 /// A record of the tap. A tick gives a row of the loop, then a row of each axis, then its stamps if there is a
 /// flight recorder.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "of one size, for the ring")]
 pub enum LoopRecord {
     /// The loop in a tick.
     Loop(LoopRow),

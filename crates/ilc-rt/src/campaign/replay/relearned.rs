@@ -32,7 +32,7 @@ impl Relearned {
             Some(_) => None,
             None => plan.law(cell)?.law,
         };
-        let own = law.as_ref().and_then(|law| law.first_input());
+        let own = law.as_deref().and_then(Law::first_input);
         let mut policy =
             RollbackPolicy::new(setup.growth_allowed).forgiving(setup.forgives_overruns);
         if own.is_some() {
