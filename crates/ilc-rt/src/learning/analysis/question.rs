@@ -19,6 +19,9 @@ use crate::model::StateSpace;
 /// Largest number of inputs (samples times channels) for which dense matrices are used.
 pub const DENSE_MAX: usize = 640;
 
+/// Largest error of a factor that replaces the one of a dense matrix.
+const EXACT: f64 = 1e-10;
+
 /// Optional inputs of the analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
@@ -100,14 +103,15 @@ pub fn analyze(
     let dense = if n_largest <= DENSE_MAX { Some(Dense::new(&mut iteration)?) } else { None };
     let method = if dense.is_some() { Method::Dense } else { Method::Structured };
     let own = match optimal {
-        Some((true, Some(weights))) if dense.is_none() => {
-            weakest::factor(&iteration, model, weights)?
-        }
+        Some((true, Some(weights))) => weakest::factor(&iteration, model, weights)?,
         _ => None,
     };
     let (radius, factor, growth) = match (&dense, own) {
-        (Some(dense), _) => {
-            let factor = dense.monotonic_factor()?;
+        (Some(dense), own) => {
+            let factor = match own.filter(|own| own.error <= EXACT) {
+                Some(own) => own,
+                None => dense.monotonic_factor()?,
+            };
             (dense.spectral_radius(factor)?, Some(factor), dense.transient_growth(factor)?)
         }
         (None, Some(factor)) => (factor, Some(factor), factor.value.max(1.0)),
