@@ -107,13 +107,7 @@ pub fn analyze(
         _ => None,
     };
     let (radius, factor, growth) = match (&dense, own) {
-        (Some(dense), own) => {
-            let factor = match own.filter(|own| own.error <= EXACT) {
-                Some(own) => own,
-                None => dense.monotonic_factor()?,
-            };
-            (dense.spectral_radius(factor)?, Some(factor), dense.transient_growth(factor)?)
-        }
+        (Some(dense), own) => of_matrices(dense, own)?,
         (None, Some(factor)) => (factor, Some(factor), factor.value.max(1.0)),
         (None, None) => structured(&mut iteration)?,
     };
@@ -187,6 +181,15 @@ fn refuse_question(question: &Question, model: &StateSpace, n_samples: usize) ->
         return Err(LearningError::Parameter { what: "noise_std", value, allowed });
     }
     Ok(())
+}
+
+/// Returns the three factors from dense matrices; `own` is the second one, if it is known.
+fn of_matrices(dense: &Dense, own: Option<Estimate>) -> Result<(Estimate, Option<Estimate>, f64)> {
+    let factor = match own.filter(|own| own.error <= EXACT) {
+        Some(own) => own,
+        None => dense.monotonic_factor()?,
+    };
+    Ok((dense.spectral_radius(factor)?, Some(factor), dense.transient_growth(factor)?))
 }
 
 /// Returns the three factors, matrix-free.
