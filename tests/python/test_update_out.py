@@ -86,7 +86,7 @@ def test_what_cannot_be_written_is_refused(out, error, line):
 def test_a_refused_update_leaves_the_input_alone():
     law = ConstrainedIlc(AXIS, N, r=0.1, input_max=0.4)
     u = U.copy()
-    with pytest.raises(ValueError, match="e holds nan at"):
+    with pytest.raises(ValueError, match="e holds NaN at"):
         law.update(u, np.where(np.arange(N) == 5, np.nan, E), out=u)
     np.testing.assert_array_equal(u, U)
 

@@ -24,6 +24,7 @@ fn main() -> Outcome {
         .measurement_time(Duration::from_millis(800))
         .configure_from_args();
     invariant(&mut criterion)?;
+    sizes(&mut criterion)?;
     varying(&mut criterion)?;
     dense(&mut criterion)?;
     criterion.final_summary();
@@ -73,6 +74,39 @@ fn invariant(criterion: &mut Criterion) -> Outcome {
         group.bench_function(BenchmarkId::new("factorisation", n_samples), |bencher| {
             bencher.iter(|| black_box(NormOptimal::new(&model, n_samples, r(1e-2)).is_ok()));
         });
+    }
+    group.finish();
+    Ok(())
+}
+
+/// Many states and coupled axes, with code of their own up to 8 and 3, and beyond.
+fn sizes(criterion: &mut Criterion) -> Outcome {
+    const N_SAMPLES: usize = 1300;
+    let mut group = criterion.benchmark_group("sizes, 1300 samples");
+    let mut update = |name: BenchmarkId, model: &StateSpace| -> Outcome {
+        let mut law = NormOptimal::new(model, N_SAMPLES, r(1e-2))?;
+        let signal = wave(N_SAMPLES * model.n_inputs());
+        let mut next = signal.clone();
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| black_box(law.update(&signal, &signal, &mut next).is_ok()));
+        });
+        Ok(())
+    };
+    for in_series in [4, 6, 8] {
+        let mut model = axis()?;
+        for _ in 1..in_series {
+            model = model.series(&axis()?)?;
+        }
+        update(BenchmarkId::new("states of one axis", model.n_states()), &model)?;
+    }
+    for n_axes in [3, 4, 6] {
+        let mut model = axis()?;
+        for _ in 1..n_axes {
+            model = model.append(&axis()?)?;
+        }
+        let skew = DMatrix::from_fn(n_axes, n_axes, |i, j| if i == j { 1.0 } else { 0.1 });
+        let model = model.series(&StateSpace::static_gain(skew, model.dt_s())?)?;
+        update(BenchmarkId::new("coupled axes", n_axes), &model)?;
     }
     group.finish();
     Ok(())

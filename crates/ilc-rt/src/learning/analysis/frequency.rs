@@ -205,7 +205,14 @@ impl Spectrum {
             // Trapezoidal rule: the two ends count half.
             let weight = if i == 0 || i + 1 == self.bins.len() { 0.5 } else { 1.0 };
             weights += weight;
-            let share = |sigma: &Matrix| (&bin.plant * sigma * bin.plant.adjoint()).trace().re;
+            let m = bin.plant.ncols();
+            // tr(P Sigma P') = tr(P'P Sigma), without the product.
+            let gram = bin.plant.adjoint() * &bin.plant;
+            let share = |sigma: &Matrix| -> f64 {
+                let column = |j: usize| (0..m).map(move |i| (i, j));
+                let terms = (0..m).flat_map(column).map(|(i, j)| gram[(j, i)] * sigma[(i, j)]);
+                terms.map(|term| term.re).sum()
+            };
             let fresh = &bin.learn * bin.learn.adjoint();
             let mut sigma = fresh.map(|_| Complex::new(0.0, 0.0));
             for run in &mut shares {

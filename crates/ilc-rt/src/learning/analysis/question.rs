@@ -19,6 +19,9 @@ use crate::model::StateSpace;
 /// Largest number of inputs (samples times channels) for which dense matrices are used.
 pub const DENSE_MAX: usize = 640;
 
+/// Largest error of a factor that replaces the one of a dense matrix.
+const EXACT: f64 = 1e-10;
+
 /// Optional inputs of the analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Question {
@@ -100,16 +103,11 @@ pub fn analyze(
     let dense = if n_largest <= DENSE_MAX { Some(Dense::new(&mut iteration)?) } else { None };
     let method = if dense.is_some() { Method::Dense } else { Method::Structured };
     let own = match optimal {
-        Some((true, Some(weights))) if dense.is_none() => {
-            weakest::factor(&iteration, model, weights)?
-        }
+        Some((true, Some(weights))) => weakest::factor(&iteration, model, weights)?,
         _ => None,
     };
     let (radius, factor, growth) = match (&dense, own) {
-        (Some(dense), _) => {
-            let factor = dense.monotonic_factor()?;
-            (dense.spectral_radius(factor)?, Some(factor), dense.transient_growth(factor)?)
-        }
+        (Some(dense), own) => of_matrices(dense, own)?,
         (None, Some(factor)) => (factor, Some(factor), factor.value.max(1.0)),
         (None, None) => structured(&mut iteration)?,
     };
@@ -183,6 +181,15 @@ fn refuse_question(question: &Question, model: &StateSpace, n_samples: usize) ->
         return Err(LearningError::Parameter { what: "noise_std", value, allowed });
     }
     Ok(())
+}
+
+/// Returns the three factors from dense matrices; `own` is the second one, if it is known.
+fn of_matrices(dense: &Dense, own: Option<Estimate>) -> Result<(Estimate, Option<Estimate>, f64)> {
+    let factor = match own.filter(|own| own.error <= EXACT) {
+        Some(own) => own,
+        None => dense.monotonic_factor()?,
+    };
+    Ok((dense.spectral_radius(factor)?, Some(factor), dense.transient_growth(factor)?))
 }
 
 /// Returns the three factors, matrix-free.
