@@ -3,19 +3,21 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use ilc_rt::campaign::replay::{Replayed, replay};
 use ilc_rt::campaign::summary::summarize;
-use ilc_rt::campaign::{self, Outcome};
+use ilc_rt::campaign::{self, Disturbance, Outcome};
 use ilc_rt::cli::{IdentifyOptions, parse};
 use ilc_rt::config::Cell;
 use ilc_rt::fieldbus::transport::loopback;
 use ilc_rt::record::{EndStatus, Event};
 use ilc_rt::recording::{Item, Reader};
 use ilc_tests::campaign::{in_process, machine, options};
+use ilc_tests::catalogue::every_cell;
 use ilc_tests::far_side::FarSide;
 use ilc_tests::{Scratch, example, example_path, short};
 use serde_json::Value;
@@ -498,4 +500,25 @@ fn the_late_cycles_of_a_recording_are_those_of_the_flight_recorder() {
     assert_eq!(record.cell, "gantry");
     let (lockstep, _) = crate::record(&cell, 1, &folder, "lockstep.mcap");
     assert!(campaign::late_of(&lockstep).unwrap_err().to_string().contains("lock-step"));
+}
+
+#[test]
+fn every_law_makes_the_same_inputs_again() {
+    let mut without = Vec::new();
+    for (learning, cell) in every_cell() {
+        let folder = Scratch::new();
+        let mut options = options(folder.file("library.db"), 3);
+        options.session.record = Some(folder.file("law.mcap"));
+        options.allow_divergent = true;
+        options.disturbance = Disturbance::measured(|_| Ok(vec![20.0]));
+        campaign::run(&cell, &options, in_process(&cell), None, &mut |_| {}).unwrap();
+        let replayed = the_same(&folder.file("law.mcap"));
+        assert_eq!(replayed.runs, 3, "{learning}");
+        match replayed.law_is_not_run {
+            None => assert!(replayed.learned >= 2, "{learning}: {replayed:?}"),
+            Some(why) => without.push((learning.split('"').nth(1).unwrap(), why)),
+        }
+    }
+    let names: BTreeSet<&str> = without.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, BTreeSet::from(["flexible", "relevance"]), "{without:?}");
 }
