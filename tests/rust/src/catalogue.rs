@@ -18,27 +18,37 @@ pub struct Built {
     pub n_values: usize,
 }
 
-/// Returns the laws of all examples of the catalogue.
+/// Returns the cells of all examples of the catalogue, each with the text of its `[learning]`.
 ///
 /// # Panics
-/// If a law has no example, or one that cannot be built.
-pub fn every_law() -> Vec<Built> {
+/// If a law has no example, or one that is invalid.
+pub fn every_cell() -> Vec<(&'static str, Cell)> {
     let tables = Learning::default();
     let examples = LawName::ALL.iter().flat_map(|law| {
         let examples = tables.parameters(*law).expect("a law has parameters").examples();
         assert!(!examples.is_empty(), "{law:?} has no example");
         examples
     });
-    let built = examples.map(|example| {
+    let cells = examples.map(|example| {
         let name = if example.is_parallel { "02_parallel.toml" } else { "01_gantry.toml" };
         let text = example_text(name);
         let before = text.split("[learning]").next().unwrap_or_default();
         let text = format!("{before}[learning]\n{}\n", example.learning);
-        let cell = Cell::parse(&text, name).expect("an example is valid");
+        (example.learning, Cell::parse(&text, name).expect("an example is valid"))
+    });
+    cells.collect()
+}
+
+/// Returns the laws of all examples of the catalogue.
+///
+/// # Panics
+/// If a law has no example, or one that cannot be built.
+pub fn every_law() -> Vec<Built> {
+    let built = every_cell().into_iter().map(|(learning, cell)| {
         let plan = Plan::new(&cell, None, true).expect("an example can be planned");
         let law = plan.law(&cell).expect("the law of an example can be built").law;
         let law = law.expect("an example learns");
-        Built { learning: example.learning, law, n_values: plan.reference_m.len() }
+        Built { learning, law, n_values: plan.reference_m.len() }
     });
     built.collect()
 }

@@ -33,7 +33,7 @@ pub fn late_of(path: &Path) -> Result<FlightRecord, RecordingError> {
                 timing.execution.record(stamps.ended.since(stamps.woke));
                 timing.stages.record(&stamps);
                 if let Some((_, _, log)) = &mut of {
-                    // Its events were reported when the cycle was late.
+                    // The event of a late cycle was published then.
                     let _ = log.take(stamps, run);
                 }
                 // Of a stop, what was before it stays.

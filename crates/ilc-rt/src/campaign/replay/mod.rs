@@ -2,7 +2,7 @@
 //! recorded one.
 //!
 //! The same [`Cycle`](crate::servo::Cycle) is built from the recorded cell description, on a bus that hands out the
-//! recorded frames ([`line`]). The law is run again as well, on the records that the replayed loop makes, where the
+//! recorded frames. The law is run again as well, on the records that the replayed loop makes, where the
 //! recording has all that it learned from.
 
 mod compare;
