@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import os
-import sqlite3
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -263,7 +262,7 @@ def trim(
             deleted = Library(str(library)).trim(min(keep, n_runs), cell)
         else:
             deleted = Library(str(library)).retain(newest=newest, days=days, best=best, cell=cell)
-    except (OSError, sqlite3.Error) as error:
+    except OSError as error:
         raise BadInputError(str(error)) from error
     if json_file is not None:
         write_text(json_file, json_text({"deleted": deleted}))
