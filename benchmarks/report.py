@@ -78,6 +78,7 @@ def main() -> None:
         "and error, the copies at the border to Python and the next input included.",
         "",
         *many_plants(),
+        *past_runs(),
         "## In Rust",
         "",
         "Medians of `cargo bench`.",
@@ -142,6 +143,21 @@ def many_plants_section(rows: list[dict[str, Any]]) -> list[str]:
             f"| {each / each_s[1]:.3g} |"
             for row, each in zip(rows, each_s, strict=True)
         ),
+        "",
+    ]
+
+
+def past_runs() -> list[str]:
+    """Return the section on the library of past runs."""
+    print("library ...", flush=True)
+    text = command(sys.executable, str(ROOT / "benchmarks" / "library.py"))
+    return [
+        "## The library of past runs",
+        "",
+        "Simulated runs of one axis under two disturbances; NumPy has all disturbances in memory,",
+        "and all inputs and errors in one file of its own.",
+        "",
+        *text.splitlines(),
         "",
     ]
 

@@ -7,7 +7,7 @@ from importlib import import_module
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
-from ilc_rt import _native, library_file
+from ilc_rt import _native
 from ilc_rt.closing import Closing
 from ilc_rt.errors import BadInputError
 from ilc_rt.given import given
@@ -15,7 +15,7 @@ from ilc_rt.retention import kept_by, selected
 
 if TYPE_CHECKING:
     import builtins
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from numpy.typing import ArrayLike
     from typing_extensions import Self
@@ -69,10 +69,7 @@ class Library(Closing, _native.Library):
 
     def __len__(self) -> int:
         """Return the number of stored runs."""
-        if self.path == IN_MEMORY:
-            return len(self.list())
-        with library_file.reading(self.path) as connection:
-            return library_file.count(connection)
+        return self._count()
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield the stored runs, oldest first, as `list` gives them."""
@@ -98,7 +95,7 @@ class Library(Closing, _native.Library):
         OSError
             If the file cannot be read.
         """
-        return super().list(cell)
+        return self._page(cell)
 
     def page(
         self,
@@ -138,14 +135,7 @@ class Library(Closing, _native.Library):
             if value is not None and value < 0:
                 message = f"{key} = {value}: a number of runs, 0 or more"
                 raise BadInputError(message)
-        if limit is not None and self.path != IN_MEMORY:
-            with library_file.reading(self.path) as connection:
-                runs = library_file.page(connection, cell, campaign, limit, offset)
-            if runs is not None:
-                return runs
-        begin = campaign or ""
-        runs = [run for run in self.list(cell) if str(run["campaign"]).startswith(begin)]
-        return runs[offset:] if limit is None else runs[offset : offset + limit]
+        return self._page(cell, campaign, limit, offset)
 
     def select(self, **wanted: Any) -> builtins.list[dict[str, Any]]:  # noqa: ANN401 (values of any key)
         """Return the runs whose entries have wanted values, oldest first.
@@ -379,7 +369,6 @@ class Library(Closing, _native.Library):
         days: float | None = None,
         best: int | None = None,
         cell: str | None = None,
-        progress: Callable[[int, int], object] | None = None,
     ) -> int:
         """Delete all runs that no rule keeps, and return how many were deleted.
 
@@ -396,9 +385,6 @@ class Library(Closing, _native.Library):
             only measure and rolled back ones are not among them.
         cell : str or None
             Only among runs of the cell of this name.
-        progress : callable or None
-            Called, while the file shrinks, with the number of its pages that were given back and of
-            all that are to be.
 
         Returns
         -------
@@ -409,19 +395,14 @@ class Library(Closing, _native.Library):
         ------
         BadInputError
             If there is no rule, or one is negative or not finite.
-        OSError, sqlite3.Error
-            If the file cannot be written; nothing is deleted then.
+        OSError
+            If the file cannot be written; nothing is deleted then. If only its size cannot be
+            changed, the message says that the runs are deleted.
         """
-        if self.path == IN_MEMORY:
-            message = f"{IN_MEMORY}: rules are for a library in a file; trim(keep) is for any"
-            raise BadInputError(message)
-        kept = kept_by(self.page(cell), newest=newest, days=days, best=best)
-        gone = [run["id"] for run in self.page(cell) if run["id"] not in kept]
-        # Nothing is trimmed by it: the native library brings an older file up to date.
-        super().trim(ALL, None)
-        with library_file.writing(self.path) as connection:
-            library_file.delete(connection, gone)
-        library_file.shrink(self.path, progress)
+        runs = self.list(cell)
+        kept = kept_by(runs, newest=newest, days=days, best=best)
+        gone = [run["id"] for run in runs if run["id"] not in kept]
+        self._remove(gone)
         return len(gone)
 
     def export(self, id: int, path: str | PathLike[str]) -> None:

@@ -98,7 +98,7 @@ def test_a_damaged_run_is_left_out_and_named(
     ilc: Callable[..., object], address: str, library: str
 ) -> None:
     with sqlite3.connect(library) as file:
-        file.execute("UPDATE iteration SET input = error_m WHERE id = 2")
+        file.execute("UPDATE signals SET input = encoder_m WHERE id = 2")
     file.close()
     done = ilc("library", "sync", f"sqlite:///{library}", address)
     assert done.returncode == 2

@@ -159,8 +159,7 @@ def test_recall_weighs_distance_and_error(tmp_path: Path) -> None:
 
 
 def test_the_digest_of_a_row_is_that_of_the_controller(finished: CampaignResult) -> None:
-    with library_file.reading(finished.library) as connection:
-        rows = library_file.rows(connection, [1, 2, 3])
+    rows = library_file.rows(ReadOnlyLibrary(finished.library), [1, 2, 3])
     assert [library_file.digest(row) for row in rows] == [row["digest"] for row in rows]
     damaged = rows[0] | {"input": rows[0]["input"][:-1] + b"\x01"}
     assert library_file.digest(damaged) != damaged["digest"]

@@ -6,7 +6,6 @@ import io
 import json
 import re
 import signal
-import sqlite3
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -93,8 +92,6 @@ def test_every_long_computation_tells_its_steps(
 
     propose_weights(gantry, progress=steps("tune"))
     write_report(finished, tmp_path / "r.html", steps("plot"))
-    library = filled(tmp_path / "l.db", 120)
-    Library(library).retain(newest=10, progress=steps("trim"))
     for name, calls in told.items():
         done = [call[0] for call in calls]
         assert done[0] == 0, name
@@ -109,28 +106,10 @@ def filled(path: Path, n_runs: int) -> Path:
     """Make a library of runs of 16 kB."""
     library = Library(path)
     library.append(np.zeros((500, 2)), np.ones((500, 2)), 0.002, cell="gantry", campaign="c")
-    with library_file.reading(path) as file:
-        (row,) = library_file.rows(file, [1])
-    with library_file.writing(path) as file:
-        for number in range(1, n_runs):
-            library_file.insert(file, row | {"iteration": number, "digest": str(number)})
+    (row,) = library_file.rows(library, [1])
+    more = (row | {"iteration": number} for number in range(1, n_runs))
+    library_file.insert(library, [run | {"digest": library_file.digest(run)} for run in more])
     return path
-
-
-def test_a_file_shrinks_in_the_steps_that_are_asked_for(tmp_path: Path) -> None:
-    """Not page by page, each a transaction: 5000 runs would take minutes."""
-    path = filled(tmp_path / "l.db", 60)
-    with library_file.writing(path) as file:
-        library_file.delete(file, range(2, 61))
-    with sqlite3.connect(path) as connection:
-        pages = connection.execute("PRAGMA freelist_count").fetchone()[0]
-    connection.close()
-    told: list[tuple[int, int]] = []
-    assert library_file.shrink(path, lambda *step: told.append(step), step_pages=100) == (
-        -(-pages // 100)
-    )
-    assert told == [(100 * step, pages) for step in range(len(told))]
-    assert path.stat().st_size < 4096 * pages
 
 
 def interrupt(process: Process) -> list[str]:
@@ -240,24 +219,20 @@ def test_ctrl_c_in_plot_keeps_the_former_pictures(
     assert [path.read_bytes() for path in files] == before
 
 
-def test_ctrl_c_in_trim_deletes_all_or_nothing_and_shrinks_later(tmp_path: Path) -> None:
+def test_ctrl_c_in_trim_deletes_all_or_nothing(tmp_path: Path) -> None:
     path = filled(tmp_path / "l.db", 60)
-    before = content(path)
+    before, size = content(path), path.stat().st_size
     words = ["library", "trim", path, "--newest", "10"]
-    process = ilc(tmp_path, *words, before=slow("ilc_rt.library_file", "delete"))
+    process = ilc(tmp_path, *words, before=slow("ilc_rt.library", "kept_by"))
     process.line_with("waiting")
     assert interrupt(process) == []
     assert content(path) == before
-    process = ilc(tmp_path, *words, before=slow("ilc_rt.library_file", "shrink"))
-    process.line_with("waiting")
-    assert interrupt(process) == []
-    assert content(path) == before[-10:]
-    size = path.stat().st_size
     again = ilc(tmp_path, *words)
     assert again.end() == 0, again.errors
     again.close()
-    assert again.said == [f"0 runs deleted from {path}"]
-    assert path.stat().st_size < size / 2
+    assert again.said == [f"50 runs deleted from {path}"]
+    assert content(path) == before[-10:]
+    assert path.stat().st_size < size
 
 
 def test_ctrl_c_in_sync_keeps_whole_batches_and_the_next_one_goes_on(
@@ -266,12 +241,10 @@ def test_ctrl_c_in_sync_keeps_whole_batches_and_the_next_one_goes_on(
     rows = template(finished.library)[:1]
     library, back = tmp_path / "l.db", tmp_path / "back.db"
     make_cell(library, rows, 1)
-    with library_file.reading(library) as file:
-        (row,) = library_file.rows(file, [1])
-    with library_file.writing(library) as file:
-        for number in range(1, 2 * BATCH + 5):
-            more = row | {"iteration": number}
-            library_file.insert(file, more | {"digest": library_file.digest(more)})
+    (row,) = library_file.rows(ReadOnlyLibrary(library), [1])
+    more = (row | {"iteration": number} for number in range(1, 2 * BATCH + 5))
+    runs = [run | {"digest": library_file.digest(run)} for run in more]
+    library_file.insert(Library(library), runs)
     there = len(ReadOnlyLibrary(library))
     with server() as postgres:
         address = postgres.database()
@@ -280,7 +253,7 @@ def test_ctrl_c_in_sync_keeps_whole_batches_and_the_next_one_goes_on(
         for words, at in (
             (["library", "sync", library, address], slowed),
             (["library", "sync", address, back, "--cell", "cell-001"],
-             slow("ilc_rt.library_file", "insert", BATCH + 20)),
+             slow("ilc_rt.library_file", "insert", 2)),
         ):  # fmt: skip
             process = ilc(tmp_path, *words, before=at)
             process.line_with("waiting")

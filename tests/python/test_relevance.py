@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sqlite3
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -273,19 +272,6 @@ def test_the_library_recalls_trims_and_exports(tmp_path: Path, ilc: Ilc) -> None
         library.append(np.zeros(5), np.zeros(4), 0.01)
     with pytest.raises(ValueError, match="cycle_s = 0"):
         library.append(np.zeros(5), np.zeros(5), 0.0)
-
-
-def test_a_library_of_the_first_version_still_opens(tmp_path: Path) -> None:
-    path = tmp_path / "old.db"
-    Library(path).append(np.zeros(5), np.zeros(5), 0.01)
-    with sqlite3.connect(path) as connection:
-        connection.execute("DROP INDEX iteration_by_disturbance")
-        connection.execute("PRAGMA user_version = 1")
-    connection.close()
-    library = Library(path)
-    assert library.load(1)["disturbance"] is None
-    library.append(np.zeros(5), np.zeros(5), 0.01, [1.0, 2.0])
-    assert [row["id"] for row in library.recall([1.0, 2.0])] == [2]
 
 
 def campaign(folder: Path, law: Any, **options: Any) -> Campaign:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import socket
-import sqlite3
 import subprocess
 import sys
 import threading
@@ -16,6 +15,7 @@ import pytest
 from ports_fixture import free_port
 from processes_fixture import DEADLINE_S, PATIENT, Bench, Process, goodbye
 
+from ilc_rt import ReadOnlyLibrary
 from ilc_rt.events import parse_event
 
 zenoh = pytest.importorskip("zenoh")
@@ -114,13 +114,12 @@ class Watched:
                 self.heard = dict(watcher.heard)
             finally:
                 watcher.session.close()
-            connection = sqlite3.connect(bench.library)
-            query = "SELECT reference_m, input, encoder_m, tool_m FROM iteration ORDER BY iteration"
+            library = ReadOnlyLibrary(bench.library)
+            runs = [library.load(run["id"]) for run in library]
             self.rows = [
-                [np.frombuffer(blob).reshape(-1, 2) for blob in row]
-                for row in connection.execute(query)
+                [run[name] for name in ("reference_m", "input", "encoder_m", "tool_m")]
+                for run in runs
             ]
-            connection.close()
 
 
 def start(bench: Bench, cell: Path, *options: str, runs: int) -> Process:

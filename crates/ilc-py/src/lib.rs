@@ -28,6 +28,7 @@ mod identify;
 mod kinematics;
 mod laws;
 mod library;
+mod library_rows;
 mod made;
 mod many;
 mod model;

@@ -3,16 +3,17 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use ilc_rt::library::{Elsewhere, Library, LibraryError, Row, Task};
+use ilc_rt::library::{Elsewhere, Library, LibraryError, Page, Row, Task};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyIterator};
 
 use crate::answer::{ByName, by_name, give_signal, give_vector};
 use crate::argument::{Signal, read_disturbance};
 use crate::arguments::{Arguments, Keywords};
 use crate::detached::detached;
 use crate::error::OrRaise;
+use crate::library_rows::{Raised, give_row, next_row};
 use crate::made::{Made, New, made};
 use crate::whole;
 
@@ -52,13 +53,56 @@ impl PyLibrary {
         made(a, Self(Held::File(path)))
     }
 
-    /// Return the stored runs, oldest first, without their arrays.
-    fn list<'py>(&self, py: Python<'py>, cell: Option<&str>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let rows = detached(py, || self.read(|library| library.list(None))).or_raise()?;
-        rows.iter()
-            .filter(|row| cell.is_none_or(|name| row.meta.cell == name))
-            .map(|row| describe(py, row))
-            .collect()
+    /// Return a part of the stored runs, oldest first, without their arrays.
+    #[pyo3(signature = (cell=None, campaign=None, limit=None, offset=0))]
+    fn _page<'py>(
+        &self,
+        py: Python<'py>,
+        cell: Option<String>,
+        campaign: Option<String>,
+        limit: Option<usize>,
+        offset: usize,
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let page = Page { cell, campaign, offset, limit };
+        let rows = detached(py, || self.read(|library| library.page(&page))).or_raise()?;
+        rows.iter().map(|row| describe(py, row)).collect()
+    }
+
+    /// Return the number of stored runs.
+    fn _count(&self, py: Python<'_>) -> PyResult<usize> {
+        detached(py, || self.read(|library| library.count(None))).or_raise()
+    }
+
+    /// Return runs with their arrays, unchecked, to be stored elsewhere.
+    fn _rows<'py>(
+        &self,
+        py: Python<'py>,
+        ids: &Bound<'py, PyAny>,
+    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let ids: Vec<i64> = ids.extract()?;
+        let rows = detached(py, || {
+            self.read(|library| {
+                ids.iter().map(|id| library.load_unchecked(*id)).collect::<Result<Vec<_>, _>>()
+            })
+        });
+        rows.or_raise()?.iter().map(|row| give_row(py, row)).collect()
+    }
+
+    /// Store runs of another library in one transaction, and return how many were new.
+    fn _insert(&self, py: Python<'_>, rows: &Bound<'_, PyAny>) -> PyResult<usize> {
+        let rows: Py<PyIterator> = rows.try_iter()?.unbind();
+        let inserted = detached(py, || {
+            self.write(|library| {
+                Ok(library.insert::<Raised>(std::iter::from_fn(|| next_row(&rows))))
+            })
+        });
+        inserted.or_raise()?.map_err(|Raised(error)| error)
+    }
+
+    /// Delete runs in one transaction, and return their space to the system.
+    fn _remove(&self, py: Python<'_>, ids: &Bound<'_, PyAny>) -> PyResult<()> {
+        let ids: Vec<i64> = ids.extract()?;
+        detached(py, || self.write(|library| library.discard(&ids))).or_raise()
     }
 
     /// Return a run with its arrays.

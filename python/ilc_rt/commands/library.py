@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import os
-import sqlite3
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,7 +20,6 @@ from ilc_rt.commands.options import (
     JsonFile,
     LibraryArgument,
 )
-from ilc_rt.commands.steps import Steps
 from ilc_rt.errors import BadInputError
 from ilc_rt.library import Library
 from ilc_rt.quantity import axis_unit, unit_for
@@ -263,11 +261,8 @@ def trim(
         if keep is not None:
             deleted = Library(str(library)).trim(min(keep, n_runs), cell)
         else:
-            with Steps("pages given back") as steps:
-                deleted = Library(str(library)).retain(
-                    newest=newest, days=days, best=best, cell=cell, progress=steps.tell
-                )
-    except (OSError, sqlite3.Error) as error:
+            deleted = Library(str(library)).retain(newest=newest, days=days, best=best, cell=cell)
+    except OSError as error:
         raise BadInputError(str(error)) from error
     if json_file is not None:
         write_text(json_file, json_text({"deleted": deleted}))

@@ -22,6 +22,7 @@ from ilc_rt.campaign import Campaign, load_cell
 from ilc_rt.errors import BadInputError, CampaignError
 from ilc_rt.fleet.database import connect, told
 from ilc_rt.fleet.sync import is_intact, prepare, store, stored_rows
+from ilc_rt.read_only import ReadOnlyLibrary
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -144,8 +145,7 @@ def rehearsed(cell: Path, name: str) -> dict[str, Any]:
             raise BadInputError(message) from error
         finally:
             draft.unlink(missing_ok=True)
-        with library_file.reading(library) as file:
-            (row,) = library_file.rows(file, [1])
+        (row,) = library_file.rows(ReadOnlyLibrary(library), [1])
     return row
 
 

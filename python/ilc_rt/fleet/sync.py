@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import sqlite3
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -137,11 +136,7 @@ def pull(
             message = f"cell = {cell}: no run of it is in the database"
             raise BadInputError(message)
         prepare(library)
-        with library_file.reading(library) as file:
-            local = {
-                (row["campaign"], row["iteration"], row["digest"])
-                for row in library_file.keys(file)
-            }
+        local = {(run["campaign"], run["index"], run["digest"]) for run in Library(library)}
         wanted = [row[0] for row in found if tuple(row[1:]) not in local]
         stored, damaged = 0, []
         for number, batch in enumerate(_batches(wanted)):
@@ -178,22 +173,16 @@ def is_intact(row: Mapping[str, Any]) -> bool:
 def store(library: str, rows: list[dict[str, Any]]) -> int:
     """Insert rows in one transaction, and return how many were not there."""
     try:
-        with library_file.writing(library) as file:
-            return sum(library_file.insert(file, row) for row in rows)
-    except sqlite3.IntegrityError as error:
-        message = f"library {library}: a campaign has another run of the same number ({error})"
-        raise BadInputError(message) from error
-    except sqlite3.Error as error:
-        message = f"library {library}: {error}"
-        raise BadInputError(message) from error
+        return library_file.insert(Library(library), rows)
+    except OSError as error:
+        raise BadInputError(str(error)) from error
 
 
 def _push(
     connection: psycopg.Connection[Any], library: str, figures: Mapping[int, str]
 ) -> list[int]:
     """Store runs in one transaction, and return the keys of those left out as damaged."""
-    with library_file.reading(library) as file:
-        rows = library_file.rows(file, list(figures))
+    rows = library_file.rows(ReadOnlyLibrary(library), list(figures))
     intact = [row for row in rows if is_intact(row)]
     provenance = {}
     for row in intact:
@@ -229,7 +218,8 @@ def _there(
 
 def _as_row(found: Mapping[str, Any]) -> dict[str, Any]:
     row = {name: found[name] for name in ("id", *SHARED, "program", "law_parameters", *ARRAYS)}
-    return row | library_file.stored_figures(json.loads(found["figures"]))
+    figures: dict[str, Any] = json.loads(found["figures"])
+    return row | figures
 
 
 def _key(run: Mapping[str, Any]) -> tuple[Any, ...]:

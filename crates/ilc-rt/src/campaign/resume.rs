@@ -50,8 +50,8 @@ impl RollbackPolicy {
         let Some(n_disturbances) = law.n_disturbances() else { return Ok(()) };
         let meta = &plan.meta;
         let task = Task { cell: Some(meta.cell.clone()) };
-        let (ids, _) = library.fitting(plan.n_samples(), meta.n_axes, n_disturbances, &task)?;
-        for id in ids {
+        let fitting = library.fitting(plan.n_samples(), meta.n_axes, n_disturbances, &task)?;
+        for (id, _) in fitting.runs {
             let Row { meta: stored, record, .. } = library.load(id)?;
             if stored.campaign == meta.campaign {
                 break;

@@ -58,6 +58,12 @@ pub enum LearningError {
         /// Its reason.
         reason: String,
     },
+    /// Earlier runs that cannot be read.
+    #[error("an earlier run cannot be read: {reason}")]
+    Shelf {
+        /// Reason.
+        reason: String,
+    },
     /// A parameter outside its range.
     #[error("{what} = {value}; {allowed}")]
     Parameter {

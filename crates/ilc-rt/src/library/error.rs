@@ -90,6 +90,16 @@ pub enum LibraryError {
         /// Number of the run.
         index: u32,
     },
+    /// Another run of this number is in the campaign already.
+    #[error("library {path}: campaign {campaign} has another run of the same number, {index}")]
+    Other {
+        /// File.
+        path: String,
+        /// Campaign.
+        campaign: String,
+        /// Number of the run.
+        index: u32,
+    },
     /// A missing row.
     #[error("library {path}: no iteration with id {id}")]
     NoSuchRow {

@@ -34,11 +34,12 @@ pub(super) fn values(figures: &Figures) -> Vec<(&'static str, Value)> {
     figure_fields().iter().map(value).collect()
 }
 
-/// Reads the figures of a row; those missing in an older file keep their default.
-pub(super) fn read(row: &rusqlite::Row<'_>) -> rusqlite::Result<Figures> {
+/// Reads the figures of a row, which begin at a column; those missing in an older file keep their
+/// default.
+pub(super) fn read(row: &rusqlite::Row<'_>, first: usize) -> rusqlite::Result<Figures> {
     let mut described = Map::new();
-    for field in figure_fields() {
-        let value = match row.get_ref(field.name.as_str())? {
+    for (column, field) in (first..).zip(figure_fields()) {
+        let value = match row.get_ref(column)? {
             ValueRef::Null | ValueRef::Blob(_) => continue,
             ValueRef::Integer(flag) if field.kind == FieldKind::Flag => Json::Bool(flag != 0),
             ValueRef::Integer(count) => count.into(),

@@ -13,8 +13,7 @@ use std::time::Duration;
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 
 use super::error::{LibraryError, told};
-use super::row::{ARRAYS, COLUMNS};
-use super::schema;
+use super::schema::{self, ARRAYS, COLUMNS};
 use crate::record::figure_fields;
 
 /// Time-out for another writing process: a run that cannot be stored has to stop the axes.
@@ -174,7 +173,7 @@ pub(super) fn found(connection: &Connection, path: &Path) -> Result<Found, Libra
     }
     // Older libraries had no mark; their table distinguishes them from other databases.
     let may_be_ours = mark == schema::MARK
-        || mark == 0 && (n_objects == 0 || has_columns(connection).map_err(fail)?);
+        || mark == 0 && (n_objects == 0 || has_columns(connection, version).map_err(fail)?);
     if may_be_ours && version > schema::VERSION {
         return Err(LibraryError::Version {
             path: name,
@@ -184,22 +183,23 @@ pub(super) fn found(connection: &Connection, path: &Path) -> Result<Found, Libra
     }
     let is_ours = may_be_ours
         && (schema::OLDEST..=schema::VERSION).contains(&version)
-        && has_columns(connection).map_err(fail)?;
+        && has_columns(connection, version).map_err(fail)?;
     if is_ours {
         return Ok(Found::Library(version));
     }
     Err(LibraryError::Foreign { path: name, found: "the database of another program".to_owned() })
 }
 
-fn has_columns(connection: &Connection) -> rusqlite::Result<bool> {
+fn has_columns(connection: &Connection, version: i64) -> rusqlite::Result<bool> {
     let mut statement = connection.prepare("SELECT name FROM pragma_table_info('iteration')")?;
     let names: Vec<String> =
         statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
     let figures = figure_fields().iter().filter(|field| field.is_required);
+    let arrays = ARRAYS.into_iter().filter(|_| version < schema::PARTED);
     let mut wanted = COLUMNS
-        .iter()
-        .chain(&ARRAYS)
-        .map(|(name, _)| *name)
+        .map(|(name, _)| name)
+        .into_iter()
+        .chain(arrays)
         .chain(figures.map(|field| field.name.as_str()));
     Ok(wanted.all(|column| names.iter().any(|name| name == column)))
 }

@@ -8,17 +8,28 @@ mod elsewhere;
 mod error;
 mod figures;
 mod file;
+mod fitting;
+mod insert;
+mod listing;
+mod near;
+mod new_run;
+mod once;
 mod recall;
+mod remove;
 mod row;
 mod schema;
+mod signals;
 mod store;
 #[cfg(test)]
 mod tests;
 mod trim;
+mod upgrade;
 
 pub use elsewhere::{Elsewhere, ElsewhereError};
 pub use error::LibraryError;
 pub(crate) use file::IN_MEMORY;
+pub use fitting::Fitting;
+pub use listing::Page;
 pub use recall::{Near, Task};
 pub use row::Row;
 pub use store::Library;

@@ -1,7 +1,9 @@
-//! One row of the table: writing and reading.
+//! One row of the table: reading, and the texts of its lists.
 
 use super::figures;
-use crate::record::{AxisKinds, IterationRecord, Meta, distances_m};
+use super::schema::COLUMNS;
+use super::signals::{Computed, floats};
+use crate::record::{AxisKinds, IterationRecord, Meta, distances_m, figure_fields};
 
 /// One stored run with its provenance.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,79 +22,58 @@ pub struct Row {
     pub record: IterationRecord,
 }
 
-/// Columns of a run beside its arrays and its figures, with their types.
-pub(super) const COLUMNS: [(&str, &str); 17] = [
-    ("id", "INTEGER PRIMARY KEY"),
-    ("created_utc", "TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))"),
-    ("cell", "TEXT NOT NULL"),
-    ("campaign", "TEXT NOT NULL"),
-    ("fingerprint", "TEXT NOT NULL"),
-    ("iteration", "INTEGER NOT NULL"),
-    ("program", "TEXT NOT NULL"),
-    ("law", "TEXT NOT NULL"),
-    ("law_parameters", "TEXT NOT NULL"),
-    ("measure", "TEXT NOT NULL"),
-    ("cycle_s", "REAL NOT NULL"),
-    ("n_axes", "INTEGER NOT NULL"),
-    ("axis_names", "TEXT NOT NULL"),
-    ("input_units", "TEXT NOT NULL"),
-    ("n_samples", "INTEGER NOT NULL"),
-    ("disturbance", "TEXT"),
-    ("digest", "TEXT NOT NULL"),
-];
-
-/// Columns of the arrays of a run, with their types.
-pub(super) const ARRAYS: [(&str, &str); 6] = [
-    ("reference_m", "BLOB NOT NULL"),
-    ("input", "BLOB NOT NULL"),
-    ("encoder_m", "BLOB NOT NULL"),
-    ("tool_m", "BLOB"),
-    ("error_m", "BLOB NOT NULL"),
-    ("contour_m", "BLOB NOT NULL"),
-];
-
+/// Reads a row of `schema::query`, whose columns have the order of [`COLUMNS`], of the figures, and
+/// of the arrays.
 pub(super) fn read_row(row: &rusqlite::Row<'_>, with_arrays: bool) -> rusqlite::Result<Row> {
-    let count = |name: &str| row.get::<_, i64>(name).map(|n| usize::try_from(n).unwrap_or(0));
-    let list = |name: &str| -> rusqlite::Result<Vec<String>> {
-        Ok(serde_json::from_str(&row.get::<_, String>(name)?).unwrap_or_default())
+    let mut columns = 0..;
+    let mut next = || columns.next().unwrap_or_default();
+    let list = |text: Option<String>| -> Vec<String> {
+        text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
     };
-    let array = |name: &str| -> rusqlite::Result<Vec<f64>> {
-        if with_arrays {
-            Ok(floats(&row.get::<_, Option<Vec<u8>>>(name)?.unwrap_or_default()))
-        } else {
-            Ok(Vec::new())
+    let count = |n: i64| usize::try_from(n).unwrap_or(0);
+    let (id, created_utc) = (row.get(next())?, row.get(next())?);
+    let (cell, campaign, fingerprint) = (row.get(next())?, row.get(next())?, row.get(next())?);
+    let index = row.get(next())?;
+    let (program, law, law_parameters) = (row.get(next())?, row.get(next())?, row.get(next())?);
+    let (measure, cycle_s, n_axes) = (row.get(next())?, row.get(next())?, count(row.get(next())?));
+    let (axis_names, input_units) = (list(row.get(next())?), list(row.get(next())?));
+    let n_samples = count(row.get(next())?);
+    let disturbance = numbers(row.get::<_, Option<String>>(next())?.as_deref());
+    let digest = row.get(next())?;
+    let figures = figures::read(row, COLUMNS.len())?;
+    let mut record = IterationRecord { index, disturbance, figures, ..Default::default() };
+    if with_arrays {
+        let mut columns = COLUMNS.len() + figure_fields().len()..;
+        let mut next = || columns.next().unwrap_or_default();
+        let array = |column: usize| -> rusqlite::Result<Vec<f64>> {
+            Ok(row.get_ref(column)?.as_blob_or_null()?.map(floats).unwrap_or_default())
+        };
+        for values in [
+            &mut record.reference_m,
+            &mut record.input,
+            &mut record.encoder_m,
+            &mut record.tool_m,
+            &mut record.error_m,
+            &mut record.contour_m,
+        ] {
+            *values = array(next())?;
         }
+        Computed::of(row.get(next())?).restore(&mut record);
+    }
+    let meta = Meta {
+        cell,
+        campaign,
+        fingerprint,
+        law,
+        law_parameters,
+        measure,
+        program,
+        cycle_s,
+        n_axes,
+        axis_names,
+        input_units,
     };
-    Ok(Row {
-        id: row.get("id")?,
-        created_utc: row.get("created_utc")?,
-        meta: Meta {
-            cell: row.get("cell")?,
-            campaign: row.get("campaign")?,
-            fingerprint: row.get("fingerprint")?,
-            law: row.get("law")?,
-            law_parameters: row.get("law_parameters")?,
-            measure: row.get("measure")?,
-            program: row.get("program")?,
-            cycle_s: row.get("cycle_s")?,
-            n_axes: count("n_axes")?,
-            axis_names: list("axis_names")?,
-            input_units: list("input_units")?,
-        },
-        digest: row.get("digest")?,
-        n_samples: count("n_samples")?,
-        record: IterationRecord {
-            index: row.get("iteration")?,
-            reference_m: array("reference_m")?,
-            input: array("input")?,
-            encoder_m: array("encoder_m")?,
-            tool_m: array("tool_m")?,
-            error_m: array("error_m")?,
-            contour_m: array("contour_m")?,
-            disturbance: numbers(row.get::<_, Option<String>>("disturbance")?.as_deref()),
-            figures: figures::read(row)?,
-        },
-    })
+    Ok(Row { id, created_utc, meta, digest, n_samples, record })
 }
 
 /// Returns true if a row was written before figures per axis existed.
@@ -133,19 +114,4 @@ pub(super) fn numbers(text: Option<&str>) -> Vec<f64> {
 
 pub(super) fn as_integer(count: usize) -> i64 {
     i64::try_from(count).unwrap_or(i64::MAX)
-}
-
-pub(super) fn blob(values: &[f64]) -> Vec<u8> {
-    values.iter().flat_map(|value| value.to_le_bytes()).collect()
-}
-
-fn floats(bytes: &[u8]) -> Vec<f64> {
-    let mut word = [0; 8];
-    bytes
-        .chunks_exact(8)
-        .map(|chunk| {
-            word.copy_from_slice(chunk);
-            f64::from_le_bytes(word)
-        })
-        .collect()
 }

@@ -1,24 +1,22 @@
 //! Appending and reading iterations.
 
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rusqlite::types::Value;
-use rusqlite::{Connection, OptionalExtension, params_from_iter};
+use rusqlite::{CachedStatement, Connection, OptionalExtension, params_from_iter};
 
 use super::error::{LibraryError, told};
 use super::figures;
 use super::file::{self, BUSY_TIMEOUT, Found};
-use super::row::{
-    ARRAYS, Row, as_integer, blob, is_old, json_list, json_numbers, read_row, refresh,
-};
+use super::row::{Row, is_old, read_row, refresh};
 use super::schema;
-use crate::record::{Figures, IterationRecord, Meta};
+use super::upgrade;
+use crate::record::Figures;
 
 /// Time-out after a failed attempt.
 const HURRIED: Duration = Duration::from_millis(200);
-/// SQLite's extended code for a row that already exists.
-const UNIQUE: i32 = rusqlite::ffi::SQLITE_CONSTRAINT_UNIQUE;
 
 /// An open iteration library.
 #[derive(Debug)]
@@ -29,6 +27,8 @@ pub struct Library {
     file: Option<(PathBuf, (u64, u64))>,
     /// Schema version of the file; below the newest only if read-only.
     pub(super) version: i64,
+    /// Starts of the queries for runs without and with their arrays.
+    queries: OnceCell<[String; 2]>,
 }
 
 impl Library {
@@ -59,17 +59,18 @@ impl Library {
         // Checked again, as an interrupted operation of a killed process is undone when the file is
         // opened.
         let is_newest = file::found(&connection, path)? == Found::Library(schema::VERSION);
-        if is_newest && schema::missing(&connection).map_err(fail)?.is_empty() {
+        if is_newest && schema::missing(&connection, "iteration").map_err(fail)?.is_empty() {
             // A program that cannot write must fail now, not when the first run is stored.
             connection.execute_batch("BEGIN IMMEDIATE; ROLLBACK").map_err(fail)?;
         } else {
-            schema::bring_up_to_date(&connection).map_err(fail)?;
+            upgrade::bring_up_to_date(&connection).map_err(fail)?;
         }
         Ok(Self {
             connection,
             path: name,
             file: file::identity(path).map(|identity| (path.to_owned(), identity)),
             version: schema::VERSION,
+            queries: OnceCell::new(),
         })
     }
 
@@ -81,7 +82,8 @@ impl Library {
     /// [`LibraryError::Open`] if it cannot be read.
     pub fn read(path: &Path) -> Result<Self, LibraryError> {
         let (connection, version) = file::reader(path)?;
-        Ok(Self { connection, path: path.display().to_string(), file: None, version })
+        let (path, queries) = (path.display().to_string(), OnceCell::new());
+        Ok(Self { connection, path, file: None, version, queries })
     }
 
     /// Opens a library in memory, deleted when dropped.
@@ -92,89 +94,17 @@ impl Library {
         let path = file::IN_MEMORY.to_owned();
         let fail = |source| LibraryError::Open { path: path.clone(), source };
         let connection = Connection::open_in_memory().map_err(fail)?;
-        schema::bring_up_to_date(&connection).map_err(fail)?;
-        Ok(Self { connection, path, file: None, version: schema::VERSION })
-    }
-
-    /// Stores one run and returns its key.
-    ///
-    /// # Errors
-    /// [`LibraryError::Taken`] if the campaign already has a run of this number;
-    /// [`LibraryError::Gone`] if the file does not exist any more; [`LibraryError::Locked`] or
-    /// [`LibraryError::Sqlite`] if it cannot be written.
-    pub fn append(&self, meta: &Meta, record: &IterationRecord) -> Result<i64, LibraryError> {
-        let n_samples = record.reference_m.len() / meta.n_axes.max(1);
-        let text = |text: &String| Value::Text(text.clone());
-        let tool = Some(&record.tool_m).filter(|tool_m| !tool_m.is_empty());
-        let disturbance = Some(&record.disturbance).filter(|measured| !measured.is_empty());
-        let mut run = vec![
-            ("cell", text(&meta.cell)),
-            ("campaign", text(&meta.campaign)),
-            ("fingerprint", text(&meta.fingerprint)),
-            ("iteration", Value::Integer(record.index.into())),
-            ("program", text(&meta.program)),
-            ("law", text(&meta.law)),
-            ("law_parameters", text(&meta.law_parameters)),
-            ("measure", text(&meta.measure)),
-            ("cycle_s", Value::Real(meta.cycle_s)),
-            ("n_axes", Value::Integer(as_integer(meta.n_axes))),
-            ("axis_names", Value::Text(json_list(&meta.axis_names))),
-            ("input_units", Value::Text(json_list(&meta.input_units))),
-            ("n_samples", Value::Integer(as_integer(n_samples))),
-            ("disturbance", disturbance.map(|measured| json_numbers(measured)).into()),
-            ("digest", Value::Text(record.digest())),
-            ("reference_m", Value::Blob(blob(&record.reference_m))),
-            ("input", Value::Blob(blob(&record.input))),
-            ("encoder_m", Value::Blob(blob(&record.encoder_m))),
-            ("tool_m", tool.map(|tool_m| blob(tool_m)).into()),
-            ("error_m", Value::Blob(blob(&record.error_m))),
-            ("contour_m", Value::Blob(blob(&record.contour_m))),
-        ];
-        run.extend(figures::values(&record.figures));
-        let (names, values): (Vec<_>, Vec<_>) = run.into_iter().unzip();
-        let places = vec!["?"; names.len()].join(", ");
-        let statement = format!("INSERT INTO iteration ({}) VALUES ({places})", names.join(", "));
-        let id = self
-            .connection
-            .prepare_cached(&statement)
-            .and_then(|mut insert| insert.insert(params_from_iter(values)))
-            .map_err(|source| match source.sqlite_error() {
-                Some(error) if error.extended_code == UNIQUE => LibraryError::Taken {
-                    path: self.path.clone(),
-                    campaign: meta.campaign.clone(),
-                    index: record.index,
-                },
-                _ => self.fail(source),
-            })?;
-        self.require_file()?;
-        Ok(id)
+        upgrade::bring_up_to_date(&connection).map_err(fail)?;
+        let (version, queries) = (schema::VERSION, OnceCell::new());
+        Ok(Self { connection, path, file: None, version, queries })
     }
 
     /// Ensures that the file written to is still the one at the path.
-    fn require_file(&self) -> Result<(), LibraryError> {
+    pub(super) fn require_file(&self) -> Result<(), LibraryError> {
         let Some((path, identity)) = &self.file else { return Ok(()) };
         let is_there =
             file::identity(path) == Some(*identity) && file::beside(path, "-wal").exists();
         if is_there { Ok(()) } else { Err(LibraryError::Gone { path: self.path.clone() }) }
-    }
-
-    /// Lists the stored runs, oldest first, without their arrays; optionally those of one campaign.
-    ///
-    /// # Errors
-    /// [`LibraryError::Sqlite`] if the file cannot be read.
-    pub fn list(&self, campaign: Option<&str>) -> Result<Vec<Row>, LibraryError> {
-        let columns = self.columns()?;
-        let query = format!(
-            "SELECT {columns} FROM iteration WHERE ?1 IS NULL OR campaign = ?1 ORDER BY id"
-        );
-        let mut statement = self.connection.prepare(&query).map_err(|e| self.fail(e))?;
-        let rows = statement.query_map([campaign], |row| read_row(row, false));
-        let mut rows: Vec<Row> =
-            rows.and_then(Iterator::collect).map_err(|source| self.fail(source))?;
-        for row in rows.iter_mut().filter(|row| is_old(row)) {
-            row.record.figures = self.figures(row.id)?.record.figures;
-        }
-        Ok(rows)
     }
 
     /// Replaces the figures of a stored run after a later decision of the law.
@@ -202,15 +132,11 @@ impl Library {
     }
 
     /// Reads one run with its arrays, unchecked.
-    fn load_unchecked(&self, id: i64) -> Result<Row, LibraryError> {
-        let arrays = ARRAYS.map(|(name, _)| name).join(", ");
-        let query = format!("SELECT {}, {arrays} FROM iteration WHERE id = ?1", self.columns()?);
-        let mut row = self
-            .connection
-            .query_row(&query, [id], |row| read_row(row, true))
-            .optional()
-            .map_err(|source| self.fail(source))?
-            .ok_or_else(|| LibraryError::NoSuchRow { path: self.path.clone(), id })?;
+    ///
+    /// # Errors
+    /// [`LibraryError::NoSuchRow`]; [`LibraryError::Sqlite`] if the file cannot be read.
+    pub fn load_unchecked(&self, id: i64) -> Result<Row, LibraryError> {
+        let mut row = self.row(id, true)?;
         if is_old(&row) {
             refresh(&mut row);
         }
@@ -219,21 +145,41 @@ impl Library {
 
     /// Reads one run without its arrays.
     pub(super) fn figures(&self, id: i64) -> Result<Row, LibraryError> {
-        let query = format!("SELECT {} FROM iteration WHERE id = ?1", self.columns()?);
-        let mut row = self
-            .connection
-            .query_row(&query, [id], |row| read_row(row, false))
-            .optional()
-            .map_err(|source| self.fail(source))?
-            .ok_or_else(|| LibraryError::NoSuchRow { path: self.path.clone(), id })?;
+        let mut row = self.row(id, false)?;
         if is_old(&row) {
             row.record.figures = self.load_unchecked(id)?.record.figures;
         }
         Ok(row)
     }
 
-    fn columns(&self) -> Result<String, LibraryError> {
-        schema::columns(&self.connection).map_err(|source| self.fail(source))
+    /// Reads one run as it is stored.
+    fn row(&self, id: i64, with_arrays: bool) -> Result<Row, LibraryError> {
+        self.select(with_arrays, "WHERE iteration.id = ?1")?
+            .query_row([id], |row| read_row(row, with_arrays))
+            .optional()
+            .map_err(|source| self.fail(source))?
+            .ok_or_else(|| LibraryError::NoSuchRow { path: self.path.clone(), id })
+    }
+
+    /// Prepares a query for runs, as [`read_row`] reads them.
+    pub(super) fn select(
+        &self,
+        with_arrays: bool,
+        condition: &str,
+    ) -> Result<CachedStatement<'_>, LibraryError> {
+        let start =
+            |with_arrays| schema::query(&self.connection, self.version, "iteration", with_arrays);
+        let prepare = || {
+            let queries = if let Some(queries) = self.queries.get() {
+                queries
+            } else {
+                let queries = [start(false)?, start(true)?];
+                self.queries.get_or_init(|| queries)
+            };
+            let start = &queries[usize::from(with_arrays)];
+            self.connection.prepare_cached(&format!("{start} {condition}"))
+        };
+        prepare().map_err(|source| self.fail(source))
     }
 
     /// Returns the number of the next run of a campaign.

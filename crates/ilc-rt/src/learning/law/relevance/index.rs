@@ -19,6 +19,8 @@ const ROUNDING: f64 = 1e-9;
 pub(super) trait Index: Send + std::fmt::Debug {
     /// Adds a run.
     fn push(&mut self, weights: &RelevanceWeights, error_sum: f64, disturbance: &[f64]);
+    /// Adds runs with as many disturbances each as there are coordinates for them.
+    fn extend(&mut self, weights: &RelevanceWeights, error_sums: &[f64], disturbances: &[f64]);
     /// Reserves space for `n` runs in all.
     fn reserve(&mut self, n: usize);
     /// Writes the sums of all runs for a disturbance.
@@ -92,6 +94,14 @@ fn distance<const K: usize>(a: &[f64; K], b: &[f64; K]) -> f64 {
 impl<const K: usize> Index for Grown<K> {
     fn push(&mut self, weights: &RelevanceWeights, error_sum: f64, disturbance: &[f64]) {
         self.places.push(weights.place(error_sum, disturbance, self.n_samples));
+        self.grow_tree();
+    }
+
+    fn extend(&mut self, weights: &RelevanceWeights, error_sums: &[f64], disturbances: &[f64]) {
+        let width = K - 1;
+        self.places.extend(error_sums.iter().enumerate().map(|(run, sum)| {
+            weights.place::<K>(*sum, &disturbances[run * width..][..width], self.n_samples)
+        }));
         self.grow_tree();
     }
 

@@ -5,21 +5,25 @@ mod index;
 mod parameters;
 #[cfg(test)]
 mod proof;
+mod proposals;
+mod shares;
+mod shelved;
 mod weights;
 
 use std::fmt;
 
 use super::expectation::{Expectation, check as check_disturbance};
-use super::inputs::Inputs;
 use crate::learning::error::{check, check_learns_from_every_run};
 use crate::learning::{Law, LearningError, Result, Surrogate};
 
 use index::{DISTURBANCES_MAX, Index, index};
+use proposals::Proposals;
 use weights::normalise;
 
 pub use parameters::RelevanceParameters;
+pub use proposals::{Each, Shelf};
+pub(crate) use shares::shares;
 pub use weights::RelevanceWeights;
-pub(crate) use weights::shares;
 
 /// Size of the runs that a [`Relevance`] law learns from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,10 +73,12 @@ pub struct Relevance {
     told: Expectation,
     /// Remembered runs may arrive again as new runs.
     is_replayed: bool,
-    proposals: Inputs,
+    proposals: Proposals,
     disturbances: Vec<f64>,
     index: Box<dyn Index>,
     proposal: Vec<f64>,
+    /// Proposal of a run from the shelf.
+    spare: Vec<f64>,
     found: Vec<(usize, f64)>,
     sums: Vec<f64>,
 }
@@ -121,10 +127,11 @@ impl Relevance {
             top,
             told: Expectation::new(n_disturbances),
             is_replayed: false,
-            proposals: Inputs::new(length),
+            proposals: Proposals::new(length),
             disturbances: Vec::new(),
             index,
             proposal: vec![0.0; length],
+            spare: Vec::new(),
             found: Vec::new(),
             sums: Vec::new(),
         })
@@ -219,29 +226,32 @@ impl Relevance {
         kept.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(a.cmp(&b)));
         kept.truncate(keep);
         kept.sort_unstable();
-        self.proposals.retain(&kept);
-        self.index.retain(&kept);
-        let old = std::mem::take(&mut self.disturbances);
-        for &number in &kept {
-            self.disturbances.extend_from_slice(&old[number * width..][..width]);
-        }
+        self.retain(&kept);
         Ok(kept)
     }
 
     /// Computes the proposal of a run.
     fn propose(&mut self, input: &[f64], error: &[f64]) -> Result {
+        let mut proposal = std::mem::take(&mut self.proposal);
+        let computed = self.compute(input, error, &mut proposal);
+        self.proposal = proposal;
+        computed
+    }
+
+    /// Computes the proposal of a run.
+    fn compute(&mut self, input: &[f64], error: &[f64], proposal: &mut [f64]) -> Result {
         let RunShape { n_samples, n_inputs, n_outputs, .. } = self.shape;
         check("input", input, n_samples, n_inputs)?;
         check("error", error, n_samples, n_outputs)?;
-        self.core.update(input, error, &mut self.proposal)?;
+        self.core.update(input, error, proposal)?;
         let RelevanceWeights { error_gain, input_gain, .. } = self.weights;
         #[expect(clippy::float_cmp, reason = "gains of exactly 1 leave every bit as it is")]
         if error_gain != 1.0 || input_gain != 1.0 {
-            for (next, u) in self.proposal.iter_mut().zip(input) {
+            for (next, u) in proposal.iter_mut().zip(input) {
                 *next = input_gain * u + error_gain * (*next - u);
             }
         }
-        check("next", &self.proposal, n_samples, n_inputs)
+        check("next", proposal, n_samples, n_inputs)
     }
 
     fn keep(&mut self, error: &[f64], disturbance: &[f64]) {
@@ -251,36 +261,65 @@ impl Relevance {
         self.index.push(&self.weights, sum, disturbance);
     }
 
-    /// Returns true if the proposal is already stored under this disturbance.
-    fn knows(&self, disturbance: &[f64]) -> bool {
-        let width = disturbance.len();
-        (0..self.len()).any(|run| {
-            self.disturbances[run * width..][..width] == *disturbance
-                && self.proposals.row(run) == self.proposal
-        })
+    /// Writes the weighted mean of the runs that count under a disturbance; of none, the proposal.
+    fn weigh(&mut self, disturbance: &[f64], next: &mut [f64]) -> Result {
+        // Again if runs have left the shelf: others count then.
+        while !self.search(disturbance)? {}
+        let epsilon = self.weights.epsilon;
+        if self.is_empty() {
+            next.copy_from_slice(&self.proposal);
+            return Ok(());
+        }
+        next.fill(0.0);
+        if self.top.is_none() {
+            normalise(&mut self.sums, epsilon);
+            for (number, &weight) in self.sums.iter().enumerate() {
+                self.proposals.add(number, weight, next);
+            }
+        } else {
+            self.sums.clear();
+            self.sums.extend(self.found.iter().map(|(_, sum)| *sum));
+            normalise(&mut self.sums, epsilon);
+            for ((number, _), &weight) in self.found.iter().zip(&self.sums) {
+                self.proposals.add(*number, weight, next);
+            }
+        }
+        Ok(())
     }
 
-    /// Writes the weighted mean of the runs that count under a disturbance.
-    fn weigh(&mut self, disturbance: &[f64], next: &mut [f64]) {
-        let epsilon = self.weights.epsilon;
-        next.fill(0.0);
+    /// Finds the runs that count, and computes the proposals of those on the shelf; false if some
+    /// are not there any more, and are forgotten.
+    fn search(&mut self, disturbance: &[f64]) -> Result<bool> {
         match self.top {
-            None => {
-                self.index.sums(&self.weights, disturbance, &mut self.sums);
-                normalise(&mut self.sums, epsilon);
-                for (number, &weight) in self.sums.iter().enumerate() {
-                    self.proposals.add(number, weight, next);
-                }
-            }
+            None => self.index.sums(&self.weights, disturbance, &mut self.sums),
             Some(top) => {
                 self.index.nearest(&self.weights, disturbance, top, &mut self.found);
-                self.sums.clear();
-                self.sums.extend(self.found.iter().map(|(_, sum)| *sum));
-                normalise(&mut self.sums, epsilon);
-                for ((number, _), &weight) in self.found.iter().zip(&self.sums) {
-                    self.proposals.add(*number, weight, next);
-                }
             }
+        }
+        if !self.proposals.has_shelf() {
+            return Ok(true);
+        }
+        let wanted: Vec<usize> = match self.top {
+            None => (0..self.len()).collect(),
+            Some(_) => self.found.iter().map(|(number, _)| *number).collect(),
+        };
+        let gone = self.fetch(&wanted)?;
+        if !gone.is_empty() {
+            let kept: Vec<usize> =
+                (0..self.len()).filter(|run| gone.binary_search(run).is_err()).collect();
+            self.retain(&kept);
+        }
+        Ok(gone.is_empty())
+    }
+
+    /// Keeps only these runs, given in ascending order.
+    fn retain(&mut self, kept: &[usize]) {
+        let width = self.shape.n_disturbances;
+        self.proposals.retain(kept);
+        self.index.retain(kept);
+        let old = std::mem::take(&mut self.disturbances);
+        for &number in kept {
+            self.disturbances.extend_from_slice(&old[number * width..][..width]);
         }
     }
 }
@@ -304,16 +343,12 @@ impl Law for Relevance {
         let coming = &coming[..n_disturbances];
         if let Some(finished) = finished {
             let finished = &finished[..n_disturbances];
-            self.is_replayed = self.is_replayed && self.knows(finished);
+            self.is_replayed = self.is_replayed && self.knows(error, finished)?;
             if !self.is_replayed {
                 self.keep(error, finished);
             }
         }
-        if self.is_empty() {
-            next.copy_from_slice(&self.proposal);
-        } else {
-            self.weigh(coming, next);
-        }
+        self.weigh(coming, next)?;
         check("next", next, n_samples, n_inputs)
     }
 

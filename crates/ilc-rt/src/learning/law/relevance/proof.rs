@@ -171,7 +171,7 @@ proptest! {
         let left: Vec<Past> = best.iter().map(|&run| runs[run].clone()).collect();
         let mut next = vec![0.0; 12];
         law.set_disturbance(&at);
-        law.weigh(&at, &mut next);
+        law.weigh(&at, &mut next).unwrap();
         close(&next, &listing(&left, &at, &law.weights.clone(), 1.0, 0.5));
         // For all disturbances met: the sums of the weights decide.
         let mut law = make();

@@ -150,34 +150,6 @@ pub(super) fn normalise(sums: &mut [f64], epsilon: f64) {
     }
 }
 
-/// Returns the total weight of each run under the disturbances of all: the sums of Eq. (4.13).
-///
-/// `disturbances` are the runs' own, already weighted, `width` numbers each.
-pub(crate) fn shares(
-    error_sums: &[f64],
-    disturbances: &[f64],
-    width: usize,
-    epsilon: f64,
-) -> Vec<f64> {
-    let mut shares = vec![0.0; error_sums.len()];
-    let mut sums = vec![0.0; error_sums.len()];
-    // Without disturbances every pass is the same.
-    let n_looks = if width == 0 { 1 } else { error_sums.len() };
-    for look in 0..n_looks {
-        let here = &disturbances[look * width..][..width];
-        for (run, (sum, error_sum)) in sums.iter_mut().zip(error_sums).enumerate() {
-            let there = &disturbances[run * width..][..width];
-            let apart = here.iter().zip(there).map(|(a, b)| (a - b) * (a - b));
-            *sum = error_sum + apart.sum::<f64>();
-        }
-        normalise(&mut sums, epsilon);
-        for (share, weight) in shares.iter_mut().zip(&sums) {
-            *share += weight;
-        }
-    }
-    shares
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
