@@ -39,7 +39,8 @@ VERBS = {
     "library": "List, show, export and trim the runs in a library.",
     "monitor": "Watch a controller: its state, each run's error, and faults.",
     "dashboard": (
-        "Serve a web page that watches cells and compares their stored runs; it commands nothing."
+        "Serve a web page that watches cells and compares the runs of libraries; it commands "
+        "nothing."
     ),
     "bridge": "Show a running controller in PlotJuggler or Foxglove.",
     "reproduce": "Compute a paper's figures again, and set them beside the printed ones.",

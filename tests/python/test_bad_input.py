@@ -72,7 +72,7 @@ OPTIONS = {
         ["cell.toml", "--library", "cell.toml"], ["library cell.toml", "not a database"],
     ),
     "library of a newer program": (
-        ["cell.toml", "--library", "newer.db"], ["library newer.db", "version 99", "version 3"],
+        ["cell.toml", "--library", "newer.db"], ["library newer.db", "version 99", "version 4"],
     ),
     "nothing to resume": (
         ["cell.toml", "--library", "nix.db", "--resume"], ["--resume", "nix.db"],

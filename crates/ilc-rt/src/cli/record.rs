@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::figures::FiguresFile;
-use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
+use super::target::answered;
+use super::{EXIT_BAD_INPUT, show};
 use crate::campaign::summary::{Summary, summarize};
 use crate::campaign::traffic::{self, TrafficFormat};
 
@@ -66,29 +66,14 @@ pub(super) fn record(arguments: &RecordArguments) -> u8 {
 }
 
 fn info(arguments: &InfoArguments) -> u8 {
-    let summary = match summarize(&arguments.recording) {
-        Ok(summary) => summary,
-        Err(error) => {
-            show::complain(&error);
-            return EXIT_BAD_INPUT;
+    answered(arguments.json.as_deref(), || {
+        let summary =
+            summarize(&arguments.recording).map_err(|error| (error.to_string(), EXIT_BAD_INPUT))?;
+        for line in lines(&summary) {
+            show::say(&line);
         }
-    };
-    let file = match &arguments.json {
-        None => None,
-        Some(path) => match FiguresFile::reserve(path, false) {
-            None => return EXIT_BAD_INPUT,
-            reserved => reserved,
-        },
-    };
-    for line in lines(&summary) {
-        show::say(&line);
-    }
-    match file {
-        Some(file) if !file.write(&serde_json::to_value(&summary).unwrap_or_default()) => {
-            EXIT_FAILURE
-        }
-        _ => 0,
-    }
+        Ok((summary, 0))
+    })
 }
 
 fn lines(summary: &Summary) -> Vec<String> {

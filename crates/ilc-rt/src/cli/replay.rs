@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::figures::FiguresFile;
+use super::target::answered;
 use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
 use crate::campaign::replay::{Replayed, replay as play};
 
@@ -24,26 +24,15 @@ pub(super) struct ReplayArguments {
 
 /// Replays a recording; returns the exit status.
 pub(super) fn replay(arguments: &ReplayArguments) -> u8 {
-    let replayed = match play(&arguments.recording) {
-        Ok(replayed) => replayed,
-        Err(error) => {
-            show::complain(&error);
-            return EXIT_BAD_INPUT;
+    answered(arguments.json.as_deref(), || {
+        let replayed =
+            play(&arguments.recording).map_err(|error| (error.to_string(), EXIT_BAD_INPUT))?;
+        for line in lines(&replayed) {
+            show::say(&line);
         }
-    };
-    let file = match &arguments.json {
-        None => None,
-        Some(path) => match FiguresFile::reserve(path, false) {
-            None => return EXIT_BAD_INPUT,
-            reserved => reserved,
-        },
-    };
-    for line in lines(&replayed) {
-        show::say(&line);
-    }
-    let is_written =
-        file.is_none_or(|file| file.write(&serde_json::to_value(&replayed).unwrap_or_default()));
-    if replayed.difference.is_none() && is_written { 0 } else { EXIT_FAILURE }
+        let status = if replayed.difference.is_none() { 0 } else { EXIT_FAILURE };
+        Ok((replayed, status))
+    })
 }
 
 fn lines(replayed: &Replayed) -> Vec<String> {

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::figures::FiguresFile;
 use super::late::{counts, node_in_words, sentence, stage_row, stages_table};
-use super::{EXIT_BAD_INPUT, EXIT_FAILURE, show};
+use super::target::answered;
+use super::{EXIT_BAD_INPUT, show};
 use crate::campaign::late_of;
 use crate::config::{Cell, read_file};
 use crate::record::{FLIGHT_SUFFIX, FlightRecord, LateCase, TEXT_MAX, printable};
@@ -34,35 +34,19 @@ pub(super) struct WhyArguments {
 
 /// Prints the worst cycles; returns the exit status.
 pub(super) fn why(arguments: &WhyArguments) -> u8 {
-    let is_recording = arguments.target.to_string_lossy().ends_with(SUFFIX);
-    let record = if is_recording {
-        late_of(&arguments.target).map_err(|error| error.to_string())
-    } else {
-        find(arguments).and_then(|path| read(&path))
-    };
-    let record = match record {
-        Ok(record) => record,
-        Err(refusal) => {
-            show::complain(&refusal);
-            return EXIT_BAD_INPUT;
+    answered(arguments.json.as_deref(), || {
+        let is_recording = arguments.target.to_string_lossy().ends_with(SUFFIX);
+        let record = if is_recording {
+            late_of(&arguments.target).map_err(|error| error.to_string())
+        } else {
+            find(arguments).and_then(|path| read(&path))
+        };
+        let record = record.map_err(|refusal| (refusal, EXIT_BAD_INPUT))?;
+        for line in lines(&record) {
+            show::say(&line);
         }
-    };
-    let file = match &arguments.json {
-        None => None,
-        Some(path) => match FiguresFile::reserve(path, false) {
-            None => return EXIT_BAD_INPUT,
-            reserved => reserved,
-        },
-    };
-    for line in lines(&record) {
-        show::say(&line);
-    }
-    match file {
-        Some(file) if !file.write(&serde_json::to_value(&record).unwrap_or_default()) => {
-            EXIT_FAILURE
-        }
-        _ => 0,
-    }
+        Ok((record, 0))
+    })
 }
 
 /// Returns the record that is meant.

@@ -67,12 +67,23 @@ impl Plant {
         })
     }
 
+    /// Lets the caller cancel every so many samples, which take well below a millisecond: asking costs as much as a
+    /// sample of a small plant.
+    #[inline]
+    fn point_at(&self, sample: usize) {
+        const OPERATIONS: usize = 1 << 18;
+        if sample % (OPERATIONS / (self.n_states * self.n_states + 1) + 1) == 0 {
+            crate::interrupt::point();
+        }
+    }
+
     /// `out = P input`
     pub(super) fn apply(&self, input: &[f64], out: &mut [f64]) {
         let [a, b, c, d] = &self.direct;
         let (mut x, mut next) = (vec![0.0; self.n_states], vec![0.0; self.n_states]);
-        crate::interrupt::point();
-        for (u, y) in input.chunks_exact(self.n_inputs).zip(out.chunks_exact_mut(self.n_outputs)) {
+        let samples = input.chunks_exact(self.n_inputs).zip(out.chunks_exact_mut(self.n_outputs));
+        for (k, (u, y)) in samples.enumerate() {
+            self.point_at(k);
             y.fill(0.0);
             c.add(&x, y);
             d.add(u, y);
@@ -88,8 +99,8 @@ impl Plant {
         let [a, b, c, d] = &self.transposed;
         let (mut x, mut next) = (vec![0.0; self.n_states], vec![0.0; self.n_states]);
         let samples = output.chunks_exact(self.n_outputs).zip(out.chunks_exact_mut(self.n_inputs));
-        crate::interrupt::point();
-        for (y, u) in samples.rev() {
+        for (k, (y, u)) in samples.rev().enumerate() {
+            self.point_at(k);
             u.fill(0.0);
             b.add(&x, u);
             d.add(y, u);
