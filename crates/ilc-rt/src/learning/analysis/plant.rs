@@ -72,7 +72,7 @@ impl Plant {
     #[inline]
     fn point_at(&self, sample: usize) {
         const OPERATIONS: usize = 1 << 18;
-        if sample % (OPERATIONS / (self.n_states * self.n_states + 1) + 1) == 0 {
+        if sample.is_multiple_of(OPERATIONS / (self.n_states * self.n_states + 1) + 1) {
             crate::interrupt::point();
         }
     }
