@@ -1,6 +1,6 @@
 //! Campaigns of libraries that older versions wrote go on, and what they learned is the same to the last
-//! bit: fingerprints and digests of the second run come from version 0.1 (`legacy_campaigns.json`). Those of
-//! `norm_optimal` without weights over time and of `adjoint` are newer: their sums are in another order.
+//! bit: fingerprints and digests of the second run come from version 0.1 (`legacy_campaigns.json`). The digest of
+//! `norm_optimal` without weights over time is newer: its sums are in another order.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

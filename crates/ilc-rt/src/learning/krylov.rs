@@ -42,6 +42,18 @@ pub(in crate::learning) fn largest_symmetric(
     largest_until(n, map, (n_basis, n_products_max), noise(n, 5), &enough)
 }
 
+/// [`largest_symmetric`] with every sum in the order of its terms, for what has to be the same bit by bit as ever.
+pub(in crate::learning) fn largest_in_order(
+    n: usize,
+    map: &mut Map,
+    n_basis: usize,
+    n_products_max: usize,
+    tolerance: f64,
+) -> Result<Estimate> {
+    let enough = |value: f64, residual: f64| residual <= tolerance * value.abs();
+    largest(Sums::InOrder, n, map, (n_basis, n_products_max), noise(n, 5), &enough)
+}
+
 /// [`largest_symmetric`] from a given start, until `enough` accepts the value with its residual.
 pub(in crate::learning) fn largest_until(
     n: usize,
@@ -50,9 +62,20 @@ pub(in crate::learning) fn largest_until(
     start: Vec<f64>,
     enough: &dyn Fn(f64, f64) -> bool,
 ) -> Result<Estimate> {
+    largest(Sums::SideBySide, n, map, (n_basis, n_products_max), start, enough)
+}
+
+fn largest(
+    sums: Sums,
+    n: usize,
+    map: &mut Map,
+    (n_basis, n_products_max): (usize, usize),
+    start: Vec<f64>,
+    enough: &dyn Fn(f64, f64) -> bool,
+) -> Result<Estimate> {
     let n_basis = n_basis.min(n).max(1);
     let n_kept = n_basis / 3;
-    let mut basis: Vec<Vec<f64>> = vec![unit(start)];
+    let mut basis: Vec<Vec<f64>> = vec![sums.unit(start)];
     let mut small = DMatrix::<f64>::zeros(n_basis, n_basis);
     let mut n_products = 0;
     let mut at = 0;
@@ -62,17 +85,17 @@ pub(in crate::learning) fn largest_until(
             let mut next = vec![0.0; n];
             map(&basis[at], &mut next)?;
             n_products += 1;
-            for (i, value) in orthogonalise(&basis, &mut next).into_iter().enumerate() {
+            for (i, value) in sums.orthogonalise(&basis, &mut next).into_iter().enumerate() {
                 small[(i, at)] = value;
                 small[(at, i)] = value;
             }
-            left = norm(&next);
+            left = sums.norm(&next);
             at += 1;
             if left <= 1e-14 * small[(0, 0)].abs().max(f64::MIN_POSITIVE) {
                 // The subspace is invariant: its eigenvalues are exact.
                 break;
             }
-            basis.push(unit(next));
+            basis.push(sums.unit(next));
         }
         let eigen = SymmetricEigen::new(small.view((0, 0), (at, at)).into_owned());
         let mut order: Vec<usize> = (0..at).collect();
@@ -89,7 +112,7 @@ pub(in crate::learning) fn largest_until(
             .iter()
             .map(|column| {
                 let mut sum = vec![0.0; n];
-                combine(&basis, eigen.eigenvectors.column(*column).as_slice(), &mut sum);
+                sums.combine(&basis, eigen.eigenvectors.column(*column).as_slice(), &mut sum);
                 sum
             })
             .collect();
@@ -99,8 +122,8 @@ pub(in crate::learning) fn largest_until(
             small[(i, i)] = eigen.eigenvalues[*column];
         }
         let mut last = last;
-        orthogonalise(&basis, &mut last);
-        basis.push(unit(last));
+        sums.orthogonalise(&basis, &mut last);
+        basis.push(sums.unit(last));
         at = n_kept;
     }
 }
@@ -220,6 +243,62 @@ pub(in crate::learning) fn radius(matrix: &DMatrix<f64>) -> Result<f64> {
     Ok(values.iter().map(|value| value.re.hypot(value.im)).fold(0.0, f64::max))
 }
 
+/// Order of the terms of a sum over a vector.
+#[derive(Clone, Copy, Debug)]
+enum Sums {
+    /// Partial sums side by side: quick.
+    SideBySide,
+    /// One after the other.
+    InOrder,
+}
+
+impl Sums {
+    fn norm(self, x: &[f64]) -> f64 {
+        match self {
+            Self::SideBySide => norm(x),
+            Self::InOrder => x.iter().map(|value| value * value).sum::<f64>().sqrt(),
+        }
+    }
+
+    fn unit(self, vector: Vec<f64>) -> Vec<f64> {
+        let size = self.norm(&vector);
+        scaled(vector, size)
+    }
+
+    /// `sum += factor_1 vector_1 + ..`
+    fn combine(self, basis: &[Vec<f64>], factors: &[f64], sum: &mut [f64]) {
+        match self {
+            Self::SideBySide => combine(basis, factors, sum),
+            Self::InOrder => {
+                for (vector, factor) in basis.iter().zip(factors) {
+                    for (value, part) in sum.iter_mut().zip(vector) {
+                        *value += factor * part;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Removes the parts along a basis, twice, and returns them.
+    fn orthogonalise(self, basis: &[Vec<f64>], next: &mut [f64]) -> Vec<f64> {
+        if matches!(self, Self::SideBySide) {
+            return orthogonalise(basis, next);
+        }
+        crate::interrupt::point();
+        let mut parts = vec![0.0; basis.len()];
+        for _ in 0..2 {
+            for (vector, part) in basis.iter().zip(&mut parts) {
+                let share: f64 = vector.iter().zip(&*next).map(|(v, x)| v * x).sum();
+                for (value, v) in next.iter_mut().zip(vector) {
+                    *value -= share * v;
+                }
+                *part += share;
+            }
+        }
+        parts
+    }
+}
+
 /// Orthogonalises `next` against the basis, twice because of rounding; returns the coefficients.
 fn orthogonalise(basis: &[Vec<f64>], next: &mut [f64]) -> Vec<f64> {
     crate::interrupt::point();
@@ -235,8 +314,12 @@ fn orthogonalise(basis: &[Vec<f64>], next: &mut [f64]) -> Vec<f64> {
     parts
 }
 
-fn unit(mut vector: Vec<f64>) -> Vec<f64> {
+fn unit(vector: Vec<f64>) -> Vec<f64> {
     let size = norm(&vector);
+    scaled(vector, size)
+}
+
+fn scaled(mut vector: Vec<f64>, size: f64) -> Vec<f64> {
     if size > 0.0 {
         for value in &mut vector {
             *value /= size;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
 
 use super::LearningError;
-use super::krylov::{Estimate, largest_symmetric};
+use super::krylov::{Estimate, largest_in_order};
 use crate::model::StateSpace;
 
 /// Largest number of inputs for which the norm is always computed to [`TOLERANCE`].
@@ -85,7 +85,8 @@ impl Operator {
         // A smaller basis in long runs: it dominates memory and time.
         let n_basis = if size <= SHORT { 150 } else { (6_000_000 / size).clamp(20, 100) };
         let n_products = if size <= SHORT { 3000 } else { n_basis.max(100) };
-        let square = largest_symmetric(
+        // The default gain of `adjoint` follows from it, which a stored campaign names with all its digits.
+        let square = largest_in_order(
             size,
             &mut |u, v| {
                 self.forward(u, &mut output);
