@@ -45,7 +45,7 @@ class Source(Protocol):
     path: Path | None
 
     def stamp(self) -> object:
-        """Return what changes with the runs; None if there are none yet."""
+        """Return a mark that changes whenever the runs do; None before the first run."""
 
     def rows(self) -> list[dict[str, Any]]:
         """Return the runs as `Library.list` does."""

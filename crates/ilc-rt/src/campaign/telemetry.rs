@@ -81,11 +81,12 @@ impl History {
     }
 
     /// Returns the events in order, each with the end of its key.
-    fn events(&self) -> impl Iterator<Item = (String, &String)> {
-        let start = self.start.iter().map(|json| ("start".to_owned(), json));
+    fn copied(&self) -> Vec<(String, String)> {
+        let start = self.start.iter().map(|json| ("start".to_owned(), json.clone()));
         let past = self.past.iter().enumerate();
-        let past = past.map(|(number, json)| ((self.n_left_out + number).to_string(), json));
-        start.chain(past)
+        let past =
+            past.map(|(number, json)| ((self.n_left_out + number).to_string(), json.clone()));
+        start.chain(past).collect()
     }
 }
 
@@ -170,9 +171,10 @@ fn publish(settings: &Settings, prefix: &str, messages: &Receiver<Message>) -> z
     let past = {
         let (history, key) = (Arc::clone(&history), past_key.clone());
         move |query: zenoh::query::Query| {
-            let Ok(history) = history.lock() else { return };
-            for (end, json) in history.events() {
-                let _ = query.reply(format!("{key}/{end}"), json.as_str()).wait();
+            // Copied first: one that reads its answers slowly must not hold up what others hear.
+            let Ok(events) = history.lock().map(|history| history.copied()) else { return };
+            for (end, json) in events {
+                let _ = query.reply(format!("{key}/{end}"), json).wait();
             }
         }
     };
@@ -221,7 +223,7 @@ mod tests {
     use super::*;
 
     fn ends(history: &History) -> Vec<String> {
-        history.events().map(|(end, json)| format!("{end} {json}")).collect()
+        history.copied().iter().map(|(end, json)| format!("{end} {json}")).collect()
     }
 
     #[test]

@@ -92,7 +92,7 @@ pub fn export(path: &Path, format: TrafficFormat, to: &Path) -> Result<u64, Reco
     Ok(n_frames)
 }
 
-/// Returns the times, and then zeros: in lock-step there are none.
+/// Returns the times, followed by zeros without end, as a recording in lock-step has no times.
 fn times(times: &[i64]) -> impl Iterator<Item = i64> {
     times.iter().copied().chain(std::iter::repeat(0))
 }

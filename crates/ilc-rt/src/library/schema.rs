@@ -125,7 +125,7 @@ pub(super) fn missing(
 /// Returns the start of a query for runs in a file of this version: columns, in the order of
 /// [`COLUMNS`] and of the figures, then the arrays if wanted, and the tables.
 ///
-/// What an older file lacks is NULL. The table of runs is `iteration` in the conditions that follow.
+/// Columns that an older file lacks are NULL. The table of runs is `iteration` in the conditions that follow.
 pub(super) fn query(
     connection: &Connection,
     version: i64,
