@@ -16,7 +16,7 @@ SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o
            Cargo.toml Cargo.lock pyproject.toml README.md
 # Half of the Python tests wait for a process or for time to pass. A file with costly fixtures of its own
 # is kept together by the mark xdist_group.
-JOBS    := $(shell expr 2 \* $$(nproc))
+JOBS    := $(shell expr 3 \* $$(nproc))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 .DEFAULT_GOAL := help
@@ -115,10 +115,11 @@ lint: $(VENV)/.test docs underived ## Formatting, lints, types, layers, language
 	$(BIN)/lint-imports
 	$(BIN)/python tests/lint/language.py
 
-docs: $(VENV)/.docs ## The documentation site in build/docs, with warnings denied
+docs: $(VENV)/.test $(VENV)/.docs ## The documentation site in build/docs, with warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
 	$(BIN)/python -m sphinx --quiet -E --fail-on-warning --keep-going -d build/doctrees -c docs . build/docs
 	rm -rf build/docs/rust
+	$(BIN)/python -m pytest -q tests/site
 	cp -r $(TARGET)/doc build/docs/rust
 
 bench: $(VENV)/.bench ## Speed, as ratios; writes docs/benchmarks.md

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import stat
-import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
+from warm_fixture import ilc, warm  # noqa: F401, they are fixtures
 
 from ilc_rt import Campaign, controllers, processes
 
@@ -65,24 +65,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> CampaignResult:
     campaign = Campaign(GANTRY, library=library, bus="loopback:")
     assert len(list(campaign.run(3))) == 3
     return campaign.result
-
-
-@pytest.fixture
-def ilc(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Return a function that runs `ilc` as a process in an empty folder."""
-
-    def run(*arguments: str | Path, timeout_s: float = 120.0) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "ilc_rt.cli", *map(str, arguments)],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=timeout_s,
-            check=False,
-            env={**os.environ, "COLUMNS": "120"},
-        )
-
-    return run
 
 
 @pytest.fixture

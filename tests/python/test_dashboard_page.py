@@ -156,7 +156,8 @@ def test_runs_of_two_campaigns_are_compared_on_one_cursor(watched: Watched) -> N
     page = watched.page("/library")
     for key in ("0-1", "0-2"):
         page.check(f'[data-run="{key}"]')
-    wait_for(page, "ilc.option('compare-error')?.series.length === 2")
+    for chart in ("compare-error", "compare-input"):
+        wait_for(page, f"ilc.option('{chart}')?.series.length === 2")
     legend = page.evaluate("ilc.option('compare-input').series.map(s => s.name)")
     assert legend[0].endswith("run 0")
     assert legend[1].endswith("run 1")

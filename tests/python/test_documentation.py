@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from postgres_fixture import Server
+    from warm_fixture import Warm
 
     from ilc_rt import CampaignResult
 
@@ -108,23 +109,24 @@ def folder(tmp_path: Path, finished: CampaignResult) -> Path:
     return tmp_path
 
 
-def environment() -> dict[str, str]:
-    """Return a reader's environment: the programs are on the path."""
-    return {**os.environ, "PATH": f"{program('ilc-rt').parent}:{os.environ['PATH']}"}
+@pytest.fixture(autouse=True)
+def path(
+    tmp_path_factory: pytest.TempPathFactory, warm: Warm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Put the programs on the path, as they are on a reader's."""
+    folder = tmp_path_factory.mktemp("bin")
+    for name, words in (("ilc", warm.shell_words()), ("python", [sys.executable])):
+        (folder / name).write_text(f'#!/bin/sh\nexec {shlex.join(words)} "$@"\n')
+        (folder / name).chmod(0o755)
+    folders = [str(folder), str(program("ilc-rt").parent), os.environ["PATH"]]
+    monkeypatch.setenv("PATH", ":".join(folders))
 
 
 def run(text: str, folder: Path) -> str:
     """Run a line in a shell, and return its output; it must succeed."""
-    for name in ("ilc", "python"):
-        text = re.sub(
-            rf"^{name} ",
-            f"{shlex.join(launcher(name) if name == 'ilc' else [sys.executable])} ",
-            text,
-        )
     done = subprocess.run(
-        ["bash", "-c", text], cwd=folder, env=environment(), capture_output=True, text=True,
-        timeout=280, check=False,
-    )  # fmt: skip
+        ["bash", "-c", text], cwd=folder, capture_output=True, text=True, timeout=280, check=False
+    )
     assert done.returncode == 0, f"{text}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 

@@ -68,6 +68,12 @@ pub fn short(name: &str) -> Cell {
     Cell::parse(&text, name).expect("the shortened example is valid")
 }
 
+/// Lets a cell that runs by the clock wait for this computer: a stall of some seconds is no stop.
+pub fn patient(mut cell: Cell) -> Cell {
+    cell.safety.overrun_cycles_max = 5000;
+    cell
+}
+
 /// A temporary folder, deleted when dropped.
 #[derive(Debug)]
 pub struct Scratch(PathBuf);

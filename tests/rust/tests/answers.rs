@@ -15,7 +15,7 @@ use ilc_rt::record::{EndStatus, IterationRecord};
 use ilc_rt::servo::{PhaseName, Sample, StopReason};
 use ilc_tests::campaign::options;
 use ilc_tests::rig::{Distort, Rig, Tap, node, write_object};
-use ilc_tests::{Scratch, short};
+use ilc_tests::{Scratch, patient, short};
 
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 const X: u8 = 1;
@@ -307,7 +307,7 @@ fn a_drive_that_switched_itself_off_is_not_switched_on_again_by_a_stop() {
 
 /// Runs of a real-time campaign on a line disturbed by `distort` in run 0.
 fn disturbed(name: &str, distort: Distort) -> Vec<IterationRecord> {
-    let cell = short(name);
+    let cell = patient(short(name));
     let scratch = Scratch::new();
     let tap = Tap::new(&cell);
     tap.line().distort(distort);

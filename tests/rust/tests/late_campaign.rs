@@ -10,7 +10,7 @@ use ilc_rt::fieldbus::{Bus, BusError, Frame};
 use ilc_rt::record::{EndStatus, Event, FaultKind, FlightRecord, LateCause, LateCycle};
 use ilc_tests::campaign::options;
 use ilc_tests::rig::{Tap, node};
-use ilc_tests::{Scratch, short};
+use ilc_tests::{Scratch, patient, short};
 
 /// A bus to the simulated machine on which a node falls silent after some SYNCs.
 struct Muting {
@@ -48,7 +48,7 @@ fn campaign(cell: &Cell, bus: Box<dyn Bus>) -> (EndStatus, Vec<Event>, FlightRec
 
 #[test]
 fn a_fault_of_a_campaign_names_the_node_that_was_silent() {
-    let mut cell = short("01_gantry.toml");
+    let mut cell = patient(short("01_gantry.toml"));
     cell.safety.silent_cycles_max = 100;
     let muting = Muting { tap: Tap::new(&cell), n_syncs: 300 };
     let (status, events, record) = campaign(&cell, Box::new(muting));
@@ -72,9 +72,9 @@ fn a_fault_of_a_campaign_names_the_node_that_was_silent() {
 
 #[test]
 fn a_campaign_tells_each_late_cycle_once_and_keeps_the_worst() {
-    let mut cell = short("01_gantry.toml");
+    let mut cell = patient(short("01_gantry.toml"));
     // Every cycle of it is late: none is done in a twentieth of nothing.
-    (cell.realtime.late_share, cell.safety.overrun_cycles_max) = (0.05, 10_000);
+    cell.realtime.late_share = 0.05;
     cell.safety.silent_cycles_max = 1000;
     cell.cell.cycle_us = 500;
     let busy = Busy { tap: Tap::new(&cell) };

@@ -23,7 +23,7 @@ use ilc_tests::campaign::{in_process, machine, options, run, run_on};
 use ilc_tests::far_side::FarSide;
 use ilc_tests::faulty::{Faults, FaultyBus, Way};
 use ilc_tests::rig::{Rig, node};
-use ilc_tests::{Scratch, short};
+use ilc_tests::{Scratch, patient, short};
 
 const CELLS: [&str; 2] = ["01_gantry.toml", "02_parallel.toml"];
 const RUNS: u32 = 3;
@@ -252,9 +252,8 @@ fn sentences(kind: &str) -> &'static [&'static str] {
 fn a_real_udp_bus_with_faults_counts_them_or_stops_with_the_right_sentence() {
     let mut held = Vec::new();
     for (kind, faults) in kinds(0.005) {
-        let mut cell = short(CELLS[0]);
         // Simulated time advances with SYNC: a busy computer only pauses the motion.
-        cell.safety.overrun_cycles_max = 5000;
+        let mut cell = patient(short(CELLS[0]));
         cell.safety.answer_timeout_s = 20.0;
         let address = free_address(&mut held, 95);
         let far = UdpMulticast::open(

@@ -19,7 +19,7 @@ use ilc_rt::recording::{Item, Reader};
 use ilc_tests::campaign::{in_process, machine, options};
 use ilc_tests::catalogue::every_cell;
 use ilc_tests::far_side::FarSide;
-use ilc_tests::{Scratch, example, example_path, short};
+use ilc_tests::{Scratch, example, example_path, patient, short};
 
 mod changed;
 
@@ -96,7 +96,7 @@ fn a_part_program_is_carried_along() {
 
 #[test]
 fn a_recording_in_real_time_replays() {
-    let cell = short("01_gantry.toml");
+    let cell = patient(short("01_gantry.toml"));
     let folder = Scratch::new();
     let path = folder.file("realtime.mcap");
     let mut options = options(folder.file("library.db"), 3);
@@ -116,7 +116,7 @@ fn a_recording_in_real_time_replays() {
 
 #[test]
 fn a_recording_of_a_stop_in_real_time_replays() {
-    let cell = short("01_gantry.toml");
+    let cell = patient(short("01_gantry.toml"));
     let folder = Scratch::new();
     let path = folder.file("stopped.mcap");
     let mut options = options(folder.file("library.db"), 100);
@@ -251,7 +251,7 @@ fn a_recording_that_grows_too_large_ends_and_the_runs_go_on() {
 
 #[test]
 fn the_late_cycles_of_a_recording_are_those_of_the_flight_recorder() {
-    let cell = short("01_gantry.toml");
+    let cell = patient(short("01_gantry.toml"));
     let folder = Scratch::new();
     let path = folder.file("realtime.mcap");
     let mut options = options(folder.file("library.db"), 1);
