@@ -19,6 +19,9 @@ SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o
 JOBS    := $(shell expr 3 \* $$(nproc))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
+# Every worker of pytest would compile every test anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help build derived underived demo gallery test test-rust test-python fuzz soak check fmt lint docs bench rt rt-page deb vcan clean
 

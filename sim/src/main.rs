@@ -55,7 +55,8 @@ enum Verb {
         /// Let time pass by SYNC only, one cycle each, instead of by the wall clock.
         #[arg(long)]
         lockstep: bool,
-        /// Take the power from a node after some time; may be given more than once.
+        /// Take the power from a node some seconds after the first SYNC, in the plant's time; may be given
+        /// more than once.
         #[arg(long, value_name = "NODE@SECONDS")]
         mute: Vec<Mute>,
         /// Silence on the bus, in seconds, after which SYNC counts as lost and the drives' time goes on

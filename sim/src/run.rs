@@ -27,7 +27,7 @@ const PRIORITY: i32 = 70;
 pub(crate) struct Mute {
     /// Node.
     pub(crate) node: NodeId,
-    /// Time since the start.
+    /// Time of the plant since the first SYNC: a controller that starts late is not early to notice.
     pub(crate) after: Duration,
 }
 
@@ -156,7 +156,7 @@ pub(crate) fn run(
             .map_err(RunError::Thread)?;
     }
     let mut orphan = Orphan::default();
-    let mut n_syncs = 0_u64;
+    let (mut n_syncs, mut first_sync_us) = (0_u64, None);
     print(&ready(cell, address, clock));
     machine.boot(&mut |frame| outlet.send(frame));
     while !stop.load(Ordering::Relaxed) {
@@ -177,12 +177,15 @@ pub(crate) fn run(
             machine.advance(n_steps, &mut |frame| outlet.send(frame));
         }
         if let Some(frame) = received {
-            n_syncs += u64::from(sync::is_sync(&frame));
+            if sync::is_sync(&frame) {
+                n_syncs += 1;
+                first_sync_us.get_or_insert(machine.time_us());
+            }
             machine.receive(&frame, &mut |frame| outlet.send(frame));
         }
-        let elapsed = start.elapsed();
+        let since_us = first_sync_us.map_or(0, |first_us| machine.time_us() - first_us);
         mutes.retain(|mute| {
-            let is_due = elapsed >= mute.after;
+            let is_due = first_sync_us.is_some() && Duration::from_micros(since_us) >= mute.after;
             if is_due {
                 machine.mute(mute.node);
             }
@@ -191,7 +194,7 @@ pub(crate) fn run(
         while let Some(event) = machine.take_event() {
             print(&event.to_string());
         }
-        if is_orphan.load(Ordering::Relaxed) && orphan.is_over(elapsed, machine.is_energised()) {
+        if is_orphan.load(Ordering::Relaxed) && orphan.is_over(start.elapsed(), machine.is_energised()) {
             break;
         }
         if let Some(error) = outlet.broken {

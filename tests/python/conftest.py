@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
-from warm_fixture import ilc, warm  # noqa: F401, they are fixtures
+from warm_fixture import Warm, ilc, warm  # noqa: F401, they are fixtures
 
 from ilc_rt import Campaign, controllers, processes
 
@@ -34,12 +34,17 @@ settings.load_profile("fuzz" if "ILC_FUZZ_SEED" in os.environ else "fixed")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-def pytest_sessionstart() -> None:
+def pytest_sessionstart(session: pytest.Session) -> None:
     """Restore the signal handlers that a background job or nohup inherits as ignored."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    if session.config.getoption("numprocesses", None):
+        # The workers share one, whose start takes as long as that of four commands.
+        server = Warm()
+        os.environ[Warm.VARIABLE] = server.socket
+        session.config.add_cleanup(server.close)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

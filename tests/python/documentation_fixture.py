@@ -14,11 +14,15 @@ import sys
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from processes_fixture import program
 from typer.main import get_command
 
 from ilc_rt.cli import application
+
+if TYPE_CHECKING:
+    import click
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("docs/theory/*.md")])
@@ -127,12 +131,18 @@ def launcher(name: str) -> list[str]:
 
 
 @cache
+def program_tree() -> click.Command:
+    """Return `ilc` with all its verbs."""
+    return get_command(application())
+
+
+@cache
 def help_of(name: str, *verb: str) -> str:
     """Return the help text of a program or a verb; for `ilc`, also its parts."""
     if name != "ilc":
         argv = [*launcher(name), *verb, "--help"]
         return subprocess.run(argv, capture_output=True, text=True, check=True, timeout=60).stdout
-    command = get_command(application())
+    command = program_tree()
     for word in verb:
         command = getattr(command, "commands")[word]  # noqa: B009
     options = [word for parameter in command.params for word in parameter.opts]
@@ -144,7 +154,7 @@ def verbs_of(name: str) -> list[list[str]]:
     """Return every verb of a program, including nested ones."""
     if name == "ilc":
         found: list[list[str]] = []
-        open_ones = [([], get_command(application()))]
+        open_ones = [([], program_tree())]
         while open_ones:
             verb, command = open_ones.pop(0)
             found.append(verb)

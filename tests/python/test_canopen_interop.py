@@ -191,10 +191,12 @@ def test_heartbeat_of_the_controller_is_watched(eds: Path) -> None:
 
 
 def test_drive_that_loses_power_goes_silent(eds: Path) -> None:
-    with running("--mute", "2@3.0") as (sim, network):
+    with running("--mute", "2@0.2") as (sim, network):
         node = attach(network, 2, eds)
         node.sdo[0x1017].raw = 20
-        node.nmt.wait_for_heartbeat(timeout=1.0)
+        node.nmt.wait_for_heartbeat(timeout=PATIENCE_S)
+        # The time until it loses power begins.
+        network.sync.transmit()
         sim.wait_line("node 2: lost power")
         # Frames in flight have arrived by then; 25 periods later there must be no more.
         with contextlib.suppress(canopen.nmt.NmtError):

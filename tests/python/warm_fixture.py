@@ -24,9 +24,17 @@ SERVER = str(Path(warm_server.__file__))
 
 
 class Warm:
-    """A server of its own for one process of pytest, and the commands that it runs."""
+    """A server, its own or that of whom it inherits the variable, and the commands that it runs."""
+
+    VARIABLE = "ILC_TEST_WARM"
 
     def __init__(self) -> None:
+        self.socket = os.environ.get(self.VARIABLE, "")
+        self._server = None
+        if not self.socket:
+            self._start()
+
+    def _start(self) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="warm-")
         self.socket = f"{self._folder.name}/socket"
         self._server = subprocess.Popen(
@@ -53,9 +61,10 @@ class Warm:
             return subprocess.CompletedProcess(["ilc", *words], code, out.read(), errors.read())
 
     def close(self) -> None:
-        """End the server; commands that still run go on."""
-        self._server.communicate()
-        self._folder.cleanup()
+        """End an own server; commands that still run go on."""
+        if self._server is not None:
+            self._server.communicate()
+            self._folder.cleanup()
 
 
 @pytest.fixture(scope="session")
