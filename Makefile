@@ -16,7 +16,7 @@ SOURCES := $(shell find crates sim python papers -name '*.rs' -o -name '*.py' -o
            Cargo.toml Cargo.lock pyproject.toml README.md
 # Half of the Python tests wait for a process or for time to pass. A file with costly fixtures of its own
 # is kept together by the mark xdist_group.
-JOBS    := $(shell expr 3 \* $$(nproc))
+JOBS    := $(shell expr 2 \* $$(nproc))
 NEXTEST := $(shell cargo nextest --version >/dev/null 2>&1 && echo yes)
 
 # Every worker of pytest would compile every test anew.
