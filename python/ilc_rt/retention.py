@@ -52,8 +52,8 @@ def kept_by(
         kept |= {int(run["id"]) for run in runs[-newest:]}
     if days is not None:
         first = (now or datetime.now(timezone.utc)) - timedelta(days=min(days, 1e6))
-        text = f"{first:%Y-%m-%dT%H:%M:%S}"
-        kept |= {int(run["id"]) for run in runs if str(run["created_utc"]) >= text}
+        text = first.strftime("%Y-%m-%dT%H:%M:%S.") + f"{first.microsecond // 1000:03}Z"
+        kept |= {int(run["id"]) for run in runs if str(run["created_utc"]) > text}
     if best:
         for of in campaigns.values():
             good = [run for run in of if run["phase"] is None and not run["rolled_back"]]

@@ -124,6 +124,10 @@ def test_age_counts_from_now_and_the_newest_run_of_a_campaign_stays() -> None:
     now = datetime(2026, 11, 29, tzinfo=timezone.utc)
     assert kept_by(runs, days=10, now=now) == {19, 21, 28}
     assert kept_by(runs, days=0, now=now) == {19, 28}
+    # To the millisecond: a run of this very second is older than 0 days.
+    soon = datetime(2026, 11, 10, 12, 0, 0, 1000, tzinfo=timezone.utc)
+    assert kept_by(runs[:3], days=0, now=soon) == {19}
+    assert kept_by(runs[:3], days=1e-7, now=soon) == {10, 19}
 
 
 def test_the_space_of_deleted_runs_is_returned(tmp_path: Path) -> None:
