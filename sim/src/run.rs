@@ -194,7 +194,8 @@ pub(crate) fn run(
         while let Some(event) = machine.take_event() {
             print(&event.to_string());
         }
-        if is_orphan.load(Ordering::Relaxed) && orphan.is_over(start.elapsed(), machine.is_energised()) {
+        let elapsed = start.elapsed();
+        if is_orphan.load(Ordering::Relaxed) && orphan.is_over(elapsed, machine.is_energised()) {
             break;
         }
         if let Some(error) = outlet.broken {

@@ -68,20 +68,27 @@ fn does_not_hear_itself((mut a, mut b): Ends) {
 }
 
 fn returns_at_once_without_a_timeout((mut a, _b): Ends) {
-    let start = Instant::now();
-    for _ in 0..1000 {
+    // The quickest: this computer may stall, but whoever waits does so each time.
+    let look = |_| {
+        let start = Instant::now();
         assert_eq!(a.recv(Duration::ZERO).unwrap(), None);
-    }
-    let elapsed = start.elapsed();
-    assert!(elapsed < Duration::from_millis(500), "1000 empty looks took {elapsed:?}");
+        start.elapsed()
+    };
+    let quickest = (0..100).map(look).min().unwrap();
+    assert!(quickest < Duration::from_millis(1), "an empty look took {quickest:?}");
 }
 
 fn waits_as_long_as_asked((mut a, _b): Ends) {
     for asked in [Duration::from_micros(300), Duration::from_millis(40)] {
-        let start = Instant::now();
-        assert_eq!(a.recv(asked).unwrap(), None);
-        let waited = start.elapsed();
-        assert!(waited >= asked && waited < asked + Duration::from_secs(2), "{waited:?}");
+        let wait = |_| {
+            let start = Instant::now();
+            assert_eq!(a.recv(asked).unwrap(), None);
+            let waited = start.elapsed();
+            assert!(waited >= asked, "{waited:?}");
+            waited
+        };
+        let shortest = (0..5).map(wait).min().unwrap();
+        assert!(shortest < asked + Duration::from_millis(500), "{shortest:?}");
     }
 }
 
@@ -133,7 +140,7 @@ fn never_blocks_the_sender((mut a, b): Ends) {
         send(&mut *a, n);
     }
     let elapsed = start.elapsed();
-    assert!(elapsed < Duration::from_secs(5), "11000 frames nobody takes took {elapsed:?}");
+    assert!(elapsed < 3 * PATIENCE, "11000 frames nobody takes took {elapsed:?}");
 }
 
 fn allocates_nothing_in_the_callers_thread((mut a, mut b): Ends) {
